@@ -1,0 +1,98 @@
+"""Named errors. Each fault says where, what was expected, what was found and the likely mistake.
+
+Input is checked once, at the door, and every fault is reported together: collect them in a
+:class:`Faults` and call :meth:`Faults.raise_if_any`.
+
+Examples
+--------
+>>> faults = Faults()
+>>> faults.add("cells.csv row 3, lat", "degrees in -90..90", "4553534.3", "metres given for degrees")
+>>> faults.raise_if_any(InputError)
+Traceback (most recent call last):
+    ...
+mapfilter.errors.InputError: cells.csv row 3, lat: expected degrees in -90..90, found 4553534.3 \
+(likely: metres given for degrees)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+_MAX_SHOWN = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One thing that is wrong with an input.
+
+    Parameters
+    ----------
+    where : str
+        File, row and field, as a user can find it.
+    expected, got : str
+        What the field should hold and what it holds.
+    hint : str
+        The likely mistake, or an empty string.
+    """
+
+    where: str
+    expected: str
+    got: str
+    hint: str = ""
+
+    def __str__(self) -> str:
+        tail = f" (likely: {self.hint})" if self.hint else ""
+        return f"{self.where}: expected {self.expected}, found {self.got}{tail}"
+
+
+class MapfilterError(Exception):
+    """Base of all errors that a user can mend; the command line shows them without a traceback."""
+
+    def __init__(self, faults: tuple[Fault, ...]) -> None:
+        self.faults = faults
+        super().__init__(faults)
+
+    def __str__(self) -> str:
+        lines = [str(fault) for fault in self.faults[:_MAX_SHOWN]]
+        if len(self.faults) > _MAX_SHOWN:
+            lines.append(f"… and {len(self.faults) - _MAX_SHOWN} more faults")
+        return "\n".join(lines)
+
+
+class ConfigError(MapfilterError):
+    """The configuration or the command is wrong."""
+
+
+class InputError(MapfilterError):
+    """An input file or table is missing, damaged or does not make sense."""
+
+
+class StoreError(MapfilterError):
+    """A file that mapfilter wrote is damaged, cut off or of a newer version."""
+
+
+class OutputError(MapfilterError):
+    """The output cannot be written."""
+
+
+@dataclass(slots=True)
+class Faults:
+    """Collects faults, so that all of them are reported together."""
+
+    found: list[Fault] = field(default_factory=list)
+
+    def add(self, where: str, expected: str, got: object, hint: str = "") -> None:
+        """Note one fault."""
+        self.found.append(Fault(where, expected, str(got), hint))
+
+    def raise_if_any(self, kind: type[MapfilterError]) -> None:
+        """Raise ``kind`` with every fault noted so far, or return when there is none."""
+        if self.found:
+            raise kind(tuple(self.found))
+
+
+def fail(
+    kind: type[MapfilterError], where: str, expected: str, got: object, hint: str = ""
+) -> MapfilterError:
+    """Make an error of ``kind`` with a single fault, to be raised by the caller."""
+    return kind((Fault(where, expected, str(got), hint),))

@@ -1,0 +1,282 @@
+"""Coordinate reference systems, the lattice, and the two ways of counting angles.
+
+Positions are east/north metres in a projected CRS. Lattice row 0 is the northern edge; a lattice
+point is a pixel's centre, the lattice's corner is a pixel's corner, as in GDAL. Planners' azimuths
+are compass degrees clockwise from *true* north; headings are radians counter-clockwise from *grid*
+east. The angle between true and grid north is the grid convergence.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pyproj import CRS, Transformer
+from pyproj.exceptions import CRSError, ProjError
+
+from mapfilter.errors import Faults, InputError, fail
+
+Floats = NDArray[np.float64]
+
+
+def wrap_rad(angle_rad: ArrayLike) -> Floats:
+    """Wrap angles into [-π, π).
+
+    Examples
+    --------
+    >>> wrap_rad([3.5, -3.5, 0.25]).round(4).tolist()
+    [-2.7832, 2.7832, 0.25]
+    """
+    angle = np.asarray(angle_rad, dtype=np.float64)
+    # np.mod may round up to 2π itself for tiny negative arguments.
+    wrapped = np.mod(angle + np.pi, 2 * np.pi) - np.pi
+    return np.where(wrapped >= np.pi, -np.pi, wrapped)
+
+
+def heading_from_azimuth_rad(azimuth_deg: ArrayLike, convergence_rad: ArrayLike = 0.0) -> Floats:
+    """Turn compass azimuths (degrees clockwise from true north) into headings.
+
+    Headings are radians counter-clockwise from grid east, in [-π, π). ``convergence_rad`` is the
+    clockwise angle from true north to grid north at the place.
+
+    Examples
+    --------
+    >>> np.degrees(heading_from_azimuth_rad([0.0, 90.0, 180.0])).tolist()
+    [90.0, 0.0, -90.0]
+    """
+    azimuth_rad = np.radians(np.asarray(azimuth_deg, dtype=np.float64))
+    return wrap_rad(np.pi / 2 - azimuth_rad + np.asarray(convergence_rad, dtype=np.float64))
+
+
+def azimuth_from_heading_deg(heading_rad: ArrayLike, convergence_rad: ArrayLike = 0.0) -> Floats:
+    """Turn headings into compass azimuths in [0, 360); the inverse of the function above.
+
+    Examples
+    --------
+    >>> azimuth_from_heading_deg(0.0).item()
+    90.0
+    """
+    heading = np.asarray(heading_rad, dtype=np.float64)
+    azimuth = np.degrees(np.pi / 2 - heading + np.asarray(convergence_rad, dtype=np.float64))
+    wrapped = np.mod(azimuth, 360.0)
+    return np.where(wrapped >= 360.0, 0.0, wrapped)
+
+
+def grid_convergence_rad(crs: str, lon_deg: float, lat_deg: float) -> float:
+    """Return the clockwise angle from true north to grid north of ``crs`` at a place."""
+    factors = _projection(crs).get_factors(lon_deg, lat_deg)
+    return float(np.radians(factors.meridian_convergence))
+
+
+def projected_crs(spec: Any, where: str = "crs") -> str:
+    """Return the canonical text of a projected CRS in metres ("EPSG:32629", else WKT).
+
+    Raises
+    ------
+    InputError
+        There is no CRS, nobody knows it, it is geographic, or its unit is not the metre.
+    """
+    if spec is None or spec == "":
+        raise fail(InputError, where, "a projected CRS in metres", "none", "CRS left out on export")
+    try:
+        crs = CRS.from_user_input(spec)
+    except (CRSError, TypeError, ValueError) as error:
+        raise fail(InputError, where, "a CRS such as EPSG:32629", repr(spec)) from error
+    if crs.is_geographic:
+        raise fail(
+            InputError, where, "a projected CRS in metres", crs.name, "degrees given for metres"
+        )
+    horizontal = crs.axis_info[:2]
+    if not crs.is_projected or any(axis.unit_name not in ("metre", "meter") for axis in horizontal):
+        units = ", ".join(axis.unit_name for axis in horizontal) or "no unit"
+        raise fail(InputError, where, "a projected CRS in metres", f"{crs.name} ({units})")
+    authority = crs.to_authority(min_confidence=100)
+    return f"{authority[0]}:{authority[1]}" if authority else str(crs.to_wkt())
+
+
+def same_crs(a: str, b: str) -> bool:
+    """Tell whether two CRS texts mean the same system."""
+    return a == b or bool(CRS.from_user_input(a).equals(CRS.from_user_input(b)))
+
+
+def utm_crs(lon_deg: float, lat_deg: float) -> str:
+    """Return the WGS 84 / UTM zone of a place.
+
+    Examples
+    --------
+    >>> utm_crs(-8.6, 41.1), utm_crs(24.9, 60.2), utm_crs(18.4, -33.9)
+    ('EPSG:32629', 'EPSG:32635', 'EPSG:32734')
+    """
+    zone = int(np.clip((lon_deg + 180.0) // 6.0 + 1, 1, 60))
+    return f"EPSG:{(32600 if lat_deg >= 0 else 32700) + zone}"
+
+
+def project(crs: str, lon_deg: ArrayLike, lat_deg: ArrayLike) -> tuple[Floats, Floats]:
+    """Turn longitudes and latitudes (WGS 84, degrees) into east and north metres."""
+    east, north = _from_lonlat(crs).transform(np.asarray(lon_deg), np.asarray(lat_deg))
+    return np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64)
+
+
+def unproject(crs: str, east_m: ArrayLike, north_m: ArrayLike) -> tuple[Floats, Floats]:
+    """Turn east and north metres into longitudes and latitudes (WGS 84, degrees)."""
+    lon, lat = _from_lonlat(crs).transform(
+        np.asarray(east_m), np.asarray(north_m), direction="INVERSE"
+    )
+    return np.asarray(lon, dtype=np.float64), np.asarray(lat, dtype=np.float64)
+
+
+def check_bbox(bbox: tuple[float, float, float, float], where: str = "bbox") -> None:
+    """Check a box given as west, south, east, north in degrees.
+
+    Raises
+    ------
+    InputError
+        With every fault and its likely mistake.
+    """
+    west, south, east, north = bbox
+    faults = Faults()
+    if not all(np.isfinite(bbox)):
+        faults.add(where, "four finite numbers", bbox)
+    elif max(abs(west), abs(east)) > 180 or max(abs(south), abs(north)) > 180:
+        faults.add(where, "degrees: west, south, east, north", bbox, "metres given for degrees")
+    elif max(abs(south), abs(north)) > 90:
+        faults.add(where, "latitudes in -90..90", bbox, "longitude and latitude swapped")
+    elif west >= east or south >= north:
+        faults.add(where, "west < east and south < north", bbox, "corners swapped")
+    faults.raise_if_any(InputError)
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """A regular grid of square pixels in a projected CRS.
+
+    Parameters
+    ----------
+    crs : str
+        Projected, in metres, as :func:`projected_crs` returns it.
+    west_m, north_m : float
+        Outer corner of pixel (0, 0).
+    resolution_m : float
+        Side of a pixel.
+    rows, cols : int
+        Size; row 0 is the northern edge.
+
+    Examples
+    --------
+    >>> lattice = Lattice("EPSG:32629", 500000.0, 4500010.0, 5.0, 2, 3)
+    >>> lattice.east_north(0, 0)
+    (500002.5, 4500007.5)
+    >>> lattice.row_col(500002.5, 4500007.5)
+    (0, 0)
+    """
+
+    crs: str
+    west_m: float
+    north_m: float
+    resolution_m: float
+    rows: int
+    cols: int
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        if not np.isfinite([self.west_m, self.north_m]).all():
+            faults.add("lattice corner", "finite metres", (self.west_m, self.north_m))
+        if not (np.isfinite(self.resolution_m) and self.resolution_m > 0):
+            faults.add("lattice resolution", "metres > 0", self.resolution_m)
+        if self.rows < 1 or self.cols < 1:
+            faults.add("lattice size", "at least one pixel", f"{self.rows} x {self.cols}")
+        faults.raise_if_any(InputError)
+
+    @classmethod
+    def covering(
+        cls, crs: str, bounds_m: tuple[float, float, float, float], resolution_m: float
+    ) -> Lattice:
+        """Return the lattice over west, south, east, north (m), snapped out to the resolution."""
+        west, south, east, north = bounds_m
+        first_col, last_col = np.floor(west / resolution_m), np.ceil(east / resolution_m)
+        first_row, last_row = np.floor(south / resolution_m), np.ceil(north / resolution_m)
+        return cls(
+            crs,
+            float(first_col * resolution_m),
+            float(last_row * resolution_m),
+            float(resolution_m),
+            int(last_row - first_row),
+            int(last_col - first_col),
+        )
+
+    @property
+    def bounds_m(self) -> tuple[float, float, float, float]:
+        """West, south, east, north of the outer edges."""
+        return (
+            self.west_m,
+            self.north_m - self.rows * self.resolution_m,
+            self.west_m + self.cols * self.resolution_m,
+            self.north_m,
+        )
+
+    @property
+    def gdal_transform(self) -> tuple[float, float, float, float, float, float]:
+        """Six numbers in GDAL's order: west, pixel width, 0, north, 0, -pixel height."""
+        return (self.west_m, self.resolution_m, 0.0, self.north_m, 0.0, -self.resolution_m)
+
+    def east_north(self, row: Any, col: Any) -> Any:
+        """Return the centres of pixels as (east_m, north_m), scalars or arrays."""
+        return (
+            self.west_m + (col + 0.5) * self.resolution_m,
+            self.north_m - (row + 0.5) * self.resolution_m,
+        )
+
+    def row_col(self, east_m: Any, north_m: Any) -> Any:
+        """Return the pixels that hold positions as integer (row, col); they may lie outside."""
+        row = np.floor((self.north_m - np.asarray(north_m)) / self.resolution_m).astype(np.int64)
+        col = np.floor((np.asarray(east_m) - self.west_m) / self.resolution_m).astype(np.int64)
+        return (int(row), int(col)) if row.ndim == 0 else (row, col)
+
+    def contains(self, row: Any, col: Any) -> Any:
+        """Tell which pixels lie on the lattice."""
+        return (row >= 0) & (row < self.rows) & (col >= 0) & (col < self.cols)
+
+    def window(self, row: int, col: int, rows: int, cols: int) -> Lattice:
+        """Return the part of this lattice that starts at (row, col), clipped to it."""
+        rows, cols = min(rows, self.rows - row), min(cols, self.cols - col)
+        west = self.west_m + col * self.resolution_m
+        north = self.north_m - row * self.resolution_m
+        return Lattice(self.crs, west, north, self.resolution_m, rows, cols)
+
+    def tiles(self, size_px: int) -> list[tuple[int, int, int, int]]:
+        """Return (row, col, rows, cols) of square tiles that cover the lattice, row by row."""
+        return [
+            (row, col, min(size_px, self.rows - row), min(size_px, self.cols - col))
+            for row in range(0, self.rows, size_px)
+            for col in range(0, self.cols, size_px)
+        ]
+
+    def aligned_with(self, other: Lattice) -> bool:
+        """Tell whether both are the same lattice to within a thousandth of a pixel."""
+        tolerance_m = 1e-3 * self.resolution_m
+        return (
+            (self.rows, self.cols) == (other.rows, other.cols)
+            and abs(self.resolution_m - other.resolution_m) * max(self.rows, self.cols)
+            <= tolerance_m
+            and abs(self.west_m - other.west_m) <= tolerance_m
+            and abs(self.north_m - other.north_m) <= tolerance_m
+            and same_crs(self.crs, other.crs)
+        )
+
+
+@lru_cache(maxsize=16)
+def _from_lonlat(crs: str) -> Transformer:
+    try:
+        return Transformer.from_crs("EPSG:4326", crs, always_xy=True)
+    except (CRSError, ProjError) as error:
+        raise fail(InputError, "crs", "a CRS such as EPSG:32629", repr(crs)) from error
+
+
+@lru_cache(maxsize=16)
+def _projection(crs: str) -> Any:
+    from pyproj import Proj
+
+    return Proj(CRS.from_user_input(crs))
