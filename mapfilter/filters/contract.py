@@ -1,0 +1,125 @@
+"""The one contract of all filters: state in, state out, news in ``info``.
+
+A filter is a frozen object with four functions. ``predict`` and ``update`` are apart, because
+inertial data, radio reports and GNSS fixes tick at different rates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+PriorT = TypeVar("PriorT", contravariant=True)
+BeliefT = TypeVar("BeliefT")
+ReadingT = TypeVar("ReadingT", contravariant=True)
+
+
+class Status(StrEnum):
+    """What a filter says about itself at an epoch.
+
+    ``SEARCHING`` → ``CONVERGED`` (the first epoch at which the switch rule holds) → ``TRACKING``;
+    ``LOST`` when the evidence says that the belief is wrong.
+    """
+
+    SEARCHING = "SEARCHING"
+    CONVERGED = "CONVERGED"
+    TRACKING = "TRACKING"
+    LOST = "LOST"
+
+
+class Reason(StrEnum):
+    """Why a reading was not used; ``USED`` when it was."""
+
+    USED = "used"
+    NOT_MOVED_ENOUGH = "not_moved_enough"
+    NO_SERVING_CELL = "no_serving_cell"
+    UNKNOWN_CELL = "unknown_cell"
+    NO_POINTS_IN_CELL = "no_points_in_cell"
+    NO_CANDIDATES_LEFT = "no_candidates_left"
+    NO_HEADING = "no_heading"
+    NO_STEP = "no_step"
+    NOT_USED_BY_FILTER = "not_used_by_filter"
+
+
+@dataclass(frozen=True, slots=True)
+class MotionStep:
+    """Dead reckoning over one interval.
+
+    Parameters
+    ----------
+    step_m : float
+        Distance moved, a_{t-1} = (trans, θ) of the paper.
+    heading_rad : float
+        Direction moved, counter-clockwise from grid east; NaN when there is no compass.
+    turn_rad : float
+        Change of heading over the interval; NaN when there is no gyroscope.
+    """
+
+    step_m: float
+    heading_rad: float
+    turn_rad: float = float("nan")
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """What a belief says about the position; NaN where the filter does not say it.
+
+    Parameters
+    ----------
+    east_m, north_m : float
+        Mean position.
+    covariance_m2 : (2, 2) array
+        East, north.
+    radii_m : (3,) array
+        Radii about the mean that hold 50, 67 and 95 % of the belief.
+    """
+
+    east_m: float
+    north_m: float
+    covariance_m2: Floats
+    radii_m: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class UpdateInfo:
+    """News of one update.
+
+    Parameters
+    ----------
+    reason : Reason
+        ``USED``, or why the reading was left alone.
+    status : Status
+        The filter's status after it.
+    hypotheses : int
+        How many position hypotheses the belief still holds.
+    """
+
+    reason: Reason
+    status: Status
+    hypotheses: int
+
+
+class Filter(Protocol[PriorT, BeliefT, ReadingT]):
+    """What every filter offers. All functions are pure: beliefs are never changed in place."""
+
+    def init(self, prior: PriorT, rng: np.random.Generator) -> BeliefT:
+        """Return the first belief."""
+
+    def predict(
+        self, belief: BeliefT, motion: MotionStep, rng: np.random.Generator
+    ) -> tuple[BeliefT, Reason]:
+        """Move the belief by one interval of dead reckoning; say why if it could not be used."""
+
+    def update(
+        self, belief: BeliefT, reading: ReadingT, rng: np.random.Generator
+    ) -> tuple[BeliefT, UpdateInfo]:
+        """Weigh the belief with one reading."""
+
+    def locate(self, belief: BeliefT) -> Estimate:
+        """Say where the belief is."""
