@@ -1,1 +1,1 @@
-
+"""Tracks: what one journey recorded, its files, and dead reckoning."""

@@ -1,0 +1,130 @@
+"""The track log: what one journey recorded, as four tables of events.
+
+Missing values stay missing: nothing is dropped because one of its fields is unknown. Rows out of
+order are sorted and exact duplicates dropped, and the log's notes tell of both. Rows of equal time
+are processed in the order :data:`mapfilter.tracks.schema.EVENT_ORDER`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from mapfilter.errors import Faults, InputError
+from mapfilter.geodesy import projected_crs
+from mapfilter.tracks.schema import TABLES
+from mapfilter.tracks.tidy import tidy_table
+
+
+@dataclass(frozen=True, eq=False)
+class TrackLog:
+    """What one journey recorded; made by :func:`make_log`, which checks everything.
+
+    Parameters
+    ----------
+    crs : str
+        Projected CRS of all positions, as :func:`mapfilter.geodesy.projected_crs` returns it.
+    start_utc_s : float
+        UTC seconds (Unix time) at which ``time_s`` is zero.
+    motion : pandas.DataFrame
+        time_s, step_m, heading_rad, turn_rad: the interval that *ends* at time_s and begins at the
+        previous row. Headings are radians counter-clockwise from grid east in [-π, π); NaN where
+        unknown.
+    radio : pandas.DataFrame
+        time_s, role ("serving" or "neighbour"), cell (str or None), arfcn, bsic (nullable
+        integers), level_dbm, censored (-1 below the scale, 0 inside, 1 above), timing_advance
+        (nullable): one row for each cell heard.
+    gnss : pandas.DataFrame
+        time_s, east_m, north_m, var_east_m2, var_north_m2, cov_east_north_m2.
+    truth : pandas.DataFrame
+        time_s, east_m, north_m, way_id (nullable integer).
+    notes : tuple of str
+        What was sorted, dropped and ignored.
+    """
+
+    crs: str
+    start_utc_s: float
+    motion: pd.DataFrame
+    radio: pd.DataFrame
+    gnss: pd.DataFrame
+    truth: pd.DataFrame
+    notes: tuple[str, ...] = ()
+
+    @property
+    def duration_s(self) -> float:
+        """Seconds from the first to the last row of any table; 0 for an empty log."""
+        times = np.concatenate([getattr(self, name)["time_s"].to_numpy() for name in TABLES])
+        return float(np.ptp(times)) if len(times) else 0.0
+
+    @property
+    def truth_length_m(self) -> float:
+        """Length of the true path, metres; 0 where the truth is unknown."""
+        east, north = self.truth["east_m"].to_numpy(), self.truth["north_m"].to_numpy()
+        return float(np.sum(np.hypot(np.diff(east), np.diff(north))))
+
+
+def make_log(
+    crs: Any,
+    *,
+    motion: pd.DataFrame | None = None,
+    radio: pd.DataFrame | None = None,
+    gnss: pd.DataFrame | None = None,
+    truth: pd.DataFrame | None = None,
+    start_utc_s: float = 0.0,
+    notes: Sequence[str] = (),
+    names: Mapping[str, str] | None = None,
+) -> TrackLog:
+    """Check four tables and make them a log.
+
+    Parameters
+    ----------
+    crs : str
+        Projected CRS in metres, in any form that pyproj knows.
+    motion, radio, gnss, truth : pandas.DataFrame, optional
+        With the columns of :class:`TrackLog`; only ``time_s``, ``role`` (radio), ``east_m`` and
+        ``north_m`` (gnss, truth) must be there. An absent table is an empty one.
+    start_utc_s : float
+        UTC seconds (Unix time) at which ``time_s`` is zero.
+    notes : sequence of str
+        What is known already of the tables' past.
+    names : mapping, optional
+        From table to the name (such as a file's) by which messages call it.
+
+    Raises
+    ------
+    InputError
+        With every fault: NaN or infinity in times or coordinates, text for numbers, values out of
+        their range, columns missing or misspelt, milliseconds for seconds, degrees for metres or
+        for radians, raw RXLEV for dBm, a CRS that is not projected.
+
+    Examples
+    --------
+    >>> walk = pd.DataFrame({"time_s": [2.0, 1.0, 2.0], "step_m": [1.5, 1.4, 1.5]})
+    >>> log = make_log("EPSG:32629", motion=walk)
+    >>> log.motion["step_m"].tolist(), log.duration_s
+    ([1.4, 1.5], 1.0)
+    >>> print(*log.notes, sep="; ")
+    motion: 1 exact duplicate rows dropped; motion: out of order in 1 places, sorted by time
+    """
+    faults = Faults()
+    try:
+        crs = projected_crs(crs, "log, crs")
+    except InputError as error:
+        faults.found.extend(error.faults)
+    if not np.isfinite(start_utc_s):
+        faults.add("log, start_utc_s", "UTC seconds", start_utc_s)
+    elif abs(start_utc_s) > 1e11:
+        faults.add("log, start_utc_s", "UTC seconds", start_utc_s, "milliseconds for s")
+    given = {"motion": motion, "radio": radio, "gnss": gnss, "truth": truth}
+    tables: dict[str, pd.DataFrame] = {}
+    told = tuple(notes)
+    for table in TABLES:
+        where = (names or {}).get(table, table)
+        tables[table], news = tidy_table(table, given[table], where, faults)
+        told += news
+    faults.raise_if_any(InputError)
+    return TrackLog(str(crs), float(start_utc_s), **tables, notes=told)

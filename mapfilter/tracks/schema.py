@@ -1,0 +1,109 @@
+"""The columns of a track log's four tables: types, units, ranges and likely mistakes.
+
+Every table has ``time_s``, seconds after the log's start. Headings are radians counter-clockwise
+from grid east; positions are metres in the log's projected CRS.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+EVENT_ORDER = ("motion", "gnss", "radio")
+"""The order in which rows of equal time are processed: first move, then measure."""
+
+TABLES = ("motion", "radio", "gnss", "truth")
+"""The tables of a log, in the order in which they are stored."""
+
+SERVING = "serving"
+NEIGHBOUR = "neighbour"
+
+_TURN_RAD = 2 * np.pi + 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column of a table.
+
+    Parameters
+    ----------
+    name : str
+        With its unit.
+    kind : {"number", "integer", "text"}
+        A float64 (missing: NaN), a nullable Int64, or text (missing: None).
+    required : bool
+        Whether the column must be there and hold a value in every row.
+    low, high : float
+        Inclusive range of a value.
+    expected, hint : str
+        What an error message says of a value outside the range.
+    """
+
+    name: str
+    kind: Literal["number", "integer", "text"] = "number"
+    required: bool = False
+    low: float = -np.inf
+    high: float = np.inf
+    expected: str = "a finite number"
+    hint: str = ""
+
+
+_TIME = Column(
+    "time_s", required=True, low=-1e11, high=1e11, expected="seconds", hint="milliseconds for s"
+)
+_EAST = Column("east_m", required=True, low=-1e8, high=1e8, expected="metres east")
+_NORTH = Column("north_m", required=True, low=-1e8, high=1e8, expected="metres north")
+
+SCHEMA: dict[str, tuple[Column, ...]] = {
+    "motion": (
+        _TIME,
+        Column("step_m", low=-1e6, high=1e6, expected="metres"),
+        Column(
+            "heading_rad",
+            low=-_TURN_RAD,
+            high=_TURN_RAD,
+            expected="radians in -2π..2π",
+            hint="degrees given for radians",
+        ),
+        Column(
+            "turn_rad",
+            low=-_TURN_RAD,
+            high=_TURN_RAD,
+            expected="radians in -2π..2π",
+            hint="degrees given for radians",
+        ),
+    ),
+    "radio": (
+        _TIME,
+        Column("role", kind="text", required=True, expected="serving or neighbour"),
+        Column("cell", kind="text", expected="a cell id"),
+        Column("arfcn", kind="integer", low=0, high=3_279_165, expected="a carrier number"),
+        Column("bsic", kind="integer", low=0, high=1007, expected="a BSIC or PCI"),
+        Column(
+            "level_dbm",
+            low=-200,
+            high=0,
+            expected="dBm in -200..0",
+            hint="raw RXLEV given for dBm",
+        ),
+        Column("censored", kind="integer", low=-1, high=1, expected="-1, 0 or 1"),
+        Column("timing_advance", kind="integer", low=0, high=3846, expected="steps >= 0"),
+    ),
+    "gnss": (
+        _TIME,
+        _EAST,
+        _NORTH,
+        Column("var_east_m2", low=0, expected="square metres >= 0"),
+        Column("var_north_m2", low=0, expected="square metres >= 0"),
+        Column("cov_east_north_m2", expected="square metres"),
+    ),
+    "truth": (
+        _TIME,
+        _EAST,
+        _NORTH,
+        Column("way_id", kind="integer", low=-(2.0**63), high=2.0**63, expected="a way's number"),
+    ),
+}
+"""The columns of each table, in the order in which they are stored."""

@@ -1,0 +1,206 @@
+"""Brings one table of a log into shape: checks it, sorts it, counts what was dropped."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mapfilter.errors import Faults
+from mapfilter.geodesy import wrap_rad
+from mapfilter.tracks.schema import NEIGHBOUR, SCHEMA, SERVING, Column
+
+_SHOWN_ROWS = 3
+_LONG_STEP_S = 50.0
+_STANDSTILL_MPS = 0.05
+
+
+def tidy_table(
+    table: str, given: pd.DataFrame | None, where: str, faults: Faults
+) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """Return a table with the columns of the schema, sorted by time, without exact duplicates.
+
+    Parameters
+    ----------
+    table : {"motion", "radio", "gnss", "truth"}
+        Which table it is.
+    given : pandas.DataFrame or None
+        As read or made; None is an empty table. Values may be text, as from CSV.
+    where : str
+        The file's or table's name for messages. Row 1 is the first row of data.
+    faults : Faults
+        Collects what is wrong; the table returned then serves only to find further faults.
+
+    Returns
+    -------
+    table : pandas.DataFrame
+    notes : tuple of str
+        What was ignored, sorted or dropped.
+    """
+    if given is None:
+        given = pd.DataFrame({column.name: [] for column in SCHEMA[table]})
+    given = given.reset_index(drop=True)
+    notes = _check_columns(table, given, where, faults)
+    tidy = pd.DataFrame(
+        {column.name: _column(column, given, where, faults) for column in SCHEMA[table]}
+    )
+    if table == "radio":
+        _check_roles(tidy["role"], where, faults)
+        tidy["censored"] = tidy["censored"].fillna(0)
+    if table == "gnss":
+        _check_covariance(tidy, where, faults)
+    if table == "motion":
+        tidy["heading_rad"] = wrap_rad(tidy["heading_rad"])
+    else:
+        _check_degrees(tidy, where, faults)
+    _check_milliseconds(table, tidy, where, faults)
+    return _sorted_unique(tidy, where, notes)
+
+
+def _check_columns(table: str, given: pd.DataFrame, where: str, faults: Faults) -> tuple[str, ...]:
+    names = [column.name for column in SCHEMA[table]]
+    notes = []
+    for name in (str(name) for name in given.columns if name not in names):
+        near = get_close_matches(name, [n for n in names if n not in given.columns], 1, 0.6)
+        if near:
+            faults.add(f"{where}, column {name}", f"columns {', '.join(names)}", name, near[0])
+        else:
+            notes.append(f"{where}: column {name} is not used")
+    for column in SCHEMA[table]:
+        if column.required and column.name not in given.columns:
+            faults.add(where, f"a column {column.name}", "none")
+    return tuple(notes)
+
+
+def _column(column: Column, given: pd.DataFrame, where: str, faults: Faults) -> Any:
+    values = given.get(column.name)
+    if values is None:
+        values = pd.Series([None] * len(given), dtype=object)
+    if column.kind == "text":
+        return _text(column, values, where, faults)
+    number, readable = _numbers(values)
+    missing = np.isnan(number)
+    bad = ~readable | np.isinf(number) | (number < column.low) | (number > column.high)
+    if column.kind == "integer":
+        bad |= ~missing & np.isfinite(number) & (number != np.round(number))
+    if column.required and column.name in given.columns:
+        bad |= missing
+    _add_rows(faults, bad, where, column, values)
+    if column.kind == "number":
+        return number
+    kept = np.where(bad | missing, 0.0, number).astype(np.int64)
+    if pd.api.types.is_integer_dtype(values.dtype):
+        kept = values.fillna(0).to_numpy(dtype=np.int64)
+    return pd.arrays.IntegerArray(kept, bad | missing)
+
+
+def _text(column: Column, values: pd.Series, where: str, faults: Faults) -> Any:
+    present = values.notna().to_numpy() & (values.astype(str) != "").to_numpy()
+    if column.required:
+        _add_rows(faults, ~present, where, column, values)
+    texts = [str(v) if ok else None for v, ok in zip(values, present, strict=True)]
+    return np.array(texts, dtype=object)
+
+
+def _numbers(values: pd.Series) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return values as floats, and which of them could be read as a number or as missing."""
+    if pd.api.types.is_numeric_dtype(values.dtype):
+        number = values.to_numpy(dtype=np.float64, na_value=np.nan)
+        return number, np.ones(len(number), dtype=bool)
+    number = np.full(len(values), np.nan)
+    readable = np.ones(len(values), dtype=bool)
+    for row, value in enumerate(values):
+        if value is None or value is pd.NA or value == "":
+            continue
+        try:
+            number[row] = float(value)
+        except (TypeError, ValueError):
+            readable[row] = False
+    return number, readable
+
+
+def _add_rows(
+    faults: Faults, bad: NDArray[np.bool_], where: str, column: Column, values: pd.Series
+) -> None:
+    rows = np.flatnonzero(bad)
+    for row in rows[:_SHOWN_ROWS]:
+        value = values.iloc[row]
+        empty = value is None or value is pd.NA or value == ""
+        off_range = not empty and _is_finite_number(value)
+        faults.add(
+            f"{where} row {row + 1}, {column.name}",
+            column.expected,
+            "nothing" if empty else value,
+            column.hint if off_range else "",
+        )
+    if len(rows) > _SHOWN_ROWS:
+        more = f"{len(rows) - _SHOWN_ROWS} more rows like these"
+        faults.add(f"{where}, {column.name}", column.expected, more, column.hint)
+
+
+def _is_finite_number(value: Any) -> bool:
+    try:
+        return bool(np.isfinite(float(value)))
+    except (TypeError, ValueError):
+        return False
+
+
+def _check_roles(role: pd.Series, where: str, faults: Faults) -> None:
+    bad = role.notna().to_numpy() & ~role.isin([SERVING, NEIGHBOUR]).to_numpy()
+    _add_rows(faults, bad, where, SCHEMA["radio"][1], role)
+
+
+def _check_covariance(gnss: pd.DataFrame, where: str, faults: Faults) -> None:
+    product = gnss["var_east_m2"].to_numpy() * gnss["var_north_m2"].to_numpy()
+    bad = gnss["cov_east_north_m2"].to_numpy() ** 2 > product * (1 + 1e-9)
+    column = Column("cov_east_north_m2", expected="a covariance of at most √(var_east·var_north)")
+    _add_rows(faults, bad, where, column, gnss["cov_east_north_m2"])
+
+
+def _check_degrees(table: pd.DataFrame, where: str, faults: Faults) -> None:
+    """Find positions that are longitudes and latitudes: near zero, and hardly moving for long."""
+    if "east_m" not in table or len(table) < 2:
+        return
+    east, north = table["east_m"].to_numpy(), table["north_m"].to_numpy()
+    small = bool(np.all(np.abs(east) <= 180) and np.all(np.abs(north) <= 180))
+    if not small:
+        return
+    extent = max(np.ptp(east), np.ptp(north))
+    if 0 < extent < 0.5 and np.ptp(table["time_s"].to_numpy()) >= 10:
+        got = f"all within {extent:.4g} of ({east[0]:.6g}, {north[0]:.6g})"
+        faults.add(f"{where}, east_m and north_m", "metres", got, "degrees given for metres")
+
+
+def _check_milliseconds(table: str, rows: pd.DataFrame, where: str, faults: Faults) -> None:
+    """Find times in milliseconds: long between rows, and much slower than anything that moves."""
+    time = np.unique(rows["time_s"].to_numpy())
+    time = time[np.isfinite(time)]
+    if len(time) < 3 or table == "radio":
+        return
+    between_s = float(np.median(np.diff(time)))
+    if table == "motion":
+        step_m = rows["step_m"].to_numpy()
+        moved_m = float(np.nansum(np.abs(step_m)))
+    else:
+        moved_m = float(np.sum(np.hypot(np.diff(rows["east_m"]), np.diff(rows["north_m"]))))
+    speed_mps = moved_m / (time[-1] - time[0])
+    if between_s >= _LONG_STEP_S and 0 < speed_mps < _STANDSTILL_MPS:
+        got = f"{between_s:g} between rows, hence {speed_mps:.2g} m/s"
+        faults.add(f"{where}, time_s", "seconds", got, "milliseconds for s")
+
+
+def _sorted_unique(
+    table: pd.DataFrame, where: str, notes: tuple[str, ...]
+) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    duplicate = table.duplicated().to_numpy()
+    if duplicate.any():
+        notes += (f"{where}: {int(duplicate.sum())} exact duplicate rows dropped",)
+        table = table[~duplicate]
+    backwards = int(np.sum(np.diff(table["time_s"].to_numpy()) < 0))
+    if backwards:
+        notes += (f"{where}: out of order in {backwards} places, sorted by time",)
+        table = table.sort_values("time_s", kind="stable")
+    return table.reset_index(drop=True), notes
