@@ -1,0 +1,82 @@
+"""The route lattice: the points of the radio rasters' lattice where one can be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapfilter.errors import Faults, InputError
+from mapfilter.geodesy import Floats, Lattice
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RouteLattice:
+    """Lattice points where one can walk or drive, in row-major order.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        The lattice on whose pixel centres the points lie.
+    row, col : numpy.ndarray of int32, shape (N,)
+        The points, in strictly ascending row-major order.
+    way_id : numpy.ndarray of int64, shape (N,)
+        The way that the point belongs to; 0 when it only lies in a square or in a class of land
+        use.
+    way_class : numpy.ndarray of int16, shape (N,)
+        Index into ``class_names``.
+    class_names : tuple of str
+        Kinds of way; points without a way have the class "square" or that of their land use.
+    distance_to_way_m : numpy.ndarray of float32, shape (N,)
+        Distance to the nearest way's centre line, also of points that belong to none; infinite
+        when the area has no way.
+    on_square : numpy.ndarray of bool, shape (N,)
+        The point lies in a square or in a walkable class of land use.
+    """
+
+    lattice: Lattice
+    row: NDArray[np.int32]
+    col: NDArray[np.int32]
+    way_id: NDArray[np.int64]
+    way_class: NDArray[np.int16]
+    class_names: tuple[str, ...]
+    distance_to_way_m: NDArray[np.float32]
+    on_square: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        columns = (self.col, self.way_id, self.way_class, self.distance_to_way_m, self.on_square)
+        if any(column.shape != self.row.shape for column in columns):
+            shapes = ", ".join(str(column.shape) for column in columns)
+            faults.add("route lattice", f"columns of length {len(self)}", shapes)
+        else:
+            if not np.all(self.lattice.contains(self.row, self.col)):
+                faults.add("route lattice", "points on the lattice", "some off the lattice")
+            if np.any(np.diff(self.point) <= 0):
+                faults.add("route lattice", "ascending row-major order", "another order")
+            if np.any((self.way_class < 0) | (self.way_class >= len(self.class_names))):
+                faults.add("route lattice, way_class", f"0..{len(self.class_names) - 1}", "others")
+            if not np.all(self.distance_to_way_m >= 0):
+                faults.add("route lattice, distance_to_way_m", "metres >= 0", "negative or NaN")
+        faults.raise_if_any(InputError)
+
+    def __len__(self) -> int:
+        return int(self.row.size)
+
+    @property
+    def point(self) -> NDArray[np.int64]:
+        """Point numbers, ``row * lattice.cols + col``: the same in every rebuild, shape (N,)."""
+        return self.row.astype(np.int64) * self.lattice.cols + self.col
+
+    @property
+    def east_north_m(self) -> tuple[Floats, Floats]:
+        """Positions of the points, shape (N,) each."""
+        east, north = self.lattice.east_north(self.row, self.col)
+        return east, north
+
+    def mask(self) -> NDArray[np.bool_]:
+        """Return where one can be, shape (lattice.rows, lattice.cols)."""
+        mask = np.zeros((self.lattice.rows, self.lattice.cols), dtype=np.bool_)
+        mask[self.row, self.col] = True
+        return mask

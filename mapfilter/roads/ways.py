@@ -1,0 +1,162 @@
+"""The ways, squares and buildings of an area, in metres, whatever map they come from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from mapfilter.errors import Faults, InputError
+
+Bounds = tuple[float, float, float, float]
+"""West, south, east, north in metres."""
+
+Geometries = NDArray[np.object_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ways:
+    """The ways that a profile may use.
+
+    A way that leaves the area and comes back is several rows with the same ``way_id``.
+
+    Parameters
+    ----------
+    crs : str
+        Projected CRS, in metres.
+    way_id : numpy.ndarray of int64, shape (N,)
+        The map's own numbers, > 0.
+    way_class : numpy.ndarray of int16, shape (N,)
+        Index into ``class_names``.
+    class_names : tuple of str
+        Kinds of way, such as ``("footway", "residential")``.
+    geometry : numpy.ndarray of shapely.LineString, shape (N,)
+        Drawn from the way's first node to its last.
+    covered : numpy.ndarray of bool, shape (N,)
+        The way runs through a tunnel or a building.
+    oneway : numpy.ndarray of int8, shape (N,)
+        1 when only the drawn direction is allowed, -1 when only the other, 0 when both.
+    """
+
+    crs: str
+    way_id: NDArray[np.int64]
+    way_class: NDArray[np.int16]
+    class_names: tuple[str, ...]
+    geometry: Geometries
+    covered: NDArray[np.bool_]
+    oneway: NDArray[np.int8]
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        _check_lengths(
+            "ways", len(self), faults, self.way_class, self.geometry, self.covered, self.oneway
+        )
+        _check_geometry("ways", self.geometry, "LineString", faults)
+        if np.any((self.way_class < 0) | (self.way_class >= len(self.class_names))):
+            faults.add("ways, way_class", f"0..{len(self.class_names) - 1}", "another code")
+        if np.any(self.way_id <= 0):
+            faults.add("ways, way_id", "numbers > 0", int(self.way_id.min()))
+        faults.raise_if_any(InputError)
+
+    def __len__(self) -> int:
+        return int(self.way_id.size)
+
+    def select(self, which: Any) -> Ways:
+        """Return the ways chosen by a mask or by indices."""
+        return Ways(
+            self.crs,
+            self.way_id[which],
+            self.way_class[which],
+            self.class_names,
+            self.geometry[which],
+            self.covered[which],
+            self.oneway[which],
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Squares:
+    """Areas where one may walk in any direction.
+
+    Parameters
+    ----------
+    crs : str
+        Projected CRS, in metres.
+    area_id : numpy.ndarray of int64, shape (N,)
+        The map's own numbers; those of multipolygon relations are negative.
+    geometry : numpy.ndarray of shapely.Polygon, shape (N,)
+        The areas; holes (fountains, lawns) are not part of them.
+    """
+
+    crs: str
+    area_id: NDArray[np.int64]
+    geometry: Geometries
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        _check_lengths("squares", len(self), faults, self.geometry)
+        _check_geometry("squares", self.geometry, "Polygon", faults)
+        faults.raise_if_any(InputError)
+
+    def __len__(self) -> int:
+        return int(self.area_id.size)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Buildings:
+    """Building footprints and heights.
+
+    Parameters
+    ----------
+    crs : str
+        Projected CRS, in metres.
+    footprints : numpy.ndarray of shapely.Polygon, shape (N,)
+        Their ground plans.
+    height_m : numpy.ndarray of float64, shape (N,)
+        Height of the roof above the ground.
+    from_height, from_levels, from_default : int
+        How many heights came from a height, from a number of storeys, and from the default.
+    """
+
+    crs: str
+    footprints: Geometries
+    height_m: NDArray[np.float64]
+    from_height: int
+    from_levels: int
+    from_default: int
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        _check_lengths("buildings", self.footprints.size, faults, self.height_m)
+        _check_geometry("buildings", self.footprints, "Polygon", faults)
+        if not np.all(np.isfinite(self.height_m) & (self.height_m > 0)):
+            faults.add("buildings, height_m", "metres > 0", "another height")
+        faults.raise_if_any(InputError)
+
+    def __len__(self) -> int:
+        return int(self.footprints.size)
+
+    @property
+    def told(self) -> str:
+        """One sentence on where the heights come from."""
+        return (
+            f"{len(self)} buildings: height from the map for {self.from_height}, "
+            f"from storeys for {self.from_levels}, the default for {self.from_default}"
+        )
+
+
+def _check_lengths(what: str, count: int, faults: Faults, *columns: NDArray[Any]) -> None:
+    if any(column.shape != (count,) for column in columns):
+        lengths = ", ".join(str(column.shape) for column in columns)
+        faults.add(what, f"columns of length {count}", lengths)
+
+
+def _check_geometry(what: str, geometry: Geometries, kind: str, faults: Faults) -> None:
+    wanted = shapely.GeometryType[kind.upper()].value
+    if np.any(shapely.get_type_id(geometry) != wanted):
+        faults.add(f"{what}, geometry", f"only {kind}s", "another kind")
+    elif not np.all(np.isfinite(shapely.get_coordinates(geometry))):
+        faults.add(f"{what}, geometry", "finite coordinates", "NaN or infinity")
