@@ -1,1 +1,1 @@
-
+"""Where models meet filters: from an unknown start to a tracked position."""

@@ -1,0 +1,184 @@
+"""What a filter says about a track: one :class:`Fix` per epoch, together a :class:`TrackEstimate`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapfilter.errors import Faults, InputError
+from mapfilter.filters.contract import Floats, Reason, Status
+
+
+@dataclass(frozen=True, slots=True)
+class Fix:
+    """Position at one epoch; NaN where the filter does not say it.
+
+    Parameters
+    ----------
+    time_s : float
+        Seconds since the start of the log.
+    east_m, north_m : float
+        Position in the database's CRS; NaN while the filter gives none.
+    covariance_m2 : (2, 2) array
+        East, north.
+    radii_m : (3,) array
+        Radii that hold 50, 67 and 95 % of the belief.
+    status : Status
+        SEARCHING, CONVERGED, TRACKING or LOST.
+    hypotheses : int
+        Position hypotheses still held.
+    mass_50m : float
+        Share of the belief within 50 m of the leading hypothesis.
+    way_id : int
+        OpenStreetMap id of the matched way; 0 where none is matched.
+    way_probability : float
+        Probability of that way.
+    reason : Reason
+        Whether the epoch's serving-cell reading was used, or why not.
+    """
+
+    time_s: float
+    east_m: float
+    north_m: float
+    covariance_m2: Floats
+    radii_m: Floats
+    status: Status
+    hypotheses: int
+    mass_50m: float
+    way_id: int
+    way_probability: float
+    reason: Reason
+
+
+@dataclass(frozen=True, slots=True)
+class UnusedReading:
+    """A reading that was not used.
+
+    Parameters
+    ----------
+    time_s : float
+        When it was taken.
+    kind : str
+        ``motion``, ``serving``, ``neighbour`` or ``gnss``.
+    what : str
+        The cell, or an empty string.
+    reason : Reason
+        Why.
+    """
+
+    time_s: float
+    kind: str
+    what: str
+    reason: Reason
+
+
+@dataclass(frozen=True)
+class TrackEstimate:
+    """The fixes of one track as arrays over N epochs.
+
+    Parameters
+    ----------
+    crs : str
+        CRS of the positions.
+    filter : str
+        Name of the filter.
+    start_utc_s : float
+        UTC seconds of ``time_s`` = 0; NaN when unknown.
+    time_s, east_m, north_m : (N,) arrays
+        See :class:`Fix`.
+    covariance_m2 : (N, 2, 2) array
+    radii_m : (N, 3) array
+        For 50, 67 and 95 %.
+    status : tuple of Status
+    hypotheses, way_id : (N,) integer arrays
+    mass_50m, way_probability : (N,) arrays
+    reason : tuple of Reason
+    unused : tuple of UnusedReading
+        Every reading not used, and why.
+    """
+
+    crs: str
+    filter: str
+    start_utc_s: float
+    time_s: Floats
+    east_m: Floats
+    north_m: Floats
+    covariance_m2: Floats
+    radii_m: Floats
+    status: tuple[Status, ...]
+    hypotheses: NDArray[np.int64]
+    mass_50m: Floats
+    way_id: NDArray[np.int64]
+    way_probability: Floats
+    reason: tuple[Reason, ...]
+    unused: tuple[UnusedReading, ...] = ()
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        count = self.time_s.size
+        for column in fields(self)[3:-1]:
+            found = len(getattr(self, column.name))
+            if found != count:
+                faults.add(f"estimate, {column.name}", f"{count} epochs", found)
+        if count and not np.all(np.isfinite(self.time_s)):
+            faults.add("estimate, time_s", "finite seconds", "NaN or infinity")
+        if count > 1 and np.any(np.diff(self.time_s) < 0):
+            faults.add("estimate, time_s", "seconds in ascending order", "a step back")
+        faults.raise_if_any(InputError)
+
+    def __len__(self) -> int:
+        return int(self.time_s.size)
+
+    def fix(self, index: int) -> Fix:
+        """Return one epoch."""
+        return Fix(
+            float(self.time_s[index]),
+            float(self.east_m[index]),
+            float(self.north_m[index]),
+            self.covariance_m2[index],
+            self.radii_m[index],
+            self.status[index],
+            int(self.hypotheses[index]),
+            float(self.mass_50m[index]),
+            int(self.way_id[index]),
+            float(self.way_probability[index]),
+            self.reason[index],
+        )
+
+    @property
+    def converged_at(self) -> int | None:
+        """Index of the first CONVERGED epoch, or None."""
+        return next((i for i, s in enumerate(self.status) if s is Status.CONVERGED), None)
+
+    @classmethod
+    def of_fixes(
+        cls,
+        crs: str,
+        filter_name: str,
+        fixes: Sequence[Fix],
+        *,
+        start_utc_s: float = float("nan"),
+        unused: Sequence[UnusedReading] = (),
+    ) -> TrackEstimate:
+        """Put the fixes of a track together."""
+        count = len(fixes)
+        return cls(
+            crs,
+            filter_name,
+            start_utc_s,
+            np.array([f.time_s for f in fixes], dtype=np.float64),
+            np.array([f.east_m for f in fixes], dtype=np.float64),
+            np.array([f.north_m for f in fixes], dtype=np.float64),
+            np.array([f.covariance_m2 for f in fixes], dtype=np.float64).reshape(count, 2, 2),
+            np.array([f.radii_m for f in fixes], dtype=np.float64).reshape(count, 3),
+            tuple(f.status for f in fixes),
+            np.array([f.hypotheses for f in fixes], dtype=np.int64),
+            np.array([f.mass_50m for f in fixes], dtype=np.float64),
+            np.array([f.way_id for f in fixes], dtype=np.int64),
+            np.array([f.way_probability for f in fixes], dtype=np.float64),
+            tuple(f.reason for f in fixes),
+            tuple(unused),
+        )

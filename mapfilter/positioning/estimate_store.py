@@ -1,0 +1,189 @@
+"""Estimates as files: GeoParquet (everything, reads back), GPX 1.1 and GeoJSON (positions)."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from xml.etree import ElementTree
+
+import geopandas
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import shapely
+from pyarrow.lib import ArrowException
+
+from mapfilter._io import atomic_file
+from mapfilter.errors import Faults, StoreError, fail
+from mapfilter.filters.contract import Reason, Status
+from mapfilter.geodesy import unproject
+from mapfilter.positioning.estimate import TrackEstimate, UnusedReading
+
+VERSION = 1
+_META = b"mapfilter"
+_GPX = "http://www.topografix.com/GPX/1/1"
+_COLUMNS = (
+    "time_s", "east_m", "north_m", "var_east_m2", "var_north_m2", "cov_east_north_m2",
+    "radius_50_m", "radius_67_m", "radius_95_m", "status", "hypotheses", "mass_50m", "way_id",
+    "way_probability", "reason",
+)  # fmt: skip
+
+
+def write_estimate(estimate: TrackEstimate, path: Path) -> None:
+    """Write an estimate as GeoParquet, one row per epoch.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be written.
+    """
+    located = np.isfinite(estimate.east_m) & np.isfinite(estimate.north_m)
+    points = np.full(len(estimate), None, dtype=object)
+    points[located] = shapely.points(estimate.east_m[located], estimate.north_m[located])
+    values = (
+        estimate.time_s,
+        estimate.east_m,
+        estimate.north_m,
+        estimate.covariance_m2[:, 0, 0],
+        estimate.covariance_m2[:, 1, 1],
+        estimate.covariance_m2[:, 0, 1],
+        *estimate.radii_m.T,
+        [str(s) for s in estimate.status],
+        estimate.hypotheses,
+        estimate.mass_50m,
+        estimate.way_id,
+        estimate.way_probability,
+        [str(r) for r in estimate.reason],
+    )
+    frame = geopandas.GeoDataFrame(
+        dict(zip(_COLUMNS, values, strict=True)), geometry=points, crs=estimate.crs
+    )
+    meta = {
+        "version": VERSION,
+        "crs": estimate.crs,
+        "filter": estimate.filter,
+        "start_utc_s": None if np.isnan(estimate.start_utc_s) else estimate.start_utc_s,
+        "unused": [[u.time_s, u.kind, u.what, str(u.reason)] for u in estimate.unused],
+    }
+    with atomic_file(path) as temporary:
+        frame.to_parquet(temporary, index=False)
+        table = pq.read_table(temporary)
+        known = dict(table.schema.metadata or {})
+        known[_META] = json.dumps(meta).encode()
+        pq.write_table(table.replace_schema_metadata(known), temporary)
+
+
+def read_estimate(path: Path) -> TrackEstimate:
+    """Read what :func:`write_estimate` wrote.
+
+    Raises
+    ------
+    StoreError
+        The file is missing, cut off, not an estimate or of a newer version.
+    """
+    try:
+        table = pq.read_table(path)
+        meta = json.loads((table.schema.metadata or {})[_META])
+    except OSError as error:
+        raise fail(StoreError, str(path), "an estimate", error.strerror or error) from error
+    except (ArrowException, KeyError, ValueError) as error:
+        raise fail(StoreError, str(path), "an estimate (Parquet)", error, "cut off") from error
+    faults = Faults()
+    if meta.get("version", 0) > VERSION:
+        faults.add(str(path), f"version <= {VERSION}", meta["version"], "a newer mapfilter")
+    for column in _COLUMNS:
+        if column not in table.column_names:
+            faults.add(f"{path}, {column}", "a column of that name", "none")
+    faults.raise_if_any(StoreError)
+    frame: pd.DataFrame = table.select(_COLUMNS).to_pandas()
+    column = {name: frame[name].to_numpy() for name in _COLUMNS}
+    cross = column["cov_east_north_m2"]
+    covariance = np.stack(
+        [
+            np.stack([column["var_east_m2"], cross], -1),
+            np.stack([cross, column["var_north_m2"]], -1),
+        ],
+        axis=-2,
+    )
+    start = meta["start_utc_s"]
+    return TrackEstimate(
+        meta["crs"],
+        meta["filter"],
+        float("nan") if start is None else start,
+        column["time_s"],
+        column["east_m"],
+        column["north_m"],
+        covariance,
+        np.stack([column[f"radius_{share}_m"] for share in (50, 67, 95)], axis=-1),
+        tuple(Status(s) for s in column["status"]),
+        column["hypotheses"],
+        column["mass_50m"],
+        column["way_id"],
+        column["way_probability"],
+        tuple(Reason(r) for r in column["reason"]),
+        tuple(UnusedReading(t, kind, what, Reason(r)) for t, kind, what, r in meta["unused"]),
+    )
+
+
+def write_gpx(estimate: TrackEstimate, path: Path, name: str = "mapfilter") -> None:
+    """Write the located epochs as a GPX 1.1 track (lon/lat, WGS 84; times where known)."""
+    ElementTree.register_namespace("", _GPX)
+    root = ElementTree.Element(f"{{{_GPX}}}gpx", version="1.1", creator="mapfilter")
+    track = ElementTree.SubElement(root, f"{{{_GPX}}}trk")
+    ElementTree.SubElement(track, f"{{{_GPX}}}name").text = name
+    segment = ElementTree.SubElement(track, f"{{{_GPX}}}trkseg")
+    located, lon, lat = _located_lonlat(estimate)
+    for index, x, y in zip(located, lon, lat, strict=True):
+        point = ElementTree.SubElement(segment, f"{{{_GPX}}}trkpt", lat=f"{y:.7f}", lon=f"{x:.7f}")
+        if np.isfinite(estimate.start_utc_s):
+            stamp = _utc_text(estimate.start_utc_s + float(estimate.time_s[index]))
+            ElementTree.SubElement(point, f"{{{_GPX}}}time").text = stamp
+    with atomic_file(path) as temporary:
+        ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
+
+
+def write_geojson(estimate: TrackEstimate, path: Path) -> None:
+    """Write the located epochs as GeoJSON points (lon/lat, WGS 84) and one line through them."""
+    located, lon, lat = _located_lonlat(estimate)
+    positions = [
+        [round(x, 7), round(y, 7)] for x, y in zip(lon.tolist(), lat.tolist(), strict=True)
+    ]
+    features: list[dict[str, object]] = []
+    if len(positions) > 1:
+        features.append(
+            {
+                "type": "Feature",
+                "geometry": {"type": "LineString", "coordinates": positions},
+                "properties": {"filter": estimate.filter},
+            }
+        )
+    for index, position in zip(located.tolist(), positions, strict=True):
+        radius_m = float(estimate.radii_m[index, 2])
+        features.append(
+            {
+                "type": "Feature",
+                "geometry": {"type": "Point", "coordinates": position},
+                "properties": {
+                    "time_s": round(float(estimate.time_s[index]), 3),
+                    "status": str(estimate.status[index]),
+                    "radius_95_m": round(radius_m, 2) if np.isfinite(radius_m) else None,
+                },
+            }
+        )
+    with atomic_file(path) as temporary:
+        text = json.dumps({"type": "FeatureCollection", "features": features}, allow_nan=False)
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def _located_lonlat(
+    estimate: TrackEstimate,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    located = np.flatnonzero(np.isfinite(estimate.east_m) & np.isfinite(estimate.north_m))
+    lon, lat = unproject(estimate.crs, estimate.east_m[located], estimate.north_m[located])
+    return located, lon, lat
+
+
+def _utc_text(utc_s: float) -> str:
+    moment = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=utc_s)
+    return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
