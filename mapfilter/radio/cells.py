@@ -1,0 +1,279 @@
+"""The cell plan: where every cell stands, where it points and what it sends."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cached_property, partial
+from pathlib import Path
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+
+from mapfilter._io import atomic_file
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.geodesy import project, projected_crs, same_crs, unproject
+from mapfilter.radio._cell_rules import OPTIONAL, RANGES, id_fault, looks_like_radians
+from mapfilter.radio._cell_table import COLUMNS, read_rows
+
+Antenna = Literal["sector", "omni"]
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One cell of a network.
+
+    Parameters
+    ----------
+    id, site : str
+        Names of the cell and of the place that it shares with other cells.
+    east_m, north_m : float
+        Position in the plan's CRS.
+    height_m : float
+        Antenna height above ground.
+    azimuth_deg : float or None
+        Boresight, degrees clockwise from true north; None for an omnidirectional antenna.
+    eirp_dbm : float
+        Radiated power at boresight, antenna gain included.
+    frequency_mhz : float
+    antenna : {"sector", "omni"}
+    downtilt_deg : float
+        Boresight below the horizon; of effect only with a vertical beamwidth.
+    beamwidth_deg : float
+        Horizontal full width at half power, φ3dB.
+    max_attenuation_db : float
+        Largest attenuation off boresight, A_m.
+    vertical_beamwidth_deg : float or None
+        Vertical full width at half power; None when only the horizontal pattern is known.
+    indoor : bool
+        Whether the antenna hangs inside a building.
+    penetration_loss_db : float
+        What an indoor cell's signal loses on its way out.
+    mcc, mnc, lac, ci : int or None
+        Global identity.
+    arfcn, bsic : int or None
+        BCCH carrier and base station identity code: all that a neighbour report tells.
+    """
+
+    id: str
+    site: str
+    east_m: float
+    north_m: float
+    height_m: float
+    azimuth_deg: float | None
+    eirp_dbm: float
+    frequency_mhz: float
+    antenna: Antenna = "sector"
+    downtilt_deg: float = 0.0
+    beamwidth_deg: float = 65.0
+    max_attenuation_db: float = 25.0
+    vertical_beamwidth_deg: float | None = None
+    indoor: bool = False
+    penetration_loss_db: float = 0.0
+    mcc: int | None = None
+    mnc: int | None = None
+    lac: int | None = None
+    ci: int | None = None
+    arfcn: int | None = None
+    bsic: int | None = None
+
+
+@dataclass(frozen=True)
+class CellPlan:
+    """The cells of an area, in one projected CRS; checked when it is made.
+
+    Parameters
+    ----------
+    crs : str
+        Projected CRS in metres.
+    cells : tuple of Cell
+        At least one; ids are unique.
+
+    Raises
+    ------
+    InputError
+        With every fault of every cell.
+    """
+
+    crs: str
+    cells: tuple[Cell, ...]
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        try:
+            object.__setattr__(self, "crs", projected_crs(self.crs, "cell plan, crs"))
+        except InputError as error:
+            faults.found.extend(error.faults)
+        object.__setattr__(self, "cells", tuple(self.cells))
+        _check_cells(self.cells, lambda i, name: f"cell {self.cells[i].id!r}, {name}", faults)
+        faults.raise_if_any(InputError)
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """Ids in the plan's order."""
+        return tuple(cell.id for cell in self.cells)
+
+    @cached_property
+    def _positions(self) -> Mapping[str, int]:
+        return MappingProxyType({cell.id: i for i, cell in enumerate(self.cells)})
+
+    @cached_property
+    def ids_by_carrier(self) -> Mapping[tuple[int, int], tuple[str, ...]]:
+        """Ids of the cells on each (ARFCN, BSIC), in the plan's order."""
+        found: dict[tuple[int, int], tuple[str, ...]] = {}
+        for cell in self.cells:
+            if cell.arfcn is not None and cell.bsic is not None:
+                key = (cell.arfcn, cell.bsic)
+                found[key] = (*found.get(key, ()), cell.id)
+        return found
+
+    def __getstate__(self) -> tuple[str, tuple[Cell, ...]]:
+        return self.crs, self.cells
+
+    def __setstate__(self, state: tuple[str, tuple[Cell, ...]]) -> None:
+        object.__setattr__(self, "crs", state[0])
+        object.__setattr__(self, "cells", state[1])
+
+    def __len__(self) -> int:
+        return len(self.cells)
+
+    def __contains__(self, cell_id: object) -> bool:
+        return cell_id in self._positions
+
+    def __getitem__(self, cell_id: str) -> Cell:
+        return self.cells[self.index(cell_id)]
+
+    def index(self, cell_id: str) -> int:
+        """Return the place of a cell in ``cells``.
+
+        Raises
+        ------
+        InputError
+            The plan has no such cell.
+        """
+        try:
+            return self._positions[cell_id]
+        except KeyError:
+            raise fail(InputError, "cell plan", "a cell of the plan", repr(cell_id)) from None
+
+    def to_crs(self, crs: str) -> CellPlan:
+        """Return the same plan in another projected CRS; azimuths keep meaning true north."""
+        target = projected_crs(crs)
+        if same_crs(self.crs, target):
+            return self
+        lon_deg, lat_deg = unproject(
+            self.crs, [cell.east_m for cell in self.cells], [cell.north_m for cell in self.cells]
+        )
+        east_m, north_m = project(target, lon_deg, lat_deg)
+        moved = zip(self.cells, east_m.tolist(), north_m.tolist(), strict=True)
+        return CellPlan(target, tuple(replace(c, east_m=e, north_m=n) for c, e, n in moved))
+
+
+def read_cell_plan(path: Path | str, crs: str) -> CellPlan:
+    """Read a cell plan from a CSV file and bring it into ``crs``.
+
+    Commas or semicolons, UTF-8, one header line. Columns: cell, lat and lon (WGS 84) *or* east and
+    north (in the CRS of a ``crs`` column, else in ``crs``), height_m, eirp_dbm, frequency_mhz; and
+    when wanted site, azimuth_deg, antenna, and the other fields of :class:`Cell`. An empty field
+    takes the default; without an azimuth the antenna is omnidirectional.
+
+    Raises
+    ------
+    InputError
+        The file is missing, empty or no such table; or with file, row (line of the file) and field
+        of every fault, and the likely mistake.
+    """
+    path = Path(path)
+    faults = Faults()
+    rows = read_rows(path, projected_crs(crs), faults)
+    known = {field.name for field in fields(Cell)}
+    whole = [row for row in rows if not row.faulty]
+    cells = tuple(Cell(**{k: v for k, v in row.values.items() if k in known}) for row in whole)
+    _check_cells(cells, lambda i, name: f"{path} row {whole[i].line}, {name}", faults, ranges=False)
+    faults.raise_if_any(InputError)
+    return CellPlan(crs, cells)
+
+
+def write_cell_plan(plan: CellPlan, path: Path | str) -> None:
+    """Write a cell plan as CSV that :func:`read_cell_plan` reads back.
+
+    Positions are longitudes and latitudes with nine decimals (0.1 mm); all else is exact.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    lon_deg, lat_deg = unproject(
+        plan.crs, [cell.east_m for cell in plan.cells], [cell.north_m for cell in plan.cells]
+    )
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for cell, lon, lat in zip(plan.cells, lon_deg.tolist(), lat_deg.tolist(), strict=True):
+        named = {"cell": cell.id, "lat": f"{lat:.9f}", "lon": f"{lon:.9f}"}
+        writer.writerow(
+            named[column] if column in named else _as_text(getattr(cell, column))
+            for column in COLUMNS
+        )
+    with atomic_file(Path(path)) as temporary:
+        temporary.write_text(text.getvalue(), encoding="utf-8")
+
+
+def _as_text(value: float | str | bool | None) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "1" if value else "0"
+    return value if isinstance(value, str) else repr(value)
+
+
+def _check_cells(
+    cells: tuple[Cell, ...],
+    where: Callable[[int, str], str],
+    faults: Faults,
+    *,
+    ranges: bool = True,
+) -> None:
+    """Note what is wrong with cells: each field (unless checked already), and all together."""
+    if not cells and not faults.found:
+        faults.add("cell plan", "at least one cell", "none")
+    first: dict[str, int] = {}
+    for i, cell in enumerate(cells):
+        if ranges:
+            _check_fields(cell, partial(where, i), faults)
+        if cell.antenna == "sector" and cell.azimuth_deg is None:
+            faults.add(
+                where(i, "azimuth_deg"),
+                "an azimuth, as the antenna is a sector",
+                "nothing",
+                "azimuth left out, or the antenna is omni",
+            )
+        if cell.id in first:
+            faults.add(where(i, "cell"), "an id used once", repr(cell.id), "a row given twice")
+        first.setdefault(cell.id, i)
+    azimuths = [cell.azimuth_deg for cell in cells if cell.azimuth_deg is not None]
+    if looks_like_radians(azimuths):
+        shown = ", ".join(f"{azimuth:g}" for azimuth in azimuths[:3])
+        faults.add(
+            where(0, "azimuth_deg"),
+            "degrees in 0..360",
+            f"{shown}, …, none above 2π",
+            "radians given for degrees",
+        )
+
+
+def _check_fields(cell: Cell, where: Callable[[str], str], faults: Faults) -> None:
+    for name in ("id", "site"):
+        if wrong := id_fault(getattr(cell, name)):
+            faults.add(where(name), *wrong)
+    if cell.antenna not in ("sector", "omni"):
+        faults.add(where("antenna"), "sector or omni", repr(cell.antenna))
+    for name, allowed in RANGES.items():
+        value = getattr(cell, name)
+        if not allowed.holds(value) and not (value is None and name in OPTIONAL):
+            hint = "" if value is None or np.isnan(value) else allowed.hint(value)
+            faults.add(where(name), allowed.expected, value, hint)
