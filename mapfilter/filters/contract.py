@@ -39,11 +39,14 @@ class Reason(StrEnum):
     USED = "used"
     NOT_MOVED_ENOUGH = "not_moved_enough"
     NO_SERVING_CELL = "no_serving_cell"
+    SECOND_SERVING_CELL = "second_serving_cell"
     UNKNOWN_CELL = "unknown_cell"
     NO_POINTS_IN_CELL = "no_points_in_cell"
     NO_CANDIDATES_LEFT = "no_candidates_left"
     NO_HEADING = "no_heading"
     NO_STEP = "no_step"
+    NO_READING = "no_reading"
+    NOT_STARTED = "not_started"
     NOT_USED_BY_FILTER = "not_used_by_filter"
 
 

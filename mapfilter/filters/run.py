@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -16,16 +16,18 @@ ReadingT = TypeVar("ReadingT")
 
 @dataclass(frozen=True, slots=True)
 class Event(Generic[ReadingT]):
-    """One thing that happened: a motion interval that ended, or a reading.
+    """What happened at one moment: a motion interval that ended, a reading, or both.
+
+    With both, the belief is moved first and weighed then.
 
     Parameters
     ----------
     time_s : float
         When; for motion the end of the interval.
     motion : MotionStep or None
-        Dead reckoning, if it is that.
+        Dead reckoning over the interval that ends now.
     reading : object or None
-        What the filter's ``update`` takes, if it is that.
+        What the filter's ``update`` takes.
     """
 
     time_s: float
@@ -43,36 +45,35 @@ class Step(Generic[BeliefT, ReadingT]):
         What happened.
     belief : object
         The filter's belief after it.
-    reason : Reason
-        Whether the event was used.
+    motion_reason : Reason
+        Whether the motion was used; ``USED`` when there was none.
     info : UpdateInfo or None
-        News of the update; None after a motion.
+        News of the update; None without a reading.
     """
 
     event: Event[ReadingT]
     belief: BeliefT
-    reason: Reason
+    motion_reason: Reason
     info: UpdateInfo | None
 
 
 def step(
-    filter_: Filter[object, BeliefT, ReadingT],
+    filter_: Filter[Any, BeliefT, ReadingT],
     belief: BeliefT,
     event: Event[ReadingT],
     rng: np.random.Generator,
 ) -> Step[BeliefT, ReadingT]:
     """Take one event in."""
-    reason, info = Reason.USED, None
+    motion_reason, info = Reason.USED, None
     if event.motion is not None:
-        belief, reason = filter_.predict(belief, event.motion, rng)
+        belief, motion_reason = filter_.predict(belief, event.motion, rng)
     if event.reading is not None:
         belief, info = filter_.update(belief, event.reading, rng)
-        reason = info.reason
-    return Step(event, belief, reason, info)
+    return Step(event, belief, motion_reason, info)
 
 
 def run(
-    filter_: Filter[object, BeliefT, ReadingT],
+    filter_: Filter[Any, BeliefT, ReadingT],
     belief: BeliefT,
     events: Iterable[Event[ReadingT]],
     rng: np.random.Generator,

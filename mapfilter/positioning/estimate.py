@@ -1,4 +1,4 @@
-"""What a filter says about a track: one :class:`Fix` per epoch, together a :class:`TrackEstimate`."""
+"""What a filter says: one :class:`Fix` per epoch, together a :class:`TrackEstimate`."""
 
 from __future__ import annotations
 

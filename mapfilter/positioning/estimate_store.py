@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import geopandas
@@ -84,7 +85,7 @@ def read_estimate(path: Path) -> TrackEstimate:
     """
     try:
         table = pq.read_table(path)
-        meta = json.loads((table.schema.metadata or {})[_META])
+        meta: dict[str, Any] = json.loads((table.schema.metadata or {})[_META])
     except OSError as error:
         raise fail(StoreError, str(path), "an estimate", error.strerror or error) from error
     except (ArrowException, KeyError, ValueError) as error:
@@ -92,9 +93,9 @@ def read_estimate(path: Path) -> TrackEstimate:
     faults = Faults()
     if meta.get("version", 0) > VERSION:
         faults.add(str(path), f"version <= {VERSION}", meta["version"], "a newer mapfilter")
-    for column in _COLUMNS:
-        if column not in table.column_names:
-            faults.add(f"{path}, {column}", "a column of that name", "none")
+    for name in _COLUMNS:
+        if name not in table.column_names:
+            faults.add(f"{path}, {name}", "a column of that name", "none")
     faults.raise_if_any(StoreError)
     frame: pd.DataFrame = table.select(_COLUMNS).to_pandas()
     column = {name: frame[name].to_numpy() for name in _COLUMNS}
