@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache
 from math import nan
 
 import numpy as np
@@ -60,7 +60,7 @@ def cell_points(database: RadioRouteDatabase, margin_db: float | None = None) ->
     """
     known = frozenset(database.cell_ids)
 
-    @lru_cache(maxsize=None)
+    @cache
     def points_of(cell: str) -> CellPointIndex | None:
         if cell not in known:
             return None

@@ -1,1 +1,1 @@
-
+"""One module per command: its configuration and the public function that runs it."""

