@@ -7,10 +7,17 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+import shapely
+from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
+from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Floats
+from mapfilter.roads.lattice import RouteLattice
+from mapfilter.roads.ways import Ways
+
+SAMPLE_M = 2.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,18 +56,120 @@ class StreetNetwork:
     oneway: NDArray[np.int8]
 
     @cached_property
+    def _links(self) -> Any:
+        """Edge numbers + 1 from node to node, the shortest of parallel edges."""
+        forth, back = np.flatnonzero(self.oneway >= 0), np.flatnonzero(self.oneway <= 0)
+        start = np.concatenate([self.node_a[forth], self.node_b[back]])
+        end = np.concatenate([self.node_b[forth], self.node_a[back]])
+        edge = np.concatenate([forth, back])
+        order = np.lexsort((edge, self.length_m[edge], end, start))
+        start, end, edge = start[order], end[order], edge[order]
+        first = np.ones(start.size, dtype=bool)
+        first[1:] = (np.diff(start) != 0) | (np.diff(end) != 0)
+        size = self.east_m.size
+        return csr_array((edge[first] + 1, (start[first], end[first])), shape=(size, size))
+
+    @cached_property
     def adjacency(self) -> Any:
         """Lengths between neighbouring nodes (m), ``scipy.sparse.csr_array``, shape (N, N).
 
         Entry (i, j) exists when one may go from i to j; of parallel edges the shortest counts.
         """
-        forth, back = self.oneway >= 0, self.oneway <= 0
-        start = np.concatenate([self.node_a[forth], self.node_b[back]])
-        end = np.concatenate([self.node_b[forth], self.node_a[back]])
-        length = np.concatenate([self.length_m[forth], self.length_m[back]])
-        order = np.lexsort((length, end, start))
-        start, end, length = start[order], end[order], length[order]
-        first = np.ones(start.size, dtype=bool)
-        first[1:] = (np.diff(start) != 0) | (np.diff(end) != 0)
-        size = self.east_m.size
-        return csr_array((length[first], (start[first], end[first])), shape=(size, size))
+        links = self._links
+        return csr_array(
+            (self.length_m[links.data - 1], links.indices, links.indptr), shape=links.shape
+        )
+
+    def edges_along(self, nodes: ArrayLike) -> NDArray[np.int64]:
+        """Return the edges that a sequence of neighbouring nodes follows, shape (len(nodes) - 1,).
+
+        Raises
+        ------
+        InputError
+            Two nodes that follow each other are not joined.
+        """
+        path = np.asarray(nodes, dtype=np.int64)
+        edges = np.atleast_1d(np.asarray(self._links[path[:-1], path[1:]])).astype(np.int64) - 1
+        if np.any(edges < 0):
+            i = int(np.flatnonzero(edges < 0)[0])
+            raise fail(InputError, "nodes", "neighbours", f"{path[i]} and {path[i + 1]}")
+        return edges
+
+
+def street_network(ways: Ways, allowed: RouteLattice | None = None) -> StreetNetwork:
+    """Return the network of ways, joined where they share a vertex.
+
+    Parameters
+    ----------
+    ways : Ways
+        What may be used; one-way streets only in their direction.
+    allowed : RouteLattice, optional
+        Leave out edges that leave these points: an edge stays when each of its samples, at most
+        2.5 m apart, lies in the pixel of a point. So nobody is routed through a building.
+
+    Returns
+    -------
+    StreetNetwork
+        The largest part in which every node is reached from every other.
+
+    Raises
+    ------
+    InputError
+        No edge is left.
+    """
+    corner, origin = shapely.get_coordinates(ways.geometry, return_index=True)
+    # Shared vertices are equal up to the rounding of the projection.
+    _, node = np.unique(np.round(corner, 3), axis=0, return_inverse=True)
+    node = node.ravel()
+    joined = (origin[1:] == origin[:-1]) & (node[1:] != node[:-1])
+    a, b = node[:-1][joined], node[1:][joined]
+    way = origin[:-1][joined]
+    position = np.zeros((int(node.max(initial=-1)) + 1, 2))
+    position[node[::-1]] = corner[::-1]
+    if allowed is not None:
+        inside = _stays_on(allowed, position[a], position[b])
+        a, b, way = a[inside], b[inside], way[inside]
+    one = ways.oneway[way]
+    start, end = (
+        np.concatenate([a[one >= 0], b[one <= 0]]),
+        np.concatenate([b[one >= 0], a[one <= 0]]),
+    )
+    size = len(position)
+    graph = csr_array((np.ones(start.size), (start, end)), shape=(size, size))
+    _, part = connected_components(graph, directed=True, connection="strong")
+    if a.size == 0 or not np.any(part[a] == part[b]):
+        raise fail(
+            InputError, "street network", "streets that join", "none", "roads not in the area"
+        )
+    weight = np.bincount(part[a][part[a] == part[b]], minlength=part.max() + 1)
+    kept = (part[a] == weight.argmax()) & (part[b] == weight.argmax())
+    a, b, way = a[kept], b[kept], way[kept]
+    used, ends = np.unique(np.concatenate([a, b]), return_inverse=True)
+    position = position[used]
+    a, b = ends[: a.size].astype(np.int32), ends[a.size :].astype(np.int32)
+    return StreetNetwork(
+        ways.crs,
+        position[:, 0].copy(),
+        position[:, 1].copy(),
+        a,
+        b,
+        np.hypot(*(position[b] - position[a]).T),
+        ways.way_id[way],
+        ways.way_class[way],
+        ways.class_names,
+        ways.oneway[way],
+    )
+
+
+def _stays_on(allowed: RouteLattice, start: Floats, end: Floats) -> NDArray[np.bool_]:
+    """Tell which straight edges keep to the pixels of a route lattice, shape (E,)."""
+    steps = np.ceil(np.hypot(*(end - start).T) / SAMPLE_M).astype(np.int64) + 1
+    edge = np.repeat(np.arange(len(start)), steps)
+    rank = np.arange(edge.size) - np.repeat(np.cumsum(steps) - steps, steps)
+    share = (rank / (steps[edge] - 1))[:, None]
+    place = start[edge] + share * (end[edge] - start[edge])
+    row, col = allowed.lattice.row_col(place[:, 0], place[:, 1])
+    lattice, mask = allowed.lattice, allowed.mask()
+    good = np.asarray(lattice.contains(row, col))
+    good[good] = mask[row[good], col[good]]
+    return np.asarray(np.bincount(edge, weights=~good, minlength=len(start)) == 0, dtype=np.bool_)

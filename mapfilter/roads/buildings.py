@@ -1,0 +1,147 @@
+"""Building footprints and heights from OpenStreetMap, and the height raster made of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from rasterio.features import rasterize
+from rasterio.transform import Affine
+
+from mapfilter.errors import Faults, InputError
+from mapfilter.geodesy import Floats, Lattice
+from mapfilter.roads.pbf import read_elements
+from mapfilter.roads.ways import Bounds, Buildings
+
+STOREY_HEIGHT_M = 3.2
+DEFAULT_HEIGHT_M = 12.0
+_FOOT_M = 0.3048
+_HIGHEST_M = 1000.0
+
+# A roof on posts stops neither walkers nor waves; the others are no buildings any more.
+_NOT_BUILDINGS = frozenset(("no", "roof", "razed", "demolished"))
+_NUMBER = re.compile(r"\s*([0-9]+(?:[.,][0-9]+)?)\s*(m|ft|')?")
+_TAGS = ["building", "height", "building:levels", "location"]
+
+
+def read_buildings(
+    path: str | Path,
+    crs: str,
+    bounds_m: Bounds,
+    *,
+    default_height_m: float = DEFAULT_HEIGHT_M,
+    storey_height_m: float = STOREY_HEIGHT_M,
+) -> Buildings:
+    """Read the buildings that touch an area; there may be none.
+
+    A height is the map's own, else the number of storeys times ``storey_height_m``, else
+    ``default_height_m``; the result counts which was used how often.
+
+    Parameters
+    ----------
+    path : str or Path
+        An ``.osm.pbf`` file, or the name of an embedded map ("helsinki").
+    crs : str
+        Projected CRS of the result, in metres.
+    bounds_m : tuple of float
+        West, south, east, north of the area in ``crs``. Footprints are not cut at its edge.
+    default_height_m, storey_height_m : float
+        Heights for buildings that tell none.
+
+    Raises
+    ------
+    InputError
+        The map is missing or damaged, or a height is not > 0.
+    """
+    faults = Faults()
+    if not default_height_m > 0:
+        faults.add("default_height_m", "metres > 0", default_height_m)
+    if not storey_height_m > 0:
+        faults.add("storey_height_m", "metres > 0", storey_height_m)
+    faults.raise_if_any(InputError)
+
+    def query(osm: Any) -> Any:
+        return osm.get_data_by_custom_criteria(
+            custom_filter={"building": True}, tags_as_columns=_TAGS, keep_nodes=False
+        )
+
+    found = read_elements(path, crs, bounds_m, query)
+    for tag in _TAGS:
+        found[tag] = found[tag].fillna("").astype(str) if tag in found else ""
+    kept = ~found["building"].isin(_NOT_BUILDINGS) & (found["location"] != "underground")
+    found = found[kept & shapely.intersects(shapely.box(*bounds_m), found.geometry.to_numpy())]
+    parts, origin = shapely.get_parts(
+        shapely.make_valid(found.geometry.to_numpy()), return_index=True
+    )
+    polygon = (shapely.get_type_id(parts) == 3) & (shapely.area(parts) > 0)
+    origin = origin[polygon]
+    by_height = _numbers(found["height"])[origin]
+    by_levels = _numbers(found["building:levels"])[origin] * storey_height_m
+    height = np.where(np.isfinite(by_height), by_height, by_levels)
+    told = np.isfinite(height)
+    from_height = int(np.isfinite(by_height).sum())
+    return Buildings(
+        crs,
+        parts[polygon],
+        np.where(told, height, default_height_m),
+        from_height,
+        int(told.sum()) - from_height,
+        int((~told).sum()),
+    )
+
+
+def rasterise_heights(buildings: Buildings, lattice: Lattice) -> NDArray[np.float32]:
+    """Return the roof height above ground at each lattice point, 0 where there is no building.
+
+    Of buildings that overlap the highest counts.
+
+    Returns
+    -------
+    numpy.ndarray of float32, shape (lattice.rows, lattice.cols)
+
+    Examples
+    --------
+    >>> house = np.array([shapely.box(0, 0, 10, 5)])
+    >>> buildings = Buildings("EPSG:32629", house, np.array([9.0]), 1, 0, 0)
+    >>> rasterise_heights(buildings, Lattice("EPSG:32629", 0.0, 10.0, 5.0, 2, 3)).tolist()
+    [[0.0, 0.0, 0.0], [9.0, 9.0, 0.0]]
+    """
+    order = np.argsort(buildings.height_m, kind="stable")
+    shapes = zip(buildings.footprints[order], buildings.height_m[order], strict=True)
+    return burn(shapes, lattice, "float32")
+
+
+def burn(
+    shapes: Iterable[tuple[Any, float]], lattice: Lattice, dtype: str, *, all_touched: bool = False
+) -> NDArray[Any]:
+    """Return a raster of ``(geometry, value)`` pairs; the last pair wins, 0 where there is none.
+
+    A pixel is in a polygon when its centre is, or with ``all_touched`` when they touch.
+    """
+    size = (lattice.rows, lattice.cols)
+    pairs = list(shapes)
+    if not pairs:
+        return np.zeros(size, dtype=dtype)
+    transform = Affine.from_gdal(*lattice.gdal_transform)
+    raster: NDArray[Any] = rasterize(
+        pairs, size, fill=0, transform=transform, dtype=dtype, all_touched=all_touched
+    )
+    return raster
+
+
+def _numbers(text: Any) -> Floats:
+    """Return metres or counts from tags such as ``12``, ``12.5 m`` or ``40 ft``; NaN if none."""
+    values = np.full(len(text), np.nan)
+    for i, entry in enumerate(text):
+        match = _NUMBER.match(entry)
+        if match:
+            number = float(match[1].replace(",", "."))
+            number *= _FOOT_M if match[2] in ("ft", "'") else 1.0
+            if 0 < number < _HIGHEST_M:
+                values[i] = number
+    return values

@@ -1,0 +1,179 @@
+"""Ways and squares from OpenStreetMap.
+
+Which ways a profile may use is decided by these tables and nothing else.
+
+========== =============================================================================
+walking    classes: :data:`WALKING_CLASSES` (no motorway, no trunk). ``foot=yes`` and its
+           like allow, ``foot=no`` and its like forbid; otherwise ``access=private``, ``no``
+           and the like forbid. Tunnels are left out (no sky, no prediction), passages
+           through buildings are kept and marked ``covered``. Indoor ways are left out.
+driving    classes: :data:`DRIVING_CLASSES`. The most exact of ``motorcar``,
+           ``motor_vehicle``, ``vehicle`` and ``access`` decides. Tunnels are kept and marked
+           ``covered``. One-way streets are told by ``oneway``.
+squares    ``place=square``, and ``area=yes`` or multipolygon areas of the classes
+           :data:`SQUARE_CLASSES`, with the access rules of walking. A closed way without
+           ``area=yes`` is a loop to walk along, not an area.
+========== =============================================================================
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import shapely
+from geopandas import GeoDataFrame
+from numpy.typing import NDArray
+
+from mapfilter.roads.pbf import nothing_there, read_elements
+from mapfilter.roads.ways import Bounds, Geometries, Squares, Ways
+
+Profile = Literal["walking", "driving"]
+
+_SHARED_CLASSES = (
+    "primary", "primary_link", "secondary", "secondary_link", "tertiary", "tertiary_link",
+    "unclassified", "residential", "living_street", "service", "road",
+)  # fmt: skip
+WALKING_CLASSES = frozenset(
+    (*_SHARED_CLASSES, "bridleway", "cycleway", "footway", "path", "pedestrian", "platform",
+     "steps", "track")
+)  # fmt: skip
+DRIVING_CLASSES = frozenset(
+    (*_SHARED_CLASSES, "motorway", "motorway_link", "trunk", "trunk_link")
+)  # fmt: skip
+SQUARE_CLASSES = frozenset(("footway", "living_street", "path", "pedestrian"))
+
+_ALLOWING = frozenset(("yes", "designated", "permissive", "official", "destination", "customers"))
+_FORBIDDING = frozenset(
+    ("no", "private", "military", "agricultural", "forestry", "delivery", "permit", "residents",
+     "use_sidepath", "emergency")
+)  # fmt: skip
+_OPEN_TUNNELS = frozenset(("", "no", "building_passage", "covered", "avalanche_protector"))
+_TAGS = [
+    "highway", "place", "area", "access", "foot", "vehicle", "motor_vehicle", "motorcar",
+    "tunnel", "covered", "indoor", "oneway", "junction",
+]  # fmt: skip
+
+
+def read_ways(path: str | Path, profile: Profile, crs: str, bounds_m: Bounds) -> Ways:
+    """Read the ways that a profile may use, clipped to an area.
+
+    Parameters
+    ----------
+    path : str or Path
+        An ``.osm.pbf`` file, or the name of an embedded map ("helsinki").
+    profile : {"walking", "driving"}
+        The rules of the table above.
+    crs : str
+        Projected CRS of the result, in metres.
+    bounds_m : tuple of float
+        West, south, east, north of the area in ``crs``. Ways are cut at its edge; within it they
+        keep all their vertices.
+
+    Returns
+    -------
+    Ways
+        Sorted by way id.
+
+    Raises
+    ------
+    InputError
+        The map is missing or damaged, or has no such ways in the area.
+    """
+    found = _read_highways(path, crs, bounds_m)
+    area = _is_area(found)
+    # Lifts drawn as outlines come as polygons, too; they fall out by their class.
+    loops = ~area & (shapely.get_type_id(found.geometry.to_numpy()) == 3)
+    found.loc[loops, "geometry"] = shapely.get_exterior_ring(found.geometry[loops].to_numpy())
+    found = found[~area & _allowed(found, profile)]
+    geometry, origin = _lines_inside(found.geometry.to_numpy(), bounds_m)
+    if origin.size == 0:
+        raise nothing_there(path, crs, bounds_m)
+    kept = found.iloc[origin]
+    names, codes = np.unique(kept["highway"].to_numpy(dtype=str), return_inverse=True)
+    return Ways(
+        crs,
+        kept["id"].to_numpy(dtype=np.int64),
+        codes.astype(np.int16),
+        tuple(str(name) for name in names),
+        geometry,
+        (~kept["tunnel"].isin(["", "no"]) | (kept["covered"] == "yes")).to_numpy(dtype=bool),
+        _oneway(kept) if profile == "driving" else np.zeros(len(kept), dtype=np.int8),
+    )
+
+
+def read_squares(path: str | Path, crs: str, bounds_m: Bounds) -> Squares:
+    """Read squares and pedestrian areas, clipped to an area; there may be none.
+
+    Parameters and errors are those of :func:`read_ways`, save that no square is no fault.
+    """
+    found = _read_highways(path, crs, bounds_m)
+    chosen = (found["place"] == "square") | found["highway"].isin(SQUARE_CLASSES)
+    found = found[_is_area(found) & chosen & _walkable(found)]
+    whole = shapely.make_valid(found.geometry.to_numpy())
+    parts, origin = shapely.get_parts(
+        shapely.intersection(whole, shapely.box(*bounds_m)), return_index=True
+    )
+    # Touching the edge of the area leaves lines and points behind.
+    polygon = (shapely.get_type_id(parts) == 3) & (shapely.area(parts) > 0)
+    kept = found.iloc[origin[polygon]]
+    number = kept["id"].to_numpy(dtype=np.int64)
+    relation = (kept["osm_type"] == "relation").to_numpy(dtype=bool)
+    return Squares(crs, np.where(relation, -number, number), parts[polygon])
+
+
+def _read_highways(path: str | Path, crs: str, bounds_m: Bounds) -> GeoDataFrame:
+    def query(osm: Any) -> Any:
+        return osm.get_data_by_custom_criteria(
+            custom_filter={"highway": True, "place": ["square"]},
+            tags_as_columns=_TAGS,
+            keep_nodes=False,
+        )
+
+    found = read_elements(path, crs, bounds_m, query)
+    for tag in _TAGS:
+        found[tag] = found[tag].fillna("").astype(str) if tag in found else ""
+    return found
+
+
+def _is_area(found: GeoDataFrame) -> NDArray[np.bool_]:
+    kind = shapely.get_type_id(found.geometry.to_numpy())
+    polygon = np.isin(kind, (3, 6))
+    meant = (found["area"] == "yes") | (found["place"] == "square")
+    return np.asarray(polygon & (meant | (found["osm_type"] == "relation")), dtype=np.bool_)
+
+
+def _allowed(found: GeoDataFrame, profile: Profile) -> NDArray[np.bool_]:
+    if profile == "walking":
+        return _walkable(found) & np.asarray(found["highway"].isin(WALKING_CLASSES), np.bool_)
+    verdict = np.where(found["access"].isin(_FORBIDDING), -1, 0)
+    for tag in ("vehicle", "motor_vehicle", "motorcar"):
+        verdict = np.where(found[tag].isin(_ALLOWING), 1, verdict)
+        verdict = np.where(found[tag].isin(_FORBIDDING), -1, verdict)
+    return np.asarray(found["highway"].isin(DRIVING_CLASSES) & (verdict >= 0), dtype=np.bool_)
+
+
+def _walkable(found: GeoDataFrame) -> NDArray[np.bool_]:
+    barred = found["access"].isin(_FORBIDDING) & ~found["foot"].isin(_ALLOWING)
+    barred |= found["foot"].isin(_FORBIDDING)
+    outdoors = found["tunnel"].isin(_OPEN_TUNNELS) & ~found["indoor"].isin(["yes", "corridor"])
+    return np.asarray(outdoors & ~barred, dtype=np.bool_)
+
+
+def _oneway(found: GeoDataFrame) -> NDArray[np.int8]:
+    implied = (found["junction"] == "roundabout") | (found["highway"] == "motorway")
+    forward = found["oneway"].isin(["yes", "true", "1"]) | (implied & (found["oneway"] == ""))
+    backward = found["oneway"].isin(["-1", "reverse"])
+    return np.where(backward, -1, np.where(forward, 1, 0)).astype(np.int8)
+
+
+def _lines_inside(geometry: Geometries, bounds_m: Bounds) -> tuple[Geometries, NDArray[np.int64]]:
+    """Return the lines clipped to a box, in parts, and which line each part comes from."""
+    crossing = ~shapely.covers(shapely.box(*bounds_m), geometry)
+    clipped = geometry.copy()
+    # Unlike an intersection, this walks along the line and keeps its direction.
+    clipped[crossing] = shapely.clip_by_rect(geometry[crossing], *bounds_m)
+    parts, origin = shapely.get_parts(clipped, return_index=True)
+    line = (shapely.get_type_id(parts) == 1) & (shapely.length(parts) > 0)
+    return parts[line], origin[line].astype(np.int64)
