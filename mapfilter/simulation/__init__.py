@@ -1,1 +1,1 @@
-
+"""Worlds with truth: networks laid out by rule, journeys, and what phone and sensors report."""

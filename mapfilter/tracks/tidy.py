@@ -102,7 +102,8 @@ def _text(column: Column, values: pd.Series, where: str, faults: Faults) -> Any:
     if column.required:
         _add_rows(faults, ~present, where, column, values)
     texts = [str(v) if ok else None for v, ok in zip(values, present, strict=True)]
-    return np.array(texts, dtype=object)
+    # Without the dtype pandas 3 makes these strings, and None becomes NaN.
+    return pd.Series(texts, dtype=object)
 
 
 def _numbers(values: pd.Series) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:

@@ -1,0 +1,309 @@
+"""What a phone reports on its way: serving cell, neighbours without identity, quantised levels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mapfilter.errors import ConfigError, Faults, InputError, fail
+from mapfilter.geodesy import Floats, Lattice
+from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.rasters import RxLevRasters
+from mapfilter.radio.rxlev import quantise_level_dbm
+from mapfilter.tracks.schema import NEIGHBOUR, SERVING
+
+Levels = Callable[[Floats, Floats], NDArray[np.floating]]
+"""From east and north (m), shape (N,), to levels (dBm), shape (N, cells); NaN: not heard."""
+
+_SILENT_DBM = -140.0
+
+
+@dataclass(frozen=True, slots=True)
+class ReportModel:
+    """How a phone measures and which cell serves it.
+
+    Parameters
+    ----------
+    period_s : float
+        Between two reports: 0.48 s in GSM, 1 s in many logs.
+    averaging_s : float
+        Handover compares means, in dB, over the reports of this long; at least the last one.
+    hysteresis_db : float
+        Another cell takes over when its mean is more than this above the serving cell's.
+    fading_db : float
+        Standard deviation of the measurement noise, drawn for each cell and report.
+    max_neighbours : int
+        Strongest other cells that are reported.
+    quantise : bool
+        Whether levels are RXLEV bin centres, censored at both ends of the scale.
+    sensitivity_dbm : float
+        Weaker cells are not heard.
+    radio : {"reality", "as_predicted"}
+        With "as_predicted" the serving cell is the strongest at each place: no noise, no
+        averaging, no hysteresis. The levels must then be the predicted ones.
+
+    Raises
+    ------
+    ConfigError
+        With every value that is not as told.
+    """
+
+    period_s: float = 1.0
+    averaging_s: float = 1.92
+    hysteresis_db: float = 4.0
+    fading_db: float = 1.0
+    max_neighbours: int = 6
+    quantise: bool = True
+    sensitivity_dbm: float = -104.0
+    radio: Literal["reality", "as_predicted"] = "reality"
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        if not (np.isfinite(self.period_s) and self.period_s > 0):
+            faults.add("reports, period_s", "a finite number > 0", self.period_s)
+        for name in ("averaging_s", "hysteresis_db", "fading_db", "max_neighbours"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= 0):
+                faults.add(f"reports, {name}", "a finite number >= 0", value)
+        if not -200 <= self.sensitivity_dbm <= 0:
+            faults.add("reports, sensitivity_dbm", "dBm in -200..0", self.sensitivity_dbm)
+        if self.radio not in ("reality", "as_predicted"):
+            faults.add("reports, radio", "reality or as_predicted", repr(self.radio))
+        faults.raise_if_any(ConfigError)
+
+
+def reports(
+    truth: pd.DataFrame,
+    levels: Levels,
+    plan: CellPlan,
+    model: ReportModel,
+    rng: np.random.Generator,
+) -> pd.DataFrame:
+    """Return the radio table of one journey.
+
+    Parameters
+    ----------
+    truth : pandas.DataFrame
+        time_s, east_m, north_m; between its rows one moves straight on.
+    levels : callable
+        From positions to levels, one column for each cell in the plan's order.
+    plan : CellPlan
+        Tells the carriers and BSICs by which neighbours are known.
+    model : ReportModel
+    rng : numpy.random.Generator
+        The draws do not depend on ``model``.
+
+    Returns
+    -------
+    radio : pandas.DataFrame
+        The columns of a log's radio table; for each report the serving cell, then the neighbours
+        from the strongest down, whose ``cell`` is None. Of cells that share carrier and BSIC only
+        the strongest is heard, or the serving one. A report in which nothing is heard has no rows.
+
+    Raises
+    ------
+    InputError
+        ``levels`` does not give one column for each cell.
+    """
+    if truth.empty:
+        raise fail(InputError, "truth", "at least one row", "none")
+    time, east, north = (truth[name].to_numpy() for name in ("time_s", "east_m", "north_m"))
+    # A whole number of periods must not lose the last report to rounding.
+    count = int(np.floor((time[-1] - time[0]) / model.period_s + 1e-9)) + 1
+    tick_s = time[0] + np.arange(count) * model.period_s
+    there = np.interp(tick_s, time, east), np.interp(tick_s, time, north)
+    level = np.asarray(levels(*there), dtype=np.float64)
+    if level.shape != (count, len(plan)):
+        expected = f"an array of shape {(count, len(plan))}"
+        raise fail(InputError, "levels", expected, level.shape, "another plan's cells")
+    noise_db = model.fading_db * rng.standard_normal(level.shape)
+    if model.radio == "reality":
+        level = level + noise_db
+    heard = np.where(level >= model.sensitivity_dbm, level, -np.inf)
+    if model.radio == "reality":
+        averaged = max(1, round(model.averaging_s / model.period_s))
+        mean = running_mean_db(np.where(np.isnan(level), _SILENT_DBM, level), averaged)
+        serving = serving_cells(mean, np.isfinite(heard), model.hysteresis_db)
+    else:
+        serving = np.where(np.isfinite(heard).any(axis=1), np.argmax(heard, axis=1), -1)
+    rank = _ranked(heard, serving, _shared_carriers(plan), model.max_neighbours)
+    return _table(tick_s, level, rank, plan, model.quantise)
+
+
+def running_mean_db(level_dbm: Floats, count: int) -> Floats:
+    """Return the mean, in dB, of the last ``count`` reports, or of as many as there are.
+
+    Parameters
+    ----------
+    level_dbm : ndarray, shape (N, cells)
+    count : int
+
+    Examples
+    --------
+    >>> running_mean_db(np.array([[-60.0], [-70.0], [-90.0]]), 2).ravel().tolist()
+    [-60.0, -65.0, -80.0]
+    """
+    total = level_dbm.copy()
+    for back in range(1, min(count, len(total))):
+        total[back:] += level_dbm[:-back]
+    return np.asarray(total / np.minimum(np.arange(len(total)) + 1, count)[:, np.newaxis])
+
+
+def serving_cells(
+    mean_dbm: Floats, heard: NDArray[np.bool_], hysteresis_db: float
+) -> NDArray[np.int64]:
+    """Return which cell serves at each report: handover with hysteresis.
+
+    A cell serves until the strongest heard one is more than ``hysteresis_db`` above it, or until
+    it is not heard any more; then the strongest takes over (the first of equals).
+
+    Parameters
+    ----------
+    mean_dbm : ndarray, shape (N, cells)
+    heard : ndarray of bool, shape (N, cells)
+    hysteresis_db : float
+
+    Returns
+    -------
+    serving : ndarray of int64, shape (N,)
+        Column of the cell, or -1 when none is heard.
+
+    Examples
+    --------
+    >>> mean_dbm = np.array([[-70.0, -80.0], [-80.0, -77.0], [-80.0, -75.0], [-80.0, -82.0]])
+    >>> serving_cells(mean_dbm, np.ones((4, 2), dtype=bool), 4.0).tolist()
+    [0, 0, 1, 1]
+    """
+    audible = np.where(heard, mean_dbm, -np.inf)
+    serving = np.full(len(audible), -1, dtype=np.int64)
+    if not audible.size:
+        return serving
+    best = np.argmax(audible, axis=1)
+    now = -1
+    for i, strongest in enumerate(best):
+        lost = now < 0 or not heard[i, now]
+        if lost or audible[i, strongest] > audible[i, now] + hysteresis_db:
+            now = int(strongest) if heard[i, strongest] else -1
+        serving[i] = now
+    return serving
+
+
+def level_sampler(
+    rasters: RxLevRasters,
+    cell_ids: Sequence[str] | None = None,
+    bounds_m: tuple[float, float, float, float] | None = None,
+) -> Levels:
+    """Return a function that looks levels up in rasters: the pixel that holds each position.
+
+    Parameters
+    ----------
+    rasters : RxLevRasters
+        Of levels in dBm.
+    cell_ids : sequence of str, optional
+        The columns, such as ``plan.ids``; else the rasters' own order.
+    bounds_m : tuple of float, optional
+        West, south, east, north of the part that is read into memory; else all of it.
+
+    Returns
+    -------
+    levels : callable
+        From east and north (m), shape (N,), to levels (dBm), shape (N, cells); NaN outside.
+
+    Raises
+    ------
+    InputError
+        The rasters hold losses, or do not reach into the bounds.
+    """
+    if rasters.quantity != "level":
+        raise fail(InputError, str(rasters.path), "levels in dBm", "losses in dB")
+    lattice, window = rasters.lattice, None
+    if bounds_m is not None:
+        window = _window(lattice, bounds_m, str(rasters.path))
+        lattice = lattice.window(*window)
+    return array_sampler(rasters.read(window, cell_ids), lattice)
+
+
+def array_sampler(level_dbm: NDArray[np.floating], lattice: Lattice) -> Levels:
+    """Return a function that looks levels up in an array of shape (cells, rows, cols)."""
+
+    def levels(east_m: Floats, north_m: Floats) -> NDArray[np.floating]:
+        row, col = lattice.row_col(np.atleast_1d(east_m), np.atleast_1d(north_m))
+        inside = lattice.contains(row, col)
+        found = level_dbm[:, np.where(inside, row, 0), np.where(inside, col, 0)].T
+        return np.where(inside[:, np.newaxis], found, np.nan)
+
+    return levels
+
+
+def _window(
+    lattice: Lattice, bounds_m: tuple[float, float, float, float], where: str
+) -> tuple[int, int, int, int]:
+    west, south, east, north = bounds_m
+    top, left = lattice.row_col(west, north)[0], lattice.row_col(west, north)[1]
+    bottom, right = lattice.row_col(east, south)
+    top, left = max(top, 0), max(left, 0)
+    bottom, right = min(bottom, lattice.rows - 1), min(right, lattice.cols - 1)
+    if bottom < top or right < left:
+        raise fail(
+            InputError, where, f"rasters over {bounds_m}", f"rasters over {lattice.bounds_m}"
+        )
+    return top, left, bottom - top + 1, right - left + 1
+
+
+def _shared_carriers(plan: CellPlan) -> list[NDArray[np.int64]]:
+    shared = (ids for ids in plan.ids_by_carrier.values() if len(ids) > 1)
+    return [np.array([plan.index(cell_id) for cell_id in ids]) for ids in shared]
+
+
+def _ranked(
+    heard_dbm: Floats,
+    serving: NDArray[np.int64],
+    shared: list[NDArray[np.int64]],
+    max_neighbours: int,
+) -> NDArray[np.int64]:
+    """Return the cells of each report, shape (N, 1 + neighbours), -1 where there is none."""
+    report = np.arange(len(serving))
+    served = serving >= 0
+    others = heard_dbm.copy()
+    # The serving cell drowns those of its own carrier and BSIC.
+    others[report[served], serving[served]] = np.inf
+    for group in shared:
+        strongest = group[np.argmax(others[:, group], axis=1)]
+        kept = others[report, strongest]
+        others[:, group] = -np.inf
+        others[report, strongest] = kept
+    others[report[served], serving[served]] = -np.inf
+    neighbours = np.argsort(-others, axis=1, kind="stable")[:, :max_neighbours]
+    audible = np.isfinite(np.take_along_axis(others, neighbours, axis=1))
+    neighbours = np.where(audible & served[:, np.newaxis], neighbours, -1)
+    return np.column_stack([serving, neighbours])
+
+
+def _table(
+    tick_s: Floats, level_dbm: Floats, rank: NDArray[np.int64], plan: CellPlan, quantise: bool
+) -> pd.DataFrame:
+    report, place = np.nonzero(rank >= 0)
+    cell = rank[report, place]
+    reported, censored = level_dbm[report, cell], np.zeros(len(cell), dtype=np.int8)
+    if quantise:
+        reported, censored = quantise_level_dbm(reported)
+    ids = np.array([*plan.ids, None], dtype=object)
+    arfcn = pd.array([c.arfcn for c in plan.cells], dtype="Int64")
+    bsic = pd.array([c.bsic for c in plan.cells], dtype="Int64")
+    return pd.DataFrame(
+        {
+            "time_s": tick_s[report],
+            "role": np.where(place == 0, SERVING, NEIGHBOUR),
+            "cell": pd.Series(ids[np.where(place == 0, cell, -1)], dtype=object),
+            "arfcn": arfcn[cell],
+            "bsic": bsic[cell],
+            "level_dbm": reported,
+            "censored": censored,
+            "timing_advance": pd.array([None] * len(cell), dtype="Int64"),
+        }
+    )

@@ -1,0 +1,129 @@
+"""Whole journeys: a route, its truth, what the inertial unit says and what the phone reports."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mapfilter.errors import ConfigError, InputError, fail
+from mapfilter.geodesy import same_crs
+from mapfilter.radio.cells import CellPlan
+from mapfilter.roads.network import StreetNetwork
+from mapfilter.simulation.imu import ImuErrors, noisy_motion
+from mapfilter.simulation.journeys import JourneyPlan, journey
+from mapfilter.simulation.reports import Levels, ReportModel, reports
+from mapfilter.simulation.routes import Route, route
+from mapfilter.tracks.log import TrackLog, make_log
+
+_ROUTE, _IMU, _RADIO = range(3)
+
+
+@dataclass(frozen=True, slots=True)
+class SimulationSettings:
+    """Which journeys are made, and how they are sensed.
+
+    Parameters
+    ----------
+    journeys : int
+        Different routes.
+    draws : int
+        Logs for each route, which differ in noise only.
+    journey : JourneyPlan
+    imu : ImuErrors
+    reports : ReportModel
+    start_utc_s : float
+        When every journey starts, UTC seconds.
+
+    Raises
+    ------
+    ConfigError
+        There are no journeys or no draws.
+    """
+
+    journeys: int = 1
+    draws: int = 1
+    journey: JourneyPlan = field(default_factory=JourneyPlan)
+    imu: ImuErrors = field(default_factory=ImuErrors)
+    reports: ReportModel = field(default_factory=ReportModel)
+    start_utc_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("journeys", "draws"):
+            if getattr(self, name) < 1:
+                raise fail(ConfigError, f"journeys, {name}", "at least 1", getattr(self, name))
+
+
+def simulate_journeys(
+    network: StreetNetwork,
+    levels: Levels,
+    plan: CellPlan,
+    settings: SimulationSettings,
+    seed: int,
+) -> Iterator[tuple[str, TrackLog]]:
+    """Make journeys one after another.
+
+    The randomness of route, inertial unit and radio comes from (seed, journey, draw) apart from
+    each other: more journeys or draws, or another noise, change no other journey.
+
+    Parameters
+    ----------
+    network : StreetNetwork
+    levels : callable
+        From positions to levels in the plan's order, as
+        :func:`mapfilter.simulation.reports.level_sampler` makes them.
+    plan : CellPlan
+        In the network's CRS.
+    settings : SimulationSettings
+    seed : int
+        Not negative.
+
+    Yields
+    ------
+    name : str
+        Such as ``journey-0003-draw-000``; names sort in the order of the journeys.
+    log : TrackLog
+
+    Raises
+    ------
+    InputError
+        Plan and network differ in their CRS, or one cannot go as far as wanted.
+    """
+    if not same_crs(plan.crs, network.crs):
+        raise fail(InputError, "cell plan, crs", f"the streets' {network.crs}", plan.crs)
+    for j in range(settings.journeys):
+        along = route(
+            network,
+            settings.journey.length_m,
+            _rng(seed, _ROUTE, j),
+            leg_m=settings.journey.leg_m,
+        )
+        for d in range(settings.draws):
+            rngs = _rng(seed, _IMU, j, d), _rng(seed, _RADIO, j, d)
+            log = simulate_log(network.crs, along, levels, plan, settings, *rngs)
+            yield f"journey-{j:04d}-draw-{d:03d}", log
+
+
+def simulate_log(
+    crs: str,
+    along: Route,
+    levels: Levels,
+    plan: CellPlan,
+    settings: SimulationSettings,
+    imu_rng: np.random.Generator,
+    radio_rng: np.random.Generator,
+) -> TrackLog:
+    """Make one journey along a route; arguments as of :func:`simulate_journeys`."""
+    truth = journey(along, settings.journey)
+    return make_log(
+        crs,
+        motion=noisy_motion(truth, settings.imu, imu_rng),
+        radio=reports(truth, levels, plan, settings.reports, radio_rng),
+        truth=truth,
+        start_utc_s=settings.start_utc_s,
+    )
+
+
+def _rng(seed: int, *key: int) -> np.random.Generator:
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
