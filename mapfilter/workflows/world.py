@@ -1,0 +1,149 @@
+"""What several commands need of the area that a configuration describes: lattice, streets, cells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mapfilter.errors import ConfigError, Faults, InputError
+from mapfilter.geodesy import Lattice, check_bbox, project, projected_crs, utm_crs
+from mapfilter.radio.cells import CellPlan, read_cell_plan
+from mapfilter.roads.buildings import rasterise_heights, read_buildings
+from mapfilter.roads.landuse import read_landuse
+from mapfilter.roads.lattice import RouteLattice
+from mapfilter.roads.osm import read_squares, read_ways
+from mapfilter.roads.pbf import map_bounds_deg, resolve_map
+from mapfilter.roads.routable import route_lattice, route_lattice_from_landuse
+from mapfilter.roads.ways import Buildings, Ways
+from mapfilter.simulation.layout import lay_out_plan
+from mapfilter.workflows.sections import Area, Config
+
+LARGEST_AREA_PX = 400_000_000
+
+
+def area_lattice(area: Area) -> Lattice:
+    """Return the lattice over an area.
+
+    Raises
+    ------
+    InputError, ConfigError
+        The box or the CRS is wrong, the map is missing, or the lattice would be absurdly large.
+    """
+    if area.southwest is not None and area.size_m is not None:
+        lon, lat = area.southwest
+        check_bbox((lon, lat, lon + 1e-6, lat + 1e-6), "area.southwest")
+        crs = projected_crs(area.crs, "area.crs") if area.crs else utm_crs(lon, lat)
+        east, north = project(crs, lon, lat)
+        bounds_m = (
+            float(east), float(north), float(east) + area.size_m[0], float(north) + area.size_m[1],
+        )  # fmt: skip
+    else:
+        box = area.bbox or map_bounds_deg(area.map)
+        check_bbox(box, "area.bbox")
+        west, south, east_deg, north_deg = box
+        centre = (west + east_deg) / 2, (south + north_deg) / 2
+        crs = projected_crs(area.crs, "area.crs") if area.crs else utm_crs(*centre)
+        lon = np.array([west, east_deg, east_deg, west])
+        easts, norths = project(crs, lon, np.array([south, south, north_deg, north_deg]))
+        bounds_m = (
+            float(easts.min()), float(norths.min()), float(easts.max()), float(norths.max()),
+        )  # fmt: skip
+    faults = Faults()
+    if not np.all(np.isfinite(bounds_m)):
+        faults.add("area", f"a box that {crs} can show", bounds_m, "a CRS of another region")
+        faults.raise_if_any(InputError)
+    pixels = np.prod([(bounds_m[i + 2] - bounds_m[i]) / area.resolution_m for i in (0, 1)])
+    if pixels > LARGEST_AREA_PX:
+        faults.add(
+            "area",
+            f"at most {LARGEST_AREA_PX:.0e} pixels",
+            f"{pixels:.1e} at {area.resolution_m:g} m",
+            "a box or a resolution in the wrong unit",
+        )
+    faults.raise_if_any(ConfigError)
+    return Lattice.covering(crs, bounds_m, area.resolution_m)
+
+
+@dataclass(frozen=True)
+class World:
+    """The area of a configuration; each part is read when it is first asked for.
+
+    Parameters
+    ----------
+    config : Config
+        Checked.
+    lattice : Lattice
+        Of the area, or that of rasters that are given.
+    """
+
+    config: Config
+    lattice: Lattice
+
+    @classmethod
+    def of(cls, config: Config) -> World:
+        """Return the world of a configuration's area."""
+        return cls(config, area_lattice(config.area))
+
+    @property
+    def map_name(self) -> str:
+        """Name of the map's file, without its folder."""
+        return resolve_map(self.config.area.map).name
+
+    @cached_property
+    def buildings(self) -> Buildings:
+        """Buildings of the map."""
+        section = self.config.buildings
+        return read_buildings(
+            self.config.area.map,
+            self.lattice.crs,
+            self.lattice.bounds_m,
+            default_height_m=section.default_height_m,
+            storey_height_m=section.storey_m,
+        )
+
+    @cached_property
+    def heights_m(self) -> np.ndarray:
+        """Building heights on the lattice, shape (rows, cols)."""
+        return rasterise_heights(self.buildings, self.lattice)
+
+    @cached_property
+    def ways(self) -> Ways:
+        """Ways of the profile."""
+        profile = self.config.roads.profile
+        return read_ways(self.config.area.map, profile, self.lattice.crs, self.lattice.bounds_m)
+
+    @cached_property
+    def routes(self) -> RouteLattice:
+        """Where one can be: from the ways, or from a land-use raster."""
+        roads = self.config.roads
+        if roads.landuse is not None and roads.landuse_table is not None:
+            landuse = read_landuse(roads.landuse, roads.landuse_table, self.lattice)
+            return route_lattice_from_landuse(landuse, self.lattice, self.ways)
+        walking = roads.profile == "walking"
+        squares = (
+            read_squares(self.config.area.map, self.lattice.crs, self.lattice.bounds_m)
+            if roads.squares and walking
+            else None
+        )
+        buildings = self.buildings if roads.cut_buildings else None
+        return route_lattice(self.ways, squares, buildings, self.lattice, roads.half_width_m)
+
+    @cached_property
+    def plan(self) -> CellPlan:
+        """The cell plan: read, or laid out by rule."""
+        cells = self.config.cells
+        if cells.plan is not None:
+            return read_cell_plan(cells.plan, self.lattice.crs)
+        return lay_out_plan(
+            self.lattice,
+            cells.sites,
+            cells.sectors,
+            cells.indoor,
+            seed=cells.seed,
+            heights_m=self.heights_m,
+            frequency_mhz=cells.frequency_mhz,
+            eirp_dbm=cells.eirp_dbm,
+            site_height_m=cells.height_m,
+        )
