@@ -13,6 +13,7 @@ from rasterio.errors import NotGeoreferencedWarning, RasterioError
 
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs
+from mapfilter.radio._cell_rules import id_fault
 
 Quantity = Literal["level", "loss"]
 
@@ -117,6 +118,9 @@ def _check_bands(where: str, source: Any, faults: Faults) -> None:
         faults.add(
             f"{where}, band {', '.join(nameless[:10])}", "a cell id as band description", "none"
         )
+    for name in filter(None, source.descriptions):
+        if wrong := id_fault(name):
+            faults.add(f"{where}, band {name!r}", *wrong)
     for name, count in Counter(filter(None, source.descriptions)).items():
         if count > 1:
             faults.add(f"{where}, bands", "each cell once", f"{name!r} {count} times")
