@@ -1,1 +1,1 @@
-
+"""Pictures of maps, beliefs and errors; the only room that draws."""

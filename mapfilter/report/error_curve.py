@@ -1,0 +1,119 @@
+"""Error against the distance travelled."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from mapfilter.evaluation.accuracy import (
+    SUCCESS_RADIUS_M,
+    Accuracy,
+    Truth,
+    accuracy,
+    position_errors_m,
+)
+from mapfilter.filters.contract import Status
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.report.basemap import HALO, Floats
+from mapfilter.report.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION, picture
+
+_SIZE_IN = (9.0, 4.8)
+_SEARCHING = "#eeeeee"
+_LOST = "#f7d9c9"
+
+
+def plot_error_over_distance(
+    estimate: TrackEstimate, truth: Truth, path: Path, *, title: str = ""
+) -> None:
+    """Draw the position error over the metres really travelled.
+
+    Marks the switch from searching to tracking, the 50 m that count as success there, the mean and
+    the 67 and 95 % errors after it, and where the filter was searching or lost.
+
+    Parameters
+    ----------
+    estimate : TrackEstimate
+        Epochs without a position leave a gap.
+    truth : Truth
+        The true path, at least one row.
+    path : Path
+        PNG to write.
+    title : str
+        Above the picture; without one, the filter's name.
+
+    Raises
+    ------
+    OutputError
+        The picture cannot be written.
+    """
+    distance_m = truth.distance_at(estimate.time_s)
+    errors_m = position_errors_m(estimate, truth)
+    length_m = max(float(truth.distance_at(truth.time_s[-1])), 1.0)
+    known_m = errors_m[np.isfinite(errors_m)]
+    top_m = 1.15 * max(float(known_m.max(initial=0.0)), 1.1 * SUCCESS_RADIUS_M)
+    with picture(path, *_SIZE_IN) as figure:
+        axes = figure.subplots()
+        axes.set_xlim(0.0, length_m)
+        axes.set_ylim(0.0, top_m)
+        _shade(axes, estimate, distance_m, Status.SEARCHING, _SEARCHING, "searching")
+        _shade(axes, estimate, distance_m, Status.LOST, _LOST, "lost")
+        axes.axhline(
+            SUCCESS_RADIUS_M, color=VERMILLION, linewidth=1.2, linestyle=(0, (5, 3)),
+            label=f"{SUCCESS_RADIUS_M:.0f} m",
+        )  # fmt: skip
+        told_m = estimate.radii_m[:, 2]
+        if np.isfinite(told_m).any():
+            axes.plot(
+                distance_m, told_m, color=ORANGE, linewidth=1.1, label="95 % radius by the filter"
+            )
+        axes.plot(distance_m, errors_m, color=BLUE, linewidth=1.5, label="error")
+        score = accuracy(estimate, truth)
+        if score.switched:
+            _draw_score(axes, score, length_m)
+        else:
+            axes.text(
+                0.5, 0.55, "never switched to tracking", transform=axes.transAxes, ha="center",
+                color=GREY, fontsize=12, path_effects=list(HALO),
+            )  # fmt: skip
+        axes.set_xlabel("distance travelled / m")
+        axes.set_ylabel("position error / m")
+        axes.set_title(title or f"Filter: {estimate.filter}")
+        axes.spines[["top", "right"]].set_visible(False)
+        figure.legend(loc="outside lower center", ncols=4, frameon=False)
+
+
+def _draw_score(axes: Axes, score: Accuracy, length_m: float) -> None:
+    """Draw the switch, and mean and percentiles from there on."""
+    at_m = score.switch_distance_m
+    axes.plot(
+        [at_m], [score.error_at_switch_m], linestyle="", marker="*", markersize=15,
+        color=VERMILLION, markeredgecolor="white", zorder=6, clip_on=False,
+        label=f"switch: {score.error_at_switch_m:.0f} m off after {at_m:.0f} m",
+    )  # fmt: skip
+    figures = (
+        ("mean", score.error_mean_m, "-", BLACK),
+        ("67 %", score.error_67_m, (0, (6, 2)), GREEN),
+        ("95 %", score.error_95_m, (0, (1.5, 1.5)), GREY),
+    )
+    for name, error_m, dashes, colour in figures:
+        if np.isfinite(error_m):
+            axes.plot(
+                [at_m, length_m], [error_m, error_m], color=colour, linewidth=1.4,
+                linestyle=dashes, zorder=5, label=f"{name} after it: {error_m:.1f} m",
+            )  # fmt: skip
+
+
+def _shade(
+    axes: Axes, estimate: TrackEstimate, distance_m: Floats, status: Status, colour: str, name: str
+) -> None:
+    """Shade the stretches during which the filter had a status."""
+    has = np.array([s is status for s in estimate.status], dtype=bool)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], has, [False]]).astype(np.int8)))
+    for index, (first, end) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
+        last = min(int(end), distance_m.size - 1)
+        axes.axvspan(
+            float(distance_m[first]), float(distance_m[last]), color=colour, linewidth=0,
+            zorder=0, label=name if index == 0 else None,
+        )  # fmt: skip
