@@ -1,0 +1,291 @@
+"""Every picture on a small made area: written whole, the same each time, showing the data."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+
+from mapfilter.errors import InputError, OutputError
+from mapfilter.evaluation.accuracy import Truth
+from mapfilter.filters.contract import Reason, Status
+from mapfilter.geodesy import Lattice, grid_convergence_rad, unproject
+from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.snapshot import Snapshot
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.report.basemap import BaseMap, draw_base
+from mapfilter.report.candidates import plot_candidates
+from mapfilter.report.canvas import BLUE, DPI, ORANGE, VERMILLION
+from mapfilter.report.coverage import plot_best_server, plot_level, plot_points_per_cell
+from mapfilter.report.error_curve import plot_error_over_distance
+from mapfilter.report.network import draw_cells
+from mapfilter.report.track import plot_track
+
+CRS = "EPSG:32635"
+WEST_M, NORTH_M = 385_000.0, 6_672_000.0
+
+
+@dataclass(frozen=True)
+class Area:
+    lattice: Lattice
+    base: BaseMap
+    plan: CellPlan
+    truth: Truth
+
+
+@pytest.fixture(scope="session")
+def area() -> Area:
+    lattice = Lattice(CRS, WEST_M, NORTH_M, 5.0, 80, 100)
+    west, south, east, _ = lattice.bounds_m
+    street = np.array([[west, south + 100.0], [east, south + 100.0]])
+    base = BaseMap(lattice.bounds_m, (street,), attribution="© OpenStreetMap contributors")
+    common = {"north_m": south + 200.0, "height_m": 30.0, "eirp_dbm": 55.0, "frequency_mhz": 1800.0}
+    cells = (
+        Cell(id="S1A", site="S1", east_m=west + 250.0, azimuth_deg=90.0, **common),
+        Cell(id="S1$B$", site="S1", east_m=west + 250.0, azimuth_deg=270.0, **common),
+        Cell(id="I1", site="I1", east_m=west + 50.0, azimuth_deg=None, antenna="omni", indoor=True,
+             **common),
+        Cell(id="far", site="far", east_m=west - 9000.0, azimuth_deg=0.0, **common),
+    )  # fmt: skip
+    time_s = np.arange(0.0, 301.0)
+    truth = Truth(time_s, west + 20.0 + 1.4 * time_s, np.full(301, south + 100.0))
+    return Area(lattice, base, CellPlan(CRS, cells), truth)
+
+
+def snapshot(area: Area, count: int, travelled_m: float = 0.0, located: bool = False) -> Snapshot:
+    west, south, _, _ = area.lattice.bounds_m
+    east_m = west + 20.0 + 440.0 * (np.arange(count) + 0.5) / max(count, 1)
+    here = (east_m[0], south + 110.0) if located else (np.nan, np.nan)
+    return Snapshot(
+        travelled_m / 1.4, travelled_m, east_m, np.full(count, south + 100.0),
+        np.full(count, 1 / max(count, 1)), *here,
+        Status.TRACKING if located else Status.SEARCHING,
+    )  # fmt: skip
+
+
+def estimate(area: Area, switch_s: float | None, error_m: float = 10.0) -> TrackEstimate:
+    """Every fifth second; located from ``switch_s`` on, ``error_m`` north of the truth."""
+    fixes = []
+    for time_s in area.truth.time_s[::5].tolist():
+        on = switch_s is not None and time_s >= switch_s
+        status = Status.SEARCHING
+        if on:
+            status = Status.CONVERGED if time_s - 5.0 < switch_s else Status.TRACKING
+        east, north = area.truth.at(time_s)
+        fixes.append(
+            Fix(
+                time_s, float(east) if on else np.nan, float(north) + error_m if on else np.nan,
+                np.full((2, 2), np.nan), np.full(3, np.nan), status, 7, np.nan, 0, np.nan,
+                Reason.USED,
+            )
+        )  # fmt: skip
+    return TrackEstimate.of_fixes(CRS, "candidate", fixes)
+
+
+def png_size(path: Path) -> tuple[int, int]:
+    """Width and height from the header of a whole PNG file."""
+    data = path.read_bytes()
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    assert data[-8:-4] == b"IEND"
+    return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
+
+
+def pixels_near(path: Path, colour: str) -> int:
+    """Count the pixels of a colour, to within the rounding of its channels."""
+    image = imread(path)[:, :, :3]
+    return int((np.abs(image - to_rgb(colour)).max(axis=2) < 0.02).sum())
+
+
+def draw_all(area: Area, folder: Path) -> list[Path]:
+    """Draw every kind of picture once."""
+    west, south, east, _ = area.lattice.bounds_m
+    points = (np.linspace(west, east, 50), np.full(50, south + 100.0))
+    groups = {
+        "S1A": points,
+        "S1$B$": (points[0][:9], points[1][:9] + 50.0),
+        "I1": (points[0][:0],) * 2,
+    }
+    level_dbm = np.linspace(-110, -60, area.lattice.rows * area.lattice.cols)
+    level_dbm = level_dbm.reshape(area.lattice.rows, area.lattice.cols).astype(np.float32)
+    level_dbm[:10] = np.nan
+    best = np.where(np.isnan(level_dbm), -1, np.arange(area.lattice.cols) // 50)
+    names = ("candidates", "points", "best", "level", "error", "track")
+    paths = [folder / f"{name}.png" for name in names]
+    snapshots = [snapshot(area, n, 20.0 * n, located=n == 1) for n in (60, 30, 9, 1)]
+    plot_candidates(snapshots, area.truth, area.base, paths[0])
+    plot_points_per_cell(groups, area.plan, area.base, paths[1], title="Points")
+    plot_best_server(best, ("S1A", "S1$B$"), area.lattice, area.plan, area.base, paths[2])
+    plot_level(level_dbm, area.lattice, area.plan, area.base, paths[3])
+    plot_error_over_distance(estimate(area, 100.0), area.truth, paths[4])
+    plot_track(estimate(area, 100.0), area.truth, area.base, paths[5])
+    return paths
+
+
+def test_same_data_give_same_bytes(area, tmp_path):
+    first, second = draw_all(area, tmp_path / "a"), draw_all(area, tmp_path / "b")
+    for one, other in zip(first, second, strict=True):
+        assert png_size(one) == png_size(other)
+        assert one.read_bytes() == other.read_bytes(), one.name
+    assert sorted(tmp_path.rglob("*")) == sorted([*first, *second, tmp_path / "a", tmp_path / "b"])
+
+
+def test_sizes_follow_the_extent(area, tmp_path):
+    path = tmp_path / "new" / "folder" / "points.png"
+    plot_points_per_cell({}, area.plan, area.base, path)
+    width, height = png_size(path)
+    assert width == pytest.approx((7.0 + 2.7) * DPI, abs=1)
+    # The area is 500 m by 400 m.
+    assert height == pytest.approx((7.0 * 0.8 + 0.85) * DPI, abs=1)
+
+
+def test_drawing_leaves_no_settings_behind(area, tmp_path):
+    before = dict(matplotlib.rcParams)
+    plot_error_over_distance(estimate(area, None), area.truth, tmp_path / "e.png")
+    with pytest.raises(InputError):
+        plot_candidates([], area.truth, area.base, tmp_path / "c.png")
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_more_candidates_more_blue(area, tmp_path):
+    blue = []
+    for count in (0, 3, 200):
+        plot_candidates([snapshot(area, count)], None, area.base, tmp_path / "c.png")
+        blue.append(pixels_near(tmp_path / "c.png", BLUE))
+    assert blue[0] < blue[1] < blue[2]
+
+
+def test_candidates_fade_with_their_weight(area, tmp_path):
+    path = tmp_path / "c.png"
+    even = snapshot(area, 40)
+    plot_candidates([even], None, area.base, path)
+    full = pixels_near(path, BLUE)
+    plot_candidates([replace(even, weight=np.array([1.0] + [0.0] * 39))], None, area.base, path)
+    assert pixels_near(path, BLUE) < full / 4
+
+
+@pytest.mark.parametrize("count", [0, 7])
+def test_number_of_panels(area, tmp_path, count):
+    path = tmp_path / "c.png"
+    with pytest.raises(InputError, match="1 to 6"):
+        plot_candidates([snapshot(area, 5)] * count, area.truth, area.base, path)
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 6])
+def test_each_number_of_panels_fits(area, tmp_path, count):
+    path = tmp_path / "c.png"
+    plot_candidates([snapshot(area, 5)] * count, area.truth, area.base, path)
+    columns = count if count <= 3 else (count + 1) // 2
+    assert png_size(path)[0] == pytest.approx((columns * 4.1 + 0.6) * DPI, abs=1)
+
+
+def test_never_switched(area, tmp_path):
+    plot_error_over_distance(estimate(area, None), area.truth, tmp_path / "e.png")
+    plot_track(estimate(area, None), area.truth, area.base, tmp_path / "t.png")
+    plot_error_over_distance(estimate(area, 100.0), area.truth, tmp_path / "e2.png")
+    star = pixels_near(tmp_path / "e2.png", VERMILLION) - pixels_near(
+        tmp_path / "e.png", VERMILLION
+    )
+    assert star > 100
+
+
+def test_track_without_epochs(area, tmp_path):
+    nothing = TrackEstimate.of_fixes(CRS, "candidate", [])
+    plot_error_over_distance(nothing, area.truth, tmp_path / "e.png")
+    plot_track(nothing, area.truth, area.base, tmp_path / "t.png")
+    plot_track(nothing, None, area.base, tmp_path / "u.png")
+    for name in ("e", "t", "u"):
+        assert min(png_size(tmp_path / f"{name}.png")) > 300
+
+
+def test_track_tells_near_from_far(area, tmp_path):
+    plot_track(estimate(area, 100.0, error_m=10.0), area.truth, area.base, tmp_path / "near.png")
+    plot_track(estimate(area, 100.0, error_m=60.0), area.truth, area.base, tmp_path / "far.png")
+    assert pixels_near(tmp_path / "near.png", ORANGE) == 0
+    assert pixels_near(tmp_path / "near.png", BLUE) > 0
+    assert pixels_near(tmp_path / "far.png", ORANGE) > 0
+    assert pixels_near(tmp_path / "far.png", BLUE) == 0
+
+
+def test_error_plot_shows_lost_and_radius(area, tmp_path):
+    good = estimate(area, 100.0)
+    status = tuple(Status.LOST if 30 <= i < 40 else s for i, s in enumerate(good.status))
+    told = replace(good, status=status, radii_m=np.full((len(good), 3), 25.0))
+    plot_error_over_distance(told, area.truth, tmp_path / "e.png")
+    assert pixels_near(tmp_path / "e.png", ORANGE) > 100
+    assert pixels_near(tmp_path / "e.png", "#f7d9c9") > 1000
+
+
+def test_points_without_streets(area, tmp_path):
+    bare = BaseMap(area.base.bounds_m, points_m=np.array([[WEST_M + 100.0, NORTH_M - 100.0]] * 3))
+    plot_candidates([snapshot(area, 3)], area.truth, bare, tmp_path / "c.png")
+    empty = BaseMap(area.base.bounds_m, points_m=np.empty((0, 2)))
+    plot_candidates([snapshot(area, 3)], area.truth, empty, tmp_path / "c.png")
+
+
+def test_rasters_are_checked(area, tmp_path):
+    path = tmp_path / "r.png"
+    with pytest.raises(InputError, match="80 x 100 pixels"):
+        plot_level(np.zeros((100, 80)), area.lattice, area.plan, area.base, path)
+    with pytest.raises(InputError, match="indices below 1"):
+        plot_best_server(
+            np.ones((80, 100), dtype=int), ("S1A",), area.lattice, area.plan, area.base, path
+        )
+    assert not path.exists()
+
+
+def test_no_cell_heard_anywhere(area, tmp_path):
+    nothing = np.full((80, 100), -1)
+    plot_best_server(nothing, (), area.lattice, area.plan, area.base, tmp_path / "b.png")
+    dark = np.full((80, 100), np.nan)
+    plot_level(dark, area.lattice, area.plan, area.base, tmp_path / "l.png")
+
+
+@pytest.mark.parametrize(
+    "bounds", [(0.0, 0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 1.0), (0.0, 0.0, np.nan, 1)]
+)
+def test_bad_extent(bounds):
+    with pytest.raises(InputError, match="map extent"):
+        BaseMap(bounds)
+
+
+def test_folder_that_cannot_be_written(area, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError):
+        plot_error_over_distance(estimate(area, None), area.truth, tmp_path / "file" / "e.png")
+
+
+def test_sector_arrow_points_along_its_azimuth(area):
+    """At 90° the arrow points to true east, turned from grid east by the grid convergence."""
+    axes = Figure().subplots()
+    frame = draw_base(axes, area.base)
+    plan = CellPlan(CRS, (area.plan["S1A"],))
+    draw_cells(axes, frame, plan, area.base.bounds_m)
+    arrow = next(text for text in axes.texts if text.get_text() == "" and text.arrow_patch)
+    east, north = np.subtract(arrow.xy, arrow.xyann)
+    lon, lat = unproject(CRS, plan.cells[0].east_m, plan.cells[0].north_m)
+    convergence = grid_convergence_rad(CRS, float(lon), float(lat))
+    assert np.arctan2(north, east) == pytest.approx(convergence, abs=1e-9)
+    # West of the central meridian 27° E, grid north lies west of true north.
+    assert convergence < 0
+    assert np.hypot(east, north) == pytest.approx(0.06 * np.hypot(500.0, 400.0))
+
+
+def test_local_frame_and_scale_bar(area):
+    axes = Figure().subplots()
+    frame = draw_base(axes, area.base)
+    x, y = frame(np.array([WEST_M + 12.0]), np.array([NORTH_M - 400.0]))
+    assert (x[0], y[0]) == (12.0, 0.0)
+    # A fifth of 500 m: the longest round length that is no more than a quarter of the width.
+    assert "100 m" in [text.get_text() for text in axes.texts]
+    wide = BaseMap((0.0, 0.0, 9000.0, 9000.0))
+    axes = Figure().subplots()
+    frame = draw_base(axes, wide)
+    x, y = frame(np.array([4500.0]), np.array([3000.0]))
+    assert (x[0], y[0]) == (4.5, 3.0)
+    assert "2 km" in [text.get_text() for text in axes.texts]
+    assert axes.get_xlabel().endswith("km")
