@@ -14,8 +14,9 @@ from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.schema import NEIGHBOUR, SCHEMA, SERVING, Column
 
 _SHOWN_ROWS = 3
-_LONG_STEP_S = 50.0
-_STANDSTILL_MPS = 0.05
+_SELDOM_S = 10.0
+_SOMEWHERE_M = 25.0
+_SLOW_MPS = 0.04
 
 
 def tidy_table(
@@ -176,19 +177,18 @@ def _check_degrees(table: pd.DataFrame, where: str, faults: Faults) -> None:
 
 
 def _check_milliseconds(table: str, rows: pd.DataFrame, where: str, faults: Faults) -> None:
-    """Find times in milliseconds: long between rows, and much slower than anything that moves."""
+    """Find times in milliseconds: rows seldom come, and what gets somewhere goes very slowly."""
     time = np.unique(rows["time_s"].to_numpy())
-    time = time[np.isfinite(time)]
-    if len(time) < 3 or table == "radio":
+    if len(time) < 3 or table == "radio" or not np.isfinite(time).all():
         return
     between_s = float(np.median(np.diff(time)))
     if table == "motion":
-        step_m = rows["step_m"].to_numpy()
-        moved_m = float(np.nansum(np.abs(step_m)))
+        moved_m = float(np.nansum(np.abs(rows["step_m"].to_numpy())))
     else:
-        moved_m = float(np.sum(np.hypot(np.diff(rows["east_m"]), np.diff(rows["north_m"]))))
+        # Not the path's length: the fixes of a parked car jitter.
+        moved_m = float(np.hypot(np.ptp(rows["east_m"]), np.ptp(rows["north_m"])))
     speed_mps = moved_m / (time[-1] - time[0])
-    if between_s >= _LONG_STEP_S and 0 < speed_mps < _STANDSTILL_MPS:
+    if between_s >= _SELDOM_S and moved_m >= _SOMEWHERE_M and speed_mps < _SLOW_MPS:
         got = f"{between_s:g} between rows, hence {speed_mps:.2g} m/s"
         faults.add(f"{where}, time_s", "seconds", got, "milliseconds for s")
 

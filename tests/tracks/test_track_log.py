@@ -1,0 +1,208 @@
+"""The door of track logs: what is mended, what is told, what is refused."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mapfilter.errors import InputError
+from mapfilter.tracks.log import make_log
+
+CRS = "EPSG:32629"
+
+
+def motion(**columns):
+    return pd.DataFrame({"time_s": [1.0, 2.0, 3.0], "step_m": [1.4, 1.5, 1.3]} | columns)
+
+
+def truth(**columns):
+    table = {
+        "time_s": [0.0, 30.0, 60.0],
+        "east_m": [531000.0, 531040.0, 531080.0],
+        "north_m": [4555000.0, 4555001.0, 4555000.0],
+    }
+    return pd.DataFrame(table | columns)
+
+
+def faults_of(**tables):
+    with pytest.raises(InputError) as caught:
+        make_log(tables.pop("crs", CRS), **tables)
+    return str(caught.value)
+
+
+def test_absent_tables_are_empty_and_absent_fields_missing():
+    log = make_log(CRS, motion=motion())
+    assert log.motion["heading_rad"].isna().all()
+    assert list(log.radio.columns) == [
+        "time_s",
+        "role",
+        "cell",
+        "arfcn",
+        "bsic",
+        "level_dbm",
+        "censored",
+        "timing_advance",
+    ]
+    assert len(log.radio) == len(log.gnss) == len(log.truth) == 0
+    assert log.notes == ()
+    assert log.duration_s == 2.0
+    assert log.truth_length_m == 0.0
+
+
+def test_duration_and_truth_length_by_hand():
+    track = truth(east_m=[0.0, 30.0, 30.0], north_m=[1000.0, 1040.0, 1050.0])
+    log = make_log(CRS, truth=track, motion=motion())
+    assert log.duration_s == 60.0
+    assert log.truth_length_m == 60.0
+
+
+def test_a_row_with_a_missing_field_is_kept():
+    radio = pd.DataFrame(
+        {"time_s": [1.0, 1.0], "role": ["serving", "neighbour"], "level_dbm": [np.nan, -80.5]}
+    )
+    log = make_log(CRS, radio=radio, motion=motion(step_m=[1.0, np.nan, 1.0]))
+    assert len(log.radio) == 2
+    assert log.radio["cell"].tolist() == [None, None]
+    assert log.radio["censored"].tolist() == [0, 0]
+    assert log.radio["arfcn"].isna().all()
+    assert len(log.motion) == 3
+
+
+def test_unsorted_rows_are_sorted_and_duplicates_counted():
+    table = pd.DataFrame({"time_s": [2.0, 1.0, 2.0, 2.0], "step_m": [5.0, 4.0, 5.0, 6.0]})
+    log = make_log(CRS, motion=table, notes=["read from a file"])
+    assert log.motion["time_s"].tolist() == [1.0, 2.0, 2.0]
+    # Rows of equal time keep their order.
+    assert log.motion["step_m"].tolist() == [4.0, 5.0, 6.0]
+    assert log.motion.index.tolist() == [0, 1, 2]
+    assert log.notes == (
+        "read from a file",
+        "motion: 1 exact duplicate rows dropped",
+        "motion: out of order in 1 places, sorted by time",
+    )
+
+
+def test_the_callers_table_is_not_changed():
+    table = motion(heading_rad=[4.0, 0.0, 1.0])
+    before = table.copy(deep=True)
+    log = make_log(CRS, motion=table)
+    pd.testing.assert_frame_equal(table, before)
+    assert log.motion["heading_rad"][0] == pytest.approx(4.0 - 2 * np.pi)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("column", ["time_s", "east_m", "north_m"])
+def test_times_and_coordinates_must_be_finite(column, bad):
+    table = truth()
+    table.loc[1, column] = bad
+    assert f"truth row 2, {column}" in faults_of(truth=table)
+
+
+def test_all_faults_of_all_tables_are_told_together():
+    message = faults_of(
+        crs="EPSG:4326",
+        motion=motion(heading_rad=[90.0, 180.0, 45.0], step_m=["1.4", "fast", "1"]),
+        radio=pd.DataFrame({"time_s": [0.0], "role": ["server"], "level_dbm": [35.0]}),
+        gnss=pd.DataFrame({"time_s": [0.0], "north_m": [1.0]}),
+        truth=truth(north_m=[np.nan, 0.0, 0.0]),
+        start_utc_s=1.7e12,
+    )
+    for part in (
+        "degrees given for metres",
+        "motion row 1, heading_rad: expected radians in -2π..2π, found 90.0 "
+        "(likely: degrees given for radians)",
+        "motion row 2, step_m: expected metres, found fast",
+        "radio row 1, role: expected serving or neighbour, found server",
+        "radio row 1, level_dbm: expected dBm in -200..0, found 35.0 "
+        "(likely: raw RXLEV given for dBm)",
+        "gnss: expected a column east_m, found none",
+        "truth row 1, north_m: expected metres north, found nan",
+        "log, start_utc_s: expected UTC seconds, found 1700000000000.0 "
+        "(likely: milliseconds for s)",
+    ):
+        assert part in message
+
+
+def test_many_bad_rows_are_counted():
+    message = faults_of(truth=truth(east_m=[np.nan] * 3).loc[[0, 1, 2, 0, 1]])
+    assert message.count("truth row") == 3
+    assert "2 more rows like these" in message
+
+
+def test_degrees_for_metres():
+    table = truth(east_m=[-8.6235, -8.6231, -8.6227], north_m=[41.1325, 41.1325, 41.1326])
+    assert "likely: degrees given for metres" in faults_of(truth=table)
+    assert "likely: degrees given for metres" in faults_of(gnss=table)
+
+
+def test_a_small_local_frame_is_not_taken_for_degrees():
+    table = truth(east_m=[0.0, 40.0, 80.0], north_m=[0.0, 1.0, 0.0])
+    assert make_log(CRS, truth=table).truth_length_m > 80
+
+
+@pytest.mark.parametrize("start", [0.0, 1.7e12])
+def test_milliseconds_for_seconds(start):
+    time = start + np.arange(25) * 1000.0
+    steps = pd.DataFrame({"time_s": time, "step_m": 1.4})
+    path = pd.DataFrame(
+        {"time_s": time, "east_m": 531000 + 1.4 * np.arange(25), "north_m": 4555000.0}
+    )
+    assert "likely: milliseconds for s" in faults_of(motion=steps)
+    assert "likely: milliseconds for s" in faults_of(truth=path)
+
+
+def test_rare_fixes_of_a_moving_car_are_not_taken_for_milliseconds():
+    path = pd.DataFrame(
+        {"time_s": [0.0, 60.0, 120.0], "east_m": [0.0, 700.0, 1400.0], "north_m": 0.0}
+    )
+    assert len(make_log(CRS, gnss=path).gnss) == 3
+
+
+def test_a_parked_car_is_not_taken_for_milliseconds():
+    rng = np.random.default_rng(0)
+    east, north = 531000 + rng.normal(0, 2, (2, 500))
+    path = pd.DataFrame({"time_s": 30.0 * np.arange(500), "east_m": east, "north_m": north})
+    assert len(make_log(CRS, gnss=path).gnss) == 500
+
+
+def test_a_misspelt_column_is_a_fault_and_a_strange_one_a_note():
+    table = motion().rename(columns={"step_m": "step"})
+    assert "motion, column step" in faults_of(motion=table)
+    assert "likely: heading_rad" in faults_of(motion=motion(heading_deg=[1.0, 2.0, 3.0]))
+    log = make_log(CRS, motion=motion(battery=[1, 2, 3]))
+    assert log.notes == ("motion: column battery is not used",)
+
+
+def test_covariance_must_be_one():
+    table = truth(var_east_m2=[4.0] * 3, var_north_m2=[1.0] * 3, cov_east_north_m2=[2.0, -2.1, 0.0])
+    assert "gnss row 2, cov_east_north_m2" in faults_of(gnss=table)
+    assert "gnss row 1, var_east_m2" in faults_of(gnss=truth(var_east_m2=[-1.0, 1.0, 1.0]))
+
+
+@pytest.mark.parametrize(
+    ("column", "bad"), [("bsic", 2000), ("arfcn", 12.5), ("censored", 2), ("timing_advance", -1)]
+)
+def test_radio_fields_have_ranges(column, bad):
+    radio = pd.DataFrame({"time_s": [0.0], "role": ["serving"], column: [bad]})
+    assert f"radio row 1, {column}" in faults_of(radio=radio)
+
+
+def test_way_ids_keep_all_their_digits():
+    ids = [2**62 + 1, 2**53 + 1, None]
+    table = truth(way_id=pd.array(ids, dtype="Int64"))
+    assert make_log(CRS, truth=table).truth["way_id"].tolist()[:2] == ids[:2]
+
+
+times = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=20)
+
+
+@given(times, st.randoms())
+def test_order_of_the_rows_does_not_matter(time, random):
+    table = pd.DataFrame({"time_s": time, "turn_rad": np.arange(len(time)) / 5})
+    table = table.drop_duplicates("time_s")
+    shuffled = table.sample(frac=1.0, random_state=random.randrange(2**32))
+    once = make_log(CRS, motion=table).motion
+    pd.testing.assert_frame_equal(make_log(CRS, motion=shuffled).motion, once)
+    pd.testing.assert_frame_equal(make_log(CRS, motion=once).motion, once)
+    assert once["time_s"].is_monotonic_increasing

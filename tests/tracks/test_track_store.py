@@ -1,0 +1,226 @@
+"""Logs on disk: round trips, hand-made folders, damage."""
+
+import json
+import shutil
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mapfilter.errors import InputError, OutputError, StoreError
+from mapfilter.tracks.log import make_log
+from mapfilter.tracks.schema import TABLES
+from mapfilter.tracks.store import is_log, list_logs, read_log, write_log
+
+CRS = "EPSG:32629"
+
+
+@pytest.fixture
+def log():
+    return make_log(
+        CRS,
+        motion=pd.DataFrame(
+            {"time_s": [0.1 + 0.2, 2.0], "step_m": [1 / 3, np.nan], "heading_rad": [0.1, -3.0]}
+        ),
+        radio=pd.DataFrame(
+            {
+                "time_s": [1.0, 1.0, 2.0],
+                "role": ["serving", "neighbour", "serving"],
+                "cell": ["NA", None, 'ü, "quoted"/..'],
+                "arfcn": [512, None, 513],
+                "bsic": [0, 63, None],
+                "level_dbm": [-110.5, np.nan, -47.5],
+                "censored": [-1, 0, 1],
+            }
+        ),
+        truth=pd.DataFrame(
+            {
+                "time_s": [0.0, 1.0],
+                "east_m": [531000.1, 531001.2],
+                "north_m": [4555000.0, 4555000.7],
+                "way_id": pd.array([1234567890123, None], dtype="Int64"),
+            }
+        ),
+        start_utc_s=1_190_764_800.25,
+        notes=["made by hand"],
+    )
+
+
+def assert_same(a, b):
+    assert (a.crs, a.start_utc_s, a.notes) == (b.crs, b.start_utc_s, b.notes)
+    for table in TABLES:
+        pd.testing.assert_frame_equal(getattr(a, table), getattr(b, table), check_exact=True)
+
+
+@pytest.mark.parametrize("form", ["parquet", "csv"])
+def test_round_trip(log, tmp_path, form):
+    write_log(log, tmp_path / "walk", form)
+    assert_same(read_log(tmp_path / "walk"), log)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["walk"]
+
+
+@pytest.mark.parametrize("form", ["parquet", "csv"])
+def test_equal_logs_give_equal_bytes(log, tmp_path, form):
+    write_log(log, tmp_path / "a", form)
+    write_log(read_log(tmp_path / "a"), tmp_path / "b", form)
+    for file in (tmp_path / "a").iterdir():
+        assert file.read_bytes() == (tmp_path / "b" / file.name).read_bytes()
+
+
+times, finite = st.floats(-4, 4), st.floats(-1e6, 1e6)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.tuples(times, finite, finite | st.just(np.nan)), max_size=5))
+def test_round_trip_of_any_numbers(tmp_path_factory, rows):
+    folder = tmp_path_factory.mktemp("logs")
+    table = pd.DataFrame(rows, columns=["time_s", "step_m", "turn_rad"], dtype=float)
+    table["turn_rad"] = table["turn_rad"] % 6
+    log = make_log(CRS, motion=table)
+    for form in ("parquet", "csv"):
+        write_log(log, folder / form, form)
+        assert_same(read_log(folder / form), log)
+
+
+def test_a_hand_made_folder_needs_only_the_crs(tmp_path):
+    (tmp_path / "log.json").write_text('{"crs": "EPSG:32629"}')
+    (tmp_path / "motion.csv").write_text("\ufefftime_s,step_m\n2,1.5\n1,1.4\n", encoding="utf-8")
+    log = read_log(tmp_path)
+    assert log.motion["step_m"].tolist() == [1.4, 1.5]
+    assert len(log.radio) == 0
+    assert log.notes == (f"{tmp_path / 'motion.csv'}: out of order in 1 places, sorted by time",)
+
+
+def test_faults_name_file_and_row(tmp_path):
+    (tmp_path / "log.json").write_text("{}")
+    (tmp_path / "motion.csv").write_text("time_s,step_m\n1,1.4\nsoon,1.5\n")
+    (tmp_path / "truth.csv").write_text("time_s,east_m,north_m\n1,531000,\n")
+    with pytest.raises(InputError) as caught:
+        read_log(tmp_path)
+    message = str(caught.value)
+    assert "log, crs: expected a projected CRS in metres, found none" in message
+    assert f"{tmp_path / 'motion.csv'} row 2, time_s: expected seconds, found soon" in message
+    assert (
+        f"{tmp_path / 'truth.csv'} row 1, north_m: expected metres north, found nothing" in message
+    )
+
+
+@pytest.mark.parametrize("content", [b"", b"time_s,step_m\n1,2,3,4\n", b"\xff\xfe\x00", b'a,"b\n1'])
+def test_unreadable_csv(tmp_path, content):
+    (tmp_path / "log.json").write_text('{"crs": "EPSG:32629"}')
+    (tmp_path / "motion.csv").write_bytes(content)
+    with pytest.raises(InputError, match=r"motion\.csv"):
+        read_log(tmp_path)
+
+
+@pytest.mark.parametrize("content", [b"", b"PAR1", b"no parquet at all"])
+def test_unreadable_parquet(tmp_path, content):
+    (tmp_path / "log.json").write_text('{"crs": "EPSG:32629"}')
+    (tmp_path / "gnss.parquet").write_bytes(content)
+    with pytest.raises(InputError, match=r"gnss\.parquet.*cut off"):
+        read_log(tmp_path)
+
+
+def test_two_files_of_one_table(tmp_path, log):
+    write_log(log, tmp_path / "walk")
+    (tmp_path / "walk" / "log.json").write_text('{"crs": "EPSG:32629"}')
+    (tmp_path / "walk" / "motion.csv").write_text("time_s\n1\n")
+    with pytest.raises(InputError, match="both Parquet and CSV"):
+        read_log(tmp_path / "walk")
+
+
+def damaged(log, folder, change):
+    write_log(log, folder, "csv")
+    head = json.loads((folder / "log.json").read_text())
+    change(head)
+    (folder / "log.json").write_text(json.dumps(head))
+
+
+def test_a_newer_version_is_refused(log, tmp_path):
+    damaged(log, tmp_path / "walk", lambda head: head.update(version=2))
+    with pytest.raises(StoreError, match="newer mapfilter"):
+        read_log(tmp_path / "walk")
+
+
+def test_another_format_is_refused(log, tmp_path):
+    damaged(log, tmp_path / "walk", lambda head: head.update(format="mapfilter estimate"))
+    with pytest.raises(StoreError, match="mapfilter track log"):
+        read_log(tmp_path / "walk")
+
+
+def test_strange_heads_are_refused(log, tmp_path):
+    damaged(log, tmp_path / "walk", lambda head: head.update(notes="one", crss="EPSG:32629"))
+    with pytest.raises(InputError, match="unknown key") as caught:
+        read_log(tmp_path / "walk")
+    assert "a list of texts" in str(caught.value)
+
+
+@pytest.mark.parametrize("parts", [None, 3, ["motion.csv"], [{"path": "../motion.csv"}]])
+def test_parts_must_be_tables_of_the_folder(log, tmp_path, parts):
+    damaged(log, tmp_path / "walk", lambda head: head.update(parts=parts))
+    with pytest.raises(StoreError, match="tables of a log"):
+        read_log(tmp_path / "walk")
+
+
+@pytest.mark.parametrize("form", ["parquet", "csv"])
+def test_cut_off_missing_and_changed_parts_are_all_named(log, tmp_path, form):
+    folder = tmp_path / "walk"
+    write_log(log, folder, form)
+    radio, motion = folder / f"radio.{form}", folder / f"motion.{form}"
+    radio.write_bytes(radio.read_bytes()[:-3])
+    content = bytearray(motion.read_bytes())
+    content[-1] ^= 1
+    motion.write_bytes(bytes(content))
+    (folder / f"truth.{form}").unlink()
+    with pytest.raises(StoreError) as caught:
+        read_log(folder)
+    message = str(caught.value)
+    assert f"radio.{form}" in message
+    assert "likely: cut off" in message
+    assert f"motion.{form}: expected SHA-256" in message
+    assert f"truth.{form}: expected a table of the log, found no such file" in message
+
+
+def test_a_cut_off_head(log, tmp_path):
+    write_log(log, tmp_path / "walk")
+    head = tmp_path / "walk" / "log.json"
+    head.write_bytes(head.read_bytes()[:40])
+    with pytest.raises(StoreError, match=r"log\.json"):
+        read_log(tmp_path / "walk")
+
+
+def test_finding_logs(log, tmp_path):
+    for name in ("b", "a"):
+        write_log(log, tmp_path / name)
+    (tmp_path / "c").mkdir()
+    assert list_logs(tmp_path) == [tmp_path / "a", tmp_path / "b"]
+    assert list_logs(tmp_path / "a") == [tmp_path / "a"]
+    assert is_log(tmp_path / "a")
+    assert not is_log(tmp_path)
+    for path in (tmp_path / "c", tmp_path / "nowhere"):
+        with pytest.raises(InputError, match="track log"):
+            list_logs(path)
+        with pytest.raises(InputError, match="track log"):
+            read_log(path)
+
+
+def test_writing_replaces_a_log_and_nothing_else(log, tmp_path):
+    write_log(log, tmp_path / "walk", "csv")
+    write_log(log, tmp_path / "walk", "parquet")
+    assert not (tmp_path / "walk" / "motion.csv").exists()
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos" / "cat.jpg").write_bytes(b"cat")
+    with pytest.raises(InputError, match="other files"):
+        write_log(log, tmp_path / "photos")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError):
+        write_log(log, tmp_path / "file")
+    assert (tmp_path / "photos" / "cat.jpg").read_bytes() == b"cat"
+
+
+def test_a_log_can_be_moved(log, tmp_path):
+    write_log(log, tmp_path / "a")
+    shutil.move(tmp_path / "a", tmp_path / "b")
+    assert_same(read_log(tmp_path / "b"), log)
