@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import floor, log10
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgb
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
@@ -34,7 +35,9 @@ class BaseMap:
     streets : tuple of (k, 2) arrays
         Lines as east, north.
     points_m : (n, 2) array or None
-        Places where one can be, as east, north; drawn as faint dots where there are no streets.
+        Places where one can be, as east, north, on a lattice; drawn as pale pixels.
+    resolution_m : float
+        Distance between neighbouring points.
     attribution : str
         Whose map it is, such as "© OpenStreetMap contributors"; drawn small in a corner.
 
@@ -48,6 +51,7 @@ class BaseMap:
     streets: tuple[Floats, ...] = ()
     points_m: Floats | None = None
     attribution: str = ""
+    resolution_m: float = 5.0
 
     def __post_init__(self) -> None:
         west, south, east, north = self.bounds_m
@@ -56,6 +60,8 @@ class BaseMap:
             faults.add("map extent", "four finite numbers", self.bounds_m)
         elif west >= east or south >= north:
             faults.add("map extent", "west < east and south < north", self.bounds_m)
+        if not (np.isfinite(self.resolution_m) and self.resolution_m > 0):
+            faults.add("map resolution", "metres > 0", self.resolution_m)
         faults.raise_if_any(InputError)
 
     @property
@@ -66,7 +72,7 @@ class BaseMap:
 
     def zoomed(self, bounds_m: Bounds) -> BaseMap:
         """Return the same map with another extent (and so another local origin)."""
-        return BaseMap(bounds_m, self.streets, self.points_m, self.attribution)
+        return replace(self, bounds_m=bounds_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,9 +119,8 @@ def draw_base(
     west, south, east, north = base.bounds_m
     in_km = max(east - west, north - south) > _KILOMETRE_FROM_M
     frame = LocalFrame(west, south, 1000.0 if in_km else 1.0)
-    if not base.streets and base.points_m is not None:
-        x, y = frame(base.points_m[:, 0], base.points_m[:, 1])
-        axes.scatter(x, y, s=2, marker="s", linewidths=0, color=STREET, zorder=1)
+    if base.points_m is not None and len(base.points_m):
+        _draw_points(axes, frame, base.points_m, base.resolution_m)
     lines = [np.column_stack(frame(line[:, 0], line[:, 1])) for line in base.streets]
     if lines:
         axes.add_collection(LineCollection(lines, colors=streets, linewidths=0.6, zorder=1.5))
@@ -139,6 +144,18 @@ def attribute(axes: Axes, base: BaseMap) -> None:
             0.992, 0.01, base.attribution, transform=axes.transAxes, ha="right", va="bottom",
             fontsize=6.5, color=GREY, path_effects=list(HALO), zorder=20,
         )  # fmt: skip
+
+
+def _draw_points(axes: Axes, frame: LocalFrame, points_m: Floats, resolution_m: float) -> None:
+    """Draw points as the pixels that they are the centres of."""
+    low = points_m.min(axis=0)
+    col, row = np.rint((points_m - low) / resolution_m).astype(np.int64).T
+    pixels = np.zeros((int(row.max()) + 1, int(col.max()) + 1, 4))
+    pixels[..., :3] = to_rgb(STREET)
+    pixels[row, col, 3] = 0.75
+    edges = low - resolution_m / 2, points_m.max(axis=0) + resolution_m / 2
+    x, y = frame(*np.transpose(edges))
+    axes.imshow(pixels, extent=(x[0], x[1], y[0], y[1]), origin="lower", zorder=1)
 
 
 def _draw_scale_bar(axes: Axes, width_m: float) -> None:

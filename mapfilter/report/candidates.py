@@ -115,7 +115,7 @@ def _draw_snapshot(axes: Axes, frame: LocalFrame, snapshot: Snapshot, truth: Tru
 def _legend(*, with_truth: bool) -> list[Line2D]:
     """Return what the marks of the panels mean."""
     handles = [
-        Line2D([], [], color=STREET, linewidth=2, label="streets"),
+        Line2D([], [], color=STREET, linewidth=2, label="where one can be"),
         Line2D([], [], linestyle="", marker="o", markersize=5, color=BLUE, label="candidates"),
     ]
     if with_truth:
