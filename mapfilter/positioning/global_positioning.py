@@ -240,11 +240,9 @@ def _first_known(events: Sequence[Event[str]], points_of: PointsOf) -> int:
 def _with_ways(database: RadioRouteDatabase, fixes: Sequence[Fix]) -> list[Fix]:
     """Match each position to the way of the database point nearest to it."""
     points = database.points()
-    order = np.lexsort((points.col, points.row))
-    index = CellPointIndex.of_points(database.lattice, points.row[order], points.col[order])
+    index = CellPointIndex.of_points(database.lattice, points.row, points.col)
     nearest, _ = index.nearest([f.east_m for f in fixes], [f.north_m for f in fixes])
-    ways = points.way_id[order]
     return [
-        replace(fix, way_id=int(ways[point])) if point >= 0 else fix
+        replace(fix, way_id=int(points.way_id[point])) if point >= 0 else fix
         for fix, point in zip(fixes, nearest.tolist(), strict=True)
     ]

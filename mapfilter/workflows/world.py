@@ -1,4 +1,4 @@
-"""What several commands need of the area that a configuration describes: lattice, streets, cells."""
+"""What several commands need of a configuration's area: lattice, streets, cells."""
 
 from __future__ import annotations
 

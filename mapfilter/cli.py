@@ -1,0 +1,230 @@
+"""The command line: parses, calls one workflow, prints. Logs and progress go to stderr."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mapfilter import __version__
+from mapfilter.errors import MapfilterError
+
+if TYPE_CHECKING:
+    from mapfilter._parallel import Progress
+
+DONE, WRONG, PARTIAL = 0, 2, 3
+
+app = typer.Typer(
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    no_args_is_help=True,
+    help="Find where a phone or a vehicle is without GNSS.",
+)
+
+ConfigOption = Annotated[
+    Path | None, typer.Option("-c", "--config", metavar="FILE", help="Configuration (TOML).")
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Change one setting; repeatable."),
+]
+OutOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Output folder.")]
+SeedOption = Annotated[int | None, typer.Option("--seed", min=0, help="Seed of what is drawn.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on one line.")]
+PathArgument = Annotated[Path, typer.Argument(metavar="PATH")]
+
+
+@app.command()
+def demo(
+    out: OutOption = None,
+    seed: SeedOption = None,
+    settings: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """The whole chain on the embedded map of central Helsinki."""
+    from mapfilter.workflows.demo import run_demo
+
+    with _progress("demo") as progress:
+        result = run_demo(
+            (out or Path("mapfilter-demo")).absolute(), settings or (), seed=seed, progress=progress
+        )
+    _print(result, as_json)
+
+
+@app.command()
+def predict(
+    config: ConfigOption = None,
+    settings: SetOption = None,
+    out: OutOption = None,
+    seed: SeedOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Cell plan and buildings to RxLev rasters, and a perturbed set that plays reality."""
+    from mapfilter.workflows.config import load_config
+    from mapfilter.workflows.predict import run_predict
+
+    seeded = _seeded(settings, seed, "prediction.seed", "prediction.reality.seed")
+    with _progress("predict") as progress:
+        result = run_predict(load_config(config, seeded, out=out), progress)
+    _print(result, as_json)
+
+
+@app.command()
+def build(
+    config: ConfigOption = None,
+    settings: SetOption = None,
+    out: OutOption = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Only tell size, memory and time.")
+    ] = False,
+    workers: Annotated[int, typer.Option("--workers", min=1, help="Local processes.")] = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """RxLev rasters and roads to a radio-route database."""
+    from mapfilter.workflows.build import run_build, run_dry_build
+    from mapfilter.workflows.config import load_config
+
+    loaded = load_config(config, settings or (), out=out)
+    if dry_run:
+        _print(run_dry_build(loaded), as_json)
+        return
+    with _progress("build") as progress:
+        result = run_build(loaded, workers=workers, progress=progress)
+    _print(result, as_json)
+
+
+@app.command()
+def export(
+    database: Annotated[Path, typer.Argument(metavar="DB")],
+    to: Annotated[Path, typer.Option("--to", metavar="FILE", help="A .gpkg file.")],
+    as_json: JsonOption = False,
+) -> None:
+    """A radio-route database to a GeoPackage."""
+    from mapfilter.workflows.export import run_export
+
+    _print(run_export(database, to), as_json)
+
+
+@app.command()
+def info(path: PathArgument, as_json: JsonOption = False) -> None:
+    """What a database, raster set or log holds."""
+    from mapfilter.workflows.info import run_info
+
+    _print(run_info(path), as_json)
+
+
+@app.command()
+def simulate(
+    config: ConfigOption = None,
+    settings: SetOption = None,
+    out: OutOption = None,
+    seed: SeedOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Journeys with truth over a database's area."""
+    from mapfilter.workflows.config import load_config
+    from mapfilter.workflows.simulate import run_simulate
+
+    seeded = _seeded(settings, seed, "journeys.seed")
+    with _progress("simulate") as progress:
+        result = run_simulate(load_config(config, seeded, out=out), progress)
+    _print(result, as_json)
+
+
+@app.command()
+def replay(
+    database: Annotated[Path | None, typer.Option("--db", metavar="DB", help="Database.")] = None,
+    log: Annotated[
+        Path | None, typer.Option("--log", metavar="LOG", help="A log, or a folder of logs.")
+    ] = None,
+    filter_name: Annotated[
+        str | None, typer.Option("--filter", metavar="NAME", help="candidate.")
+    ] = None,
+    config: ConfigOption = None,
+    settings: SetOption = None,
+    out: OutOption = None,
+    seed: SeedOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Locate one log, or every log of a folder; exit code 3 if some cells were unknown."""
+    from mapfilter.workflows.config import load_config
+    from mapfilter.workflows.replay import replay_facts, run_replay
+
+    given = _seeded(settings, seed, "journeys.seed")
+    for key, value in (("database.path", database), ("track.path", log)):
+        if value is not None:
+            given.append(f"{key}={json.dumps(str(value))}")
+    if filter_name is not None:
+        given.append(f"filter.name={json.dumps(filter_name)}")
+    loaded = load_config(config, given)
+    folder = (out or loaded.output.dir / "replay").absolute()
+    with _progress("replay") as progress:
+        result = run_replay(loaded, folder, progress=progress)
+    _print(replay_facts(result), as_json)
+    if result.partial:
+        _say("some cells are unknown to the database; their readings are labelled unknown_cell")
+        raise typer.Exit(PARTIAL)
+
+
+@app.callback(invoke_without_command=True)
+def _version(
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    if version:
+        sys.stdout.write(f"mapfilter {__version__}\n")
+        raise typer.Exit(DONE)
+
+
+def main() -> None:
+    """Run the command line; a user's error is one clear message and exit code 2."""
+    try:
+        app()
+    except MapfilterError as error:
+        _say(str(error), "error: ")
+        sys.exit(WRONG)
+    except KeyboardInterrupt:
+        _say("interrupted; nothing half-written is left")
+        sys.exit(130)
+
+
+def _seeded(settings: list[str] | None, seed: int | None, *keys: str) -> list[str]:
+    """Return the settings with a seed for each key, after what was set by name."""
+    seeds = [] if seed is None else [f"{key}={seed}" for key in keys]
+    return [*(settings or ()), *seeds]
+
+
+def _say(text: str, kind: str = "") -> None:
+    for line in text.splitlines():
+        sys.stderr.write(f"mapfilter: {kind}{line}\n")
+
+
+@contextlib.contextmanager
+def _progress(label: str) -> Iterator[Progress | None]:
+    """Give a progress bar on stderr, or nothing when nobody watches."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import Progress as Bar
+
+    with Bar(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(label)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def _print(result: Any, as_json: bool) -> None:
+    """Print a result: one JSON line, or one line for each figure."""
+    from mapfilter.workflows.facts import facts, text_lines
+
+    found = facts(result)
+    if as_json:
+        sys.stdout.write(json.dumps(found, ensure_ascii=False, allow_nan=False) + "\n")
+        return
+    for line in text_lines(found):
+        sys.stdout.write(line + "\n")

@@ -1,0 +1,65 @@
+"""``mapfilter info``: what a database, a raster set or a log holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from mapfilter.database.store import MANIFEST, info, open_database
+from mapfilter.errors import InputError, fail
+from mapfilter.radio.rasters import open_rasters
+from mapfilter.tracks.schema import TABLES
+from mapfilter.tracks.store import is_log, list_logs, read_log
+
+
+def run_info(path: Path) -> dict[str, Any]:
+    """Return what is at a path, ready for JSON; a database's checksums are compared.
+
+    Raises
+    ------
+    MapfilterError
+        It is nothing that mapfilter reads, or it is damaged.
+    """
+    if not path.exists():
+        raise fail(InputError, str(path), "a database, raster file or log", "nothing there")
+    if path.is_file():
+        return _raster_info(path)
+    if (path / MANIFEST).exists():
+        return {"kind": "database", **info(open_database(path, verify="full"))}
+    if is_log(path):
+        return _log_info(path)
+    logs = list_logs(path)
+    if logs:
+        return {"kind": "logs", "logs": len(logs), "first": logs[0].name, "last": logs[-1].name}
+    hint = "a folder that was not written whole" if any(path.iterdir()) else "an empty folder"
+    raise fail(InputError, str(path), f"{MANIFEST} or a log", "neither", hint)
+
+
+def _raster_info(path: Path) -> dict[str, Any]:
+    rasters = open_rasters(path)
+    lattice = rasters.lattice
+    return {
+        "kind": "rasters",
+        "cells": len(rasters.cell_ids),
+        "cell_ids": list(rasters.cell_ids),
+        "quantity": rasters.quantity,
+        "crs": lattice.crs,
+        "bounds_m": list(lattice.bounds_m),
+        "resolution_m": lattice.resolution_m,
+        "rows": lattice.rows,
+        "cols": lattice.cols,
+        "bytes": path.stat().st_size,
+    }
+
+
+def _log_info(path: Path) -> dict[str, Any]:
+    log = read_log(path)
+    return {
+        "kind": "log",
+        "crs": log.crs,
+        "start_utc_s": log.start_utc_s,
+        "duration_s": log.duration_s,
+        "truth_length_m": log.truth_length_m,
+        "rows": {name: len(getattr(log, name)) for name in TABLES},
+        "notes": list(log.notes),
+    }

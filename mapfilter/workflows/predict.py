@@ -1,0 +1,119 @@
+"""``mapfilter predict``: cell plan and buildings to RxLev rasters, and a set that plays reality."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from mapfilter import __version__
+from mapfilter._io import ensure_writable_folder
+from mapfilter._parallel import Progress
+from mapfilter.radio.cells import write_cell_plan
+from mapfilter.radio.predict import (
+    PredictionModel,
+    RealityErrors,
+    outside_validity,
+    predict,
+    realise,
+)
+from mapfilter.radio.rasters import write_rasters
+from mapfilter.workflows.sections import Config, Prediction
+from mapfilter.workflows.world import World
+
+
+@dataclass(frozen=True)
+class PredictResult:
+    """What was predicted.
+
+    Parameters
+    ----------
+    cells, rows, cols : int
+        Counts of cells and pixels.
+    rasters : Path
+        The predicted levels.
+    reality : Path or None
+        The levels that play reality, where asked for.
+    plan : Path
+        The cell plan used, as CSV.
+    notes : tuple of str
+        Where building heights come from, and what lies outside the model's published range.
+    """
+
+    cells: int
+    rows: int
+    cols: int
+    rasters: Path
+    reality: Path | None
+    plan: Path
+    notes: tuple[str, ...]
+
+
+def run_predict(config: Config, progress: Progress | None = None) -> PredictResult:
+    """Predict every cell of the plan over the area.
+
+    Raises
+    ------
+    MapfilterError
+        The area, map or plan is wrong, or the output cannot be written.
+    """
+    world = World.of(config)
+    target, reality = config.rasters_path, config.reality_path
+    for path in (target, reality, config.output.dir / "x"):
+        ensure_writable_folder(path.parent)
+    plan, lattice, model = world.plan, world.lattice, _model(config.prediction)
+    notes = (world.buildings.told, *outside_validity(plan, lattice, model))
+    heights_m = world.heights_m
+    wanted = 2 if config.prediction.reality.write else 1
+    tags = {"SOFTWARE": f"mapfilter {__version__}", "MODEL": model.model, "MAP": world.map_name}
+    levels = predict(plan, lattice, heights_m, model, _part(progress, 0, wanted))
+    write_rasters(target, lattice, levels, plan.ids, tags)
+    if wanted == 2:
+        errors = _errors(config.prediction)
+        real = realise(plan, lattice, heights_m, model, errors, _part(progress, 1, wanted))
+        write_rasters(reality, lattice, real, plan.ids, {**tags, "PLAYS": "reality"})
+    plan_path = config.output.dir / "cells.csv"
+    write_cell_plan(plan, plan_path)
+    return PredictResult(
+        len(plan),
+        lattice.rows,
+        lattice.cols,
+        target,
+        reality if wanted == 2 else None,
+        plan_path,
+        notes,
+    )
+
+
+def _model(section: Prediction) -> PredictionModel:
+    return PredictionModel(
+        model=section.model,
+        metropolitan=section.metropolitan,
+        mobile_height_m=section.mobile_height_m,
+        street_width_m=section.street_width_m,
+        building_separation_m=section.building_separation_m,
+        default_roof_height_m=section.default_roof_height_m,
+        shadowing_db=section.shadowing_db,
+        shadowing_correlation_m=section.shadowing_correlation_m,
+        site_share=section.site_share,
+        seed=section.seed,
+    )
+
+
+def _errors(section: Prediction) -> RealityErrors:
+    reality = section.reality
+    return RealityErrors(
+        level_error_db=reality.level_error_db,
+        correlation_m=reality.correlation_m,
+        site_share=reality.site_share,
+        eirp_error_db=reality.eirp_error_db,
+        azimuth_error_deg=reality.azimuth_error_deg,
+        slope_error=reality.slope_error,
+        seed=reality.seed,
+    )
+
+
+def _part(progress: Progress | None, part: int, parts: int) -> Progress | None:
+    """Return a progress that counts one of several equal parts of the work."""
+    if progress is None:
+        return None
+    return lambda done, total: progress(part * total + done, parts * total)

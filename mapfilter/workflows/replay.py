@@ -1,0 +1,191 @@
+"""``mapfilter replay``: locates one log, or every log of a folder, and scores it against truth."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mapfilter._io import ensure_writable_folder, write_json
+from mapfilter._parallel import Progress
+from mapfilter.database.store import open_database
+from mapfilter.errors import InputError, fail
+from mapfilter.evaluation.accuracy import Accuracy, accuracy
+from mapfilter.evaluation.success import SuccessSummary, summarise
+from mapfilter.filters.candidate import CandidateOptions
+from mapfilter.filters.contract import Reason
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
+from mapfilter.positioning.global_positioning import (
+    PositionedTrack,
+    cell_points,
+    position_by_candidates,
+)
+from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.store import list_logs, read_log
+from mapfilter.workflows.pictures import draw_track
+from mapfilter.workflows.sections import Config, FilterSection
+from mapfilter.workflows.truth import truth_of
+
+
+@dataclass(frozen=True)
+class ReplayedLog:
+    """One log, located.
+
+    Parameters
+    ----------
+    name : str
+        Of the log's folder.
+    accuracy : Accuracy or None
+        Against the truth, where the log has it.
+    unused : dict
+        How many readings were not used, by reason.
+    filter_s : float
+        Processor time of the filter.
+    outputs : tuple of Path
+        Files written.
+    """
+
+    name: str
+    accuracy: Accuracy | None
+    unused: dict[str, int]
+    filter_s: float
+    outputs: tuple[Path, ...]
+
+
+@dataclass(frozen=True)
+class ReplayResult:
+    """All logs, located.
+
+    Parameters
+    ----------
+    filter : str
+        Its name.
+    logs : tuple of ReplayedLog
+        In the order of their names.
+    summary : SuccessSummary or None
+        Over the logs with truth.
+    partial : bool
+        Whether some cells were unknown to the database.
+    out : Path
+        Folder of the results.
+    """
+
+    filter: str
+    logs: tuple[ReplayedLog, ...]
+    summary: SuccessSummary | None
+    partial: bool
+    out: Path
+
+
+def run_replay(
+    config: Config,
+    out: Path,
+    *,
+    progress: Progress | None = None,
+    attribution: str = "",
+) -> ReplayResult:
+    """Locate the log or logs of a configuration and write estimates, figures and pictures.
+
+    Parameters
+    ----------
+    config : Config
+        Its database, track, filter and output sections count.
+    out : Path
+        Folder of the results; one log writes straight into it, several into a folder each.
+    progress : callable, optional
+        Called with logs done and logs in all.
+    attribution : str
+        Whose map the pictures show.
+
+    Raises
+    ------
+    MapfilterError
+        The database or a log is missing or damaged, or the output cannot be written.
+    """
+    database = open_database(config.database_path, verify="full")
+    folders = list_logs(config.track_path)
+    if not folders:
+        raise fail(InputError, str(config.track_path), "a log, or a folder of logs", "none")
+    ensure_writable_folder(out)
+    points_of = cell_points(database, config.filter.margin_db)
+    options = candidate_options(config.filter, database.lattice.resolution_m)
+    logs: list[ReplayedLog] = []
+    scores: list[Accuracy] = []
+    for index, folder in enumerate(folders):
+        log = read_log(folder)
+        rng = np.random.default_rng([config.journeys.seed, index])
+        track = position_by_candidates(database, points_of, log, options, rng)
+        into = out if len(folders) == 1 else out / folder.name
+        drawn = config.output.pictures == "all" or (config.output.pictures == "first" and not index)
+        pictures: tuple[Path, ...] = ()
+        if drawn:
+            pictures = draw_track(database, log, track, into, attribution=attribution)
+        logs.append(_write(folder.name, log, track, into, pictures))
+        score = logs[-1].accuracy
+        if score is not None:
+            scores.append(score)
+        if progress is not None:
+            progress(index + 1, len(folders))
+    summary = summarise(scores) if scores else None
+    if summary is not None and len(folders) > 1:
+        write_json(out / "summary.json", finite(asdict(summary)))
+    unknown = any(str(Reason.UNKNOWN_CELL) in log.unused for log in logs)
+    return ReplayResult("candidate", tuple(logs), summary, unknown, out)
+
+
+def candidate_options(section: FilterSection, resolution_m: float) -> CandidateOptions:
+    """Return the reading of the paper that a configuration asks for."""
+    return CandidateOptions(
+        resolution_m=resolution_m,
+        update_length_m=section.update_length_m,
+        tracking_length_m=section.tracking_length_m,
+        prediction=section.prediction,
+        duplicates=section.duplicates,
+        threshold=section.threshold,
+        at_threshold=section.at_threshold,
+        switch_check=section.switch_check,
+        when_empty=section.when_empty,
+    )
+
+
+def finite(values: dict[str, Any]) -> dict[str, Any]:
+    """Replace NaN and infinity, which JSON does not know, by None."""
+    return {
+        key: None if isinstance(value, float) and not math.isfinite(value) else value
+        for key, value in values.items()
+    }
+
+
+def _write(
+    name: str, log: TrackLog, track: PositionedTrack, out: Path, pictures: tuple[Path, ...]
+) -> ReplayedLog:
+    files = tuple(out / f"estimate.{kind}" for kind in ("parquet", "gpx", "geojson"))
+    write_estimate(track.estimate, files[0])
+    write_gpx(track.estimate, files[1], name)
+    write_geojson(track.estimate, files[2])
+    truth = truth_of(log)
+    score = accuracy(track.estimate, truth) if truth is not None else None
+    unused = _count_reasons(track.estimate)
+    figures: dict[str, Any] = {
+        "log": name,
+        "filter": track.estimate.filter,
+        "epochs": len(track.estimate),
+        "unused": unused,
+        "notes": list(log.notes),
+        **(finite(asdict(score)) if score is not None else {}),
+    }
+    write_json(out / "figures.json", figures)
+    return ReplayedLog(
+        name, score, unused, track.filter_s, (*files, out / "figures.json", *pictures)
+    )
+
+
+def _count_reasons(estimate: TrackEstimate) -> dict[str, int]:
+    counts: dict[str, int] = {}
+    for reading in estimate.unused:
+        counts[str(reading.reason)] = counts.get(str(reading.reason), 0) + 1
+    return dict(sorted(counts.items()))

@@ -1,0 +1,99 @@
+"""``mapfilter simulate``: journeys with truth, along the streets of the area."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mapfilter._io import atomic_dir
+from mapfilter._parallel import Progress
+from mapfilter.radio.rasters import check_against_plan, open_rasters
+from mapfilter.roads.network import street_network
+from mapfilter.simulation.imu import ImuErrors
+from mapfilter.simulation.journeys import JourneyPlan
+from mapfilter.simulation.reports import ReportModel, level_sampler
+from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
+from mapfilter.tracks.store import write_log
+from mapfilter.workflows.sections import Config
+from mapfilter.workflows.world import World
+
+
+@dataclass(frozen=True)
+class SimulateResult:
+    """What was simulated.
+
+    Parameters
+    ----------
+    logs : int
+        Journeys times draws.
+    track_m : float
+        True length of each journey.
+    path : Path
+        Folder that holds one log folder for each.
+    """
+
+    logs: int
+    track_m: float
+    path: Path
+
+
+def run_simulate(config: Config, progress: Progress | None = None) -> SimulateResult:
+    """Simulate journeys and write their logs; a folder of older logs is replaced as a whole.
+
+    Raises
+    ------
+    MapfilterError
+        The area, map, plan or rasters are wrong, or the output cannot be written.
+    """
+    world = World.of(config)
+    section = config.journeys
+    as_predicted = section.radio == "as_predicted"
+    rasters = open_rasters(config.rasters_path if as_predicted else config.reality_path)
+    check_against_plan(rasters, world.plan)
+    network = street_network(world.ways, world.routes)
+    levels = level_sampler(rasters, world.plan.ids, world.lattice.bounds_m)
+    settings = simulation_settings(config)
+    total = settings.journeys * settings.draws
+    with atomic_dir(config.track_path) as folder:
+        track_m = 0.0
+        journeys = simulate_journeys(network, levels, world.plan, settings, section.seed)
+        for done, (name, log) in enumerate(journeys, start=1):
+            write_log(log, folder / name)
+            track_m = log.truth_length_m
+            if progress is not None:
+                progress(done, total)
+    return SimulateResult(total, track_m, config.track_path)
+
+
+def simulation_settings(config: Config) -> SimulationSettings:
+    """Return the settings of journeys, inertial unit and reports that a configuration asks for."""
+    section, imu = config.journeys, config.imu
+    return SimulationSettings(
+        journeys=section.count,
+        draws=section.draws,
+        journey=JourneyPlan(
+            length_m=section.length_m,
+            profile=config.roads.profile,
+            speed_mps=section.speed_mps,
+            period_s=imu.period_s,
+        ),
+        imu=ImuErrors(
+            sigma_trans_m=imu.sigma_trans_m,
+            sigma_orient_rad=float(np.radians(imu.sigma_orient_deg)),
+            heading_bias_sd_rad=float(np.radians(imu.bias_deg)),
+            heading_drift_rad_per_sqrt_s=float(np.radians(imu.drift_deg_per_sqrt_s)),
+            step_scale_sd=imu.scale,
+            translation_noise=imu.translation_noise,
+        ),
+        reports=ReportModel(
+            period_s=section.report_period_s,
+            averaging_s=section.averaging_s,
+            hysteresis_db=section.hysteresis_db,
+            fading_db=section.fading_db,
+            max_neighbours=section.max_neighbours,
+            sensitivity_dbm=section.sensitivity_dbm,
+            radio=section.radio,
+        ),
+    )
