@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
@@ -56,44 +56,22 @@ class StreetNetwork:
     oneway: NDArray[np.int8]
 
     @cached_property
-    def _links(self) -> Any:
-        """Edge numbers + 1 from node to node, the shortest of parallel edges."""
-        forth, back = np.flatnonzero(self.oneway >= 0), np.flatnonzero(self.oneway <= 0)
-        start = np.concatenate([self.node_a[forth], self.node_b[back]])
-        end = np.concatenate([self.node_b[forth], self.node_a[back]])
-        edge = np.concatenate([forth, back])
-        order = np.lexsort((edge, self.length_m[edge], end, start))
-        start, end, edge = start[order], end[order], edge[order]
-        first = np.ones(start.size, dtype=bool)
-        first[1:] = (np.diff(start) != 0) | (np.diff(end) != 0)
-        size = self.east_m.size
-        return csr_array((edge[first] + 1, (start[first], end[first])), shape=(size, size))
-
-    @cached_property
     def adjacency(self) -> Any:
         """Lengths between neighbouring nodes (m), ``scipy.sparse.csr_array``, shape (N, N).
 
         Entry (i, j) exists when one may go from i to j; of parallel edges the shortest counts.
         """
-        links = self._links
-        return csr_array(
-            (self.length_m[links.data - 1], links.indices, links.indptr), shape=links.shape
-        )
-
-    def edges_along(self, nodes: ArrayLike) -> NDArray[np.int64]:
-        """Return the edges that a sequence of neighbouring nodes follows, shape (len(nodes) - 1,).
-
-        Raises
-        ------
-        InputError
-            Two nodes that follow each other are not joined.
-        """
-        path = np.asarray(nodes, dtype=np.int64)
-        edges = np.atleast_1d(np.asarray(self._links[path[:-1], path[1:]])).astype(np.int64) - 1
-        if np.any(edges < 0):
-            i = int(np.flatnonzero(edges < 0)[0])
-            raise fail(InputError, "nodes", "neighbours", f"{path[i]} and {path[i + 1]}")
-        return edges
+        forth, back = self.oneway >= 0, self.oneway <= 0
+        start = np.concatenate([self.node_a[forth], self.node_b[back]])
+        end = np.concatenate([self.node_b[forth], self.node_a[back]])
+        length = np.concatenate([self.length_m[forth], self.length_m[back]])
+        order = np.lexsort((length, end, start))
+        start, end, length = start[order], end[order], length[order]
+        # A sparse array would add up parallel edges.
+        first = np.ones(start.size, dtype=bool)
+        first[1:] = (np.diff(start) != 0) | (np.diff(end) != 0)
+        size = self.east_m.size
+        return csr_array((length[first], (start[first], end[first])), shape=(size, size))
 
 
 def street_network(ways: Ways, allowed: RouteLattice | None = None) -> StreetNetwork:

@@ -1,0 +1,187 @@
+"""Writing a database's Parquet parts tile by tile, with bounded memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import shapely
+from numpy.typing import NDArray
+
+from mapfilter.database.store import POINTS, describe_part, levels_folder
+from mapfilter.database.tiles import TileLevels
+from mapfilter.geodesy import Floats, Lattice
+from mapfilter.roads.geoparquet import dictionary, geo_metadata, point_geometry
+from mapfilter.roads.lattice import RouteLattice
+
+_ROWS_IN_A_GROUP = 1 << 16
+ROWS_IN_MEMORY = 1 << 22
+
+
+def z_order(row: NDArray[Any], col: NDArray[Any]) -> NDArray[np.uint64]:
+    """Return positions along the Z-order (Morton) curve: the bits of row and col in turns.
+
+    Examples
+    --------
+    >>> z_order(np.array([0, 0, 1, 1, 0]), np.array([0, 1, 0, 1, 2])).tolist()
+    [0, 1, 2, 3, 4]
+    """
+    return (_spread(row) << np.uint64(1)) | _spread(col)
+
+
+def places_table(routes: RouteLattice, lattice: Lattice, order: NDArray[np.int64]) -> pa.Table:
+    """Return what is known of points before anything is heard, in the order given.
+
+    Parameters
+    ----------
+    routes : RouteLattice
+    lattice : Lattice
+        The database's, aligned with that of the routes; rows, columns and point numbers are its.
+    order : numpy.ndarray of int64, shape (N,)
+        Which points, in which order.
+    """
+    east, north = (axis[order] for axis in routes.east_north_m)
+    row, col = lattice.row_col(east, north)
+    return pa.table(
+        {
+            "point": row * lattice.cols + col,
+            "row": row.astype(np.int32),
+            "col": col.astype(np.int32),
+            "way_id": routes.way_id[order],
+            "way_class": dictionary(routes.way_class[order], routes.class_names),
+            "on_square": routes.on_square[order],
+            "distance_to_way_m": routes.distance_to_way_m[order],
+            "geometry": point_geometry(east, north),
+        }
+    )
+
+
+def points_table(places: pa.Table, levels: TileLevels, cell_ids: tuple[str, ...]) -> pa.Table:
+    """Return rows of ``points.parquet``: the places at which some cell is heard."""
+    heard = levels.best >= 0
+    table = places.filter(pa.array(heard))
+    columns = {
+        "best_server": dictionary(levels.best[heard], cell_ids),
+        "best_level_dbm": levels.best_level_dbm[heard],
+        "margin_db": levels.margin_db[heard],
+    }
+    for name, values in columns.items():
+        table = table.add_column(table.num_columns - 1, name, pa.array(values))
+    return table
+
+
+def levels_tables(
+    places: pa.Table, levels: TileLevels, cell_ids: tuple[str, ...]
+) -> Iterator[tuple[int, pa.Table]]:
+    """Yield (cell, rows of its ``levels`` part) for every cell heard at some of the places."""
+    columns = {name: places[name].to_numpy() for name in ("point", "row", "col")}
+    heard, first = np.unique(levels.cell, return_index=True)
+    ends = np.append(first[1:], levels.cell.size)
+    for cell, start, end in zip(heard.tolist(), first.tolist(), ends.tolist(), strict=True):
+        which = levels.which[start:end]
+        table = {name: values[which] for name, values in columns.items()}
+        table["cell"] = dictionary(np.zeros(which.size, np.int32), (cell_ids[cell],))
+        table["level_dbm"] = levels.level_dbm[start:end]
+        table["below_best_db"] = levels.below_best_db[start:end]
+        yield cell, pa.table(table)
+
+
+class PartWriter:
+    """Gathers rows and writes them out whenever enough of them are in memory.
+
+    Parameters
+    ----------
+    folder : Path
+        The database folder under construction.
+    crs : str
+    cell_ids : tuple of str
+    """
+
+    def __init__(self, folder: Path, crs: str, cell_ids: tuple[str, ...]) -> None:
+        self._folder, self._crs, self._cell_ids = folder, crs, cell_ids
+        self._points: list[pa.Table] = []
+        self._levels: dict[int, list[pa.Table]] = {}
+        self._waiting = 0
+        self._points_file: pq.ParquetWriter | None = None
+        self._points_written = 0
+        self._bounds: tuple[Floats, Floats] = (np.full(2, np.inf), np.full(2, -np.inf))
+        self._written: dict[int, list[dict[str, Any]]] = {}
+
+    def __enter__(self) -> PartWriter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._points_file is not None:
+            self._points_file.close()
+
+    def add(self, places: pa.Table, levels: TileLevels) -> None:
+        """Take the rows of one tile."""
+        points = points_table(places, levels, self._cell_ids)
+        if points.num_rows:
+            self._points.append(points)
+        for cell, table in levels_tables(places, levels, self._cell_ids):
+            self._levels.setdefault(cell, []).append(table)
+        self._waiting += levels.cell.size
+        if self._waiting >= ROWS_IN_MEMORY:
+            self._flush()
+
+    def finish(self) -> list[dict[str, Any]]:
+        """Write what is left; return the manifest's entries, points first, then cell by cell.
+
+        At least one point must have been added.
+        """
+        self._flush()
+        if self._points_file is not None:
+            bounds = tuple(float(value) for value in np.concatenate(self._bounds))
+            geo = geo_metadata(self._crs, (bounds[0], bounds[1], bounds[2], bounds[3]))
+            self._points_file.add_key_value_metadata({"geo": geo.decode()})
+            self._points_file.close()
+            self._points_file = None
+        points = describe_part(self._folder, self._folder / POINTS, self._points_written)
+        return [points, *(part for cell in sorted(self._written) for part in self._written[cell])]
+
+    def _flush(self) -> None:
+        if self._points:
+            self._write_points(pa.concat_tables(self._points).unify_dictionaries())
+        for cell in sorted(self._levels):
+            self._write_levels(cell, pa.concat_tables(self._levels[cell]).unify_dictionaries())
+        self._points, self._levels, self._waiting = [], {}, 0
+
+    def _write_points(self, table: pa.Table) -> None:
+        table = table.replace_schema_metadata(None)
+        if self._points_file is None:
+            self._points_file = pq.ParquetWriter(
+                self._folder / POINTS, table.schema, compression="zstd"
+            )
+        self._points_file.write_table(table, row_group_size=_ROWS_IN_A_GROUP)
+        self._points_written += table.num_rows
+        geometry = shapely.from_wkb(table["geometry"].to_numpy(zero_copy_only=False))
+        corner = shapely.get_coordinates(geometry)
+        low, high = self._bounds
+        self._bounds = np.minimum(low, corner.min(axis=0)), np.maximum(high, corner.max(axis=0))
+
+    def _write_levels(self, cell: int, table: pa.Table) -> None:
+        cell_id = self._cell_ids[cell]
+        written = self._written.setdefault(cell, [])
+        file = self._folder / levels_folder(cell_id) / f"part-{len(written)}.parquet"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        pq.write_table(table, file, compression="zstd", row_group_size=_ROWS_IN_A_GROUP)
+        written.append(describe_part(self._folder, file, table.num_rows, cell_id))
+
+
+def _spread(number: NDArray[Any]) -> NDArray[np.uint64]:
+    """Put a zero between any two bits of 32-bit numbers."""
+    bits = np.asarray(number).astype(np.uint64)
+    for shift, mask in (
+        (16, 0x0000FFFF0000FFFF),
+        (8, 0x00FF00FF00FF00FF),
+        (4, 0x0F0F0F0F0F0F0F0F),
+        (2, 0x3333333333333333),
+        (1, 0x5555555555555555),
+    ):
+        bits = (bits | (bits << np.uint64(shift))) & np.uint64(mask)
+    return bits

@@ -1,0 +1,234 @@
+"""The radio-route database: where one can be, per cell, and the levels heard there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from mapfilter.database.field import RadioField, fill_field
+from mapfilter.errors import InputError, fail
+from mapfilter.geodesy import Lattice
+from mapfilter.radio.cells import CellPlan
+
+Rows = NDArray[np.int32]
+Floats32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Points:
+    """All points of a database in row-major order, as columns of length N.
+
+    Parameters
+    ----------
+    point : numpy.ndarray of int64
+        ``row * lattice.cols + col``: the same in every rebuild on the same lattice.
+    row, col : numpy.ndarray of int32
+    way_id : numpy.ndarray of int64
+        0 where the point belongs to no way.
+    way_class : tuple of (numpy.ndarray of int32, tuple of str)
+        Codes and the names that they stand for.
+    on_square : numpy.ndarray of bool
+    distance_to_way_m : numpy.ndarray of float32
+    best_server : numpy.ndarray of int32
+        Index into the database's ``cell_ids``.
+    best_level_dbm : numpy.ndarray of float32
+    margin_db : numpy.ndarray of float32
+        Best level above the second best, NaN where only one cell is predicted.
+    """
+
+    point: NDArray[np.int64]
+    row: Rows
+    col: Rows
+    way_id: NDArray[np.int64]
+    way_class: tuple[Rows, tuple[str, ...]]
+    on_square: NDArray[np.bool_]
+    distance_to_way_m: Floats32
+    best_server: Rows
+    best_level_dbm: Floats32
+    margin_db: Floats32
+
+    def __len__(self) -> int:
+        return int(self.point.size)
+
+
+@dataclass(frozen=True)
+class RadioRouteDatabase:
+    """A database folder, read when asked and only as far as asked.
+
+    Open one with :func:`mapfilter.database.store.open_database`.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+    lattice : Lattice
+        Where the points lie.
+    plan : CellPlan
+        The cells, in the lattice's CRS.
+    margin_db : float
+        A point belongs to its best server and to every cell at most this much weaker.
+    floor_dbm : float
+        Levels below it are not heard and not kept.
+    manifest : mapping
+        Everything that ``manifest.json`` holds: inputs, parameters, parts, counts, versions.
+    """
+
+    path: Path
+    lattice: Lattice
+    plan: CellPlan
+    margin_db: float
+    floor_dbm: float
+    manifest: Mapping[str, Any]
+
+    @property
+    def cell_ids(self) -> tuple[str, ...]:
+        """Ids of all cells, also of those that no point hears."""
+        return self.plan.ids
+
+    @cached_property
+    def _parts(self) -> Mapping[str, tuple[Path, ...]]:
+        parts: dict[str, tuple[Path, ...]] = {}
+        for part in self.manifest["parts"]:
+            if part.get("cell") is not None:
+                cell = str(part["cell"])
+                parts[cell] = (*parts.get(cell, ()), self.path / part["path"])
+        return MappingProxyType(parts)
+
+    @cached_property
+    def _points(self) -> Points:
+        table = pq.ParquetFile(self.path / "points.parquet").read(list(_POINT_COLUMNS))
+        order = np.argsort(table["point"].to_numpy())
+        server, names = _codes(table["best_server"])
+        rank = np.array([self.plan.index(name) for name in names], dtype=np.int32)
+        way_class, classes = _codes(table["way_class"])
+        plain = table.drop_columns(["best_server", "way_class"])
+        return Points(
+            **{name: plain[name].to_numpy()[order] for name in plain.column_names},
+            best_server=rank[server[order]],
+            way_class=(way_class[order], classes),
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        # What was read is not sent to other processes; they read it themselves.
+        return {name: self.__dict__[name] for name in self.__dataclass_fields__}
+
+    def points(self) -> Points:
+        """Return all points in row-major order; read at the first call and kept."""
+        return self._points
+
+    def cell_points(
+        self, cell_id: str, margin_db: float | None = None
+    ) -> tuple[Rows, Rows, Floats32]:
+        """Return the points that belong to a cell, reading only that cell's partition.
+
+        Parameters
+        ----------
+        cell_id : str
+        margin_db : float or None
+            A point belongs to the cell when the cell is at most this much weaker than the point's
+            best server; infinity gives all points above the floor, None takes the database's own.
+
+        Returns
+        -------
+        row, col : numpy.ndarray of int32, shape (N,)
+            In row-major order.
+        level_dbm : numpy.ndarray of float32, shape (N,)
+
+        Raises
+        ------
+        InputError
+            The database has no such cell, or the margin is negative or NaN.
+        """
+        margin = self.margin_db if margin_db is None else margin_db
+        if not margin >= 0:
+            raise fail(InputError, "margin_db", "dB >= 0", margin)
+        if cell_id not in self.plan:
+            hint = "log and database of different networks or dates"
+            raise fail(InputError, str(self.path), "a cell of the database", repr(cell_id), hint)
+        point, row, col, level, below = self._cell_levels(cell_id)
+        # In single precision on both sides, so that 2.4 dB is within 2.4 dB.
+        kept = np.flatnonzero(below <= np.float32(margin))
+        kept = kept[np.argsort(point[kept])]
+        return row[kept], col[kept], level[kept]
+
+    def field(self, bounds_m: tuple[float, float, float, float] | None = None) -> RadioField:
+        """Return the levels of all cells over an area, also off the ways.
+
+        Parameters
+        ----------
+        bounds_m : tuple of float, optional
+            West, south, east, north; the whole lattice when left out.
+
+        Raises
+        ------
+        InputError
+            The database has no point there.
+        """
+        top, left, window = self._window(bounds_m)
+        points = self.points()
+        row, col = points.row - top, points.col - left
+        inside = np.flatnonzero(window.contains(row, col))
+        if not inside.size:
+            where = "whole lattice" if bounds_m is None else f"area {bounds_m}"
+            raise fail(InputError, where, "points of the database", "none", "another area or CRS")
+        heard: list[tuple[str, Rows, Rows, Floats32]] = []
+        for cell_id in self.cell_ids:
+            _, cell_row, cell_col, level, _ = self._cell_levels(cell_id)
+            there = window.contains(cell_row - top, cell_col - left)
+            if there.any():
+                pixel = cell_row[there] - top, cell_col[there] - left
+                heard.append((cell_id, *pixel, level[there]))
+        on_way_m = np.where(points.on_square, np.float32(0), points.distance_to_way_m)[inside]
+        pixels = row[inside], col[inside]
+        return fill_field(window, pixels, points.way_id[inside], on_way_m, heard)
+
+    def _window(
+        self, bounds_m: tuple[float, float, float, float] | None
+    ) -> tuple[int, int, Lattice]:
+        if bounds_m is None:
+            return 0, 0, self.lattice
+        west, south, east, north = bounds_m
+        top, left = self.lattice.row_col(west, north)
+        bottom, right = self.lattice.row_col(east, south)
+        top, left = max(top, 0), max(left, 0)
+        rows, cols = (
+            min(bottom, self.lattice.rows - 1) - top + 1,
+            min(right, self.lattice.cols - 1) - left + 1,
+        )
+        if rows < 1 or cols < 1:
+            covered = ", ".join(f"{value:.0f}" for value in self.lattice.bounds_m)
+            hint = "degrees given for metres, or another CRS"
+            raise fail(InputError, "area", f"an area within {covered}", bounds_m, hint)
+        return top, left, self.lattice.window(top, left, rows, cols)
+
+    def _cell_levels(
+        self, cell_id: str
+    ) -> tuple[NDArray[np.int64], Rows, Rows, Floats32, Floats32]:
+        columns = ["point", "row", "col", "level_dbm", "below_best_db"]
+        kinds = (np.int64, np.int32, np.int32, np.float32, np.float32)
+        tables = [pq.ParquetFile(part).read(columns) for part in self._parts.get(cell_id, ())]
+        point, row, col, level, below = (
+            np.concatenate([np.empty(0, kind), *(table[name].to_numpy() for table in tables)])
+            for name, kind in zip(columns, kinds, strict=True)
+        )
+        return point, row, col, level, below
+
+
+_POINT_COLUMNS = tuple(Points.__dataclass_fields__)
+
+
+def _codes(column: Any) -> tuple[Rows, tuple[str, ...]]:
+    """Return codes and names of a dictionary-encoded column."""
+    joined = column.unify_dictionaries().combine_chunks()
+    if hasattr(joined, "chunks"):
+        joined = joined.chunk(0)
+    names = tuple(str(name) for name in joined.dictionary.to_pylist())
+    return joined.indices.to_numpy().astype(np.int32), names
