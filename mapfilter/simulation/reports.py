@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -195,7 +195,7 @@ def serving_cells(
 
 def level_sampler(
     rasters: RxLevRasters,
-    cell_ids: Sequence[str] | None = None,
+    plan: CellPlan | None = None,
     bounds_m: tuple[float, float, float, float] | None = None,
 ) -> Levels:
     """Return a function that looks levels up in rasters: the pixel that holds each position.
@@ -203,9 +203,9 @@ def level_sampler(
     Parameters
     ----------
     rasters : RxLevRasters
-        Of levels in dBm.
-    cell_ids : sequence of str, optional
-        The columns, such as ``plan.ids``; else the rasters' own order.
+        Of levels (dBm), or of losses (dB), which need the plan's EIRP.
+    plan : CellPlan, optional
+        Gives the order of the columns; else it is the rasters' own.
     bounds_m : tuple of float, optional
         West, south, east, north of the part that is read into memory; else all of it.
 
@@ -217,15 +217,18 @@ def level_sampler(
     Raises
     ------
     InputError
-        The rasters hold losses, or do not reach into the bounds.
+        The rasters hold losses and there is no plan, lack a cell of the plan, or do not reach into
+        the bounds.
     """
-    if rasters.quantity != "level":
-        raise fail(InputError, str(rasters.path), "levels in dBm", "losses in dB")
+    if plan is None and rasters.quantity != "level":
+        raise fail(InputError, str(rasters.path), "levels in dBm, or a cell plan", "losses in dB")
     lattice, window = rasters.lattice, None
     if bounds_m is not None:
         window = _window(lattice, bounds_m, str(rasters.path))
         lattice = lattice.window(*window)
-    return array_sampler(rasters.read(window, cell_ids), lattice)
+    if plan is None:
+        return array_sampler(rasters.read(window), lattice)
+    return array_sampler(rasters.read_levels_dbm(plan, window, plan.ids), lattice)
 
 
 def array_sampler(level_dbm: NDArray[np.floating], lattice: Lattice) -> Levels:
@@ -244,7 +247,7 @@ def _window(
     lattice: Lattice, bounds_m: tuple[float, float, float, float], where: str
 ) -> tuple[int, int, int, int]:
     west, south, east, north = bounds_m
-    top, left = lattice.row_col(west, north)[0], lattice.row_col(west, north)[1]
+    top, left = lattice.row_col(west, north)
     bottom, right = lattice.row_col(east, south)
     top, left = max(top, 0), max(left, 0)
     bottom, right = min(bottom, lattice.rows - 1), min(right, lattice.cols - 1)
