@@ -13,7 +13,8 @@ import numpy as np
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from mapfilter.database.field import RadioField, fill_field
+from mapfilter.database.field import RadioField as RadioField
+from mapfilter.database.field import fill_field
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan

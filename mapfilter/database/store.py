@@ -8,7 +8,7 @@ row per point, ``levels/CELL/part-N.parquet`` one row per point at which the cel
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
@@ -146,6 +146,31 @@ def info(database: RadioRouteDatabase) -> dict[str, Any]:
         "inputs": manifest["inputs"],
         "levels_per_cell": counts,
     }
+
+
+def export_geopackage(
+    database: RadioRouteDatabase, path: Path | str, cells: Sequence[str] = ()
+) -> None:
+    """Write a database as GeoPackage: layers ``points`` and ``cells``, and one per cell named.
+
+    Parameters
+    ----------
+    database : RadioRouteDatabase
+    path : Path or str
+        Ends in .gpkg; an older file is replaced.
+    cells : sequence of str
+        Cells whose points, within the database's margin, become a layer of their own.
+
+    Raises
+    ------
+    InputError
+        The database has no such cell.
+    OutputError
+        The file cannot be written.
+    """
+    from mapfilter.database.geopackage import write_geopackage
+
+    write_geopackage(database, Path(path), cells)
 
 
 def describe_part(folder: Path, file: Path, rows: int, cell: str | None = None) -> dict[str, Any]:

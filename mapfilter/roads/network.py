@@ -83,7 +83,8 @@ def street_network(ways: Ways, allowed: RouteLattice | None = None) -> StreetNet
         What may be used; one-way streets only in their direction.
     allowed : RouteLattice, optional
         Leave out edges that leave these points: an edge stays when each of its samples, at most
-        2.5 m apart, lies in the pixel of a point. So nobody is routed through a building.
+        2.5 m apart, has a point among the four lattice points around it. So nobody is routed
+        through a building, and alleys narrower than a pixel stay.
 
     Returns
     -------
@@ -146,8 +147,12 @@ def _stays_on(allowed: RouteLattice, start: Floats, end: Floats) -> NDArray[np.b
     rank = np.arange(edge.size) - np.repeat(np.cumsum(steps) - steps, steps)
     share = (rank / (steps[edge] - 1))[:, None]
     place = start[edge] + share * (end[edge] - start[edge])
-    row, col = allowed.lattice.row_col(place[:, 0], place[:, 1])
-    lattice, mask = allowed.lattice, allowed.mask()
-    good = np.asarray(lattice.contains(row, col))
-    good[good] = mask[row[good], col[good]]
+    lattice = allowed.lattice
+    around = np.pad(allowed.mask(), 1)
+    # True where one of the points (r-1, c-1), (r-1, c), (r, c-1), (r, c) is allowed.
+    corner = around[:-1, :-1] | around[:-1, 1:] | around[1:, :-1] | around[1:, 1:]
+    half_m = lattice.resolution_m / 2
+    row, col = lattice.row_col(place[:, 0] + half_m, place[:, 1] - half_m)
+    good = (row >= 0) & (row <= lattice.rows) & (col >= 0) & (col <= lattice.cols)
+    good[good] = corner[row[good], col[good]]
     return np.asarray(np.bincount(edge, weights=~good, minlength=len(start)) == 0, dtype=np.bool_)
