@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,6 +15,7 @@ from mapfilter.geodesy import Floats, Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rasters import RxLevRasters
 from mapfilter.radio.rxlev import quantise_level_dbm
+from mapfilter.simulation.handover import running_mean_db, serving_cells
 from mapfilter.tracks.schema import NEIGHBOUR, SERVING
 
 Levels = Callable[[Floats, Floats], NDArray[np.floating]]
@@ -135,79 +136,25 @@ def reports(
     return _table(tick_s, level, rank, plan, model.quantise)
 
 
-def running_mean_db(level_dbm: Floats, count: int) -> Floats:
-    """Return the mean, in dB, of the last ``count`` reports, or of as many as there are.
-
-    Parameters
-    ----------
-    level_dbm : ndarray, shape (N, cells)
-    count : int
-
-    Examples
-    --------
-    >>> running_mean_db(np.array([[-60.0], [-70.0], [-90.0]]), 2).ravel().tolist()
-    [-60.0, -65.0, -80.0]
-    """
-    total = level_dbm.copy()
-    for back in range(1, min(count, len(total))):
-        total[back:] += level_dbm[:-back]
-    return np.asarray(total / np.minimum(np.arange(len(total)) + 1, count)[:, np.newaxis])
-
-
-def serving_cells(
-    mean_dbm: Floats, heard: NDArray[np.bool_], hysteresis_db: float
-) -> NDArray[np.int64]:
-    """Return which cell serves at each report: handover with hysteresis.
-
-    A cell serves until the strongest heard one is more than ``hysteresis_db`` above it, or until
-    it is not heard any more; then the strongest takes over (the first of equals).
-
-    Parameters
-    ----------
-    mean_dbm : ndarray, shape (N, cells)
-    heard : ndarray of bool, shape (N, cells)
-    hysteresis_db : float
-
-    Returns
-    -------
-    serving : ndarray of int64, shape (N,)
-        Column of the cell, or -1 when none is heard.
-
-    Examples
-    --------
-    >>> mean_dbm = np.array([[-70.0, -80.0], [-80.0, -77.0], [-80.0, -75.0], [-80.0, -82.0]])
-    >>> serving_cells(mean_dbm, np.ones((4, 2), dtype=bool), 4.0).tolist()
-    [0, 0, 1, 1]
-    """
-    audible = np.where(heard, mean_dbm, -np.inf)
-    serving = np.full(len(audible), -1, dtype=np.int64)
-    if not audible.size:
-        return serving
-    best = np.argmax(audible, axis=1)
-    now = -1
-    for i, strongest in enumerate(best):
-        lost = now < 0 or not heard[i, now]
-        if lost or audible[i, strongest] > audible[i, now] + hysteresis_db:
-            now = int(strongest) if heard[i, strongest] else -1
-        serving[i] = now
-    return serving
-
-
 def level_sampler(
     rasters: RxLevRasters,
-    plan: CellPlan | None = None,
+    cell_ids: Sequence[str] | None = None,
     bounds_m: tuple[float, float, float, float] | None = None,
+    *,
+    plan: CellPlan | None = None,
 ) -> Levels:
     """Return a function that looks levels up in rasters: the pixel that holds each position.
 
     Parameters
     ----------
     rasters : RxLevRasters
-        Of levels (dBm), or of losses (dB), which need the plan's EIRP.
-    plan : CellPlan, optional
-        Gives the order of the columns; else it is the rasters' own.
+        Of levels (dBm), or of losses (dB), which need ``plan``.
+    cell_ids : sequence of str, optional
+        The columns, such as ``plan.ids``; else the rasters' own order.
     bounds_m : tuple of float, optional
         West, south, east, north of the part that is read into memory; else all of it.
+    plan : CellPlan, optional
+        Gives the EIRP from which losses are taken.
 
     Returns
     -------
@@ -217,7 +164,7 @@ def level_sampler(
     Raises
     ------
     InputError
-        The rasters hold losses and there is no plan, lack a cell of the plan, or do not reach into
+        The rasters hold losses and there is no plan, a cell is missing, or they do not reach into
         the bounds.
     """
     if plan is None and rasters.quantity != "level":
@@ -227,8 +174,8 @@ def level_sampler(
         window = _window(lattice, bounds_m, str(rasters.path))
         lattice = lattice.window(*window)
     if plan is None:
-        return array_sampler(rasters.read(window), lattice)
-    return array_sampler(rasters.read_levels_dbm(plan, window, plan.ids), lattice)
+        return array_sampler(rasters.read(window, cell_ids), lattice)
+    return array_sampler(rasters.read_levels_dbm(plan, window, cell_ids), lattice)
 
 
 def array_sampler(level_dbm: NDArray[np.floating], lattice: Lattice) -> Levels:

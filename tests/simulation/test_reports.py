@@ -11,14 +11,8 @@ from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.rasters import open_rasters, write_rasters
 from mapfilter.radio.rxlev import resolve_neighbours
-from mapfilter.simulation.reports import (
-    ReportModel,
-    array_sampler,
-    level_sampler,
-    reports,
-    running_mean_db,
-    serving_cells,
-)
+from mapfilter.simulation.handover import running_mean_db, serving_cells
+from mapfilter.simulation.reports import ReportModel, array_sampler, level_sampler, reports
 from mapfilter.tracks.log import make_log
 
 CRS = "EPSG:32629"
@@ -254,10 +248,10 @@ def test_sampling_rasters(lattice, tmp_path, plan_of):
     east, north = lattice.east_north(*np.indices((4, 3)).reshape(2, -1))
     np.testing.assert_allclose(level_sampler(rasters)(east, north), array[::-1].reshape(2, -1).T)
     plan = plan_of([(0, 0), (1, 1)])
-    in_plans_order = level_sampler(rasters, plan)(east, north)
+    in_plans_order = level_sampler(rasters, plan.ids)(east, north)
     np.testing.assert_allclose(in_plans_order, array.reshape(2, -1).T)
     bounds_m = (530006.0, 4555006.0, 530011.0, 4555009.0)
-    part = level_sampler(rasters, plan, bounds_m)(east, north)
+    part = level_sampler(rasters, plan.ids, bounds_m)(east, north)
     inside = np.zeros((4, 3), dtype=bool)
     inside[2, 1:] = True
     np.testing.assert_array_equal(np.isfinite(part[:, 0]).reshape(4, 3), inside)
@@ -272,6 +266,6 @@ def test_sampling_losses_needs_the_plan(lattice, tmp_path, plan_of):
     write_rasters(path, lattice, iter([("C0", loss)]), ["C0"], quantity="loss")
     with pytest.raises(InputError, match="losses in dB"):
         level_sampler(open_rasters(path))
-    level = level_sampler(open_rasters(path), plan_of([(0, 0)]))
+    level = level_sampler(open_rasters(path), plan=plan_of([(0, 0)]))
     # 55 dBm EIRP less 90 dB.
     assert level(np.array([530001.0]), np.array([4555001.0])).tolist() == [[-35.0]]
