@@ -75,7 +75,7 @@ class BuildEstimate:
     seconds: float
 
 
-def build_database(
+def build(
     rasters: RxLevRasters,
     plan: CellPlan,
     routes: RouteLattice,
@@ -182,7 +182,7 @@ def dry_run(
 ) -> BuildEstimate:
     """Estimate a build from up to four of its tiles, writing nothing.
 
-    Parameters and errors are those of :func:`build_database`.
+    Parameters and errors are those of :func:`build`.
     """
     _check_parameters(margin_db, floor_dbm, tile_px)
     plan = plan.to_crs(rasters.lattice.crs)

@@ -58,7 +58,9 @@ def read_landuse(path: Path | str, table_path: Path | str, lattice: Lattice) -> 
     faults = Faults()
     for code, count in zip(found.tolist(), counts.tolist(), strict=True):
         if code != _OUTSIDE and code not in keys:
-            shown = _shown(code) if is_colour else f"value {code}"
+            shown = f"value {code}"
+            if is_colour:
+                shown = f"colour {code >> 16},{code >> 8 & 255},{code & 255}"
             hint = "a class left out, or colours blended by compression or resampling"
             faults.add(str(path), f"classes of {table_path}", f"{shown} at {count} points", hint)
     faults.raise_if_any(InputError)
