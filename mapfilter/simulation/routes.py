@@ -71,8 +71,8 @@ def route(
 
     It starts at the end of a random edge (long edges more often), and goes by shortest paths to
     one random node after another that lies ``leg_m`` away as the crow flies, or, when there is no
-    such node, to the farthest that can be reached. It turns back on the spot only where no goal
-    can be reached otherwise. One-way streets are kept.
+    such node, to the farthest that can be reached. Goals do not lie in dead ends, and it does not
+    turn back on the spot, unless there is nowhere else to go. One-way streets are kept.
 
     Parameters
     ----------
@@ -90,10 +90,11 @@ def route(
     if not network.node_a.size:
         raise fail(InputError, "street network", "at least one street", "none", "wrong box")
     share = network.length_m / network.length_m.sum()
+    through = _through(network)
     for _ in range(_STARTS):
         edge = int(rng.choice(share.size, p=share))
         start = int((network.node_a if rng.random() < 0.5 else network.node_b)[edge])
-        nodes = _wander(network, start, length_m, leg_m, rng)
+        nodes = _wander(network, through, start, length_m, leg_m, rng)
         if nodes is not None:
             return _cut(network, nodes, length_m)
     got = "only dead ends of one-way streets"
@@ -102,6 +103,7 @@ def route(
 
 def _wander(
     network: StreetNetwork,
+    through: NDArray[np.bool_],
     start: int,
     length_m: float,
     leg_m: tuple[float, float],
@@ -111,7 +113,7 @@ def _wander(
     nodes, gone_m = [start], 0.0
     while gone_m < length_m:
         came_from = nodes[-2] if len(nodes) > 1 else -1
-        leg = _leg(network, nodes[-1], came_from, leg_m, rng)
+        leg = _leg(network, through, nodes[-1], came_from, leg_m, rng)
         if leg is None:
             return None
         path = [nodes[-1], *leg]
@@ -122,6 +124,7 @@ def _wander(
 
 def _leg(
     network: StreetNetwork,
+    through: NDArray[np.bool_],
     here: int,
     came_from: int,
     leg_m: tuple[float, float],
@@ -135,6 +138,7 @@ def _leg(
     onward, anyway = _without_edge(network.adjacency, here, came_from), network.adjacency
     anywhere = np.ones_like(in_reach)
     for graph, wanted in (
+        (onward, in_reach & through),
         (onward, in_reach),
         (anyway, in_reach),
         (onward, anywhere),
@@ -142,11 +146,24 @@ def _leg(
     ):
         length, before = dijkstra(graph, indices=here, return_predecessors=True)
         goals = np.flatnonzero(np.isfinite(length) & (length > 0) & wanted)
-        if goals.size and wanted is in_reach:
+        if goals.size and wanted is not anywhere:
             return _path(before, here, int(rng.choice(goals)))
         if goals.size:
             return _path(before, here, int(goals[np.argmax(length[goals])]))
     return None
+
+
+def _through(network: StreetNetwork) -> NDArray[np.bool_]:
+    """Tell which nodes are left when dead ends are taken off again and again."""
+    left = np.ones(network.east_m.size, dtype=bool)
+    ends = np.unique(np.sort(np.stack([network.node_a, network.node_b], axis=1), axis=1), axis=0)
+    ends = ends[ends[:, 0] != ends[:, 1]]
+    while True:
+        ends = ends[left[ends].all(axis=1)]
+        dead = left & (np.bincount(ends.ravel(), minlength=left.size) < 2)
+        if not dead.any():
+            return left
+        left &= ~dead
 
 
 def _without_edge(graph: csr_array, start: int, end: int) -> csr_array:

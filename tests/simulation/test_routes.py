@@ -91,6 +91,20 @@ def test_a_dead_end_is_left_the_way_one_came(network_of):
     assert set(path.east_m[:-1].tolist()) == {0.0, 400.0}
 
 
+def test_a_ring_with_dead_ends_is_walked_round(network_of):
+    """A square of 400 m with a side street of 300 m at each corner: goals lie on the square."""
+    east = [0, 400, 400, 0, -300, 700, 700, -300, -150, 550, 550, -150]
+    north = [0, 0, 400, 400, 0, 0, 400, 400, 0, 0, 400, 400]
+    edges = [(0, 1), (1, 2), (2, 3), (3, 0)]
+    edges += [(i, 8 + i) for i in range(4)] + [(8 + i, 4 + i) for i in range(4)]
+    ring = network_of(east, north, edges)
+    for seed in range(20):
+        nodes = nodes_of(route(ring, 6000.0, rng(seed)), ring)
+        inside = nodes[np.argmax(nodes < 4) :]
+        assert (inside < 4).all()
+        assert (inside[2:] != inside[:-2]).all()
+
+
 def test_a_network_smaller_than_a_leg(network_of):
     block = network_of([0, 50, 50, 0], [0, 0, 50, 50], [(0, 1), (1, 2), (2, 3), (3, 0)])
     assert route(block, 1940.0, rng(0)).length_m == pytest.approx(1940.0)
