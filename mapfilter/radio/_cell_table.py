@@ -193,39 +193,33 @@ def _place(path: Path, rows: list[Row], crs: str, faults: Faults) -> None:
         values = row.values
         lat, lon = values.get("lat"), values.get("lon")
         east, north = values.get("east"), values.get("north")
-        where = f"{path} row {row.line}"
+        own = values.get("crs", crs)
         if lat is not None and lon is not None:
-            wrong = _degree_fault(lat, lon, crs)
-            if wrong:
-                faults.add(f"{where}, lat, lon", *wrong)
-                row.faulty = True
-                continue
+            fields, wrong = "lat, lon", _degree_fault(lat, lon, crs)
         elif east is not None and north is not None:
-            own = values.get("crs", crs)
-            lon_deg, lat_deg = unproject(own, east, north)
-            lon, lat = float(lon_deg), float(lat_deg)
-            if not _near(own, lon, lat):
-                hint = (
-                    "degrees given for metres"
-                    if abs(east) <= 180 and abs(north) <= 180
-                    else ("east and north swapped, or another CRS")
-                )
-                faults.add(
-                    f"{where}, east, north",
-                    f"metres where {own} is used",
-                    f"{east:g}, {north:g}",
-                    hint,
-                )
-                row.faulty = True
-                continue
-            if own == crs:
-                values["east_m"], values["north_m"] = east, north
-                continue
+            fields, wrong = "east, north", _metre_fault(east, north, own)
         else:
             row.faulty = True
             continue
-        east_m, north_m = project(crs, lon, lat)
-        values["east_m"], values["north_m"] = float(east_m), float(north_m)
+        if wrong is not None:
+            faults.add(f"{path} row {row.line}, {fields}", *wrong)
+            row.faulty = True
+        elif lat is None and own == crs:
+            values["east_m"], values["north_m"] = east, north
+        else:
+            place = (lon, lat) if lat is not None else unproject(own, east, north)
+            east_m, north_m = project(crs, *place)
+            values["east_m"], values["north_m"] = float(east_m), float(north_m)
+
+
+def _metre_fault(east: float, north: float, crs: str) -> tuple[str, str, str] | None:
+    expected, got = f"metres where {crs} is used", f"{east:g}, {north:g}"
+    if max(abs(east), abs(north)) <= 180 and (_near(crs, east, north) or _near(crs, north, east)):
+        return expected, got, "degrees given for metres"
+    lon_deg, lat_deg = unproject(crs, east, north)
+    if _near(crs, float(lon_deg), float(lat_deg)):
+        return None
+    return expected, got, "east and north swapped, or another CRS"
 
 
 def _degree_fault(lat: float, lon: float, crs: str) -> tuple[str, str, str] | None:

@@ -39,6 +39,10 @@ def describe(path: Path, quantity: Quantity | None) -> tuple[tuple[str, ...], La
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", NotGeoreferencedWarning)
             with rasterio.open(path) as source:
+                if source.driver == "GTiff":
+                    _check_extent_of_file(path, source, faults)
+                    # What a cut-off file says about itself is not worth telling.
+                    faults.raise_if_any(InputError)
                 lattice = _lattice(path, source, faults)
                 quantity = quantity or _quantity(source)
                 ids = tuple(str(name) for name in source.descriptions)
@@ -87,8 +91,6 @@ def _lattice(path: Path, source: Any, faults: Faults) -> Lattice | None:
     except InputError as error:
         faults.found.extend(error.faults)
     _check_bands(where, source, faults)
-    if source.driver == "GTiff":
-        _check_extent_of_file(path, source, faults)
     if not _check_pixels(where, source, faults) or crs is None:
         return None
     corner = source.transform
