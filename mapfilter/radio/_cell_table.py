@@ -190,26 +190,36 @@ class _Reader:
 def _place(path: Path, rows: list[Row], crs: str, faults: Faults) -> None:
     """Give every row its east and north in ``crs``, checking that they lie where the CRS is for."""
     for row in rows:
-        values = row.values
-        lat, lon = values.get("lat"), values.get("lon")
-        east, north = values.get("east"), values.get("north")
-        own = values.get("crs", crs)
-        if lat is not None and lon is not None:
-            fields, wrong = "lat, lon", _degree_fault(lat, lon, crs)
-        elif east is not None and north is not None:
-            fields, wrong = "east, north", _metre_fault(east, north, own)
+        if {"lat", "lon"} <= row.values.keys():
+            fields, wrong = "lat, lon", _from_degrees(row.values, crs)
+        elif {"east", "north"} <= row.values.keys():
+            fields, wrong = "east, north", _from_metres(row.values, crs)
         else:
             row.faulty = True
             continue
         if wrong is not None:
             faults.add(f"{path} row {row.line}, {fields}", *wrong)
             row.faulty = True
-        elif lat is None and own == crs:
-            values["east_m"], values["north_m"] = east, north
-        else:
-            place = (lon, lat) if lat is not None else unproject(own, east, north)
-            east_m, north_m = project(crs, *place)
-            values["east_m"], values["north_m"] = float(east_m), float(north_m)
+
+
+def _from_degrees(values: dict[str, Any], crs: str) -> tuple[str, str, str] | None:
+    lat, lon = values["lat"], values["lon"]
+    if lat is None or lon is None:
+        return None
+    east_m, north_m = project(crs, lon, lat)
+    values["east_m"], values["north_m"] = float(east_m), float(north_m)
+    return _degree_fault(lat, lon, crs)
+
+
+def _from_metres(values: dict[str, Any], crs: str) -> tuple[str, str, str] | None:
+    east, north, own = values["east"], values["north"], values.get("crs", crs)
+    if east is None or north is None:
+        return None
+    values["east_m"], values["north_m"] = east, north
+    if own != crs:
+        east_m, north_m = project(crs, *unproject(own, east, north))
+        values["east_m"], values["north_m"] = float(east_m), float(north_m)
+    return _metre_fault(east, north, own)
 
 
 def _metre_fault(east: float, north: float, crs: str) -> tuple[str, str, str] | None:

@@ -155,5 +155,7 @@ def _check_extent_of_file(path: Path, source: Any, faults: Faults) -> None:
                 offset = source.get_tag_item(f"BLOCK_OFFSET_{block}", "TIFF", bidx=band)
                 length = source.get_tag_item(f"BLOCK_SIZE_{block}", "TIFF", bidx=band)
                 needed = max(needed, int(offset or 0) + int(length or 0))
-    if needed > size_bytes:
+    if needed == 0:
+        faults.add(str(path), "pixels", "a header without any", hint)
+    elif needed > size_bytes:
         faults.add(str(path), f"at least {needed} bytes", f"{size_bytes} bytes", hint)
