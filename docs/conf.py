@@ -1,0 +1,31 @@
+"""Sphinx configuration; build with ``sphinx-build -W -b html docs docs/_build``."""
+
+from importlib.metadata import version as installed_version
+from importlib.util import find_spec
+
+project = "mapfilter"
+author = "the mapfilter authors"
+copyright = "the mapfilter authors, Apache-2.0"  # noqa: A001
+release = version = installed_version("mapfilter")
+
+extensions = [
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.doctest",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.napoleon",
+]
+templates_path = ["_templates"]
+exclude_patterns = ["_build", "_templates"]
+
+autosummary_generate = True
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_default_options = {"members": True}
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+doctest_test_doctest_blocks = "default"
+
+html_theme = "furo" if find_spec("furo") is not None else "alabaster"
+html_title = f"mapfilter {release}"
+html_show_sphinx = False
