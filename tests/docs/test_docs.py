@@ -1,0 +1,112 @@
+"""The documentation's examples run, and what it lists is what the program has."""
+
+import doctest
+import re
+import tomllib
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+import typer
+from pydantic import BaseModel
+
+from mapfilter.cli import app
+from mapfilter.filters.candidate import CandidateOptions
+from mapfilter.filters.contract import Reason, Status
+from mapfilter.positioning.estimate_store import _COLUMNS as ESTIMATE_COLUMNS
+from mapfilter.radio._cell_table import COLUMNS as PLAN_COLUMNS
+from mapfilter.tracks.schema import SCHEMA
+from mapfilter.workflows.config import load_config
+from mapfilter.workflows.sections import Config
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+PAGES = sorted(path.relative_to(DOCS) for path in DOCS.rglob("*.rst") if "api" not in path.parts)
+
+
+def page(name: str) -> str:
+    return (DOCS / name).read_text(encoding="utf-8")
+
+
+def named(text: str) -> set[str]:
+    """Everything in double backticks, without the braces of examples around it."""
+    return set(re.findall(r"``([^`]+)``", text))
+
+
+@pytest.mark.parametrize("name", PAGES, ids=str)
+def test_examples_of_each_page(name):
+    failed, _ = doctest.testfile(
+        str(DOCS / name), module_relative=False, encoding="utf-8", verbose=False
+    )
+    assert failed == 0
+
+
+def test_the_quickstart_has_examples():
+    parser = doctest.DocTestParser()
+    assert len(parser.get_examples(page("quickstart.rst"))) > 10
+    assert len(parser.get_examples(page("conventions.rst"))) > 10
+
+
+def test_conventions_name_every_status_and_reason():
+    listed = named(page("conventions.rst"))
+    assert {str(status) for status in Status} <= listed
+    assert {str(reason) for reason in Reason} <= listed
+
+
+def test_files_name_every_column():
+    listed = named(page("file-formats.rst"))
+    assert set(PLAN_COLUMNS) <= listed
+    assert set(ESTIMATE_COLUMNS) <= listed
+    assert {column.name for table in SCHEMA.values() for column in table} <= listed
+
+
+def test_files_name_every_column_of_a_database():
+    from mapfilter.database.radioroutes import Points
+
+    listed = named(page("file-formats.rst"))
+    assert {field.name for field in fields(Points)} <= listed
+    assert {"level_dbm", "below_best_db", "cell", "geometry"} <= listed
+
+
+def test_filter_page_tells_every_option_with_its_default():
+    text = page("explanation/candidate-filter.rst")
+    told = dict(re.findall(r"\* - ``(\w+)``\n     - ``([^`]+)``", text))
+    assert told == {field.name: str(field.default) for field in fields(CandidateOptions)}
+
+
+def test_configuration_file_holds_every_key_with_its_default(tmp_path):
+    file = DOCS / "configuration.toml"
+    given = tomllib.loads(file.read_text(encoding="utf-8"))
+    text = file.read_text(encoding="utf-8")
+    (tmp_path / "empty.toml").write_text("")
+    assert load_config(file, out=tmp_path) == load_config(tmp_path / "empty.toml", out=tmp_path)
+    _compare(Config, given, text)
+
+
+def _compare(model: type[BaseModel], given: dict[str, object], text: str) -> None:
+    """Every key is in the file, in a comment if it has no default."""
+    for key, field in model.model_fields.items():
+        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
+            values = given.get(key, {})
+            assert isinstance(values, dict)
+            _compare(field.annotation, values, text)
+        elif field.default is None:
+            assert re.search(rf"^# {key} = ", text, flags=re.MULTILINE), key
+        elif key not in given:
+            assert re.search(rf"^(# )?{key} = ", text, flags=re.MULTILINE), key
+
+
+def test_command_line_page_names_every_command_and_option():
+    text = page("cli.rst")
+    command = typer.main.get_command(app)
+    for name, sub in command.commands.items():
+        assert f"mapfilter {name}" in text
+        for parameter in sub.params:
+            for option in parameter.opts:
+                if option.startswith("-") and option != "--help":
+                    assert option in text, (name, option)
+
+
+def test_quickstart_shows_only_commands_that_exist():
+    commands = set(typer.main.get_command(app).commands)
+    shown = set(re.findall(r"^   \$ mapfilter (\w+)", page("quickstart.rst"), flags=re.MULTILINE))
+    assert shown == commands
