@@ -19,8 +19,8 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mapfilter.database.build import build_database as build_database
-    from mapfilter.database.radioroutes import RadioField as RadioField
+    from mapfilter.database.build import build as build
+    from mapfilter.database.field import RadioField as RadioField
     from mapfilter.database.radioroutes import RadioRouteDatabase as RadioRouteDatabase
     from mapfilter.database.store import open_database as open_database
     from mapfilter.errors import MapfilterError as MapfilterError
@@ -53,7 +53,7 @@ _HOMES = {
     "Fix": "positioning.estimate",
     "Lattice": "geodesy",
     "MapfilterError": "errors",
-    "RadioField": "database.radioroutes",
+    "RadioField": "database.field",
     "RadioRouteDatabase": "database.radioroutes",
     "RouteLattice": "roads.lattice",
     "RxLevRasters": "radio.rasters",
@@ -62,7 +62,7 @@ _HOMES = {
     "TrackLog": "tracks.log",
     "Truth": "evaluation.accuracy",
     "accuracy": "evaluation.accuracy",
-    "build_database": "database.build",
+    "build": "database.build",
     "cell_points": "positioning.global_positioning",
     "make_log": "tracks.log",
     "open_database": "database.store",

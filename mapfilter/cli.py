@@ -47,7 +47,7 @@ def demo(
     settings: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """The whole chain on the embedded map of central Helsinki."""
+    """Run the whole chain on the embedded map of central Helsinki."""
     from mapfilter.workflows.demo import run_demo
 
     with _progress("demo") as progress:
@@ -65,7 +65,7 @@ def predict(
     seed: SeedOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Cell plan and buildings to RxLev rasters, and a perturbed set that plays reality."""
+    """Predict RxLev rasters from cell plan and buildings, and a set that plays reality."""
     from mapfilter.workflows.config import load_config
     from mapfilter.workflows.predict import run_predict
 
@@ -86,7 +86,7 @@ def build(
     workers: Annotated[int, typer.Option("--workers", min=1, help="Local processes.")] = 1,
     as_json: JsonOption = False,
 ) -> None:
-    """RxLev rasters and roads to a radio-route database."""
+    """Build a radio-route database from RxLev rasters and roads."""
     from mapfilter.workflows.build import run_build, run_dry_build
     from mapfilter.workflows.config import load_config
 
@@ -105,7 +105,7 @@ def export(
     to: Annotated[Path, typer.Option("--to", metavar="FILE", help="A .gpkg file.")],
     as_json: JsonOption = False,
 ) -> None:
-    """A radio-route database to a GeoPackage."""
+    """Write a radio-route database as GeoPackage."""
     from mapfilter.workflows.export import run_export
 
     _print(run_export(database, to), as_json)
@@ -113,7 +113,7 @@ def export(
 
 @app.command()
 def info(path: PathArgument, as_json: JsonOption = False) -> None:
-    """What a database, raster set or log holds."""
+    """Tell what a database, raster set or log holds."""
     from mapfilter.workflows.info import run_info
 
     _print(run_info(path), as_json)
@@ -127,7 +127,7 @@ def simulate(
     seed: SeedOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Journeys with truth over a database's area."""
+    """Simulate journeys with truth along the streets."""
     from mapfilter.workflows.config import load_config
     from mapfilter.workflows.simulate import run_simulate
 

@@ -31,11 +31,11 @@ def facts(value: Any) -> Any:
 
 
 def text_lines(found: Mapping[str, Any], indent: str = "") -> Iterator[str]:
-    """Yield one line for each figure, nested ones indented.
+    r"""Yield one line for each figure, nested ones indented.
 
     Examples
     --------
-    >>> print(*text_lines({"cells": 3, "seconds": {"build": 1.23456}}), sep="\\n")
+    >>> print(*text_lines({"cells": 3, "seconds": {"build": 1.23456}}), sep="\n")
     cells: 3
     seconds:
       build: 1.235

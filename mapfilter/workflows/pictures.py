@@ -106,5 +106,5 @@ def choose_snapshots(snapshots: Sequence[Snapshot]) -> list[Snapshot]:
     chosen = {0, last}
     for goal in np.linspace(0, depth[last], MAX_PANELS)[1:-1]:
         free = [i for i in range(1, last) if i not in chosen]
-        chosen.add(min(free, key=lambda i, goal=goal: abs(depth[i] - goal)))
+        chosen.add(free[int(np.argmin(np.abs(depth[free] - goal)))])
     return [snapshots[i] for i in sorted(chosen)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +25,7 @@ from mapfilter.positioning.global_positioning import (
 )
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.store import list_logs, read_log
+from mapfilter.workflows.facts import facts
 from mapfilter.workflows.pictures import draw_track
 from mapfilter.workflows.sections import Config, FilterSection
 from mapfilter.workflows.truth import truth_of
@@ -132,7 +132,7 @@ def run_replay(
             progress(index + 1, len(folders))
     summary = summarise(scores) if scores else None
     if summary is not None and len(folders) > 1:
-        write_json(out / "summary.json", finite(asdict(summary)))
+        write_json(out / "summary.json", facts(summary))
     unknown = any(str(Reason.UNKNOWN_CELL) in log.unused for log in logs)
     return ReplayResult("candidate", tuple(logs), summary, unknown, out)
 
@@ -152,14 +152,6 @@ def candidate_options(section: FilterSection, resolution_m: float) -> CandidateO
     )
 
 
-def finite(values: dict[str, Any]) -> dict[str, Any]:
-    """Replace NaN and infinity, which JSON does not know, by None."""
-    return {
-        key: None if isinstance(value, float) and not math.isfinite(value) else value
-        for key, value in values.items()
-    }
-
-
 def _write(
     name: str, log: TrackLog, track: PositionedTrack, out: Path, pictures: tuple[Path, ...]
 ) -> ReplayedLog:
@@ -176,7 +168,7 @@ def _write(
         "epochs": len(track.estimate),
         "unused": unused,
         "notes": list(log.notes),
-        **(finite(asdict(score)) if score is not None else {}),
+        **(facts(score) if score is not None else {}),
     }
     write_json(out / "figures.json", figures)
     return ReplayedLog(
@@ -189,3 +181,19 @@ def _count_reasons(estimate: TrackEstimate) -> dict[str, int]:
     for reading in estimate.unused:
         counts[str(reading.reason)] = counts.get(str(reading.reason), 0) + 1
     return dict(sorted(counts.items()))
+
+
+def replay_facts(result: ReplayResult) -> dict[str, Any]:
+    """Return what a replay found, as JSON shows it.
+
+    One log gives its own figures, several the summary of all.
+    """
+    shown: dict[str, Any] = {"filter": result.filter, "logs": len(result.logs)}
+    if len(result.logs) == 1:
+        log = result.logs[0]
+        shown |= asdict(log.accuracy) if log.accuracy is not None else {}
+        shown |= {"unused": log.unused, "outputs": log.outputs}
+    elif result.summary is not None:
+        shown |= asdict(result.summary)
+    filter_s = sorted(log.filter_s for log in result.logs)
+    return {**shown, "filter_s": filter_s[len(filter_s) // 2], "out": result.out}

@@ -193,7 +193,7 @@ class FilterSection(Section):
     duplicates: Literal["set", "list"] = "set"
     threshold: Annotated[int, Field(ge=1)] = 1
     at_threshold: Literal["switch", "stall"] = "switch"
-    switch_check: Literal["next_call", "same_call"] = "next_call"
+    switch_check: Literal["next_call", "same_call"] = "same_call"
     when_empty: Literal["fail", "reinitialise"] = "fail"
 
 

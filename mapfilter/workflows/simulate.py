@@ -53,7 +53,7 @@ def run_simulate(config: Config, progress: Progress | None = None) -> SimulateRe
     rasters = open_rasters(config.rasters_path if as_predicted else config.reality_path)
     check_against_plan(rasters, world.plan)
     network = street_network(world.ways, world.routes)
-    levels = level_sampler(rasters, world.plan.ids, world.lattice.bounds_m)
+    levels = level_sampler(rasters, world.plan.ids, world.lattice.bounds_m, plan=world.plan)
     settings = simulation_settings(config)
     total = settings.journeys * settings.draws
     with atomic_dir(config.track_path) as folder:

@@ -35,26 +35,23 @@ def area_lattice(area: Area) -> Lattice:
         lon, lat = area.southwest
         check_bbox((lon, lat, lon + 1e-6, lat + 1e-6), "area.southwest")
         crs = projected_crs(area.crs, "area.crs") if area.crs else utm_crs(lon, lat)
-        east, north = project(crs, lon, lat)
-        bounds_m = (
-            float(east), float(north), float(east) + area.size_m[0], float(north) + area.size_m[1],
-        )  # fmt: skip
+        # Snapped first, so that the size asked for is the size of the lattice.
+        corner = np.concatenate(project(crs, [lon], [lat])) // area.resolution_m * area.resolution_m
+        bounds_m = (*corner, *(corner + area.size_m))
     else:
         box = area.bbox or map_bounds_deg(area.map)
         check_bbox(box, "area.bbox")
-        west, south, east_deg, north_deg = box
-        centre = (west + east_deg) / 2, (south + north_deg) / 2
+        west, south, east, north = box
+        centre = (west + east) / 2, (south + north) / 2
         crs = projected_crs(area.crs, "area.crs") if area.crs else utm_crs(*centre)
-        lon = np.array([west, east_deg, east_deg, west])
-        easts, norths = project(crs, lon, np.array([south, south, north_deg, north_deg]))
-        bounds_m = (
-            float(easts.min()), float(norths.min()), float(easts.max()), float(norths.max()),
-        )  # fmt: skip
+        edges = project(crs, [west, east, east, west], [south, south, north, north])
+        bounds_m = (*np.min(edges, axis=1), *np.max(edges, axis=1))
     faults = Faults()
     if not np.all(np.isfinite(bounds_m)):
         faults.add("area", f"a box that {crs} can show", bounds_m, "a CRS of another region")
         faults.raise_if_any(InputError)
-    pixels = np.prod([(bounds_m[i + 2] - bounds_m[i]) / area.resolution_m for i in (0, 1)])
+    width_m, height_m = bounds_m[2] - bounds_m[0], bounds_m[3] - bounds_m[1]
+    pixels = width_m * height_m / area.resolution_m**2
     if pixels > LARGEST_AREA_PX:
         faults.add(
             "area",

@@ -23,7 +23,7 @@ from mapfilter.filters.run import Event, run
 
 RNG = np.random.default_rng(0)
 POINTS = [(0.0, 10.0), (5.0, 10.0), (0.0, 0.0), (5.0, 0.0), (10.0, 0.0), (15.0, 0.0)]
-LITERAL = CandidateOptions(update_length_m=5.0, tracking_length_m=0.0)
+LITERAL = CandidateOptions(update_length_m=5.0, tracking_length_m=0.0, switch_check="next_call")
 
 
 @dataclass(frozen=True)
