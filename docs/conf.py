@@ -22,6 +22,13 @@ autosummary_generate = True
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_default_options = {"members": True}
+autodoc_type_aliases = {
+    name: name
+    for name in (
+        "ArrayLike", "Bools", "Bounds", "Floats", "Floats32", "Geometries", "Levels", "Progress",
+        "Rows",
+    )
+}  # fmt: skip
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 doctest_test_doctest_blocks = "default"

@@ -72,7 +72,10 @@ def plot_candidates(
                 axes.set_xticklabels([])
         attribute(panels[(count - 1) // columns, (count - 1) % columns], base)
         figure.legend(
-            handles=_legend(with_truth=truth is not None),
+            handles=_legend(
+                with_truth=truth is not None,
+                with_estimate=any(np.isfinite(s.east_m) for s in snapshots),
+            ),
             loc="outside lower center",
             ncols=5,
             frameon=False,
@@ -112,7 +115,7 @@ def _draw_snapshot(axes: Axes, frame: LocalFrame, snapshot: Snapshot, truth: Tru
         )
 
 
-def _legend(*, with_truth: bool) -> list[Line2D]:
+def _legend(*, with_truth: bool, with_estimate: bool) -> list[Line2D]:
     """Return what the marks of the panels mean."""
     handles = [
         Line2D([], [], color=STREET, linewidth=2, label="where one can be"),
@@ -126,10 +129,11 @@ def _legend(*, with_truth: bool) -> list[Line2D]:
                 markeredgecolor=BLACK, markeredgewidth=1.6, label="true position",
             ),
         ]  # fmt: skip
-    handles.append(
-        Line2D(
-            [], [], linestyle="", marker="*", markersize=13, color=VERMILLION,
-            markeredgecolor="white", label="estimate",
-        )
-    )  # fmt: skip
+    if with_estimate:
+        handles.append(
+            Line2D(
+                [], [], linestyle="", marker="*", markersize=13, color=VERMILLION,
+                markeredgecolor="white", label="estimate",
+            )
+        )  # fmt: skip
     return handles

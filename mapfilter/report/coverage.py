@@ -62,7 +62,7 @@ def plot_points_per_cell(
     """
     colours = distinct_colours(len(points_by_cell))
     pitch_pt = 72 * _MAP_IN * resolution_m / (base.bounds_m[2] - base.bounds_m[0])
-    size = float(np.clip((0.9 * pitch_pt) ** 2, 1.2, 25.0))
+    size = float(np.clip((1.05 * pitch_pt) ** 2, 1.2, 25.0))
     with picture(path, _MAP_IN + _SIDE_IN, map_height_in(base, _MAP_IN) + 0.85) as figure:
         axes = figure.subplots()
         frame = draw_base(axes, base)

@@ -59,9 +59,10 @@ def plot_track(
         if truth is not None and truth.time_s.size:
             x, y = frame(truth.east_m, truth.north_m)
             axes.plot(x, y, color=BLACK, linewidth=2.6, zorder=4, label="truth")
-            axes.text(
-                float(x[0]), float(y[0]), " start", fontsize=9, path_effects=list(HALO), zorder=12
-            )
+            axes.annotate(
+                "start", (float(x[0]), float(y[0])), xytext=(0, -13), textcoords="offset points",
+                ha="center", fontsize=9, path_effects=list(HALO), zorder=3.5,
+            )  # fmt: skip
             axes.scatter(x[:1], y[:1], s=50, color="white", edgecolors=BLACK, zorder=11)
             off = position_errors_m(estimate, truth) > SUCCESS_RADIUS_M
         near = located & ~off
@@ -70,7 +71,7 @@ def plot_track(
             if which.any():
                 x, y = frame(estimate.east_m[which], estimate.north_m[which])
                 axes.scatter(
-                    x, y, s=13, marker=marker, color=colour, edgecolors="white", linewidths=0.3,
+                    x, y, s=10, marker=marker, color=colour, linewidths=0,
                     zorder=6, label=label,
                 )  # fmt: skip
         switch = estimate.converged_at
