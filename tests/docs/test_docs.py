@@ -2,6 +2,9 @@
 
 import doctest
 import re
+import shlex
+import shutil
+import textwrap
 import tomllib
 from dataclasses import fields
 from pathlib import Path
@@ -9,6 +12,7 @@ from pathlib import Path
 import pytest
 import typer
 from pydantic import BaseModel
+from typer.testing import CliRunner
 
 from mapfilter.cli import app
 from mapfilter.filters.candidate import CandidateOptions
@@ -44,6 +48,27 @@ def test_the_quickstart_has_examples():
     parser = doctest.DocTestParser()
     assert len(parser.get_examples(page("quickstart.rst"))) > 10
     assert len(parser.get_examples(page("conventions.rst"))) > 10
+
+
+def test_quickstart_commands_run(tmp_path, monkeypatch):
+    """All but the demo, which is these same steps, one after another in an empty folder."""
+    text = page("quickstart.rst")
+    toml = re.search(r"code-block:: toml\n\n((?:   .*\n|\n)+)", text)
+    assert toml is not None
+    (tmp_path / "helsinki.toml").write_text(textwrap.dedent(toml[1]), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    commands = re.findall(r"^   \$ mapfilter (.+)$", text, flags=re.MULTILINE)
+    assert len(commands) == 11
+    for command in commands:
+        if command.startswith("demo"):
+            continue
+        if "my-walk" in command:
+            shutil.copytree("out/journeys/journey-0001-draw-000", "my-walk")
+        result = CliRunner().invoke(app, shlex.split(command), catch_exceptions=False)
+        assert result.exit_code == 0, (command, result.output)
+    found = {path.name for path in (tmp_path / "located").rglob("*")}
+    named_there = {f"estimate.{kind}" for kind in ("parquet", "gpx", "geojson")}
+    assert named_there | {"figures.json", "candidates.png", "track.png", "error.png"} <= found
 
 
 def test_conventions_name_every_status_and_reason():
