@@ -80,7 +80,7 @@ def levels_tables(
     """Yield (cell, rows of its ``levels`` part) for every cell heard at some of the places."""
     columns = {name: places[name].to_numpy() for name in ("point", "row", "col")}
     heard, first = np.unique(levels.cell, return_index=True)
-    ends = np.append(first[1:], levels.cell.size)
+    ends = np.append(first, levels.cell.size)[1:]
     for cell, start, end in zip(heard.tolist(), first.tolist(), ends.tolist(), strict=True):
         which = levels.which[start:end]
         table = {name: values[which] for name, values in columns.items()}

@@ -11,7 +11,6 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path, PurePosixPath
-from types import MappingProxyType
 from typing import Any, Literal
 from urllib.parse import quote
 
@@ -119,7 +118,7 @@ def open_database(
         ) from error
     if listed != list(plan.ids):
         raise fail(StoreError, where, f"the cells of {CELLS}", "other cells", "parts mixed up")
-    return RadioRouteDatabase(path, lattice, plan, margin_db, floor_dbm, MappingProxyType(manifest))
+    return RadioRouteDatabase(path, lattice, plan, margin_db, floor_dbm, manifest)
 
 
 def info(database: RadioRouteDatabase) -> dict[str, Any]:
