@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from mapfilter.database.build import build
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.radio.rasters import RxLevRasters
+from mapfilter.radio.rasters import RxLevRasters, open_rasters, write_rasters
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.routable import route_lattice
 from mapfilter.roads.ways import Squares, Ways
@@ -61,3 +62,18 @@ class World:
     routes: RouteLattice
     rasters: RxLevRasters
     levels_dbm: np.ndarray
+
+
+def make_world(folder):
+    """Write the rasters into a folder."""
+    plan = make_plan()
+    items = list(levels_of(plan))
+    write_rasters(folder / "rxlev.tif", LATTICE, iter(items), plan.ids)
+    levels_dbm = np.stack([values for _, values in items])
+    return World(plan, make_routes(), open_rasters(folder / "rxlev.tif"), levels_dbm)
+
+
+def make_database(world, folder):
+    """Build the database of a world in tiles of 16 pixels."""
+    out = folder / "database"
+    return build(world.rasters, world.plan, world.routes, out, floor_dbm=FLOOR_DBM, tile_px=16)

@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_plan, make_routes
+from small_world import (
+    CRS,
+    FLOOR_DBM,
+    IDS,
+    LATTICE,
+    make_database,
+    make_plan,
+    make_routes,
+    make_world,
+)
 
 from mapfilter._parallel import SerialExecutor, local_executor
 from mapfilter.database import parts
@@ -19,6 +28,16 @@ from mapfilter.database.store import info
 from mapfilter.errors import InputError, OutputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.rasters import open_rasters, write_rasters
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory):
+    return make_world(tmp_path_factory.mktemp("rasters"))
+
+
+@pytest.fixture(scope="module")
+def database(world, tmp_path_factory):
+    return make_database(world, tmp_path_factory.mktemp("built"))
 
 
 def contents(folder: Path):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_plan
+from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_database, make_plan, make_world
 
 from mapfilter.database.store import (
     export_geopackage,
@@ -20,6 +20,16 @@ from mapfilter.database.store import (
     write_cells,
 )
 from mapfilter.errors import InputError, OutputError, StoreError
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory):
+    return make_world(tmp_path_factory.mktemp("rasters"))
+
+
+@pytest.fixture(scope="module")
+def database(world, tmp_path_factory):
+    return make_database(world, tmp_path_factory.mktemp("built"))
 
 
 @pytest.fixture

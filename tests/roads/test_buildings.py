@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import shapely
+from made_maps import AREA, write_pbf
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
@@ -10,6 +11,11 @@ from mapfilter.roads.buildings import rasterise_heights, read_buildings
 from mapfilter.roads.ways import Buildings
 
 SQUARE = [(50, 50), (70, 50), (70, 70), (50, 70), (50, 50)]
+
+
+@pytest.fixture
+def make_map(tmp_path):
+    return lambda ways, relations=(): write_pbf(tmp_path / "made.osm.pbf", ways, relations)
 
 
 @pytest.mark.parametrize(
@@ -28,9 +34,9 @@ SQUARE = [(50, 50), (70, 50), (70, 70), (50, 70), (50, 50)]
         ({}, 12.0, "default"),
     ],
 )
-def test_height_of_a_building(make_map, area, tags, height_m, source):
+def test_height_of_a_building(make_map, tags, height_m, source):
     made = make_map([(3, {"building": "yes", **tags}, SQUARE)])
-    buildings = read_buildings(made, *area)
+    buildings = read_buildings(made, *AREA)
     np.testing.assert_allclose(buildings.height_m, [height_m])
     counts = {
         "height": buildings.from_height,
@@ -45,18 +51,18 @@ def test_height_of_a_building(make_map, area, tags, height_m, source):
     "tags",
     [{"building": "no"}, {"building": "roof"}, {"building": "yes", "location": "underground"}],
 )
-def test_what_is_no_building(make_map, area, tags):
-    assert len(read_buildings(make_map([(3, tags, SQUARE)]), *area)) == 0
+def test_what_is_no_building(make_map, tags):
+    assert len(read_buildings(make_map([(3, tags, SQUARE)]), *AREA)) == 0
 
 
-def test_defaults_are_arguments_and_checked(make_map, area):
+def test_defaults_are_arguments_and_checked(make_map):
     levels = {"building": "yes", "building:levels": "2"}
     other = [(x + 100, y) for x, y in SQUARE]
     made = make_map([(3, levels, SQUARE), (4, {"building": "yes"}, other)])
-    found = read_buildings(made, *area, default_height_m=8, storey_height_m=4)
+    found = read_buildings(made, *AREA, default_height_m=8, storey_height_m=4)
     assert found.height_m.tolist() == [8.0, 8.0]
     with pytest.raises(InputError, match=r"default_height_m.*\n.*storey_height_m"):
-        read_buildings(made, *area, default_height_m=0, storey_height_m=-1)
+        read_buildings(made, *AREA, default_height_m=0, storey_height_m=-1)
 
 
 def test_the_highest_of_overlapping_buildings_counts():

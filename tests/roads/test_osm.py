@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import shapely
+from made_maps import AREA, write_pbf
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import project
@@ -35,8 +36,13 @@ CASES = [
 ]
 
 
+@pytest.fixture
+def make_map(tmp_path):
+    return lambda ways, relations=(): write_pbf(tmp_path / "made.osm.pbf", ways, relations)
+
+
 @pytest.mark.parametrize(("highway", "tags", "walking", "driving"), CASES)
-def test_rules_of_the_profiles(make_map, area, highway, tags, walking, driving):
+def test_rules_of_the_profiles(make_map, highway, tags, walking, driving):
     always = {"highway": "residential"}
     made = make_map(
         [
@@ -45,19 +51,19 @@ def test_rules_of_the_profiles(make_map, area, highway, tags, walking, driving):
         ]
     )
     for profile, expected in (("walking", walking), ("driving", driving)):
-        ways = read_ways(made, profile, *area)
+        ways = read_ways(made, profile, *AREA)
         assert (5 in ways.way_id) is expected
         assert 9 in ways.way_id
 
 
-def test_ways_keep_place_class_and_vertices(make_map, area):
+def test_ways_keep_place_class_and_vertices(make_map):
     corners = [(10.0, 10.0), (60.0, 10.0), (61.0, 40.0)]
     made = make_map([(7, {"highway": "path", "tunnel": "building_passage"}, corners)])
-    ways = read_ways(made, "walking", *area)
+    ways = read_ways(made, "walking", *AREA)
     assert ways.way_id.tolist() == [7]
     assert ways.class_names == ("path",)
     assert ways.covered.tolist() == [True]
-    found = shapely.get_coordinates(ways.geometry) - (area[1][0], area[1][1])
+    found = shapely.get_coordinates(ways.geometry) - (AREA[1][0], AREA[1][1])
     np.testing.assert_allclose(found, corners, atol=0.02)  # a map keeps 1e-7 degrees
 
 
@@ -71,25 +77,25 @@ def test_ways_keep_place_class_and_vertices(make_map, area):
         ({"junction": "roundabout"}, 1),
     ],
 )
-def test_one_way_streets_bind_drivers_only(make_map, area, tags, expected):
+def test_one_way_streets_bind_drivers_only(make_map, tags, expected):
     made = make_map([(7, {"highway": "residential", **tags}, [(10, 10), (60, 10)])])
-    assert read_ways(made, "driving", *area).oneway.tolist() == [expected]
-    assert read_ways(made, "walking", *area).oneway.tolist() == [0]
+    assert read_ways(made, "driving", *AREA).oneway.tolist() == [expected]
+    assert read_ways(made, "walking", *AREA).oneway.tolist() == [0]
 
 
-def test_ways_are_cut_at_the_edge_and_keep_their_direction(make_map, area):
+def test_ways_are_cut_at_the_edge_and_keep_their_direction(make_map):
     # It leaves to the south, comes back, and ends beyond the eastern edge.
     corners = [(100, 50), (100, -50), (200, -50), (200, 50), (500, 50)]
     made = make_map([(7, {"highway": "residential", "oneway": "yes"}, corners)])
-    ways = read_ways(made, "driving", *area)
+    ways = read_ways(made, "driving", *AREA)
     assert ways.way_id.tolist() == [7, 7]
-    lines = [shapely.get_coordinates(line) - (area[1][0], area[1][1]) for line in ways.geometry]
+    lines = [shapely.get_coordinates(line) - (AREA[1][0], AREA[1][1]) for line in ways.geometry]
     lines.sort(key=lambda line: line[0, 0])
     np.testing.assert_allclose(lines[0], [(100, 50), (100, 0)], atol=0.02)
     np.testing.assert_allclose(lines[1], [(200, 0), (200, 50), (400, 50)], atol=0.02)
 
 
-def test_a_loop_is_a_way_and_an_area_is_a_square(make_map, area):
+def test_a_loop_is_a_way_and_an_area_is_a_square(make_map):
     shifted = [(x + 100, y) for x, y in RING]
     made = make_map(
         [
@@ -97,7 +103,7 @@ def test_a_loop_is_a_way_and_an_area_is_a_square(make_map, area):
             (2, {"highway": "pedestrian", "area": "yes"}, shifted),
         ]
     )
-    ways, squares = read_ways(made, "walking", *area), read_squares(made, *area)
+    ways, squares = read_ways(made, "walking", *AREA), read_squares(made, *AREA)
     assert ways.way_id.tolist() == [1]
     assert shapely.length(ways.geometry).sum() == pytest.approx(140, abs=0.1)
     assert squares.area_id.tolist() == [2]
@@ -115,26 +121,26 @@ def test_a_loop_is_a_way_and_an_area_is_a_square(make_map, area):
         ({"highway": "elevator"}, False),
     ],
 )
-def test_which_areas_are_squares(make_map, area, tags, is_square):
+def test_which_areas_are_squares(make_map, tags, is_square):
     made = make_map([(3, tags, RING), (4, {"highway": "path"}, [(10, 10), (60, 10)])])
-    assert (3 in read_squares(made, *area).area_id) is is_square
+    assert (3 in read_squares(made, *AREA).area_id) is is_square
 
 
-def test_multipolygon_squares_have_negative_ids(make_map, area):
+def test_multipolygon_squares_have_negative_ids(make_map):
     path = (4, {"highway": "path"}, [(10, 10), (60, 10)])
     made = make_map([(3, {}, RING), path], [(8, {"highway": "pedestrian"}, [3])])
-    assert read_squares(made, *area).area_id.tolist() == [-8]
+    assert read_squares(made, *AREA).area_id.tolist() == [-8]
 
 
-def test_squares_are_cut_at_the_edge(make_map, area):
+def test_squares_are_cut_at_the_edge(make_map):
     half_out = [(x - 70, y) for x, y in RING]
     made = make_map([(3, {"place": "square"}, half_out)])
-    assert shapely.area(read_squares(made, *area).geometry).sum() == pytest.approx(600, abs=2)
+    assert shapely.area(read_squares(made, *AREA).geometry).sum() == pytest.approx(600, abs=2)
 
 
-def test_no_way_in_the_area_is_told(make_map, area):
+def test_no_way_in_the_area_is_told(make_map):
     made = make_map([(7, {"highway": "path"}, [(10, 10), (60, 10)])])
-    crs, (west, south, east, north) = area
+    crs, (west, south, east, north) = AREA
     with pytest.raises(InputError, match="outside the map"):
         read_ways(made, "walking", crs, (west + 5e3, south, east + 5e3, north))
 
@@ -148,7 +154,7 @@ def test_swapped_longitude_and_latitude_are_guessed():
         read_ways("helsinki", "walking", crs, bounds)
 
 
-def test_broken_maps_are_named(tmp_path, make_map, area):
+def test_broken_maps_are_named(tmp_path, make_map):
     whole = make_map([(7, {"highway": "path"}, [(10, 10), (60, 10)])]).read_bytes()
     broken = {
         "empty.osm.pbf": (b"", "empty file"),
@@ -159,10 +165,10 @@ def test_broken_maps_are_named(tmp_path, make_map, area):
     for name, (content, message) in broken.items():
         (tmp_path / name).write_bytes(content)
         with pytest.raises(InputError, match=message) as caught:
-            read_ways(tmp_path / name, "walking", *area)
+            read_ways(tmp_path / name, "walking", *AREA)
         assert name in str(caught.value)
     with pytest.raises(InputError, match="no such file"):
-        read_ways(tmp_path / "none.osm.pbf", "walking", *area)
+        read_ways(tmp_path / "none.osm.pbf", "walking", *AREA)
 
 
 def test_bounds_come_from_the_header_or_else_from_the_ways(make_map):

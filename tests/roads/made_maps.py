@@ -2,12 +2,13 @@
 
 import struct
 
-import pytest
-
 from mapfilter.geodesy import unproject
 
 CRS = "EPSG:32629"
 ORIGIN = (531_000.0, 4_556_000.0)
+
+AREA = (CRS, (ORIGIN[0], ORIGIN[1], ORIGIN[0] + 400.0, ORIGIN[1] + 400.0))
+"""A box of 400 m with ORIGIN at its south-western corner."""
 
 
 def write_pbf(path, ways, relations=()):
@@ -70,15 +71,3 @@ def write_pbf(path, ways, relations=()):
             head = fileformat_pb2.BlobHeader(type=kind, datasize=len(body)).SerializeToString()
             stream.write(struct.pack(">I", len(head)) + head + body)
     return path
-
-
-@pytest.fixture
-def make_map(tmp_path):
-    """Return a function that writes a made map and returns its path."""
-    return lambda ways, relations=(): write_pbf(tmp_path / "made.osm.pbf", ways, relations)
-
-
-@pytest.fixture
-def area():
-    """The CRS and a box of 400 m around ORIGIN, which lies at its south-western corner."""
-    return CRS, (ORIGIN[0], ORIGIN[1], ORIGIN[0] + 400.0, ORIGIN[1] + 400.0)
