@@ -2,6 +2,8 @@
 
 from importlib.metadata import version as installed_version
 from importlib.util import find_spec
+from pathlib import Path
+from shutil import rmtree
 
 project = "mapfilter"
 author = "the mapfilter authors"
@@ -18,6 +20,8 @@ extensions = [
 templates_path = ["_templates"]
 exclude_patterns = ["_build", "_templates"]
 
+# Pages of modules that are gone would stay and fail the next build.
+rmtree(Path(__file__).parent / "api", ignore_errors=True)
 autosummary_generate = True
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
@@ -31,7 +35,8 @@ autodoc_type_aliases = {
 }  # fmt: skip
 napoleon_google_docstring = False
 napoleon_use_rtype = False
-doctest_test_doctest_blocks = "default"
+# Examples in docstrings are run by pytest, with the names of their modules.
+doctest_test_doctest_blocks = ""
 
 html_theme = "furo" if find_spec("furo") is not None else "alabaster"
 html_title = f"mapfilter {release}"
