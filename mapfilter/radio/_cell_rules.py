@@ -60,11 +60,15 @@ def _arfcn_hint(value: float) -> str:
     return "EARFCN given for ARFCN" if value > 1023 else ""
 
 
+def _azimuth_hint(value: float) -> str:
+    return "counted from -180; add 360" if -180 <= value < 0 else ""
+
+
 RANGES: dict[str, Range] = {
     "east_m": Range(-1e8, 1e8, "finite metres"),
     "north_m": Range(-1e8, 1e8, "finite metres"),
     "height_m": Range(0, 1000, "metres", above_low=True, hint=_height_hint),
-    "azimuth_deg": Range(0, 360, "degrees clockwise from true north"),
+    "azimuth_deg": Range(0, 360, "degrees clockwise from true north", hint=_azimuth_hint),
     "downtilt_deg": Range(-90, 90, "degrees"),
     "beamwidth_deg": Range(0, 360, "degrees", above_low=True),
     "vertical_beamwidth_deg": Range(0, 180, "degrees", above_low=True),

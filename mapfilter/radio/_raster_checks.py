@@ -36,17 +36,17 @@ def describe(path: Path, quantity: Quantity | None) -> tuple[tuple[str, ...], La
     _check_file(path)
     faults = Faults()
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", NotGeoreferencedWarning)
             with rasterio.open(path) as source:
                 if source.driver == "GTiff":
                     _check_extent_of_file(path, source, faults)
                     # What a cut-off file says about itself is not worth telling.
                     faults.raise_if_any(InputError)
-                lattice = _lattice(path, source, faults)
+                lattice = _lattice(path, source, not caught, faults)
                 quantity = quantity or _quantity(source)
                 ids = tuple(str(name) for name in source.descriptions)
-    except RasterioError as error:
+    except (RasterioError, UnicodeDecodeError) as error:
         hint = "cut off, or no raster"
         raise fail(
             InputError, str(path), "a raster that GDAL can read", reason(error), hint
@@ -82,7 +82,7 @@ def _quantity(source: Any) -> Quantity | None:
     return found if found in ("level", "loss") else None
 
 
-def _lattice(path: Path, source: Any, faults: Faults) -> Lattice | None:
+def _lattice(path: Path, source: Any, placed: bool, faults: Faults) -> Lattice | None:
     """Return where the pixels lie, or None; what is wrong with the file is added to ``faults``."""
     where = str(path)
     crs = None
@@ -91,16 +91,16 @@ def _lattice(path: Path, source: Any, faults: Faults) -> Lattice | None:
     except InputError as error:
         faults.found.extend(error.faults)
     _check_bands(where, source, faults)
-    if not _check_pixels(where, source, faults) or crs is None:
+    if not _check_pixels(where, source, placed, faults) or crs is None:
         return None
     corner = source.transform
     return Lattice(crs, corner.c, corner.f, corner.a, source.height, source.width)
 
 
-def _check_pixels(where: str, source: Any, faults: Faults) -> bool:
+def _check_pixels(where: str, source: Any, placed: bool, faults: Faults) -> bool:
     t = source.transform
     before = len(faults.found)
-    if t.is_identity:
+    if not placed or t.is_identity:
         faults.add(f"{where}, transform", "where the pixels lie", "nothing", "exported without it")
     elif t.b != 0 or t.d != 0:
         faults.add(f"{where}, transform", "rows that run east", "a rotated raster")

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -223,12 +223,14 @@ def write_cell_plan(plan: CellPlan, path: Path | str) -> None:
         temporary.write_text(text.getvalue(), encoding="utf-8")
 
 
-def _as_text(value: float | str | bool | None) -> str:
+def _as_text(value: Any) -> str:
+    if isinstance(value, np.generic):
+        value = value.item()
     if value is None:
         return ""
     if isinstance(value, bool):
         return "1" if value else "0"
-    return value if isinstance(value, str) else repr(value)
+    return str(value) if isinstance(value, str) else repr(value)
 
 
 def _check_cells(
@@ -275,5 +277,5 @@ def _check_fields(cell: Cell, where: Callable[[str], str], faults: Faults) -> No
     for name, allowed in RANGES.items():
         value = getattr(cell, name)
         if not allowed.holds(value) and not (value is None and name in OPTIONAL):
-            hint = "" if value is None or np.isnan(value) else allowed.hint(value)
+            hint = allowed.hint(value) if isinstance(value, int | float) else ""
             faults.add(where(name), allowed.expected, value, hint)

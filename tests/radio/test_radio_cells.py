@@ -1,5 +1,6 @@
 """The cell plan: checks, reading, writing."""
 
+import contextlib
 import pickle
 from dataclasses import replace
 from importlib import resources
@@ -82,6 +83,7 @@ def test_east_and_north_are_taken_as_they_are_or_moved_from_their_own_crs(tmp_pa
         ("A,S,60.17,24.94,30,120,50,1.8e9,600,7", "Hz given for MHz"),
         ("A,S,60.17,24.94,30,120,50,1800,6400,7", "EARFCN given for ARFCN"),
         ("A,S,60.17,24.94,30,120,50,1800,600,64", "row 2, bsic"),
+        ("A,S,60.17,24.94,30,-90,50,1800,600,7", "counted from -180; add 360"),
         ("A,S,60.17,24.94,30,120,50,1800,600.5,7", "row 2, arfcn"),
         ("A,S,60.17,24.94,30,east,50,1800,600,7", "'east'"),
         ("A,S,60.17,24.94,30,120,50,1800,600", "the line is cut off"),
@@ -148,6 +150,12 @@ def test_wrong_headers_are_told(tmp_path: Path, header: str, said: str) -> None:
 )
 def test_files_that_are_no_plan(tmp_path: Path, content: bytes, said: str) -> None:
     assert said in _complaint(tmp_path, content)
+
+
+@given(st.text(st.sampled_from('A,;"\n60.17 -24e9x'), max_size=120))
+def test_any_rows_are_read_or_told(tmp_path_factory: pytest.TempPathFactory, rows: str) -> None:
+    with contextlib.suppress(InputError):
+        _read(tmp_path_factory.mktemp("rows"), HEADER + rows)
 
 
 def test_missing_file_and_folder(tmp_path: Path) -> None:
@@ -236,6 +244,15 @@ def test_plan_is_checked_when_made() -> None:
         "used once",
     ):
         assert part in text
+
+
+def test_numpy_numbers_are_written_as_numbers_and_texts_are_refused(tmp_path: Path) -> None:
+    numbers = replace(CELL, height_m=np.float64(30.5), bsic=np.int64(7), indoor=np.True_)
+    write_cell_plan(CellPlan(CRS, (numbers,)), tmp_path / "a.csv")
+    again = read_cell_plan(tmp_path / "a.csv", CRS)["A"]
+    assert (again.height_m, again.bsic, again.indoor) == (30.5, 7, True)
+    with pytest.raises(InputError, match="height_m: expected metres > 0"):
+        CellPlan(CRS, (replace(CELL, height_m="30"),))  # type: ignore[arg-type]
 
 
 def test_empty_plan_sector_without_azimuth_and_unknown_cell() -> None:

@@ -1,5 +1,6 @@
 """RxLev rasters: round trips, determinism and files that nobody should send."""
 
+import contextlib
 import struct
 import warnings
 from pathlib import Path
@@ -185,6 +186,26 @@ def test_damaged_pixels_are_told_when_read(written: Path, tmp_path: Path) -> Non
     path.write_bytes(data)
     with pytest.raises(InputError, match="cut off or damaged"):
         open_rasters(path).read()
+
+
+# rasterio's own logger stumbles over GDAL messages that quote bytes which are no text.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@given(st.data())
+@settings(max_examples=150, derandomize=True)
+def test_damaged_bytes_are_told_or_harmless(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    lattice = Lattice("EPSG:32635", 385000.0, 6673000.0, 5.0, 12, 9)
+    path = tmp_path_factory.mktemp("damaged") / "x.tif"
+    write_rasters(path, lattice, [("A", np.full((12, 9), -80.0))], ["A"])
+    content = bytearray(path.read_bytes())
+    for _ in range(data.draw(st.integers(1, 4))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path.write_bytes(content)
+    with contextlib.suppress(InputError):
+        rasters = open_rasters(path)
+        if rasters.lattice.rows * rasters.lattice.cols < 10**6:
+            rasters.read()
 
 
 def _tiff_header(width: int, height: int, rows_per_strip: int) -> bytes:
