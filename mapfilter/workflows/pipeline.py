@@ -1,0 +1,54 @@
+"""Running stages one after another on one configuration: what the scripts of ``pipelines/`` do."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from mapfilter.errors import MapfilterError
+from mapfilter.workflows.config import load_config
+from mapfilter.workflows.facts import facts, text_lines
+from mapfilter.workflows.sections import Config
+
+Stage = Callable[[Config], Any]
+
+
+def run_pipeline(stages: Mapping[str, Stage], file: Path, argv: Sequence[str] | None = None) -> int:
+    """Run all stages, print what each found, and return the exit code.
+
+    Parameters
+    ----------
+    stages : mapping of str to callable
+        Public functions of the workflows, by the name that is printed.
+    file : Path
+        The pipeline's TOML; ``-c`` names another.
+    argv : sequence of str, optional
+        Arguments: ``-c FILE``, ``--set section.key=value``, ``--out DIR``, ``--json``; those of
+        the process when left out.
+    """
+    parser = argparse.ArgumentParser(description=f"Stages: {', '.join(stages)}.")
+    parser.add_argument("-c", "--config", metavar="FILE", type=Path, default=file)
+    parser.add_argument("--set", metavar="SECTION.KEY=VALUE", action="append", default=[])
+    parser.add_argument("--out", metavar="DIR", type=Path)
+    parser.add_argument("--json", action="store_true", help="one JSON object, last on stdout")
+    given = parser.parse_args(argv)
+    found: dict[str, Any] = {}
+    try:
+        config = load_config(given.config, given.set, out=given.out)
+        for name, stage in stages.items():
+            began_s = time.perf_counter()
+            found[name] = facts(stage(config))
+            found[name]["stage_seconds"] = round(time.perf_counter() - began_s, 3)
+            if not given.json:
+                sys.stdout.write("\n".join(text_lines({name: found[name]})) + "\n")
+    except MapfilterError as error:
+        sys.stderr.write("".join(f"mapfilter: error: {line}\n" for line in str(error).splitlines()))
+        return 2
+    if given.json:
+        sys.stdout.write(json.dumps(found, ensure_ascii=False, allow_nan=False) + "\n")
+    return 0
