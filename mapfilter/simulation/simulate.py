@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
+import pandas as pd
 
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import same_crs
@@ -32,6 +33,8 @@ class SimulationSettings:
         Logs for each route, which differ in noise only.
     journey : JourneyPlan
     imu : ImuErrors
+    imu_period_s : float
+        Length of an interval of dead reckoning; noise is drawn once for each.
     reports : ReportModel
     start_utc_s : float
         When every journey starts, UTC seconds.
@@ -39,13 +42,14 @@ class SimulationSettings:
     Raises
     ------
     ConfigError
-        There are no journeys or no draws.
+        There are no journeys or no draws, or the period is not > 0.
     """
 
     journeys: int = 1
     draws: int = 1
     journey: JourneyPlan = field(default_factory=JourneyPlan)
     imu: ImuErrors = field(default_factory=ImuErrors)
+    imu_period_s: float = 1.0
     reports: ReportModel = field(default_factory=ReportModel)
     start_utc_s: float = 0.0
 
@@ -53,6 +57,8 @@ class SimulationSettings:
         for name in ("journeys", "draws"):
             if getattr(self, name) < 1:
                 raise fail(ConfigError, f"journeys, {name}", "at least 1", getattr(self, name))
+        if not (np.isfinite(self.imu_period_s) and self.imu_period_s > 0):
+            raise fail(ConfigError, "imu, period_s", "seconds > 0", self.imu_period_s)
 
 
 def simulate_journeys(
@@ -118,11 +124,21 @@ def simulate_log(
     truth = journey(along, settings.journey)
     return make_log(
         crs,
-        motion=noisy_motion(truth, settings.imu, imu_rng),
+        motion=noisy_motion(_at_ticks(truth, settings.imu_period_s), settings.imu, imu_rng),
         radio=reports(truth, levels, plan, settings.reports, radio_rng),
         truth=truth,
         start_utc_s=settings.start_utc_s,
     )
+
+
+def _at_ticks(truth: pd.DataFrame, period_s: float) -> pd.DataFrame:
+    """Return where one was at the unit's ticks, from the start on."""
+    time_s = truth["time_s"].to_numpy()
+    # A whole number of periods must not lose the last tick to rounding.
+    count = int(np.floor((time_s[-1] - time_s[0]) / period_s + 1e-9)) + 1
+    tick_s = time_s[0] + np.arange(count) * period_s
+    there = {name: np.interp(tick_s, time_s, truth[name]) for name in ("east_m", "north_m")}
+    return pd.DataFrame({"time_s": tick_s, **there})
 
 
 def _rng(seed: int, *key: int) -> np.random.Generator:

@@ -77,7 +77,6 @@ def simulation_settings(config: Config) -> SimulationSettings:
             length_m=section.length_m,
             profile=config.roads.profile,
             speed_mps=section.speed_mps,
-            period_s=imu.period_s,
         ),
         imu=ImuErrors(
             sigma_trans_m=imu.sigma_trans_m,
@@ -87,6 +86,7 @@ def simulation_settings(config: Config) -> SimulationSettings:
             step_scale_sd=imu.scale,
             translation_noise=imu.translation_noise,
         ),
+        imu_period_s=imu.period_s,
         reports=ReportModel(
             period_s=section.report_period_s,
             averaging_s=section.averaging_s,

@@ -1,0 +1,20 @@
+"""Journeys along the streets of a database's area, located from an unknown start, and scored.
+
+Run ``build_database.py`` first, with the same area; the settings are in ``replay_tracks.toml``::
+
+    python pipelines/replay_tracks.py --set area.map=CITY.osm.pbf --set area.bbox=W,S,E,N
+"""
+
+import sys
+from pathlib import Path
+
+from mapfilter.workflows.pipeline import Stage, run_pipeline
+from mapfilter.workflows.replay import replay_facts, run_replay
+from mapfilter.workflows.simulate import run_simulate
+
+if __name__ == "__main__":
+    stages: dict[str, Stage] = {
+        "simulate": run_simulate,
+        "replay": lambda config: replay_facts(run_replay(config, config.output.dir / "replay")),
+    }
+    sys.exit(run_pipeline(stages, Path(__file__).with_suffix(".toml")))
