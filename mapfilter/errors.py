@@ -6,12 +6,12 @@ Input is checked once, at the door, and every fault is reported together: collec
 Examples
 --------
 >>> faults = Faults()
->>> faults.add("cells.csv row 3, lat", "degrees in -90..90", "4553534.3", "metres given for degrees")
+>>> faults.add("cells.csv row 3, lat", "degrees in -90..90", "4553534.3", "metres for degrees")
 >>> faults.raise_if_any(InputError)
 Traceback (most recent call last):
     ...
 mapfilter.errors.InputError: cells.csv row 3, lat: expected degrees in -90..90, found 4553534.3 \
-(likely: metres given for degrees)
+(likely: metres for degrees)
 """
 
 from __future__ import annotations

@@ -85,6 +85,7 @@ def build(
     floor_dbm: float = FLOOR_DBM,
     tile_px: int = TILE_PX,
     inputs: Mapping[str, str] | None = None,
+    attribution: str = "",
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> RadioRouteDatabase:
@@ -110,6 +111,8 @@ def build(
         Z-order curve, and along it within each tile.
     inputs : mapping of str to str, optional
         Names and SHA-256 of what the roads and the rasters were made from, for the record.
+    attribution : str
+        Whose map the roads come from, as its licence wants it shown.
     executor : Executor, optional
         Where tiles are read; the result does not depend on it.
     progress : callable, optional
@@ -159,6 +162,7 @@ def build(
                     "floor_dbm": float(floor_dbm),
                     "tile_px": tile_px,
                 },
+                "attribution": attribution,
                 "inputs": [{"name": name, "sha256": recorded[name]} for name in sorted(recorded)],
                 "counts": {
                     "points": heard,

@@ -94,6 +94,11 @@ class RadioRouteDatabase:
         """Ids of all cells, also of those that no point hears."""
         return self.plan.ids
 
+    @property
+    def attribution(self) -> str:
+        """Whose map the roads come from; to be shown with every picture of it."""
+        return str(self.manifest.get("attribution", ""))
+
     @cached_property
     def _parts(self) -> Mapping[str, tuple[Path, ...]]:
         parts: dict[str, tuple[Path, ...]] = {}

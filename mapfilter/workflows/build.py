@@ -16,6 +16,8 @@ from mapfilter.roads.pbf import resolve_map
 from mapfilter.workflows.sections import Area, Config
 from mapfilter.workflows.world import World, area_lattice
 
+ATTRIBUTION = "© OpenStreetMap contributors (ODbL)"
+
 
 @dataclass(frozen=True)
 class BuildResult:
@@ -64,6 +66,7 @@ def run_build(config: Config, *, workers: int = 1, progress: Progress | None = N
             floor_dbm=config.database.floor_dbm,
             tile_px=config.database.tile_px,
             inputs=_inputs(config),
+            attribution=ATTRIBUTION,
             executor=executor,
             progress=progress,
         )

@@ -12,14 +12,13 @@ from pathlib import Path
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress
 from mapfilter.database.store import open_database
+from mapfilter.radio.rasters import open_rasters
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.config import load_config
-from mapfilter.workflows.pictures import draw_database, draw_site
+from mapfilter.workflows.pictures import draw_coverage, draw_database, draw_site
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.replay import run_replay
 from mapfilter.workflows.simulate import run_simulate
-
-ATTRIBUTION = "© OpenStreetMap contributors (ODbL)"
 
 _STAGES = ("predict", "build", "simulate", "replay", "pictures")
 
@@ -105,16 +104,16 @@ def run_demo(
     with stage("simulate"):
         simulated = run_simulate(config)
     with stage("replay"):
-        replayed = run_replay(config, out / "replay", attribution=ATTRIBUTION)
+        replayed = run_replay(config, out / "replay")
     with stage("pictures"):
         database = open_database(built.database)
         pictures = (
-            draw_database(database, out / "points-per-cell.png", attribution=ATTRIBUTION),
+            draw_coverage(open_rasters(predicted.rasters), database, out / "coverage.png"),
+            draw_database(database, out / "points-per-cell.png"),
             draw_site(
                 database,
                 database.plan.cells[0].site,
                 out / "points-of-one-site.png",
-                attribution=ATTRIBUTION,
             ),
         )
     walk = replayed.logs[0]

@@ -10,78 +10,44 @@ import numpy as np
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.positioning.global_positioning import PositionedTrack
 from mapfilter.positioning.snapshot import Snapshot
+from mapfilter.radio.rasters import RxLevRasters
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.candidates import MAX_PANELS, plot_candidates
-from mapfilter.report.coverage import plot_points_per_cell
+from mapfilter.report.coverage import plot_level, plot_points_per_cell
 from mapfilter.report.error_curve import plot_error_over_distance
 from mapfilter.report.track import plot_track
 from mapfilter.tracks.log import TrackLog
 from mapfilter.workflows.truth import truth_of
 
 
-def draw_database(database: RadioRouteDatabase, path: Path, *, attribution: str = "") -> Path:
+def draw_coverage(rasters: RxLevRasters, database: RadioRouteDatabase, path: Path) -> Path:
+    """Draw the level of the best server everywhere in the rasters."""
+    levels_dbm = rasters.read_levels_dbm(database.plan)
+    silent = np.isnan(levels_dbm).all(axis=0)
+    best_dbm = np.where(silent, np.nan, np.nan_to_num(levels_dbm, nan=-np.inf).max(axis=0))
+    base = BaseMap(rasters.lattice.bounds_m, attribution=database.attribution)
+    plot_level(
+        best_dbm, rasters.lattice, database.plan, base, path, title="Level of the best server"
+    )
+    return path
+
+
+def draw_database(database: RadioRouteDatabase, path: Path) -> Path:
     """Draw all points grouped by the cell that serves them best (the paper's Fig. 4)."""
-    points = database.points()
-    east_m, north_m = database.lattice.east_north(points.row, points.col)
-    groups = {
-        cell_id: (east_m[points.best_server == index], north_m[points.best_server == index])
-        for index, cell_id in enumerate(database.cell_ids)
-    }
-    plot_points_per_cell(
-        groups,
-        database.plan,
-        BaseMap(database.lattice.bounds_m, attribution=attribution),
-        path,
-        title="Points by best server",
-        resolution_m=database.lattice.resolution_m,
-    )
-    return path
+    return _draw_points(database, database.cell_ids, path, "Points by best server")
 
 
-def draw_site(
-    database: RadioRouteDatabase, site: str, path: Path, *, attribution: str = ""
-) -> Path:
+def draw_site(database: RadioRouteDatabase, site: str, path: Path) -> Path:
     """Draw the points that the sectors of one site serve best (the paper's Fig. 2)."""
-    points = database.points()
-    east_m, north_m = database.lattice.east_north(points.row, points.col)
-    groups = {
-        cell.id: (east_m[points.best_server == index], north_m[points.best_server == index])
-        for index, cell in enumerate(database.plan.cells)
-        if cell.site == site
-    }
-    base = BaseMap(
-        database.lattice.bounds_m,
-        points_m=np.stack([east_m, north_m], axis=-1),
-        attribution=attribution,
-    )
-    plot_points_per_cell(
-        groups,
-        database.plan,
-        base,
-        path,
-        title=f"Points served by site {site}",
-        resolution_m=database.lattice.resolution_m,
-    )
-    return path
+    cells = [cell.id for cell in database.plan.cells if cell.site == site]
+    return _draw_points(database, cells, path, f"Points served by site {site}")
 
 
 def draw_track(
-    database: RadioRouteDatabase,
-    log: TrackLog,
-    track: PositionedTrack,
-    folder: Path,
-    *,
-    attribution: str = "",
+    database: RadioRouteDatabase, log: TrackLog, track: PositionedTrack, folder: Path
 ) -> tuple[Path, ...]:
     """Draw one located log: candidates thinning out (Fig. 1), the track, error over distance."""
-    points = database.points()
-    east_m, north_m = database.lattice.east_north(points.row, points.col)
-    base = BaseMap(
-        database.lattice.bounds_m,
-        points_m=np.stack([east_m, north_m], axis=-1),
-        attribution=attribution,
-    )
-    truth, drawn = truth_of(log), []
+    base, truth, drawn = _streets(database), truth_of(log), []
     if track.snapshots:
         drawn.append(folder / "candidates.png")
         plot_candidates(choose_snapshots(track.snapshots), truth, base, drawn[-1])
@@ -108,3 +74,31 @@ def choose_snapshots(snapshots: Sequence[Snapshot]) -> list[Snapshot]:
         free = [i for i in range(1, last) if i not in chosen]
         chosen.add(free[int(np.argmin(np.abs(depth[free] - goal)))])
     return [snapshots[i] for i in sorted(chosen)]
+
+
+def _draw_points(
+    database: RadioRouteDatabase, cells: Sequence[str], path: Path, title: str
+) -> Path:
+    points = database.points()
+    east_m, north_m = database.lattice.east_north(points.row, points.col)
+    served = {cell: points.best_server == database.plan.index(cell) for cell in cells}
+    plot_points_per_cell(
+        {cell: (east_m[best], north_m[best]) for cell, best in served.items()},
+        database.plan,
+        _streets(database),
+        path,
+        title=title,
+        resolution_m=database.lattice.resolution_m,
+    )
+    return path
+
+
+def _streets(database: RadioRouteDatabase) -> BaseMap:
+    """Return the base map of a database: its points, and whose map they come from."""
+    points, lattice = database.points(), database.lattice
+    return BaseMap(
+        lattice.bounds_m,
+        points_m=np.stack(lattice.east_north(points.row, points.col), axis=-1),
+        attribution=database.attribution,
+        resolution_m=lattice.resolution_m,
+    )

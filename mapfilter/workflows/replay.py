@@ -86,7 +86,6 @@ def run_replay(
     out: Path,
     *,
     progress: Progress | None = None,
-    attribution: str = "",
 ) -> ReplayResult:
     """Locate the log or logs of a configuration and write estimates, figures and pictures.
 
@@ -98,8 +97,6 @@ def run_replay(
         Folder of the results; one log writes straight into it, several into a folder each.
     progress : callable, optional
         Called with logs done and logs in all.
-    attribution : str
-        Whose map the pictures show.
 
     Raises
     ------
@@ -123,7 +120,7 @@ def run_replay(
         drawn = config.output.pictures == "all" or (config.output.pictures == "first" and not index)
         pictures: tuple[Path, ...] = ()
         if drawn:
-            pictures = draw_track(database, log, track, into, attribution=attribution)
+            pictures = draw_track(database, log, track, into)
         logs.append(_write(folder.name, log, track, into, pictures))
         score = logs[-1].accuracy
         if score is not None:

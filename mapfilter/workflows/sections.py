@@ -73,7 +73,7 @@ class Cells(Section):
     sectors: Annotated[int, Field(ge=1, le=6)] = 3
     indoor: Annotated[int, Field(ge=0, le=10_000)] = 4
     frequency_mhz: Positive = 1800.0
-    eirp_dbm: Finite = 55.0
+    eirp_dbm: Finite = 52.0
     height_m: Positive = 30.0
     seed: Seed = 0
 
