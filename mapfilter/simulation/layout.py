@@ -20,6 +20,8 @@ _LLOYD_ROUNDS = 40
 _MOST_SECTORS = 6
 _ABOVE_ROOF_M = 3.0
 _SNAP_M = 75.0
+# COST-231 Walfisch-Ikegami holds for antennas up to 50 m; nobody plans a macro cell on a tower.
+_HIGHEST_ROOF_M = 45.0
 _INTERIOR = 0.1
 _FIRST_ARFCN = 512
 _CARRIERS = 36
@@ -46,8 +48,8 @@ def lay_out_plan(
     """Lay out sites with sectors, and indoor cells, over an area.
 
     Sites are spread evenly (a centroidal Voronoi tessellation by Lloyd's rounds, which tends to
-    hexagons when there are many), each moved onto the highest roof within 75 m where heights are
-    given. Sectors point in equal steps. Indoor cells hang in the largest buildings that stand
+    hexagons when there are many), each moved onto the highest roof within 75 m, of at most 45 m, where
+    heights are given. Sectors point in equal steps. Indoor cells hang in the largest buildings that stand
     apart, or, without heights, where the sites are farthest.
 
     Cells are called S1A, S1B, … from north to south, and I1, I2, … The n-th cell gets carrier
@@ -179,11 +181,12 @@ def _candidates(lattice: Lattice) -> Floats:
 
 
 def _onto_roof(lattice: Lattice, heights: Floats32, place: Floats) -> tuple[float, float]:
-    """Return the highest roof near a place, the nearest of equal ones; the place without any."""
+    """Return the highest fit roof near a place, the nearest of equals; the place without any."""
     row, col = lattice.row_col(*place)
     reach = int(_SNAP_M / lattice.resolution_m)
     top, left = max(0, row - reach), max(0, col - reach)
     near = heights[top : row + reach + 1, left : col + reach + 1]
+    near = np.where(near <= _HIGHEST_ROOF_M, near, 0.0)
     if near.max() <= 0:
         return float(place[0]), float(place[1])
     rows, cols = np.nonzero(near == near.max())

@@ -79,12 +79,13 @@ def test_antennas_stand_on_roofs_and_indoor_cells_hang_in_buildings() -> None:
     assert _apart_m([cell for cell in plan.cells if cell.indoor]) > 500.0
 
 
-def test_the_highest_roof_nearby_is_taken() -> None:
+def test_the_highest_roof_nearby_is_taken_but_no_tower() -> None:
     heights = np.zeros((600, 600), dtype=np.float32)
-    heights[295:298, 305:308] = 50.0
+    heights[295:298, 305:308] = 40.0
+    heights[300:303, 295:298] = 75.0
     cell = lay_out_plan(LATTICE, 1, 3, 0, 1, heights).cells[0]
-    assert heights[LATTICE.row_col(cell.east_m, cell.north_m)] == 50.0
-    assert cell.height_m == 53.0
+    assert heights[LATTICE.row_col(cell.east_m, cell.north_m)] == 40.0
+    assert cell.height_m == 43.0
 
 
 def test_too_few_buildings_leave_open_places() -> None:
