@@ -14,6 +14,18 @@ from mapfilter.errors import ConfigError, Fault, Faults, fail
 from mapfilter.workflows.sections import EMBEDDED_MAP, Config, resolve_map, resolve_path
 
 _RESOLVERS = (resolve_path, resolve_map)
+_EXPECTED = {
+    "model_type": "a section",
+    "missing": "one value more",
+    "path_type": "a path",
+    "is_instance_of": "a path",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "float_type": "a number",
+    "string_type": "a text",
+    "tuple_type": "a list",
+    "bool_type": "true or false",
+}
 
 
 def load_config(
@@ -47,33 +59,44 @@ def load_config(
     for setting in settings:
         _apply(values, setting, faults)
     faults.raise_if_any(ConfigError)
-    if out is not None:
-        values.setdefault("output", {})["dir"] = str(out.absolute())
     folder = file.absolute().parent if file is not None else Path.cwd()
-    values.setdefault("output", {}).setdefault("dir", str(Path.cwd() / "out"))
+    output = values.setdefault("output", {})
+    if isinstance(output, dict):
+        if out is not None:
+            output["dir"] = str(out.absolute())
+        output.setdefault("dir", str(Path.cwd() / "out"))
     try:
         return Config.model_validate(values, context={"folder": folder})
     except ValidationError as error:
-        name = str(file) if file is not None else "the settings"
-        raise ConfigError(tuple(_fault(name, detail) for detail in error.errors())) from None
+        changed = [_keys(setting) for setting in settings]
+        raise ConfigError(
+            tuple(_fault(file, changed, detail) for detail in error.errors())
+        ) from None
 
 
 def _read_toml(file: Path) -> dict[str, Any]:
     try:
-        with file.open("rb") as stream:
-            return tomllib.load(stream)
+        text = file.read_bytes().decode("utf-8-sig")
+        values = tomllib.loads(text.replace("\r\n", "\n"))
     except OSError as error:
         raise fail(ConfigError, str(file), "a TOML file", error.strerror or error) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise fail(ConfigError, str(file), "TOML", error) from error
+    if not text.strip():
+        raise fail(ConfigError, str(file), "a TOML file", "an empty file", "cut off when saved")
+    return values
+
+
+def _keys(setting: str) -> list[str]:
+    return [part.strip() for part in setting.partition("=")[0].split(".")]
 
 
 def _apply(values: dict[str, Any], setting: str, faults: Faults) -> None:
-    key, equals, text = setting.partition("=")
-    *parents, last = [part.strip() for part in key.split(".")]
+    _, equals, text = setting.partition("=")
+    *parents, last = _keys(setting)
     where = f"--set {setting}"
     if not equals or not parents or not all((*parents, last)):
-        faults.add(where, "section.key=value", setting)
+        faults.add(where, "section.key=value", repr(setting))
         return
     place = values
     for parent in parents:
@@ -82,7 +105,11 @@ def _apply(values: dict[str, Any], setting: str, faults: Faults) -> None:
             faults.add(where, "a section", f"{parent}, which is a value")
             return
     value = _parse_value(text.strip())
-    place[last] = str(Path(value).absolute()) if _is_path((*parents, last), value) else value
+    if _is_path((*parents, last)):
+        # A folder may be called 2024, which TOML takes for a number.
+        value = value if isinstance(value, str) else text.strip()
+        value = value if value in ("", EMBEDDED_MAP) else str(Path(value).expanduser().absolute())
+    place[last] = value
 
 
 def _parse_value(text: str) -> Any:
@@ -94,8 +121,8 @@ def _parse_value(text: str) -> Any:
     return text
 
 
-def _is_path(keys: tuple[str, ...], value: Any) -> bool:
-    """Tell whether a setting fills a field of paths (and is not the name of the embedded map)."""
+def _is_path(keys: tuple[str, ...]) -> bool:
+    """Tell whether a setting fills a field of paths."""
     model: Any = Config
     for key in keys[:-1]:
         field = model.model_fields.get(key)
@@ -103,25 +130,38 @@ def _is_path(keys: tuple[str, ...], value: Any) -> bool:
         if not (isinstance(model, type) and issubclass(model, BaseModel)):
             return False
     field = model.model_fields.get(keys[-1])
-    if field is None or not isinstance(value, str) or not value:
+    if field is None:
         return False
     marks = [*field.metadata]
     for variant in getattr(field.annotation, "__args__", ()):
         marks += getattr(variant, "__metadata__", ())
-    resolved = any(isinstance(m, BeforeValidator) and m.func in _RESOLVERS for m in marks)
-    return resolved and value != EMBEDDED_MAP
+    return any(isinstance(m, BeforeValidator) and m.func in _RESOLVERS for m in marks)
 
 
-def _fault(name: str, detail: Mapping[str, Any]) -> Fault:
+def _fault(file: Path | None, changed: Sequence[list[str]], detail: Mapping[str, Any]) -> Fault:
     """Turn one of pydantic's findings into a fault, with the key that was probably meant."""
     keys = [str(part) for part in detail["loc"]]
-    where = f"{name}, {'.'.join(keys)}" if keys else name
+    in_file = file is not None and not any(_one_path(keys, key) for key in changed)
+    where = f"{file}, {'.'.join(keys)}" if in_file else f"setting {'.'.join(keys)}"
     if detail["type"] == "extra_forbidden":
         close = difflib.get_close_matches(keys[-1], _known_keys(keys[:-1]), n=1)
         kind = "section" if len(keys) == 1 else "key"
         return Fault(where, f"a known {kind}", repr(keys[-1]), f"{close[0]!r}" if close else "")
-    expected = str(detail["msg"]).removeprefix("Value error, ").removeprefix("Input should be ")
-    return Fault(where, expected, repr(detail.get("input")))
+    if detail["type"] == "value_error":
+        return Fault(where, str(detail["ctx"]["error"]), ", ".join(detail["input"]))
+    if detail["type"] in ("too_short", "too_long"):
+        wanted = detail["ctx"].get("max_length", detail["ctx"].get("min_length"))
+        return Fault(where, f"{wanted} values", f"{len(detail['input'])}")
+    return Fault(where, _EXPECTED.get(detail["type"], _said(detail)), repr(detail["input"]))
+
+
+def _one_path(a: Sequence[str], b: Sequence[str]) -> bool:
+    shorter = min(len(a), len(b))
+    return a[:shorter] == b[:shorter]
+
+
+def _said(detail: Mapping[str, Any]) -> str:
+    return str(detail["msg"]).removeprefix("Input should be ")
 
 
 def _known_keys(parents: Sequence[str]) -> list[str]:

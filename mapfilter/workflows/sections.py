@@ -15,14 +15,16 @@ EMBEDDED_MAP = "helsinki"
 
 def resolve_path(value: Any, info: ValidationInfo) -> Any:
     """Make a path relative to the configuration file absolute."""
-    if isinstance(value, str | Path) and str(value) and info.context:
-        return Path(info.context["folder"]) / Path(value).expanduser()
+    if isinstance(value, str | Path) and str(value):
+        folder = info.context["folder"] if info.context else ""
+        return Path(folder) / Path(value).expanduser()
     return value
 
 
 def resolve_map(value: Any, info: ValidationInfo) -> Any:
     """Make a map's path absolute; the embedded map has a name."""
-    return value if value == EMBEDDED_MAP else str(resolve_path(value, info))
+    found = resolve_path(value, info)
+    return str(found) if isinstance(found, Path) and value != EMBEDDED_MAP else value
 
 
 FilePath = Annotated[Path, BeforeValidator(resolve_path)]
@@ -30,15 +32,18 @@ MapName = Annotated[str, BeforeValidator(resolve_map)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+Box = Annotated[tuple[Finite, Finite, Finite, Finite], Field(strict=False)]
+Pair = Annotated[tuple[Finite, Finite], Field(strict=False)]
+Size = Annotated[tuple[Positive, Positive], Field(strict=False)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Seed = Annotated[int, Field(ge=0, lt=2**63)]
 Count = Annotated[int, Field(ge=0, le=1_000_000)]
 
 
 class Section(BaseModel):
-    """A section: frozen, and strict about its keys."""
+    """A section: frozen, and strict about its keys and the types of its values."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class Area(Section):
@@ -50,18 +55,18 @@ class Area(Section):
     """
 
     map: MapName = EMBEDDED_MAP
-    bbox: tuple[Finite, Finite, Finite, Finite] | None = None
-    southwest: tuple[Finite, Finite] | None = None
-    size_m: tuple[Positive, Positive] | None = None
+    bbox: Box | None = None
+    southwest: Pair | None = None
+    size_m: Size | None = None
     crs: str | None = None
     resolution_m: Positive = 5.0
 
     @model_validator(mode="after")
     def _one_box(self) -> Area:
         if self.bbox is not None and self.southwest is not None:
-            raise ValueError("give bbox, or southwest with size_m, not both")
+            raise ValueError("bbox, or southwest with size_m, not both")
         if (self.southwest is None) != (self.size_m is None):
-            raise ValueError("southwest and size_m go together")
+            raise ValueError("southwest and size_m together")
         return self
 
 
@@ -98,7 +103,7 @@ class Roads(Section):
     @model_validator(mode="after")
     def _table_goes_with_raster(self) -> Roads:
         if (self.landuse is None) != (self.landuse_table is None):
-            raise ValueError("landuse and landuse_table go together")
+            raise ValueError("landuse and landuse_table together")
         return self
 
 
