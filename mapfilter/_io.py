@@ -21,6 +21,7 @@ from typing import Any
 from mapfilter.errors import MapfilterError, OutputError, StoreError, fail
 
 _CHUNK_BYTES = 1 << 20
+_ASIDE = "old"
 _AT_FDCWD = -100
 _RENAME_EXCHANGE = 2
 
@@ -106,7 +107,7 @@ def read_json(path: Path) -> dict[str, Any]:
         value = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise fail(StoreError, str(path), "a readable file", error.strerror or error) from error
-    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise fail(StoreError, str(path), "JSON", f"no JSON ({error})", "cut off") from error
     if not isinstance(value, dict):
         raise fail(StoreError, str(path), "a JSON object", type(value).__name__)
@@ -134,8 +135,14 @@ def _partial_folder(path: Path) -> Path:
     prefix = f".{path.name}.partial-"
     for stale in path.parent.glob(f"{_glob_escape(prefix)}*"):
         if not _is_alive(stale.name.removeprefix(prefix).split("-")[0]):
+            if (stale / _ASIDE).is_dir() and not path.exists():
+                # Its process died between the two renames of an exchange.
+                (stale / _ASIDE).rename(path)
             shutil.rmtree(stale, ignore_errors=True)
-    return Path(tempfile.mkdtemp(prefix=f"{prefix}{os.getpid()}-", dir=path.parent))
+    try:
+        return Path(tempfile.mkdtemp(prefix=f"{prefix}{os.getpid()}-", dir=path.parent))
+    except OSError as error:
+        raise _not_writable(path, error) from error
 
 
 def _glob_escape(text: str) -> str:
@@ -145,7 +152,7 @@ def _glob_escape(text: str) -> str:
 def _is_alive(pid: str) -> bool:
     try:
         os.kill(int(pid), 0)
-    except (ValueError, ProcessLookupError):
+    except (ValueError, OverflowError, ProcessLookupError):
         return False
     except PermissionError:
         return True
@@ -162,9 +169,13 @@ def _exchange(new: Path, old: Path) -> None:
         if ctypes.get_errno() not in (errno.EINVAL, errno.ENOSYS):
             number = ctypes.get_errno()
             raise OSError(number, os.strerror(number), str(old))
-    aside = new.with_name("old")
+    aside = new.with_name(_ASIDE)
     old.rename(aside)
-    new.rename(old)
+    try:
+        new.rename(old)
+    except BaseException:
+        aside.rename(old)
+        raise
 
 
 def _sync(path: Path) -> None:

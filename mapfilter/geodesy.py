@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pyproj import CRS, Transformer
+from pyproj import CRS, Proj, Transformer
 from pyproj.exceptions import CRSError, ProjError
 
 from mapfilter.errors import Faults, InputError, fail
@@ -66,9 +66,17 @@ def azimuth_from_heading_deg(heading_rad: ArrayLike, convergence_rad: ArrayLike 
 
 
 def grid_convergence_rad(crs: str, lon_deg: float, lat_deg: float) -> float:
-    """Return the clockwise angle from true north to grid north of ``crs`` at a place."""
-    factors = _projection(crs).get_factors(lon_deg, lat_deg)
-    return float(np.radians(factors.meridian_convergence))
+    """Return the clockwise angle from true north to grid north of ``crs`` at a place.
+
+    Raises
+    ------
+    InputError
+        The projection has no such place.
+    """
+    convergence_deg = float(_projection(crs).get_factors(lon_deg, lat_deg).meridian_convergence)
+    if not np.isfinite(convergence_deg):
+        raise fail(InputError, "place", f"a longitude and latitude of {crs}", (lon_deg, lat_deg))
+    return float(np.radians(convergence_deg))
 
 
 def projected_crs(spec: Any, where: str = "crs") -> str:
@@ -77,7 +85,7 @@ def projected_crs(spec: Any, where: str = "crs") -> str:
     Raises
     ------
     InputError
-        There is no CRS, nobody knows it, it is geographic, or its unit is not the metre.
+        There is no CRS, nobody knows it, or it does not count metres east and north.
     """
     if spec is None or spec == "":
         raise fail(InputError, where, "a projected CRS in metres", "none", "CRS left out on export")
@@ -90,9 +98,11 @@ def projected_crs(spec: Any, where: str = "crs") -> str:
             InputError, where, "a projected CRS in metres", crs.name, "degrees given for metres"
         )
     horizontal = crs.axis_info[:2]
-    if not crs.is_projected or any(axis.unit_name not in ("metre", "meter") for axis in horizontal):
-        units = ", ".join(axis.unit_name for axis in horizontal) or "no unit"
-        raise fail(InputError, where, "a projected CRS in metres", f"{crs.name} ({units})")
+    if not crs.is_projected or any(
+        axis.unit_name not in ("metre", "meter") or axis.direction == "west" for axis in horizontal
+    ):
+        axes = ", ".join(f"{axis.unit_name} {axis.direction}" for axis in horizontal) or "no unit"
+        raise fail(InputError, where, "metres east and north", f"{crs.name} ({axes})")
     authority = crs.to_authority(min_confidence=100)
     return f"{authority[0]}:{authority[1]}" if authority else str(crs.to_wkt())
 
@@ -194,8 +204,17 @@ class Lattice:
     def covering(
         cls, crs: str, bounds_m: tuple[float, float, float, float], resolution_m: float
     ) -> Lattice:
-        """Return the lattice over west, south, east, north (m), snapped out to the resolution."""
+        """Return the lattice over west, south, east, north (m), snapped out to the resolution.
+
+        Raises
+        ------
+        InputError
+            A bound is not finite, the resolution is not above zero, or the bounds hold nothing.
+        """
         west, south, east, north = bounds_m
+        if not (np.isfinite([*bounds_m, resolution_m]).all() and resolution_m > 0):
+            got = f"{bounds_m} m at {resolution_m} m"
+            raise fail(InputError, "lattice", "finite bounds and a resolution > 0", got)
         first_col, last_col = np.floor(west / resolution_m), np.ceil(east / resolution_m)
         first_row, last_row = np.floor(south / resolution_m), np.ceil(north / resolution_m)
         return cls(
@@ -276,7 +295,5 @@ def _from_lonlat(crs: str) -> Transformer:
 
 
 @lru_cache(maxsize=16)
-def _projection(crs: str) -> Any:
-    from pyproj import Proj
-
+def _projection(crs: str) -> Proj:
     return Proj(CRS.from_user_input(crs))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -88,7 +89,9 @@ def percentile_m(errors_m: Floats, share: float) -> float:
     """
     if errors_m.size == 0:
         return float("nan")
-    return float(np.quantile(errors_m, share, method="inverted_cdf"))
+    # 0.67 · 1500 is a hair above 1005 in floating point.
+    rank = ceil(share * errors_m.size - 1e-9)
+    return float(np.sort(errors_m)[max(rank, 1) - 1])
 
 
 def accuracy(estimate: TrackEstimate, truth: Truth) -> Accuracy:

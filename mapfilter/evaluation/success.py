@@ -8,7 +8,7 @@ from math import sqrt
 
 import numpy as np
 
-from mapfilter.evaluation.accuracy import Accuracy
+from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Accuracy
 
 _Z_95 = 1.959963984540054
 
@@ -74,6 +74,7 @@ def summarise(scores: Sequence[Accuracy]) -> SuccessSummary:
     runs = len(scores)
     switched = [score for score in scores if score.switched]
     right = [score for score in switched if score.success]
+    wrong = [score for score in switched if score.error_at_switch_m > SUCCESS_RADIUS_M]
     low, high = wilson_interval(len(right), runs)
     return SuccessSummary(
         runs,
@@ -82,7 +83,7 @@ def summarise(scores: Sequence[Accuracy]) -> SuccessSummary:
         len(right) / runs if runs else float("nan"),
         low,
         high,
-        (len(switched) - len(right)) / runs if runs else float("nan"),
+        len(wrong) / runs if runs else float("nan"),
         _mean([score.switch_distance_m for score in switched]),
         _mean([score.error_mean_m for score in right]),
         _mean([score.error_67_m for score in right]),

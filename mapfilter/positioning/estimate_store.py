@@ -10,13 +10,12 @@ from xml.etree import ElementTree
 
 import geopandas
 import numpy as np
-import pandas as pd
 import pyarrow.parquet as pq
 import shapely
 from pyarrow.lib import ArrowException
 
 from mapfilter._io import atomic_file
-from mapfilter.errors import Faults, StoreError, fail
+from mapfilter.errors import Faults, InputError, StoreError, fail
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import unproject
 from mapfilter.positioning.estimate import TrackEstimate, UnusedReading
@@ -69,10 +68,11 @@ def write_estimate(estimate: TrackEstimate, path: Path) -> None:
     }
     with atomic_file(path) as temporary:
         frame.to_parquet(temporary, index=False)
-        table = pq.read_table(temporary)
+        table = pq.ParquetFile(temporary).read()
         known = dict(table.schema.metadata or {})
         known[_META] = json.dumps(meta).encode()
-        pq.write_table(table.replace_schema_metadata(known), temporary)
+        table = table.replace_schema_metadata(known)
+        pq.write_table(table, temporary, write_page_checksum=True)
 
 
 def read_estimate(path: Path) -> TrackEstimate:
@@ -84,21 +84,30 @@ def read_estimate(path: Path) -> TrackEstimate:
         The file is missing, cut off, not an estimate or of a newer version.
     """
     try:
-        table = pq.read_table(path)
-        meta: dict[str, Any] = json.loads((table.schema.metadata or {})[_META])
+        # pyarrow says of a missing file only its name.
+        with path.open("rb"), pq.ParquetFile(path, page_checksum_verification=True) as source:
+            table = source.read()
     except OSError as error:
         raise fail(StoreError, str(path), "an estimate", error.strerror or error) from error
-    except (ArrowException, KeyError, ValueError) as error:
+    except (ArrowException, ValueError) as error:
         raise fail(StoreError, str(path), "an estimate (Parquet)", error, "cut off") from error
+    if _META not in (table.schema.metadata or {}):
+        raise fail(StoreError, str(path), "an estimate", "Parquet that mapfilter did not write")
+    try:
+        return _estimate(table, json.loads(table.schema.metadata[_META]), path)
+    except (ArrowException, InputError, KeyError, TypeError, ValueError) as error:
+        raise fail(StoreError, str(path), "an estimate", repr(error), "damaged") from error
+
+
+def _estimate(table: Any, meta: dict[str, Any], path: Path) -> TrackEstimate:
     faults = Faults()
-    if meta.get("version", 0) > VERSION:
+    if meta["version"] > VERSION:
         faults.add(str(path), f"version <= {VERSION}", meta["version"], "a newer mapfilter")
     for name in _COLUMNS:
         if name not in table.column_names:
             faults.add(f"{path}, {name}", "a column of that name", "none")
     faults.raise_if_any(StoreError)
-    frame: pd.DataFrame = table.select(_COLUMNS).to_pandas()
-    column = {name: frame[name].to_numpy() for name in _COLUMNS}
+    column = {name: table[name].to_numpy() for name in _COLUMNS}
     cross = column["cov_east_north_m2"]
     covariance = np.stack(
         [

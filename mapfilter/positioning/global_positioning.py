@@ -37,7 +37,8 @@ class PositionedTrack:
     estimate : TrackEstimate
         A fix per epoch and a reason for every reading not used.
     snapshots : tuple of Snapshot
-        The candidates after every update until the filter switched (or failed), the start first.
+        The candidates at the start and whenever an update left another number of them, until the
+        filter switched (or failed).
     filter_s : float
         Processor time that the filter took, databases already in memory.
     """
@@ -109,7 +110,7 @@ def position_by_candidates(
         points_of(cell)
     began_s = time.process_time()
     first = _first_known(merged.events, points_of)
-    epochs = [_before_start(event) for event in merged.events[:first]]
+    epochs = [_before_start(event, points_of) for event in merged.events[:first]]
     snapshots: list[Snapshot] = []
     if first < len(merged.events):
         filter_ = CandidateFilter(points_of, options)
@@ -140,8 +141,12 @@ class _Epoch:
     located: Estimate
 
 
-def _before_start(event: Event[str]) -> _Epoch:
-    reason = Reason.NO_READING if event.reading is None else Reason.UNKNOWN_CELL
+def _before_start(event: Event[str], points_of: PointsOf) -> _Epoch:
+    if event.reading is None:
+        reason = Reason.NO_READING
+    else:
+        known = points_of(event.reading) is not None
+        reason = Reason.NO_POINTS_IN_CELL if known else Reason.UNKNOWN_CELL
     moved = Reason.USED if event.motion is None else Reason.NOT_STARTED
     return _Epoch(event, moved, reason, Status.SEARCHING, 0, _NOWHERE)
 
@@ -176,6 +181,8 @@ def _follow(
         epochs.append(
             _Epoch(event, step.motion_reason, reading_reason, status, hypotheses, located)
         )
+    if first.motion is not None:
+        epochs[0] = replace(epochs[0], motion_reason=Reason.NOT_STARTED)
     return epochs, snapshots
 
 
