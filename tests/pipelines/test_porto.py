@@ -1,0 +1,59 @@
+"""The paper's set-up on a real city: sizes and success rates (Khalaf-Allah 2007, Fig. 5)."""
+
+from __future__ import annotations
+
+import json
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+
+from mapfilter.evaluation.success import wilson_interval
+
+PIPELINES = Path(__file__).resolve().parents[2] / "pipelines"
+ROUTES, DRAWS = 40, 2
+
+
+def run_script(name: str, capsys: pytest.CaptureFixture[str], *settings: str) -> dict:
+    argv, sys.argv = sys.argv, [name, "--json", *settings]
+    try:
+        with pytest.raises(SystemExit) as ended:
+            runpy.run_path(str(PIPELINES / f"{name}.py"), run_name="__main__")
+    finally:
+        sys.argv = argv
+    out = capsys.readouterr()
+    assert ended.value.code == 0, out.err
+    return json.loads(out.out.splitlines()[-1])
+
+
+@pytest.fixture(scope="module")
+def porto(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    settings = {
+        "area.map": shared_data / "osm-extracts" / "porto.osm.pbf",
+        "area.southwest": "-8.6235,41.1325",
+        "area.size_m": "3000,3000",
+    }
+    out = ["--out", str(tmp_path_factory.mktemp("porto"))]
+    return [
+        *(part for key, value in settings.items() for part in ("--set", f"{key}={value}")),
+        *out,
+    ]
+
+
+def test_porto_has_the_points_and_the_success_of_the_paper(
+    porto: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    database = run_script("build_database", capsys, *porto)
+    assert database["predict"]["rows"] == database["predict"]["cols"] == 600
+    assert database["predict"]["cells"] == 10
+    assert 55_000 <= database["build"]["points"] <= 75_000
+    counts = ["--set", f"journeys.count={ROUTES}", "--set", f"journeys.draws={DRAWS}"]
+    for sigma_deg, published in ((3, 0.78), (6, 0.65)):
+        noise = ["--set", f"imu.sigma_orient_deg={sigma_deg}", "--set", "output.pictures=none"]
+        found = run_script("replay_tracks", capsys, *porto, *counts, *noise)["replay"]
+        assert found["runs"] == ROUTES * DRAWS
+        # The 95 % interval of what was found must meet 10 points about the published share.
+        low, high = wilson_interval(found["successes"], found["runs"])
+        assert low <= published + 0.10
+        assert high >= published - 0.10
