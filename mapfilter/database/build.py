@@ -36,7 +36,7 @@ from mapfilter.database.store import (
     write_cells,
 )
 from mapfilter.database.tiles import Tile, pixel_offset, read_tile
-from mapfilter.errors import Faults, InputError, fail
+from mapfilter.errors import Faults, InputError, OutputError, fail
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rasters import RxLevRasters, check_against_plan
 from mapfilter.roads.lattice import RouteLattice
@@ -124,12 +124,13 @@ def build(
         Rasters and plan hold different cells, rasters and roads do not align or overlap, a
         parameter is out of range, or no point hears any cell.
     OutputError
-        The folder cannot be written.
+        The folder cannot be written, or holds other files than a database.
     """
     _check_parameters(margin_db, floor_dbm, tile_px)
     plan = plan.to_crs(rasters.lattice.crs)
     places, tiles = _cut_into_tiles(rasters, plan, routes, floor_dbm, tile_px)
     out = Path(out)
+    _check_replaceable(out)
     with atomic_dir(out) as folder:
         with PartWriter(folder, rasters.lattice.crs, plan.ids) as writer:
             start, heard = 0, 0
@@ -214,6 +215,12 @@ def dry_run(
         round(memory + window),
         seconds * scale,
     )
+
+
+def _check_replaceable(out: Path) -> None:
+    if out.is_dir() and any(out.iterdir()) and not (out / MANIFEST).is_file():
+        expected = "a database, or nothing yet"
+        raise fail(OutputError, str(out), expected, "a folder of other files", "a mistyped path")
 
 
 def _check_parameters(margin_db: float, floor_dbm: float, tile_px: int) -> None:

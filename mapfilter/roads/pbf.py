@@ -117,6 +117,18 @@ def read_elements(
     return found.sort_values(["id", "osm_type"], ignore_index=True).to_crs(crs)
 
 
+def check_on_map(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> None:
+    """See that a box in metres overlaps what the map covers.
+
+    Raises
+    ------
+    InputError
+        It does not, with the likely mistake; or the map is missing or damaged.
+    """
+    if not _overlap(box_deg(crs, bounds_m), map_bounds_deg(name_or_path)):
+        raise nothing_there(name_or_path, crs, bounds_m)
+
+
 def nothing_there(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> MapfilterError:
     """Return the error for an area in which the map has no ways, with the likely mistake."""
     area, covered = box_deg(crs, bounds_m), map_bounds_deg(name_or_path)

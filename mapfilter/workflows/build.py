@@ -10,11 +10,12 @@ from mapfilter._io import ensure_writable_folder, sha256_file
 from mapfilter._parallel import Progress, local_executor
 from mapfilter.database.build import BuildEstimate, build, dry_run
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.geodesy import Lattice, projected_crs, same_crs
+from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rasters import RxLevRasters, open_rasters
 from mapfilter.roads.pbf import resolve_map
 from mapfilter.workflows.sections import Area, Config
-from mapfilter.workflows.world import World, area_lattice
+from mapfilter.workflows.world import World, area_lattice, check_scale
 
 ATTRIBUTION = "© OpenStreetMap contributors (ODbL)"
 
@@ -53,13 +54,13 @@ def run_build(config: Config, *, workers: int = 1, progress: Progress | None = N
     """
     began_s = time.perf_counter()
     target = config.database_path
+    rasters, plan, world = _raster_world(config)
     ensure_writable_folder(target.parent)
-    rasters, world = _raster_world(config)
     routes = world.routes
     with local_executor(workers) as executor:
         database = build(
             rasters,
-            world.plan,
+            plan,
             routes,
             target,
             margin_db=config.database.margin_db,
@@ -87,11 +88,11 @@ def run_dry_build(config: Config) -> BuildEstimate:
     MapfilterError
         As for :func:`run_build`.
     """
-    rasters, world = _raster_world(config)
+    rasters, plan, world = _raster_world(config)
     section = config.database
     return dry_run(
         rasters,
-        world.plan,
+        plan,
         world.routes,
         margin_db=section.margin_db,
         floor_dbm=section.floor_dbm,
@@ -99,13 +100,25 @@ def run_dry_build(config: Config) -> BuildEstimate:
     )
 
 
-def _raster_world(config: Config) -> tuple[RxLevRasters, World]:
-    """Return the rasters and the world on their lattice, cut to the area where one is given."""
+def _raster_world(config: Config) -> tuple[RxLevRasters, CellPlan, World]:
+    """Return rasters, plan, and the world on the rasters' lattice, cut to the area if one is given.
+
+    A plan by rule is laid out over the whole rasters, as when they were predicted.
+    """
     rasters = open_rasters(config.rasters_path)
-    lattice = rasters.lattice
-    if config.area.bbox is not None or config.area.southwest is not None:
-        lattice = _cut(lattice, config.area, str(rasters.path))
-    return rasters, World(config, lattice)
+    lattice, area = rasters.lattice, config.area
+    if area.crs is not None:
+        wanted = projected_crs(area.crs, "area.crs")
+        if not same_crs(wanted, lattice.crs):
+            expected = f"{wanted}, the CRS of the area"
+            raise fail(InputError, f"{rasters.path}, CRS", expected, lattice.crs, "another zone")
+    check_scale(lattice.crs, lattice.bounds_m, f"{rasters.path}, CRS")
+    whole = World(config, lattice)
+    if area.bbox is None and area.southwest is None:
+        return rasters, whole.plan, whole
+    cut = _cut(lattice, area, str(rasters.path))
+    world = whole if cut == lattice else World(config, cut)
+    return rasters, whole.plan, world
 
 
 def _cut(lattice: Lattice, area: Area, name: str) -> Lattice:
@@ -127,5 +140,6 @@ def _cut(lattice: Lattice, area: Area, name: str) -> Lattice:
 
 def _inputs(config: Config) -> dict[str, str]:
     files = [resolve_map(config.area.map)]
-    files += [path for path in (config.cells.plan, config.roads.landuse) if path is not None]
+    given = (config.cells.plan, config.roads.landuse, config.roads.landuse_table)
+    files += [path for path in given if path is not None]
     return {path.name: sha256_file(path) for path in files}

@@ -9,13 +9,15 @@ import numpy as np
 
 from mapfilter._io import atomic_dir
 from mapfilter._parallel import Progress
+from mapfilter.errors import InputError, OutputError, fail
+from mapfilter.geodesy import same_crs
 from mapfilter.radio.rasters import check_against_plan, open_rasters
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel, level_sampler
 from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
-from mapfilter.tracks.store import write_log
+from mapfilter.tracks.store import is_log, write_log
 from mapfilter.workflows.sections import Config
 from mapfilter.workflows.world import World
 
@@ -52,6 +54,11 @@ def run_simulate(config: Config, progress: Progress | None = None) -> SimulateRe
     as_predicted = section.radio == "as_predicted"
     rasters = open_rasters(config.rasters_path if as_predicted else config.reality_path)
     check_against_plan(rasters, world.plan)
+    if not same_crs(rasters.lattice.crs, world.lattice.crs):
+        expected = f"{world.lattice.crs}, the CRS of the area"
+        where = f"{rasters.path}, CRS"
+        raise fail(InputError, where, expected, rasters.lattice.crs, "another zone: set area.crs")
+    _check_replaceable(config.track_path)
     network = street_network(world.ways, world.routes)
     levels = level_sampler(rasters, world.plan.ids, world.lattice.bounds_m, plan=world.plan)
     settings = simulation_settings(config)
@@ -65,6 +72,15 @@ def run_simulate(config: Config, progress: Progress | None = None) -> SimulateRe
             if progress is not None:
                 progress(done, total)
     return SimulateResult(total, track_m, config.track_path)
+
+
+def _check_replaceable(folder: Path) -> None:
+    """See that nothing but logs is lost when a folder is replaced."""
+    if folder.is_dir() and not all(is_log(path) for path in folder.iterdir()):
+        hint = "a mistyped path; simulated logs need a folder of their own"
+        raise fail(
+            OutputError, str(folder), "a folder of logs, or nothing yet", "other files", hint
+        )
 
 
 def simulation_settings(config: Config) -> SimulationSettings:

@@ -7,20 +7,24 @@ from functools import cached_property
 
 import numpy as np
 
-from mapfilter.errors import ConfigError, Faults, InputError
-from mapfilter.geodesy import Lattice, check_bbox, project, projected_crs, utm_crs
+from mapfilter.errors import ConfigError, Faults, InputError, fail
+from mapfilter.geodesy import Lattice, check_bbox, project, projected_crs, unproject, utm_crs
 from mapfilter.radio.cells import CellPlan, read_cell_plan
 from mapfilter.roads.buildings import rasterise_heights, read_buildings
 from mapfilter.roads.landuse import read_landuse
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.osm import read_squares, read_ways
-from mapfilter.roads.pbf import map_bounds_deg, resolve_map
+from mapfilter.roads.pbf import check_on_map, map_bounds_deg, resolve_map
 from mapfilter.roads.routable import route_lattice, route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings, Ways
 from mapfilter.simulation.layout import lay_out_plan
 from mapfilter.workflows.sections import Area, Config
 
 LARGEST_AREA_PX = 400_000_000
+EARTH_RADIUS_M = 6_371_000.0
+
+_SHORT_M = 100.0
+_SCALE_TOLERANCE = 0.03
 
 
 def area_lattice(area: Area) -> Lattice:
@@ -29,7 +33,8 @@ def area_lattice(area: Area) -> Lattice:
     Raises
     ------
     InputError, ConfigError
-        The box or the CRS is wrong, the map is missing, or the lattice would be absurdly large.
+        The box or the CRS is wrong, the map is missing or of another place, or the lattice would
+        be absurdly large.
     """
     if area.southwest is not None and area.size_m is not None:
         lon, lat = area.southwest
@@ -38,6 +43,9 @@ def area_lattice(area: Area) -> Lattice:
         # Snapped first, so that the size asked for is the size of the lattice.
         corner = np.concatenate(project(crs, [lon], [lat])) // area.resolution_m * area.resolution_m
         bounds_m = (*corner, *(corner + area.size_m))
+        if max(area.size_m) < area.resolution_m:
+            expected = f"metres, at least {area.resolution_m:g}"
+            raise fail(InputError, "area.size_m", expected, area.size_m, "degrees given for metres")
     else:
         box = area.bbox or map_bounds_deg(area.map)
         check_bbox(box, "area.bbox")
@@ -60,7 +68,29 @@ def area_lattice(area: Area) -> Lattice:
             "a box or a resolution in the wrong unit",
         )
     faults.raise_if_any(ConfigError)
+    check_on_map(area.map, crs, bounds_m)
+    check_scale(crs, bounds_m, "area.crs")
     return Lattice.covering(crs, bounds_m, area.resolution_m)
+
+
+def check_scale(crs: str, bounds_m: tuple[float, float, float, float], where: str) -> None:
+    """See that metres of a CRS are metres on the ground in the middle of an area.
+
+    Raises
+    ------
+    InputError
+        They differ by more than 3 %: the CRS is made for another region or is Web Mercator.
+    """
+    west, south, east, north = bounds_m
+    middle_m = np.array([[(west + east) / 2], [(south + north) / 2]])
+    ends_m = middle_m + np.array([[0.0, _SHORT_M], [0.0, 0.0]])
+    lon_rad, lat_rad = np.radians(unproject(crs, *ends_m))
+    along_rad = np.hypot(np.diff(lon_rad) * np.cos(lat_rad[0]), np.diff(lat_rad))
+    ground_m = float(along_rad[0] * EARTH_RADIUS_M)
+    if not abs(ground_m / _SHORT_M - 1) <= _SCALE_TOLERANCE:
+        expected = "a CRS whose metres are metres on the ground in this area"
+        got = f"{crs}, of which {_SHORT_M:g} m are {ground_m:.0f} m"
+        raise fail(InputError, where, expected, got, "a CRS of another region, or Web Mercator")
 
 
 @dataclass(frozen=True)
