@@ -1,0 +1,225 @@
+"""Coordinate systems and angles, against independent derivatives and hand-worked numbers."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mapfilter.errors import InputError
+from mapfilter.geodesy import (
+    azimuth_from_heading_deg,
+    check_bbox,
+    grid_convergence_rad,
+    heading_from_azimuth_rad,
+    project,
+    projected_crs,
+    same_crs,
+    unproject,
+    utm_crs,
+    wrap_rad,
+)
+
+ANGLES = st.floats(-1e4, 1e4)
+TURN = 2 * np.pi
+
+
+@given(ANGLES)
+def test_wrapped_angles_lie_in_one_turn_and_point_the_same_way(angle):
+    wrapped = wrap_rad(angle)
+    assert -np.pi <= wrapped < np.pi
+    assert np.cos(wrapped - angle) == pytest.approx(1.0)
+    assert wrap_rad(wrapped) == pytest.approx(wrapped, abs=1e-15)
+
+
+@given(st.floats(-np.pi, np.pi, exclude_max=True), st.integers(-20, 20))
+def test_whole_turns_are_taken_away(angle, turns):
+    off = wrap_rad(wrap_rad(angle + turns * TURN) - angle)
+    assert abs(off) < 1e-12
+
+
+def test_both_sides_of_the_seam():
+    assert wrap_rad([np.pi, -np.pi, 3 * np.pi]).tolist() == [-np.pi] * 3
+    assert wrap_rad(np.pi + np.array([-1e-12, 1e-12])) == pytest.approx([np.pi, -np.pi])
+    assert wrap_rad(-np.pi + np.array([-1e-12, 1e-12])) == pytest.approx([np.pi, -np.pi])
+    assert wrap_rad(-1e-20) == pytest.approx(0.0)
+    assert np.isnan(wrap_rad(np.nan))
+    assert wrap_rad(np.zeros((2, 3))).shape == (2, 3)
+
+
+def test_azimuths_are_clockwise_from_north_and_headings_counter_clockwise_from_east():
+    azimuths = [0, 45, 90, 180, 270, 360, -90]
+    headings = np.degrees(heading_from_azimuth_rad(azimuths))
+    assert headings == pytest.approx([90, 45, 0, -90, -180, 90, -180])
+    assert azimuth_from_heading_deg(np.radians([90, 0, -90, 180])) == pytest.approx(
+        [0, 90, 180, 270]
+    )
+
+
+@given(st.floats(-720, 720), st.floats(-0.1, 0.1))
+def test_azimuth_and_heading_are_each_others_inverse(azimuth_deg, convergence_rad):
+    heading = heading_from_azimuth_rad(azimuth_deg, convergence_rad)
+    back = azimuth_from_heading_deg(heading, convergence_rad)
+    assert 0 <= back < 360
+    assert abs((back - azimuth_deg + 180) % 360 - 180) < 1e-9
+
+
+PLACES = [
+    # UTM zone, and places west and east of its central meridian in both hemispheres
+    ("EPSG:32629", -11.5, 41.1, -1),
+    ("EPSG:32629", -8.6, 41.1, 1),
+    ("EPSG:32635", 24.94, 60.17, -1),
+    ("EPSG:32635", 29.5, 60.17, 1),
+    ("EPSG:32734", 18.42, -33.92, 1),
+    ("EPSG:32734", 23.9, -33.92, -1),
+    ("EPSG:2193", 174.78, -41.29, -1),  # axes given as north, east; central meridian 173
+    ("EPSG:3413", -30.0, 75.0, 1),
+    ("EPSG:2154", 7.75, 48.58, 1),
+]
+
+
+def bearing_of_true_north_rad(crs, lon, lat, step_deg=1e-4):
+    """Heading, on the grid, of a small step due north: a derivative of the projection itself."""
+    east, north = project(crs, [lon, lon], [lat - step_deg, lat + step_deg])
+    return float(np.arctan2(north[1] - north[0], east[1] - east[0]))
+
+
+@pytest.mark.parametrize(("crs", "lon", "lat", "sign"), PLACES)
+def test_convergence_against_a_derivative_of_the_projection(crs, lon, lat, sign):
+    convergence = grid_convergence_rad(crs, lon, lat)
+    north_on_grid = bearing_of_true_north_rad(crs, lon, lat)
+    assert wrap_rad(north_on_grid - np.pi / 2 - convergence) == pytest.approx(0.0, abs=1e-7)
+    assert heading_from_azimuth_rad(0.0, convergence) == pytest.approx(north_on_grid, abs=1e-7)
+    if sign:
+        assert convergence * sign > 0
+
+
+@pytest.mark.parametrize(("crs", "lon", "lat", "sign"), PLACES)
+def test_a_walk_along_a_geodesic_has_the_heading_of_its_azimuth(crs, lon, lat, sign):  # noqa: ARG001
+    from pyproj import Geod
+
+    for azimuth_deg in (0.0, 37.0, 90.0, 200.0, 330.0):
+        to_lon, to_lat, _ = Geod(ellps="WGS84").fwd(lon, lat, azimuth_deg, 5.0)
+        east, north = project(crs, [lon, to_lon], [lat, to_lat])
+        heading = np.arctan2(north[1] - north[0], east[1] - east[0])
+        expected = heading_from_azimuth_rad(azimuth_deg, grid_convergence_rad(crs, lon, lat))
+        assert wrap_rad(heading - expected) == pytest.approx(0.0, abs=2e-6)
+
+
+def test_convergence_of_utm_by_hand():
+    # tan γ = tan Δλ · sin φ on the sphere; at 60.17° N and -2.06° from the meridian -1.79°.
+    expected = np.arctan(np.tan(np.radians(24.94 - 27.0)) * np.sin(np.radians(60.17)))
+    assert grid_convergence_rad("EPSG:32635", 24.94, 60.17) == pytest.approx(expected, abs=2e-5)
+    assert grid_convergence_rad("EPSG:32635", 27.0, 60.17) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("place", [(0.0, 95.0), (float("nan"), 41.0), (float("inf"), 0.0)])
+def test_convergence_of_no_place_is_told(place):
+    with pytest.raises(InputError, match="place: expected a longitude and latitude"):
+        grid_convergence_rad("EPSG:32629", *place)
+
+
+@given(st.floats(-11.9, -6.1), st.floats(-79, 83))
+def test_project_and_unproject_are_each_others_inverse(lon, lat):
+    crs = utm_crs(-9.0, lat)
+    east, north = project(crs, lon, lat)
+    back = unproject(crs, east, north)
+    assert (float(back[0]), float(back[1])) == pytest.approx((lon, lat), abs=1e-9)
+
+
+def test_projection_of_a_known_place():
+    # On the central meridian east is 500 km; on the equator north is 0.
+    assert project("EPSG:32629", -9.0, 0.0) == (pytest.approx(500_000), pytest.approx(0, abs=1e-6))
+    east, north = project("EPSG:32734", [21.0], [0.0])
+    assert (east.shape, east[0], north[0]) == ((1,), pytest.approx(5e5), pytest.approx(1e7))
+    with pytest.raises(InputError, match="EPSG:32629"):
+        project("EPSG:nonsense", 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("lon", "lat", "zone"),
+    [(-180, 1, 32601), (179.99, 1, 32660), (180, 1, 32660), (0, 0, 32631), (-0.01, -0.01, 32730)],
+)
+def test_utm_zones_at_the_seams(lon, lat, zone):
+    assert utm_crs(lon, lat) == f"EPSG:{zone}"
+
+
+@pytest.mark.parametrize(
+    "spec",
+    ["EPSG:32629", "epsg:32629", 32629, "+proj=utm +zone=29 +datum=WGS84 +units=m +type=crs"],
+)
+def test_the_same_system_however_it_is_called(spec):
+    assert same_crs(projected_crs(spec), "EPSG:32629")
+
+
+def test_a_system_without_a_number_keeps_its_text():
+    local = "+proj=tmerc +lat_0=41.1 +lon_0=-8.6 +datum=WGS84 +units=m +type=crs"
+    text = projected_crs(local)
+    assert text.startswith("PROJCRS")
+    assert projected_crs(text) == text
+    assert same_crs(text, local)
+    assert not same_crs(text, "EPSG:32629")
+
+
+def test_systems_of_other_axis_order_are_taken():
+    assert projected_crs("EPSG:2193") == "EPSG:2193"
+    assert projected_crs("EPSG:31467") == "EPSG:31467"
+    # always_xy: east comes first whatever the register says.
+    east, north = project("EPSG:2193", 174.78, -41.29)
+    assert (round(float(east), -5), round(float(north), -5)) == (1.7e6, 5.4e6)
+
+
+@pytest.mark.parametrize(
+    ("spec", "got", "hint"),
+    [
+        (None, "none", "CRS left out on export"),
+        ("", "none", "CRS left out on export"),
+        ("EPSG:4326", "WGS 84", "degrees given for metres"),
+        (4258, "ETRS89", "degrees given for metres"),
+        ("EPSG:2225", "NAD83 / California zone 1 (ftUS) (US survey foot", ""),
+        ("EPSG:2048", "Hartebeesthoek94 / Lo19 (metre west, metre south)", ""),
+        ("EPSG:5513", "S-JTSK / Krovak (metre south, metre west)", ""),
+        ("EPSG:4978", "WGS 84 (metre", ""),
+        ("EPSG:5773", "EGM96 height (metre up)", ""),
+        ("nonsense", "'nonsense'", ""),
+        ("EPSG:999999", "'EPSG:999999'", ""),
+        (-1, "-1", ""),
+        (float("nan"), "nan", ""),
+        ([1], "[1]", ""),
+        ({}, "{}", ""),
+        (b"\x00", "b'\\x00'", ""),
+    ],
+)
+def test_systems_that_do_not_count_metres_east_and_north(spec, got, hint):
+    with pytest.raises(InputError) as caught:
+        projected_crs(spec, "roads.gpkg, crs")
+    (fault,) = caught.value.faults
+    assert fault.where == "roads.gpkg, crs"
+    assert fault.got.startswith(got)
+    assert fault.hint == hint
+
+
+PORTO = (-8.63, 41.13, -8.59, 41.16)
+
+
+def test_a_good_box_passes_also_at_the_ends():
+    check_bbox(PORTO)
+    check_bbox((-180.0, -90.0, 180.0, 90.0))
+
+
+@pytest.mark.parametrize(
+    ("box", "hint"),
+    [
+        ((531_000.0, 4_553_000.0, 534_000.0, 4_556_000.0), "metres given for degrees"),
+        ((-33.95, 151.1, -33.85, 151.3), "longitude and latitude swapped"),
+        ((PORTO[2], PORTO[1], PORTO[0], PORTO[3]), "corners swapped"),
+        ((PORTO[0], PORTO[3], PORTO[2], PORTO[1]), "corners swapped"),
+        ((PORTO[0], PORTO[1], PORTO[0], PORTO[3]), "corners swapped"),
+        ((float("nan"), 41.0, -8.0, 42.0), ""),
+        ((-8.63, 41.13, float("inf"), 41.16), ""),
+    ],
+)
+def test_bad_boxes_are_told_with_their_likely_mistake(box, hint):
+    with pytest.raises(InputError) as caught:
+        check_bbox(box, "area.bbox")
+    (fault,) = caught.value.faults
+    assert (fault.where, fault.hint) == ("area.bbox", hint)

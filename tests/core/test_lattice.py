@@ -1,0 +1,167 @@
+"""The lattice: pixels and coordinates, row 0 in the north."""
+
+from dataclasses import replace
+
+import numpy as np
+import pyproj
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mapfilter.errors import InputError
+from mapfilter.geodesy import Lattice
+
+CRS = "EPSG:32629"
+LATTICE = Lattice(CRS, 531_000.0, 4_556_000.0, 5.0, 40, 50)
+SIZES = st.integers(1, 60)
+RESOLUTIONS = st.sampled_from([0.5, 1.0, 2.5, 5.0, 10.0, 25.0, 0.1, 1 / 3])
+
+
+@st.composite
+def lattices(draw):
+    resolution = draw(RESOLUTIONS)
+    west, north = draw(st.integers(-1000, 1000)), draw(st.integers(-1000, 1000))
+    return Lattice(CRS, west * resolution, north * resolution, resolution, draw(SIZES), draw(SIZES))
+
+
+@given(lattices())
+def test_every_pixel_centre_lies_in_its_own_pixel(lattice):
+    row, col = np.indices((lattice.rows, lattice.cols))
+    east, north = lattice.east_north(row, col)
+    again = lattice.row_col(east, north)
+    assert np.array_equal(again[0], row)
+    assert np.array_equal(again[1], col)
+    assert lattice.contains(row, col).all()
+    west, south, right, top = lattice.bounds_m
+    assert ((east > west) & (east < right) & (north > south) & (north < top)).all()
+
+
+@given(lattices(), st.floats(-2000, 2000), st.floats(-2000, 2000))
+def test_a_position_is_at_most_half_a_pixel_from_its_centre(lattice, east, north):
+    row, col = lattice.row_col(east, north)
+    assert isinstance(row, int)
+    assert isinstance(col, int)
+    centre = lattice.east_north(row, col)
+    half = lattice.resolution_m * (0.5 + 1e-6)
+    assert abs(centre[0] - east) <= half
+    assert abs(centre[1] - north) <= half
+
+
+def test_row_zero_is_the_northern_edge_as_in_gdal():
+    assert LATTICE.east_north(0, 0) == (531_002.5, 4_555_997.5)
+    assert LATTICE.east_north(39, 49) == (531_247.5, 4_555_802.5)
+    assert LATTICE.bounds_m == (531_000.0, 4_555_800.0, 531_250.0, 4_556_000.0)
+    a, b, c, d, e, f = LATTICE.gdal_transform
+    row, col = 7, 11
+    corner = (a + col * b + row * c, d + col * e + row * f)
+    assert corner == (531_055.0, 4_555_965.0)
+    assert LATTICE.row_col(corner[0] + 0.01, corner[1] - 0.01) == (row, col)
+
+
+def test_edges_belong_to_the_pixel_to_the_south_and_east():
+    assert LATTICE.row_col(531_000.0, 4_556_000.0) == (0, 0)
+    assert LATTICE.row_col(531_005.0, 4_555_995.0) == (1, 1)
+    outside = LATTICE.row_col(
+        np.array([530_999.9, 531_250.0, 531_000.0]), np.array([4_556_000.1, 4_555_999, 4_555_800.0])
+    )
+    assert not LATTICE.contains(*outside).any()
+    assert [part.tolist() for part in outside] == [[-1, 0, 40], [-1, 50, 0]]
+
+
+@given(
+    st.floats(-1e6, 1e6), st.floats(-1e6, 1e6), st.floats(0.01, 500), st.floats(0.01, 500),
+    RESOLUTIONS,
+)  # fmt: skip
+def test_covering_covers_snaps_and_is_not_larger_than_it_must_be(west, south, wide, high, res):
+    lattice = Lattice.covering(CRS, (west, south, west + wide, south + high), res)
+    left, bottom, right, top = lattice.bounds_m
+    slack = 1e-6 * res
+    assert left <= west + slack
+    assert bottom <= south + slack
+    assert right >= west + wide - slack
+    assert top >= south + high - slack
+    assert max(west - left, right - west - wide, south - bottom, top - south - high) < res + slack
+    for edge in (left, top):
+        assert edge / res == pytest.approx(round(edge / res), abs=1e-6)
+
+
+def test_covering_of_neighbouring_areas_is_one_lattice():
+    a = Lattice.covering(CRS, (1.0, 1.0, 12.0, 12.0), 5.0)
+    b = Lattice.covering(CRS, (12.0, 1.0, 31.0, 12.0), 5.0)
+    assert (a.bounds_m, b.bounds_m) == ((0.0, 0.0, 15.0, 15.0), (10.0, 0.0, 35.0, 15.0))
+    assert Lattice.covering(CRS, a.bounds_m, 5.0) == a
+
+
+@pytest.mark.parametrize(
+    ("bounds", "resolution"),
+    [
+        ((0.0, 0.0, 10.0, 10.0), 0.0),
+        ((0.0, 0.0, 10.0, 10.0), -5.0),
+        ((0.0, 0.0, 10.0, 10.0), float("nan")),
+        ((0.0, 0.0, float("nan"), 10.0), 5.0),
+        ((0.0, 0.0, float("inf"), 10.0), 5.0),
+        ((10.0, 0.0, 0.0, 10.0), 5.0),
+        ((0.0, 0.0, 0.0, 10.0), 5.0),
+    ],
+)
+def test_covering_nothing_is_told(bounds, resolution):
+    with pytest.raises(InputError, match="lattice"):
+        Lattice.covering(CRS, bounds, resolution)
+
+
+def test_all_faults_of_a_lattice_come_together():
+    with pytest.raises(InputError) as caught:
+        Lattice(CRS, float("inf"), 0.0, float("nan"), 0, -3)
+    assert [fault.where for fault in caught.value.faults] == [
+        "lattice corner", "lattice resolution", "lattice size",
+    ]  # fmt: skip
+
+
+@given(lattices(), st.data())
+def test_a_window_keeps_every_pixel_in_its_place(lattice, data):
+    row = data.draw(st.integers(0, lattice.rows - 1))
+    col = data.draw(st.integers(0, lattice.cols - 1))
+    window = lattice.window(row, col, data.draw(SIZES), data.draw(SIZES))
+    assert row + window.rows <= lattice.rows
+    assert col + window.cols <= lattice.cols
+    last = window.rows - 1, window.cols - 1
+    for there in ((0, 0), last):
+        here = there[0] + row, there[1] + col
+        assert window.east_north(*there) == pytest.approx(lattice.east_north(*here))
+
+
+def test_a_window_beyond_the_lattice_is_told():
+    with pytest.raises(InputError, match="at least one pixel"):
+        LATTICE.window(40, 0, 5, 5)
+
+
+@given(lattices(), st.integers(1, 70))
+def test_tiles_cover_every_pixel_exactly_once_row_by_row(lattice, size):
+    seen = np.zeros((lattice.rows, lattice.cols), dtype=int)
+    tiles = lattice.tiles(size)
+    for row, col, rows, cols in tiles:
+        assert 1 <= rows <= size
+        assert 1 <= cols <= size
+        seen[row : row + rows, col : col + cols] += 1
+        window = lattice.window(row, col, size, size)
+        assert (window.rows, window.cols) == (rows, cols)
+    assert (seen == 1).all()
+    assert tiles == sorted(tiles)
+
+
+def test_aligned_means_the_same_to_a_thousandth_of_a_pixel():
+    assert LATTICE.aligned_with(LATTICE)
+    assert LATTICE.aligned_with(replace(LATTICE, west_m=LATTICE.west_m + 0.004))
+    assert not LATTICE.aligned_with(replace(LATTICE, crs="EPSG:32630"))
+    for changed in (
+        replace(LATTICE, west_m=LATTICE.west_m + 0.006),
+        replace(LATTICE, north_m=LATTICE.north_m - 0.006),
+        replace(LATTICE, north_m=LATTICE.north_m + 5.0),
+        replace(LATTICE, resolution_m=5.0002),
+        replace(LATTICE, rows=41),
+        replace(LATTICE, cols=49),
+        replace(LATTICE, rows=50, cols=40),
+    ):
+        assert not LATTICE.aligned_with(changed), changed
+        assert not changed.aligned_with(LATTICE)
+    assert LATTICE.aligned_with(replace(LATTICE, crs=pyproj.CRS(CRS).to_wkt()))
