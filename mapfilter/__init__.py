@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from mapfilter.evaluation.accuracy import accuracy as accuracy
     from mapfilter.evaluation.success import wilson_interval as wilson_interval
     from mapfilter.filters.candidate import CandidateFilter as CandidateFilter
-    from mapfilter.filters.candidate import CandidateOptions as CandidateOptions
+    from mapfilter.filters.candidate_options import CandidateOptions as CandidateOptions
     from mapfilter.filters.contract import Status as Status
     from mapfilter.geodesy import Lattice as Lattice
     from mapfilter.positioning.estimate import Fix as Fix
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "CandidateFilter": "filters.candidate",
-    "CandidateOptions": "filters.candidate",
+    "CandidateOptions": "filters.candidate_options",
     "CellPlan": "radio.cells",
     "Fix": "positioning.estimate",
     "Lattice": "geodesy",

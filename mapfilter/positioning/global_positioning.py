@@ -13,7 +13,8 @@ import numpy as np
 from mapfilter.database.nearest import CellPointIndex
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
-from mapfilter.filters.candidate import CandidateBelief, CandidateFilter, CandidateOptions
+from mapfilter.filters.candidate import CandidateBelief, CandidateFilter
+from mapfilter.filters.candidate_options import CandidateOptions
 from mapfilter.filters.contract import Estimate, Reason, Status
 from mapfilter.filters.run import Event, run
 from mapfilter.geodesy import same_crs

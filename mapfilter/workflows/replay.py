@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,12 @@ import numpy as np
 from mapfilter._io import ensure_writable_folder, write_json
 from mapfilter._parallel import Progress
 from mapfilter.database.store import open_database
-from mapfilter.errors import InputError, fail
+from mapfilter.errors import Faults, InputError, MapfilterError
 from mapfilter.evaluation.accuracy import Accuracy, accuracy
 from mapfilter.evaluation.success import SuccessSummary, summarise
-from mapfilter.filters.candidate import CandidateOptions
+from mapfilter.filters.candidate_options import CandidateOptions
 from mapfilter.filters.contract import Reason
+from mapfilter.geodesy import same_crs
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.global_positioning import (
@@ -23,6 +25,7 @@ from mapfilter.positioning.global_positioning import (
     cell_points,
     position_by_candidates,
 )
+from mapfilter.tracks.leave_out import leave_out
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.store import list_logs, read_log
 from mapfilter.workflows.facts import facts
@@ -105,15 +108,14 @@ def run_replay(
     """
     database = open_database(config.database_path, verify="full")
     folders = list_logs(config.track_path)
-    if not folders:
-        raise fail(InputError, str(config.track_path), "a log, or a folder of logs", "none")
+    _check_logs(folders, database.lattice.crs)
     ensure_writable_folder(out)
     points_of = cell_points(database, config.filter.margin_db)
     options = candidate_options(config.filter, database.lattice.resolution_m)
     logs: list[ReplayedLog] = []
     scores: list[Accuracy] = []
     for index, folder in enumerate(folders):
-        log = read_log(folder)
+        log = leave_out(read_log(folder), config.track.without)
         rng = np.random.default_rng([config.journeys.seed, index])
         track = position_by_candidates(database, points_of, log, options, rng)
         into = out if len(folders) == 1 else out / folder.name
@@ -132,6 +134,21 @@ def run_replay(
         write_json(out / "summary.json", facts(summary))
     unknown = any(str(Reason.UNKNOWN_CELL) in log.unused for log in logs)
     return ReplayResult("candidate", tuple(logs), summary, unknown, out)
+
+
+def _check_logs(folders: Sequence[Path], crs: str) -> None:
+    """Read every log once before any is located, so that all faults are told and none half-way."""
+    faults = Faults()
+    for folder in folders:
+        try:
+            log = read_log(folder)
+        except MapfilterError as error:
+            faults.found.extend(error.faults)
+            continue
+        if not same_crs(log.crs, crs):
+            expected = f"{crs}, the database's"
+            faults.add(f"{folder}, crs", expected, log.crs, "log of another area or zone")
+    faults.raise_if_any(InputError)
 
 
 def candidate_options(section: FilterSection, resolution_m: float) -> CandidateOptions:

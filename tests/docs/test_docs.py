@@ -15,7 +15,7 @@ from pydantic import BaseModel
 from typer.testing import CliRunner
 
 from mapfilter.cli import app
-from mapfilter.filters.candidate import CandidateOptions
+from mapfilter.filters.candidate_options import CandidateOptions
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate_store import _COLUMNS as ESTIMATE_COLUMNS
 from mapfilter.radio._cell_table import COLUMNS as PLAN_COLUMNS

@@ -17,7 +17,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapfilter.errors import ConfigError
-from mapfilter.filters.candidate import CandidateBelief, CandidateFilter, CandidateOptions, Mode
+from mapfilter.filters.candidate import CandidateBelief, CandidateFilter, Mode
+from mapfilter.filters.candidate_options import CandidateOptions
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.run import Event, run
 
