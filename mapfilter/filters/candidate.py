@@ -14,7 +14,7 @@ The paper leaves several things open; each is a field of
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from math import cos, isfinite, nan, sin
 from typing import Protocol
@@ -103,7 +103,7 @@ class CandidateFilter:
     """
 
     points_of: Callable[[str], PointSet | None]
-    options: CandidateOptions = CandidateOptions()
+    options: CandidateOptions = field(default_factory=CandidateOptions)
 
     def init(self, prior: str, rng: np.random.Generator) -> CandidateBelief:  # noqa: ARG002
         """Return all points of the first serving cell as candidates (Table 2, lines 2 and 4)."""
