@@ -146,6 +146,10 @@ def replay(
     filter_name: Annotated[
         str | None, typer.Option("--filter", metavar="NAME", help="candidate.")
     ] = None,
+    without: Annotated[
+        str | None,
+        typer.Option("--without", metavar="KINDS", help="What to leave out: gnss,ta,neighbours."),
+    ] = None,
     config: ConfigOption = None,
     settings: SetOption = None,
     out: OutOption = None,
@@ -159,9 +163,11 @@ def replay(
     given = _seeded(settings, seed, "journeys.seed")
     for key, value in (("database.path", database), ("track.path", log)):
         if value is not None:
-            given.append(f"{key}={json.dumps(str(value))}")
+            given.append(f"{key}={_toml(str(value))}")
     if filter_name is not None:
-        given.append(f"filter.name={json.dumps(filter_name)}")
+        given.append(f"filter.name={_toml(filter_name)}")
+    if without is not None:
+        given.append(f"track.without={_toml([kind.strip() for kind in without.split(',')])}")
     loaded = load_config(config, given)
     folder = (out or loaded.output.dir / "replay").absolute()
     with _progress("replay") as progress:
@@ -197,6 +203,12 @@ def _seeded(settings: list[str] | None, seed: int | None, *keys: str) -> list[st
     """Return the settings with a seed for each key, after what was set by name."""
     seeds = [] if seed is None else [f"{key}={seed}" for key in keys]
     return [*(settings or ()), *seeds]
+
+
+def _toml(value: str | list[str]) -> str:
+    """Return a text, or a list of texts, as TOML writes it."""
+    # Escapes of JSON in the ASCII form are pairs of surrogates, which TOML does not know.
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _say(text: str, kind: str = "") -> None:

@@ -182,9 +182,13 @@ class Imu(Section):
 
 
 class Track(Section):
-    """``[track]``: a log, or a folder of logs; by default the simulated journeys."""
+    """``[track]``: a log, or a folder of logs, and what the filter is not shown of them.
+
+    The default are the simulated journeys.
+    """
 
     path: FilePath | None = None
+    without: Annotated[tuple[Literal["gnss", "ta", "neighbours"], ...], Field(strict=False)] = ()
 
 
 class FilterSection(Section):
