@@ -1,0 +1,79 @@
+"""Running commands in this process, and what a refusal looks like."""
+
+import contextlib
+import hashlib
+import io
+import json
+import re
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from unittest.mock import patch
+
+from mapfilter.cli import main
+
+
+@dataclass(frozen=True)
+class Outcome:
+    code: int
+    out: str
+    err: str
+
+    @property
+    def json(self):
+        """The last line of stdout, parsed; constants that are no JSON are refused."""
+
+        def refuse(name):
+            raise ValueError(name)
+
+        return json.loads(self.out.splitlines()[-1], parse_constant=refuse)
+
+
+def mapfilter(*args: object) -> Outcome:
+    """Run the command line with its own ``main``, as the installed command does."""
+    out, err, code = io.StringIO(), io.StringIO(), 0
+    argv = ["mapfilter", *map(str, args)]
+    with (
+        patch.object(sys, "argv", argv),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+    ):
+        try:
+            main()
+        except SystemExit as end:
+            code = int(end.code or 0)
+    return Outcome(code, out.getvalue(), err.getvalue())
+
+
+def assert_done(outcome: Outcome) -> Outcome:
+    assert outcome.code == 0, outcome.err
+    assert outcome.err == ""
+    return outcome
+
+
+def assert_refused(outcome: Outcome, *told: object) -> None:
+    """Exit code 2, nothing on stdout, and a message per line: where, expected, found."""
+    assert outcome.code == 2, (outcome.code, outcome.err)
+    assert outcome.out == ""
+    lines = outcome.err.splitlines()
+    assert lines
+    for line in lines:
+        assert re.fullmatch(r"mapfilter: error: .+: expected .+, found .+", line), line
+    for text in told:
+        assert str(text) in outcome.err, (text, outcome.err)
+
+
+def contents(*places: Path) -> dict[str, str]:
+    """SHA-256 of every file in folders (hidden ones too), so that two states can be compared."""
+    found = {}
+    for place in places:
+        for path in sorted(place.rglob("*")) if place.is_dir() else [place]:
+            if path.is_file():
+                name = str(path.relative_to(place)) if place.is_dir() else path.name
+                found[f"{place.name}/{name}"] = hashlib.sha256(path.read_bytes()).hexdigest()
+    return found
+
+
+def settings(**values: object) -> list[str]:
+    """``--set`` for each, with ``__`` for the dot."""
+    return [f"--set={key.replace('__', '.')}={value}" for key, value in values.items()]

@@ -1,0 +1,84 @@
+"""One small world for all commands: 400 m of central Helsinki with three cells."""
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from command_line import assert_done, mapfilter
+
+PLAN = """cell,site,lat,lon,height_m,azimuth_deg,eirp_dbm,frequency_mhz,arfcn,bsic
+A,S1,60.16690,24.94300,30,60,50,1825.2,612,17
+B,S1,60.16690,24.94300,30,180,50,1826.4,618,17
+C,S2,60.16890,24.94880,25,240,50,1827.6,624,17
+"""
+
+TOML = """[area]
+bbox = [24.9420, 60.1660, 24.9495, 60.1697]
+[cells]
+plan = "cells.csv"
+[prediction]
+shadowing_db = 8.0
+[journeys]
+count = 2
+length_m = 250
+radio = "as_predicted"
+[filter]
+margin_db = 0.0
+update_length_m = 10.0
+[output]
+dir = "out"
+"""
+
+
+@dataclass(frozen=True)
+class World:
+    """Files of the world; nobody may change them: take a copy."""
+
+    folder: Path
+
+    @property
+    def toml(self) -> Path:
+        return self.folder / "world.toml"
+
+    @property
+    def plan(self) -> Path:
+        return self.folder / "cells.csv"
+
+    @property
+    def out(self) -> Path:
+        return self.folder / "out"
+
+    @property
+    def rasters(self) -> Path:
+        return self.out / "rxlev.tif"
+
+    @property
+    def database(self) -> Path:
+        return self.out / "database"
+
+    @property
+    def journeys(self) -> Path:
+        return self.out / "journeys"
+
+
+def make_world(folder: Path) -> World:
+    world = World(folder)
+    world.plan.write_text(PLAN, encoding="utf-8")
+    world.toml.write_text(TOML, encoding="utf-8")
+    for command in ("predict", "build", "simulate"):
+        assert_done(mapfilter(command, "-c", world.toml))
+    return world
+
+
+@pytest.fixture(scope="session")
+def world(tmp_path_factory: pytest.TempPathFactory) -> World:
+    """Plan, rasters, database and two journeys, made by the commands themselves."""
+    return make_world(tmp_path_factory.mktemp("world"))
+
+
+@pytest.fixture
+def own_world(world: World, tmp_path: Path) -> World:
+    """A copy of the world that a test may spoil."""
+    shutil.copytree(world.folder, tmp_path / "world")
+    return World(tmp_path / "world")

@@ -1,0 +1,201 @@
+"""Wrong configurations and command lines: one message, exit code 2, nothing written."""
+
+import os
+
+import pytest
+from command_line import assert_done, assert_refused, contents, mapfilter
+
+BOX = "area.bbox=24.9420,60.1660,24.9495,60.1697"
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(text: str | bytes):
+        file = tmp_path / "given.toml"
+        file.write_bytes(text.encode() if isinstance(text, str) else text)
+        return file
+
+    return write
+
+
+@pytest.mark.parametrize("command", ["predict", "build", "simulate", "replay"])
+def test_missing_file(command, tmp_path):
+    refused = mapfilter(command, "-c", tmp_path / "none.toml")
+    assert_refused(refused, "none.toml: expected a TOML file, found No such file")
+    assert not contents(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "found an empty file (likely: cut off when saved)"),
+        ("\n \n", "found an empty file"),
+        ("[area]\nbbox = [24.9420, 60.16", "expected TOML"),
+        (b"[area]\nmap = '\xff\xfe'", "expected TOML"),
+        ("[area]\n[area]\n", "expected TOML"),
+    ],
+)
+def test_empty_truncated_or_other_file(text, told, write):
+    assert_refused(mapfilter("predict", "-c", write(text)), "given.toml: ", told)
+
+
+def test_a_folder_for_a_file(tmp_path):
+    assert_refused(mapfilter("predict", "-c", tmp_path), "Is a directory")
+
+
+def test_all_faults_are_told_together_with_the_near_match(write):
+    file = write(
+        "[aera]\nmap = 'helsinki'\n[cells]\nsite = 3\nsectors = 9\nindoor = 'four'\n"
+        "[prediction]\nmetropolitan = 1\n[prediction.reality]\nslope_eror = 0.1\n"
+        "[roads]\nprofile = 'cycling'\nlanduse = 'x.tif'\n[journeys]\nlength_m = -3.0\n"
+    )
+    refused = mapfilter("predict", "-c", file)
+    assert_refused(
+        refused,
+        "given.toml, aera: expected a known section, found 'aera' (likely: 'area')",
+        "given.toml, cells.site: expected a known key, found 'site' (likely: 'sites')",
+        "given.toml, cells.sectors: expected less than or equal to 6, found 9",
+        "given.toml, cells.indoor: expected a whole number, found 'four'",
+        "given.toml, prediction.metropolitan: expected true or false, found 1",
+        "given.toml, prediction.reality.slope_eror: expected a known key, found 'slope_eror'",
+        "given.toml, roads.profile: expected 'walking' or 'driving', found 'cycling'",
+        "given.toml, journeys.length_m: expected greater than 0, found -3.0",
+    )
+    assert len(refused.err.splitlines()) == 8
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("output = 5", "output: expected a section, found 5"),
+        ("area = [1, 2]", "area: expected a section, found [1, 2]"),
+        ("[output]\ndir = 5", "output.dir: expected a path, found 5"),
+        ("[cells]\nsites = true", "cells.sites: expected a whole number, found True"),
+        ("[area]\nresolution_m = '5'", "area.resolution_m: expected a number, found '5'"),
+        ("[area]\nmap = 5", "area.map: expected a text, found 5"),
+        ("[area]\nbbox = [1, 2, 3]", "area.bbox.3: expected one value more, found [1, 2, 3]"),
+        ("[area]\nbbox = [1, 2, 3, 4, 5]", "area.bbox: expected 4 values, found 5"),
+        ("[area]\nbbox = [1, 2, nan, 4]", "area.bbox.2: expected a finite number, found nan"),
+        ("[area]\nresolution_m = inf", "area.resolution_m: expected a finite number, found inf"),
+        ("[area]\nsouthwest = [24.9, 60.1]", "area: expected southwest and size_m together"),
+        (
+            "[area]\nbbox = [1, 2, 3, 4]\nsouthwest = [1, 2]\nsize_m = [9, 9]",
+            "area: expected bbox, or southwest with size_m, not both",
+        ),
+        ("[roads]\nlanduse = 'x'", "roads: expected landuse and landuse_table together"),
+    ],
+)
+def test_wrong_values(text, told, write):
+    assert_refused(mapfilter("predict", "-c", write(text)), told)
+
+
+@pytest.mark.parametrize(
+    ("setting", "told"),
+    [
+        ("area", "--set area: expected section.key=value"),
+        ("area=3", "--set area=3: expected section.key=value"),
+        ("=3", "--set =3: expected section.key=value"),
+        ("area.=3", "--set area.=3: expected section.key=value"),
+        ("", "--set : expected section.key=value, found ''"),
+        ("area.map.name=3", "setting area.map: expected a text, found {'name': 3}"),
+        ("aera.map=x", "setting aera: expected a known section, found 'aera' (likely: 'area')"),
+        ("area.mop=x", "setting area.mop: expected a known key, found 'mop' (likely: 'map')"),
+        ("cells.sites=many", "setting cells.sites: expected a whole number, found 'many'"),
+        ("area.bbox=1,2,x,4", "setting area.bbox: expected a list, found '1,2,x,4'"),
+        ("area.bbox=", "setting area.bbox: expected a list, found ''"),
+        ("track.without=gnss", "setting track.without: expected a list, found 'gnss'"),
+    ],
+)
+def test_malformed_settings(setting, told):
+    assert_refused(mapfilter("predict", "--set", setting), told)
+
+
+def test_a_setting_is_not_blamed_on_the_file(write):
+    file = write("[cells]\nsites = 0\nindoor = 1\n")
+    refused = mapfilter("predict", "-c", file, "--set=cells.indoor=-1", "--set=journeys.count=0")
+    assert_refused(
+        refused, "given.toml, cells.sites: ", "setting cells.indoor: ", "setting journeys.count: "
+    )
+
+
+def test_a_setting_inside_a_value_of_the_file(write):
+    refused = mapfilter("predict", "-c", write("[area]\nmap = 'helsinki'\n"), "--set=area.map.x=1")
+    assert_refused(refused, "--set area.map.x=1: expected a section, found map, which is a value")
+
+
+@pytest.mark.parametrize(
+    ("box", "told"),
+    [
+        ("60.1660,24.9420,60.1697,24.9495", "found none (likely: longitude and latitude swapped)"),
+        ("24.9420,160.1660,24.9495,160.1697", "(likely: longitude and latitude swapped)"),
+        ("385795,6671660,386230,6672090", "(likely: metres given for degrees)"),
+        ("24.9495,60.1697,24.9420,60.1660", "(likely: corners swapped)"),
+        ("8.6,49.3,8.7,49.4", "(likely: the area lies outside the map)"),
+    ],
+)
+@pytest.mark.parametrize("command", ["predict", "build", "simulate"])
+def test_boxes(command, box, told, own_world):
+    before = contents(own_world.folder)
+    assert_refused(mapfilter(command, "-c", own_world.toml, f"--set=area.bbox={box}"), told)
+    assert contents(own_world.folder) == before
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ([BOX, "area.crs=EPSG:4326"], "expected a projected CRS in metres, found WGS 84"),
+        ([BOX, "area.crs=EPSG:99999"], "area.crs: expected a CRS such as EPSG:32629"),
+        ([BOX, "area.crs=EPSG:3857"], "of which 100 m are 50 m (likely: a CRS of another region"),
+        ([BOX, "area.crs=EPSG:32629"], "EPSG:32629, of which 100 m are 96 m"),
+        ([BOX, "area.resolution_m=0.00005"], "a box or a resolution in the wrong unit"),
+        (
+            ["area.southwest=24.942,60.166", "area.size_m=0.004,0.004"],
+            "area.size_m: expected metres, at least 5, found (0.004, 0.004)"
+            " (likely: degrees given for metres)",
+        ),
+        (["area.southwest=60.166,24.942", "area.size_m=400,400"], "longitude and latitude swapped"),
+    ],
+)
+def test_areas(given, told, tmp_path):
+    settings = [f"--set={setting}" for setting in given]
+    assert_refused(mapfilter("predict", *settings, "--out", tmp_path / "out"), told)
+    assert not contents(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("args", "told"),
+    [
+        (["predcit"], "No such command 'predcit'"),
+        (["build", "--workes", "2"], "No such option: --workes"),
+        (["build", "--workers", "0"], "'--workers'"),
+        (["simulate", "--seed", "-1"], "'--seed'"),
+        (["export"], "Missing argument 'DB'"),
+        (["info"], "Missing argument 'PATH'"),
+    ],
+)
+def test_wrong_command_lines_end_as_the_rest_does(args, told):
+    refused = mapfilter(*args)
+    assert (refused.code, refused.out) == (2, "")
+    assert told in refused.err
+    assert "Traceback" not in refused.err
+    assert not set("╭│╰") & set(refused.err)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a file name that Windows does not allow")
+def test_the_message_shows_a_name_with_control_characters_on_its_own_line(tmp_path):
+    refused = mapfilter("predict", "-c", tmp_path / "two\nlines.toml")
+    assert refused.code == 2
+    assert all(line.startswith("mapfilter: error: ") for line in refused.err.splitlines())
+
+
+def test_demo_refuses_wrong_settings(tmp_path):
+    refused = mapfilter("demo", "--out", tmp_path / "demo", "--set", "journeys.lenght_m=3")
+    assert_refused(refused, "setting journeys.lenght_m", "(likely: 'length_m')")
+    assert not contents(tmp_path)
+
+
+def test_a_byte_order_mark_and_windows_lines_are_read(write, world):
+    text = world.toml.read_text(encoding="utf-8").replace("\n", "\r\n")
+    text = text.replace('"cells.csv"', f"'{world.plan}'").replace('"out"', f"'{world.out}'")
+    file = write(b"\xef\xbb\xbf" + text.encode())
+    assert_done(mapfilter("build", "-c", file, "--dry-run"))
