@@ -9,7 +9,7 @@ from mapfilter.database.store import MANIFEST, info, open_database
 from mapfilter.errors import InputError, fail
 from mapfilter.radio.rasters import open_rasters
 from mapfilter.tracks.schema import TABLES
-from mapfilter.tracks.store import is_log, list_logs, read_log
+from mapfilter.tracks.store import is_log, read_log
 
 
 def run_info(path: Path) -> dict[str, Any]:
@@ -28,11 +28,11 @@ def run_info(path: Path) -> dict[str, Any]:
         return {"kind": "database", **info(open_database(path, verify="full"))}
     if is_log(path):
         return _log_info(path)
-    logs = list_logs(path)
+    logs = sorted(inner for inner in path.iterdir() if is_log(inner))
     if logs:
         return {"kind": "logs", "logs": len(logs), "first": logs[0].name, "last": logs[-1].name}
     hint = "a folder that was not written whole" if any(path.iterdir()) else "an empty folder"
-    raise fail(InputError, str(path), f"{MANIFEST} or a log", "neither", hint)
+    raise fail(InputError, str(path), f"{MANIFEST}, a log, or logs", "none", hint)
 
 
 def _raster_info(path: Path) -> dict[str, Any]:

@@ -1,7 +1,5 @@
 """Wrong maps, cell plans and land-use rasters: one message, exit code 2, nothing written."""
 
-import os
-
 import numpy as np
 import pytest
 import rasterio
@@ -140,16 +138,3 @@ def test_landuse_of_another_crs_or_cut_off(own_world, landuse):
         name.unlink()
         assert_refused(mapfilter("build", "-c", own_world.toml, *given), name.name)
     assert contents(own_world.database) == before
-
-
-def test_journeys_longer_than_the_streets_allow(own_world):
-    before = contents(own_world.folder)
-    given = settings(area__bbox="24.9420,60.1660,24.9424,60.1662", journeys__length_m=5000)
-    assert_refused(mapfilter("simulate", "-c", own_world.toml, *given))
-    assert contents(own_world.folder) == before
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
-def test_a_plan_that_may_not_be_read(own_world):
-    own_world.plan.chmod(0)
-    assert_refused(mapfilter("predict", "-c", own_world.toml), "cells.csv", "Permission denied")
