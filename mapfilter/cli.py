@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import sys
 from collections.abc import Iterator
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from mapfilter._parallel import Progress
 
 DONE, WRONG, PARTIAL = 0, 2, 3
+_NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 
 app = typer.Typer(
     add_completion=False,
@@ -194,9 +196,12 @@ def main() -> None:
     except MapfilterError as error:
         _say(str(error), "error: ")
         sys.exit(WRONG)
-    except KeyboardInterrupt:
-        _say("interrupted; nothing half-written is left")
-        sys.exit(130)
+    except OSError as error:
+        if error.errno not in _NO_SPACE:
+            raise
+        where = error.filename or "the output"
+        _say(f"{where}: expected space on the disk, found none left", "error: ")
+        sys.exit(WRONG)
 
 
 def _seeded(settings: list[str] | None, seed: int | None, *keys: str) -> list[str]:

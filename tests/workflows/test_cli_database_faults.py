@@ -1,5 +1,6 @@
 """Damaged databases and outputs that cannot be written; nothing is lost and none half-written."""
 
+import errno
 import json
 import subprocess
 import sys
@@ -199,3 +200,27 @@ def test_rasters_under_another_name(own_world, tmp_path):
     refused = mapfilter("predict", "-c", own_world.toml, *given)
     assert_refused(refused, "rxlev.png: expected a name that ends in .tif, found .png")
     assert not (tmp_path / "rxlev.png").exists()
+
+
+@pytest.mark.parametrize("command", ["predict", "build", "simulate"])
+def test_a_full_disk(command, own_world, monkeypatch):
+    def full(_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    before = contents(own_world.folder)
+    refused = mapfilter(command, "-c", own_world.toml)
+    assert_refused(refused, "the output: expected space on the disk, found none left")
+    assert contents(own_world.folder) == before
+
+
+def test_interrupting_a_build_leaves_everything_as_it_was(own_world, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("mapfilter.database.build.write_cells", interrupted)
+    before = contents(own_world.folder)
+    outcome = mapfilter("build", "-c", own_world.toml)
+    assert (outcome.code, outcome.out) == (130, "")
+    assert "Traceback" not in outcome.err
+    assert contents(own_world.folder) == before

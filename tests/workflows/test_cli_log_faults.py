@@ -225,3 +225,17 @@ def test_a_log_with_a_header_and_no_rows(log, replay):
         file = log / f"{table}.csv"
         file.write_text(file.read_text().splitlines()[0] + "\n")
     assert_done(replay(log, "--set=output.pictures=all"))
+
+
+def test_what_is_left_out_is_counted(log, replay, tmp_path):
+    change(log / "radio.csv", timing_advance=put(3))
+    (log / "gnss.csv").write_text("time_s,east_m,north_m\n5,386000,6671800\n")
+    neighbours = (pd.read_csv(log / "radio.csv")["role"] == "neighbour").sum()
+    found = assert_done(replay(log, "--without", "neighbours,ta,gnss", "--json")).json
+    assert found["unused"] == {}
+    notes = json.loads((tmp_path / "out" / "figures.json").read_text())["notes"]
+    left = ["gnss: 1 left out", "ta: 1 left out", f"neighbours: {neighbours} left out"]
+    assert notes == left
+    assert_done(replay(log))
+    every = read_estimate(tmp_path / "out" / "estimate.parquet")
+    assert {u.kind for u in every.unused} == {"neighbour", "gnss"}
