@@ -46,7 +46,7 @@ def test_cut_off_rasters_say_nothing_but_the_fault(command, world, tmp_path):
 
 
 def test_a_build_prints_nothing_but_its_json(command, own_world):
-    done = command("build", "-c", own_world.toml, "--workers", 2, "--json")
+    done = command("build", "-c", own_world.toml, "--json")
     assert (done.returncode, done.stderr) == (0, "")
     (line,) = done.stdout.splitlines()
     assert list(json.loads(line)) == ["points", "cells", "routable_points", "database", "seconds"]
