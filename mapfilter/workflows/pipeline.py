@@ -19,7 +19,7 @@ Stage = Callable[[Config], Any]
 
 
 def run_pipeline(stages: Mapping[str, Stage], file: Path, argv: Sequence[str] | None = None) -> int:
-    """Run all stages, print what each found, and return the exit code.
+    """Run all stages, print what each found, and return the exit code: 0, 2, or 3 for partly done.
 
     Parameters
     ----------
@@ -51,4 +51,4 @@ def run_pipeline(stages: Mapping[str, Stage], file: Path, argv: Sequence[str] | 
         return 2
     if given.json:
         sys.stdout.write(json.dumps(found, ensure_ascii=False, allow_nan=False) + "\n")
-    return 0
+    return 3 if any(stage.get("partial") for stage in found.values()) else 0

@@ -210,4 +210,5 @@ def replay_facts(result: ReplayResult) -> dict[str, Any]:
     elif result.summary is not None:
         shown |= asdict(result.summary)
     filter_s = sorted(log.filter_s for log in result.logs)
+    shown["partial"] = result.partial
     return {**shown, "filter_s": filter_s[len(filter_s) // 2], "out": result.out}
