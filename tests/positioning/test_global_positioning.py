@@ -13,6 +13,7 @@ from cross_world import (
     NORTH,
     WAY_EAST_WEST,
     WAY_NORTH_SOUTH,
+    make_database,
     walk_log,
     walk_tables,
 )
@@ -33,6 +34,16 @@ from mapfilter.tracks.log import make_log
 # 16 steps of 1.25 m: every match lands on a lattice point, so the walk is followed exactly.
 OPTIONS = CandidateOptions(update_length_m=20.0)
 S, C, T, L = Status.SEARCHING, Status.CONVERGED, Status.TRACKING, Status.LOST
+
+
+@pytest.fixture(scope="module")
+def cross_database(tmp_path_factory):
+    return make_database(tmp_path_factory.mktemp("cross"))
+
+
+@pytest.fixture(scope="module")
+def cross_points(cross_database):
+    return cell_points(cross_database)
 
 
 @pytest.fixture(scope="module")
