@@ -9,6 +9,10 @@ from typing import Any
 
 import numpy as np
 
+POINTED = ("sector", "3gpp")
+"""Antennas that need an azimuth."""
+ANTENNAS = (*POINTED, "omni")
+"""Antennas given by formula; any other name is that of a pattern file."""
 _LONGEST_ID = 128
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 
@@ -70,9 +74,11 @@ RANGES: dict[str, Range] = {
     "height_m": Range(0, 1000, "metres", above_low=True, hint=_height_hint),
     "azimuth_deg": Range(0, 360, "degrees clockwise from true north", hint=_azimuth_hint),
     "downtilt_deg": Range(-90, 90, "degrees"),
+    "mechanical_downtilt_deg": Range(-90, 90, "degrees"),
     "beamwidth_deg": Range(0, 360, "degrees", above_low=True),
     "vertical_beamwidth_deg": Range(0, 180, "degrees", above_low=True),
     "max_attenuation_db": Range(0, 100, "dB"),
+    "side_lobe_db": Range(0, 100, "dB"),
     "eirp_dbm": Range(-30, 80, "dBm", hint=_eirp_hint),
     "frequency_mhz": Range(100, 7000, "MHz", hint=_frequency_hint),
     "penetration_loss_db": Range(0, 100, "dB"),
@@ -108,6 +114,19 @@ def id_fault(value: Any) -> tuple[str, str] | None:
     if "/" in value or "\\" in value or ".." in value or _CONTROL.search(value):
         return expected, repr(value)
     return None
+
+
+def antenna_fault(value: Any) -> tuple[str, str] | None:
+    """Return (expected, found) when ``value`` names no antenna, else None.
+
+    A pattern's name becomes a file name, so it has to be what an id has to be.
+    """
+    if isinstance(value, str) and value in ANTENNAS:
+        return None
+    wrong = id_fault(value)
+    if wrong is None:
+        return None
+    return f"{', '.join(ANTENNAS)}, or the name of a pattern file in one folder", wrong[1]
 
 
 def looks_like_radians(azimuths: list[float]) -> bool:

@@ -14,12 +14,13 @@ from pyproj import CRS
 
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import project, projected_crs, unproject
-from mapfilter.radio._cell_rules import OPTIONAL, RANGES, id_fault
+from mapfilter.radio._cell_rules import ANTENNAS, OPTIONAL, RANGES, antenna_fault, id_fault
 
 COLUMNS = (
-    "cell", "site", "lat", "lon", "height_m", "azimuth_deg", "downtilt_deg", "antenna",
-    "beamwidth_deg", "max_attenuation_db", "vertical_beamwidth_deg", "eirp_dbm", "frequency_mhz",
-    "indoor", "penetration_loss_db", "mcc", "mnc", "lac", "ci", "arfcn", "bsic",
+    "cell", "site", "lat", "lon", "height_m", "azimuth_deg", "downtilt_deg",
+    "mechanical_downtilt_deg", "antenna", "beamwidth_deg", "max_attenuation_db",
+    "vertical_beamwidth_deg", "side_lobe_db", "eirp_dbm", "frequency_mhz", "indoor",
+    "penetration_loss_db", "mcc", "mnc", "lac", "ci", "arfcn", "bsic",
 )  # fmt: skip
 """Columns of a file that mapfilter writes, in order."""
 _ALLOWED = {*COLUMNS, "east", "north", "crs"}
@@ -133,9 +134,7 @@ class _Reader:
         values.setdefault("azimuth_deg", None)
         values["indoor"] = self._truth("indoor", given.get("indoor", ""))
         default = "omni" if not given.get("azimuth_deg") else "sector"
-        values["antenna"] = given.get("antenna", "").lower() or default
-        if values["antenna"] not in ("sector", "omni"):
-            self._fault("antenna", "sector or omni", repr(given["antenna"]))
+        values["antenna"] = self._antenna(given.get("antenna", ""), default)
         if given.get("crs"):
             try:
                 values["crs"] = projected_crs(given["crs"], f"{self._path} row {self._line}, crs")
@@ -152,6 +151,14 @@ class _Reader:
         if wrong := id_fault(text):
             self._fault(name, *wrong)
         return text
+
+    def _antenna(self, text: str, default: str) -> str:
+        name = text or default
+        if name.lower() in ANTENNAS:
+            return name.lower()
+        if wrong := antenna_fault(name):
+            self._fault("antenna", *wrong)
+        return name
 
     def _number(self, name: str, text: str) -> None:
         allowed = RANGES[name]

@@ -9,17 +9,24 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from mapfilter._io import atomic_file
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import project, projected_crs, same_crs, unproject
-from mapfilter.radio._cell_rules import OPTIONAL, RANGES, id_fault, looks_like_radians
+from mapfilter.radio._cell_rules import (
+    OPTIONAL,
+    POINTED,
+    RANGES,
+    antenna_fault,
+    id_fault,
+    looks_like_radians,
+)
 from mapfilter.radio._cell_table import COLUMNS, read_rows
 
-Antenna = Literal["sector", "omni"]
+Antenna = str
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,15 +46,21 @@ class Cell:
     eirp_dbm : float
         Radiated power at boresight, antenna gain included.
     frequency_mhz : float
-    antenna : {"sector", "omni"}
+    antenna : str
+        ``"sector"``, ``"omni"``, ``"3gpp"`` or the name of a pattern file.
     downtilt_deg : float
-        Boresight below the horizon; of effect only with a vertical beamwidth.
+        Electrical downtilt: the beam below the horizon, alike all around; of effect only where the
+        vertical pattern is known.
+    mechanical_downtilt_deg : float
+        The whole antenna leans forward by this much; of effect as above.
     beamwidth_deg : float
         Horizontal full width at half power, φ3dB.
     max_attenuation_db : float
         Largest attenuation off boresight, A_m.
     vertical_beamwidth_deg : float or None
         Vertical full width at half power; None when only the horizontal pattern is known.
+    side_lobe_db : float
+        Largest attenuation of the vertical pattern, SLA_V.
     indoor : bool
         Whether the antenna hangs inside a building.
     penetration_loss_db : float
@@ -68,9 +81,11 @@ class Cell:
     frequency_mhz: float
     antenna: Antenna = "sector"
     downtilt_deg: float = 0.0
+    mechanical_downtilt_deg: float = 0.0
     beamwidth_deg: float = 65.0
     max_attenuation_db: float = 25.0
     vertical_beamwidth_deg: float | None = None
+    side_lobe_db: float = 20.0
     indoor: bool = False
     penetration_loss_db: float = 0.0
     mcc: int | None = None
@@ -247,7 +262,7 @@ def _check_cells(
     for i, cell in enumerate(cells):
         if ranges:
             _check_fields(cell, partial(where, i), faults)
-        if cell.antenna == "sector" and cell.azimuth_deg is None:
+        if cell.antenna in POINTED and cell.azimuth_deg is None:
             faults.add(
                 where(i, "azimuth_deg"),
                 "an azimuth, as the antenna is a sector",
@@ -272,8 +287,8 @@ def _check_fields(cell: Cell, where: Callable[[str], str], faults: Faults) -> No
     for name in ("id", "site"):
         if wrong := id_fault(getattr(cell, name)):
             faults.add(where(name), *wrong)
-    if cell.antenna not in ("sector", "omni"):
-        faults.add(where("antenna"), "sector or omni", repr(cell.antenna))
+    if wrong := antenna_fault(cell.antenna):
+        faults.add(where("antenna"), *wrong)
     for name, allowed in RANGES.items():
         value = getattr(cell, name)
         if not allowed.holds(value) and not (value is None and name in OPTIONAL):
