@@ -111,7 +111,7 @@ def position_by_candidates(
         points = points_of(cell)
         if points is not None:
             # The compiled search is loaded, like the points, before the clock starts.
-            points.nearest(0.0, 0.0)
+            points.nearest(0.0, 0.0, 0.0)
     began_s = time.process_time()
     first = _first_known(merged.events, points_of)
     epochs = [_before_start(event, points_of) for event in merged.events[:first]]
