@@ -4,11 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from mapfilter.errors import ConfigError, Faults
+from mapfilter.radio.pathloss_hata import Environment
+
+ModelName = Literal[
+    "friis",
+    "log_distance",
+    "okumura_hata",
+    "cost231_hata",
+    "cost231_walfisch_ikegami",
+    "tr38901_uma",
+    "tr38901_umi",
+]
+LineOfSight = Literal["buildings", "probability"]
 
 
 @dataclass(frozen=True)
@@ -17,9 +29,17 @@ class PredictionModel:
 
     Parameters
     ----------
-    model : {"cost231_walfisch_ikegami", "cost231_hata"}
+    model : str
+        One of :data:`ModelName`.
+    line_of_sight : {"buildings", "probability"}
+        Who sees an antenna: the raster of building heights tells, or the path losses with and
+        without line of sight are averaged by their probability (TR 38.901 only).
     mobile_height_m : float
         Height of the phone above ground.
+    environment : {"large_city", "city", "suburban", "open"}
+        Of Okumura-Hata.
+    path_loss_exponent, reference_distance_m, reference_loss_db : float
+        Of log-distance; the loss at the reference distance is that of free space when it is None.
     street_width_m, building_separation_m : float
         Mean width of the streets, and mean distance between the buildings' centres.
     street_orientation_deg : float
@@ -39,8 +59,13 @@ class PredictionModel:
         With every fault.
     """
 
-    model: Literal["cost231_walfisch_ikegami", "cost231_hata"] = "cost231_walfisch_ikegami"
+    model: ModelName = "cost231_walfisch_ikegami"
+    line_of_sight: LineOfSight = "buildings"
     mobile_height_m: float = 1.5
+    environment: Environment = "city"
+    path_loss_exponent: float = 3.0
+    reference_distance_m: float = 1.0
+    reference_loss_db: float | None = None
     street_width_m: float = 20.0
     building_separation_m: float = 40.0
     street_orientation_deg: float = 90.0
@@ -53,11 +78,20 @@ class PredictionModel:
 
     def __post_init__(self) -> None:
         faults = Faults()
-        if self.model not in ("cost231_walfisch_ikegami", "cost231_hata"):
-            expected = "cost231_walfisch_ikegami or cost231_hata"
-            faults.add("prediction, model", expected, repr(self.model))
-        positive = ("mobile_height_m", "street_width_m", "building_separation_m")
-        _check(self, "prediction", [*positive, "default_roof_height_m"], 1e-3, 1e4, faults)
+        choices = {"model": ModelName, "line_of_sight": LineOfSight, "environment": Environment}
+        for name, allowed in choices.items():
+            if getattr(self, name) not in get_args(allowed):
+                expected = ", ".join(get_args(allowed))
+                faults.add(f"prediction, {name}", expected, repr(getattr(self, name)))
+        if self.line_of_sight == "probability" and not self.model.startswith("tr38901"):
+            expected = "buildings, as only tr38901_uma and tr38901_umi tell a probability"
+            faults.add("prediction, line_of_sight", expected, "probability")
+        positive = ["mobile_height_m", "street_width_m", "building_separation_m"]
+        positive += ["default_roof_height_m", "reference_distance_m"]
+        _check(self, "prediction", positive, 1e-3, 1e4, faults)
+        _check(self, "prediction", ["path_loss_exponent"], 0.1, 20, faults)
+        if self.reference_loss_db is not None:
+            _check(self, "prediction", ["reference_loss_db"], 0, 300, faults)
         _check(self, "prediction", ["street_orientation_deg"], 0, 90, faults)
         _check(self, "prediction", ["shadowing_db"], 0, 50, faults)
         _check(self, "prediction", ["shadowing_correlation_m"], 0, 1e5, faults)

@@ -1,229 +1,171 @@
-"""Empirical path loss in towns: COST 231 Hata and COST 231 Walfisch-Ikegami.
-
-Source: COST Action 231, *Digital mobile radio towards future generation systems, final report*,
-EUR 18957 (1999), chapter 4, "COST 231-Hata-Model" and "COST 231-Walfisch-Ikegami-Model". Terms
-carry the names that the report gives them.
-
-Outside the published ranges one rule holds: distances below 20 m count as 20 m, roofs less than
-1 m above the mobile count as 1 m above it, and everything else is extrapolated by the same
-equations. :func:`outside_published_range` tells in words what is extrapolated.
-"""
+"""The path loss of a chosen model, and whether it was published for the case at hand."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mapfilter.radio._models import ModelName, PredictionModel
+from mapfilter.radio.pathloss_free import SHORTEST_FREE_DISTANCE_M, friis_db, log_distance_db
+from mapfilter.radio.pathloss_hata import SHORTEST_DISTANCE_M, cost231_hata_db, okumura_hata_db
+from mapfilter.radio.pathloss_walfisch import cost231_walfisch_ikegami_db
+from mapfilter.radio.tr38901 import (
+    SHORTEST_TR38901_DISTANCE_M,
+    Scenario,
+    hidden_loss_db,
+    seen_loss_db,
+    sight_probability,
+)
+
 Floats = NDArray[np.float64]
+Range = tuple[float, float]
 
-SHORTEST_DISTANCE_M = 20.0
-"""Shorter distances count as this one."""
-LOWEST_ROOF_ABOVE_MOBILE_M = 1.0
-"""Lower roofs count as this high above the mobile."""
+_HATA = {"base_height_m": (30.0, 200.0), "mobile_height_m": (1.0, 10.0)}
+_HATA_DISTANCE = {"distance_m": (1000.0, 20000.0)}
+_TR38901 = {"frequency_mhz": (500.0, 1e5), "mobile_height_m": (1.5, 22.5)}
+_TR38901_DISTANCE = {"distance_m": (10.0, 5000.0)}
 
-_RANGES = {
-    "cost231_hata": {
-        "frequency_mhz": (1500.0, 2000.0),
-        "base_height_m": (30.0, 200.0),
-        "mobile_height_m": (1.0, 10.0),
-        "distance_m": (1000.0, 20000.0),
-    },
-    "cost231_walfisch_ikegami": {
-        "frequency_mhz": (800.0, 2000.0),
-        "base_height_m": (4.0, 50.0),
-        "mobile_height_m": (1.0, 3.0),
-        "distance_m": (20.0, 5000.0),
-    },
-}
+PUBLISHED: Mapping[ModelName, Mapping[str, Range]] = MappingProxyType(
+    {
+        "friis": {},
+        "log_distance": {},
+        "okumura_hata": {"frequency_mhz": (150.0, 1500.0), **_HATA, **_HATA_DISTANCE},
+        "cost231_hata": {"frequency_mhz": (1500.0, 2000.0), **_HATA, **_HATA_DISTANCE},
+        "cost231_walfisch_ikegami": {
+            "frequency_mhz": (800.0, 2000.0),
+            "base_height_m": (4.0, 50.0),
+            "mobile_height_m": (1.0, 3.0),
+            "distance_m": (20.0, 5000.0),
+        },
+        "tr38901_uma": {**_TR38901, "base_height_m": (25.0, 25.0), **_TR38901_DISTANCE},
+        "tr38901_umi": {**_TR38901, "base_height_m": (10.0, 10.0), **_TR38901_DISTANCE},
+    }
+)
+"""The ranges that each model was published for."""
+
+_SCENARIOS: Mapping[str, Scenario] = MappingProxyType({"tr38901_uma": "uma", "tr38901_umi": "umi"})
 
 
-def cost231_hata_db(
+def path_loss_db(
+    model: PredictionModel,
     distance_m: ArrayLike,
     frequency_mhz: float,
     base_height_m: float,
-    mobile_height_m: float,
-    metropolitan: bool,
-) -> Floats:
-    """Return the path loss of the COST 231 Hata model in dB.
-
-    ``L = 46.3 + 33.9 lg f - 13.82 lg h_b - a(h_m) + (44.9 - 6.55 lg h_b) lg d + C_m`` with
-    ``a(h_m) = (1.1 lg f - 0.7) h_m - (1.56 lg f - 0.8)``; C_m is 3 dB in metropolitan centres,
-    else 0; f in MHz, d in km. Published for 1500-2000 MHz, bases of 30-200 m above all roofs,
-    mobiles of 1-10 m, 1-20 km.
-
-    Parameters
-    ----------
-    distance_m : array_like, any shape
-        Horizontal distance.
-    frequency_mhz, base_height_m, mobile_height_m : float
-    metropolitan : bool
-        Metropolitan centre, or medium-sized city and suburbs.
-
-    Examples
-    --------
-    >>> cost231_hata_db(2000.0, 1800.0, 30.0, 1.5, False).round(2).item()
-    146.8
-    """
-    distance_km = np.maximum(np.asarray(distance_m, dtype=np.float64), SHORTEST_DISTANCE_M) / 1000
-    lg_f, lg_base = np.log10(frequency_mhz), np.log10(base_height_m)
-    mobile_db = (1.1 * lg_f - 0.7) * mobile_height_m - (1.56 * lg_f - 0.8)
-    slope_db = 44.9 - 6.55 * lg_base
-    city_db = 3.0 if metropolitan else 0.0
-    constant_db = 46.3 + 33.9 * lg_f - 13.82 * lg_base - mobile_db + city_db
-    return np.asarray(constant_db + slope_db * np.log10(distance_km))
-
-
-def cost231_walfisch_ikegami_db(
-    distance_m: ArrayLike,
-    frequency_mhz: float,
-    base_height_m: float,
-    mobile_height_m: float,
     roof_height_m: ArrayLike,
-    street_width_m: float,
-    building_separation_m: float,
-    street_orientation_deg: ArrayLike,
-    metropolitan: bool,
-    line_of_sight: ArrayLike,
+    sight: ArrayLike,
 ) -> Floats:
-    """Return the path loss of the COST 231 Walfisch-Ikegami model in dB.
-
-    In a street canyon with line of sight ``42.6 + 26 lg d + 20 lg f``; without it free space plus
-    roof-top-to-street and multi-screen diffraction where their sum is positive, else free space;
-    f in MHz, d in km. Published for 800-2000 MHz, bases of 4-50 m, mobiles of 1-3 m, 0.02-5 km.
-    Array arguments broadcast.
+    """Return the path loss in dB by the model that a prediction asks for.
 
     Parameters
     ----------
+    model : PredictionModel
     distance_m : array_like
         Horizontal distance.
-    frequency_mhz, base_height_m, mobile_height_m : float
+    frequency_mhz, base_height_m : float
     roof_height_m : array_like
-        Mean height of the roofs around the mobile.
-    street_width_m, building_separation_m : float
-        Width of the streets, w, and distance between the buildings' centres, b.
-    street_orientation_deg : array_like
-        Angle between the street and the direct path, 0..90.
-    metropolitan : bool
-        Metropolitan centre, or medium-sized city and suburbs.
-    line_of_sight : array_like of bool
-
-    Examples
-    --------
-    >>> loss_db = cost231_walfisch_ikegami_db(
-    ...     1000.0, 1800.0, 30.0, 1.5, 15.0, 20.0, 40.0, 90.0, False, [True, False])
-    >>> loss_db.round(2).tolist()
-    [107.71, 129.81]
+        Mean height of the roofs around the mobile; of use to Walfisch-Ikegami only.
+    sight : array_like
+        0 where the antenna is hidden, 1 where it is seen, between them its probability; of use to
+        Walfisch-Ikegami and TR 38.901 only. Losses in dB are averaged by it.
     """
-    distance_km = np.maximum(np.asarray(distance_m, dtype=np.float64), SHORTEST_DISTANCE_M) / 1000
-    roof = np.maximum(
-        np.asarray(roof_height_m, dtype=np.float64), mobile_height_m + LOWEST_ROOF_ABOVE_MOBILE_M
-    )
-    canyon_db = 42.6 + 26.0 * np.log10(distance_km) + 20.0 * np.log10(frequency_mhz)
-    diffraction_db = roof_to_street_db(
-        frequency_mhz, roof - mobile_height_m, street_width_m, street_orientation_deg
-    ) + multi_screen_db(
-        distance_km * 1000, frequency_mhz, base_height_m, roof, building_separation_m, metropolitan
-    )
-    blocked_db = free_space_db(distance_km * 1000, frequency_mhz) + np.maximum(diffraction_db, 0.0)
-    return np.where(np.asarray(line_of_sight, dtype=bool), canyon_db, blocked_db)
+    mobile_m, city = model.mobile_height_m, model.metropolitan
+    match model.model:
+        case "friis":
+            return friis_db(distance_m, frequency_mhz)
+        case "log_distance":
+            return log_distance_db(
+                distance_m, frequency_mhz, model.path_loss_exponent, model.reference_distance_m,
+                model.reference_loss_db,
+            )  # fmt: skip
+        case "okumura_hata":
+            return okumura_hata_db(
+                distance_m, frequency_mhz, base_height_m, mobile_m, model.environment
+            )
+        case "cost231_hata":
+            return cost231_hata_db(distance_m, frequency_mhz, base_height_m, mobile_m, city)
+        case "cost231_walfisch_ikegami":
+            return cost231_walfisch_ikegami_db(
+                distance_m, frequency_mhz, base_height_m, mobile_m, roof_height_m,
+                model.street_width_m, model.building_separation_m, model.street_orientation_deg,
+                city, np.asarray(sight) > 0.5,
+            )  # fmt: skip
+        case "tr38901_uma" | "tr38901_umi":
+            where = (distance_m, frequency_mhz, base_height_m, mobile_m)
+            seen_db = seen_loss_db(_SCENARIOS[model.model], *where)
+            hidden_db = hidden_loss_db(_SCENARIOS[model.model], *where)
+            return hidden_db + np.asarray(sight, dtype=np.float64) * (seen_db - hidden_db)
 
 
-def free_space_db(distance_m: ArrayLike, frequency_mhz: float) -> Floats:
-    """Return the free-space loss ``32.4 + 20 lg d + 20 lg f`` in dB.
-
-    Examples
-    --------
-    >>> free_space_db(1000.0, 1800.0).round(2).item()
-    97.51
-    """
-    distance_km = np.asarray(distance_m, dtype=np.float64) / 1000
-    return np.asarray(32.4 + 20.0 * np.log10(distance_km) + 20.0 * np.log10(frequency_mhz))
+def probability_of_sight(model: PredictionModel, distance_m: ArrayLike) -> Floats:
+    """Return the probability of line of sight by TR 38.901, 0 with the models that have none."""
+    scenario = _SCENARIOS.get(model.model)
+    if scenario is None:
+        return np.zeros(np.shape(distance_m))
+    return sight_probability(scenario, distance_m, model.mobile_height_m)
 
 
-def roof_to_street_db(
-    frequency_mhz: float,
-    roof_above_mobile_m: ArrayLike,
-    street_width_m: float,
-    street_orientation_deg: ArrayLike,
-) -> Floats:
-    """Return the roof-top-to-street diffraction and scatter loss L_rts in dB.
-
-    ``-16.9 - 10 lg w + 10 lg f + 20 lg (h_roof - h_m) + L_ori``, where L_ori is
-    ``-10 + 0.354 φ`` below 35°, ``2.5 + 0.075 (φ - 35)`` below 55° and ``4 - 0.114 (φ - 55)`` up to
-    90°.
-
-    Examples
-    --------
-    >>> roof_to_street_db(1800.0, 13.5, 20.0, [0.0, 35.0, 55.0]).round(2).tolist()
-    [15.25, 27.75, 29.25]
-    """
-    angle = np.asarray(street_orientation_deg, dtype=np.float64)
-    orientation_db = np.select(
-        [angle < 35.0, angle < 55.0],
-        [-10.0 + 0.354 * angle, 2.5 + 0.075 * (angle - 35.0)],
-        4.0 - 0.114 * (angle - 55.0),
-    )
-    above = np.asarray(roof_above_mobile_m, dtype=np.float64)
-    constant_db = -16.9 - 10.0 * np.log10(street_width_m) + 10.0 * np.log10(frequency_mhz)
-    return np.asarray(constant_db + 20.0 * np.log10(above) + orientation_db)
+def needs_sight(model: PredictionModel) -> bool:
+    """Tell whether a model loses less where the antenna is seen."""
+    return model.model == "cost231_walfisch_ikegami" or model.model in _SCENARIOS
 
 
-def multi_screen_db(
-    distance_m: ArrayLike,
-    frequency_mhz: float,
-    base_height_m: float,
-    roof_height_m: ArrayLike,
-    building_separation_m: float,
-    metropolitan: bool,
-) -> Floats:
-    """Return the multi-screen diffraction loss L_msd in dB.
-
-    ``L_bsh + k_a + k_d lg d + k_f lg f - 9 lg b``; L_bsh, k_a and k_d depend on whether the base
-    stands above the roofs, k_f on the kind of town.
-
-    Examples
-    --------
-    >>> multi_screen_db(1000.0, 1800.0, 30.0, 15.0, 40.0, False).round(2).item()
-    7.04
-    """
-    distance_km = np.asarray(distance_m, dtype=np.float64) / 1000
-    roof = np.asarray(roof_height_m, dtype=np.float64)
-    base_above_roof = base_height_m - roof
-    above = base_above_roof > 0
-    # log10 is evaluated on both branches, so the unused one must stay positive.
-    height_db = np.where(above, -18.0 * np.log10(1.0 + np.maximum(base_above_roof, 0.0)), 0.0)
-    near = np.minimum(distance_km, 0.5) / 0.5
-    k_a = np.where(above, 54.0, 54.0 - 0.8 * base_above_roof * near)
-    k_d = np.where(above, 18.0, 18.0 - 15.0 * base_above_roof / roof)
-    k_f = -4.0 + (1.5 if metropolitan else 0.7) * (frequency_mhz / 925.0 - 1.0)
-    frequency_db = k_f * np.log10(frequency_mhz) - 9.0 * np.log10(building_separation_m)
-    return np.asarray(height_db + k_a + k_d * np.log10(distance_km) + frequency_db)
+def shortest_distance_m(model: PredictionModel) -> float:
+    """Return the distance below which distances count as this one."""
+    match model.model:
+        case "friis":
+            return SHORTEST_FREE_DISTANCE_M
+        case "log_distance":
+            return model.reference_distance_m
+        case "tr38901_uma" | "tr38901_umi":
+            return SHORTEST_TR38901_DISTANCE_M
+    return SHORTEST_DISTANCE_M
 
 
 def outside_published_range(
-    model: str,
+    model: ModelName,
     *,
     frequency_mhz: float,
     base_height_m: float,
     mobile_height_m: float,
     longest_distance_m: float,
+    nearest_distance_m: float | None = None,
 ) -> tuple[str, ...]:
     """Tell in words which values lie outside the range a model was published for.
+
+    Parameters
+    ----------
+    model : str
+    frequency_mhz, base_height_m, mobile_height_m : float
+    longest_distance_m, nearest_distance_m : float
+        Between which distances it is used; the nearest need not be looked at.
 
     Examples
     --------
     >>> outside_published_range("cost231_walfisch_ikegami", frequency_mhz=2600.0,
     ...     base_height_m=30.0, mobile_height_m=1.5, longest_distance_m=900.0)
     ('frequency_mhz 2600 is outside 800..2000',)
+    >>> outside_published_range("tr38901_uma", frequency_mhz=2600.0,
+    ...     base_height_m=30.0, mobile_height_m=1.5, longest_distance_m=900.0)
+    ('base_height_m 30 is not 25',)
     """
+    published = PUBLISHED[model]
     values = {
         "frequency_mhz": frequency_mhz,
         "base_height_m": base_height_m,
         "mobile_height_m": mobile_height_m,
         "distance_m": longest_distance_m,
     }
-    return tuple(
-        f"{name} {values[name]:g} is outside {low:g}..{high:g}"
-        for name, (low, high) in _RANGES[model].items()
+    told = [
+        f"{name} {values[name]:g} is "
+        + (f"outside {low:g}..{high:g}" if low < high else f"not {low:g}")
+        for name, (low, high) in published.items()
         if not low <= values[name] <= high
-    )
+    ]
+    if nearest_distance_m is not None and "distance_m" in published:
+        low, high = published["distance_m"]
+        if nearest_distance_m < low <= longest_distance_m:
+            told.append(f"distance_m from {nearest_distance_m:g} on is outside {low:g}..{high:g}")
+    return tuple(told)

@@ -6,18 +6,22 @@ raster of building heights is given it decides who sees the antenna and how high
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mapfilter._parallel import Progress
+from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice
+from mapfilter.radio._cell_rules import ANTENNAS
 from mapfilter.radio._models import PredictionModel, RealityErrors
 from mapfilter.radio._surroundings import Surroundings, views_of
+from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.radio.pathloss import outside_published_range
+from mapfilter.radio.pathloss import outside_published_range, shortest_distance_m
 from mapfilter.radio.shadowing import named_rng, site_shadowing
 
 __all__ = [
@@ -30,6 +34,10 @@ __all__ = [
 ]
 
 Floats32 = NDArray[np.float32]
+Antennas = Mapping[str, MeasuredAntenna]
+
+_MOST_NAMED = 3
+_ROUND_DB = 3.0
 
 
 def predict_cell(
@@ -39,6 +47,7 @@ def predict_cell(
     model: PredictionModel,
     *,
     slope_factor: float = 1.0,
+    antennas: Antennas | None = None,
 ) -> Floats32:
     """Predict the level of one cell at every pixel's centre.
 
@@ -48,11 +57,14 @@ def predict_cell(
         With its position in the lattice's CRS.
     lattice : Lattice
     heights_m : ndarray of float32, shape (rows, cols), or None
-        Heights of buildings above ground, 0 where there is none. Without them nobody sees an
-        antenna, and every roof has the model's default height.
+        Heights of buildings above ground, 0 where there is none. Without them every roof has the
+        model's default height, and nobody sees an antenna or, with TR 38.901, as probably as its
+        table says.
     model : PredictionModel
     slope_factor : float
         Multiplies the path loss per decade of distance; the loss at 100 m stays.
+    antennas : mapping of str to MeasuredAntenna, optional
+        The antennas that cells name, see :func:`mapfilter.radio.msi.read_antennas`.
 
     Returns
     -------
@@ -62,11 +74,13 @@ def predict_cell(
     Raises
     ------
     InputError
-        The heights do not fit the lattice.
+        The heights do not fit the lattice, or the cell's antenna is not there.
     """
-    surroundings = Surroundings.of(lattice, heights_m, model)
-    ((_, clutter_db),) = _clutter(CellPlan(lattice.crs, (cell,)), lattice, model)
-    level_dbm = surroundings.median_level_dbm(cell, surroundings.seen(cell), slope_factor)
+    plan = CellPlan(lattice.crs, (cell,))
+    _check_antennas(plan, antennas)
+    surroundings = Surroundings.of(lattice, heights_m, model, antennas)
+    ((_, clutter_db),) = _clutter(plan, lattice, model)
+    level_dbm = surroundings.median_level_dbm(cell, surroundings.sight(cell), slope_factor)
     return np.asarray(level_dbm + clutter_db, dtype=np.float32)
 
 
@@ -76,6 +90,8 @@ def predict(
     heights_m: Floats32 | None,
     model: PredictionModel,
     progress: Progress | None = None,
+    *,
+    antennas: Antennas | None = None,
 ) -> Iterator[tuple[str, Floats32]]:
     """Predict every cell of a plan, as :func:`predict_cell` does, one at a time.
 
@@ -88,6 +104,8 @@ def predict(
     model : PredictionModel
     progress : callable, optional
         Called with (cells done, cells in all).
+    antennas : mapping of str to MeasuredAntenna, optional
+        The antennas that cells name.
 
     Yields
     ------
@@ -97,10 +115,11 @@ def predict(
     Raises
     ------
     InputError
-        The heights do not fit the lattice.
+        The heights do not fit the lattice, or an antenna is not there.
     """
     plan = plan.to_crs(lattice.crs)
-    surroundings = Surroundings.of(lattice, heights_m, model)
+    _check_antennas(plan, antennas)
+    surroundings = Surroundings.of(lattice, heights_m, model, antennas)
     views = views_of(plan, surroundings)
     clutter = _clutter(plan, lattice, model)
     for done, (cell, seen, (cell_id, clutter_db)) in enumerate(
@@ -119,6 +138,8 @@ def realise(
     model: PredictionModel,
     errors: RealityErrors,
     progress: Progress | None = None,
+    *,
+    antennas: Antennas | None = None,
 ) -> Iterator[tuple[str, Floats32]]:
     """Play reality: the prediction of each cell, wrong in the ways that predictions are.
 
@@ -129,7 +150,7 @@ def realise(
 
     Parameters
     ----------
-    plan, lattice, heights_m, model, progress
+    plan, lattice, heights_m, model, progress, antennas
         As for :func:`predict`, and the same as the prediction was made with.
     errors : RealityErrors
 
@@ -141,10 +162,11 @@ def realise(
     Raises
     ------
     InputError
-        The heights do not fit the lattice.
+        The heights do not fit the lattice, or an antenna is not there.
     """
     plan = plan.to_crs(lattice.crs)
-    surroundings = Surroundings.of(lattice, heights_m, model)
+    _check_antennas(plan, antennas)
+    surroundings = Surroundings.of(lattice, heights_m, model, antennas)
     views = views_of(plan, surroundings)
     clutter = _clutter(plan, lattice, model)
     wrong = site_shadowing(
@@ -162,24 +184,58 @@ def realise(
 
 
 def outside_validity(plan: CellPlan, lattice: Lattice, model: PredictionModel) -> tuple[str, ...]:
-    """Tell, cell by cell, what of a prediction lies outside the model's published range."""
-    plan = plan.to_crs(lattice.crs)
-    west, south, east, north = lattice.bounds_m
-    notes: list[str] = []
-    for cell in plan.cells:
-        farthest_m = np.hypot(
-            max(abs(cell.east_m - west), abs(cell.east_m - east)),
-            max(abs(cell.north_m - south), abs(cell.north_m - north)),
-        )
-        found = outside_published_range(
+    """Tell what of a prediction lies outside the model's published range, and for which cells."""
+    alike: dict[tuple[float, float], list[Cell]] = defaultdict(list)
+    for cell in plan.to_crs(lattice.crs).cells:
+        alike[cell.frequency_mhz, cell.height_m].append(cell)
+    ids: dict[str, list[str]] = defaultdict(list)
+    for (frequency_mhz, height_m), cells in alike.items():
+        reach = np.array([_distances_m(cell, lattice) for cell in cells])
+        notes = outside_published_range(
             model.model,
-            frequency_mhz=cell.frequency_mhz,
-            base_height_m=cell.height_m,
+            frequency_mhz=frequency_mhz,
+            base_height_m=height_m,
             mobile_height_m=model.mobile_height_m,
-            longest_distance_m=float(farthest_m),
+            longest_distance_m=round(reach[:, 1].max()),
+            nearest_distance_m=max(round(reach[:, 0].min()), shortest_distance_m(model)),
         )
-        notes.extend(f"cell {cell.id!r}: {note}" for note in found)
-    return tuple(notes)
+        for note in notes:
+            ids[note].extend(cell.id for cell in cells)
+    return tuple(f"{_named(names)}: {note}" for note, names in ids.items())
+
+
+def _distances_m(cell: Cell, lattice: Lattice) -> tuple[float, float]:
+    """Return how far the nearest and the farthest place of a lattice are from a cell."""
+    west, south, east, north = lattice.bounds_m
+    beside_m = max(west - cell.east_m, 0.0, cell.east_m - east)
+    below_m = max(south - cell.north_m, 0.0, cell.north_m - north)
+    across_m = max(abs(cell.east_m - west), abs(cell.east_m - east))
+    along_m = max(abs(cell.north_m - south), abs(cell.north_m - north))
+    return float(np.hypot(beside_m, below_m)), float(np.hypot(across_m, along_m))
+
+
+def _named(ids: list[str]) -> str:
+    if len(ids) == 1:
+        return f"cell {ids[0]!r}"
+    shown = ", ".join(repr(name) for name in ids[:_MOST_NAMED])
+    return f"{len(ids)} cells ({shown}{', …' if len(ids) > _MOST_NAMED else ''})"
+
+
+def _check_antennas(plan: CellPlan, antennas: Antennas | None) -> None:
+    """See that every antenna is there, and that those that point have an azimuth."""
+    faults = Faults()
+    for cell in plan.cells:
+        if cell.antenna in ANTENNAS:
+            continue
+        where = f"cell {cell.id!r}, antenna"
+        measured = (antennas or {}).get(cell.antenna)
+        if measured is None:
+            expected = f"{', '.join(ANTENNAS)}, or a pattern that was read"
+            faults.add(where, expected, repr(cell.antenna), "misspelt, or no folder of antennas")
+        elif cell.azimuth_deg is None and np.ptp(measured.horizontal_loss_db) > _ROUND_DB:
+            expected = "an azimuth, as the antenna is not alike all around"
+            faults.add(f"cell {cell.id!r}, azimuth_deg", expected, "nothing")
+    faults.raise_if_any(InputError)
 
 
 def _perturbed(cell: Cell, errors: RealityErrors) -> tuple[Cell, float]:

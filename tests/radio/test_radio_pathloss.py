@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapfilter.radio.pathloss import (
-    cost231_hata_db,
+from mapfilter.radio.pathloss import outside_published_range
+from mapfilter.radio.pathloss_hata import cost231_hata_db
+from mapfilter.radio.pathloss_walfisch import (
     cost231_walfisch_ikegami_db,
     free_space_db,
     multi_screen_db,
-    outside_published_range,
     roof_to_street_db,
 )
 

@@ -10,7 +10,8 @@ from pyproj import Geod
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import Lattice, project, unproject
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.radio.pathloss import cost231_hata_db, cost231_walfisch_ikegami_db
+from mapfilter.radio.pathloss_hata import cost231_hata_db
+from mapfilter.radio.pathloss_walfisch import cost231_walfisch_ikegami_db
 from mapfilter.radio.predict import (
     PredictionModel,
     RealityErrors,

@@ -1,0 +1,191 @@
+"""Path loss and line-of-sight probability of 3GPP TR 38.901, outdoors: UMa and UMi-Street Canyon.
+
+Source: 3GPP TR 38.901, *Study on channel model for frequencies from 0.5 to 100 GHz*, tables 7.4.1-1
+and 7.4.2-1. Distances are horizontal (d_2D); the slant distance (d_3D) follows from the heights. f
+is in GHz, c is 3·10⁸ m/s as in the report.
+
+Distances below 10 m count as 10 m. Heights less than 0.5 m above the effective environment count as
+0.5 m above it. All else outside the published ranges is extrapolated by the same equations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+Scenario = Literal["uma", "umi"]
+
+SHORTEST_TR38901_DISTANCE_M = 10.0
+"""Shorter distances count as this one."""
+LONE_ENVIRONMENT_UP_TO_M = 13.0
+"""Up to this mobile height the effective environment is 1 m high in UMa, too."""
+_SPEED_OF_LIGHT_MPS = 3.0e8
+_ENVIRONMENT_M = 1.0
+_LEAST_EFFECTIVE_M = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class _Terms:
+    """Constants of one scenario's rows of table 7.4.1-1."""
+
+    constant_db: float
+    near_slope_db: float
+    breakpoint_db: float
+    hidden_constant_db: float
+    hidden_slope_db: float
+    hidden_frequency_db: float
+    hidden_height_db: float
+
+
+_TERMS: dict[Scenario, _Terms] = {
+    "uma": _Terms(28.0, 22.0, 9.0, 13.54, 39.08, 20.0, 0.6),
+    "umi": _Terms(32.4, 21.0, 9.5, 22.4, 35.3, 21.3, 0.3),
+}
+
+
+def breakpoint_distance_m(
+    frequency_mhz: float,
+    base_height_m: float,
+    mobile_height_m: float,
+    environment_height_m: ArrayLike = _ENVIRONMENT_M,
+) -> Floats:
+    """Return the breakpoint distance ``d'_BP = 4 (h_BS - h_E)(h_UT - h_E) f_c / c`` in metres.
+
+    Table 7.4.1-1, note 1. The effective environment height h_E is 1 m in UMi, and in UMa for
+    mobiles up to 13 m; higher, the report draws it for each link.
+
+    Examples
+    --------
+    >>> breakpoint_distance_m(2000.0, 25.0, 1.5).item()
+    320.0
+    """
+    environment = np.asarray(environment_height_m, dtype=np.float64)
+    base = np.maximum(base_height_m - environment, _LEAST_EFFECTIVE_M)
+    mobile = np.maximum(mobile_height_m - environment, _LEAST_EFFECTIVE_M)
+    return np.asarray(4 * base * mobile * frequency_mhz * 1e6 / _SPEED_OF_LIGHT_MPS)
+
+
+def seen_loss_db(
+    scenario: Scenario,
+    distance_m: ArrayLike,
+    frequency_mhz: float,
+    base_height_m: float,
+    mobile_height_m: float,
+    environment_height_m: ArrayLike = _ENVIRONMENT_M,
+) -> Floats:
+    """Return the path loss with line of sight in dB, PL_UMa-LOS or PL_UMi-LOS.
+
+    UMa: ``28.0 + 22 lg d_3D + 20 lg f`` up to the breakpoint, then
+    ``28.0 + 40 lg d_3D + 20 lg f - 9 lg(d'_BP² + (h_BS - h_UT)²)``; UMi: 32.4, 21 and 9.5 in place
+    of 28.0, 22 and 9. Published for 0.5-100 GHz, 10 m - 5 km, mobiles of 1.5-22.5 m and bases of
+    25 m (UMa) or 10 m (UMi).
+
+    Parameters
+    ----------
+    scenario : {"uma", "umi"}
+    distance_m : array_like, any shape
+        Horizontal distance, d_2D.
+    frequency_mhz, base_height_m, mobile_height_m : float
+    environment_height_m : array_like
+        Effective environment height, h_E.
+
+    Examples
+    --------
+    >>> seen_loss_db("uma", [100.0, 1000.0], 2000.0, 25.0, 1.5).round(2).tolist()
+    [78.28, 108.91]
+    """
+    terms = _TERMS[scenario]
+    flat, slant = _distances_m(distance_m, base_height_m, mobile_height_m)
+    break_m = breakpoint_distance_m(
+        frequency_mhz, base_height_m, mobile_height_m, environment_height_m
+    )
+    lg_slant, frequency_db = np.log10(slant), 20 * np.log10(frequency_mhz / 1000)
+    near_db = terms.constant_db + terms.near_slope_db * lg_slant + frequency_db
+    bend_db = terms.breakpoint_db * np.log10(break_m**2 + (base_height_m - mobile_height_m) ** 2)
+    far_db = terms.constant_db + 40 * lg_slant + frequency_db - bend_db
+    return np.asarray(np.where(flat <= break_m, near_db, far_db))
+
+
+def hidden_loss_db(
+    scenario: Scenario,
+    distance_m: ArrayLike,
+    frequency_mhz: float,
+    base_height_m: float,
+    mobile_height_m: float,
+    environment_height_m: ArrayLike = _ENVIRONMENT_M,
+) -> Floats:
+    """Return the path loss without line of sight in dB, PL_UMa-NLOS or PL_UMi-NLOS.
+
+    The larger of the loss with line of sight and, in UMa,
+    ``13.54 + 39.08 lg d_3D + 20 lg f - 0.6 (h_UT - 1.5)``, in UMi
+    ``22.4 + 35.3 lg d_3D + 21.3 lg f - 0.3 (h_UT - 1.5)``.
+
+    Parameters
+    ----------
+    scenario, distance_m, frequency_mhz, base_height_m, mobile_height_m, environment_height_m
+        As for :func:`seen_loss_db`.
+
+    Examples
+    --------
+    >>> hidden_loss_db("uma", [100.0, 1000.0], 2000.0, 25.0, 1.5).round(2).tolist()
+    [98.18, 136.81]
+    """
+    terms = _TERMS[scenario]
+    _, slant = _distances_m(distance_m, base_height_m, mobile_height_m)
+    own_db = (
+        terms.hidden_constant_db
+        + terms.hidden_slope_db * np.log10(slant)
+        + terms.hidden_frequency_db * np.log10(frequency_mhz / 1000)
+        - terms.hidden_height_db * (mobile_height_m - 1.5)
+    )
+    seen_db = seen_loss_db(
+        scenario, distance_m, frequency_mhz, base_height_m, mobile_height_m, environment_height_m
+    )
+    return np.asarray(np.maximum(seen_db, own_db))
+
+
+def sight_probability(
+    scenario: Scenario, distance_m: ArrayLike, mobile_height_m: float = 1.5
+) -> Floats:
+    """Return the probability that an outdoor mobile sees the base (table 7.4.2-1), 0..1.
+
+    1 up to 18 m; beyond, with s = 36 m in UMi and 63 m in UMa,
+    ``18 / d + exp(-d / s) (1 - 18 / d)``, in UMa times
+    ``1 + C' 5/4 (d / 100)³ exp(-d / 150)``, where C' is 0 up to 13 m of mobile height and
+    ``((h_UT - 13) / 10)^1.5`` up to 23 m. It stands for antennas of 25 m (UMa) and 10 m (UMi).
+
+    Parameters
+    ----------
+    scenario : {"uma", "umi"}
+    distance_m : array_like, any shape
+        Horizontal distance outdoors, d_2D-out.
+    mobile_height_m : float
+        Above 23 m it counts as 23 m.
+
+    Examples
+    --------
+    >>> sight_probability("uma", [10.0, 100.0, 500.0]).round(4).tolist()
+    [1.0, 0.3477, 0.0363]
+    >>> sight_probability("umi", [10.0, 100.0, 500.0]).round(4).tolist()
+    [1.0, 0.231, 0.036]
+    """
+    distance = np.maximum(np.asarray(distance_m, dtype=np.float64), 18.0)
+    share = 18.0 / distance
+    decay = np.exp(-distance / (36.0 if scenario == "umi" else 63.0))
+    probability = share + decay * (1 - share)
+    if scenario == "uma" and mobile_height_m > LONE_ENVIRONMENT_UP_TO_M:
+        raised = ((min(mobile_height_m, 23.0) - 13.0) / 10.0) ** 1.5
+        bulge = 1.25 * (distance / 100) ** 3 * np.exp(-distance / 150)
+        probability = np.where(distance > 18.0, probability * (1 + raised * bulge), probability)
+    return np.minimum(probability, 1.0)
+
+
+def _distances_m(
+    distance_m: ArrayLike, base_height_m: float, mobile_height_m: float
+) -> tuple[Floats, Floats]:
+    flat = np.maximum(np.asarray(distance_m, dtype=np.float64), SHORTEST_TR38901_DISTANCE_M)
+    return flat, np.hypot(flat, base_height_m - mobile_height_m)
