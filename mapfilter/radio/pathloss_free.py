@@ -43,8 +43,8 @@ def log_distance_db(
     """Return the log-distance path loss in dB.
 
     ``L = L(d0) + 10 n lg(d / d0)`` (Rappaport 2002, eq. 4.68). L(d0) is that of free space unless
-    it was measured; with d0 = 1 m this is the close-in model (Sun et al. 2016, eq. 1). Distances below
-    d0 count as d0.
+    it was measured; with d0 = 1 m this is the close-in model (Sun et al. 2016, eq. 1). Distances
+    below d0 count as d0.
 
     Parameters
     ----------

@@ -27,6 +27,7 @@ from mapfilter.radio.shadowing import named_rng, site_shadowing
 __all__ = [
     "PredictionModel",
     "RealityErrors",
+    "off_frequency",
     "outside_validity",
     "predict",
     "predict_cell",
@@ -38,6 +39,7 @@ Antennas = Mapping[str, MeasuredAntenna]
 
 _MOST_NAMED = 3
 _ROUND_DB = 3.0
+_NEAR_FREQUENCY = 0.2
 
 
 def predict_cell(
@@ -201,6 +203,20 @@ def outside_validity(plan: CellPlan, lattice: Lattice, model: PredictionModel) -
         )
         for note in notes:
             ids[note].extend(cell.id for cell in cells)
+    return tuple(f"{_named(names)}: {note}" for note, names in ids.items())
+
+
+def off_frequency(plan: CellPlan, antennas: Antennas) -> tuple[str, ...]:
+    """Tell which cells send far from the frequency at which their antenna was measured."""
+    ids: dict[str, list[str]] = defaultdict(list)
+    for cell in plan.cells:
+        measured = antennas.get(cell.antenna)
+        if measured is None or measured.frequency_mhz is None:
+            continue
+        if abs(cell.frequency_mhz / measured.frequency_mhz - 1) > _NEAR_FREQUENCY:
+            ids[f"antenna {cell.antenna!r} was measured at {measured.frequency_mhz:g} MHz"].append(
+                cell.id
+            )
     return tuple(f"{_named(names)}: {note}" for note, names in ids.items())
 
 

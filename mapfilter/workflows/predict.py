@@ -12,6 +12,7 @@ from mapfilter.radio.cells import write_cell_plan
 from mapfilter.radio.predict import (
     PredictionModel,
     RealityErrors,
+    off_frequency,
     outside_validity,
     predict,
     realise,
@@ -36,7 +37,8 @@ class PredictResult:
     plan : Path
         The cell plan used, as CSV.
     notes : tuple of str
-        Where building heights come from, and what lies outside the model's published range.
+        Where building heights come from, what lies outside the model's published range, and which
+        antennas were measured at another frequency.
     """
 
     cells: int
@@ -61,15 +63,23 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     for path in (target, reality, config.output.dir / "x"):
         ensure_writable_folder(path.parent)
     plan, lattice, model = world.plan, world.lattice, _model(config.prediction)
-    notes = (world.buildings.told, *outside_validity(plan, lattice, model))
+    antennas = world.antennas
+    notes = (
+        world.buildings.told,
+        *(note for antenna in antennas.values() for note in antenna.notes),
+        *outside_validity(plan, lattice, model),
+        *off_frequency(plan, antennas),
+    )
     heights_m = world.heights_m
     wanted = 2 if config.prediction.reality.write else 1
     tags = {"SOFTWARE": f"mapfilter {__version__}", "MODEL": model.model, "MAP": world.map_name}
-    levels = predict(plan, lattice, heights_m, model, _part(progress, 0, wanted))
+    levels = predict(plan, lattice, heights_m, model, _part(progress, 0, wanted), antennas=antennas)
     write_rasters(target, lattice, levels, plan.ids, tags)
     if wanted == 2:
         errors = _errors(config.prediction)
-        real = realise(plan, lattice, heights_m, model, errors, _part(progress, 1, wanted))
+        real = realise(
+            plan, lattice, heights_m, model, errors, _part(progress, 1, wanted), antennas=antennas
+        )
         write_rasters(reality, lattice, real, plan.ids, {**tags, "PLAYS": "reality"})
     plan_path = config.output.dir / "cells.csv"
     write_cell_plan(plan, plan_path)
@@ -87,10 +97,16 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
 def _model(section: Prediction) -> PredictionModel:
     return PredictionModel(
         model=section.model,
+        line_of_sight=section.line_of_sight,
+        environment=section.environment,
+        path_loss_exponent=section.path_loss_exponent,
+        reference_distance_m=section.reference_distance_m,
+        reference_loss_db=section.reference_loss_db,
         metropolitan=section.metropolitan,
         mobile_height_m=section.mobile_height_m,
         street_width_m=section.street_width_m,
         building_separation_m=section.building_separation_m,
+        street_orientation_deg=section.street_orientation_deg,
         default_roof_height_m=section.default_roof_height_m,
         shadowing_db=section.shadowing_db,
         shadowing_correlation_m=section.shadowing_correlation_m,

@@ -71,9 +71,13 @@ class Area(Section):
 
 
 class Cells(Section):
-    """``[cells]``: a cell plan from a file, or laid out by rule over the area."""
+    """``[cells]``: a cell plan from a file, or laid out by rule over the area.
+
+    ``antennas`` is the folder of the pattern files that the plan names.
+    """
 
     plan: FilePath | None = None
+    antennas: FilePath | None = None
     sites: Annotated[int, Field(ge=1, le=10_000)] = 2
     sectors: Annotated[int, Field(ge=1, le=6)] = 3
     indoor: Annotated[int, Field(ge=0, le=10_000)] = 4
@@ -123,11 +127,25 @@ class Reality(Section):
 class Prediction(Section):
     """``[prediction]``: the propagation model and its terrain detail."""
 
-    model: Literal["cost231_walfisch_ikegami", "cost231_hata"] = "cost231_walfisch_ikegami"
+    model: Literal[
+        "friis",
+        "log_distance",
+        "okumura_hata",
+        "cost231_hata",
+        "cost231_walfisch_ikegami",
+        "tr38901_uma",
+        "tr38901_umi",
+    ] = "cost231_walfisch_ikegami"
+    line_of_sight: Literal["buildings", "probability"] = "buildings"
+    environment: Literal["large_city", "city", "suburban", "open"] = "city"
+    path_loss_exponent: Positive = 3.0
+    reference_distance_m: Positive = 1.0
+    reference_loss_db: NotNegative | None = None
     metropolitan: bool = False
     mobile_height_m: Positive = 1.5
     street_width_m: Positive = 20.0
     building_separation_m: Positive = 40.0
+    street_orientation_deg: Annotated[float, Field(ge=0, le=90)] = 90.0
     default_roof_height_m: Positive = 12.0
     shadowing_db: NotNegative = 6.0
     shadowing_correlation_m: Positive = 50.0

@@ -9,7 +9,9 @@ import numpy as np
 
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.geodesy import Lattice, check_bbox, project, projected_crs, unproject, utm_crs
+from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan, read_cell_plan
+from mapfilter.radio.msi import read_antennas
 from mapfilter.roads.buildings import rasterise_heights, read_buildings
 from mapfilter.roads.landuse import read_landuse
 from mapfilter.roads.lattice import RouteLattice
@@ -174,3 +176,11 @@ class World:
             eirp_dbm=cells.eirp_dbm,
             site_height_m=cells.height_m,
         )
+
+    @cached_property
+    def antennas(self) -> dict[str, MeasuredAntenna]:
+        """The measured antennas that the plan names, read from their folder."""
+        folder = self.config.cells.antennas
+        if folder is None:
+            return {}
+        return read_antennas(folder, (cell.antenna for cell in self.plan.cells))
