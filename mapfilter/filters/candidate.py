@@ -183,7 +183,7 @@ class CandidateFilter:
             return switched, _info(switched, Reason.USED, converged=True)
         if belief.east_m.size <= options.threshold:
             return belief, _info(belief, Reason.USED)
-        if not _moved_enough(belief, options.update_length_m):
+        if belief.travelled_m < options.update_length_m:
             return belief, _info(belief, Reason.NOT_MOVED_ENOUGH)
         shift_east_m, shift_north_m = self._shift(belief)
         matched, _ = points.nearest(
@@ -208,14 +208,16 @@ class CandidateFilter:
     def _track(
         self, belief: CandidateBelief, points: PointSet
     ) -> tuple[CandidateBelief, UpdateInfo]:
+        """Move and match the one position (Table 3, lines 4–9).
+
+        Table 3 knows no travelled distance: each step moves by its own signed length along its own
+        heading, so steps between two matches add up as vectors.
+        """
         length_m = self.options.tracking_length_m
-        if not _moved_enough(
-            belief, self.options.update_length_m if length_m is None else length_m
-        ):
+        if belief.travelled_m < (self.options.update_length_m if length_m is None else length_m):
             return belief, _info(belief, Reason.NOT_MOVED_ENOUGH)
-        shift_east_m, shift_north_m = self._shift(belief)
         matched, _ = points.nearest(
-            belief.east_m + shift_east_m, belief.north_m + shift_north_m, np.inf
+            belief.east_m + belief.shift_east_m, belief.north_m + belief.shift_north_m, np.inf
         )
         tracked = CandidateBelief(
             belief.mode,
@@ -233,17 +235,14 @@ class CandidateFilter:
         return count < self.options.threshold
 
     def _shift(self, belief: CandidateBelief) -> tuple[float, float]:
-        """Return how far the prediction moves candidates (Table 2 line 10, Table 3 line 4)."""
-        if self.options.prediction == "displacement":
+        """Return how far the prediction moves candidates (Table 2, line 10)."""
+        # Standing still there is no heading yet, and nothing to project along it.
+        if self.options.prediction == "displacement" or belief.travelled_m == 0:
             return belief.shift_east_m, belief.shift_north_m
         return (
             belief.travelled_m * cos(belief.heading_rad),
             belief.travelled_m * sin(belief.heading_rad),
         )
-
-
-def _moved_enough(belief: CandidateBelief, length_m: float) -> bool:
-    return belief.travelled_m > 0 and belief.travelled_m >= length_m
 
 
 def _switch(belief: CandidateBelief) -> CandidateBelief:

@@ -262,12 +262,39 @@ def test_negative_noisy_step_counts_as_distance_and_moves_back():
     assert (belief.travelled_m, belief.shift_east_m) == (2.0, -2.0)
 
 
-def test_standing_still_changes_nothing():
-    filter_ = build(replace(LITERAL, update_length_m=0.0))
+@pytest.mark.parametrize("prediction", ["displacement", "last_heading"])
+def test_standing_still_changes_nothing(prediction):
+    filter_ = build(replace(LITERAL, update_length_m=0.0, prediction=prediction))
     start = filter_.init("A", RNG)
     belief, info = call(filter_, start, 0.0)
     assert held(belief) == held(start)
-    assert info.reason is Reason.NOT_MOVED_ENOUGH
+    assert info.reason is Reason.USED
+    belief, _ = filter_.update(start, "A", RNG)
+    assert held(belief) == held(start)
+
+
+@pytest.mark.parametrize("prediction", ["displacement", "last_heading"])
+def test_tracking_moves_by_signed_steps_whatever_the_prediction(prediction):
+    """Table 3, line 4: a noisy step below zero goes back; noise about zero goes nowhere."""
+    filter_ = build(replace(LITERAL, prediction=prediction, tracking_length_m=6.0))
+    belief = CandidateBelief(Mode.POSITION_TRACKING, np.array([10.0]), np.array([0.0]))
+    back, _ = call(filter_, belief, -6.0)
+    assert held(back) == [(5, 0)], "10 - 6 = 4, and p3 is 1 m off"
+    still = belief
+    for step_m in (0.5, -0.5) * 6:
+        still, info = call(filter_, still, step_m)
+    assert info.reason is Reason.USED
+    assert held(still) == [(10, 0)], "the steps sum to zero, their lengths to 6 m"
+
+
+def test_literal_tracking_matches_at_every_call_also_standing():
+    filter_ = build(replace(LITERAL, threshold=2))
+    belief = filter_.init("A", RNG)
+    for _ in range(3):
+        belief, info = call(filter_, belief)
+    assert (info.status, filter_.locate(belief).east_m) == (Status.CONVERGED, 12.5)
+    belief, _ = filter_.update(belief, "A", RNG)
+    assert held(belief) == [(15, 0)], "the mean of two points is no point; of equals the last"
 
 
 def test_bad_options_are_told_together():
