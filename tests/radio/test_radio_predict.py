@@ -228,7 +228,20 @@ def test_wrong_models_are_told_together() -> None:
 
 
 def test_what_is_extrapolated_is_told_by_cell() -> None:
-    plan = CellPlan(CRS, (OMNI, replace(OMNI, id="low", height_m=3.0)))
+    low = replace(OMNI, id="low", height_m=3.0)
+    plan = CellPlan(CRS, (OMNI, low))
     assert outside_validity(plan, LATTICE, PLAIN) == (
         "cell 'low': base_height_m 3 is outside 4..50",
     )
+    many = CellPlan(CRS, tuple(replace(low, id=name) for name in "abcd"))
+    hata = replace(PLAIN, model="cost231_hata")
+    assert outside_validity(many, LATTICE, hata) == (
+        "4 cells ('a', 'b', 'c', …): base_height_m 3 is outside 30..200",
+        "4 cells ('a', 'b', 'c', …): distance_m 821 is outside 1000..20000",
+    )
+    wide = replace(LATTICE, resolution_m=100.0)
+    assert outside_validity(CellPlan(CRS, (OMNI,)), wide, hata) == (
+        "cell 'A': distance_m from 20 on is outside 1000..20000",
+    )
+    for model in ("friis", "log_distance"):
+        assert outside_validity(many, wide, replace(PLAIN, model=model)) == ()
