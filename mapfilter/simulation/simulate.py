@@ -37,7 +37,7 @@ class SimulationSettings:
         Length of an interval of dead reckoning; noise is drawn once for each.
     reports : ReportModel
     start_utc_s : float
-        When every journey starts, UTC seconds.
+        When every journey starts, UTC seconds; NaN, the default, where that does not matter.
 
     Raises
     ------
@@ -51,7 +51,7 @@ class SimulationSettings:
     imu: ImuErrors = field(default_factory=ImuErrors)
     imu_period_s: float = 1.0
     reports: ReportModel = field(default_factory=ReportModel)
-    start_utc_s: float = 0.0
+    start_utc_s: float = float("nan")
 
     def __post_init__(self) -> None:
         for name in ("journeys", "draws"):

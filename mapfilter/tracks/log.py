@@ -16,6 +16,7 @@ import pandas as pd
 
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import projected_crs
+from mapfilter.tracks.clocks import check_clocks, check_start
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.tidy import tidy_table
 
@@ -29,7 +30,7 @@ class TrackLog:
     crs : str
         Projected CRS of all positions, as :func:`mapfilter.geodesy.projected_crs` returns it.
     start_utc_s : float
-        UTC seconds (Unix time) at which ``time_s`` is zero.
+        UTC seconds (Unix time) at which ``time_s`` is zero; NaN where unknown.
     motion : pandas.DataFrame
         time_s, step_m, heading_rad, turn_rad: the interval that *ends* at time_s and begins at the
         previous row. Headings are radians counter-clockwise from grid east in [-π, π); NaN where
@@ -74,7 +75,7 @@ def make_log(
     radio: pd.DataFrame | None = None,
     gnss: pd.DataFrame | None = None,
     truth: pd.DataFrame | None = None,
-    start_utc_s: float = 0.0,
+    start_utc_s: float = float("nan"),
     notes: Sequence[str] = (),
     names: Mapping[str, str] | None = None,
 ) -> TrackLog:
@@ -88,7 +89,7 @@ def make_log(
         With the columns of :class:`TrackLog`; only ``time_s``, ``role`` (radio), ``east_m`` and
         ``north_m`` (gnss, truth) must be there. An absent table is an empty one.
     start_utc_s : float
-        UTC seconds (Unix time) at which ``time_s`` is zero.
+        UTC seconds (Unix time) at which ``time_s`` is zero; NaN, the default, where unknown.
     notes : sequence of str
         What is known already of the tables' past.
     names : mapping, optional
@@ -99,7 +100,8 @@ def make_log(
     InputError
         With every fault: NaN or infinity in times or coordinates, text for numbers, values out of
         their range, columns missing or misspelt, milliseconds for seconds, degrees for metres or
-        for radians, raw RXLEV for dBm, a CRS that is not projected.
+        for radians, raw RXLEV for dBm, a CRS that is not projected, tables that do not overlap in
+        time, a start outside the years 1 to 9999.
 
     Examples
     --------
@@ -115,10 +117,6 @@ def make_log(
         crs = projected_crs(crs, "log, crs")
     except InputError as error:
         faults.found.extend(error.faults)
-    if not np.isfinite(start_utc_s):
-        faults.add("log, start_utc_s", "UTC seconds", start_utc_s)
-    elif abs(start_utc_s) > 1e11:
-        faults.add("log, start_utc_s", "UTC seconds", start_utc_s, "milliseconds for s")
     given = {"motion": motion, "radio": radio, "gnss": gnss, "truth": truth}
     tables: dict[str, pd.DataFrame] = {}
     told = tuple(notes)
@@ -126,5 +124,8 @@ def make_log(
         where = (names or {}).get(table, table)
         tables[table], news = tidy_table(table, given[table], where, faults)
         told += news
+    check_start(start_utc_s, tables, faults)
+    if not any(fault.where.endswith("time_s") for fault in faults.found):
+        check_clocks(tables, names or {}, faults)
     faults.raise_if_any(InputError)
     return TrackLog(str(crs), float(start_utc_s), **tables, notes=told)

@@ -21,6 +21,8 @@ SERVING = "serving"
 NEIGHBOUR = "neighbour"
 
 _TURN_RAD = 2 * np.pi + 1e-9
+# 2.0**63 itself is one more than an int64 holds.
+_LARGEST_ID = float(np.nextafter(2.0**63, 0.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +105,9 @@ SCHEMA: dict[str, tuple[Column, ...]] = {
         _TIME,
         _EAST,
         _NORTH,
-        Column("way_id", kind="integer", low=-(2.0**63), high=2.0**63, expected="a way's number"),
+        Column(
+            "way_id", kind="integer", low=-_LARGEST_ID, high=_LARGEST_ID, expected="a way's number"
+        ),
     ),
 }
 """The columns of each table, in the order in which they are stored."""

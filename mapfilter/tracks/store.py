@@ -7,6 +7,7 @@ folder made by hand needs only ``{"crs": "EPSG:…"}`` in it; a table that is ab
 from __future__ import annotations
 
 import warnings
+from math import inf, isnan, nan
 from pathlib import Path
 from typing import Any, Literal
 
@@ -68,7 +69,7 @@ def write_log(log: TrackLog, folder: Path, format: Literal["parquet", "csv"] = "
             "format": FORMAT,
             "version": VERSION,
             "crs": log.crs,
-            "start_utc_s": log.start_utc_s,
+            "start_utc_s": None if isnan(log.start_utc_s) else log.start_utc_s,
             "notes": list(log.notes),
             "parts": parts,
         }
@@ -97,7 +98,7 @@ def read_log(folder: Path) -> TrackLog:
     return make_log(
         head.get("crs"),
         **tables,
-        start_utc_s=head.get("start_utc_s", 0.0),
+        start_utc_s=_start_utc_s(head),
         notes=head.get("notes", ()),
         names=names,
     )
@@ -141,13 +142,21 @@ def _check_head(head: dict[str, Any], where: str) -> None:
     for key in head:
         if key not in _KEYS:
             faults.add(f"{where}, {key}", f"one of {', '.join(_KEYS)}", "an unknown key")
-    start = head.get("start_utc_s", 0.0)
-    if isinstance(start, bool) or not isinstance(start, int | float):
-        faults.add(f"{where}, start_utc_s", "UTC seconds", repr(start))
+    start = head.get("start_utc_s")
+    if start is not None and (isinstance(start, bool) or not isinstance(start, int | float)):
+        faults.add(f"{where}, start_utc_s", "UTC seconds, or null", repr(start))
     notes = head.get("notes", [])
     if not (isinstance(notes, list) and all(isinstance(note, str) for note in notes)):
         faults.add(f"{where}, notes", "a list of texts", repr(notes))
     faults.raise_if_any(InputError)
+
+
+def _start_utc_s(head: dict[str, Any]) -> float:
+    start = head.get("start_utc_s")
+    try:
+        return nan if start is None else float(start)
+    except OverflowError:
+        return inf
 
 
 def _checked_parts(folder: Path, head: dict[str, Any]) -> dict[str, Path]:

@@ -194,6 +194,11 @@ def test_way_ids_keep_all_their_digits():
     assert make_log(CRS, truth=table).truth["way_id"].tolist()[:2] == ids[:2]
 
 
+@pytest.mark.parametrize("way_id", [2.0**63, -(2.0**63), 1e300])
+def test_way_ids_that_no_int64_holds_are_refused(way_id):
+    assert "truth row 1, way_id" in faults_of(truth=truth(way_id=[way_id, 1.0, 2.0]))
+
+
 times = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=20)
 
 

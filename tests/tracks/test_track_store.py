@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -49,7 +50,8 @@ def log():
 
 
 def assert_same(a, b):
-    assert (a.crs, a.start_utc_s, a.notes) == (b.crs, b.start_utc_s, b.notes)
+    assert (a.crs, a.notes) == (b.crs, b.notes)
+    np.testing.assert_equal(a.start_utc_s, b.start_utc_s)
     for table in TABLES:
         pd.testing.assert_frame_equal(getattr(a, table), getattr(b, table), check_exact=True)
 
@@ -91,6 +93,26 @@ def test_a_hand_made_folder_needs_only_the_crs(tmp_path):
     assert log.motion["step_m"].tolist() == [1.4, 1.5]
     assert len(log.radio) == 0
     assert log.notes == (f"{tmp_path / 'motion.csv'}: out of order in 1 places, sorted by time",)
+
+
+@pytest.mark.parametrize("form", ["parquet", "csv"])
+def test_an_unknown_start_is_null_and_reads_back(log, tmp_path, form):
+    unknown = replace(log, start_utc_s=float("nan"))
+    write_log(unknown, tmp_path / "walk", form)
+    assert json.loads((tmp_path / "walk" / "log.json").read_text())["start_utc_s"] is None
+    assert_same(read_log(tmp_path / "walk"), unknown)
+
+
+def test_a_head_without_a_start_has_an_unknown_one(tmp_path):
+    (tmp_path / "log.json").write_text('{"crs": "EPSG:32629"}')
+    assert np.isnan(read_log(tmp_path).start_utc_s)
+
+
+@pytest.mark.parametrize("start", [2**70, "1" + "0" * 400, -9e10, 3e11, "1e999", "[1]", '"now"'])
+def test_starts_that_are_no_date(tmp_path, start):
+    (tmp_path / "log.json").write_text(f'{{"crs": "EPSG:32629", "start_utc_s": {start}}}')
+    with pytest.raises(InputError, match="start_utc_s: expected UTC seconds"):
+        read_log(tmp_path)
 
 
 def test_faults_name_file_and_row(tmp_path):

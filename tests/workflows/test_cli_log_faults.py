@@ -72,6 +72,8 @@ def test_a_log_made_by_hand_is_replayed(log, replay, tmp_path):
     [
         ("motion", {"time_s": lambda t: t * 1000}, "milliseconds for s"),
         ("truth", {"time_s": lambda t: t * 1000}, "milliseconds for s"),
+        ("radio", {"time_s": lambda t: t * 1000}, "milliseconds for s"),
+        ("motion", {"time_s": lambda t: t + 1.7e9}, "tables that overlap in time"),
         ("motion", {"time_s": put("nan")}, "row 2, time_s: expected seconds, found nan"),
         ("motion", {"time_s": put("inf")}, "row 2, time_s: expected seconds, found inf"),
         ("radio", {"time_s": put("soon")}, "row 2, time_s: expected seconds, found soon"),
@@ -239,3 +241,14 @@ def test_what_is_left_out_is_counted(log, replay, tmp_path):
     assert_done(replay(log))
     every = read_estimate(tmp_path / "out" / "estimate.parquet")
     assert {u.kind for u in every.unused} == {"neighbour", "gnss"}
+
+
+def test_only_logs_that_know_their_start_give_times_in_gpx(log, replay, tmp_path):
+    assert_done(replay(log))
+    gpx = tmp_path / "out" / "estimate.gpx"
+    assert "<time>" not in gpx.read_text()
+    head = json.loads((log / "log.json").read_text())
+    (log / "log.json").write_text(json.dumps({**head, "start_utc_s": 1_700_000_000}))
+    assert_done(replay(log))
+    assert "<time>2023-11-14T22:16:18.000Z<" in gpx.read_text()
+    assert assert_done(mapfilter("info", log, "--json")).json["start_utc_s"] == 1_700_000_000

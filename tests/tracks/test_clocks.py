@@ -1,0 +1,90 @@
+"""Tables of one log that count time differently."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mapfilter.errors import InputError
+from mapfilter.tracks.log import make_log
+
+CRS = "EPSG:32629"
+
+
+def motion(time_s):
+    return pd.DataFrame({"time_s": time_s, "step_m": 1.4})
+
+
+def radio(time_s):
+    return pd.DataFrame({"time_s": time_s, "role": "serving", "cell": "A"})
+
+
+def fault_of(**tables):
+    with pytest.raises(InputError) as caught:
+        make_log(CRS, **tables)
+    assert len(caught.value.faults) == 1
+    return str(caught.value)
+
+
+TIME_S = np.arange(180.0)
+
+
+@pytest.mark.parametrize("first_s", [0.0, 100.0])
+def test_radio_in_milliseconds(first_s):
+    message = fault_of(motion=motion(TIME_S), radio=radio((TIME_S[::2] + first_s) * 1000))
+    assert "log, time_s: expected tables that overlap in time, found motion 0..179; " in message
+    assert "likely: milliseconds for s in radio" in message
+
+
+def test_motion_without_steps_in_milliseconds():
+    message = fault_of(motion=motion(TIME_S * 1000).assign(step_m=np.nan), radio=radio(TIME_S))
+    assert "likely: milliseconds for s in motion" in message
+
+
+def test_motion_in_unix_time():
+    message = fault_of(motion=motion(TIME_S + 1.7e9), radio=radio(TIME_S))
+    assert "found motion 1700000000..1700000179; radio 0..179" in message
+    assert "Unix time" in message
+
+
+def test_the_files_of_the_tables_are_named():
+    with pytest.raises(InputError, match=r"walk/radio\.csv 0\.\.179"):
+        make_log(
+            CRS,
+            motion=motion(TIME_S + 1e6),
+            radio=radio(TIME_S),
+            names={"radio": "walk/radio.csv"},
+        )
+
+
+@pytest.mark.parametrize(
+    "heard_s",
+    [
+        [5.0],
+        [0.0, 0.1, 0.18],  # a burst, 1000 times shorter
+        np.arange(0.0, 180_000.0, 60.0),  # reports of two days, a short walk in them
+        TIME_S + 400,  # radio that comes some minutes later
+        [],
+    ],
+)
+def test_tables_of_one_clock(heard_s):
+    log = make_log(CRS, motion=motion(TIME_S), radio=radio(np.array(heard_s)))
+    assert len(log.radio) == len(heard_s)
+
+
+@pytest.mark.parametrize(
+    ("start_utc_s", "first_s", "good"),
+    [
+        (-62_135_596_800.0, 0.0, True),
+        (-62_135_596_801.0, 0.0, False),
+        (-62_135_596_000.0, -801.0, False),
+        (1e11, 9e10, True),
+        (1.1e11, 0.0, False),
+    ],
+)
+def test_starts_before_the_year_1_or_in_milliseconds_are_refused(start_utc_s, first_s, good):
+    steps = motion([first_s, first_s + 1])
+    if good:
+        assert make_log(CRS, motion=steps, start_utc_s=start_utc_s).start_utc_s == start_utc_s
+        return
+    with pytest.raises(InputError, match="start_utc_s: expected UTC seconds"):
+        make_log(CRS, motion=steps, start_utc_s=start_utc_s)
