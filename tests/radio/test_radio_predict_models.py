@@ -144,7 +144,7 @@ def test_electrical_tilt_is_alike_all_around_and_mechanical_tilt_is_not() -> Non
 def test_a_measured_antenna_is_turned_to_its_azimuth_the_right_way_round() -> None:
     horizontal = np.full(360, 20.0)
     horizontal[60:120] = 0.0
-    lobe_right = _panel(horizontal_loss_db=horizontal, vertical_loss_db=np.zeros(360))
+    lobe_right = _panel(horizontal_loss_db=horizontal, vertical_loss_db=np.full(360, 20.0))
     cell = replace(NORTH, antenna="odd.msi")
     level = predict_cell(cell, LATTICE, None, PLAIN, antennas={"odd.msi": lobe_right})
     row, col = PIXEL
