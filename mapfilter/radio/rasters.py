@@ -145,6 +145,11 @@ class RxLevRasters:
                 f"{known.min():g}..{known.max():g}",
                 hint,
             )
+        if self.quantity == "level" and known.size and 2 * (known >= 0).sum() > known.size:
+            got = f"{known.min():g}..{known.max():g}, mostly 0 and above"
+            raise fail(
+                InputError, f"{self.path} pixels", "levels in dBm, mostly below 0", got, hint
+            )
 
 
 def open_rasters(path: Path | str, quantity: Quantity | None = None) -> RxLevRasters:

@@ -135,6 +135,26 @@ def test_losses_taken_for_levels_are_told(tmp_path: Path) -> None:
         open_rasters(path).read()
 
 
+@pytest.mark.parametrize("best", [63, 58])
+@pytest.mark.parametrize("missing", [None, -110.0])
+def test_raw_rxlev_taken_for_levels_is_told(
+    tmp_path: Path, missing: float | None, best: int
+) -> None:
+    rxlev = np.random.default_rng(3).integers(0, best, (2, 6, 8)).astype(float)
+    rxlev[0, 0, :2] = 0, best
+    if missing is not None:
+        rxlev[1, :3] = missing
+    path = _foreign(tmp_path / "x.tif", data=rxlev)
+    with pytest.raises(InputError, match=rf"dBm.*, found .*\.\.{best}.*likely: .*raw RXLEV"):
+        open_rasters(path).read()
+
+
+def test_a_few_levels_above_0_dbm_are_fine(tmp_path: Path) -> None:
+    data = np.full((2, 6, 8), -60.0)
+    data[:, :2] = 12.0
+    assert open_rasters(_foreign(tmp_path / "x.tif", data=data)).read().max() == 12.0
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
