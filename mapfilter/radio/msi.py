@@ -26,7 +26,8 @@ Floats = NDArray[np.float64]
 DBI_OVER_DBD = 2.15
 """Gain of a half-wave dipole over an isotropic antenna, in dB."""
 
-_LARGEST_BYTES = 4 << 20
+_LARGEST_BYTES = 1 << 20
+_LONGEST_VALUE = 200
 _SUFFIXES = (".msi", ".pln", ".txt")
 _FEWEST_POINTS, _MOST_POINTS = 36, 7200
 _LARGEST_GAP_DEG = 15.0
@@ -141,7 +142,7 @@ def _sections(path: Path) -> tuple[dict[str, str], dict[str, tuple[int, str, lis
     """Split a file into its keywords and, by name, each cut's first row, count and rows."""
     try:
         if path.stat().st_size > _LARGEST_BYTES:
-            raise fail(InputError, str(path), "an antenna of at most 4 MiB", "a larger file")
+            raise fail(InputError, str(path), "an antenna of at most 1 MiB", "a larger file")
         data = path.read_bytes()
     except OSError as error:
         raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
@@ -161,12 +162,13 @@ def _sections(path: Path) -> tuple[dict[str, str], dict[str, tuple[int, str, lis
             rows = []
             cuts[key] = (line, " ".join(words[1:]), rows)
         elif rows is not None and not key[0].isalpha():
-            rows.append((line, words))
+            if len(rows) <= _MOST_POINTS:
+                rows.append((line, words))
         elif key in _SECTIONS:
             raise fail(InputError, f"{path} row {line}", f"one {key}", "another")
         else:
             rows = None
-            header.setdefault(key, content.strip()[len(key) :].strip())
+            header.setdefault(key, " ".join(words[1:])[:_LONGEST_VALUE])
     return header, cuts
 
 
@@ -198,7 +200,9 @@ def _cut(
     elif not ((loss_db >= 0) & (loss_db <= _LARGEST_LOSS_DB)).all():
         row = rows[int(np.argmax((loss_db < 0) | (loss_db > _LARGEST_LOSS_DB)))]
         hint = "gains given for losses" if loss_db.min() < 0 else ""
-        faults.add(f"{path} row {row[0]}", f"a loss in 0..{_LARGEST_LOSS_DB:g} dB", row[1][1], hint)
+        faults.add(
+            f"{path} row {row[0]}", f"a loss in 0..{_LARGEST_LOSS_DB:g} dB", row[1][1][:40], hint
+        )
     angle_deg, loss_db = _sorted_cut(angle_deg, loss_db)
     gaps_deg = np.diff(angle_deg, append=angle_deg[0] + 360.0)
     if gaps_deg.max() > _LARGEST_GAP_DEG:
