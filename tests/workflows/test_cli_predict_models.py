@@ -1,9 +1,14 @@
 """``mapfilter predict`` with each propagation model and with antennas from files."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
 import rasterio
 from command_line import assert_done, assert_refused, mapfilter, settings
+
+from mapfilter.radio import _models
+from mapfilter.workflows.sections import Prediction
 
 BOX = "[area]\nbbox = [24.9445, 60.1672, 24.9470, 60.1684]\n"
 MODELS = {
@@ -54,6 +59,16 @@ def test_every_model_predicts_finite_levels_of_its_own(small):
         assert -140 < level.min() < level.max() < 10
         seen.append(level.mean())
     assert len(np.unique(np.round(seen, 3))) == len(MODELS)
+
+
+def test_the_configuration_knows_every_choice_of_a_prediction():
+    choices = {
+        "model": _models.ModelName,
+        "line_of_sight": _models.LineOfSight,
+        "environment": _models.Environment,
+    }
+    for key, choice in choices.items():
+        assert set(get_args(choice)) <= set(get_args(Prediction.model_fields[key].annotation))
 
 
 def test_a_probability_is_refused_where_the_model_has_none(small):
