@@ -15,7 +15,7 @@ from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs
 from mapfilter.radio._cell_rules import id_fault
 
-Quantity = Literal["level", "loss"]
+Quantity = Literal["level", "loss", "deviation"]
 
 QUANTITY_TAG = "MAPFILTER_QUANTITY"
 """Tag of a file that says which quantity its bands hold."""
@@ -79,7 +79,7 @@ def _quantity(source: Any) -> Quantity | None:
     named = {source.tags().get(QUANTITY_TAG)} - {None}
     named = named or {_UNITS.get((unit or "").strip().lower()) for unit in source.units}
     found = named.pop() if len(named) == 1 else None
-    return found if found in ("level", "loss") else None
+    return found if found in ("level", "loss", "deviation") else None
 
 
 def _lattice(path: Path, source: Any, placed: bool, faults: Faults) -> Lattice | None:

@@ -27,6 +27,7 @@ _LARGEST_READ_BYTES = 4 << 30
 _PLAUSIBLE: dict[Quantity, tuple[float, float, str]] = {
     "level": (-300.0, 60.0, "path losses, or raw RXLEV, given for levels"),
     "loss": (0.0, 400.0, "levels given for path losses"),
+    "deviation": (0.0, 100.0, "levels or path losses given for deviations"),
 }
 
 
@@ -41,8 +42,9 @@ class RxLevRasters:
         One per band, in the order of the bands.
     lattice : Lattice
         Where the pixels lie.
-    quantity : {"level", "loss"}
-        Received level (dBm), or path loss (dB) that is to be taken from a cell's EIRP.
+    quantity : {"level", "loss", "deviation"}
+        Received level (dBm), path loss (dB) that is to be taken from a cell's EIRP, or how far off
+        levels may be (dB, one standard deviation).
     """
 
     path: Path
@@ -108,8 +110,11 @@ class RxLevRasters:
         Raises
         ------
         InputError
-            As :meth:`read`, or the plan lacks a cell.
+            As :meth:`read`, or the plan lacks a cell, or the file holds deviations.
         """
+        if self.quantity == "deviation":
+            hint = "the deviations of a survey given for its levels"
+            raise fail(InputError, str(self.path), "levels or losses", "deviations", hint)
         values = self.read(window, cells)
         if self.quantity == "level":
             return values
@@ -196,7 +201,7 @@ def write_rasters(
         The band descriptions.
     tags : mapping of str to str, optional
         Free text kept in the file, such as how it was predicted.
-    quantity : {"level", "loss"}
+    quantity : {"level", "loss", "deviation"}
 
     Raises
     ------

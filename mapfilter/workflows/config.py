@@ -11,7 +11,8 @@ from typing import Any
 from pydantic import BaseModel, BeforeValidator, ValidationError
 
 from mapfilter.errors import ConfigError, Fault, Faults, fail
-from mapfilter.workflows.sections import EMBEDDED_MAP, Config, resolve_map, resolve_path
+from mapfilter.workflows.fields import EMBEDDED_MAP, resolve_map, resolve_path
+from mapfilter.workflows.sections import Config
 
 _RESOLVERS = (resolve_path, resolve_map)
 _EXPECTED = {
@@ -106,10 +107,16 @@ def _apply(values: dict[str, Any], setting: str, faults: Faults) -> None:
             return
     value = _parse_value(text.strip())
     if _is_path((*parents, last)):
-        # A folder may be called 2024, which TOML takes for a number.
-        value = value if isinstance(value, str) else text.strip()
-        value = value if value in ("", EMBEDDED_MAP) else str(Path(value).expanduser().absolute())
+        if isinstance(value, list) and text.strip().startswith("["):
+            value = [_absolute(item) if isinstance(item, str) else item for item in value]
+        else:
+            # A folder may be called 2024, which TOML takes for a number.
+            value = _absolute(value if isinstance(value, str) else text.strip())
     place[last] = value
+
+
+def _absolute(value: str) -> str:
+    return value if value in ("", EMBEDDED_MAP) else str(Path(value).expanduser().absolute())
 
 
 def _parse_value(text: str) -> Any:

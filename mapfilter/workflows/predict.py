@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mapfilter import __version__
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress
+from mapfilter.radio._models import ModelName
 from mapfilter.radio.cells import write_cell_plan
 from mapfilter.radio.predict import (
     PredictionModel,
@@ -20,6 +22,9 @@ from mapfilter.radio.predict import (
 from mapfilter.radio.rasters import write_rasters
 from mapfilter.workflows.sections import Config, Prediction
 from mapfilter.workflows.world import World
+
+if TYPE_CHECKING:
+    from mapfilter.workflows.survey import SurveyResult
 
 
 @dataclass(frozen=True)
@@ -50,19 +55,24 @@ class PredictResult:
     notes: tuple[str, ...]
 
 
-def run_predict(config: Config, progress: Progress | None = None) -> PredictResult:
-    """Predict every cell of the plan over the area.
+def run_predict(config: Config, progress: Progress | None = None) -> PredictResult | SurveyResult:
+    """Predict every cell of the plan over the area, or make the map of a survey's measurements.
 
     Raises
     ------
     MapfilterError
         The area, map or plan is wrong, or the output cannot be written.
     """
+    name = config.prediction.model
+    if name == "survey":
+        from mapfilter.workflows.survey import run_survey
+
+        return run_survey(config, progress)
     world = World.of(config)
     target, reality = config.rasters_path, config.reality_path
     for path in (target, reality, config.output.dir / "x"):
         ensure_writable_folder(path.parent)
-    plan, lattice, model = world.plan, world.lattice, _model(config.prediction)
+    plan, lattice, model = world.plan, world.lattice, _model(name, config.prediction)
     antennas = world.antennas
     notes = (
         world.buildings.told,
@@ -94,9 +104,9 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     )
 
 
-def _model(section: Prediction) -> PredictionModel:
+def _model(name: ModelName, section: Prediction) -> PredictionModel:
     return PredictionModel(
-        model=section.model,
+        model=name,
         line_of_sight=section.line_of_sight,
         environment=section.environment,
         path_loss_exponent=section.path_loss_exponent,

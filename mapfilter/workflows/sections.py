@@ -6,44 +6,25 @@ Each section is a noun. Lengths, angles and levels carry their unit in the name.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
+from pydantic import Field, model_validator
 
-EMBEDDED_MAP = "helsinki"
-
-
-def resolve_path(value: Any, info: ValidationInfo) -> Any:
-    """Make a path relative to the configuration file absolute."""
-    if isinstance(value, str | Path) and str(value):
-        folder = info.context["folder"] if info.context else ""
-        return Path(folder) / Path(value).expanduser()
-    return value
-
-
-def resolve_map(value: Any, info: ValidationInfo) -> Any:
-    """Make a map's path absolute; the embedded map has a name."""
-    found = resolve_path(value, info)
-    return str(found) if isinstance(found, Path) and value != EMBEDDED_MAP else value
-
-
-FilePath = Annotated[Path, BeforeValidator(resolve_path)]
-MapName = Annotated[str, BeforeValidator(resolve_map)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Box = Annotated[tuple[Finite, Finite, Finite, Finite], Field(strict=False)]
-Pair = Annotated[tuple[Finite, Finite], Field(strict=False)]
-Size = Annotated[tuple[Positive, Positive], Field(strict=False)]
-Share = Annotated[float, Field(ge=0, le=1)]
-Seed = Annotated[int, Field(ge=0, lt=2**63)]
-Count = Annotated[int, Field(ge=0, le=1_000_000)]
-
-
-class Section(BaseModel):
-    """A section: frozen, and strict about its keys and the types of its values."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+from mapfilter.workflows.fields import (
+    EMBEDDED_MAP,
+    Box,
+    FilePath,
+    Finite,
+    MapName,
+    NotNegative,
+    Pair,
+    Positive,
+    Section,
+    Seed,
+    Share,
+    Size,
+)
+from mapfilter.workflows.survey_section import SurveySection
 
 
 class Area(Section):
@@ -125,7 +106,7 @@ class Reality(Section):
 
 
 class Prediction(Section):
-    """``[prediction]``: the propagation model and its terrain detail."""
+    """``[prediction]``: the propagation model and its terrain detail, or a survey."""
 
     model: Literal[
         "friis",
@@ -135,6 +116,7 @@ class Prediction(Section):
         "cost231_walfisch_ikegami",
         "tr38901_uma",
         "tr38901_umi",
+        "survey",
     ] = "cost231_walfisch_ikegami"
     line_of_sight: Literal["buildings", "probability"] = "buildings"
     environment: Literal["large_city", "city", "suburban", "open"] = "city"
@@ -152,6 +134,7 @@ class Prediction(Section):
     site_share: Share = 0.5
     seed: Seed = 0
     reality: Reality = Reality()
+    survey: SurveySection = SurveySection()
 
 
 class Rasters(Section):
@@ -256,6 +239,11 @@ class Config(Section):
     def reality_path(self) -> Path:
         """Where the rasters that play reality are."""
         return self.rasters.reality or self.output.dir / "rxlev-reality.tif"
+
+    @property
+    def deviation_path(self) -> Path:
+        """Where a survey's deviations are: beside its rasters."""
+        return self.rasters_path.with_name(f"{self.rasters_path.stem}-deviation.tif")
 
     @property
     def database_path(self) -> Path:

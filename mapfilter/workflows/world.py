@@ -29,8 +29,8 @@ _SHORT_M = 100.0
 _SCALE_TOLERANCE = 0.03
 
 
-def area_lattice(area: Area) -> Lattice:
-    """Return the lattice over an area.
+def area_lattice(area: Area, *, on_map: bool = True) -> Lattice:
+    """Return the lattice over an area; without ``on_map`` the map need not cover it.
 
     Raises
     ------
@@ -70,7 +70,8 @@ def area_lattice(area: Area) -> Lattice:
             "a box or a resolution in the wrong unit",
         )
     faults.raise_if_any(ConfigError)
-    check_on_map(area.map, crs, bounds_m)
+    if on_map:
+        check_on_map(area.map, crs, bounds_m)
     check_scale(crs, bounds_m, "area.crs")
     return Lattice.covering(crs, bounds_m, area.resolution_m)
 
