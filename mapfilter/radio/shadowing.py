@@ -15,13 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from mapfilter.errors import Faults, InputError
+from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
 
 Floats32 = NDArray[np.float32]
 
 _PAD_LENGTHS = 10.0
+# About five arrays of 8 bytes per pixel are held at a time: 8 GiB.
+_LARGEST_TORUS_PX = 8 * 2**30 // 40
 
 
 def correlated_field(
@@ -49,7 +51,7 @@ def correlated_field(
     Raises
     ------
     InputError
-        A parameter is negative or not finite.
+        A parameter is negative or not finite, or the torus would take more than 8 GiB.
     """
     _check(deviation_db, correlation_m)
     if deviation_db == 0:
@@ -58,12 +60,28 @@ def correlated_field(
         white = deviation_db * rng.standard_normal((lattice.rows, lattice.cols))
         return np.asarray(white, dtype=np.float32)
     length_px = correlation_m / lattice.resolution_m
-    pad = int(np.ceil(_PAD_LENGTHS * length_px))
+    pad = _pad(lattice, length_px)
     shape = tuple(fft.next_fast_len(n + pad, real=True) for n in (lattice.rows, lattice.cols))
     amplitude = _spectral_amplitude(shape, length_px)
     field = fft.irfft2(amplitude * fft.rfft2(rng.standard_normal(shape)), s=shape)
     cut = field[: lattice.rows, : lattice.cols]
     return np.asarray(deviation_db * cut, dtype=np.float32)
+
+
+def _pad(lattice: Lattice, length_px: float) -> int:
+    """Return by how many pixels the torus is wider than a lattice."""
+    pad_px = np.ceil(_PAD_LENGTHS * length_px)
+    if (lattice.rows + pad_px) * (lattice.cols + pad_px) > _LARGEST_TORUS_PX:
+        correlation_m = length_px * lattice.resolution_m
+        side_m = np.sqrt(_LARGEST_TORUS_PX) * lattice.resolution_m
+        raise fail(
+            InputError,
+            "shadowing, correlation_m",
+            f"area and ten correlation lengths within {side_m:.0f} m, to fit into memory",
+            f"{correlation_m:g} m, {lattice.rows} x {lattice.cols} pixels",
+            "a correlation length in the wrong unit, or too fine a resolution",
+        )
+    return int(pad_px)
 
 
 def site_shadowing(

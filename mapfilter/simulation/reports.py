@@ -22,6 +22,8 @@ Levels = Callable[[Floats, Floats], NDArray[np.floating]]
 """From east and north (m), shape (N,), to levels (dBm), shape (N, cells); NaN: not heard."""
 
 _SILENT_DBM = -140.0
+_MOST_LEVELS = 100_000_000
+_MOST_AVERAGED = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +35,8 @@ class ReportModel:
     period_s : float
         Between two reports: 0.48 s in GSM, 1 s in many logs.
     averaging_s : float
-        Handover compares means, in dB, over the reports of this long; at least the last one.
+        Handover compares means, in dB, over the reports of this long; at least the last one, at
+        most 1000.
     hysteresis_db : float
         Another cell takes over when its mean is more than this above the serving cell's.
     fading_db : float
@@ -71,8 +74,11 @@ class ReportModel:
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= 0):
                 faults.add(f"reports, {name}", "a finite number >= 0", value)
-        if not -200 <= self.sensitivity_dbm <= 0:
-            faults.add("reports, sensitivity_dbm", "dBm in -200..0", self.sensitivity_dbm)
+        if not faults.found and self.averaging_s > _MOST_AVERAGED * self.period_s:
+            longest = f"at most {_MOST_AVERAGED} reports, {_MOST_AVERAGED * self.period_s:g} s"
+            faults.add("reports, averaging_s", longest, self.averaging_s, "milliseconds for s")
+        if not -150 <= self.sensitivity_dbm <= 0:
+            faults.add("reports, sensitivity_dbm", "dBm in -150..0", self.sensitivity_dbm)
         if self.radio not in ("reality", "as_predicted"):
             faults.add("reports, radio", "reality or as_predicted", repr(self.radio))
         faults.raise_if_any(ConfigError)
@@ -110,12 +116,18 @@ def reports(
     ------
     InputError
         ``levels`` does not give one column for each cell.
+    ConfigError
+        There would be more than 1e8 levels.
     """
     if truth.empty:
         raise fail(InputError, "truth", "at least one row", "none")
     time, east, north = (truth[name].to_numpy() for name in ("time_s", "east_m", "north_m"))
     # A whole number of periods must not lose the last report to rounding.
     count = int(np.floor((time[-1] - time[0]) / model.period_s + 1e-9)) + 1
+    if count * len(plan) > _MOST_LEVELS:
+        expected = f"at most {_MOST_LEVELS:.0e} levels per journey"
+        got = f"{count} reports of {len(plan)} cells"
+        raise fail(ConfigError, "reports, period_s", expected, got, "a wrong unit")
     tick_s = time[0] + np.arange(count) * model.period_s
     there = np.interp(tick_s, time, east), np.interp(tick_s, time, north)
     level = np.asarray(levels(*there), dtype=np.float64)

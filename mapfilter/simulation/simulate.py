@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
-from mapfilter.errors import ConfigError, InputError, fail
+from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.geodesy import same_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.network import StreetNetwork
@@ -19,6 +19,7 @@ from mapfilter.simulation.routes import Route, route
 from mapfilter.tracks.log import TrackLog, make_log
 
 _ROUTE, _IMU, _RADIO = range(3)
+_MOST_TICKS = 10_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +43,8 @@ class SimulationSettings:
     Raises
     ------
     ConfigError
-        There are no journeys or no draws, or the period is not > 0.
+        There are no journeys or no draws, the period is not > 0, or a journey would have more than
+        ten million ticks.
     """
 
     journeys: int = 1
@@ -59,6 +61,26 @@ class SimulationSettings:
                 raise fail(ConfigError, f"journeys, {name}", "at least 1", getattr(self, name))
         if not (np.isfinite(self.imu_period_s) and self.imu_period_s > 0):
             raise fail(ConfigError, "imu, period_s", "seconds > 0", self.imu_period_s)
+        self._check_ticks()
+
+    def _check_ticks(self) -> None:
+        journey, faults = self.journey, Faults()
+        # Drivers are sampled at every metre.
+        speed_mps = journey.speed_mps if journey.profile == "walking" else 1.0
+        for name, period_s in (
+            ("journeys, period_s", journey.period_s),
+            ("imu, period_s", self.imu_period_s),
+            ("journeys, report_period_s", self.reports.period_s),
+        ):
+            ticks = journey.length_m / speed_mps / period_s
+            if ticks > _MOST_TICKS:
+                got = (
+                    f"{ticks:.1e}: {journey.length_m:g} m at {speed_mps:g} m/s every {period_s:g} s"
+                )
+                faults.add(
+                    name, f"at most {_MOST_TICKS:.0e} times per journey", got, "a wrong unit"
+                )
+        faults.raise_if_any(ConfigError)
 
 
 def simulate_journeys(

@@ -110,3 +110,9 @@ def test_wrong_parameters_are_told_together() -> None:
         list(site_shadowing(_plan("A1"), LATTICE, -1.0, float("nan"), 50.0, -1))
     for name in ("deviation_db", "correlation_m", "site_share", "seed", "per cent"):
         assert name in str(caught.value)
+
+
+@pytest.mark.parametrize("correlation_m", [20_000.0, 1e5])
+def test_a_torus_larger_than_the_memory_is_refused(correlation_m: float) -> None:
+    with pytest.raises(InputError, match="shadowing, correlation_m: expected area and ten"):
+        correlated_field(LATTICE, 8.0, correlation_m, np.random.default_rng(0))

@@ -7,6 +7,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
+from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.network import street_network
 from mapfilter.roads.osm import read_ways
 from mapfilter.roads.routable import route_lattice
@@ -81,6 +82,40 @@ def test_edges_through_buildings_are_left_out():
     assert street_network(ways, route_lattice(ways, None, None, lattice)).length_m.sum() == (
         pytest.approx(240)
     )
+
+
+def route_points(lattice, row, col):
+    count = len(row)
+    return RouteLattice(
+        lattice,
+        np.array(row, np.int32),
+        np.array(col, np.int32),
+        np.ones(count, np.int64),
+        np.zeros(count, np.int16),
+        ("residential",),
+        np.zeros(count, np.float32),
+        np.zeros(count, bool),
+    )
+
+
+@pytest.mark.parametrize(
+    ("place_m", "stays"), [(22.4, False), (22.6, True), (32.4, True), (32.6, False)]
+)
+def test_an_edge_stays_between_the_points_around_it(place_m, stays):
+    """Points at 27.5 m are around a place from one pixel before them to one after."""
+    lattice, along = Lattice(CRS, 0.0, 50.0, 5.0, 10, 10), np.arange(10)
+    # Row 4 is at 27.5 m north, column 5 at 27.5 m east.
+    rows = route_points(lattice, np.full(10, 4), along)
+    cols = route_points(lattice, along, np.full(10, 5))
+    for allowed, line in (
+        (rows, [(10, place_m), (40, place_m)]),
+        (cols, [(place_m, 10), (place_m, 40)]),
+    ):
+        if stays:
+            assert street_network(ways_of(line), allowed).length_m.sum() == pytest.approx(30)
+        else:
+            with pytest.raises(InputError, match="streets that join"):
+                street_network(ways_of(line), allowed)
 
 
 def test_nothing_left_is_told():

@@ -141,6 +141,14 @@ def test_cells_that_share_carrier_and_bsic_are_heard_once(plan_of, level, rows):
     assert list(got) == rows
 
 
+def test_the_serving_cell_drowns_a_stronger_twin_that_hysteresis_keeps_from_serving(plan_of):
+    twins = plan_of([(0, 0), (1, 1), (2, 2), (3, 3)], [(512, 1), (600, 2), (600, 2), (700, 3)])
+    sequence = [(-80, -60, -70, -90), (-80, -62, -60, -90)]
+    radio = reports(standing(2), told(sequence), twins, EXACT, rng())
+    assert serving_of(radio) == ["C1", "C1"]
+    assert radio.loc[radio["time_s"] == 1, "bsic"].tolist() == [2, 1, 3]
+
+
 def test_levels_are_quantised_and_censored(plan_of):
     plan = plan_of([(0, 0), (1, 1), (2, 2), (3, 3)])
     model = ReportModel(fading_db=0.0, sensitivity_dbm=-130)
@@ -210,6 +218,25 @@ def test_levels_of_another_plan_are_refused(plan, plan_of, levels):
         reports(standing(2), levels, plan_of([(0, 0)]), EXACT, rng())
     with pytest.raises(InputError, match="at least one row"):
         reports(standing(0), levels, plan, EXACT, rng())
+
+
+@pytest.mark.parametrize("averaging_s", [481.0, 1e300])
+def test_means_over_too_many_reports_are_refused(averaging_s):
+    assert ReportModel(period_s=0.48, averaging_s=480.0).averaging_s == 480.0
+    with pytest.raises(ConfigError, match="averaging_s: expected at most 1000 reports, 480 s"):
+        ReportModel(period_s=0.48, averaging_s=averaging_s)
+
+
+def test_more_levels_than_fit_into_memory_are_refused(plan_of):
+    truth = pd.DataFrame({"time_s": [0.0, 60.0], "east_m": 0.0, "north_m": 0.0})
+    with pytest.raises(ConfigError, match=r"expected at most 1e[+]08 levels per journey"):
+        reports(
+            truth,
+            told([]),
+            plan_of([(0, 0), (1, 1)]),
+            ReportModel(period_s=1e-6, averaging_s=0),
+            rng(),
+        )
 
 
 def test_every_wrong_value_is_told():

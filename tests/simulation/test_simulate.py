@@ -116,3 +116,18 @@ def test_no_journeys():
         SimulationSettings(journeys=0)
     with pytest.raises(ConfigError, match="at least 1"):
         SimulationSettings(draws=0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"journey": JourneyPlan(length_m=1e12)}, "journeys, period_s"),
+        ({"journey": JourneyPlan(length_m=1e12, profile="driving")}, "journeys, period_s"),
+        ({"journey": JourneyPlan(speed_mps=1e-9)}, "journeys, period_s"),
+        ({"imu_period_s": 1e-9}, "imu, period_s"),
+        ({"reports": ReportModel(period_s=1e-9, averaging_s=0.0)}, "journeys, report_period_s"),
+    ],
+)
+def test_journeys_that_would_never_end_are_refused(changes, told):
+    with pytest.raises(ConfigError, match=f"{told}: expected at most 1e[+]07 times per journey"):
+        SimulationSettings(**changes)
