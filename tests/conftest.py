@@ -3,8 +3,20 @@
 from pathlib import Path
 
 import pytest
+from fuzz import MUTATIONS
 
 _SHARED = Path(__file__).resolve().parents[2] / "shared"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    said = "damaged copies of each sample that a reader is fed with"
+    parser.addoption("--mutations", type=int, default=MUTATIONS, help=said)
+
+
+@pytest.fixture(scope="session")
+def mutation_count(request: pytest.FixtureRequest) -> int:
+    """How many damaged copies of a sample a reader is fed with."""
+    return int(request.config.getoption("--mutations"))
 
 
 @pytest.fixture(scope="session")
