@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fuzz import fuzz
 from msi_files import cut, panel, panel_losses
 
 from mapfilter.errors import InputError
@@ -169,3 +170,17 @@ def test_missing_antennas_are_told_together_with_what_is_near(tmp_path: Path) ->
     assert "HORIZONTAL" in str(caught.value)
     with pytest.raises(InputError, match="a folder"):
         read_antennas(tmp_path / "nowhere", ["A"])
+
+
+def test_damaged_files_are_refused_or_read_in_peace(tmp_path: Path, mutation_count: int) -> None:
+    around_rad = np.linspace(-np.pi, np.pi, 7)
+
+    def read(data: bytes) -> None:
+        antenna = read_msi(write(tmp_path, data))
+        gain_db = antenna.gain_db(around_rad, around_rad / 2, 4.0)
+        assert np.isfinite(gain_db).all()
+        assert (gain_db <= 0).all()
+
+    tally = fuzz(panel(downtilt_deg=6.0).encode(), read, mutation_count)
+    assert tally.read > 0
+    assert tally.refused > 0
