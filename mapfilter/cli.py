@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mapfilter import __version__
-from mapfilter.errors import MapfilterError
+from mapfilter.errors import ConfigError, MapfilterError, fail
 
 if TYPE_CHECKING:
     from mapfilter._parallel import Progress
@@ -29,6 +29,16 @@ app = typer.Typer(
     help="Find where a phone or a vehicle is without GNSS.",
 )
 
+
+def _given_path(path: Path | None) -> Path | None:
+    """Refuse what cannot be a path, before anything is opened."""
+    from mapfilter.workflows.paths import path_fault, shown
+
+    if path is not None and (wrong := path_fault(path)):
+        raise fail(ConfigError, "command line", wrong, shown(str(path)))
+    return path
+
+
 ConfigOption = Annotated[
     Path | None, typer.Option("-c", "--config", metavar="FILE", help="Configuration (TOML).")
 ]
@@ -36,10 +46,13 @@ SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Change one setting; repeatable."),
 ]
-OutOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Output folder.")]
+OutOption = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Output folder.", callback=_given_path),
+]
 SeedOption = Annotated[int | None, typer.Option("--seed", min=0, help="Seed of what is drawn.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on one line.")]
-PathArgument = Annotated[Path, typer.Argument(metavar="PATH")]
+PathArgument = Annotated[Path, typer.Argument(metavar="PATH", callback=_given_path)]
 
 
 @app.command()
@@ -103,8 +116,10 @@ def build(
 
 @app.command()
 def export(
-    database: Annotated[Path, typer.Argument(metavar="DB")],
-    to: Annotated[Path, typer.Option("--to", metavar="FILE", help="A .gpkg file.")],
+    database: Annotated[Path, typer.Argument(metavar="DB", callback=_given_path)],
+    to: Annotated[
+        Path, typer.Option("--to", metavar="FILE", help="A .gpkg file.", callback=_given_path)
+    ],
     as_json: JsonOption = False,
 ) -> None:
     """Write a radio-route database as GeoPackage."""
@@ -195,6 +210,10 @@ def main() -> None:
         app()
     except MapfilterError as error:
         _say(str(error), "error: ")
+        sys.exit(WRONG)
+    except MemoryError:
+        hint = "too large an area, too fine a resolution, or a value in the wrong unit"
+        _say(f"memory: expected enough of it, found none left (likely: {hint})", "error: ")
         sys.exit(WRONG)
     except OSError as error:
         if error.errno not in _NO_SPACE:

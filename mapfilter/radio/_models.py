@@ -69,7 +69,7 @@ class PredictionModel:
     street_width_m: float = 20.0
     building_separation_m: float = 40.0
     street_orientation_deg: float = 90.0
-    default_roof_height_m: float = 15.0
+    default_roof_height_m: float = 12.0
     metropolitan: bool = False
     shadowing_db: float = 6.0
     shadowing_correlation_m: float = 50.0

@@ -76,7 +76,7 @@ class ReportModel:
                 faults.add(f"reports, {name}", "a finite number >= 0", value)
         if not faults.found and self.averaging_s > _MOST_AVERAGED * self.period_s:
             longest = f"at most {_MOST_AVERAGED} reports, {_MOST_AVERAGED * self.period_s:g} s"
-            faults.add("reports, averaging_s", longest, self.averaging_s, "milliseconds for s")
+            faults.add("reports, averaging_s", longest, self.averaging_s, "a wrong unit")
         if not -150 <= self.sensitivity_dbm <= 0:
             faults.add("reports, sensitivity_dbm", "dBm in -150..0", self.sensitivity_dbm)
         if self.radio not in ("reality", "as_predicted"):

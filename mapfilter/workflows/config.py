@@ -12,6 +12,7 @@ from pydantic import BaseModel, BeforeValidator, ValidationError
 
 from mapfilter.errors import ConfigError, Fault, Faults, fail
 from mapfilter.workflows.fields import EMBEDDED_MAP, resolve_map, resolve_path
+from mapfilter.workflows.paths import path_fault, shown
 from mapfilter.workflows.sections import Config
 
 _RESOLVERS = (resolve_path, resolve_map)
@@ -76,13 +77,17 @@ def load_config(
 
 
 def _read_toml(file: Path) -> dict[str, Any]:
+    if wrong := path_fault(file):
+        raise fail(ConfigError, "--config", wrong, shown(str(file)))
     try:
         text = file.read_bytes().decode("utf-8-sig")
         values = tomllib.loads(text.replace("\r\n", "\n"))
     except OSError as error:
         raise fail(ConfigError, str(file), "a TOML file", error.strerror or error) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise fail(ConfigError, str(file), "TOML", error) from error
+    except RecursionError as error:
+        raise fail(ConfigError, str(file), "TOML", "hundreds of nested values") from error
     if not text.strip():
         raise fail(ConfigError, str(file), "a TOML file", "an empty file", "cut off when saved")
     return values
@@ -116,14 +121,15 @@ def _apply(values: dict[str, Any], setting: str, faults: Faults) -> None:
 
 
 def _absolute(value: str) -> str:
-    return value if value in ("", EMBEDDED_MAP) else str(Path(value).expanduser().absolute())
+    as_it_is = value in ("", EMBEDDED_MAP) or value.startswith("~")
+    return value if as_it_is else str(Path(value).absolute())
 
 
 def _parse_value(text: str) -> Any:
     for candidate in (text, f"[{text}]" if "," in text else text):
         try:
             return tomllib.loads(f"value = {candidate}")["value"]
-        except tomllib.TOMLDecodeError:
+        except (ValueError, RecursionError):
             continue
     return text
 
@@ -155,11 +161,13 @@ def _fault(file: Path | None, changed: Sequence[list[str]], detail: Mapping[str,
         kind = "section" if len(keys) == 1 else "key"
         return Fault(where, f"a known {kind}", repr(keys[-1]), f"{close[0]!r}" if close else "")
     if detail["type"] == "value_error":
-        return Fault(where, str(detail["ctx"]["error"]), ", ".join(detail["input"]))
+        given = detail["input"]
+        got = ", ".join(given) if isinstance(given, Mapping) else shown(given)
+        return Fault(where, str(detail["ctx"]["error"]), got)
     if detail["type"] in ("too_short", "too_long"):
         wanted = detail["ctx"].get("max_length", detail["ctx"].get("min_length"))
         return Fault(where, f"{wanted} values", f"{len(detail['input'])}")
-    return Fault(where, _EXPECTED.get(detail["type"], _said(detail)), repr(detail["input"]))
+    return Fault(where, _EXPECTED.get(detail["type"], _said(detail)), shown(detail["input"]))
 
 
 def _one_path(a: Sequence[str], b: Sequence[str]) -> bool:

@@ -7,6 +7,8 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 
+from mapfilter.workflows.paths import path_fault
+
 EMBEDDED_MAP = "helsinki"
 
 
@@ -14,14 +16,20 @@ def resolve_path(value: Any, info: ValidationInfo) -> Any:
     """Make a path relative to the configuration file absolute."""
     if isinstance(value, str | Path) and str(value):
         folder = info.context["folder"] if info.context else ""
-        return Path(folder) / Path(value).expanduser()
+        try:
+            path = Path(folder) / Path(value).expanduser()
+        except RuntimeError as error:
+            raise ValueError("a path whose ~ is the folder of a user") from error
+        if fault := path_fault(path):
+            raise ValueError(fault)
+        return path
     return value
 
 
 def resolve_map(value: Any, info: ValidationInfo) -> Any:
     """Make a map's path absolute; the embedded map has a name."""
-    found = resolve_path(value, info)
-    return str(found) if isinstance(found, Path) and value != EMBEDDED_MAP else value
+    found = value if value == EMBEDDED_MAP else resolve_path(value, info)
+    return str(found) if isinstance(found, Path) else value
 
 
 FilePath = Annotated[Path, BeforeValidator(resolve_path)]

@@ -20,6 +20,7 @@ from mapfilter.radio.predict import (
     realise,
 )
 from mapfilter.radio.rasters import write_rasters
+from mapfilter.workflows.reality import reality_tags
 from mapfilter.workflows.sections import Config, Prediction
 from mapfilter.workflows.world import World
 
@@ -70,8 +71,8 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
         return run_survey(config, progress)
     world = World.of(config)
     target, reality = config.rasters_path, config.reality_path
-    for path in (target, reality, config.output.dir / "x"):
-        ensure_writable_folder(path.parent)
+    for folder in (target.parent, reality.parent, config.output.dir):
+        ensure_writable_folder(folder)
     plan, lattice, model = world.plan, world.lattice, _model(name, config.prediction)
     antennas = world.antennas
     notes = (
@@ -90,7 +91,7 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
         real = realise(
             plan, lattice, heights_m, model, errors, _part(progress, 1, wanted), antennas=antennas
         )
-        write_rasters(reality, lattice, real, plan.ids, {**tags, "PLAYS": "reality"})
+        write_rasters(reality, lattice, real, plan.ids, {**tags, **reality_tags(target)})
     plan_path = config.output.dir / "cells.csv"
     write_cell_plan(plan, plan_path)
     return PredictResult(

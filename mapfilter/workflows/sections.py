@@ -59,9 +59,9 @@ class Cells(Section):
 
     plan: FilePath | None = None
     antennas: FilePath | None = None
-    sites: Annotated[int, Field(ge=1, le=10_000)] = 2
+    sites: Annotated[int, Field(ge=1, le=1000)] = 2
     sectors: Annotated[int, Field(ge=1, le=6)] = 3
-    indoor: Annotated[int, Field(ge=0, le=10_000)] = 4
+    indoor: Annotated[int, Field(ge=0, le=1000)] = 4
     frequency_mhz: Positive = 1800.0
     eirp_dbm: Finite = 52.0
     height_m: Positive = 30.0
@@ -163,7 +163,7 @@ class Journeys(Section):
     report_period_s: Positive = 1.0
     radio: Literal["as_predicted", "reality"] = "reality"
     hysteresis_db: NotNegative = 4.0
-    averaging_s: NotNegative = 2.0
+    averaging_s: NotNegative = 1.92
     fading_db: NotNegative = 1.0
     max_neighbours: Annotated[int, Field(ge=0, le=32)] = 6
     sensitivity_dbm: Annotated[float, Field(ge=-150, le=0)] = -104.0

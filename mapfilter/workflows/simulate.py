@@ -18,6 +18,7 @@ from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel, level_sampler
 from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
 from mapfilter.tracks.store import is_log, write_log
+from mapfilter.workflows.reality import check_reality
 from mapfilter.workflows.sections import Config
 from mapfilter.workflows.world import World
 
@@ -53,6 +54,8 @@ def run_simulate(config: Config, progress: Progress | None = None) -> SimulateRe
     section = config.journeys
     as_predicted = section.radio == "as_predicted"
     rasters = open_rasters(config.rasters_path if as_predicted else config.reality_path)
+    if not as_predicted:
+        check_reality(config)
     check_against_plan(rasters, world.plan)
     if not same_crs(rasters.lattice.crs, world.lattice.crs):
         expected = f"{world.lattice.crs}, the CRS of the area"

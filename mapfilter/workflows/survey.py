@@ -76,8 +76,8 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
     if not section.files:
         raise fail(ConfigError, "prediction.survey.files", "measurement files", "none")
     target, deviation = config.rasters_path, config.deviation_path
-    for path in (target, deviation, config.output.dir / "x"):
-        ensure_writable_folder(path.parent)
+    for folder in (target.parent, deviation.parent, config.output.dir):
+        ensure_writable_folder(folder)
     rasters = open_rasters(section.calibrate) if section.calibrate is not None else None
     measurements, plan = _measurements(config, rasters)
     lattice = rasters.lattice if rasters is not None else _lattice(config, measurements)

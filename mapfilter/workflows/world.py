@@ -61,6 +61,9 @@ def area_lattice(area: Area, *, on_map: bool = True) -> Lattice:
         faults.add("area", f"a box that {crs} can show", bounds_m, "a CRS of another region")
         faults.raise_if_any(InputError)
     width_m, height_m = bounds_m[2] - bounds_m[0], bounds_m[3] - bounds_m[1]
+    if max(width_m, height_m) < area.resolution_m:
+        expected = f"metres, at most the area's {max(width_m, height_m):.0f}"
+        faults.add("area.resolution_m", expected, area.resolution_m, "a resolution in another unit")
     pixels = width_m * height_m / area.resolution_m**2
     if pixels > LARGEST_AREA_PX:
         faults.add(

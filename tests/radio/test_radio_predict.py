@@ -47,7 +47,7 @@ def _town() -> NDArray[np.float32]:
 def test_without_buildings_it_is_eirp_less_the_model() -> None:
     level = predict_cell(OMNI, LATTICE, None, PLAIN)
     loss = cost231_walfisch_ikegami_db(
-        _distance_m(OMNI), 1800, 30, 1.5, 15, 20, 40, 90, False, False
+        _distance_m(OMNI), 1800, 30, 1.5, 12, 20, 40, 90, False, False
     )
     np.testing.assert_allclose(level, 50.0 - loss, atol=1e-4)
     hata = predict_cell(OMNI, LATTICE, None, replace(PLAIN, model="cost231_hata"))
@@ -60,7 +60,7 @@ def test_buildings_decide_who_sees_the_antenna() -> None:
     row, seen, hidden = 60, 69, 85
     distance = _distance_m(OMNI)
     canyon = cost231_walfisch_ikegami_db(
-        distance[row, seen], 1800, 30, 1.5, 15, 20, 40, 90, False, True
+        distance[row, seen], 1800, 30, 1.5, 12, 20, 40, 90, False, True
     )
     assert level[row, seen] == pytest.approx(50.0 - canyon, abs=1e-4)
     # Behind the 40 m block only its own roofs are near.

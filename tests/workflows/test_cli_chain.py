@@ -8,7 +8,7 @@ from pathlib import Path
 
 import geopandas
 import pytest
-from command_line import assert_done, contents, mapfilter, settings
+from command_line import assert_done, assert_refused, contents, mapfilter, settings
 
 from mapfilter.positioning.estimate_store import read_estimate
 from mapfilter.radio.rasters import open_rasters
@@ -120,6 +120,26 @@ def test_simulate_gives_the_same_bytes_for_a_seed(world, tmp_path):
     log = read_log(tmp_path / "a" / "journeys" / JOURNEYS[0])
     assert log.truth_length_m > 0.97 * 250
     assert set(log.radio["cell"].dropna()) <= {"A", "B", "C"}
+
+
+def test_reality_of_another_prediction_is_refused(own_world):
+    given = ["-c", own_world.toml, "--set=journeys.radio=reality"]
+    assert_done(mapfilter("simulate", *given))
+    # The same prediction again, without reality: the older one still belongs to it.
+    again = [*given, "--set=prediction.reality.write=false"]
+    assert_done(mapfilter("predict", *again))
+    assert_done(mapfilter("simulate", *given))
+    assert_done(mapfilter("predict", *again, "--seed", 5))
+    before = contents(own_world.folder)
+    assert_refused(
+        mapfilter("simulate", *given),
+        "rxlev-reality.tif: expected reality that was played to rxlev.tif",
+        "prediction.reality.write = true",
+    )
+    assert contents(own_world.folder) == before
+    assert_done(mapfilter("simulate", *given, "--set=journeys.radio=as_predicted"))
+    named = f"--set=rasters.reality={own_world.out / 'rxlev-reality.tif'}"
+    assert_done(mapfilter("simulate", *given, named))
 
 
 def test_replay_locates_and_gives_the_same_bytes(world, tmp_path):

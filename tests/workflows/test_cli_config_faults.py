@@ -199,3 +199,101 @@ def test_a_byte_order_mark_and_windows_lines_are_read(write, world):
     text = text.replace('"cells.csv"', f"'{world.plan}'").replace('"out"', f"'{world.out}'")
     file = write(b"\xef\xbb\xbf" + text.encode())
     assert_done(mapfilter("build", "-c", file, "--dry-run"))
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("[cells]\nseed = " + "9" * 5000, "given.toml: expected TOML, found Exceeds the limit"),
+        ("[area]\nbbox = " + "[" * 3000 + "]" * 3000, "given.toml: expected TOML, found"),
+        ("[cells]\nseed = " + "9" * 4000, "given.toml, cells.seed: expected less than"),
+        ("[cells]\nheight_m = " + "9" * 4000, "given.toml, cells.height_m: expected"),
+        ("[output]\ndir = 'a\\u0000b'".replace("'", '"'), "output.dir: expected a path without a"),
+        ("[output]\ndir = '~nouser/out'", "expected a path whose ~ is the folder of a user"),
+        (f"[cells]\nplan = '{'a' * 300}'", "cells.plan: expected a path that the system takes"),
+        (f"[area]\nmap = '{'a/' * 3000}'", "area.map: expected a path that the system takes"),
+        ("[area]\nresolution_m = 1e9", "area.resolution_m: expected metres, at most the area's"),
+        ("[journeys]\naveraging_s = 1e300", "averaging_s: expected at most 1000 reports"),
+        ("[journeys]\nlength_m = 1e12", "journeys, period_s: expected at most 1e+07 times"),
+        ("[journeys]\nspeed_mps = 1e-9", "journeys, period_s: expected at most 1e+07 times"),
+        (
+            "[journeys]\nreport_period_s = 1e-9\naveraging_s = 0",
+            "report_period_s: expected at most 1e+07 times",
+        ),
+        ("[imu]\nperiod_s = 1e-9", "imu, period_s: expected at most 1e+07 times"),
+        ("[cells]\nsites = 10000", "cells.sites: expected less than or equal to 1000"),
+    ],
+)
+def test_hostile_values(text, told, write, own_world):
+    given = ["-c", write(text), "--set=journeys.radio=as_predicted", f"--set={BOX}"]
+    if "[output]" not in text:
+        given += ["--out", own_world.out]
+    if "[cells]" not in text:
+        given += [f"--set=cells.plan={own_world.plan}"]
+    assert_refused(mapfilter("simulate", *given), told)
+
+
+def test_a_correlation_that_no_memory_holds(own_world):
+    before = contents(own_world.folder)
+    given = ["-c", own_world.toml, "--set=prediction.shadowing_correlation_m=20000"]
+    assert_refused(mapfilter("predict", *given), "shadowing, correlation_m: expected area and ten")
+    assert contents(own_world.folder) == before
+
+
+@pytest.mark.parametrize("setting", ["cells.seed=" + "9" * 5000, "cells.seed=" + "[" * 3000])
+def test_hostile_settings(setting):
+    assert_refused(mapfilter("predict", "--set", setting), "cells.seed: expected a whole number")
+
+
+def test_a_user_without_a_folder_in_a_setting():
+    refused = mapfilter("predict", "--set=output.dir=~nouser/x")
+    assert_refused(refused, "output.dir: expected a path whose ~ is the folder of a user")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="pipes are no files on Windows")
+def test_pipes_are_refused_not_waited_for(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    told = "expected a file or a folder, not a pipe, socket or device"
+    for args in (
+        ["predict", "-c", pipe],
+        ["info", pipe],
+        ["export", pipe, "--to", tmp_path / "x.gpkg"],
+        ["predict", f"--set=cells.plan={pipe}"],
+        ["replay", "--log", pipe],
+        ["demo", "--out", pipe],
+    ):
+        assert_refused(mapfilter(*args), told)
+
+
+@pytest.mark.parametrize(
+    ("path", "told"),
+    [
+        ("a" * 5000, "expected a path that the system takes"),
+        (os.fsdecode(b"out-\xff"), "expected a path in UTF-8, found "),
+    ],
+)
+@pytest.mark.parametrize(
+    "args",
+    [
+        ["info"],
+        ["demo", "--out"],
+        ["predict", "--out"],
+        ["replay", "--out"],
+        ["replay", "--db"],
+        ["export", "x", "--to"],
+        ["predict", "-c"],
+    ],
+)
+def test_paths_that_are_none(args, path, told, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert_refused(mapfilter(*args, path), told)
+    assert not any(tmp_path.iterdir())
+
+
+def test_out_of_memory_is_one_message(monkeypatch):
+    def full(*_args, **_more):
+        raise MemoryError
+
+    monkeypatch.setattr("mapfilter.workflows.info.run_info", full)
+    assert_refused(mapfilter("info", "x"), "memory: expected enough of it, found none left")
