@@ -173,7 +173,7 @@ def replay(
     seed: SeedOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Locate one log, or every log of a folder; exit code 3 if some cells were unknown."""
+    """Locate one log, or every log of a folder; exit code 3 if that was done in part only."""
     from mapfilter.workflows.config import load_config
     from mapfilter.workflows.replay import replay_facts, run_replay
 
@@ -190,8 +190,9 @@ def replay(
     with _progress("replay") as progress:
         result = run_replay(loaded, folder, progress=progress)
     _print(replay_facts(result), as_json)
+    for warning in result.warnings:
+        _say(warning)
     if result.partial:
-        _say("some cells are unknown to the database; their readings are labelled unknown_cell")
         raise typer.Exit(PARTIAL)
 
 

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from mapfilter._io import ensure_writable_folder, write_json
 from mapfilter._parallel import Progress
 from mapfilter.database.store import open_database
-from mapfilter.errors import Faults, InputError, MapfilterError
 from mapfilter.evaluation.accuracy import Accuracy, accuracy
 from mapfilter.evaluation.success import SuccessSummary, summarise
 from mapfilter.filters.candidate_options import CandidateOptions
 from mapfilter.filters.contract import Reason
-from mapfilter.geodesy import same_crs
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.global_positioning import (
@@ -25,13 +21,18 @@ from mapfilter.positioning.global_positioning import (
     cell_points,
     position_by_candidates,
 )
+from mapfilter.radio.shadowing import named_rng
 from mapfilter.tracks.leave_out import leave_out
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.store import list_logs, read_log
 from mapfilter.workflows.facts import facts
+from mapfilter.workflows.log_checks import check_logs, lacking
 from mapfilter.workflows.pictures import draw_track
+from mapfilter.workflows.results import ESTIMATES, FIGURES, SUMMARY, clear_results
 from mapfilter.workflows.sections import Config, FilterSection
 from mapfilter.workflows.truth import truth_of
+
+_NAMED = 3
 
 
 @dataclass(frozen=True)
@@ -71,8 +72,8 @@ class ReplayResult:
         In the order of their names.
     summary : SuccessSummary or None
         Over the logs with truth.
-    partial : bool
-        Whether some cells were unknown to the database.
+    warnings : tuple of str
+        What was done in part only: cells unknown to the database, logs that lack what it takes.
     out : Path
         Folder of the results.
     """
@@ -80,8 +81,13 @@ class ReplayResult:
     filter: str
     logs: tuple[ReplayedLog, ...]
     summary: SuccessSummary | None
-    partial: bool
+    warnings: tuple[str, ...]
     out: Path
+
+    @property
+    def partial(self) -> bool:
+        """Whether something was done in part only."""
+        return bool(self.warnings)
 
 
 def run_replay(
@@ -108,15 +114,17 @@ def run_replay(
     """
     database = open_database(config.database_path, verify="full")
     folders = list_logs(config.track_path)
-    _check_logs(folders, database.lattice.crs)
+    check_logs(folders, database.lattice)
     ensure_writable_folder(out)
+    clear_results(out)
     points_of = cell_points(database, config.filter.margin_db)
     options = candidate_options(config.filter, database.lattice.resolution_m)
     logs: list[ReplayedLog] = []
     scores: list[Accuracy] = []
+    lacks: dict[str, str] = {}
     for index, folder in enumerate(folders):
         log = leave_out(read_log(folder), config.track.without)
-        rng = np.random.default_rng([config.journeys.seed, index])
+        rng = named_rng(config.journeys.seed, "replay", folder.name)
         track = position_by_candidates(database, points_of, log, options, rng)
         into = out if len(folders) == 1 else out / folder.name
         drawn = config.output.pictures == "all" or (config.output.pictures == "first" and not index)
@@ -124,6 +132,8 @@ def run_replay(
         if drawn:
             pictures = draw_track(database, log, track, into)
         logs.append(_write(folder.name, log, track, into, pictures))
+        if lack := lacking(log):
+            lacks[folder.name] = lack
         score = logs[-1].accuracy
         if score is not None:
             scores.append(score)
@@ -131,24 +141,20 @@ def run_replay(
             progress(index + 1, len(folders))
     summary = summarise(scores) if scores else None
     if summary is not None and len(folders) > 1:
-        write_json(out / "summary.json", facts(summary))
-    unknown = any(str(Reason.UNKNOWN_CELL) in log.unused for log in logs)
-    return ReplayResult("candidate", tuple(logs), summary, unknown, out)
+        write_json(out / SUMMARY, facts(summary))
+    return ReplayResult("candidate", tuple(logs), summary, _warnings(logs, lacks), out)
 
 
-def _check_logs(folders: Sequence[Path], crs: str) -> None:
-    """Read every log once before any is located, so that all faults are told and none half-way."""
-    faults = Faults()
-    for folder in folders:
-        try:
-            log = read_log(folder)
-        except MapfilterError as error:
-            faults.found.extend(error.faults)
-            continue
-        if not same_crs(log.crs, crs):
-            expected = f"{crs}, the database's"
-            faults.add(f"{folder}, crs", expected, log.crs, "log of another area or zone")
-    faults.raise_if_any(InputError)
+def _warnings(logs: Sequence[ReplayedLog], lacks: Mapping[str, str]) -> tuple[str, ...]:
+    told = []
+    if any(str(Reason.UNKNOWN_CELL) in log.unused for log in logs):
+        label = Reason.UNKNOWN_CELL
+        told.append(f"some cells are unknown to the database; their readings are labelled {label}")
+    for lack in sorted(set(lacks.values())):
+        names = [name for name, its in lacks.items() if its == lack]
+        more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+        told.append(f"nothing is located in {', '.join(names[:_NAMED])}{more}: {lack}")
+    return tuple(told)
 
 
 def candidate_options(section: FilterSection, resolution_m: float) -> CandidateOptions:
@@ -169,7 +175,7 @@ def candidate_options(section: FilterSection, resolution_m: float) -> CandidateO
 def _write(
     name: str, log: TrackLog, track: PositionedTrack, out: Path, pictures: tuple[Path, ...]
 ) -> ReplayedLog:
-    files = tuple(out / f"estimate.{kind}" for kind in ("parquet", "gpx", "geojson"))
+    files = tuple(out / file for file in ESTIMATES)
     write_estimate(track.estimate, files[0])
     write_gpx(track.estimate, files[1], name)
     write_geojson(track.estimate, files[2])
@@ -184,10 +190,8 @@ def _write(
         "notes": list(log.notes),
         **(facts(score) if score is not None else {}),
     }
-    write_json(out / "figures.json", figures)
-    return ReplayedLog(
-        name, score, unused, track.filter_s, (*files, out / "figures.json", *pictures)
-    )
+    write_json(out / FIGURES, figures)
+    return ReplayedLog(name, score, unused, track.filter_s, (*files, out / FIGURES, *pictures))
 
 
 def _count_reasons(estimate: TrackEstimate) -> dict[str, int]:

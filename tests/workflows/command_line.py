@@ -10,7 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from unittest.mock import patch
 
+import pandas as pd
+
 from mapfilter.cli import main
+
+ONE = "journey-0000-draw-000"
+"""The first simulated log of the small world."""
 
 
 @dataclass(frozen=True)
@@ -77,3 +82,22 @@ def contents(*places: Path) -> dict[str, str]:
 def settings(**values: object) -> list[str]:
     """``--set`` for each, with ``__`` for the dot."""
     return [f"--set={key.replace('__', '.')}={value}" for key, value in values.items()]
+
+
+def change(file, **columns):
+    """Give columns of a CSV table new values, each a function of the old ones."""
+    table = pd.read_csv(file)
+    for name, function in columns.items():
+        table[name] = function(table[name])
+    table.to_csv(file, index=False)
+
+
+def put(value, row=2):
+    """Return a function that puts a value into a row of a column, counted from 1."""
+
+    def changed(column):
+        column = column.astype(object)
+        column.iloc[row - 1] = value
+        return column
+
+    return changed

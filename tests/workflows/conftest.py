@@ -1,11 +1,14 @@
 """One small world for all commands: 400 m of central Helsinki with three cells."""
 
+import json
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from command_line import assert_done, mapfilter
+from command_line import ONE, assert_done, mapfilter, settings
+
+from mapfilter.tracks.store import read_log, write_log
 
 PLAN = """cell,site,lat,lon,height_m,azimuth_deg,eirp_dbm,frequency_mhz,arfcn,bsic
 A,S1,60.16690,24.94300,30,60,50,1825.2,612,17
@@ -82,3 +85,23 @@ def own_world(world: World, tmp_path: Path) -> World:
     """A copy of the world that a test may spoil."""
     shutil.copytree(world.folder, tmp_path / "world")
     return World(tmp_path / "world")
+
+
+@pytest.fixture
+def log(world, tmp_path):
+    """A log folder as a person makes it: ``log.json`` with a CRS, and CSV tables."""
+    folder = tmp_path / "my-walk"
+    write_log(read_log(world.journeys / ONE), folder, "csv")
+    crs = json.loads((folder / "log.json").read_text())["crs"]
+    (folder / "log.json").write_text(json.dumps({"crs": crs}))
+    return folder
+
+
+@pytest.fixture
+def replay(world, tmp_path):
+    def replay(log, *more):
+        given = ["--db", world.database, "--log", log, "--out", tmp_path / "out"]
+        pictures = settings(output__pictures="none")
+        return mapfilter("replay", "-c", world.toml, *given, *pictures, *more)
+
+    return replay

@@ -1,57 +1,12 @@
-"""Wrong logs, unknown cells, and what replay does with both."""
+"""Wrong logs: one message, exit code 2, and nothing written."""
 
-import json
+import os
 import shutil
 
 import numpy as np
 import pandas as pd
 import pytest
-from command_line import assert_done, assert_refused, contents, mapfilter, settings
-
-from mapfilter.filters.contract import Reason
-from mapfilter.positioning.estimate_store import read_estimate
-from mapfilter.tracks.store import read_log, write_log
-
-ONE = "journey-0000-draw-000"
-
-
-@pytest.fixture
-def log(world, tmp_path):
-    """A log folder as a person makes it: ``log.json`` with a CRS, and CSV tables."""
-    folder = tmp_path / "my-walk"
-    write_log(read_log(world.journeys / ONE), folder, "csv")
-    crs = json.loads((folder / "log.json").read_text())["crs"]
-    (folder / "log.json").write_text(json.dumps({"crs": crs}))
-    return folder
-
-
-@pytest.fixture
-def replay(world, tmp_path):
-    def replay(log, *more):
-        given = ["--db", world.database, "--log", log, "--out", tmp_path / "out"]
-        pictures = settings(output__pictures="none")
-        return mapfilter("replay", "-c", world.toml, *given, *pictures, *more)
-
-    return replay
-
-
-def change(file, **columns):
-    """Give columns of a CSV table new values, each a function of the old ones."""
-    table = pd.read_csv(file)
-    for name, function in columns.items():
-        table[name] = function(table[name])
-    table.to_csv(file, index=False)
-
-
-def put(value, row=2):
-    """Return a function that puts a value into a row of a column, counted from 1."""
-
-    def changed(column):
-        column = column.astype(object)
-        column.iloc[row - 1] = value
-        return column
-
-    return changed
+from command_line import ONE, assert_done, assert_refused, change, contents, mapfilter, put
 
 
 def assert_log_refused(replay, log, *told):
@@ -180,75 +135,30 @@ def test_options(more, told, log, replay):
     assert contents(log.parent) == before
 
 
-def test_some_cells_unknown(log, replay, tmp_path):
-    table = pd.read_csv(log / "radio.csv")
-    late = (table["role"] == "serving") & (table["time_s"] > 150)
-    table.loc[late, "cell"] = "../new"
-    table.to_csv(log / "radio.csv", index=False)
-    outcome = replay(log, "--json")
-    assert outcome.code == 3
-    assert outcome.err == (
-        "mapfilter: some cells are unknown to the database; their readings are labelled "
-        "unknown_cell\n"
-    )
-    assert outcome.json["unused"]["unknown_cell"] == late.sum()
-    estimate = read_estimate(tmp_path / "out" / "estimate.parquet")
-    labelled = [u for u in estimate.unused if u.reason is Reason.UNKNOWN_CELL]
-    assert {(u.kind, u.what) for u in labelled} == {("serving", "../new")}
-    assert [u.time_s for u in labelled] == table.loc[late, "time_s"].tolist()
-    motion = pd.read_csv(log / "motion.csv")
-    assert len(estimate) >= len(motion)
-    assert np.isfinite(estimate.east_m[-1])
+@pytest.mark.parametrize(
+    ("change_m", "hint"),
+    [
+        (lambda e, n: (n, e), "east and north swapped"),
+        (lambda e, n: (e + 50_000, n), "log of another area or zone"),
+        (lambda e, n: (e, n - 10_000), "log of another area or zone"),
+    ],
+)
+@pytest.mark.parametrize("table", ["truth", "gnss"])
+def test_positions_far_off_the_database(table, change_m, hint, log, replay, tmp_path):
+    rows = pd.read_csv(log / "truth.csv")[["time_s", "east_m", "north_m"]]
+    rows["east_m"], rows["north_m"] = change_m(rows["east_m"], rows["north_m"])
+    rows.to_csv(log / f"{table}.csv", index=False)
+    told = f"my-walk, {table}: expected positions near the database's "
+    assert_refused(replay(log), told, hint)
+    assert not (tmp_path / "out").exists()
 
 
-def test_all_cells_unknown_with_pictures(log, replay, tmp_path):
-    change(log / "radio.csv", cell=lambda c: c.where(c.isna(), "X"))
-    outcome = replay(log, "--json", "--set=output.pictures=all")
-    assert outcome.code == 3
-    assert outcome.json["switched"] is False
-    assert outcome.json["error_mean_m"] is None
-    names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert {"estimate.parquet", "estimate.gpx", "estimate.geojson", "track.png"} <= names
-
-
-@pytest.mark.parametrize("kept", [(), ("motion",), ("radio",), ("truth",), ("motion", "radio")])
-def test_logs_of_few_tables(kept, log, replay, tmp_path):
-    for table in ("motion", "radio", "gnss", "truth"):
-        if table not in kept:
-            (log / f"{table}.csv").unlink()
-    outcome = replay(log, "--json", "--set=output.pictures=all")
-    assert_done(outcome)
-    assert "error_mean_m" not in outcome.json or kept == ("truth",)
-    assert (tmp_path / "out" / "estimate.parquet").is_file()
-
-
-def test_a_log_with_a_header_and_no_rows(log, replay):
-    for table in ("motion", "radio", "gnss", "truth"):
-        file = log / f"{table}.csv"
-        file.write_text(file.read_text().splitlines()[0] + "\n")
-    assert_done(replay(log, "--set=output.pictures=all"))
-
-
-def test_what_is_left_out_is_counted(log, replay, tmp_path):
-    change(log / "radio.csv", timing_advance=put(3))
-    (log / "gnss.csv").write_text("time_s,east_m,north_m\n5,386000,6671800\n")
-    neighbours = (pd.read_csv(log / "radio.csv")["role"] == "neighbour").sum()
-    found = assert_done(replay(log, "--without", "neighbours,ta,gnss", "--json")).json
-    assert found["unused"] == {}
-    notes = json.loads((tmp_path / "out" / "figures.json").read_text())["notes"]
-    left = ["gnss: 1 left out", "ta: 1 left out", f"neighbours: {neighbours} left out"]
-    assert notes == left
+def test_a_log_that_leaves_the_database_is_replayed(log, replay):
+    change(log / "truth.csv", east_m=lambda e: e + np.linspace(-2_000, 50_000, len(e)))
     assert_done(replay(log))
-    every = read_estimate(tmp_path / "out" / "estimate.parquet")
-    assert {u.kind for u in every.unused} == {"neighbour", "gnss"}
 
 
-def test_only_logs_that_know_their_start_give_times_in_gpx(log, replay, tmp_path):
-    assert_done(replay(log))
-    gpx = tmp_path / "out" / "estimate.gpx"
-    assert "<time>" not in gpx.read_text()
-    head = json.loads((log / "log.json").read_text())
-    (log / "log.json").write_text(json.dumps({**head, "start_utc_s": 1_700_000_000}))
-    assert_done(replay(log))
-    assert "<time>2023-11-14T22:16:18.000Z<" in gpx.read_text()
-    assert assert_done(mapfilter("info", log, "--json")).json["start_utc_s"] == 1_700_000_000
+def test_a_log_whose_name_is_no_text(own_world, replay):
+    odd = own_world.journeys / os.fsdecode(b"walk-\xff")
+    (own_world.journeys / ONE).rename(odd)
+    assert_refused(replay(own_world.journeys), "logs: expected a path in UTF-8, found ")

@@ -1,0 +1,83 @@
+"""What replay sees of logs before it locates any."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from mapfilter.errors import Faults, InputError, MapfilterError
+from mapfilter.geodesy import Floats, Lattice, same_crs
+from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.schema import SERVING
+from mapfilter.tracks.store import read_log
+from mapfilter.workflows.paths import path_fault, shown
+
+_AWAY_M = 5000.0
+
+
+def check_logs(folders: Sequence[Path], lattice: Lattice) -> None:
+    """Read every log once before any is located, so that all faults are told and none half-way.
+
+    Raises
+    ------
+    InputError
+        Logs cannot be read, are in another CRS than the database, or their truth or GNSS fixes all
+        lie more than 5 km outside its lattice.
+    """
+    faults = Faults()
+    for folder in folders:
+        if wrong := path_fault(folder):
+            faults.add("logs", wrong, shown(str(folder)))
+            continue
+        try:
+            log = read_log(folder)
+        except MapfilterError as error:
+            faults.found.extend(error.faults)
+            continue
+        if not same_crs(log.crs, lattice.crs):
+            expected = f"{lattice.crs}, the database's"
+            faults.add(f"{folder}, crs", expected, log.crs, "log of another area or zone")
+            continue
+        for table in ("truth", "gnss"):
+            places = getattr(log, table)
+            east_m, north_m = places["east_m"].to_numpy(), places["north_m"].to_numpy()
+            _check_near(f"{folder}, {table}", east_m, north_m, lattice, faults)
+    faults.raise_if_any(InputError)
+
+
+def lacking(log: TrackLog) -> str:
+    """Return what a log lacks so that nothing can be located in it, or an empty text."""
+    serving = (log.radio["role"] == SERVING) & log.radio["cell"].notna()
+    lacks = [] if serving.any() else ["no serving cell"]
+    lacks += [] if log.motion["step_m"].notna().any() else ["no motion"]
+    return " and ".join(lacks)
+
+
+def _check_near(
+    where: str, east_m: Floats, north_m: Floats, lattice: Lattice, faults: Faults
+) -> None:
+    if not east_m.size or _away_m(east_m, north_m, lattice) <= _AWAY_M:
+        return
+    box = lattice.bounds_m
+    found = east_m.min(), north_m.min(), east_m.max(), north_m.max()
+    swapped = _away_m(north_m, east_m, lattice) <= _AWAY_M
+    faults.add(
+        where,
+        f"positions near the database's {_box(*box)}",
+        _box(*found),
+        "east and north swapped" if swapped else "log of another area or zone",
+    )
+
+
+def _box(west_m: float, south_m: float, east_m: float, north_m: float) -> str:
+    return f"{west_m:.0f}..{east_m:.0f} m east, {south_m:.0f}..{north_m:.0f} m north"
+
+
+def _away_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> float:
+    """Return how far outside a lattice the nearest of some positions lies."""
+    west, south, east, north = lattice.bounds_m
+    off_east = np.maximum(np.maximum(west - east_m, east_m - east), 0.0)
+    off_north = np.maximum(np.maximum(south - north_m, north_m - north), 0.0)
+    return float(np.hypot(off_east, off_north).min())

@@ -1,0 +1,149 @@
+"""What replay writes and tells: of good logs, of logs that lack something, over older results."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from command_line import ONE, assert_done, change, contents, mapfilter, put
+
+from mapfilter.filters.contract import Reason
+from mapfilter.positioning.estimate_store import read_estimate
+from mapfilter.positioning.global_positioning import position_by_candidates
+from mapfilter.workflows.config import load_config
+from mapfilter.workflows.replay import run_replay
+
+
+def test_some_cells_unknown(log, replay, tmp_path):
+    table = pd.read_csv(log / "radio.csv")
+    late = (table["role"] == "serving") & (table["time_s"] > 150)
+    table.loc[late, "cell"] = "../new"
+    table.to_csv(log / "radio.csv", index=False)
+    outcome = replay(log, "--json")
+    assert outcome.code == 3
+    assert outcome.err == (
+        "mapfilter: some cells are unknown to the database; their readings are labelled "
+        "unknown_cell\n"
+    )
+    assert outcome.json["unused"]["unknown_cell"] == late.sum()
+    estimate = read_estimate(tmp_path / "out" / "estimate.parquet")
+    labelled = [u for u in estimate.unused if u.reason is Reason.UNKNOWN_CELL]
+    assert {(u.kind, u.what) for u in labelled} == {("serving", "../new")}
+    assert [u.time_s for u in labelled] == table.loc[late, "time_s"].tolist()
+    motion = pd.read_csv(log / "motion.csv")
+    assert len(estimate) >= len(motion)
+    assert np.isfinite(estimate.east_m[-1])
+
+
+def test_all_cells_unknown_with_pictures(log, replay, tmp_path):
+    change(log / "radio.csv", cell=lambda c: c.where(c.isna(), "X"))
+    outcome = replay(log, "--json", "--set=output.pictures=all")
+    assert outcome.code == 3
+    assert outcome.json["switched"] is False
+    assert outcome.json["error_mean_m"] is None
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert {"estimate.parquet", "estimate.gpx", "estimate.geojson", "track.png"} <= names
+
+
+@pytest.mark.parametrize(
+    ("kept", "lack"),
+    [
+        ((), "no serving cell and no motion"),
+        (("motion",), "no serving cell"),
+        (("radio", "truth"), "no motion"),
+        (("truth",), "no serving cell and no motion"),
+    ],
+)
+def test_logs_in_which_nothing_can_be_located(kept, lack, log, replay, tmp_path):
+    for table in ("motion", "radio", "gnss", "truth"):
+        if table not in kept:
+            (log / f"{table}.csv").unlink()
+    outcome = replay(log, "--json", "--set=output.pictures=all")
+    assert outcome.code == 3
+    assert outcome.err == f"mapfilter: nothing is located in my-walk: {lack}\n"
+    assert outcome.json["partial"] is True
+    assert ("error_mean_m" in outcome.json) == ("truth" in kept)
+    assert np.isnan(read_estimate(tmp_path / "out" / "estimate.parquet").east_m).all()
+
+
+def test_a_log_with_neighbours_only(log, replay):
+    table = pd.read_csv(log / "radio.csv")
+    table[table["role"] == "neighbour"].to_csv(log / "radio.csv", index=False)
+    outcome = replay(log)
+    assert outcome.code == 3
+    assert outcome.err == "mapfilter: nothing is located in my-walk: no serving cell\n"
+
+
+def test_a_log_without_truth_is_located(log, replay):
+    (log / "truth.csv").unlink()
+    assert "error_mean_m" not in assert_done(replay(log, "--json")).json
+
+
+def test_a_log_with_a_header_and_no_rows(log, replay):
+    for table in ("motion", "radio", "gnss", "truth"):
+        file = log / f"{table}.csv"
+        file.write_text(file.read_text().splitlines()[0] + "\n")
+    outcome = replay(log, "--set=output.pictures=all")
+    assert outcome.code == 3
+    assert "nothing is located in my-walk: no serving cell and no motion" in outcome.err
+
+
+def test_a_logs_randomness_depends_on_its_name_not_on_its_neighbours(world, tmp_path, monkeypatch):
+    drawn = {}
+
+    def position(database, points_of, log, options, rng):
+        drawn.setdefault(log.truth_length_m, []).append(rng.integers(2**62))
+        return position_by_candidates(database, points_of, log, options, rng)
+
+    monkeypatch.setattr("mapfilter.workflows.replay.position_by_candidates", position)
+    settings = ["output.pictures=none", f"database.path={world.database}"]
+    for path in (world.journeys, world.journeys / "journey-0001-draw-000"):
+        config = load_config(world.toml, [*settings, f"track.path={path}"])
+        run_replay(config, tmp_path / "out")
+    first, second = drawn.values()
+    assert len(first) == 1
+    assert second[0] == second[1] != first[0]
+
+
+def test_results_of_an_older_replay_do_not_stay_beside_new_ones(world, log, replay, tmp_path):
+    out = tmp_path / "out"
+    for keep in ("notes.txt", "other/notes.txt", "my-walk/figures.json", f"{ONE}-b/figures.json"):
+        (out / keep).parent.mkdir(parents=True, exist_ok=True)
+        (out / keep).write_text('{"log": "another"}')
+    kept = contents(out)
+    assert_done(replay(world.journeys, "--set=output.pictures=all"))
+    assert {"out/summary.json", f"out/{ONE}/figures.json", f"out/{ONE}/track.png"} < set(
+        contents(out)
+    )
+    assert_done(replay(log))
+    now = contents(out)
+    assert {name: now[name] for name in kept} == kept
+    files = {"estimate.parquet", "estimate.gpx", "estimate.geojson", "figures.json"}
+    assert set(now) - set(kept) == {f"out/{name}" for name in files}
+    assert_done(replay(world.journeys))
+    assert not (out / "figures.json").exists()
+
+
+def test_what_is_left_out_is_counted(log, replay, tmp_path):
+    change(log / "radio.csv", timing_advance=put(3))
+    (log / "gnss.csv").write_text("time_s,east_m,north_m\n5,386000,6671800\n")
+    neighbours = (pd.read_csv(log / "radio.csv")["role"] == "neighbour").sum()
+    found = assert_done(replay(log, "--without", "neighbours,ta,gnss", "--json")).json
+    assert found["unused"] == {}
+    notes = json.loads((tmp_path / "out" / "figures.json").read_text())["notes"]
+    left = ["gnss: 1 left out", "ta: 1 left out", f"neighbours: {neighbours} left out"]
+    assert notes == left
+    assert_done(replay(log))
+    every = read_estimate(tmp_path / "out" / "estimate.parquet")
+    assert {u.kind for u in every.unused} == {"neighbour", "gnss"}
+
+
+def test_only_logs_that_know_their_start_give_times_in_gpx(log, replay, tmp_path):
+    assert_done(replay(log))
+    gpx = tmp_path / "out" / "estimate.gpx"
+    assert "<time>" not in gpx.read_text()
+    head = json.loads((log / "log.json").read_text())
+    (log / "log.json").write_text(json.dumps({**head, "start_utc_s": 1_700_000_000}))
+    assert_done(replay(log))
+    assert "<time>2023-11-14T22:16:18.000Z<" in gpx.read_text()
+    assert assert_done(mapfilter("info", log, "--json")).json["start_utc_s"] == 1_700_000_000
