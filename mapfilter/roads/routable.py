@@ -1,80 +1,25 @@
-"""From ways, squares, buildings and land use to the route lattice, tile by tile."""
+"""From ways, squares, buildings, water and land use to the route lattice, tile by tile."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation
 from shapely import STRtree
 
 from mapfilter._parallel import Progress
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.geodesy import Floats, Lattice, same_crs
 from mapfilter.roads.buildings import burn
 from mapfilter.roads.lattice import RouteLattice
-from mapfilter.roads.ways import Buildings, Geometries, Squares, Ways
+from mapfilter.roads.near import HALF_WIDTH_M, WayIndex, note_half_widths
+from mapfilter.roads.ways import Buildings, Geometries, Squares, Water, Ways
 
-HALF_WIDTH_M = 6.0
 SQUARE_CLASS = "square"
 LANDUSE_CLASS = "land use"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class WayIndex:
-    """Straight segments of ways in a search tree, for exact distances.
-
-    Examples
-    --------
-    >>> line = np.array([shapely.LineString([(0, 0), (10, 0), (10, 10)])])
-    >>> ways = Ways("EPSG:32629", np.array([7]), np.array([0], np.int16), ("path",), line,
-    ...             np.array([False]), np.array([0], np.int8))
-    >>> WayIndex.of(ways).nearest(np.array([4.0]), np.array([3.0]), 6.0)
-    (array([0]), array([3.]))
-    """
-
-    ways: Ways
-    tree: STRtree
-    way: NDArray[np.int64]
-
-    @classmethod
-    def of(cls, ways: Ways) -> WayIndex:
-        """Index the segments of ways."""
-        corner, origin = shapely.get_coordinates(ways.geometry, return_index=True)
-        joined = (origin[1:] == origin[:-1]) & np.any(corner[1:] != corner[:-1], axis=1)
-        ends = np.stack([corner[:-1][joined], corner[1:][joined]], axis=1)
-        return cls(ways, STRtree(shapely.linestrings(ends)), origin[:-1][joined])
-
-    def nearest(
-        self, east_m: NDArray[np.float64], north_m: NDArray[np.float64], reach_m: float = np.inf
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Return the nearest way of each position and its distance.
-
-        Returns
-        -------
-        way : numpy.ndarray of int64, shape (N,)
-            Index into ``ways``, -1 when none is within ``reach_m``; of equally near ways the one
-            with the smallest id.
-        distance_m : numpy.ndarray of float64, shape (N,)
-            Infinite where ``way`` is -1.
-        """
-        way = np.full(east_m.size, -1, dtype=np.int64)
-        distance = np.full(east_m.size, np.inf)
-        if not (self.way.size and east_m.size):
-            return way, distance
-        (which, segment), found_m = self.tree.query_nearest(
-            shapely.points(east_m, north_m),
-            max_distance=None if np.isinf(reach_m) else reach_m,
-            return_distance=True,
-        )
-        candidate = self.way[segment]
-        order = np.lexsort((candidate, self.ways.way_id[candidate], which))
-        which, candidate, found_m = which[order], candidate[order], found_m[order]
-        first = np.flatnonzero(np.diff(which, prepend=-1))
-        way[which[first]], distance[which[first]] = candidate[first], found_m[first]
-        return way, distance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,6 +40,71 @@ class AreaIndex:
         return burn(((shape, 1) for shape in self.geometry[near]), window, "uint8").astype(bool)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class RouteSource:
+    """What any tile of a route lattice is made from; it can be sent to other processes.
+
+    Parameters
+    ----------
+    crs : str
+        Projected CRS of everything, in metres.
+    ways : WayIndex
+    squares, buildings, water : AreaIndex or None
+    bridges : WayIndex or None
+        The parts of the ways that lie in the water: water cuts nothing off these.
+    """
+
+    crs: str
+    ways: WayIndex
+    squares: AreaIndex | None
+    buildings: AreaIndex | None
+    water: AreaIndex | None
+    bridges: WayIndex | None
+
+    @classmethod
+    def of(
+        cls,
+        ways: Ways,
+        squares: Squares | None = None,
+        buildings: Buildings | None = None,
+        half_width_m: float = HALF_WIDTH_M,
+        *,
+        half_width_by_class_m: Mapping[str, float] | None = None,
+        water: Water | None = None,
+    ) -> RouteSource:
+        """Index the layers of an area; the parameters are those of :func:`route_lattice`.
+
+        Raises
+        ------
+        InputError
+            The CRS differ, or a half width is no length.
+        """
+        faults = Faults()
+        layers = {"squares": squares, "buildings": buildings, "water": water}
+        _note_crs(faults, ways.crs, layers)
+        faults.raise_if_any(InputError)
+        index = WayIndex.of(ways, half_width_m, half_width_by_class_m or {})
+        return cls(
+            ways.crs,
+            index,
+            AreaIndex.of(squares.geometry) if squares else None,
+            AreaIndex.of(buildings.footprints) if buildings else None,
+            AreaIndex.of(water.geometry) if water else None,
+            index.inside(water.geometry) if water else None,
+        )
+
+    def tile(self, window: Lattice) -> RouteLattice:
+        """Return the route lattice of a window; the same points as on the whole lattice."""
+        on_square = _mask(self.squares, window)
+        way, distance_m = self.ways.reaching(window)
+        allowed = ((way >= 0) | on_square) & ~_mask(self.buildings, window)
+        if self.water is not None and self.bridges is not None:
+            wet = self.water.mask(window)
+            if np.any(wet & allowed):
+                allowed &= ~wet | (self.bridges.reaching(window)[0] >= 0)
+        return _described(allowed, window, on_square, self.ways, (way, distance_m), SQUARE_CLASS)
+
+
 def route_lattice(
     ways: Ways,
     squares: Squares | None,
@@ -102,19 +112,26 @@ def route_lattice(
     lattice: Lattice,
     half_width_m: float = HALF_WIDTH_M,
     *,
+    half_width_by_class_m: Mapping[str, float] | None = None,
+    water: Water | None = None,
     tile_px: int = 512,
     progress: Progress | None = None,
 ) -> RouteLattice:
-    """Return the lattice points near a way or in a square, outside buildings.
+    """Return the lattice points near a way or in a square, outside buildings and water.
 
     Parameters
     ----------
     ways, squares, buildings
-        Of the lattice's area, in its CRS.
+        Of the lattice's area, in its CRS. Ways just outside count for points inside.
     lattice : Lattice
         Normally that of the radio rasters.
     half_width_m : float
-        A point belongs to a way at most this far from its centre line.
+        A point belongs to a way at most this far from its centre line; to the nearest of several.
+    half_width_by_class_m : mapping of str to float, optional
+        The same for some classes of way; 0 leaves the class out.
+    water : Water, optional
+        Where nobody walks, save on the ways that cross it and within their half width: where a
+        way runs through water there is a bridge, a pier or a ford.
     tile_px : int
         Side of the tiles that the work is done by; it bounds the memory, not the result.
     progress : callable, optional
@@ -123,24 +140,25 @@ def route_lattice(
     Raises
     ------
     InputError
-        The CRS differ, ``half_width_m`` is not > 0, or no point is left.
+        The CRS differ, a half width is no length, or no point is left.
     """
     faults = Faults()
-    for name, layer in (("ways", ways), ("squares", squares), ("buildings", buildings)):
-        if layer is not None and not same_crs(layer.crs, lattice.crs):
-            faults.add(f"{name}, crs", lattice.crs, layer.crs, "layers of different CRS")
-    if not (np.isfinite(half_width_m) and half_width_m > 0):
-        faults.add("half_width_m", "metres > 0", half_width_m)
+    layers = {"ways": ways, "squares": squares, "buildings": buildings, "water": water}
+    _note_crs(faults, lattice.crs, layers)
+    note_half_widths(faults, half_width_m, half_width_by_class_m or {})
     faults.raise_if_any(InputError)
-    index = WayIndex.of(ways)
-    open_areas = AreaIndex.of(squares.geometry) if squares else None
-    built = AreaIndex.of(buildings.footprints) if buildings else None
+    source = RouteSource.of(
+        ways,
+        squares,
+        buildings,
+        half_width_m,
+        half_width_by_class_m=half_width_by_class_m,
+        water=water,
+    )
     tiles = lattice.tiles(tile_px)
     parts = []
     for done, (row, col, rows, cols) in enumerate(tiles, start=1):
-        window = lattice.window(row, col, rows, cols)
-        tile = rasterise_tile(window, index, open_areas, built, half_width_m)
-        parts.append((row, col, tile))
+        parts.append((row, col, source.tile(lattice.window(row, col, rows, cols))))
         if progress is not None:
             progress(done, len(tiles))
     routes = _joined(lattice, parts)
@@ -155,42 +173,26 @@ def route_lattice(
     return routes
 
 
-def rasterise_tile(
-    window: Lattice,
-    ways: WayIndex,
-    squares: AreaIndex | None,
-    buildings: AreaIndex | None,
-    half_width_m: float,
-) -> RouteLattice:
-    """Return the route lattice of one window; the same points as on the whole lattice."""
-    on_square = _mask(squares, window)
-    near = _pixels_near(ways, window, half_width_m)
-    candidate = (near | on_square) & ~_mask(buildings, window)
-    row, col = np.nonzero(candidate)
-    east, north = window.east_north(row, col)
-    way, distance = ways.nearest(east, north, half_width_m)
-    kept = (way >= 0) | on_square[row, col]
-    pixels, nearest = (row[kept], col[kept]), (way[kept], distance[kept])
-    return _described(window, on_square, pixels, ways, nearest, SQUARE_CLASS)
-
-
 def route_lattice_from_landuse(
     mask: NDArray[np.bool_],
     lattice: Lattice,
     ways: Ways | None = None,
     half_width_m: float = HALF_WIDTH_M,
+    *,
+    half_width_by_class_m: Mapping[str, float] | None = None,
 ) -> RouteLattice:
     """Return the lattice points in walkable classes of land use, the paper's second database.
 
     Parameters
     ----------
     mask : numpy.ndarray of bool, shape (lattice.rows, lattice.cols)
-        Where one can be, as :func:`mapfilter.roads.landuse.read_landuse` returns it.
+        Where one can be, as :class:`mapfilter.roads.landuse.LandUse` tells it.
     lattice : Lattice
     ways : Ways, optional
-        Name the way of points within ``half_width_m`` of one, and give all points their distance;
-        they add no point.
-    half_width_m : float
+        Name the way of points within its half width, and give all points their distance; they
+        add no point.
+    half_width_m, half_width_by_class_m
+        As for :func:`route_lattice`.
 
     Raises
     ------
@@ -202,32 +204,37 @@ def route_lattice_from_landuse(
         raise fail(InputError, "land-use mask", f"shape {shape}", mask.shape)
     if not mask.any():
         raise fail(InputError, "land use", "a walkable point", "none", "no class is walkable")
-    index = WayIndex.of(_no_ways(lattice.crs) if ways is None else ways)
-    row, col = np.nonzero(mask)
-    east, north = lattice.east_north(row, col)
-    nearest = index.nearest(east, north, half_width_m)
-    return _described(lattice, mask, (row, col), index, nearest, LANDUSE_CLASS)
+    index = WayIndex.of(
+        _no_ways(lattice.crs) if ways is None else ways, half_width_m, half_width_by_class_m or {}
+    )
+    return landuse_tile(mask, lattice, index)
+
+
+def landuse_tile(mask: NDArray[np.bool_], window: Lattice, ways: WayIndex) -> RouteLattice:
+    """Return the route lattice of a window of land use; there may be no point in it."""
+    return _described(mask, window, mask, ways, ways.reaching(window), LANDUSE_CLASS)
 
 
 def _described(
-    lattice: Lattice,
+    allowed: NDArray[np.bool_],
+    window: Lattice,
     on_square: NDArray[np.bool_],
-    pixels: tuple[NDArray[np.int64], NDArray[np.int64]],
     ways: WayIndex,
-    nearest: tuple[NDArray[np.int64], NDArray[np.float64]],
+    nearest: tuple[NDArray[np.int64], Floats],
     other_class: str,
 ) -> RouteLattice:
-    (row, col), (way, distance_m) = pixels, nearest
+    """Return the allowed pixels with their ways, or the distance of the nearest that is."""
+    row, col = np.nonzero(allowed)
+    way, distance_m = nearest[0][row, col], nearest[1][row, col]
     alone = way < 0
-    east, north = lattice.east_north(row[alone], col[alone])
-    distance_m[alone] = ways.nearest(east, north)[1]
+    distance_m[alone] = ways.nearest(*window.east_north(row[alone], col[alone]))[1]
     names = (*ways.ways.class_names, other_class)
     way_id = np.zeros(row.size, dtype=np.int64)
     way_id[~alone] = ways.ways.way_id[way[~alone]]
     way_class = np.full(row.size, len(names) - 1, dtype=np.int16)
     way_class[~alone] = ways.ways.way_class[way[~alone]]
     return RouteLattice(
-        lattice,
+        window,
         row.astype(np.int32),
         col.astype(np.int32),
         way_id,
@@ -238,25 +245,12 @@ def _described(
     )
 
 
-def _pixels_near(ways: WayIndex, window: Lattice, reach_m: float) -> NDArray[np.bool_]:
-    """Return all pixels whose centre may be within reach of a segment, and some more."""
-    pad = int(np.ceil(reach_m / window.resolution_m + 0.5)) + 1
-    side_m = pad * window.resolution_m
-    wide = Lattice(
-        window.crs,
-        window.west_m - side_m,
-        window.north_m + side_m,
-        window.resolution_m,
-        window.rows + 2 * pad,
-        window.cols + 2 * pad,
-    )
-    segments = np.sort(ways.tree.query(shapely.box(*wide.bounds_m)))
-    near = np.unique(ways.way[segments])
-    shapes = ((line, 1) for line in ways.ways.geometry[near])
-    touched = burn(shapes, wide, "uint8", all_touched=True).astype(bool)
-    square = np.ones((2 * pad + 1, 2 * pad + 1), dtype=bool)
-    grown = binary_dilation(touched, square)
-    return np.asarray(grown[pad:-pad, pad:-pad], dtype=np.bool_)
+def _note_crs(
+    faults: Faults, crs: str, layers: Mapping[str, Ways | Squares | Buildings | Water | None]
+) -> None:
+    for name, layer in layers.items():
+        if layer is not None and not same_crs(layer.crs, crs):
+            faults.add(f"{name}, crs", crs, layer.crs, "layers of different CRS")
 
 
 def _mask(areas: AreaIndex | None, window: Lattice) -> NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""The ways, squares and buildings of an area, in metres, whatever map they come from."""
+"""The ways, squares, buildings and waters of an area, in metres, whatever map they come from."""
 
 from __future__ import annotations
 
@@ -146,6 +146,30 @@ class Buildings:
             f"{len(self)} buildings: height from the map for {self.from_height}, "
             f"from storeys for {self.from_levels}, the default for {self.from_default}"
         )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Water:
+    """Where one cannot be without a boat.
+
+    Parameters
+    ----------
+    crs : str
+        Projected CRS, in metres.
+    geometry : numpy.ndarray of shapely.Polygon, shape (N,)
+        Rivers, lakes and seas; holes (islands) are not part of them.
+    """
+
+    crs: str
+    geometry: Geometries
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        _check_geometry("water", self.geometry, "Polygon", faults)
+        faults.raise_if_any(InputError)
+
+    def __len__(self) -> int:
+        return int(self.geometry.size)
 
 
 def _check_lengths(what: str, count: int, faults: Faults, *columns: NDArray[Any]) -> None:
