@@ -15,6 +15,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ _CHUNK_BYTES = 1 << 20
 _ASIDE = "old"
 _AT_FDCWD = -100
 _RENAME_EXCHANGE = 2
+_WRITE_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
 
 def sha256_file(path: Path) -> str:
@@ -39,20 +41,24 @@ def sha256_file(path: Path) -> str:
 def atomic_file(path: Path) -> Iterator[Path]:
     """Give a temporary path beside ``path``; rename it into place when the block succeeds.
 
-    The temporary path keeps the suffix of ``path``, because drivers choose formats by it.
+    The temporary path keeps the suffix of ``path``, because drivers choose formats by it. Where
+    ``path`` is a link, what it leads to is replaced.
 
     Raises
     ------
     OutputError
-        The folder cannot be made or written.
+        The folder cannot be made or written, or writing the file fails, as on a full disk.
     """
-    partial = _partial_folder(path)
+    target = _behind_link(path)
+    partial = _partial_folder(target)
     temporary = partial / path.name
     try:
-        yield temporary
-        _sync(temporary)
+        with _writing(temporary, path):
+            yield temporary
+            _sync(temporary)
         try:
-            temporary.replace(path)
+            temporary.replace(target)
+            _sync(target.parent)
         except OSError as error:
             raise _not_writable(path, error) from error
     finally:
@@ -63,29 +69,95 @@ def atomic_file(path: Path) -> Iterator[Path]:
 def atomic_dir(path: Path) -> Iterator[Path]:
     """Give a temporary folder beside ``path``; exchange it with ``path`` when the block succeeds.
 
+    Where ``path`` is a link, what it leads to is replaced.
+
     Raises
     ------
     OutputError
-        The parent folder cannot be made or written, or ``path`` is a file.
+        The parent folder cannot be made or written, ``path`` is a file, or writing in the folder
+        fails, as on a full disk.
     """
     if path.exists() and not path.is_dir():
         raise fail(OutputError, str(path), "a folder, or nothing yet", "a file")
-    partial = _partial_folder(path)
+    target = _behind_link(path)
+    partial = _partial_folder(target)
     new = partial / "new"
     new.mkdir()
     try:
-        yield new
-        for file in sorted(new.rglob("*")):
-            _sync(file)
+        with _writing(new, path):
+            yield new
+            for inner in sorted(new.rglob("*")):
+                _sync(inner)
+            _sync(new)
         try:
-            if path.exists():
-                _exchange(new, path)
+            if target.exists():
+                _exchange(new, target)
             else:
-                new.rename(path)
+                new.rename(target)
+            _sync(target.parent)
         except OSError as error:
             raise _not_writable(path, error) from error
     finally:
         shutil.rmtree(partial, ignore_errors=True)
+
+
+def left_aside(path: Path) -> Path | None:
+    """Return where a folder lies that was moved aside to be replaced, if that was cut short."""
+    found = path.parent.glob(f"{_glob_escape(f'.{path.name}.partial-')}*/{_ASIDE}")
+    return next((aside for aside in sorted(found) if aside.is_dir()), None)
+
+
+def check_replaceable(folder: Path, head: str, what: str) -> None:
+    """See that replacing a folder loses nothing but what mapfilter wrote there as ``what``.
+
+    Parameters
+    ----------
+    folder : Path
+        May be absent.
+    head : str
+        Name of the JSON file in it that holds ``format``, which is ``what``, and lists ``parts``.
+    what : str
+
+    Raises
+    ------
+    OutputError
+        The folder holds a file that is neither the head nor listed there.
+    """
+    inner = folder.rglob("*") if folder.is_dir() else ()
+    found = {p.relative_to(folder).as_posix() for p in inner if p.is_symlink() or not p.is_dir()}
+    if foreign := sorted(found - _listed(folder / head, what)):
+        got = f"other files ({', '.join(foreign[:3])}{', …' if len(foreign) > 3 else ''})"
+        hint = "a mistyped path; choose another, or move the files away"
+        raise fail(OutputError, str(folder), f"a {what}, or nothing yet", got, hint)
+
+
+def _listed(head: Path, what: str) -> set[str]:
+    """Return the names of a head and of the parts that it lists; none when it is no such head."""
+    try:
+        value = read_json(head)
+    except StoreError:
+        return set()
+    if value.get("format") != what or not isinstance(value.get("parts"), list):
+        return set()
+    return {
+        head.name,
+        *(str(part.get("path")) for part in value["parts"] if isinstance(part, dict)),
+    }
+
+
+def check_version(where: str, found: object, known: int) -> None:
+    """See that what is read has the version that this mapfilter knows.
+
+    Raises
+    ------
+    StoreError
+        It has another.
+    """
+    if found == known and not isinstance(found, bool):
+        return
+    newer = isinstance(found, int) and found > known
+    hint = "written by a newer mapfilter; update it" if newer else "edited or damaged"
+    raise fail(StoreError, where, f"version {known}", found, hint)
 
 
 def write_json(path: Path, value: Mapping[str, Any]) -> None:
@@ -127,6 +199,31 @@ def ensure_writable_folder(path: Path) -> None:
         with tempfile.TemporaryFile(dir=path):
             pass
     except OSError as error:
+        raise _not_writable(path, error) from error
+
+
+def _behind_link(path: Path) -> Path:
+    return Path(os.path.realpath(path)) if path.is_symlink() else path
+
+
+@contextlib.contextmanager
+def _writing(temporary: Path, path: Path) -> Iterator[None]:
+    """Tell what fails in writing ``temporary`` as an OutputError of ``path``.
+
+    Errors of files read meanwhile are not of writing and go through as they are.
+    """
+    try:
+        yield
+    except OutputError as error:
+        named = (replace(f, where=f.where.replace(str(temporary), str(path))) for f in error.faults)
+        raise OutputError(tuple(named)) from error
+    except OSError as error:
+        if isinstance(error.filename, str | bytes):
+            of_writing = Path(os.fsdecode(error.filename)).is_relative_to(temporary.parent)
+        else:
+            of_writing = error.errno in _WRITE_ERRORS
+        if not of_writing:
+            raise
         raise _not_writable(path, error) from error
 
 
@@ -179,9 +276,16 @@ def _exchange(new: Path, old: Path) -> None:
 
 
 def _sync(path: Path) -> None:
-    if path.is_file():
-        with path.open("rb") as stream:
-            os.fsync(stream.fileno())
+    """Have a file's bytes, or a folder's list of names, on the disk before going on."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        # Not every file system can do this for folders.
+        if error.errno != errno.EINVAL or not path.is_dir():
+            raise
+    finally:
+        os.close(handle)
 
 
 def _not_writable(path: Path, error: OSError) -> MapfilterError:

@@ -9,8 +9,10 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from typing import Any, ParamSpec, TypeVar
+
+from mapfilter.errors import MapfilterError, fail
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -57,16 +59,28 @@ def ordered_results(
 ) -> Iterator[T]:
     """Yield ``function(task)`` for every task, in order, with at most ``in_flight`` waiting.
 
-    Memory stays bounded by ``in_flight`` results, however many tasks there are.
+    Memory stays bounded by ``in_flight`` results, however many tasks there are; twice the number
+    of workers keeps all of them busy.
+
+    Raises
+    ------
+    MapfilterError
+        A worker process died.
     """
     todo = list(tasks)
     waiting: list[Future[T]] = []
     submitted = 0
     for done in range(len(todo)):
-        while submitted < len(todo) and submitted - done < in_flight:
-            waiting.append(executor.submit(function, todo[submitted]))
-            submitted += 1
-        result = waiting.pop(0).result()
+        try:
+            while submitted < len(todo) and submitted - done < in_flight:
+                waiting.append(executor.submit(function, todo[submitted]))
+                submitted += 1
+            result = waiting.pop(0).result()
+        except BrokenExecutor as error:
+            hint = "out of memory: take fewer workers or a smaller tile_px"
+            raise fail(
+                MapfilterError, "worker processes", "all of them at work", "one that died", hint
+            ) from error
         if progress is not None:
             progress(done + 1, len(todo))
         yield result

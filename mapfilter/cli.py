@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mapfilter._parallel import Progress
 
 DONE, WRONG, PARTIAL = 0, 2, 3
-_NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
+_NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 app = typer.Typer(
     add_completion=False,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
@@ -15,8 +15,16 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from mapfilter._io import atomic_dir, sha256_file, write_json
+from mapfilter._io import atomic_dir, check_replaceable, write_json
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
+from mapfilter.database.manifest import (
+    CELLS,
+    FORMAT,
+    MANIFEST,
+    VERSION,
+    InputFile,
+    describe_part,
+)
 from mapfilter.database.parts import (
     ROWS_IN_MEMORY,
     PartWriter,
@@ -26,17 +34,9 @@ from mapfilter.database.parts import (
     z_order,
 )
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.database.store import (
-    CELLS,
-    FORMAT,
-    MANIFEST,
-    VERSION,
-    describe_part,
-    open_database,
-    write_cells,
-)
+from mapfilter.database.store import open_database, write_cells
 from mapfilter.database.tiles import Tile, pixel_offset, read_tile
-from mapfilter.errors import Faults, InputError, OutputError, fail
+from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rasters import RxLevRasters, check_against_plan
 from mapfilter.roads.lattice import RouteLattice
@@ -84,9 +84,10 @@ def build(
     margin_db: float = MARGIN_DB,
     floor_dbm: float = FLOOR_DBM,
     tile_px: int = TILE_PX,
-    inputs: Mapping[str, str] | None = None,
+    inputs: Sequence[InputFile] = (),
     attribution: str = "",
     executor: Executor | None = None,
+    in_flight: int = 8,
     progress: Progress | None = None,
 ) -> RadioRouteDatabase:
     """Build a database folder and open it.
@@ -109,12 +110,14 @@ def build(
     tile_px : int
         Side of the tiles that the work is done by. Points are stored tile by tile along the
         Z-order curve, and along it within each tile.
-    inputs : mapping of str to str, optional
-        Names and SHA-256 of what the roads and the rasters were made from, for the record.
+    inputs : sequence of InputFile
+        What the roads and the rasters were made from, for the record; the rasters are added.
     attribution : str
         Whose map the roads come from, as its licence wants it shown.
     executor : Executor, optional
         Where tiles are read; the result does not depend on it.
+    in_flight : int
+        Tiles handed to it at a time; twice its workers keeps all of them busy.
     progress : callable, optional
         Called with tiles done and tiles in all.
 
@@ -130,12 +133,17 @@ def build(
     plan = plan.to_crs(rasters.lattice.crs)
     places, tiles = _cut_into_tiles(rasters, plan, routes, floor_dbm, tile_px)
     out = Path(out)
-    _check_replaceable(out)
+    check_replaceable(out, MANIFEST, FORMAT)
+    recorded = [*inputs, InputFile.of("rasters", rasters.path)]
     with atomic_dir(out) as folder:
         with PartWriter(folder, rasters.lattice.crs, plan.ids) as writer:
             start, heard = 0, 0
             results = ordered_results(
-                executor or SerialExecutor(), read_tile, tiles, progress=progress
+                executor or SerialExecutor(),
+                read_tile,
+                tiles,
+                in_flight=in_flight,
+                progress=progress,
             )
             for tile, levels in zip(tiles, results, strict=True):
                 writer.add(places.slice(start, tile.row.size), levels)
@@ -148,7 +156,6 @@ def build(
             parts = writer.finish()
         write_cells(plan, folder / CELLS)
         parts.insert(0, describe_part(folder, folder / CELLS, len(plan.ids)))
-        recorded = {**(inputs or {}), rasters.path.name: sha256_file(rasters.path)}
         write_json(
             folder / MANIFEST,
             {
@@ -164,7 +171,7 @@ def build(
                     "tile_px": tile_px,
                 },
                 "attribution": attribution,
-                "inputs": [{"name": name, "sha256": recorded[name]} for name in sorted(recorded)],
+                "inputs": [asdict(file) for file in recorded],
                 "counts": {
                     "points": heard,
                     "points_below_floor": len(places) - heard,
@@ -215,12 +222,6 @@ def dry_run(
         round(memory + window),
         seconds * scale,
     )
-
-
-def _check_replaceable(out: Path) -> None:
-    if out.is_dir() and any(out.iterdir()) and not (out / MANIFEST).is_file():
-        expected = "a database, or nothing yet"
-        raise fail(OutputError, str(out), expected, "a folder of other files", "a mistyped path")
 
 
 def _check_parameters(margin_db: float, floor_dbm: float, tile_px: int) -> None:

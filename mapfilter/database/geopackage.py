@@ -10,13 +10,16 @@ from pathlib import Path
 import geopandas as gpd
 import pandas as pd
 import pyogrio
-from pyogrio.errors import DataSourceError
+from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, GeometryError
 
 from mapfilter._io import atomic_file
-from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.database.columns import read_columns
+from mapfilter.database.manifest import POINTS, apart
+from mapfilter.database.radioroutes import Points, RadioRouteDatabase
 from mapfilter.errors import OutputError, fail
 
 # GeoPackages hold the time of writing; a fixed one gives equal bytes for equal databases.
+_WRITE_ERRORS = (DataSourceError, DataLayerError, FeatureError, GeometryError)
 _WRITTEN = "2000-01-01T00:00:00.000Z"
 
 
@@ -26,25 +29,30 @@ def write_geopackage(database: RadioRouteDatabase, path: Path, cells: Sequence[s
         raise fail(OutputError, str(path), "a name that ends in .gpkg", path.suffix or "no suffix")
     crs = database.lattice.crs
     layers = {"points": _points(database), "cells": _cells(database)}
-    for cell_id in cells:
+    # Layers of a GeoPackage are tables, whose names SQLite does not tell apart by case.
+    names = apart({cell_id: f"cell {cell_id}" for cell_id in cells})
+    for cell_id, name in names.items():
         row, col, level_dbm = database.cell_points(cell_id)
         east, north = database.lattice.east_north(row, col)
         columns = {"row": row, "col": col, "level_dbm": level_dbm}
         place = gpd.points_from_xy(east, north)
-        layers[f"cell {cell_id}"] = gpd.GeoDataFrame(columns, geometry=place, crs=crs)
+        layers[name] = gpd.GeoDataFrame(columns, geometry=place, crs=crs)
     with atomic_file(path) as temporary, _fixed_date():
         try:
             for name, layer in layers.items():
                 pyogrio.write_dataframe(layer, temporary, layer=name, driver="GPKG")
-        except (DataSourceError, OSError) as error:
+        except _WRITE_ERRORS as error:
             raise fail(OutputError, str(path), "a place that can be written", error) from error
 
 
 def _points(database: RadioRouteDatabase) -> gpd.GeoDataFrame:
-    table = gpd.read_parquet(database.path / "points.parquet")
+    columns = [*Points.__dataclass_fields__, "geometry"]
+    table = read_columns(database.path / POINTS, columns).to_pandas()
     for name in ("way_class", "best_server"):
         table[name] = table[name].astype(str)
-    return table.sort_values("point", ignore_index=True)
+    place = gpd.GeoSeries.from_wkb(table["geometry"])
+    frame = gpd.GeoDataFrame(table, geometry=place, crs=database.lattice.crs)
+    return frame.sort_values("point", ignore_index=True)
 
 
 def _cells(database: RadioRouteDatabase) -> gpd.GeoDataFrame:

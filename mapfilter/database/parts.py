@@ -12,7 +12,8 @@ import pyarrow.parquet as pq
 import shapely
 from numpy.typing import NDArray
 
-from mapfilter.database.store import POINTS, describe_part, levels_folder
+from mapfilter.database.columns import open_writer, write_columns
+from mapfilter.database.manifest import POINTS, describe_part, levels_folders
 from mapfilter.database.tiles import TileLevels
 from mapfilter.geodesy import Floats, Lattice
 from mapfilter.roads.geoparquet import dictionary, geo_metadata, point_geometry
@@ -103,6 +104,7 @@ class PartWriter:
 
     def __init__(self, folder: Path, crs: str, cell_ids: tuple[str, ...]) -> None:
         self._folder, self._crs, self._cell_ids = folder, crs, cell_ids
+        self._folders = levels_folders(cell_ids)
         self._points: list[pa.Table] = []
         self._levels: dict[int, list[pa.Table]] = {}
         self._waiting = 0
@@ -154,9 +156,7 @@ class PartWriter:
     def _write_points(self, table: pa.Table) -> None:
         table = table.replace_schema_metadata(None)
         if self._points_file is None:
-            self._points_file = pq.ParquetWriter(
-                self._folder / POINTS, table.schema, compression="zstd"
-            )
+            self._points_file = open_writer(table.schema, self._folder / POINTS)
         self._points_file.write_table(table, row_group_size=_ROWS_IN_A_GROUP)
         self._points_written += table.num_rows
         geometry = shapely.from_wkb(table["geometry"].to_numpy(zero_copy_only=False))
@@ -167,9 +167,9 @@ class PartWriter:
     def _write_levels(self, cell: int, table: pa.Table) -> None:
         cell_id = self._cell_ids[cell]
         written = self._written.setdefault(cell, [])
-        file = self._folder / levels_folder(cell_id) / f"part-{len(written)}.parquet"
+        file = self._folder / self._folders[cell_id] / f"part-{len(written)}.parquet"
         file.parent.mkdir(parents=True, exist_ok=True)
-        pq.write_table(table, file, compression="zstd", row_group_size=_ROWS_IN_A_GROUP)
+        write_columns(table, file, _ROWS_IN_A_GROUP)
         written.append(describe_part(self._folder, file, table.num_rows, cell_id))
 
 

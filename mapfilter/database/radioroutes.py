@@ -10,12 +10,13 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from mapfilter.database.columns import read_columns
 from mapfilter.database.field import RadioField as RadioField
 from mapfilter.database.field import fill_field
-from mapfilter.errors import InputError, fail
+from mapfilter.database.manifest import POINTS
+from mapfilter.errors import InputError, StoreError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
 
@@ -110,10 +111,16 @@ class RadioRouteDatabase:
 
     @cached_property
     def _points(self) -> Points:
-        table = pq.ParquetFile(self.path / "points.parquet").read(list(_POINT_COLUMNS))
+        file = self.path / POINTS
+        table = read_columns(file, _POINT_COLUMNS)
+        self._check_places(file, *(table[name].to_numpy() for name in ("point", "row", "col")))
         order = np.argsort(table["point"].to_numpy())
         server, names = _codes(table["best_server"])
-        rank = np.array([self.plan.index(name) for name in names], dtype=np.int32)
+        try:
+            rank = np.array([self.plan.index(name) for name in names], dtype=np.int32)
+        except InputError as error:
+            expected = "best servers among the cells"
+            raise fail(StoreError, str(file), expected, names, "parts mixed up") from error
         way_class, classes = _codes(table["way_class"])
         plain = table.drop_columns(["best_server", "way_class"])
         return Points(
@@ -220,20 +227,30 @@ class RadioRouteDatabase:
     ) -> tuple[NDArray[np.int64], Rows, Rows, Floats32, Floats32]:
         columns = ["point", "row", "col", "level_dbm", "below_best_db"]
         kinds = (np.int64, np.int32, np.int32, np.float32, np.float32)
-        tables = [pq.ParquetFile(part).read(columns) for part in self._parts.get(cell_id, ())]
+        tables = []
+        for part in self._parts.get(cell_id, ()):
+            tables.append(read_columns(part, columns))
+            self._check_places(part, *(tables[-1][name].to_numpy() for name in columns[:3]))
         point, row, col, level, below = (
             np.concatenate([np.empty(0, kind), *(table[name].to_numpy() for table in tables)])
             for name, kind in zip(columns, kinds, strict=True)
         )
         return point, row, col, level, below
 
+    def _check_places(self, file: Path, point: NDArray[np.int64], row: Rows, col: Rows) -> None:
+        """See that the points of a part lie on the lattice."""
+        numbers = row.astype(np.int64) * self.lattice.cols + col
+        if not (np.array_equal(point, numbers) and self.lattice.contains(row, col).all()):
+            expected = "points on the database's lattice"
+            raise fail(StoreError, str(file), expected, "others", "parts mixed up")
+
 
 _POINT_COLUMNS = tuple(Points.__dataclass_fields__)
 
 
 def _codes(column: Any) -> tuple[Rows, tuple[str, ...]]:
-    """Return codes and names of a dictionary-encoded column."""
-    joined = column.unify_dictionaries().combine_chunks()
+    """Return codes and names of a column of text."""
+    joined = column.dictionary_encode().unify_dictionaries().combine_chunks()
     if hasattr(joined, "chunks"):
         joined = joined.chunk(0)
     names = tuple(str(name) for name in joined.dictionary.to_pylist())

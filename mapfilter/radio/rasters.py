@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import rasterio
 from numpy.typing import NDArray
+from rasterio._err import CPLE_BaseError
 from rasterio.errors import RasterioError
 from rasterio.shutil import copy as copy_raster
 from rasterio.windows import Window
@@ -233,7 +234,7 @@ def write_rasters(
                 bands, temporary, driver="COG", compress="DEFLATE", predictor="YES",
                 blocksize=_BLOCK_PX, overview_resampling="average", bigtiff="if_safer",
             )  # fmt: skip
-        except RasterioError as error:
+        except (RasterioError, CPLE_BaseError) as error:
             raise fail(
                 OutputError, str(path), "a raster that can be written", reason(error)
             ) from error

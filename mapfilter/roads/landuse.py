@@ -8,42 +8,59 @@ from __future__ import annotations
 
 import csv
 import warnings
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import rasterio
 from numpy.typing import NDArray
-from rasterio.enums import Resampling
 from rasterio.errors import NotGeoreferencedWarning, RasterioError
-from rasterio.transform import Affine
-from rasterio.warp import reproject
+from rasterio.windows import Window
 
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
 
 _COLOUR = ("r", "g", "b")
-_OUTSIDE = -1
+_LARGEST_WINDOW_PX = 1 << 24
+_MOST_DIGITS = 10
+_ALIGNED_PX = 1e-3
 
 
-def read_landuse(path: Path | str, table_path: Path | str, lattice: Lattice) -> NDArray[np.bool_]:
+@dataclass(frozen=True, slots=True, eq=False)
+class LandUse:
+    """Where a land-use raster lets one be.
+
+    Parameters
+    ----------
+    walkable : numpy.ndarray of bool, shape (rows, cols) of the lattice
+    notes : tuple of str
+        What was done to the raster; empty when it lay on the lattice already.
+    """
+
+    walkable: NDArray[np.bool_]
+    notes: tuple[str, ...] = ()
+
+
+def read_landuse(path: Path | str, table_path: Path | str, lattice: Lattice) -> LandUse:
     """Return which lattice points lie in a walkable class of land use.
 
     Each lattice point takes the class of the pixel that holds it (nearest neighbour), whatever
-    the raster's resolution; points off the raster and no-data pixels are not walkable.
+    the raster's resolution; points off the raster and no-data pixels are not walkable. The raster
+    is read by windows of bounded size.
 
     Parameters
     ----------
     path : Path or str
         GeoTIFF or the like with one band of values or three of colours (8 bits each; a fourth
-        band is taken for transparency: 0 is no data), in the lattice's CRS.
+        band is taken for transparency: 0 is no data), in the lattice's CRS, north up.
     table_path : Path or str
         What values or colours mean.
     lattice : Lattice
 
     Returns
     -------
-    numpy.ndarray of bool, shape (lattice.rows, lattice.cols)
+    LandUse
 
     Raises
     ------
@@ -53,11 +70,11 @@ def read_landuse(path: Path | str, table_path: Path | str, lattice: Lattice) -> 
     """
     path = Path(path)
     keys, is_colour = _read_table(Path(table_path))
-    codes = _read_codes(path, lattice, colour=is_colour)
-    found, counts = np.unique(codes, return_counts=True)
+    codes, known, notes = _read_codes(path, lattice, colour=is_colour)
+    found, counts = np.unique(codes[known], return_counts=True)
     faults = Faults()
     for code, count in zip(found.tolist(), counts.tolist(), strict=True):
-        if code != _OUTSIDE and code not in keys:
+        if code not in keys:
             shown = f"value {code}"
             if is_colour:
                 shown = f"colour {code >> 16},{code >> 8 & 255},{code & 255}"
@@ -65,12 +82,12 @@ def read_landuse(path: Path | str, table_path: Path | str, lattice: Lattice) -> 
             faults.add(str(path), f"classes of {table_path}", f"{shown} at {count} points", hint)
     faults.raise_if_any(InputError)
     walkable = [code for code, (_, can_walk) in keys.items() if can_walk]
-    mask = np.isin(codes, walkable)
+    mask = np.isin(codes, walkable) & known
     if not mask.any():
-        got = "no point of the raster" if (codes == _OUTSIDE).all() else "none"
-        hint = "raster of another area" if (codes == _OUTSIDE).all() else "wrong table"
+        got = "none" if known.any() else "no point of the raster"
+        hint = "wrong table" if known.any() else "raster of another area"
         raise fail(InputError, str(path), "walkable points in the area", got, hint)
-    return mask
+    return LandUse(mask, notes)
 
 
 def _read_table(path: Path) -> tuple[dict[int, tuple[str, bool]], bool]:
@@ -106,7 +123,8 @@ def _code(row: dict[str, str], is_colour: bool, where: str, faults: Faults) -> i
     code = 0
     for name in _COLOUR if is_colour else ("value",):
         text = (row[name] or "").strip()
-        if not text.isdigit() or (is_colour and int(text) > 255):
+        is_number = text.isascii() and text.isdigit() and len(text) <= _MOST_DIGITS
+        if not is_number or (is_colour and int(text) > 255):
             expected = "a whole number in 0..255" if is_colour else "a whole number >= 0"
             faults.add(f"{where}, {name}", expected, repr(row[name]))
             return None
@@ -114,8 +132,10 @@ def _code(row: dict[str, str], is_colour: bool, where: str, faults: Faults) -> i
     return code
 
 
-def _read_codes(path: Path, lattice: Lattice, *, colour: bool) -> NDArray[np.int64]:
-    """Return the values or packed colours at the lattice points; -1 where there are none."""
+def _read_codes(
+    path: Path, lattice: Lattice, *, colour: bool
+) -> tuple[NDArray[np.integer[Any]], NDArray[np.bool_], tuple[str, ...]]:
+    """Return values or packed colours at the lattice points, which are known, and notes."""
     if not path.is_file():
         raise fail(InputError, str(path), "a raster file", "no such file", "a mistyped path")
     try:
@@ -123,15 +143,61 @@ def _read_codes(path: Path, lattice: Lattice, *, colour: bool) -> NDArray[np.int
             warnings.simplefilter("ignore", NotGeoreferencedWarning)
             with rasterio.open(path) as source:
                 _check_raster(source, path, lattice, colour)
-                bands = 3 if colour else 1
-                values = [_on_lattice(source, band, lattice) for band in range(1, bands + 1)]
-                known = np.all([_known(source, band, lattice) for band in range(1, bands + 1)], 0)
+                return *_at_points(source, lattice, colour=colour), _notes(source, path, lattice)
     except RasterioError as error:
         raise fail(InputError, str(path), "a readable raster", error, "cut off") from error
-    codes = values[0]
-    for band_values in values[1:]:
-        codes = codes * 256 + band_values
-    return np.where(known, codes, _OUTSIDE)
+
+
+def _at_points(
+    source: Any, lattice: Lattice, *, colour: bool
+) -> tuple[NDArray[np.integer[Any]], NDArray[np.bool_]]:
+    shape = lattice.rows, lattice.cols
+    kind = np.promote_types(np.int32 if colour else source.dtypes[0], np.uint8)
+    codes, known = np.zeros(shape, dtype=kind), np.zeros(shape, dtype=np.bool_)
+    rows, cols = _pixels(source, lattice)
+    on_rows = np.flatnonzero((rows >= 0) & (rows < source.height))
+    on_cols = np.flatnonzero((cols >= 0) & (cols < source.width))
+    if not (on_rows.size and on_cols.size):
+        return codes, known
+    bands = [1, 2, 3] if colour else [1]
+    left, width = int(cols[on_cols[0]]), int(np.ptp(cols[on_cols])) + 1
+    down_px = lattice.resolution_m / -source.transform.e
+    at_a_time = max(1, int(_LARGEST_WINDOW_PX / width / max(down_px, 1)))
+    for first in range(0, on_rows.size, at_a_time):
+        some = on_rows[first : first + at_a_time]
+        top, height = int(rows[some[0]]), int(np.ptp(rows[some])) + 1
+        window = Window(left, top, width, height)
+        wanted = np.ix_(rows[some] - top, cols[on_cols] - left)
+        values = [band[wanted] for band in source.read(bands, window=window)]
+        target = np.ix_(some, on_cols)
+        packed = values[0].astype(kind)
+        for band_values in values[1:]:
+            packed = packed * 256 + band_values
+        codes[target] = packed
+        known[target] = (source.read_masks(bands, window=window) > 0).all(axis=0)[wanted]
+    return codes, known
+
+
+def _pixels(source: Any, lattice: Lattice) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the raster's row of each row of the lattice, and its column of each column."""
+    east, _ = lattice.east_north(np.zeros(lattice.cols), np.arange(lattice.cols))
+    _, north = lattice.east_north(np.arange(lattice.rows), np.zeros(lattice.rows))
+    rows = np.floor((north - source.transform.f) / source.transform.e)
+    cols = np.floor((east - source.transform.c) / source.transform.a)
+    return rows.astype(np.int64), cols.astype(np.int64)
+
+
+def _notes(source: Any, path: Path, lattice: Lattice) -> tuple[str, ...]:
+    """Return a note when the pixels are not the lattice's own."""
+    pixel_m = np.array([source.transform.a, -source.transform.e])
+    shift_m = np.array([lattice.west_m - source.transform.c, source.transform.f - lattice.north_m])
+    shift_px = shift_m / lattice.resolution_m
+    own_size = np.allclose(pixel_m, lattice.resolution_m, rtol=1e-6, atol=0)
+    if own_size and np.abs(shift_px - np.round(shift_px)).max() < _ALIGNED_PX:
+        return ()
+    size = " x ".join(f"{side:g}" for side in np.unique(pixel_m))
+    points = f"points of a lattice of {lattice.resolution_m:g} m"
+    return (f"{path}: pixels of {size} m resampled to the {points} (nearest neighbour)",)
 
 
 def _check_raster(source: Any, path: Path, lattice: Lattice, colour: bool) -> None:
@@ -145,27 +211,8 @@ def _check_raster(source: Any, path: Path, lattice: Lattice, colour: bool) -> No
         faults.add(f"{path}, bands", expected, source.count, "table and raster of different kinds")
     elif not all(np.issubdtype(np.dtype(kind), np.integer) for kind in source.dtypes):
         faults.add(f"{path}, pixels", "whole numbers", source.dtypes[0], "a continuous quantity")
+    elif colour and set(source.dtypes) != {"uint8"}:
+        faults.add(f"{path}, pixels", "colours of 8 bits", source.dtypes[0])
+    if source.transform.b or source.transform.d or source.transform.e >= 0:
+        faults.add(f"{path}, pixels", "rows from north to south", "rotated or upside-down ones")
     faults.raise_if_any(InputError)
-
-
-def _on_lattice(source: Any, band: int, lattice: Lattice) -> NDArray[np.int64]:
-    return _nearest(source.read(band), source.transform, lattice)
-
-
-def _known(source: Any, band: int, lattice: Lattice) -> NDArray[np.bool_]:
-    return _nearest(source.read_masks(band) > 0, source.transform, lattice) > 0
-
-
-def _nearest(values: NDArray[Any], transform: Affine, lattice: Lattice) -> NDArray[np.int64]:
-    target = np.zeros((lattice.rows, lattice.cols), dtype=np.int64)
-    reproject(
-        values.astype(np.int64),
-        target,
-        src_transform=transform,
-        dst_transform=Affine.from_gdal(*lattice.gdal_transform),
-        src_crs=lattice.crs,
-        dst_crs=lattice.crs,
-        resampling=Resampling.nearest,
-        init_dest_nodata=False,
-    )
-    return target

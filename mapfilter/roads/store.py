@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from mapfilter._io import atomic_file
+from mapfilter._io import atomic_file, check_version
 from mapfilter.errors import MapfilterError, StoreError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.roads.geoparquet import dictionary, geo_metadata, point_geometry
@@ -95,8 +95,6 @@ def read_route_lattice(path: Path) -> RouteLattice:
 def _check_header(path: Path, header: Any, rows: int) -> None:
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise fail(StoreError, str(path), f"a {FORMAT}", "another Parquet file")
-    if header["version"] != VERSION:
-        hint = "written by a newer mapfilter; update it"
-        raise fail(StoreError, str(path), f"version {VERSION}", header["version"], hint)
+    check_version(str(path), header.get("version"), VERSION)
     if header["points"] != rows:
         raise fail(StoreError, str(path), f"{header['points']} points", rows, "cut off")

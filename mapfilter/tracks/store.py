@@ -15,7 +15,14 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from mapfilter._io import atomic_dir, read_json, sha256_file, write_json
+from mapfilter._io import (
+    atomic_dir,
+    check_replaceable,
+    check_version,
+    read_json,
+    sha256_file,
+    write_json,
+)
 from mapfilter.errors import Faults, InputError, StoreError, fail
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.schema import SCHEMA, TABLES
@@ -35,19 +42,16 @@ def write_log(log: TrackLog, folder: Path, format: Literal["parquet", "csv"] = "
     ----------
     log : TrackLog
     folder : Path
-        Replaced when it is there; must be absent, empty or a log.
+        Replaced when it is there; must be absent, empty or a log that mapfilter wrote.
     format : {"parquet", "csv"}
         Of the tables.
 
     Raises
     ------
     OutputError
-        The folder cannot be written.
-    InputError
-        The folder holds something else than a log.
+        The folder cannot be written, or holds files that no log of mapfilter lists.
     """
-    if folder.is_dir() and not is_log(folder) and any(folder.iterdir()):
-        raise fail(InputError, str(folder), "a track log, or nothing yet", "other files")
+    check_log_replaceable(folder)
     with atomic_dir(folder) as new:
         parts = []
         for table in TABLES:
@@ -109,6 +113,17 @@ def is_log(path: Path) -> bool:
     return (path / _HEAD).is_file()
 
 
+def check_log_replaceable(folder: Path) -> None:
+    """See that replacing a folder loses nothing but a log that mapfilter wrote.
+
+    Raises
+    ------
+    OutputError
+        It holds other files, a log made by hand among them.
+    """
+    check_replaceable(folder, _HEAD, FORMAT)
+
+
 def list_logs(path: Path) -> list[Path]:
     """Return the log that ``path`` is, or the logs that lie in it, by name.
 
@@ -132,12 +147,9 @@ def _arrow(table: str, rows: pd.DataFrame) -> pa.Table:
 
 
 def _check_head(head: dict[str, Any], where: str) -> None:
-    version = head.get("version", VERSION)
     if head.get("format", FORMAT) != FORMAT:
         raise fail(StoreError, f"{where}, format", FORMAT, head["format"])
-    if not isinstance(version, int) or version > VERSION:
-        hint = "written by a newer mapfilter"
-        raise fail(StoreError, f"{where}, version", f"at most {VERSION}", version, hint)
+    check_version(f"{where}, version", head.get("version", VERSION), VERSION)
     faults = Faults()
     for key in head:
         if key not in _KEYS:

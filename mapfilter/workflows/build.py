@@ -6,9 +6,10 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from mapfilter._io import ensure_writable_folder, sha256_file
+from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress, local_executor
 from mapfilter.database.build import BuildEstimate, build, dry_run
+from mapfilter.database.manifest import InputFile
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
 from mapfilter.radio.cells import CellPlan
@@ -34,6 +35,8 @@ class BuildResult:
         The folder.
     seconds : float
         Wall time.
+    notes : tuple of str
+        What was done to the inputs, such as a land-use raster resampled.
     """
 
     points: int
@@ -41,6 +44,7 @@ class BuildResult:
     routable_points: int
     database: Path
     seconds: float
+    notes: tuple[str, ...] = ()
 
 
 def run_build(config: Config, *, workers: int = 1, progress: Progress | None = None) -> BuildResult:
@@ -69,6 +73,7 @@ def run_build(config: Config, *, workers: int = 1, progress: Progress | None = N
             inputs=_inputs(config),
             attribution=ATTRIBUTION,
             executor=executor,
+            in_flight=2 * workers,
             progress=progress,
         )
     return BuildResult(
@@ -77,6 +82,7 @@ def run_build(config: Config, *, workers: int = 1, progress: Progress | None = N
         len(routes),
         target,
         time.perf_counter() - began_s,
+        world.landuse.notes if world.landuse is not None else (),
     )
 
 
@@ -138,8 +144,12 @@ def _cut(lattice: Lattice, area: Area, name: str) -> Lattice:
     return lattice.window(top, left, rows, cols)
 
 
-def _inputs(config: Config) -> dict[str, str]:
-    files = [resolve_map(config.area.map)]
-    given = (config.cells.plan, config.roads.landuse, config.roads.landuse_table)
-    files += [path for path in given if path is not None]
-    return {path.name: sha256_file(path) for path in files}
+def _inputs(config: Config) -> list[InputFile]:
+    roads = config.roads
+    found = [InputFile.of("map", resolve_map(config.area.map))]
+    if config.cells.plan is not None:
+        found.append(InputFile.of("plan", config.cells.plan))
+    if roads.landuse is not None and roads.landuse_table is not None:
+        found.append(InputFile.of("landuse", roads.landuse))
+        found.append(InputFile.of("landuse_table", roads.landuse_table))
+    return found

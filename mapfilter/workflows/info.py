@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from mapfilter.database.store import MANIFEST, info, open_database
+from mapfilter.database.manifest import MANIFEST
+from mapfilter.database.store import info, open_database
 from mapfilter.errors import InputError, fail
 from mapfilter.radio.rasters import open_rasters
 from mapfilter.tracks.schema import TABLES

@@ -17,7 +17,7 @@ from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel, level_sampler
 from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
-from mapfilter.tracks.store import is_log, write_log
+from mapfilter.tracks.store import check_log_replaceable, is_log, write_log
 from mapfilter.workflows.reality import check_reality
 from mapfilter.workflows.sections import Config
 from mapfilter.workflows.world import World
@@ -78,12 +78,13 @@ def run_simulate(config: Config, progress: Progress | None = None) -> SimulateRe
 
 
 def _check_replaceable(folder: Path) -> None:
-    """See that nothing but logs is lost when a folder is replaced."""
-    if folder.is_dir() and not all(is_log(path) for path in folder.iterdir()):
-        hint = "a mistyped path; simulated logs need a folder of their own"
-        raise fail(
-            OutputError, str(folder), "a folder of logs, or nothing yet", "other files", hint
-        )
+    """See that nothing but logs that mapfilter wrote is lost when a folder is replaced."""
+    for inner in sorted(folder.iterdir()) if folder.is_dir() else ():
+        if not is_log(inner):
+            expected = "a folder of logs, or nothing yet"
+            hint = "a mistyped path; simulated logs need a folder of their own"
+            raise fail(OutputError, str(folder), expected, f"other files ({inner.name})", hint)
+        check_log_replaceable(inner)
 
 
 def simulation_settings(config: Config) -> SimulationSettings:

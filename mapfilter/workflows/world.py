@@ -13,7 +13,7 @@ from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan, read_cell_plan
 from mapfilter.radio.msi import read_antennas
 from mapfilter.roads.buildings import rasterise_heights, read_buildings
-from mapfilter.roads.landuse import read_landuse
+from mapfilter.roads.landuse import LandUse, read_landuse
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.osm import read_squares, read_ways
 from mapfilter.roads.pbf import check_on_map, map_bounds_deg, resolve_map
@@ -148,12 +148,19 @@ class World:
         return read_ways(self.config.area.map, profile, self.lattice.crs, self.lattice.bounds_m)
 
     @cached_property
+    def landuse(self) -> LandUse | None:
+        """What the land-use raster says, where one is given."""
+        roads = self.config.roads
+        if roads.landuse is None or roads.landuse_table is None:
+            return None
+        return read_landuse(roads.landuse, roads.landuse_table, self.lattice)
+
+    @cached_property
     def routes(self) -> RouteLattice:
         """Where one can be: from the ways, or from a land-use raster."""
         roads = self.config.roads
-        if roads.landuse is not None and roads.landuse_table is not None:
-            landuse = read_landuse(roads.landuse, roads.landuse_table, self.lattice)
-            return route_lattice_from_landuse(landuse, self.lattice, self.ways)
+        if self.landuse is not None:
+            return route_lattice_from_landuse(self.landuse.walkable, self.lattice, self.ways)
         walking = roads.profile == "walking"
         squares = (
             read_squares(self.config.area.map, self.lattice.crs, self.lattice.bounds_m)

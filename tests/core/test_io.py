@@ -14,6 +14,7 @@ from mapfilter._io import (
     atomic_dir,
     atomic_file,
     ensure_writable_folder,
+    left_aside,
     read_json,
     sha256_file,
     write_json,
@@ -233,6 +234,8 @@ def test_a_process_killed_between_two_renames_loses_nothing(tmp_path):
     for state in ("old", "new"):
         (stale / state).mkdir(parents=True)
         (stale / state / "part").write_text(state)
+    assert left_aside(tmp_path / "folder") == stale / "old"
+    assert left_aside(tmp_path / "other") is None
     with pytest.raises(ValueError, match="again"), atomic_dir(tmp_path / "folder"):
         raise ValueError("again")
     assert read_folder(tmp_path / "folder") == {"part": "old"}

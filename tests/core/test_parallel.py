@@ -6,7 +6,7 @@ from concurrent.futures import Future
 import pytest
 
 from mapfilter._parallel import SerialExecutor, local_executor, ordered_results
-from mapfilter.errors import InputError, fail
+from mapfilter.errors import InputError, MapfilterError, fail
 
 
 def cube(number):
@@ -38,6 +38,21 @@ def test_an_error_comes_out_at_its_place_with_its_faults(workers):
         with pytest.raises(InputError) as caught:
             next(found)
     assert caught.value.faults[0].where == "task 3"
+
+
+def dies(number):
+    if number == 3:
+        os._exit(9)
+    return number
+
+
+@pytest.mark.parametrize("tasks", [4, 40])
+def test_a_worker_that_dies_is_told(tasks):
+    with (
+        pytest.raises(MapfilterError, match=r"worker processes.*one that died.*memory"),
+        local_executor(2) as executor,
+    ):
+        list(ordered_results(executor, dies, range(tasks), in_flight=4))
 
 
 class Counting(SerialExecutor):

@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_database, make_plan, make_world
 
+from mapfilter.database.manifest import apart, levels_folders
 from mapfilter.database.store import (
     export_geopackage,
     info,
-    levels_folder,
     open_database,
     read_cells,
     write_cells,
@@ -56,7 +56,7 @@ def test_one_cell_is_read_without_the_rest(copy):
     database = open_database(copy)
     (copy / "points.parquet").unlink()
     for cell in IDS[1:]:
-        shutil.rmtree(copy / levels_folder(cell), ignore_errors=True)
+        shutil.rmtree(copy / levels_folders([cell])[cell], ignore_errors=True)
     assert database.cell_points(IDS[0])[0].size > 0
 
 
@@ -68,7 +68,7 @@ def test_cells_survive_the_table(tmp_path):
 
 @given(st.text(min_size=1, max_size=128))
 def test_no_cell_id_leads_out_of_the_folder(cell_id):
-    folder = levels_folder(cell_id)
+    folder = levels_folders([cell_id])[cell_id]
     head, name = folder.split("/")
     assert head == "levels"
     assert 0 < len(name) <= 255
@@ -77,7 +77,15 @@ def test_no_cell_id_leads_out_of_the_folder(cell_id):
 
 def test_no_two_ids_share_a_folder():
     ids = ["a", "a.", "a%2E", "A b", "A+b", "é", "x" * 128, "ü" * 100, "ü" * 101]
-    assert len({levels_folder(i) for i in ids}) == len(ids)
+    assert len(set(levels_folders(ids).values())) == len(ids)
+
+
+def test_names_that_differ_in_case_only_are_kept_apart():
+    folders = levels_folders(["s1a", "S1A", "S2"])
+    assert folders["S2"] == "levels/S2"
+    assert len({folder.lower() for folder in folders.values()}) == 3
+    assert levels_folders(["S2", "S1A", "s1a"]) == folders
+    assert apart({"a": "x", "b": "y"}) == {"a": "x", "b": "y"}
 
 
 def test_a_missing_database(tmp_path):
@@ -94,18 +102,73 @@ def test_a_missing_database(tmp_path):
     ("changes", "message"),
     [
         ({"version": 2}, "newer"),
+        ({"version": 0}, "version 1, found 0 .likely: edited"),
+        ({"version": None}, "version 1, found None .likely: edited"),
         ({"format": "something else"}, "format"),
         ({"parts": []}, "points.parquet"),
         ({"parts": [{"path": "../../x", "bytes": 1}]}, "within the folder"),
         ({"parts": 5}, "edited or damaged"),
         ({"lattice": {}}, "edited or damaged"),
         ({"parameters": {}}, "edited or damaged"),
-        ({"cells": ["x"]}, "mixed up"),
+        ({"cells": ["x"]}, "a cell listed, found 'S1.A'"),
+        ({"cells": ["S1.B", "S1.A", "I 1"]}, "mixed up"),
+        ({"crs": "EPSG:32630"}, "crs: expected the lattice's CRS"),
     ],
 )
 def test_manifests_that_are_refused(copy, changes, message):
     change_manifest(copy, **changes)
     with pytest.raises(StoreError, match=message):
+        open_database(copy)
+
+
+@pytest.mark.parametrize(
+    "key", ["software", "crs", "attribution", "inputs", "counts", "parameters", "lattice", "parts"]
+)
+def test_a_manifest_that_lacks_a_field(copy, key):
+    manifest = json.loads((copy / "manifest.json").read_text())
+    del manifest[key]
+    (copy / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(StoreError, match=f"{key}: expected a value, found none"):
+        open_database(copy)
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "message"),
+    [
+        (("parts", 2, "rows"), "x", "parts.2.rows: expected a valid integer, found 'x'"),
+        (("parts", 2, "rows"), 1.5, "parts.2.rows: expected a valid integer, found 1.5"),
+        (("parts", 2, "rows"), True, "parts.2.rows"),
+        (("parts", 2, "rows"), 7, "part-0.parquet: expected 7 rows"),
+        (("parts", 2, "bytes"), -1, "parts.2.bytes"),
+        (("parts", 2, "sha256"), "abc", "parts.2.sha256"),
+        (("parts", 2, "cell"), "ZZ", "expected a cell listed, found 'ZZ'"),
+        (("parts", 2, "cell"), "I 1", "expected a part in levels/I%201 for cell 'I 1'"),
+        (("parts", 2, "cell"), None, "expected the cell whose part it is, found none"),
+        (("parts", 2, "path"), "points.parquet", "points.parquet once, found 2 times"),
+        (("parts", 1, "path"), "/etc/passwd", "expected a path within the folder"),
+        (("parameters", "margin_db"), float("nan"), "margin_db: expected a finite number"),
+        (("parameters", "margin_db"), "6", "margin_db: expected a valid number"),
+        (("lattice", "rows"), 0, "lattice.rows"),
+        (("lattice", "crs"), "EPSG:4326", "expected"),
+        (("counts", "points"), 1, "points.parquet: expected 1 rows"),
+        (("inputs", 0, "role"), "other", "inputs.0.role"),
+    ],
+)
+def test_a_manifest_with_a_wrong_value(copy, place, value, message):
+    manifest = json.loads((copy / "manifest.json").read_text())
+    within = manifest
+    for key in place[:-1]:
+        within = within[key]
+    within[place[-1]] = value
+    (copy / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(StoreError) as caught:
+        open_database(copy)
+    assert message in str(caught.value)
+
+
+def test_wrong_values_are_told_together(copy):
+    change_manifest(copy, software=3, counts={}, cells="A")
+    with pytest.raises(StoreError, match=r"(?s)software.*cells.*counts\.points:"):
         open_database(copy)
 
 
@@ -118,23 +181,13 @@ def test_a_manifest_that_is_cut_off(copy):
 
 def test_parts_missing_or_cut_off_are_all_named(copy):
     (copy / "points.parquet").unlink()
-    part = copy / levels_folder(IDS[0]) / "part-0.parquet"
+    part = copy / levels_folders([IDS[0]])[IDS[0]] / "part-0.parquet"
     part.write_bytes(part.read_bytes()[:-1])
     with pytest.raises(StoreError) as caught:
         open_database(copy)
     assert "points.parquet" in str(caught.value)
     assert "part-0.parquet" in str(caught.value)
     assert "cut off" in str(caught.value)
-
-
-def test_a_changed_byte_is_found_by_the_full_check(copy):
-    part = copy / levels_folder(IDS[1]) / "part-0.parquet"
-    content = bytearray(part.read_bytes())
-    content[len(content) // 2] ^= 1
-    part.write_bytes(bytes(content))
-    open_database(copy)
-    with pytest.raises(StoreError, match="SHA-256"):
-        open_database(copy, verify="full")
 
 
 def test_unknown_cells_and_odd_margins(database):

@@ -1,5 +1,7 @@
 """Classified rasters and their tables."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 import rasterio
@@ -35,30 +37,74 @@ def write(tmp_path):
 
 
 def test_values(write):
-    np.testing.assert_array_equal(read_landuse(*write(VALUES), LATTICE), VALUES != 2)
+    np.testing.assert_array_equal(read_landuse(*write(VALUES), LATTICE).walkable, VALUES != 2)
 
 
 def test_colours(write):
     bands = np.moveaxis(COLOURS[VALUES], -1, 0)
-    mask = read_landuse(*write(bands, table=COLOUR_TABLE), LATTICE)
+    mask = read_landuse(*write(bands, table=COLOUR_TABLE), LATTICE).walkable
     np.testing.assert_array_equal(mask, VALUES != 2)
 
 
 def test_finer_and_coarser_rasters_are_read_at_the_lattice_points(write):
     fine = Lattice(CRS, LATTICE.west_m, LATTICE.north_m, 1.0, 20, 30)
     files = write(np.kron(VALUES, np.ones((5, 5), np.uint8)), lattice=fine)
-    np.testing.assert_array_equal(read_landuse(*files, LATTICE), VALUES != 2)
+    np.testing.assert_array_equal(read_landuse(*files, LATTICE).walkable, VALUES != 2)
     coarse = Lattice(CRS, LATTICE.west_m, LATTICE.north_m, 10.0, 2, 3)
     files = write(VALUES[::2, ::2], lattice=coarse)
-    np.testing.assert_array_equal(read_landuse(*files, LATTICE), VALUES != 2)
+    np.testing.assert_array_equal(read_landuse(*files, LATTICE).walkable, VALUES != 2)
 
 
 def test_off_the_raster_and_no_data_are_not_walkable(write):
     part = Lattice(CRS, LATTICE.west_m + 5, LATTICE.north_m, 5.0, 4, 4)
-    mask = read_landuse(*write(VALUES[:, 1:5], lattice=part, nodata=3), LATTICE)
+    mask = read_landuse(*write(VALUES[:, 1:5], lattice=part, nodata=3), LATTICE).walkable
     expected = VALUES == 1
     expected[:, [0, 5]] = False
     np.testing.assert_array_equal(mask, expected)
+
+
+def test_resampling_is_told_and_alignment_is_not(write):
+    assert read_landuse(*write(VALUES), LATTICE).notes == ()
+    larger = Lattice(CRS, LATTICE.west_m - 10, LATTICE.north_m + 5, 5.0, 5, 8)
+    files = write(np.pad(VALUES, ((1, 0), (2, 0)), constant_values=1), lattice=larger)
+    assert read_landuse(*files, LATTICE).notes == ()
+    for west_m, size_m in ((LATTICE.west_m - 2.5, 5.0), (LATTICE.west_m, 10.0)):
+        files = write(VALUES, lattice=Lattice(CRS, west_m, LATTICE.north_m, size_m, 4, 6))
+        (note,) = read_landuse(*files, LATTICE).notes
+        assert f"landuse.tif: pixels of {size_m:g} m resampled" in note
+
+
+def test_a_value_below_zero_is_unknown_and_not_outside(write):
+    values = VALUES.astype(np.int16)
+    values[0, 0] = -1
+    with pytest.raises(InputError, match="value -1 at 1 points"):
+        read_landuse(*write(values), LATTICE)
+
+
+@pytest.mark.parametrize("rows_at_a_time", [1, 3, 1000])
+def test_windows_change_nothing(write, monkeypatch, rows_at_a_time):
+    rng = np.random.default_rng(4)
+    fine = Lattice(CRS, LATTICE.west_m - 3, LATTICE.north_m + 4, 0.7, 45, 60)
+    values = rng.integers(1, 4, (45, 60)).astype(np.uint8)
+    monkeypatch.setattr("mapfilter.roads.landuse._LARGEST_WINDOW_PX", 60 * 8 * rows_at_a_time)
+    found = read_landuse(*write(values, lattice=fine), LATTICE).walkable
+    row, col = np.divmod(np.arange(24), 6)
+    there = fine.row_col(*LATTICE.east_north(row, col))
+    np.testing.assert_array_equal(found.ravel(), values[there] != 2)
+
+
+def test_a_fine_raster_is_never_in_memory_as_a_whole(write, monkeypatch):
+    fine = Lattice(CRS, LATTICE.west_m, LATTICE.north_m, 0.01, 2000, 3000)
+    files = write(np.kron(VALUES, np.ones((500, 500), np.uint8)), lattice=fine)
+    monkeypatch.setattr("mapfilter.roads.landuse._LARGEST_WINDOW_PX", 1 << 16)
+    tracemalloc.start()
+    try:
+        found = read_landuse(*files, LATTICE).walkable
+        _, peak_bytes = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    np.testing.assert_array_equal(found, VALUES != 2)
+    assert peak_bytes < fine.rows * fine.cols / 2
 
 
 def test_unknown_values_and_colours_are_listed_with_their_counts(write):
@@ -80,6 +126,8 @@ def test_unknown_values_and_colours_are_listed_with_their_counts(write):
         ("", "no rows"),
         ("name,value\nstreet,1\n", "name, value"),
         ("class,value,walkable\nstreet,one,1\n", "row 2, value"),
+        ("class,value,walkable\nstreet,²,1\n", "row 2, value"),
+        (f"class,value,walkable\nstreet,{'9' * 5000},1\n", "row 2, value"),
         ("class,value,walkable\nstreet,1,yes\n", "row 2, walkable"),
         ("class,value,walkable\nstreet,1,1\npath,1,1\n", "row 3: .*again that of 'street'"),
         ("class,r,g,b,walkable\nstreet,1,2,300,1\n", "row 2, b"),
@@ -101,6 +149,14 @@ def test_rasters_that_do_not_fit(write, tmp_path):
         read_landuse(*write(VALUES, crs=None), LATTICE)
     with pytest.raises(InputError, match="continuous"):
         read_landuse(*write(VALUES.astype(np.float32)), LATTICE)
+    bands = np.moveaxis(COLOURS[VALUES], -1, 0).astype(np.uint16)
+    with pytest.raises(InputError, match="colours of 8 bits"):
+        read_landuse(*write(bands, table=COLOUR_TABLE), LATTICE)
+    path, table = write(VALUES)
+    with rasterio.open(path, "r+") as source:
+        source.transform = rasterio.Affine(5, 1, 531_000, 1, -5, 4_556_000)
+    with pytest.raises(InputError, match="rotated"):
+        read_landuse(path, table, LATTICE)
     far = Lattice(CRS, 600_000.0, 4_556_000.0, 5.0, 4, 6)
     with pytest.raises(InputError, match="another area"):
         read_landuse(*write(VALUES, lattice=far), LATTICE)

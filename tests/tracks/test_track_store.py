@@ -166,6 +166,13 @@ def test_a_newer_version_is_refused(log, tmp_path):
         read_log(tmp_path / "walk")
 
 
+@pytest.mark.parametrize("version", [None, 0, "1", True])
+def test_a_version_that_is_no_newer_one_is_not_called_newer(log, tmp_path, version):
+    damaged(log, tmp_path / "walk", lambda head: head.update(version=version))
+    with pytest.raises(StoreError, match=r"version 1, found .*edited or damaged"):
+        read_log(tmp_path / "walk")
+
+
 def test_another_format_is_refused(log, tmp_path):
     damaged(log, tmp_path / "walk", lambda head: head.update(format="mapfilter estimate"))
     with pytest.raises(StoreError, match="mapfilter track log"):
@@ -228,13 +235,27 @@ def test_finding_logs(log, tmp_path):
             read_log(path)
 
 
+def test_files_beside_a_log_and_logs_made_by_hand_are_not_replaced(log, tmp_path):
+    folder = tmp_path / "walk"
+    write_log(log, folder, "csv")
+    (folder / "notes.txt").write_text("mine")
+    with pytest.raises(OutputError, match=r"other files \(notes\.txt\)"):
+        write_log(log, folder)
+    assert (folder / "notes.txt").read_text() == "mine"
+    (folder / "notes.txt").unlink()
+    (folder / "log.json").write_text('{"crs": "EPSG:32629"}')
+    with pytest.raises(OutputError, match=r"gnss\.csv, log\.json"):
+        write_log(log, folder)
+    assert len(read_log(folder).motion) == 2
+
+
 def test_writing_replaces_a_log_and_nothing_else(log, tmp_path):
     write_log(log, tmp_path / "walk", "csv")
     write_log(log, tmp_path / "walk", "parquet")
     assert not (tmp_path / "walk" / "motion.csv").exists()
     (tmp_path / "photos").mkdir()
     (tmp_path / "photos" / "cat.jpg").write_bytes(b"cat")
-    with pytest.raises(InputError, match="other files"):
+    with pytest.raises(OutputError, match=r"other files \(cat\.jpg\)"):
         write_log(log, tmp_path / "photos")
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError):

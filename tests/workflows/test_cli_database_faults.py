@@ -2,6 +2,8 @@
 
 import errno
 import json
+import resource
+import shutil
 import subprocess
 import sys
 
@@ -48,10 +50,12 @@ def manifest(own_world):
     return change
 
 
-@pytest.mark.parametrize("version", [2, 99, "2", None])
-def test_another_version(version, own_world, manifest):
+@pytest.mark.parametrize(
+    ("version", "why"), [(2, "newer"), (99, "newer"), ("2", "edited"), (None, "edited")]
+)
+def test_another_version(version, why, own_world, manifest):
     manifest(version=version)
-    assert_all_refuse(own_world, f"manifest.json: expected version 1, found {version}", "newer")
+    assert_all_refuse(own_world, f"manifest.json: expected version 1, found {version}", why)
 
 
 def test_another_format(own_world, manifest):
@@ -59,7 +63,10 @@ def test_another_format(own_world, manifest):
     assert_all_refuse(own_world, "manifest.json: expected format", "found something else")
 
 
-@pytest.mark.parametrize("values", [{"parts": 3}, {"lattice": {}}, {"cells": ["A"]}, {"parts": []}])
+@pytest.mark.parametrize(
+    "values",
+    [{"parts": 3}, {"lattice": {}}, {"cells": ["A"]}, {"parts": []}, {"software": None}],
+)
 def test_a_manifest_that_was_edited(values, own_world, manifest):
     manifest(**values)
     assert_all_refuse(own_world, "manifest.json")
@@ -188,6 +195,32 @@ def test_a_folder_of_other_files_is_not_replaced(command, key, own_world):
     assert contents(own_world.folder) == before
 
 
+def test_a_database_path_that_also_holds_the_inputs(own_world):
+    before = contents(own_world.folder)
+    shutil.copytree(own_world.database, own_world.out, dirs_exist_ok=True)
+    shutil.rmtree(own_world.database)
+    before = contents(own_world.folder)
+    refused = mapfilter("build", "-c", own_world.toml, *settings(database__path=own_world.out))
+    assert_refused(refused, "out: expected a mapfilter radio-route database, or nothing yet")
+    assert contents(own_world.folder) == before
+
+
+def test_a_file_beside_the_tables_of_a_simulated_log(own_world):
+    notes = next(own_world.journeys.iterdir()) / "notes.txt"
+    notes.write_text("mine")
+    before = contents(own_world.folder)
+    assert_refused(mapfilter("simulate", "-c", own_world.toml), "other files (notes.txt)")
+    assert contents(own_world.folder) == before
+
+
+def test_a_log_made_by_hand_among_simulated_ones(own_world):
+    folder = own_world.journeys / "my-walk"
+    folder.mkdir()
+    (folder / "log.json").write_text('{"crs": "EPSG:32635"}')
+    assert_refused(mapfilter("simulate", "-c", own_world.toml), "my-walk", "other files (log.json)")
+    assert folder.is_dir()
+
+
 @pytest.mark.parametrize("name", ["x.gpk", "x", "x.tif", "x.GPKG.zip"])
 def test_export_to_another_kind_of_file(name, world, tmp_path):
     refused = mapfilter("export", world.database, "--to", tmp_path / name)
@@ -210,8 +243,32 @@ def test_a_full_disk(command, own_world, monkeypatch):
     monkeypatch.setattr("os.fsync", full)
     before = contents(own_world.folder)
     refused = mapfilter(command, "-c", own_world.toml)
-    assert_refused(refused, "the output: expected space on the disk, found none left")
+    told = "expected a place that can be written, found No space left on device"
+    assert_refused(refused, str(own_world.out), told)
+    assert ".partial" not in refused.err
     assert contents(own_world.folder) == before
+
+
+@pytest.mark.parametrize("command", ["predict", "build", "simulate", "replay", "export"])
+@pytest.mark.parametrize("limit_bytes", [500, 8_000, 50_000])
+def test_a_limit_on_the_size_of_files(command, limit_bytes, own_world):
+    """Every writer runs into it somewhere; none shows a traceback or leaves half a file."""
+    given = ["-c", own_world.toml]
+    if command == "export":
+        given = [own_world.database, "--to", own_world.folder / "x.gpkg"]
+    before = contents(own_world.database, own_world.journeys)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit_bytes, hard))
+    try:
+        outcome = mapfilter(command, *given)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    if outcome.code:
+        assert_refused(outcome, "written")
+        assert not list(own_world.folder.rglob("*.partial-*"))
+        assert contents(own_world.database, own_world.journeys) == before
+    else:
+        assert (command, limit_bytes) == ("simulate", 8_000) or limit_bytes == 50_000
 
 
 def test_interrupting_a_build_leaves_everything_as_it_was(own_world, monkeypatch):

@@ -117,8 +117,22 @@ def test_landuse_replaces_the_ways(own_world, landuse):
     _, _, given = landuse
     found = assert_done(mapfilter("build", "-c", own_world.toml, *given, "--json")).json
     assert found["points"] == 86 * 11
+    assert found["notes"] == []
     inputs = assert_done(mapfilter("info", own_world.database, "--json")).json["inputs"]
-    assert {"use.tif", "use.csv", "cells.csv"} < {entry["name"] for entry in inputs}
+    names = {entry["role"]: entry["name"] for entry in inputs}
+    assert names["landuse"] == "use.tif"
+    assert names["landuse_table"] == "use.csv"
+    assert names["plan"] == "cells.csv"
+    assert names["rasters"] == "rxlev.tif"
+
+
+def test_landuse_that_was_resampled_is_told(own_world, landuse):
+    raster, _, given = landuse
+    with rasterio.open(raster, "r+") as source:
+        west, north = source.transform.c, source.transform.f
+        source.transform = rasterio.Affine(6, 0, west, 0, -6, north)
+    found = assert_done(mapfilter("build", "-c", own_world.toml, *given, "--json")).json
+    assert "use.tif: pixels of 6 m resampled" in found["notes"][0]
 
 
 def test_landuse_of_another_crs_or_cut_off(own_world, landuse):

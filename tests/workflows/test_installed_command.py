@@ -49,7 +49,14 @@ def test_a_build_prints_nothing_but_its_json(command, own_world):
     done = command("build", "-c", own_world.toml, "--json")
     assert (done.returncode, done.stderr) == (0, "")
     (line,) = done.stdout.splitlines()
-    assert list(json.loads(line)) == ["points", "cells", "routable_points", "database", "seconds"]
+    assert list(json.loads(line)) == [
+        "points",
+        "cells",
+        "routable_points",
+        "database",
+        "seconds",
+        "notes",
+    ]
 
 
 def test_a_pipeline_runs_its_stages(own_world, tmp_path, capsys):

@@ -1,0 +1,66 @@
+"""Parquet parts whose pages carry checksums, so that a changed byte is an error when it is read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from mapfilter.errors import MapfilterError, StoreError, fail
+
+# A damaged footer or page header can ask for absurd amounts of memory or name other columns.
+_DAMAGE = (OSError, pa.ArrowException, ValueError, KeyError, MemoryError)
+
+
+def write_columns(table: pa.Table, path: Path, rows_in_a_group: int | None = None) -> None:
+    """Write a table as Parquet with page checksums."""
+    pq.write_table(
+        table, path, compression="zstd", row_group_size=rows_in_a_group, write_page_checksum=True
+    )
+
+
+def open_writer(schema: pa.Schema, path: Path) -> pq.ParquetWriter:
+    """Return a writer that adds row groups as :func:`write_columns` writes them."""
+    return pq.ParquetWriter(path, schema, compression="zstd", write_page_checksum=True)
+
+
+def read_columns(path: Path, columns: Sequence[str]) -> pa.Table:
+    """Read some columns of a part; the checksums of what is read are compared.
+
+    Raises
+    ------
+    StoreError
+        The part is missing or damaged, or has no such column.
+    """
+    try:
+        with pq.ParquetFile(path, page_checksum_verification=True) as source:
+            table = source.read(list(columns))
+        table.validate(full=True)
+    except _DAMAGE as error:
+        raise _damaged(path, error) from error
+    if missing := [name for name in columns if name not in table.column_names]:
+        raise fail(StoreError, str(path), f"column {missing[0]}", "none", "damaged")
+    return table.select(list(columns))
+
+
+def count_rows(path: Path) -> int:
+    """Return the number of rows that a part's footer tells.
+
+    Raises
+    ------
+    StoreError
+        The part is missing or damaged.
+    """
+    try:
+        return int(pq.read_metadata(path).num_rows)
+    except _DAMAGE as error:
+        raise _damaged(path, error) from error
+
+
+def _damaged(path: Path, error: Exception) -> MapfilterError:
+    if isinstance(error, FileNotFoundError):
+        return fail(StoreError, str(path), "a part of the database", "no such file")
+    said = (str(error).splitlines() or [type(error).__name__])[0]
+    return fail(StoreError, str(path), "a whole Parquet file", said, "damaged")

@@ -1,0 +1,220 @@
+"""The manifest of a database folder: what it must hold, and names that it gives to the parts."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Any, Literal
+from urllib.parse import quote
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+
+from mapfilter._io import check_version, read_json, sha256_file
+from mapfilter.errors import Fault, Faults, StoreError, fail
+
+FORMAT = "mapfilter radio-route database"
+VERSION = 1
+MANIFEST = "manifest.json"
+CELLS = "cells.parquet"
+POINTS = "points.parquet"
+
+InputRole = Literal["map", "plan", "landuse", "landuse_table", "rasters"]
+
+_LONGEST_NAME = 200
+_DAMAGED = "edited or damaged"
+
+
+@dataclass(frozen=True, slots=True)
+class InputFile:
+    """A file that a database was made from, for the record.
+
+    Parameters
+    ----------
+    role : {"map", "plan", "landuse", "landuse_table", "rasters"}
+    name : str
+        Its name without its folder.
+    sha256 : str
+    """
+
+    role: InputRole
+    name: str
+    sha256: str
+
+    @classmethod
+    def of(cls, role: InputRole, path: Path) -> InputFile:
+        """Return the record of a file."""
+        return cls(role, path.name, sha256_file(path))
+
+
+def _within(path: str) -> str:
+    place = PurePosixPath(path)
+    if place.is_absolute() or ".." in place.parts or "\0" in path:
+        raise ValueError("a path within the folder")
+    return path
+
+
+_Count = Annotated[int, Field(ge=0)]
+_Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(strict=True, frozen=True)
+
+
+class _Lattice(_Strict):
+    crs: str
+    west_m: FiniteFloat
+    north_m: FiniteFloat
+    resolution_m: Annotated[FiniteFloat, Field(gt=0)]
+    rows: Annotated[int, Field(ge=1)]
+    cols: Annotated[int, Field(ge=1)]
+
+
+class _Parameters(_Strict):
+    margin_db: Annotated[FiniteFloat, Field(ge=0)]
+    floor_dbm: FiniteFloat
+    tile_px: Annotated[int, Field(ge=1)]
+
+
+class _Input(_Strict):
+    role: InputRole
+    name: str
+    sha256: str
+
+
+class _Counts(_Strict):
+    points: _Count
+    points_below_floor: _Count
+    points_off_rasters: _Count
+
+
+class _Part(_Strict):
+    path: Annotated[str, AfterValidator(_within)]
+    rows: _Count
+    bytes: _Count
+    sha256: _Sha256
+    cell: str | None = None
+
+
+class _Manifest(_Strict):
+    software: str
+    crs: str
+    lattice: _Lattice
+    cells: Annotated[list[str], Field(min_length=1)]
+    parameters: _Parameters
+    attribution: str
+    inputs: list[_Input]
+    counts: _Counts
+    parts: list[_Part]
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Read the manifest of a database folder and check all of it.
+
+    Raises
+    ------
+    StoreError
+        It is missing, cut off, of a newer version or another format, or, with every fault, its
+        fields are not what a build writes or contradict each other.
+    """
+    file = folder / MANIFEST
+    manifest = read_json(file)
+    if manifest.get("format") != FORMAT:
+        raise fail(StoreError, str(file), f"format {FORMAT!r}", manifest.get("format"))
+    check_version(str(file), manifest.get("version"), VERSION)
+    try:
+        whole = _Manifest.model_validate(manifest)
+    except ValidationError as error:
+        raise StoreError(tuple(_fault(file, detail) for detail in error.errors())) from None
+    faults = Faults()
+    _check_together(whole, str(file), faults)
+    faults.raise_if_any(StoreError)
+    return manifest
+
+
+def levels_folders(cell_ids: Iterable[str]) -> dict[str, str]:
+    """Return each cell's folder within the database; no id leads out of it.
+
+    Ids that differ only in case get folders that differ in more, as not every disk tells cases
+    apart.
+
+    Examples
+    --------
+    >>> list(levels_folders(["S1A", "../x", "12.7"]).values())
+    ['levels/S1A', 'levels/%2E%2E%2Fx', 'levels/12%2E7']
+    """
+    escaped = {cell_id: _escaped(cell_id) for cell_id in cell_ids}
+    return {cell_id: f"levels/{name}" for cell_id, name in apart(escaped).items()}
+
+
+def apart(names: Mapping[str, str]) -> dict[str, str]:
+    """Return id -> name, with a suffix where names would differ in case only, or not at all.
+
+    Examples
+    --------
+    >>> apart({"a": "cell a", "b": "cell b"})
+    {'a': 'cell a', 'b': 'cell b'}
+    >>> apart({"a": "cell a", "A": "cell A"})
+    {'a': 'cell a-ca978112ca1b', 'A': 'cell A-559aead08264'}
+    """
+    times = Counter(name.casefold() for name in names.values())
+    return {
+        key: name if times[name.casefold()] == 1 else f"{name}-{_digest(key)[:12]}"
+        for key, name in names.items()
+    }
+
+
+def describe_part(folder: Path, file: Path, rows: int, cell: str | None = None) -> dict[str, Any]:
+    """Return a part's entry for the manifest."""
+    entry: dict[str, Any] = {"path": file.relative_to(folder).as_posix(), "rows": rows}
+    if cell is not None:
+        entry["cell"] = cell
+    return {**entry, "bytes": file.stat().st_size, "sha256": sha256_file(file)}
+
+
+def _escaped(cell_id: str) -> str:
+    name = quote(cell_id, safe="").replace(".", "%2E")
+    if len(name) > _LONGEST_NAME:
+        name = name[: _LONGEST_NAME // 2] + "-" + _digest(cell_id)
+    return name
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _fault(file: Path, detail: Mapping[str, Any]) -> Fault:
+    where = ", ".join([str(file), ".".join(str(key) for key in detail["loc"])])
+    if detail["type"] == "missing":
+        return Fault(where, "a value", "none", _DAMAGED)
+    expected = detail["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
+    return Fault(where, expected, repr(detail["input"])[:80], _DAMAGED)
+
+
+def _check_together(manifest: _Manifest, where: str, faults: Faults) -> None:
+    """Note what fields say against each other."""
+    if manifest.crs != manifest.lattice.crs:
+        faults.add(f"{where}, crs", "the lattice's CRS", manifest.crs, _DAMAGED)
+    folders = levels_folders(manifest.cells)
+    named = {CELLS: len(manifest.cells), POINTS: manifest.counts.points}
+    paths = Counter(part.path for part in manifest.parts)
+    for name in named:
+        if name not in paths:
+            faults.add(where, f"a part {name}", "none", _DAMAGED)
+    for path, times in paths.items():
+        if times > 1:
+            faults.add(where, f"part {path} once", f"{times} times", _DAMAGED)
+    for part in manifest.parts:
+        if part.cell is None:
+            if part.path not in named:
+                faults.add(f"{where}, {part.path}", "the cell whose part it is", "none", _DAMAGED)
+            elif part.rows != named[part.path]:
+                faults.add(f"{where}, {part.path}", f"{named[part.path]} rows", part.rows, _DAMAGED)
+        elif part.cell not in folders:
+            faults.add(f"{where}, {part.path}", "a cell listed", repr(part.cell), _DAMAGED)
+        elif PurePosixPath(part.path).parent != PurePosixPath(folders[part.cell]):
+            expected = f"a part in {folders[part.cell]} for cell {part.cell!r}"
+            faults.add(where, expected, part.path, _DAMAGED)

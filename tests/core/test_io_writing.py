@@ -1,0 +1,191 @@
+"""Errors of writing are told as such, links are followed, and nothing of others is replaced."""
+
+import errno
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mapfilter._io import atomic_dir, atomic_file, check_replaceable, check_version
+from mapfilter.errors import OutputError, StoreError
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def write_folder(path, text):
+    with atomic_dir(path) as folder:
+        (folder / "deep").mkdir()
+        (folder / "deep" / "part").write_text(text)
+
+
+def read_folder(path):
+    return {str(p.relative_to(path)): p.read_text() for p in path.rglob("*") if p.is_file()}
+
+
+def told(path, write):
+    with pytest.raises(OutputError) as caught:
+        write()
+    (fault,) = caught.value.faults
+    assert fault.where == str(path)
+    return fault
+
+
+def fails(atomic, path, error):
+    def write():
+        with atomic(path) as new:
+            (new if atomic is atomic_file else new / "part").write_text("half")
+            raise error
+
+    return write
+
+
+@pytest.mark.parametrize("atomic", [atomic_file, atomic_dir])
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO])
+def test_what_fails_while_writing_is_told(tmp_path, atomic, number):
+    path = tmp_path / "result"
+    fault = told(path, fails(atomic, path, OSError(number, os.strerror(number))))
+    assert fault.got == os.strerror(number)
+    assert names(tmp_path) == []
+
+
+def test_what_fails_within_the_new_folder_is_told_by_its_final_name(tmp_path):
+    def missing():
+        with atomic_dir(tmp_path / "folder") as new:
+            (new / "none" / "part").write_text("")
+
+    told(tmp_path / "folder", missing)
+
+    def nested():
+        with (
+            atomic_dir(tmp_path / "folder") as new,
+            atomic_file(new / "deep" / "part"),
+        ):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    told(tmp_path / "folder" / "deep" / "part", nested)
+
+
+@pytest.mark.parametrize("atomic", [atomic_file, atomic_dir])
+def test_what_fails_while_reading_something_else_is_not_called_an_output_error(tmp_path, atomic):
+    missing = FileNotFoundError(errno.ENOENT, "No such file", str(tmp_path / "input"))
+    for error in (missing, BrokenPipeError(errno.EPIPE, "Broken pipe")):
+        with pytest.raises(type(error)):
+            fails(atomic, tmp_path / "result", error)()
+
+
+def test_a_file_size_limit_is_told(tmp_path):
+    code = """
+import resource, sys
+from pathlib import Path
+from mapfilter._io import atomic_file
+from mapfilter.errors import OutputError
+resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+try:
+    with atomic_file(Path(sys.argv[1])) as new:
+        new.write_bytes(bytes(5000))
+except OutputError as error:
+    print(error)
+"""
+    run = subprocess.run([sys.executable, "-c", code, str(tmp_path / "f")],
+                         capture_output=True, text=True, check=True)  # fmt: skip
+    assert "found File too large" in run.stdout
+    assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("dangling", [False, True])
+def test_output_through_a_link_replaces_what_it_leads_to(tmp_path, dangling):
+    disk, here = tmp_path / "disk", tmp_path / "here"
+    disk.mkdir()
+    here.mkdir()
+    (here / "file").symlink_to(disk / "big file")
+    (here / "folder").symlink_to(Path("..") / "disk" / "big folder")
+    if not dangling:
+        (disk / "big file").write_text("old")
+        write_folder(disk / "big folder", "old")
+    with atomic_file(here / "file") as temporary:
+        assert temporary.name == "file"
+        temporary.write_text("new")
+    write_folder(here / "folder", "new")
+    assert (here / "file").is_symlink()
+    assert (here / "folder").is_symlink()
+    assert (disk / "big file").read_text() == "new"
+    assert read_folder(disk / "big folder") == {"deep/part": "new"}
+    assert names(disk) == ["big file", "big folder"]
+    assert names(here) == ["file", "folder"]
+
+
+def test_files_and_folders_are_on_the_disk_before_and_after_the_rename(tmp_path, monkeypatch):
+    synced = []
+    fsync = os.fsync
+
+    def noted(handle):
+        synced.append(Path(f"/proc/self/fd/{handle}").readlink().name)
+        fsync(handle)
+
+    monkeypatch.setattr(os, "fsync", noted)
+    write_folder(tmp_path / "folder", "text")
+    assert synced == ["deep", "part", "new", tmp_path.name]
+    synced.clear()
+    with atomic_file(tmp_path / "file") as temporary:
+        temporary.write_text("")
+    assert synced == ["file", tmp_path.name]
+
+
+def test_folders_that_cannot_be_synced_are_let_go(tmp_path, monkeypatch):
+    fsync = os.fsync
+
+    def only_files(handle):
+        if Path(f"/proc/self/fd/{handle}").is_dir():
+            raise OSError(errno.EINVAL, "Invalid argument")
+        fsync(handle)
+
+    monkeypatch.setattr(os, "fsync", only_files)
+    write_folder(tmp_path / "folder", "text")
+    assert read_folder(tmp_path / "folder") == {"deep/part": "text"}
+
+
+HEAD = '{"format": "a thing", "parts": [{"path": "one"}, {"path": "deep/two"}, 3, {}]}'
+
+
+@pytest.mark.parametrize(
+    ("files", "foreign"),
+    [
+        ({}, None),
+        ({"head.json": HEAD, "one": "", "deep/two": ""}, None),
+        ({"head.json": HEAD, "one": "", "deep/three": ""}, "deep/three"),
+        ({"head.json": HEAD, ".hidden": ""}, ".hidden"),
+        ({"head.json": '{"format": "other", "parts": []}'}, "head.json"),
+        ({"head.json": '{"format": "a thing"}'}, "head.json"),
+        ({"head.json": HEAD[:20], "one": ""}, "head.json, one"),
+        ({"a": "", "b": "", "c": "", "d": ""}, "a, b, c, …"),
+    ],
+)
+def test_only_what_a_head_lists_may_be_replaced(tmp_path, files, foreign):
+    folder = tmp_path / "folder"
+    check_replaceable(folder, "head.json", "a thing")
+    (folder / "deep").mkdir(parents=True)
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    if foreign is None:
+        check_replaceable(folder, "head.json", "a thing")
+    else:
+        fault = told(folder, lambda: check_replaceable(folder, "head.json", "a thing"))
+        assert fault.got == f"other files ({foreign})"
+
+
+def test_a_link_in_a_folder_is_somebody_elses(tmp_path):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder" / "link").symlink_to(tmp_path)
+    told(tmp_path / "folder", lambda: check_replaceable(tmp_path / "folder", "head.json", "x"))
+
+
+def test_versions():
+    check_version("x", 1, 1)
+    for found, hint in ((2, "newer"), (0, "edited"), (None, "edited"), ("2", "edited"),
+                        (True, "edited"), (1.5, "edited")):  # fmt: skip
+        with pytest.raises(StoreError, match=hint):
+            check_version("x", found, 1)
