@@ -19,6 +19,7 @@ Floats = NDArray[np.float64]
 
 _CHUNK = 4096
 _LEARNT_FROM = 250
+_LEARNT_FROM_CELLS = 40
 _BOUNDS = np.log([[1.0, 400.0], [10.0, 1000.0], [0.5, 200.0]])
 _SOFTENING_M = 20.0
 _PRIOR_WEIGHT = 4.0
@@ -55,14 +56,14 @@ def learn_shadowing(
     Parameters
     ----------
     points, trends : sequences of equal length
-        One of each per cell.
+        One of each per cell. The 40 cells with the most points are taken.
     start : Shadowing
         Also the answer when no cell has two points.
     """
     processes = []
-    for some, trend in zip(points, trends, strict=True):
-        if len(some) < 2:
-            continue
+    pairs = [pair for pair in zip(points, trends, strict=True) if len(pair[0]) > 1]
+    pairs.sort(key=lambda pair: -len(pair[0]))
+    for some, trend in pairs[:_LEARNT_FROM_CELLS]:
         thin = some.thinned(_LEARNT_FROM)
         residual_db = thin.level_dbm - trend.level_dbm(thin.east_m, thin.north_m)
         process = GaussianProcessRegressor(start.kernel, optimizer=None)
@@ -116,42 +117,58 @@ class GaussianField:
 class NeighbourField:
     """The distance-weighted mean of the nearest points' residuals about a trend.
 
-    The deviation comes from how well each of those points is told by its own neighbours, drawn
-    towards that of all points where there are few.
+    The deviation comes from how well each of those points is told by its neighbours of other
+    sessions, drawn towards that of all points where there are few.
     """
 
     def __init__(self, points: Points, trend: Trend, shadowing: Shadowing, neighbours: int) -> None:
         self._trend = trend
-        self._count = min(neighbours, len(points))
-        self._search = NearestNeighbors(n_neighbors=self._count).fit(points.places)
         self._residual_db = points.level_dbm - trend.level_dbm(points.east_m, points.north_m)
-        variance_db2 = shadowing.variance_db2 + shadowing.noise_db2
-        self._squared_db2 = np.full(len(points), variance_db2)
-        if len(points) > 1:
-            # Without an argument, scikit-learn leaves each point out of its own neighbours.
-            distance_m, index = self._search.kneighbors(
-                n_neighbors=min(self._count, len(points) - 1)
-            )
-            told = np.average(
-                self._residual_db[index], axis=1, weights=1 / (distance_m + _SOFTENING_M)
-            )
-            self._squared_db2 = (self._residual_db - told) ** 2
-            variance_db2 = float(self._squared_db2.mean())
-        self._overall_db2 = variance_db2
+        self._near = _Nearest(points.places, self._residual_db, neighbours)
+        self._squared_db2 = np.full(
+            len(points), shadowing.variance_db2 + shadowing.noise_db2, dtype=np.float64
+        )
+        sessions = np.unique(points.session)
+        for session in sessions if len(sessions) > 1 else ():
+            out = points.session == session
+            others = _Nearest(points.places[~out], self._residual_db[~out], neighbours)
+            self._squared_db2[out] = (
+                self._residual_db[out] - others.mean(points.places[out])[0]
+            ) ** 2
+        if len(sessions) == 1 and len(points) > 1:
+            self._squared_db2 = (self._residual_db - self._near.mean(None)[0]) ** 2
+        self._overall_db2 = float(self._squared_db2.mean())
 
     def predict(self, east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
         """Return the mean level and the deviation of a new reading at places."""
         mean_dbm = self._trend.level_dbm(east_m, north_m)
         if not len(east_m):
             return mean_dbm, mean_dbm
-        distance_m, index = self._search.kneighbors(np.column_stack([east_m, north_m]))
-        weights = 1 / (distance_m + _SOFTENING_M)
-        mean_dbm += np.average(self._residual_db[index], axis=1, weights=weights)
+        told_db, index, weights = self._near.mean(np.column_stack([east_m, north_m]))
         own_db2 = np.average(self._squared_db2[index], axis=1, weights=weights)
-        variance_db2 = (self._count * own_db2 + _PRIOR_WEIGHT * self._overall_db2) / (
-            self._count + _PRIOR_WEIGHT
+        count = index.shape[1]
+        variance_db2 = (count * own_db2 + _PRIOR_WEIGHT * self._overall_db2) / (
+            count + _PRIOR_WEIGHT
         )
-        return mean_dbm, np.sqrt(variance_db2)
+        return mean_dbm + told_db, np.sqrt(variance_db2)
+
+
+class _Nearest:
+    def __init__(self, places: Floats, values: Floats, neighbours: int) -> None:
+        count = min(neighbours, len(places))
+        self._search = NearestNeighbors(n_neighbors=count).fit(places)
+        self._values = values
+
+    def mean(self, places: Floats | None) -> tuple[Floats, NDArray[np.int64], Floats]:
+        """Return weighted means, and the neighbours and weights behind them.
+
+        Without places: at each of its own points, from the others.
+        """
+        most = len(self._values) - (places is None)
+        count = min(self._search.n_neighbors, most)
+        distance_m, index = self._search.kneighbors(places, n_neighbors=count)
+        weights = 1 / (distance_m + _SOFTENING_M)
+        return np.average(self._values[index], axis=1, weights=weights), index, weights
 
 
 class TrendField:

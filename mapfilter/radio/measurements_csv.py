@@ -22,6 +22,7 @@ FIELDS = (
 )  # fmt: skip
 """What a column map may name."""
 _IDENTITY = ("mcc", "mnc", "lac", "ci")
+_REQUIRED = ("lat", "lon", "level_dbm")
 _WITHOUT_IDENTITY = "rows of cells without identity"
 
 
@@ -41,7 +42,7 @@ class Dialect:
 
     columns: Mapping[str, tuple[str, ...]]
     technology: str = ""
-    required: tuple[str, ...] = ("lat", "lon", "level_dbm")
+    required: tuple[str, ...] = _REQUIRED
 
 
 PLAIN = Dialect({name: (name,) for name in FIELDS})
@@ -53,6 +54,7 @@ OPENCELLID = Dialect(
         "accuracy_m": ("rating",),
     },
     technology="act",
+    required=(*_REQUIRED, *_IDENTITY),
 )  # fmt: skip
 """The CSV that OpenCellID takes, as uploaders write it; levels in dBm or as ASU."""
 TOWER_COLLECTOR = Dialect(
@@ -60,7 +62,8 @@ TOWER_COLLECTOR = Dialect(
         "mcc": ("mcc",), "mnc": ("mnc",), "lac": ("lac",), "ci": ("cell_id",),
         "lat": ("lat",), "lon": ("lon",), "level_dbm": ("dbm",), "time": ("measured_at",),
         "accuracy_m": ("accuracy",),
-    }
+    },
+    required=(*_REQUIRED, *_IDENTITY),
 )  # fmt: skip
 """What Tower Collector exports."""
 DIALECTS: Mapping[str, Dialect] = {
@@ -78,7 +81,7 @@ def mapped(columns: Mapping[str, str]) -> Dialect:
         Field (one of :data:`FIELDS`) to the name of its column.
     """
     named = {name: (column,) for name, column in columns.items()}
-    return Dialect({**PLAIN.columns, **named}, required=(*PLAIN.required, *columns))
+    return Dialect({**PLAIN.columns, **named}, required=(*_REQUIRED, *columns))
 
 
 def read_csv(path: Path, dialect: Dialect) -> Rows:
@@ -226,7 +229,8 @@ def _places(path: Path, header: list[str], dialect: Dialect) -> dict[str, tuple[
             near = difflib.get_close_matches(columns.lower(), header, n=1, cutoff=0.5)
             expected = f"a column {columns}" + (f" for {name}" if columns != name else "")
             faults.add(where, expected, "none", f"{near[0]} meant" if near else "")
-    if not places.get("cell") and not all(places.get(name) for name in _IDENTITY):
+    told = set(_IDENTITY) <= set(dialect.required)
+    if not (told or places.get("cell") or all(places.get(name) for name in _IDENTITY)):
         faults.add(where, "a column cell, or mcc, mnc, lac and ci", "none", "name the columns")
     for column in {header[place] for some in places.values() for place in some}:
         if header.count(column) > 1:

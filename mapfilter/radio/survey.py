@@ -133,7 +133,7 @@ class SurveyedCell:
     def predict(self, east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
         """Return the mean level (dBm) and the deviation (dB) of a new reading at places."""
         # Threads make small matrices slower, and their sums depend on how many there are.
-        with threadpool_limits(1, "blas"):
+        with threadpool_limits(1):
             return self.field.predict(east_m, north_m)
 
 
@@ -185,7 +185,7 @@ def fit_survey(
     InputError
         No cell was heard often enough.
     """
-    with threadpool_limits(1, "blas"):
+    with threadpool_limits(1):
         return _fit(measurements, options, plan, predicted)
 
 

@@ -17,6 +17,7 @@ from mapfilter.radio.survey import SurveyOptions, fit_survey
 
 _MOST_FOLDS = 20
 _PARTS_OF_ONE_SESSION = 5
+_WITHIN_1 = 0.6827
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,8 @@ class Validation:
     within_1_deviation, within_2_deviations : float
         Share of the errors within so many predicted deviations; 0.68 and 0.95 when they are right.
     deviation_factor : float
-        What to multiply the predicted deviations by so that the mean squared ratio of error to
-        deviation is 1; 1 where nothing was told.
+        What to multiply the predicted deviations by so that 68 % of the errors are within one; 1
+        where nothing was told.
     """
 
     folds: int
@@ -104,7 +105,7 @@ def cross_validate(
         _mean(error_db),
         _mean(np.abs(error_db) <= deviation_db),
         _mean(np.abs(error_db) <= 2 * deviation_db),
-        _rms(error_db / deviation_db) if len(table) else 1.0,
+        float(np.quantile(np.abs(error_db) / deviation_db, _WITHIN_1)) if len(table) else 1.0,
     )
 
 

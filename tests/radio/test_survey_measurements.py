@@ -1,0 +1,278 @@
+"""Reading measurements: every dialect, and bad rows that lose nothing but themselves."""
+
+import math
+
+import numpy as np
+import pytest
+from fuzz import fuzz
+
+from mapfilter.errors import InputError
+from mapfilter.radio._measurement_rows import unix_seconds
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.radio.measurements import named_after, read_measurements
+from mapfilter.radio.measurements_antennas import read_antennas_log
+from mapfilter.radio.measurements_csv import DIALECTS, read_csv
+
+OPENCELLID = """\
+mcc,mnc,lac,cellid,lat,lon,signal,measured_at,rating,speed,direction,act,ta,psc,tac,pci,sid,nid,bid
+302,720,29100,8302920,45.4110995,-75.7054742,-73,1599319703000,50.9,0.33,317.3,LTE+,0,,29100,449,,,
+302,720,29100,8302920,45.4111200,-75.7054900,-75,1599319709000,12.5,0.33,317.3,LTE+,1,,29100,449,,,
+302,720,,8302871,45.4121200,-75.7064900,-91,1599319715000,9.5,1.33,317.3,LTE+,1,,29100,457,,,
+302,720,29100,8302871,45.4122200,-75.7065900,49,1599319721000,9.5,1.33,317.3,LTE,1,,29100,457,,,
+"""
+TOWER_COLLECTOR = """\
+mcc,mnc,lac,cell_id,psc,asu,dbm,ta,lat,lon,accuracy,speed,bearing,altitude,measured_at,net_type,\
+neighboring,device\r
+260,2,39030,55321,-1,14,-85,3,52.2296756,21.0122287,8.5,1.2,90,110,"2020-09-05T11:49:30.250Z",GSM,\
+false,"Acme, One"\r
+260,2,39030,55322,-1,10,-93,,52.2296756,21.0122287,8.5,1.2,90,110,"2020-09-05T11:49:30.250Z",GSM,\
+true,"Acme, One"\r
+,,,,200,20,-73,,52.2296756,21.0122287,8.5,1.2,90,110,"2020-09-05T11:49:30.250Z",UMTS,true,"Acme"\r
+"""
+ANTENNAS = """\
+BEGIN,2014-09-24 19:30:37:883 GMT+05:30
+Antennas,  Build=0105, API=2
+
+Record, Time="2014-09-24 19:30:40:62 GMT+05:30", Phone Type=GSM, Country=in, Operator=40492
+ACTIVE GSM, LAC=1377, CID=3532, Signal= -67dBm
+GSM, LAC=1377, CID=3514, PSC=-1, TYP=1, Signal= -77dBm
+GSM, LAC=-1, CID=-1, PSC=-1, TYP=1, Signal= -79dBm
+Network Location, Provider=N, Lat=19.132124, Lon=72.906728
+Best Location, Provider=N, Lat=19.132124, Lon=72.906728
+
+Record, Time="2014-09-24 19:30:43:923 GMT+05:30", Phone Type=GSM, Country=in, Operator=40492
+ACTIVE GSM, LAC=1377, CID=3532, Signal= >-52dBm
+Best Location, Provider=N, Lat=19.132224, Lon=72.906828
+"""
+PLAIN = "cell,lat,lon,level_dbm,time,accuracy_m\n" + "".join(
+    f"A,60.17{i:02d},24.94{i:02d},-{70 + i},{1_600_000_000 + 5 * i},10\n" for i in range(20)
+)
+
+
+def write(folder, text, name="drive.csv"):
+    path = folder / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def refused(path, **kwargs):
+    with pytest.raises(InputError) as error:
+        read_measurements([path], **kwargs)
+    return str(error.value)
+
+
+def test_opencellid_upload(tmp_path):
+    found = read_measurements([write(tmp_path, OPENCELLID)])
+    assert found.crs == "EPSG:32618"
+    assert found.cell_ids == ("302-720-29100-8302871", "302-720-29100-8302920")
+    assert found.identities["302-720-29100-8302871"] == (302, 720, 29100, 8302871)
+    np.testing.assert_array_equal(found.level_dbm, [-73, -75, -91, 49 - 140])
+    np.testing.assert_array_equal(found.cell, [1, 1, 0, 0])
+    np.testing.assert_allclose(np.diff(found.time_s), 6)
+    assert found.time_s[0] == 1599319703
+    assert found.accuracy_m[0] == 50.9
+    assert found.notes == ("drive.csv: 1 levels given as ASU (turned into dBm)",)
+    assert len(found.accurate(50.0)) == 3
+
+
+def test_tower_collector_export(tmp_path):
+    found = read_measurements([write(tmp_path, TOWER_COLLECTOR)])
+    assert found.cell_ids == ("260-2-39030-55321", "260-2-39030-55322")
+    np.testing.assert_array_equal(found.level_dbm, [-85, -93])
+    assert found.time_s[0] == pytest.approx(1599306570.25)
+    assert found.notes == ("drive.csv: 1 rows of cells without identity",)
+
+
+def test_antennas_log(tmp_path):
+    found = read_measurements([write(tmp_path, ANTENNAS, "walk.log")])
+    assert found.cell_ids == ("404-92-1377-3514", "404-92-1377-3532")
+    np.testing.assert_array_equal(found.level_dbm, [-67, -77])
+    assert found.time_s[0] == pytest.approx(unix_seconds("2014-09-24T14:00:40.062Z"))
+    assert set(found.notes) == {
+        "walk.log: 1 rows of cells without identity",
+        "walk.log: 1 levels that are only bounds (>)",
+    }
+
+
+def test_a_log_without_its_last_position_refuses_only_that_record(tmp_path):
+    cut = ANTENNAS[: ANTENNAS.rindex("Best Location")]
+    found = read_measurements([write(tmp_path, cut, "walk.log")])
+    assert len(found) == 2
+    assert any("1 of 4 rows left out: " in n and "Best Location" in n for n in found.notes)
+
+
+def test_column_map_semicolons_and_decimal_commas(tmp_path):
+    text = "Zeit;Breite;Laenge;RSRP;Zelle;Fahrt\n" + "".join(
+        f"2024-05-0{d}T10:00:0{s};50,11{s};8,68{s};-8{s},5;Z1;Tag {d}\n"
+        for d in (1, 2)
+        for s in range(3)
+    )
+    columns = {
+        "lat": "Breite", "lon": "Laenge", "level_dbm": "RSRP", "cell": "Zelle", "time": "Zeit",
+        "session": "Fahrt",
+    }  # fmt: skip
+    found = read_measurements([write(tmp_path, text)], columns=columns)
+    np.testing.assert_array_equal(found.level_dbm, [-80.5, -81.5, -82.5] * 2)
+    assert len(found.sessions) == 2
+    np.testing.assert_array_equal(found.session, [0, 0, 0, 1, 1, 1])
+
+
+@pytest.mark.parametrize(
+    ("row", "told"),
+    [
+        ("A,60.1,24.9,-70,1600000000", "fields: expected 6, found 5 (likely: a line cut off)"),
+        ("A,60.1,24.9,-70,1600000000,10,7", "found 7 (likely: a separator in a field)"),
+        ("A,sixty,24.9,-70,,", "lat: expected a number, found 'sixty'"),
+        ("A,60.1,,-70,,", "lon: expected a number, found nothing"),
+        ("A,60.1,24.9,nan,,", "level_dbm: expected a number"),
+        ("A,60.1,24.9,1e999,,", "level_dbm: expected a number"),
+        ("A,60.1,24.9,31,,", "(likely: RXLEV or ASU given for dBm)"),
+        ("A,60.1,24.9,2147483647,,", "the marker of a level that was not available"),
+        ("A,60.1,24.9,-400,,", "level_dbm: expected dBm in -170..-10"),
+        ("A,124.9,60.1,-70,,", "(likely: latitude and longitude swapped)"),
+        ("A,6673000,385000,-70,,", "(likely: metres given for degrees)"),
+        ("A,0,0,-70,,", "(likely: no fix yet)"),
+        ("../x,60.1,24.9,-70,,", "row 12, cell: expected an id"),
+        ('"A,60.1,24.9,-70,,', "fields: expected 6, found 1"),
+        ("x" * 70_000, "line: expected at most 65536 characters"),
+        ("A,60.1\0,24.9,-70,,", "lat: expected a number"),
+        ("A,60.1\udcff,24.9,-70,,", "lat: expected a number"),
+    ],
+)
+def test_one_bad_row_is_counted_located_told_and_loses_nothing_else(tmp_path, row, told):
+    lines = PLAIN.splitlines()
+    lines.insert(11, row)
+    text = "\n".join(lines).encode(errors="surrogateescape")
+    found = read_measurements([write(tmp_path, text)])
+    assert len(found) == 20
+    (note,) = found.notes
+    assert note.startswith("drive.csv: 1 of 21 rows left out: ")
+    assert "row 12, " in note
+    assert told in note
+
+
+def test_a_bad_time_or_accuracy_costs_only_itself(tmp_path):
+    text = PLAIN + "A,60.18,24.95,-80,yesterday,10\nA,60.181,24.951,-81,-5,wide\n"
+    found = read_measurements([write(tmp_path, text)])
+    assert len(found) == 22
+    assert np.isnan(found.time_s[-2:]).all()
+    assert math.isnan(found.accuracy_m[-1])
+    assert found.notes == ("drive.csv: 2 times not understood (levels kept)",)
+
+
+def test_repetitions_are_left_out_and_told(tmp_path):
+    lines = PLAIN.splitlines(keepends=True)
+    found = read_measurements([write(tmp_path, "".join([*lines, lines[3], lines[3]]))])
+    assert len(found) == 20
+    assert found.notes == ("2 rows left out: given twice",)
+
+
+def test_equal_rows_without_a_time_are_two_readings(tmp_path):
+    text = "cell,lat,lon,level_dbm\n" + "A,60.17,24.94,-70\n" * 3
+    assert len(read_measurements([write(tmp_path, text)])) == 3
+
+
+def test_files_gaps_and_folders_make_sessions(tmp_path):
+    late = PLAIN + "A,60.18,24.95,-80,1600009000,10\n"
+    write(tmp_path, late, "a.csv")
+    write(tmp_path, PLAIN, "b.csv")
+    write(tmp_path, "no measurements", "LICENSE.txt")
+    found = read_measurements([tmp_path])
+    assert found.sessions == ("a#1", "a#2", "b")
+    np.testing.assert_array_equal(np.bincount(found.session), [20, 1, 20])
+    joined = read_measurements([tmp_path], session_gap_s=1e5)
+    assert joined.sessions == ("a", "b")
+
+
+def test_files_without_any_good_row_are_refused_together(tmp_path):
+    asu = write(tmp_path, "cell,lat,lon,level_dbm\nA,60.1,24.9,20\nA,60.1,24.9,21\n", "asu.csv")
+    nothing = write(tmp_path, "cell,lat,lon,level_dbm\n", "nothing.csv")
+    with pytest.raises(InputError) as error:
+        read_measurements([asu, nothing, tmp_path / "absent.csv"])
+    text = str(error.value)
+    assert f"{asu} row 2, level_dbm" in text
+    assert f"{asu} row 3, level_dbm" in text
+    assert "RXLEV or ASU given for dBm" in text
+    assert f"{nothing}: expected at least one level with cell and position, found 0 rows" in text
+    assert "absent.csv: expected a readable file" in text
+
+
+def test_headers_that_do_not_fit_say_which_column_is_meant(tmp_path):
+    path = write(tmp_path, "cell,lat,lng,rsrp_dbm\nA,60.1,24.9,-70\n")
+    text = refused(path)
+    assert "header: expected a column lon, found none" in text
+    assert "header: expected a column level_dbm, found none" in text
+    text = refused(path, columns={"lon": "lng", "level_dbm": "rsrp", "session": "drive"})
+    assert "expected a column rsrp for level_dbm, found none (likely: rsrp_dbm meant)" in text
+    assert "expected a column drive for session" in text
+    text = refused(path, format="opencellid")
+    for column in ("mcc", "cellid", "signal"):
+        assert f"expected a column {column}" in text
+    twice = write(tmp_path, "cell,lat,lon,lon,level_dbm\nA,60.1,24.9,24.9,-70\n", "twice.csv")
+    assert "expected one column lon, found 2" in refused(twice)
+
+
+@pytest.mark.parametrize(
+    ("data", "told"),
+    [
+        (b"", "an empty file"),
+        (b"\n \n", "a header line and rows"),
+        ("cell,lat".encode("utf-16"), "UTF-16"),
+        (b"\x1f\x8b\x08", "gzip"),
+        (b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 30, "a column lat"),
+        (b"x" * 200_000, "a header line and rows"),
+    ],
+)
+def test_files_that_are_no_measurements(tmp_path, data, told):
+    assert told in refused(write(tmp_path, data))
+
+
+def test_folders_without_measurements_and_no_files_at_all(tmp_path):
+    with pytest.raises(InputError, match=r"files \.csv, \.log, \.tsv"):
+        read_measurements([tmp_path])
+    with pytest.raises(InputError, match="at least one file"):
+        read_measurements([])
+
+
+def test_places_that_a_crs_does_not_have_are_left_out(tmp_path):
+    text = PLAIN + "A,-89.999999,-65,-70,1600001000,10\n"
+    found = read_measurements([write(tmp_path, text)], "EPSG:3857")
+    assert np.isfinite(found.north_m).all()
+
+
+def test_identity_gives_cells_the_names_of_the_plan(tmp_path):
+    found = read_measurements([write(tmp_path, OPENCELLID)])
+    known = Cell("West 1", "W", 444_800.0, 5_029_000.0, 30.0, None, 50.0, 1800.0, "omni",
+                 mcc=302, mnc=720, lac=29100, ci=8302920)  # fmt: skip
+    named = named_after(found, CellPlan(found.crs, (known,)))
+    assert named.cell_ids == ("302-720-29100-8302871", "West 1")
+    assert [named.cell_ids[i] for i in named.cell] == [
+        {"302-720-29100-8302920": "West 1"}.get(found.cell_ids[i], found.cell_ids[i])
+        for i in found.cell
+    ]
+    assert named.identities["West 1"] == (302, 720, 29100, 8302920)
+
+
+@pytest.mark.parametrize(
+    ("sample", "read"),
+    [
+        (OPENCELLID, lambda path: read_csv(path, DIALECTS["opencellid"])),
+        (TOWER_COLLECTOR, lambda path: read_csv(path, DIALECTS["towercollector"])),
+        (PLAIN, lambda path: read_csv(path, DIALECTS["csv"])),
+        (ANTENNAS, read_antennas_log),
+        (OPENCELLID, lambda path: read_measurements([path])),
+    ],
+    ids=["opencellid", "towercollector", "csv", "antennas", "auto"],
+)
+def test_mutated_files_are_read_or_refused(tmp_path, mutation_count, sample, read):
+    path = tmp_path / "mutated.csv"
+
+    def feed(data):
+        path.write_bytes(data)
+        rows = read(path)
+        levels = np.asarray(rows.level_dbm)
+        assert np.isfinite(levels).all()
+        assert np.all((levels <= -10) & (levels >= -170))
+
+    tally = fuzz(sample.encode(), feed, mutation_count)
+    assert tally.read > mutation_count / 10

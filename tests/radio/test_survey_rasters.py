@@ -1,0 +1,168 @@
+"""Surveys on a lattice: what is measured, what is marked, and rasters to calibrate."""
+
+import hashlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_survey_fit import ANTENNA, CRS, LATTICE, law, measured, shadowed, somewhere
+
+from mapfilter.errors import InputError
+from mapfilter.geodesy import Lattice
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.radio.rasters import check_against_plan, open_rasters, write_rasters
+from mapfilter.radio.survey import SurveyOptions, fit_survey
+from mapfilter.radio.survey_rasters import predicted_levels, surveyed_plan, write_survey
+
+
+def along_a_street(count=120, cell_ids=("A",)):
+    rng = np.random.default_rng(3)
+    west, south, east, _ = LATTICE.bounds_m
+    east_m = np.linspace(west + 50, east - 200, count)
+    north_m = np.full(count, south + 200.0)
+    level = law(east_m, north_m) + rng.normal(0, 2, count)
+    return measured(east_m, north_m, level, cell_ids=cell_ids)
+
+
+def digest(*paths):
+    return [hashlib.sha256(path.read_bytes()).hexdigest() for path in paths]
+
+
+def written(folder, survey, lattice=LATTICE, **kwargs):
+    mean, deviation = folder / "rxlev.tif", folder / "rxlev-deviation.tif"
+    ids = write_survey(survey, lattice, mean, deviation, **kwargs)
+    return ids, open_rasters(mean), open_rasters(deviation)
+
+
+def centres(lattice):
+    row, col = np.mgrid[: lattice.rows, : lattice.cols]
+    return lattice.east_north(row, col)
+
+
+def test_pixels_that_nobody_measured_are_marked(tmp_path):
+    rows = along_a_street()
+    survey = fit_survey(rows, SurveyOptions(reach_m=60.0))
+    ids, mean, deviation = written(tmp_path, survey)
+    assert ids == mean.cell_ids == deviation.cell_ids == ("A",)
+    assert (mean.quantity, deviation.quantity) == ("level", "deviation")
+    east_m, north_m = centres(LATTICE)
+    places = np.column_stack([rows.east_m, rows.north_m])
+    distance = np.min([np.hypot(east_m - e, north_m - n) for e, n in places], axis=0)  # brute force
+    level, off = mean.read()[0], deviation.read()[0]
+    np.testing.assert_array_equal(np.isnan(level), distance > 60)
+    np.testing.assert_array_equal(np.isnan(off), distance > 60)
+    expected = survey.cells["A"].predict(east_m[distance <= 60], north_m[distance <= 60])
+    np.testing.assert_allclose(level[distance <= 60], expected[0], atol=0.006)
+    np.testing.assert_allclose(off[distance <= 60], expected[1], atol=0.006)
+    assert np.nanmin(off) < off[distance <= 60][np.argmax(distance[distance <= 60])]
+
+
+def test_filled_rasters_keep_the_trend_and_still_mark(tmp_path, monkeypatch):
+    monkeypatch.setattr("mapfilter.radio.survey_rasters._FIELD_LENGTHS", 0.0)
+    survey = fit_survey(along_a_street(), SurveyOptions(reach_m=60.0))
+    _, mean, deviation = written(tmp_path, survey, fill=True)
+    level, off = mean.read()[0], deviation.read()[0]
+    assert np.isfinite(level).all()
+    assert 0.05 < np.isfinite(off).mean() < 0.4
+    trend = survey.cells["A"].trend.level_dbm(*(a.ravel() for a in centres(LATTICE)))
+    far = (slice(0, 20), slice(0, 20))
+    np.testing.assert_allclose(level[far], trend.reshape(level.shape)[far], atol=0.006)
+
+
+def test_strips_and_threads_change_no_byte(tmp_path, monkeypatch):
+    survey = fit_survey(shadowed(drives=2)[0], SurveyOptions())
+    written(tmp_path / "one", survey)
+    monkeypatch.setattr("mapfilter.radio.survey_rasters._LARGEST_WINDOW_PX", 1000)
+    again = fit_survey(shadowed(drives=2)[0], SurveyOptions())
+    written(tmp_path / "two", again)
+    names = "rxlev.tif", "rxlev-deviation.tif"
+    one, two = (digest(*(tmp_path / name / file for file in names)) for name in ("one", "two"))
+    assert one == two
+
+
+def test_deviations_are_multiplied(tmp_path):
+    survey = fit_survey(along_a_street(), SurveyOptions())
+    _, mean, off = written(tmp_path / "a", survey)
+    _, same, more = written(tmp_path / "b", survey, deviation_factor=1.5)
+    np.testing.assert_array_equal(mean.read(), same.read())
+    np.testing.assert_allclose(more.read(), 1.5 * off.read(), atol=0.02)
+
+
+def test_deviations_are_no_levels(tmp_path):
+    survey = fit_survey(along_a_street(), SurveyOptions())
+    ids, _, deviation = written(tmp_path, survey)
+    plan = surveyed_plan(survey, ids, {}, None, height_m=30, eirp_dbm=50, frequency_mhz=1800)
+    with pytest.raises(InputError, match="deviations of a survey given for its levels"):
+        deviation.read_levels_dbm(plan)
+
+
+def test_cells_not_measured_on_the_lattice_are_left_out(tmp_path):
+    rows = along_a_street(cell_ids=("A", "B"))
+    far = replace(rows, east_m=rows.east_m + 1e5, cell=np.ones_like(rows.cell))
+    both = replace(
+        rows,
+        **{
+            name: np.concatenate([getattr(rows, name), getattr(far, name)])
+            for name in (
+                "cell", "session", "time_s", "east_m", "north_m", "level_dbm", "accuracy_m",
+            )
+        },
+    )  # fmt: skip
+    survey = fit_survey(both, SurveyOptions())
+    assert list(survey.cells) == ["A", "B"]
+    ids, mean, _ = written(tmp_path, survey)
+    assert ids == mean.cell_ids == ("A",)
+    elsewhere = Lattice(CRS, 600_000.0, 6_673_000.0, 5.0, 20, 20)
+    with pytest.raises(InputError, match="measurements: expected some in the area"):
+        written(tmp_path / "none", survey, elsewhere)
+
+
+def test_the_plan_of_a_survey_fits_its_rasters(tmp_path):
+    known = CellPlan(CRS, (Cell("A", "Tower", *ANTENNA, 40.0, 90.0, 55.0, 800.0),))
+    survey = fit_survey(along_a_street(), SurveyOptions(), plan=known)
+    ids, mean, _ = written(tmp_path, survey)
+    given = {"height_m": 30.0, "eirp_dbm": 50.0, "frequency_mhz": 1800.0}
+    plan = surveyed_plan(survey, ids, {}, known, **given)
+    assert plan.cells == known.cells
+    check_against_plan(mean, plan)
+    blind = fit_survey(along_a_street(), SurveyOptions())
+    (cell,) = surveyed_plan(blind, ids, {"A": (302, 720, 1, 2)}, None, **given).cells
+    assert (cell.east_m, cell.north_m) == blind.cells["A"].antenna
+    assert (cell.mcc, cell.mnc, cell.lac, cell.ci, cell.antenna) == (302, 720, 1, 2, "omni")
+    mean_only = fit_survey(along_a_street(), SurveyOptions(trend="mean"))
+    (cell,) = surveyed_plan(mean_only, ids, {}, None, **given).cells
+    assert abs(cell.east_m - ANTENNA[0]) < 150
+
+
+def test_a_predicted_raster_is_calibrated(tmp_path):
+    """Two dB too high and a slope of 0.9; west of the antenna nobody predicted anything."""
+    rows, field = shadowed(deviation_db=5.0)
+    east_m, north_m = centres(LATTICE)
+    truth = law(east_m, north_m) + field
+    predicted = (law(east_m, north_m) + 82) / 1.1 - 80
+    predicted[:, :40] = np.nan
+    path = tmp_path / "predicted.tif"
+    write_rasters(path, LATTICE, [("A", predicted)], ("A",))
+    levels = predicted_levels(open_rasters(path), None)
+    np.testing.assert_array_equal(
+        levels["A"](np.array([0.0, 385_002.5]), np.array([0.0, 6_672_997.5])), [np.nan, np.nan]
+    )
+    survey = fit_survey(rows, SurveyOptions(reach_m=30.0), predicted=levels)
+    _, mean, deviation = written(tmp_path, survey, fill=True)
+    level, off = mean.read()[0], deviation.read()[0]
+    assert np.isnan(level[:, :40]).all()
+    assert np.isfinite(level[:, 40:]).all()
+    error, before = level - truth, predicted - truth
+    near = np.isfinite(off)
+    assert np.sqrt(np.mean(error[near] ** 2)) < 0.75 * np.sqrt(np.mean(before[near] ** 2))
+    assert abs(np.nanmean(error)) < 1.0
+
+
+def test_losses_are_calibrated_with_the_plans_eirp(tmp_path):
+    east_m, north_m = somewhere(80)
+    plan = CellPlan(CRS, (Cell("A", "A", *ANTENNA, 30.0, None, 50.0, 1800.0, "omni"),))
+    path = tmp_path / "loss.tif"
+    loss = 50.0 - law(*centres(LATTICE))
+    write_rasters(path, LATTICE, [("A", loss)], ("A",), quantity="loss")
+    levels = predicted_levels(open_rasters(path), plan)
+    np.testing.assert_allclose(levels["A"](east_m, north_m), law(east_m, north_m), atol=2.0)
