@@ -1,0 +1,46 @@
+"""Rasters on a disk that is full at either step of writing them."""
+
+import resource
+
+import numpy as np
+import pytest
+
+from mapfilter.errors import OutputError
+from mapfilter.geodesy import Lattice
+from mapfilter.radio import rasters
+from mapfilter.radio.rasters import write_rasters
+
+LATTICE = Lattice("EPSG:32629", 531_000.0, 4_556_000.0, 5.0, 512, 512)
+
+
+@pytest.fixture
+def limit_files():
+    """Let no file grow beyond a size, as a full disk would, until the test is over."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def assert_told(path):
+    noise = np.random.default_rng(1).uniform(-120, -40, (512, 512))
+    with pytest.raises(OutputError, match=r"x\.tif: expected a raster that can be written"):
+        write_rasters(path, LATTICE, [("A", noise)], ["A"])
+    assert list(path.parent.iterdir()) == []
+
+
+@pytest.mark.parametrize("size", [0, 100_000, 1_000_000])
+def test_the_bands_do_not_fit(tmp_path, limit_files, size):
+    limit_files(size)
+    assert_told(tmp_path / "x.tif")
+
+
+@pytest.mark.parametrize("size", [0, 100_000, 500_000])
+def test_the_final_file_does_not_fit(tmp_path, limit_files, monkeypatch, size):
+    copy = rasters.copy_raster
+
+    def copy_to_a_full_disk(*args, **options):
+        limit_files(size)
+        return copy(*args, **options)
+
+    monkeypatch.setattr(rasters, "copy_raster", copy_to_a_full_disk)
+    assert_told(tmp_path / "x.tif")
