@@ -15,7 +15,8 @@ from rasterio.transform import Affine
 
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Floats, Lattice
-from mapfilter.roads.pbf import read_elements
+from mapfilter.roads._elements import Query
+from mapfilter.roads.maps import read_elements
 from mapfilter.roads.ways import Bounds, Buildings
 
 STOREY_HEIGHT_M = 3.2
@@ -26,7 +27,7 @@ _HIGHEST_M = 1000.0
 # A roof on posts stops neither walkers nor waves; the others are no buildings any more.
 _NOT_BUILDINGS = frozenset(("no", "roof", "razed", "demolished"))
 _NUMBER = re.compile(r"\s*([0-9]+(?:[.,][0-9]+)?)\s*(m|ft|')?")
-_TAGS = ["building", "height", "building:levels", "location"]
+_BUILDINGS = Query({"building": ()}, ("building", "height", "building:levels", "location"))
 
 
 def read_buildings(
@@ -45,7 +46,7 @@ def read_buildings(
     Parameters
     ----------
     path : str or Path
-        An ``.osm.pbf`` file, or the name of an embedded map ("helsinki").
+        An ``.osm.pbf``, ``.osm`` or ``.osm.gz`` file, or the name of an embedded map ("helsinki").
     crs : str
         Projected CRS of the result, in metres.
     bounds_m : tuple of float
@@ -65,14 +66,7 @@ def read_buildings(
         faults.add("storey_height_m", "metres > 0", storey_height_m)
     faults.raise_if_any(InputError)
 
-    def query(osm: Any) -> Any:
-        return osm.get_data_by_custom_criteria(
-            custom_filter={"building": True}, tags_as_columns=_TAGS, keep_nodes=False
-        )
-
-    found = read_elements(path, crs, bounds_m, query)
-    for tag in _TAGS:
-        found[tag] = found[tag].fillna("").astype(str) if tag in found else ""
+    found = read_elements(path, crs, bounds_m, _BUILDINGS)
     kept = ~found["building"].isin(_NOT_BUILDINGS) & (found["location"] != "underground")
     found = found[kept & shapely.intersects(shapely.box(*bounds_m), found.geometry.to_numpy())]
     parts, origin = shapely.get_parts(

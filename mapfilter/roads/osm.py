@@ -19,14 +19,15 @@ squares    ``place=square``, and ``area=yes`` or multipolygon areas of the class
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import shapely
 from geopandas import GeoDataFrame
 from numpy.typing import NDArray
 
-from mapfilter.roads.pbf import nothing_there, read_elements
+from mapfilter.roads._elements import Query
+from mapfilter.roads.maps import nothing_there, read_elements
 from mapfilter.roads.ways import Bounds, Geometries, Squares, Ways
 
 Profile = Literal["walking", "driving"]
@@ -50,10 +51,11 @@ _FORBIDDING = frozenset(
      "use_sidepath", "emergency")
 )  # fmt: skip
 _OPEN_TUNNELS = frozenset(("", "no", "building_passage", "covered", "avalanche_protector"))
-_TAGS = [
-    "highway", "place", "area", "access", "foot", "vehicle", "motor_vehicle", "motorcar",
-    "tunnel", "covered", "indoor", "oneway", "junction",
-]  # fmt: skip
+_HIGHWAYS = Query(
+    {"highway": (), "place": ("square",)},
+    ("highway", "place", "area", "access", "foot", "vehicle", "motor_vehicle", "motorcar",
+     "tunnel", "covered", "indoor", "oneway", "junction"),
+)  # fmt: skip
 
 
 def read_ways(path: str | Path, profile: Profile, crs: str, bounds_m: Bounds) -> Ways:
@@ -62,7 +64,7 @@ def read_ways(path: str | Path, profile: Profile, crs: str, bounds_m: Bounds) ->
     Parameters
     ----------
     path : str or Path
-        An ``.osm.pbf`` file, or the name of an embedded map ("helsinki").
+        An ``.osm.pbf``, ``.osm`` or ``.osm.gz`` file, or the name of an embedded map ("helsinki").
     profile : {"walking", "driving"}
         The rules of the table above.
     crs : str
@@ -124,17 +126,7 @@ def read_squares(path: str | Path, crs: str, bounds_m: Bounds) -> Squares:
 
 
 def _read_highways(path: str | Path, crs: str, bounds_m: Bounds) -> GeoDataFrame:
-    def query(osm: Any) -> Any:
-        return osm.get_data_by_custom_criteria(
-            custom_filter={"highway": True, "place": ["square"]},
-            tags_as_columns=_TAGS,
-            keep_nodes=False,
-        )
-
-    found = read_elements(path, crs, bounds_m, query)
-    for tag in _TAGS:
-        found[tag] = found[tag].fillna("").astype(str) if tag in found else ""
-    return found
+    return read_elements(path, crs, bounds_m, _HIGHWAYS)
 
 
 def _is_area(found: GeoDataFrame) -> NDArray[np.bool_]:

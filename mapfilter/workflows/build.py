@@ -14,7 +14,7 @@ from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rasters import RxLevRasters, open_rasters
-from mapfilter.roads.pbf import resolve_map
+from mapfilter.roads.maps import resolve_map
 from mapfilter.workflows.sections import Area, Config
 from mapfilter.workflows.world import World, area_lattice, check_scale
 

@@ -15,8 +15,8 @@ from mapfilter.radio.msi import read_antennas
 from mapfilter.roads.buildings import rasterise_heights, read_buildings
 from mapfilter.roads.landuse import LandUse, read_landuse
 from mapfilter.roads.lattice import RouteLattice
+from mapfilter.roads.maps import check_on_map, map_bounds_deg, resolve_map
 from mapfilter.roads.osm import read_squares, read_ways
-from mapfilter.roads.pbf import check_on_map, map_bounds_deg, resolve_map
 from mapfilter.roads.routable import route_lattice, route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings, Ways
 from mapfilter.simulation.layout import lay_out_plan

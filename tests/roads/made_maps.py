@@ -1,6 +1,8 @@
-"""Small made maps, written as real .osm.pbf files."""
+"""Small made maps, written as real .osm.pbf, .osm and .osm.gz files."""
 
+import gzip
 import struct
+from xml.sax.saxutils import quoteattr
 
 from mapfilter.geodesy import unproject
 
@@ -70,4 +72,33 @@ def write_pbf(path, ways, relations=()):
             body = fileformat_pb2.Blob(raw=message.SerializeToString()).SerializeToString()
             head = fileformat_pb2.BlobHeader(type=kind, datasize=len(body)).SerializeToString()
             stream.write(struct.pack(">I", len(head)) + head + body)
+    return path
+
+
+def write_xml(path, ways, relations=(), bounds=None):
+    """Write what :func:`write_pbf` writes as .osm, or by the path's suffix as .osm.gz."""
+    nodes = {}
+    for _, _, corners in ways:
+        for corner in corners:
+            nodes.setdefault(corner, len(nodes) + 1)
+    lon, lat = unproject(CRS, [ORIGIN[0] + x for x, _ in nodes], [ORIGIN[1] + y for _, y in nodes])
+    lines = ["<?xml version='1.0' encoding='UTF-8'?>", '<osm version="0.6" generator="made">']
+    if bounds is not None:
+        west, south, east, north = bounds
+        lines.append(f'<bounds minlat="{south}" minlon="{west}" maxlat="{north}" maxlon="{east}"/>')
+    for number, x, y in zip(nodes.values(), lon, lat, strict=True):
+        lines.append(f'<node id="{number}" lat="{y:.7f}" lon="{x:.7f}"/>')
+
+    def tags(given):
+        return [f"<tag k={quoteattr(k)} v={quoteattr(v)}/>" for k, v in given.items()]
+
+    for way_id, given, corners in ways:
+        refs = [f'<nd ref="{nodes[corner]}"/>' for corner in corners]
+        lines += [f'<way id="{way_id}">', *refs, *tags(given), "</way>"]
+    for relation_id, given, members in relations:
+        inner = [f'<member type="way" ref="{member}" role="outer"/>' for member in members]
+        given = {"type": "multipolygon", **given}
+        lines += [f'<relation id="{relation_id}">', *inner, *tags(given), "</relation>"]
+    content = "\n".join([*lines, "</osm>", ""]).encode()
+    path.write_bytes(gzip.compress(content, mtime=0) if path.suffix == ".gz" else content)
     return path

