@@ -184,7 +184,7 @@ def test_all_faults_are_told_together(tmp_path: Path) -> None:
 
 def test_missing_empty_folder_and_other_files(tmp_path: Path) -> None:
     assert "No such file" in _complaint(tmp_path / "none.tif")
-    assert "a folder" in _complaint(tmp_path)
+    assert "found none in this folder" in _complaint(tmp_path)
     (tmp_path / "empty.tif").write_bytes(b"")
     assert "an empty file" in _complaint(tmp_path / "empty.tif")
     (tmp_path / "text.tif").write_text("cell,lat,lon\n")
