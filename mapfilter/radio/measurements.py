@@ -235,6 +235,10 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
     placed = np.isfinite(east_m) & np.isfinite(north_m)
     if not placed.all():
         count = int((~placed).sum())
+        if count == len(placed):
+            got = f"{lat_deg[0]:g}, {lon_deg[0]:g} and {count - 1} more"
+            hint = "latitude and longitude swapped, or another area"
+            raise fail(InputError, "measurements", f"places where {crs} is used", got, hint)
         joined = joined.where(placed, f"{count} rows left out: {crs} has no such places")
     return _once(joined)
 

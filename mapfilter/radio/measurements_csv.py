@@ -11,7 +11,6 @@ import difflib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio._cell_rules import RANGES
@@ -100,6 +99,7 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
     separator = max(",;\t", key=header_text.count)
     header = [name.strip().lower() for name in _split(header_text, separator)]
     places = _places(path, header, dialect)
+    known: dict[tuple[str, ...], str] = {}
     for line, text in lines:
         if text is not None and not text.strip():
             continue
@@ -112,7 +112,7 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
             hint = "a line cut off" if len(fields) < len(header) else "a separator in a field"
             rows.refuse(line, "fields", str(len(header)), len(fields), hint)
             continue
-        _add(rows, line, _Fields(fields, places, separator != ","))
+        _add(rows, line, _Fields(fields, places, separator != ","), known)
     return rows
 
 
@@ -150,22 +150,14 @@ class _Fields:
         return text.replace(",", ".") if self.decimal_commas and "." not in text else text
 
 
-def _add(rows: Rows, line: int, fields: _Fields) -> None:
-    cell = fields["cell"]
-    parts = [whole(fields[name]) for name in _IDENTITY]
-    mcc, mnc, lac, ci = parts
-    complete = mcc is not None and mnc is not None and lac is not None and ci is not None
-    if not cell and not complete:
-        rows.aside[_WITHOUT_IDENTITY] += 1
-        return
-    if complete:
-        for name, part in zip(_IDENTITY, parts, strict=True):
-            if not RANGES[name].holds(part):
-                rows.refuse(line, name, RANGES[name].expected, part)
-                return
-        cell = cell or "-".join(str(part) for part in parts)
-        identity: Any = (mcc, mnc, lac, ci)
-        rows.identities.setdefault(cell, identity)
+def _add(rows: Rows, line: int, fields: _Fields, known: dict[tuple[str, ...], str]) -> None:
+    given = tuple(map(fields.__getitem__, ("cell", *_IDENTITY)))
+    cell = known.get(given)
+    if cell is None:
+        cell = _identified(rows, line, given)
+        if cell is None:
+            return
+        known[given] = cell
     level = fields.numeric("level_dbm")
     technology = fields["technology"].upper()
     if technology and (dbm := _from_asu(number(level), technology)) is not None:
@@ -180,6 +172,24 @@ def _add(rows: Rows, line: int, fields: _Fields) -> None:
         accuracy=fields.numeric("accuracy_m"),
         session=fields["session"],
     )
+
+
+def _identified(rows: Rows, line: int, given: tuple[str, ...]) -> str | None:
+    """Return the cell that a row tells, or refuse the row or set it aside."""
+    cell, *texts = given
+    mcc, mnc, lac, ci = map(whole, texts)
+    if mcc is None or mnc is None or lac is None or ci is None:
+        if not cell:
+            rows.aside[_WITHOUT_IDENTITY] += 1
+        return cell or None
+    identity = (mcc, mnc, lac, ci)
+    for name, value in zip(_IDENTITY, identity, strict=True):
+        if not RANGES[name].holds(value):
+            rows.refuse(line, name, RANGES[name].expected, value)
+            return None
+    cell = cell or "-".join(map(str, identity))
+    rows.identities.setdefault(cell, identity)
+    return cell
 
 
 def _from_asu(asu: float, technology: str) -> float | None:

@@ -79,8 +79,9 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
     for folder in (target.parent, deviation.parent, config.output.dir):
         ensure_writable_folder(folder)
     rasters = open_rasters(section.calibrate) if section.calibrate is not None else None
-    measurements, plan = _measurements(config, rasters)
-    lattice = rasters.lattice if rasters is not None else _lattice(config, measurements)
+    given = _given_lattice(config, rasters)
+    measurements, plan = _measurements(config, given)
+    lattice = given or _lattice_about(measurements, section.reach_m, config.area.resolution_m)
     _check_inside(measurements, lattice, section.reach_m)
     predicted = _predicted(rasters, plan)
     options = _options(section)
@@ -127,12 +128,10 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
     )
 
 
-def _measurements(
-    config: Config, rasters: RxLevRasters | None
-) -> tuple[Measurements, CellPlan | None]:
-    """Return the measurements in the CRS of the rasters or the area, named as in the plan."""
+def _measurements(config: Config, lattice: Lattice | None) -> tuple[Measurements, CellPlan | None]:
+    """Return the measurements in the CRS of the lattice or the area, named as in the plan."""
     section = config.prediction.survey
-    crs = rasters.lattice.crs if rasters is not None else None
+    crs = lattice.crs if lattice is not None else None
     if crs is None and config.area.crs is not None:
         crs = projected_crs(config.area.crs, "area.crs")
     columns = {name: column for name, column in section.columns if column is not None}
@@ -152,10 +151,16 @@ def _measurements(
     return named_after(found, plan), plan
 
 
-def _lattice(config: Config, measurements: Measurements) -> Lattice:
-    area, reach_m = config.area, config.prediction.survey.reach_m
-    if area.bbox is not None or area.southwest is not None:
-        return area_lattice(area.model_copy(update={"crs": measurements.crs}), on_map=False)
+def _given_lattice(config: Config, rasters: RxLevRasters | None) -> Lattice | None:
+    if rasters is not None:
+        return rasters.lattice
+    area = config.area
+    if area.bbox is None and area.southwest is None:
+        return None
+    return area_lattice(area, on_map=False)
+
+
+def _lattice_about(measurements: Measurements, reach_m: float, resolution_m: float) -> Lattice:
     bounds_m = (
         float(measurements.east_m.min()) - reach_m,
         float(measurements.north_m.min()) - reach_m,
@@ -163,14 +168,14 @@ def _lattice(config: Config, measurements: Measurements) -> Lattice:
         float(measurements.north_m.max()) + reach_m,
     )
     width_m, height_m = bounds_m[2] - bounds_m[0], bounds_m[3] - bounds_m[1]
-    pixels = width_m * height_m / area.resolution_m**2
+    pixels = width_m * height_m / resolution_m**2
     if pixels > LARGEST_AREA_PX:
         expected = f"at most {LARGEST_AREA_PX:.0e} pixels about all measurements"
-        got = f"{width_m / 1000:.0f} km x {height_m / 1000:.0f} km at {area.resolution_m:g} m"
+        got = f"{width_m / 1000:.0f} km x {height_m / 1000:.0f} km at {resolution_m:g} m"
         hint = "a position far off the others; give area.bbox"
         raise fail(InputError, "measurements", expected, got, hint)
     check_scale(measurements.crs, bounds_m, "measurements")
-    return Lattice.covering(measurements.crs, bounds_m, area.resolution_m)
+    return Lattice.covering(measurements.crs, bounds_m, resolution_m)
 
 
 def _check_inside(measurements: Measurements, lattice: Lattice, reach_m: float) -> None:

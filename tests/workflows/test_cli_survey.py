@@ -1,0 +1,140 @@
+"""The model "survey" on the command line: drives through the small world's rasters become a map."""
+
+import json
+
+import numpy as np
+import pytest
+from command_line import assert_done, assert_refused, contents, mapfilter, settings
+
+from mapfilter.geodesy import unproject
+from mapfilter.radio.rasters import open_rasters
+
+HEADER = "cell,lat,lon,level_dbm,time,accuracy_m\n"
+
+
+def drive(rasters, seed, count=150):
+    """Readings of all cells at random places, in the order of a walk of five minutes."""
+    rng = np.random.default_rng(seed)
+    lattice, levels = rasters.lattice, rasters.read()
+    row, col = rng.integers(0, [lattice.rows, lattice.cols], (count, 2)).T
+    lon, lat = unproject(lattice.crs, *lattice.east_north(row, col))
+    lines = [
+        f"{cell_id},{lat[i]:.7f},{lon[i]:.7f},{level + rng.normal(0, 2):.1f},{1.6e9 + 2 * i},5\n"
+        for i in range(count)
+        for cell_id, level in zip(rasters.cell_ids, levels[:, row[i], col[i]], strict=True)
+    ]
+    return HEADER + "".join(lines)
+
+
+@pytest.fixture(scope="module")
+def survey(world, tmp_path_factory):
+    """A folder with three drives and a configuration without an area."""
+    folder = tmp_path_factory.mktemp("survey")
+    (folder / "drives").mkdir()
+    rasters = open_rasters(world.rasters)
+    for seed in range(3):
+        (folder / "drives" / f"drive-{seed}.csv").write_text(drive(rasters, seed))
+    (folder / "cells.csv").write_bytes(world.plan.read_bytes())
+    (folder / "survey.toml").write_text(
+        '[cells]\nplan = "cells.csv"\n[prediction]\nmodel = "survey"\n'
+        '[prediction.survey]\nfiles = ["drives"]\nreach_m = 60\n[output]\ndir = "out"\n'
+    )
+    return folder
+
+
+def test_a_survey_becomes_rasters_and_a_database(survey, world, tmp_path):
+    config = survey / "survey.toml"
+    found = assert_done(mapfilter("predict", "-c", config, "--out", tmp_path, "--json")).json
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"rxlev.tif", "rxlev-deviation.tif", "cells.csv"}
+    assert (found["cells"], found["sessions"], found["measurements"]) == (3, 3, 1350)
+    assert found["reality"] is None
+    told = found["validation"]
+    assert told["by_session"]
+    assert told["rmse_db"] < 0.85 * told["trend_rmse_db"]
+    assert told["predicted"] > 1300
+    mean, truth = open_rasters(tmp_path / "rxlev.tif"), open_rasters(world.rasters)
+    assert mean.cell_ids == ("A", "B", "C")
+    assert mean.lattice.crs == truth.lattice.crs
+    top, left = mean.lattice.row_col(*truth.lattice.east_north(0, 0))
+    size = truth.lattice.rows, truth.lattice.cols
+    error = mean.read((top, left, *size)) - truth.read()
+    off = open_rasters(tmp_path / "rxlev-deviation.tif").read((top, left, *size))
+    assert np.isfinite(error).mean() > 0.9
+    assert np.sqrt(np.nanmean(error**2)) < np.nanmean(off)
+    info = assert_done(mapfilter("info", tmp_path / "rxlev-deviation.tif", "--json")).json
+    assert info["quantity"] == "deviation"
+    built = assert_done(
+        mapfilter(
+            "build", "-c", config, "--out", tmp_path, "--json",
+            *settings(cells__plan=tmp_path / "cells.csv"),
+        )
+    ).json  # fmt: skip
+    assert built["points"] > 1000
+
+
+def test_a_survey_calibrates_a_prediction(survey, world, tmp_path):
+    more = settings(prediction__survey__calibrate=world.rasters, prediction__survey__fill="true")
+    config = survey / "survey.toml"
+    found = assert_done(mapfilter("predict", "-c", config, "--out", tmp_path, "--json", *more)).json
+    lattice = open_rasters(world.rasters).lattice
+    assert (found["rows"], found["cols"]) == (lattice.rows, lattice.cols)
+    values = open_rasters(tmp_path / "rxlev.tif").read()
+    assert np.isfinite(values).all()
+    error = values - open_rasters(world.rasters).read()
+    assert np.sqrt(np.mean(error**2)) < 1.5
+    assert found["validation"]["rmse_db"] < 2.5
+
+
+def test_equal_surveys_give_equal_bytes(survey, tmp_path):
+    """And files given one by one on the command line are the folder."""
+    files = sorted((survey / "drives").iterdir())
+    config = survey / "survey.toml"
+    given = f"--set=prediction.survey.files={json.dumps([str(path) for path in files])}"
+    quick = settings(prediction__survey__cross_validate="false")
+    for name, more in (("a", ()), ("b", (given,))):
+        out = tmp_path / name
+        assert_done(mapfilter("predict", "-c", config, "--out", out, *quick, *more))
+    one, two = (sorted(contents(tmp_path / name).items()) for name in "ab")
+    assert [digest for _, digest in one] == [digest for _, digest in two]
+
+
+def test_an_area_cuts_the_survey_and_a_column_map_is_taken(survey, tmp_path):
+    renamed = (survey / "drives" / "drive-0.csv").read_text().replace("level_dbm", "rsrp", 1)
+    (tmp_path / "renamed.csv").write_text(renamed + "A,60.1,24.9\n")
+    more = settings(
+        prediction__survey__files=tmp_path / "renamed.csv",
+        prediction__survey__columns__level_dbm="rsrp",
+        prediction__survey__method="knn",
+        area__bbox="24.9440,60.1670,24.9470,60.1690",
+    )
+    config = survey / "survey.toml"
+    found = assert_done(
+        mapfilter("predict", "-c", config, "--out", tmp_path / "out", "--json", *more)
+    ).json
+    assert found["rows"] * 5 < 260
+    assert not found["validation"]["by_session"]
+    assert found["notes"][0].startswith("renamed.csv: 1 of 451 rows left out: ")
+    assert "row 452, fields: expected 6, found 3" in found["notes"][0]
+
+
+def test_what_cannot_be_surveyed_is_told(survey, tmp_path):
+    def refused(*told, **given):
+        more = settings(**given)
+        config = survey / "survey.toml"
+        assert_refused(mapfilter("predict", "-c", config, "--out", tmp_path, *more), *told)
+
+    refused("prediction.survey.files", "measurement files", prediction__survey__files="[]")
+    refused("absent.csv", "a readable file", prediction__survey__files="absent.csv")
+    refused("method", "'gp', 'knn' or 'trend'", prediction__survey__method="svm")
+    refused("positions accurate to 1 m", prediction__survey__max_accuracy_m=1.0)
+    refused("heard in at least 900 squares", prediction__survey__min_points=900)
+    refused("measurements", "some in the area", area__bbox="24.99,60.19,25.0,60.2")
+    refused("longitude and latitude swapped", area__bbox="60.166,24.942,60.1697,24.9495")
+    far = tmp_path / "far.csv"
+    far.write_text(HEADER + "A,60.16,24.94,-70,1,5\n" * 3 + "A,50.0,10.0,-70,2,5\n")
+    refused("a position far off the others", prediction__survey__files=far)
+    lost = tmp_path / "deviations.tif"
+    assert_done(mapfilter("predict", "-c", survey / "survey.toml", "--out", tmp_path / "good"))
+    (tmp_path / "good" / "rxlev-deviation.tif").rename(lost)
+    refused("levels or losses", "deviations", prediction__survey__calibrate=lost)
