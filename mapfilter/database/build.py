@@ -134,7 +134,7 @@ def build(
     places, tiles = _cut_into_tiles(rasters, plan, routes, floor_dbm, tile_px)
     out = Path(out)
     check_replaceable(out, MANIFEST, FORMAT)
-    recorded = [*inputs, InputFile.of("rasters", rasters.path)]
+    recorded = [*inputs, InputFile("rasters", rasters.path.name, rasters.sha256())]
     with atomic_dir(out) as folder:
         with PartWriter(folder, rasters.lattice.crs, plan.ids) as writer:
             start, heard = 0, 0

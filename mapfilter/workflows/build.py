@@ -13,10 +13,10 @@ from mapfilter.database.manifest import InputFile
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
 from mapfilter.radio.cells import CellPlan
-from mapfilter.radio.rasters import RxLevRasters, open_rasters
+from mapfilter.radio.rasters import RxLevRasters
 from mapfilter.roads.maps import resolve_map
 from mapfilter.workflows.sections import Area, Config
-from mapfilter.workflows.world import World, area_lattice, check_scale
+from mapfilter.workflows.world import World, area_lattice, check_scale, planned_rasters
 
 ATTRIBUTION = "© OpenStreetMap contributors (ODbL)"
 
@@ -36,7 +36,7 @@ class BuildResult:
     seconds : float
         Wall time.
     notes : tuple of str
-        What was done to the inputs, such as a land-use raster resampled.
+        What was done to the inputs, such as rasters resampled.
     """
 
     points: int
@@ -82,7 +82,7 @@ def run_build(config: Config, *, workers: int = 1, progress: Progress | None = N
         len(routes),
         target,
         time.perf_counter() - began_s,
-        world.landuse.notes if world.landuse is not None else (),
+        (*rasters.notes, *(world.landuse.notes if world.landuse is not None else ())),
     )
 
 
@@ -111,7 +111,7 @@ def _raster_world(config: Config) -> tuple[RxLevRasters, CellPlan, World]:
 
     A plan by rule is laid out over the whole rasters, as when they were predicted.
     """
-    rasters = open_rasters(config.rasters_path)
+    rasters = planned_rasters(config)
     lattice, area = rasters.lattice, config.area
     if area.crs is not None:
         wanted = projected_crs(area.crs, "area.crs")

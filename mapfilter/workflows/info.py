@@ -8,7 +8,7 @@ from typing import Any
 from mapfilter.database.manifest import MANIFEST
 from mapfilter.database.store import info, open_database
 from mapfilter.errors import InputError, fail
-from mapfilter.radio.rasters import open_rasters
+from mapfilter.radio.rasters import is_raster_folder, open_rasters
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import is_log, read_log
 
@@ -29,6 +29,8 @@ def run_info(path: Path) -> dict[str, Any]:
         return {"kind": "database", **info(open_database(path, verify="full"))}
     if is_log(path):
         return _log_info(path)
+    if is_raster_folder(path):
+        return _raster_info(path)
     logs = sorted(inner for inner in path.iterdir() if is_log(inner))
     if logs:
         return {"kind": "logs", "logs": len(logs), "first": logs[0].name, "last": logs[-1].name}
@@ -49,7 +51,8 @@ def _raster_info(path: Path) -> dict[str, Any]:
         "resolution_m": lattice.resolution_m,
         "rows": lattice.rows,
         "cols": lattice.cols,
-        "bytes": path.stat().st_size,
+        "bytes": sum(part.stat().st_size for part in rasters.parts),
+        "notes": list(rasters.notes),
     }
 
 

@@ -138,10 +138,30 @@ class Prediction(Section):
 
 
 class Rasters(Section):
-    """``[rasters]``: where the RxLev rasters are; by default in the output folder."""
+    """``[rasters]``: where the RxLev rasters are; by default in the output folder.
+
+    ``path`` is a GeoTIFF, a folder of rasters or an index of them. What the files there do not say
+    themselves is said here: ``quantity``, ``crs``, ``factor`` (dB per stored unit), ``nodata``;
+    files on different lattices are read on one of ``resolution_m``, by default the finest.
+    """
 
     path: FilePath | None = None
     reality: FilePath | None = None
+    quantity: Literal["level", "loss"] | None = None
+    crs: str | None = None
+    factor: Finite = 1.0
+    nodata: Finite | None = None
+    resolution_m: Positive | None = None
+    resampling: Literal["nearest", "bilinear"] = "nearest"
+
+    @model_validator(mode="after")
+    def _said_of_a_path(self) -> Rasters:
+        said = (self.quantity, self.crs, self.nodata, self.resolution_m)
+        if self.path is None and (any(one is not None for one in said) or self.factor != 1):
+            raise ValueError("path, as the other keys say what is there")
+        if self.factor == 0:
+            raise ValueError("a factor other than 0")
+        return self
 
 
 class Database(Section):

@@ -20,7 +20,7 @@ from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
 from mapfilter.tracks.store import check_log_replaceable, is_log, write_log
 from mapfilter.workflows.reality import check_reality
 from mapfilter.workflows.sections import Config
-from mapfilter.workflows.world import World
+from mapfilter.workflows.world import World, planned_rasters
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def run_simulate(config: Config, progress: Progress | None = None) -> SimulateRe
     world = World.of(config)
     section = config.journeys
     as_predicted = section.radio == "as_predicted"
-    rasters = open_rasters(config.rasters_path if as_predicted else config.reality_path)
+    rasters = planned_rasters(config) if as_predicted else open_rasters(config.reality_path)
     if not as_predicted:
         check_reality(config)
     check_against_plan(rasters, world.plan)

@@ -12,6 +12,7 @@ from mapfilter.geodesy import Lattice, check_bbox, project, projected_crs, unpro
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan, read_cell_plan
 from mapfilter.radio.msi import read_antennas
+from mapfilter.radio.rasters import RxLevRasters, open_rasters
 from mapfilter.roads.buildings import rasterise_heights, read_buildings
 from mapfilter.roads.landuse import LandUse, read_landuse
 from mapfilter.roads.lattice import RouteLattice
@@ -97,6 +98,26 @@ def check_scale(crs: str, bounds_m: tuple[float, float, float, float], where: st
         expected = "a CRS whose metres are metres on the ground in this area"
         got = f"{crs}, of which {_SHORT_M:g} m are {ground_m:.0f} m"
         raise fail(InputError, where, expected, got, "a CRS of another region, or Web Mercator")
+
+
+def planned_rasters(config: Config) -> RxLevRasters:
+    """Open the rasters of a configuration: predicted by mapfilter, or a planning tool's.
+
+    Raises
+    ------
+    InputError
+        They are wrong, or do not fit what the configuration says of them.
+    """
+    section = config.rasters
+    return open_rasters(
+        config.rasters_path,
+        section.quantity,
+        crs=section.crs,
+        factor=section.factor,
+        nodata=section.nodata,
+        resolution_m=section.resolution_m,
+        resampling=section.resampling,
+    )
 
 
 @dataclass(frozen=True)
