@@ -1,4 +1,4 @@
-"""Building footprints and heights from OpenStreetMap, and the height raster made of them."""
+"""Building footprints and heights of a map, and the height raster made of them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 from rasterio.features import rasterize
 from rasterio.transform import Affine
@@ -16,8 +15,9 @@ from rasterio.transform import Affine
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Floats, Lattice
 from mapfilter.roads._elements import Query
+from mapfilter.roads.clip import polygons_inside
 from mapfilter.roads.maps import read_elements
-from mapfilter.roads.ways import Bounds, Buildings
+from mapfilter.roads.ways import Bounds, Buildings, Geometries
 
 STOREY_HEIGHT_M = 3.2
 DEFAULT_HEIGHT_M = 12.0
@@ -59,29 +59,70 @@ def read_buildings(
     InputError
         The map is missing or damaged, or a height is not > 0.
     """
+    check_heights(default_height_m, storey_height_m)
+    found = read_elements(path, crs, bounds_m, _BUILDINGS)
+    kept = ~found["building"].isin(_NOT_BUILDINGS) & (found["location"] != "underground")
+    found = found[kept]
+    return made_buildings(
+        crs,
+        found.geometry.to_numpy(),
+        bounds_m,
+        found["height"].to_numpy(dtype=object),
+        found["building:levels"].to_numpy(dtype=object),
+        default_height_m=default_height_m,
+        storey_height_m=storey_height_m,
+    )
+
+
+def check_heights(default_height_m: float, storey_height_m: float) -> None:
+    """See that the heights for buildings that tell none are heights.
+
+    Raises
+    ------
+    InputError
+        One is not > 0.
+    """
     faults = Faults()
-    if not default_height_m > 0:
+    if not (np.isfinite(default_height_m) and default_height_m > 0):
         faults.add("default_height_m", "metres > 0", default_height_m)
-    if not storey_height_m > 0:
+    if not (np.isfinite(storey_height_m) and storey_height_m > 0):
         faults.add("storey_height_m", "metres > 0", storey_height_m)
     faults.raise_if_any(InputError)
 
-    found = read_elements(path, crs, bounds_m, _BUILDINGS)
-    kept = ~found["building"].isin(_NOT_BUILDINGS) & (found["location"] != "underground")
-    found = found[kept & shapely.intersects(shapely.box(*bounds_m), found.geometry.to_numpy())]
-    parts, origin = shapely.get_parts(
-        shapely.make_valid(found.geometry.to_numpy()), return_index=True
-    )
-    polygon = (shapely.get_type_id(parts) == 3) & (shapely.area(parts) > 0)
-    origin = origin[polygon]
-    by_height = _numbers(found["height"])[origin]
-    by_levels = _numbers(found["building:levels"])[origin] * storey_height_m
+
+def made_buildings(
+    crs: str,
+    geometry: Geometries,
+    bounds_m: Bounds,
+    heights: NDArray[np.object_],
+    levels: NDArray[np.object_],
+    *,
+    default_height_m: float,
+    storey_height_m: float,
+) -> Buildings:
+    """Return the buildings that touch an area.
+
+    Parameters
+    ----------
+    crs : str
+    geometry : numpy.ndarray of shapely geometries, shape (N,)
+        Other than polygons are left out.
+    bounds_m : tuple of float
+        West, south, east, north. Footprints are not cut at its edge.
+    heights, levels : numpy.ndarray of object, shape (N,)
+        As a map writes them: texts such as ``12``, ``12.5 m`` or ``40 ft``, numbers, or nothing.
+    default_height_m, storey_height_m : float
+        Checked by :func:`check_heights`.
+    """
+    footprints, origin = polygons_inside(geometry, bounds_m, cut=False)
+    by_height = _numbers(heights)[origin]
+    by_levels = _numbers(levels)[origin] * storey_height_m
     height = np.where(np.isfinite(by_height), by_height, by_levels)
     told = np.isfinite(height)
     from_height = int(np.isfinite(by_height).sum())
     return Buildings(
         crs,
-        parts[polygon],
+        footprints,
         np.where(told, height, default_height_m),
         from_height,
         int(told.sum()) - from_height,
@@ -128,14 +169,16 @@ def burn(
     return raster
 
 
-def _numbers(text: Any) -> Floats:
+def _numbers(text: NDArray[np.object_]) -> Floats:
     """Return metres or counts from tags such as ``12``, ``12.5 m`` or ``40 ft``; NaN if none."""
     values = np.full(len(text), np.nan)
     for i, entry in enumerate(text):
-        match = _NUMBER.match(entry)
-        if match:
+        number = np.nan
+        if isinstance(entry, int | float | np.number):
+            number = float(entry)
+        elif entry is not None and (match := _NUMBER.match(str(entry))):
             number = float(match[1].replace(",", "."))
             number *= _FOOT_M if match[2] in ("ft", "'") else 1.0
-            if 0 < number < _HIGHEST_M:
-                values[i] = number
+        if 0 < number < _HIGHEST_M:
+            values[i] = number
     return values

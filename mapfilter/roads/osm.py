@@ -27,8 +27,9 @@ from geopandas import GeoDataFrame
 from numpy.typing import NDArray
 
 from mapfilter.roads._elements import Query
+from mapfilter.roads.clip import lines_inside, polygons_inside
 from mapfilter.roads.maps import nothing_there, read_elements
-from mapfilter.roads.ways import Bounds, Geometries, Squares, Ways
+from mapfilter.roads.ways import Bounds, Squares, Ways
 
 Profile = Literal["walking", "driving"]
 
@@ -89,7 +90,7 @@ def read_ways(path: str | Path, profile: Profile, crs: str, bounds_m: Bounds) ->
     loops = ~area & (shapely.get_type_id(found.geometry.to_numpy()) == 3)
     found.loc[loops, "geometry"] = shapely.get_exterior_ring(found.geometry[loops].to_numpy())
     found = found[~area & _allowed(found, profile)]
-    geometry, origin = _lines_inside(found.geometry.to_numpy(), bounds_m)
+    geometry, origin = lines_inside(found.geometry.to_numpy(), bounds_m)
     if origin.size == 0:
         raise nothing_there(path, crs, bounds_m)
     kept = found.iloc[origin]
@@ -113,16 +114,11 @@ def read_squares(path: str | Path, crs: str, bounds_m: Bounds) -> Squares:
     found = _read_highways(path, crs, bounds_m)
     chosen = (found["place"] == "square") | found["highway"].isin(SQUARE_CLASSES)
     found = found[_is_area(found) & chosen & _walkable(found)]
-    whole = shapely.make_valid(found.geometry.to_numpy())
-    parts, origin = shapely.get_parts(
-        shapely.intersection(whole, shapely.box(*bounds_m)), return_index=True
-    )
-    # Touching the edge of the area leaves lines and points behind.
-    polygon = (shapely.get_type_id(parts) == 3) & (shapely.area(parts) > 0)
-    kept = found.iloc[origin[polygon]]
+    geometry, origin = polygons_inside(found.geometry.to_numpy(), bounds_m, cut=True)
+    kept = found.iloc[origin]
     number = kept["id"].to_numpy(dtype=np.int64)
     relation = (kept["osm_type"] == "relation").to_numpy(dtype=bool)
-    return Squares(crs, np.where(relation, -number, number), parts[polygon])
+    return Squares(crs, np.where(relation, -number, number), geometry)
 
 
 def _read_highways(path: str | Path, crs: str, bounds_m: Bounds) -> GeoDataFrame:
@@ -158,14 +154,3 @@ def _oneway(found: GeoDataFrame) -> NDArray[np.int8]:
     forward = found["oneway"].isin(["yes", "true", "1"]) | (implied & (found["oneway"] == ""))
     backward = found["oneway"].isin(["-1", "reverse"])
     return np.where(backward, -1, np.where(forward, 1, 0)).astype(np.int8)
-
-
-def _lines_inside(geometry: Geometries, bounds_m: Bounds) -> tuple[Geometries, NDArray[np.int64]]:
-    """Return the lines clipped to a box, in parts, and which line each part comes from."""
-    crossing = ~shapely.covers(shapely.box(*bounds_m), geometry)
-    clipped = geometry.copy()
-    # Unlike an intersection, this walks along the line and keeps its direction.
-    clipped[crossing] = shapely.clip_by_rect(geometry[crossing], *bounds_m)
-    parts, origin = shapely.get_parts(clipped, return_index=True)
-    line = (shapely.get_type_id(parts) == 1) & (shapely.length(parts) > 0)
-    return parts[line], origin[line].astype(np.int64)

@@ -1,0 +1,250 @@
+"""Reading a layer of any vector file that GDAL knows, or GeoParquet, cut to an area."""
+
+from __future__ import annotations
+
+import difflib
+import warnings
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import geopandas
+import numpy as np
+import pyogrio
+import pyproj
+import shapely
+from geopandas import GeoDataFrame
+from numpy.typing import NDArray
+from pyarrow import ArrowException
+from pyproj.exceptions import CRSError, ProjError
+from shapely.errors import GEOSException
+
+from mapfilter.errors import InputError, MapfilterError, fail
+from mapfilter.roads.maps import box_deg
+from mapfilter.roads.ways import Bounds, Geometries
+
+T = TypeVar("T")
+
+_PARQUET = (".parquet", ".geoparquet")
+_LARGEST_RATIO = 60
+_ALWAYS_ALLOWED_BYTES = 64 << 20
+_HEAD_BYTES = 4096
+# Files that only say where the data are: on another path, or in the net.
+_POINTERS = (b"<OGRVRTDataSource", b"<OGRWFSDataSource", b"<OGRCSWDataSource", b"gdal_streamed_alg",
+             b"<WFS_Capabilities", b"<VRTDataset")  # fmt: skip
+_MOST_DEG = 360.0
+_SHP_LENGTH = slice(24, 28)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Features:
+    """What a layer holds in and about an area.
+
+    Parameters
+    ----------
+    geometry : numpy.ndarray of shapely geometries, shape (N,)
+        In two dimensions and the CRS asked for; they reach beyond the area.
+    number : numpy.ndarray of int64, shape (N,)
+        The features' own numbers in the file (FID), plus 1.
+    columns : mapping of str to numpy.ndarray of object, shape (N,)
+        The columns asked for.
+    notes : tuple of str
+        What was left out.
+    """
+
+    geometry: Geometries
+    number: NDArray[np.int64]
+    columns: Mapping[str, NDArray[np.object_]]
+    notes: tuple[str, ...]
+
+
+def read_layer(
+    path: Path,
+    crs: str,
+    bounds_m: Bounds,
+    layer_name: str | None,
+    columns: Sequence[str] = (),
+    *,
+    may_be_empty: bool = False,
+) -> Features:
+    """Read the features of a layer that touch an area.
+
+    Parameters
+    ----------
+    path : Path
+        A file, a zipped one, or a folder that is a file geodatabase.
+    crs : str
+        Projected CRS of the result, in metres.
+    bounds_m : tuple of float
+        West, south, east, north of the area in ``crs``.
+    layer_name : str, optional
+        Needed where the file has several layers.
+    columns : sequence of str
+        Columns to read beside the geometry.
+    may_be_empty : bool
+        Nothing in the area is no fault.
+
+    Raises
+    ------
+    InputError
+        The file is missing, damaged or no vector file, has several layers, no CRS, or lacks a
+        column, or nothing of it lies in the area.
+    """
+    _check_file(path)
+    if path.suffix.lower() in _PARQUET:
+        frame = _guarded(path, lambda: geopandas.read_parquet(path))
+        _check_columns(path, [name for name in frame.columns if name != "geometry"], columns)
+        source_crs, covered = frame.crs, frame.total_bounds
+    else:
+        layer = _layer(path, layer_name)
+        about = _guarded(path, lambda: pyogrio.read_info(path, layer=layer))
+        _check_columns(path, list(about["fields"]), columns)
+        frame, source_crs, covered = None, about["crs"], about["total_bounds"]
+    if source_crs is None:
+        hint = "the .prj file was left behind" if path.suffix.lower() == ".shp" else ""
+        raise fail(InputError, f"{path}, crs", "a layer that tells its CRS", "none", hint)
+    box = _box(path, crs, bounds_m, source_crs)
+    if frame is None:
+        frame = _guarded(path, lambda: _read(path, layer, box, columns))
+    found = _features(path, frame, crs, bounds_m, columns)
+    if not (found.number.size or may_be_empty):
+        raise _nothing_there(path, crs, bounds_m, source_crs, covered)
+    return found
+
+
+def _features(
+    path: Path, frame: Any, crs: str, bounds_m: Bounds, columns: Sequence[str]
+) -> Features:
+    notes = []
+    has_shape = (~frame.geometry.isna()).to_numpy()
+    if not has_shape.all():
+        notes.append(f"{path}: {(~has_shape).sum()} features without geometry left out")
+        frame = frame[has_shape]
+    number = frame.index.to_numpy().astype(np.int64) + 1
+    frame = _guarded(path, lambda: frame.to_crs(crs))
+    geometry = shapely.force_2d(frame.geometry.to_numpy())
+    finite = np.isfinite(shapely.bounds(geometry)).all(axis=1) | shapely.is_empty(geometry)
+    if not finite.all():
+        notes.append(f"{path}: {(~finite).sum()} features left out: {crs} has no such places")
+    kept = finite & shapely.intersects(shapely.box(*bounds_m), geometry)
+    values = {name: frame[name].to_numpy(dtype=object)[kept] for name in columns}
+    return Features(geometry[kept], number[kept], values, tuple(notes))
+
+
+def _check_file(path: Path) -> None:
+    """See that there is a file which holds its data itself, and not too much of it."""
+    if not path.exists():
+        hint = "a mistyped path, or one relative to another folder"
+        raise fail(InputError, str(path), "a vector file", "no such file", hint)
+    if path.is_dir():
+        if path.suffix.lower() != ".gdb":
+            raise fail(InputError, str(path), "a vector file", "a folder", "name a file in it")
+        return
+    size_bytes = path.stat().st_size
+    if size_bytes == 0:
+        raise fail(InputError, str(path), "a vector file", "an empty file", "a failed download")
+    with path.open("rb") as stream:
+        head = stream.read(_HEAD_BYTES)
+    if any(mark in head for mark in _POINTERS):
+        expected = "a vector file that holds its data itself"
+        raise fail(InputError, str(path), expected, "one that leads to other places")
+    if path.suffix.lower() == ".shp":
+        told_bytes = 2 * int.from_bytes(head[_SHP_LENGTH], "big")
+        if size_bytes < told_bytes:
+            raise fail(InputError, str(path), f"{told_bytes} bytes", size_bytes, "cut off")
+    if zipfile.is_zipfile(path):
+        with zipfile.ZipFile(path) as archive:
+            unpacked_bytes = sum(inner.file_size for inner in archive.infolist())
+        allowed_bytes = _LARGEST_RATIO * size_bytes + _ALWAYS_ALLOWED_BYTES
+        if unpacked_bytes > allowed_bytes:
+            expected = f"at most {allowed_bytes >> 20} MB when unpacked"
+            raise fail(InputError, str(path), expected, f"{unpacked_bytes >> 20} MB", "a bomb")
+
+
+def _layer(path: Path, wanted: str | None) -> str:
+    layers = _guarded(path, lambda: pyogrio.list_layers(path))
+    names = [str(name) for name, kind in layers if kind is not None]
+    if wanted is None and len(names) == 1:
+        return names[0]
+    if wanted is not None and wanted in names:
+        return wanted
+    if not names:
+        hint = "a table without places"
+        raise fail(InputError, str(path), "a layer with geometry", "none", hint)
+    expected = f"the name of one of its layers: {', '.join(names)}"
+    close = difflib.get_close_matches(wanted or "", names, n=1)
+    hint = repr(close[0]) if close else ""
+    raise fail(InputError, f"{path}, layer", expected, repr(wanted) if wanted else "none", hint)
+
+
+def _check_columns(path: Path, known: Sequence[str], wanted: Sequence[str]) -> None:
+    for name in wanted:
+        if name not in known:
+            close = difflib.get_close_matches(name, known, n=1)
+            expected = f"one of its columns: {', '.join(known) or 'it has none'}"
+            hint = repr(close[0]) if close else ""
+            raise fail(InputError, f"{path}, column", expected, repr(name), hint)
+
+
+def _box(path: Path, crs: str, bounds_m: Bounds, source_crs: Any) -> tuple[float, ...]:
+    """Return a box in the layer's CRS that holds a box in another."""
+    try:
+        change = pyproj.Transformer.from_crs(crs, source_crs, always_xy=True)
+        box = change.transform_bounds(*bounds_m, densify_pts=21)
+    except (CRSError, ProjError) as error:
+        raise fail(InputError, f"{path}, crs", "a CRS on Earth", error) from error
+    if not np.isfinite(box).all():
+        expected = f"a CRS that can show the area {_numbers(bounds_m)}"
+        raise fail(InputError, f"{path}, crs", expected, source_crs, "a CRS of another region")
+    return tuple(float(side) for side in box)
+
+
+def _read(path: Path, layer: str, box: tuple[float, ...], columns: Sequence[str]) -> GeoDataFrame:
+    return pyogrio.read_dataframe(
+        path, layer=layer, columns=list(columns), bbox=box, fid_as_index=True, force_2d=True
+    )
+
+
+def _guarded(path: Path, read: Callable[[], T]) -> T:
+    try:
+        with warnings.catch_warnings():
+            # GDAL warns of much that it copes with; what it cannot read has no geometry.
+            warnings.simplefilter("ignore", RuntimeWarning)
+            warnings.simplefilter("ignore", UserWarning)
+            return read()
+    except (RuntimeError, ValueError, TypeError, OverflowError, OSError) as error:
+        raise _unreadable(path, error) from error
+    except (GEOSException, ArrowException, CRSError, ProjError) as error:
+        raise _unreadable(path, error) from error
+
+
+def _unreadable(path: Path, error: Exception) -> MapfilterError:
+    reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+    hint = "cut off, or another format under this name"
+    return fail(InputError, str(path), "a vector file that GDAL reads", reason, hint)
+
+
+def _nothing_there(
+    path: Path, crs: str, bounds_m: Bounds, source_crs: Any, covered: Any
+) -> MapfilterError:
+    """Return the error for a layer with nothing in the area, with the likely mistake."""
+    where, hint = f"{path}, area {_numbers(bounds_m)} in {crs}", "the area lies outside the layer"
+    if covered is None or not np.isfinite(covered).all():
+        return fail(InputError, where, "features in the area", "none", hint)
+    if pyproj.CRS.from_user_input(source_crs).is_geographic:
+        west, south, east, north = box_deg(crs, bounds_m)
+        if (
+            max(abs(covered[0]), abs(covered[2])) > 360
+            or max(abs(covered[1]), abs(covered[3])) > 90
+        ):
+            hint = "its CRS says degrees and its numbers are none: another CRS left out on export"
+        elif south < covered[2] and covered[0] < north and west < covered[3] and covered[1] < east:
+            hint = "longitude and latitude swapped"
+    expected = f"features in the area; the layer covers {_numbers(covered)}"
+    return fail(InputError, where, expected, "none", hint)
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return ", ".join(f"{value:.8g}" for value in values)

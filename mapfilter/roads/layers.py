@@ -1,0 +1,176 @@
+"""Roads and buildings from any vector file, such as a shapefile, a GeoPackage or GeoJSON.
+
+Lines are ways; polygons in a layer of roads are areas where one can be, as squares are. A layer
+has no access rules: what one must not use is left out by its class, with a half width of 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.roads._vector import read_layer
+from mapfilter.roads.buildings import (
+    DEFAULT_HEIGHT_M,
+    STOREY_HEIGHT_M,
+    check_heights,
+    made_buildings,
+)
+from mapfilter.roads.clip import lines_inside, polygons_inside
+from mapfilter.roads.ways import Bounds, Buildings, Squares, Ways
+
+ROAD_CLASS = "road"
+"""The class of ways that have none."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LayerRoads:
+    """The roads of a layer: its lines, and its polygons.
+
+    Parameters
+    ----------
+    ways : Ways
+    areas : Squares
+    notes : tuple of str
+        What was left out.
+    """
+
+    ways: Ways
+    areas: Squares
+    notes: tuple[str, ...]
+
+
+def read_layer_roads(
+    path: Path | str,
+    crs: str,
+    bounds_m: Bounds,
+    *,
+    layer_name: str | None = None,
+    class_column: str | None = None,
+    id_column: str | None = None,
+) -> LayerRoads:
+    """Read ways and areas from a vector file, cut to an area.
+
+    Parameters
+    ----------
+    path : Path or str
+        Whatever geopandas reads.
+    crs : str
+        Projected CRS of the result, in metres; the layer may have any.
+    bounds_m : tuple of float
+        West, south, east, north of the area in ``crs``.
+    layer_name : str, optional
+        Needed where the file has several layers.
+    class_column : str, optional
+        Column that holds the kind of way, in words or as a number.
+    id_column : str, optional
+        Column that holds the ways' numbers, > 0; by default a feature's own in the file (FID),
+        plus 1.
+
+    Raises
+    ------
+    InputError
+        The file, its layer, its CRS or a column is missing or damaged, or no road is in the area.
+    """
+    columns = [name for name in (class_column, id_column) if name is not None]
+    found = read_layer(Path(path), crs, bounds_m, layer_name, columns)
+    number = found.number
+    if id_column is not None:
+        number = _ids(found.columns[id_column], f"{path}, column {id_column}")
+    lines, origin = lines_inside(found.geometry, bounds_m)
+    order = np.argsort(number[origin], kind="stable")
+    lines, origin = lines[order], origin[order]
+    words = _classes(found.columns[class_column] if class_column else None, len(number))
+    names, codes = np.unique(words[origin].astype(str), return_inverse=True)
+    areas, of_area = polygons_inside(found.geometry, bounds_m, cut=True)
+    if not (origin.size or of_area.size):
+        kinds = sorted({shape.geom_type for shape in found.geometry})
+        raise fail(InputError, str(path), "lines or polygons in the area", ", ".join(kinds))
+    none = np.zeros(origin.size, dtype=np.int8)
+    ways = Ways(
+        crs,
+        number[origin],
+        codes.astype(np.int16),
+        tuple(str(name) for name in names),
+        lines,
+        none.astype(bool),
+        none,
+    )
+    return LayerRoads(ways, Squares(crs, number[of_area], areas), found.notes)
+
+
+def read_layer_buildings(
+    path: Path | str,
+    crs: str,
+    bounds_m: Bounds,
+    *,
+    layer_name: str | None = None,
+    height_column: str | None = None,
+    levels_column: str | None = None,
+    default_height_m: float = DEFAULT_HEIGHT_M,
+    storey_height_m: float = STOREY_HEIGHT_M,
+) -> Buildings:
+    """Read the buildings that touch an area from a vector file.
+
+    Parameters
+    ----------
+    path, crs, bounds_m, layer_name
+        As for :func:`read_layer_roads`.
+    height_column : str, optional
+        Column that holds the height above ground, in metres, or as a text with its unit.
+    levels_column : str, optional
+        Column that holds the number of storeys, used where there is no height.
+    default_height_m, storey_height_m : float
+        Heights for buildings that tell none; how often they were used is told.
+
+    Raises
+    ------
+    InputError
+        The file, its layer, its CRS or a column is missing or damaged, a height is not > 0, or
+        the area has no polygon.
+    """
+    check_heights(default_height_m, storey_height_m)
+    columns = [name for name in (height_column, levels_column) if name is not None]
+    found = read_layer(Path(path), crs, bounds_m, layer_name, columns)
+    unknown = np.full(found.number.size, None, dtype=object)
+    buildings = made_buildings(
+        crs,
+        found.geometry,
+        bounds_m,
+        found.columns[height_column] if height_column else unknown,
+        found.columns[levels_column] if levels_column else unknown,
+        default_height_m=default_height_m,
+        storey_height_m=storey_height_m,
+    )
+    if not len(buildings):
+        kinds = ", ".join(sorted({shape.geom_type for shape in found.geometry}))
+        raise fail(InputError, str(path), "polygons in the area", kinds, "another layer")
+    return buildings
+
+
+def _classes(values: NDArray[np.object_] | None, count: int) -> NDArray[np.object_]:
+    """Return kinds of way as texts; whole numbers without decimals."""
+    words = np.full(count, ROAD_CLASS, dtype=object)
+    for i, value in enumerate(values if values is not None else ()):
+        is_whole = isinstance(value, float) and value.is_integer()
+        text = str(int(value) if is_whole else value).strip()
+        if value is not None and value == value and text:
+            words[i] = text
+    return words
+
+
+def _ids(values: NDArray[np.object_], where: str) -> NDArray[np.int64]:
+    numbers = np.zeros(len(values), dtype=np.int64)
+    faults = Faults()
+    for i, value in enumerate(values):
+        text = str(int(value)) if isinstance(value, float) and value.is_integer() else str(value)
+        if not (text.isascii() and text.isdigit() and 0 < int(text[:20]) < 2**63):
+            faults.add(where, "whole numbers > 0", repr(value), "another column")
+            break
+        numbers[i] = int(text)
+    faults.raise_if_any(InputError)
+    return numbers
