@@ -20,6 +20,7 @@ _PLAUSIBLE: dict[Quantity, tuple[float, float, str]] = {
     "deviation": (0.0, 100.0, "levels or path losses given for deviations"),
 }
 _LEAST_LOSS_DB = 20.0
+_LEAST_NODATA = 250.0
 
 
 def reason(error: Exception) -> str:
@@ -76,6 +77,7 @@ def check_plausible(values: NDArray[np.float32], quantity: Quantity, path: Path)
 def _hint(known: NDArray[np.float32], low: float, high: float) -> str:
     """Return a hint for numbers far beyond what is possible, or nothing."""
     wrong = known[(known < low) | (known > high)]
-    if wrong.size < known.size and (wrong == wrong[0]).all():
+    alike = wrong.size < known.size and (wrong == wrong[0]).all()
+    if alike and abs(wrong[0]) >= _LEAST_NODATA:
         return f"{wrong[0]:g} means no data, and the file does not say so; say nodata"
     return "factor left out, or the wrong byte order" if np.abs(wrong).max() > 1000 else ""

@@ -51,10 +51,10 @@ def common_lattice(
     alike = [file for file in off if _alike(file.lattice.resolution_m, lattice.resolution_m)]
     others = [file for file in off if file not in alike]
     if alike:
-        right, down = _off_step(alike[0].lattice, lattice)
+        right, up = _off_step(alike[0].lattice, lattice)
         notes.append(
             f"{len(alike)} of {len(files)} rasters lie between the pixels of the lattice (by "
-            f"{right:+.2f} pixels east, {-down:+.2f} north), resampled ({resampling}): "
+            f"{right:+.2f} pixels east, {up:+.2f} north), resampled ({resampling}): "
             f"{_names(alike)}"
         )
     if others:
@@ -107,10 +107,10 @@ def _names(files: Sequence[RasterFile]) -> str:
 
 
 def _off_step(source: Lattice, target: Lattice) -> tuple[float, float]:
-    """Return by which parts of a pixel, east and south, two lattices of one resolution differ."""
+    """Return by which parts of a pixel, east and north, two lattices of one resolution differ."""
     right = (source.west_m - target.west_m) / target.resolution_m
-    down = (target.north_m - source.north_m) / target.resolution_m
-    return right - round(right), down - round(down)
+    up = (source.north_m - target.north_m) / target.resolution_m
+    return right - round(right), up - round(up)
 
 
 def _alike(a_m: float, b_m: float) -> bool:
