@@ -141,6 +141,7 @@ def rasterise_heights(buildings: Buildings, lattice: Lattice) -> NDArray[np.floa
 
     Examples
     --------
+    >>> import shapely
     >>> house = np.array([shapely.box(0, 0, 10, 5)])
     >>> buildings = Buildings("EPSG:32629", house, np.array([9.0]), 1, 0, 0)
     >>> rasterise_heights(buildings, Lattice("EPSG:32629", 0.0, 10.0, 5.0, 2, 3)).tolist()
@@ -151,21 +152,17 @@ def rasterise_heights(buildings: Buildings, lattice: Lattice) -> NDArray[np.floa
     return burn(shapes, lattice, "float32")
 
 
-def burn(
-    shapes: Iterable[tuple[Any, float]], lattice: Lattice, dtype: str, *, all_touched: bool = False
-) -> NDArray[Any]:
-    """Return a raster of ``(geometry, value)`` pairs; the last pair wins, 0 where there is none.
+def burn(shapes: Iterable[tuple[Any, float]], lattice: Lattice, dtype: str) -> NDArray[Any]:
+    """Return a raster of ``(polygon, value)`` pairs; the last pair wins, 0 where there is none.
 
-    A pixel is in a polygon when its centre is, or with ``all_touched`` when they touch.
+    A pixel is in a polygon when its centre is.
     """
     size = (lattice.rows, lattice.cols)
     pairs = list(shapes)
     if not pairs:
         return np.zeros(size, dtype=dtype)
     transform = Affine.from_gdal(*lattice.gdal_transform)
-    raster: NDArray[Any] = rasterize(
-        pairs, size, fill=0, transform=transform, dtype=dtype, all_touched=all_touched
-    )
+    raster: NDArray[Any] = rasterize(pairs, size, fill=0, transform=transform, dtype=dtype)
     return raster
 
 
