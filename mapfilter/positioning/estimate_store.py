@@ -30,7 +30,7 @@ _COLUMNS = (
 )  # fmt: skip
 
 
-def write_estimate(estimate: TrackEstimate, path: Path) -> None:
+def write_estimate(estimate: TrackEstimate, path: str | Path) -> None:
     """Write an estimate as GeoParquet, one row per epoch.
 
     Raises
@@ -66,7 +66,7 @@ def write_estimate(estimate: TrackEstimate, path: Path) -> None:
         "start_utc_s": None if np.isnan(estimate.start_utc_s) else estimate.start_utc_s,
         "unused": [[u.time_s, u.kind, u.what, str(u.reason)] for u in estimate.unused],
     }
-    with atomic_file(path) as temporary:
+    with atomic_file(Path(path)) as temporary:
         frame.to_parquet(temporary, index=False)
         table = pq.ParquetFile(temporary).read()
         known = dict(table.schema.metadata or {})
@@ -75,7 +75,7 @@ def write_estimate(estimate: TrackEstimate, path: Path) -> None:
         pq.write_table(table, temporary, write_page_checksum=True)
 
 
-def read_estimate(path: Path) -> TrackEstimate:
+def read_estimate(path: str | Path) -> TrackEstimate:
     """Read what :func:`write_estimate` wrote.
 
     Raises
@@ -83,6 +83,7 @@ def read_estimate(path: Path) -> TrackEstimate:
     StoreError
         The file is missing, cut off, not an estimate or of a newer version.
     """
+    path = Path(path)
     try:
         # pyarrow says of a missing file only its name.
         with path.open("rb"), pq.ParquetFile(path, page_checksum_verification=True) as source:
@@ -136,7 +137,7 @@ def _estimate(table: Any, meta: dict[str, Any], path: Path) -> TrackEstimate:
     )
 
 
-def write_gpx(estimate: TrackEstimate, path: Path, name: str = "mapfilter") -> None:
+def write_gpx(estimate: TrackEstimate, path: str | Path, name: str = "mapfilter") -> None:
     """Write the located epochs as a GPX 1.1 track (lon/lat, WGS 84; times where known)."""
     ElementTree.register_namespace("", _GPX)
     root = ElementTree.Element(f"{{{_GPX}}}gpx", version="1.1", creator="mapfilter")
@@ -149,11 +150,11 @@ def write_gpx(estimate: TrackEstimate, path: Path, name: str = "mapfilter") -> N
         if np.isfinite(estimate.start_utc_s):
             stamp = _utc_text(estimate.start_utc_s + float(estimate.time_s[index]))
             ElementTree.SubElement(point, f"{{{_GPX}}}time").text = stamp
-    with atomic_file(path) as temporary:
+    with atomic_file(Path(path)) as temporary:
         ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
 
 
-def write_geojson(estimate: TrackEstimate, path: Path) -> None:
+def write_geojson(estimate: TrackEstimate, path: str | Path) -> None:
     """Write the located epochs as GeoJSON points (lon/lat, WGS 84) and one line through them."""
     located, lon, lat = _located_lonlat(estimate)
     positions = [
@@ -181,7 +182,7 @@ def write_geojson(estimate: TrackEstimate, path: Path) -> None:
                 },
             }
         )
-    with atomic_file(path) as temporary:
+    with atomic_file(Path(path)) as temporary:
         text = json.dumps({"type": "FeatureCollection", "features": features}, allow_nan=False)
         temporary.write_text(text + "\n", encoding="utf-8")
 

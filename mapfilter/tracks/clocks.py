@@ -16,6 +16,8 @@ _APART_S = 600.0
 _TIMES_MS = (300.0, 3000.0)
 """Between these, one duration is taken for milliseconds of another."""
 
+_EARLY_S = 30.0
+_EARLY_SHARE = 0.1
 _EARLIEST_UTC_S = datetime(1, 1, 1, tzinfo=UTC).timestamp()
 _MOST_S = 1e11
 
@@ -30,7 +32,7 @@ def check_clocks(
     tables : mapping of str to pandas.DataFrame
         With finite ``time_s``, sorted.
     names : mapping of str to str
-        What messages call a table.
+        What messages call a table, and ``log`` the whole.
     faults : Faults
         Collects at most one fault, since it takes two tables to disagree.
     """
@@ -47,14 +49,33 @@ def check_clocks(
         hint = "seconds of the day, or Unix time, in one of them, or milliseconds for s"
     if hint:
         spans = "; ".join(f"{name} {time[0]:.10g}..{time[-1]:.10g}" for name, time in times.items())
-        faults.add("log, time_s", "tables that overlap in time", spans, hint)
+        whole = names.get("log", "log")
+        faults.add(f"{whole}, time_s", "tables that overlap in time", spans, hint)
 
 
-def check_start(start_utc_s: float, tables: Mapping[str, pd.DataFrame], faults: Faults) -> None:
+def early_ends(tables: Mapping[str, pd.DataFrame]) -> tuple[str, ...]:
+    """Return a note where motion or radio ends long before the other one, as if cut off."""
+    ends_s = {
+        table: float(tables[table]["time_s"].iloc[-1])
+        for table in ("motion", "radio")
+        if len(tables[table])
+    }
+    if len(ends_s) < 2:
+        return ()
+    (first, first_s), (last, last_s) = sorted(ends_s.items(), key=lambda end: end[1])
+    begin_s = min(float(rows["time_s"].iloc[0]) for rows in tables.values() if len(rows))
+    if last_s - first_s <= max(_EARLY_S, _EARLY_SHARE * (last_s - begin_s)):
+        return ()
+    return (f"{first}: ends {last_s - first_s:.0f} s before {last}, as if cut off",)
+
+
+def check_start(
+    start_utc_s: float, tables: Mapping[str, pd.DataFrame], faults: Faults, whole: str = "log"
+) -> None:
     """See that a log's start, if it is known, and all its times are dates that calendars show."""
     if np.isnan(start_utc_s):
         return
-    where = "log, start_utc_s"
+    where = f"{whole}, start_utc_s"
     if not abs(start_utc_s) <= _MOST_S:
         hint = "milliseconds for s" if np.isfinite(start_utc_s) else ""
         faults.add(where, "UTC seconds", start_utc_s, hint)

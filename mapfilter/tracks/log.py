@@ -13,11 +13,13 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import projected_crs
-from mapfilter.tracks.clocks import check_clocks, check_start
+from mapfilter.tracks.clocks import check_clocks, check_start, early_ends
 from mapfilter.tracks.schema import TABLES
+from mapfilter.tracks.steps import check_steps
 from mapfilter.tracks.tidy import tidy_table
 
 
@@ -78,6 +80,7 @@ def make_log(
     start_utc_s: float = float("nan"),
     notes: Sequence[str] = (),
     names: Mapping[str, str] | None = None,
+    row_numbers: Mapping[str, ArrayLike] | None = None,
 ) -> TrackLog:
     """Check four tables and make them a log.
 
@@ -93,15 +96,17 @@ def make_log(
     notes : sequence of str
         What is known already of the tables' past.
     names : mapping, optional
-        From table to the name (such as a file's) by which messages call it.
+        From table to the name (such as a file's) by which messages call it; ``log`` for the whole.
+    row_numbers : mapping, optional
+        From table to what messages call each of its rows; rows are counted from 1 without.
 
     Raises
     ------
     InputError
         With every fault: NaN or infinity in times or coordinates, text for numbers, values out of
         their range, columns missing or misspelt, milliseconds for seconds, degrees for metres or
-        for radians, raw RXLEV for dBm, a CRS that is not projected, tables that do not overlap in
-        time, a start outside the years 1 to 9999.
+        for radians, steps that are none, raw RXLEV for dBm, a CRS that is not projected, tables
+        that do not overlap in time, a start outside the years 1 to 9999.
 
     Examples
     --------
@@ -112,20 +117,24 @@ def make_log(
     >>> print(*log.notes, sep="; ")
     motion: 1 exact duplicate rows dropped; motion: out of order in 1 places, sorted by time
     """
-    faults = Faults()
+    faults, called, numbers = Faults(), names or {}, row_numbers or {}
+    whole = called.get("log", "log")
     try:
-        crs = projected_crs(crs, "log, crs")
+        crs = projected_crs(crs, f"{whole}, crs")
     except InputError as error:
         faults.found.extend(error.faults)
     given = {"motion": motion, "radio": radio, "gnss": gnss, "truth": truth}
     tables: dict[str, pd.DataFrame] = {}
     told = tuple(notes)
     for table in TABLES:
-        where = (names or {}).get(table, table)
-        tables[table], news = tidy_table(table, given[table], where, faults)
+        where = called.get(table, table)
+        rows, news = tidy_table(table, given[table], where, faults, numbers.get(table))
+        tables[table] = rows
         told += news
-    check_start(start_utc_s, tables, faults)
+    check_start(start_utc_s, tables, faults, whole)
     if not any(fault.where.endswith("time_s") for fault in faults.found):
-        check_clocks(tables, names or {}, faults)
+        check_clocks(tables, called, faults)
+        told += check_steps(tables, called.get("motion", "motion"), faults)
+        told += early_ends(tables)
     faults.raise_if_any(InputError)
-    return TrackLog(str(crs), float(start_utc_s), **tables, notes=told)
+    return TrackLog(str(crs), float(start_utc_s), **tables, notes=tuple(dict.fromkeys(told)))

@@ -20,6 +20,9 @@ TABLES = ("motion", "radio", "gnss", "truth")
 SERVING = "serving"
 NEIGHBOUR = "neighbour"
 
+MISSING_SIGNS = (-9999.0, -99999.0, -999999.0)
+"""Numbers by which other programs mean that a value is missing; here its field is empty."""
+
 _TURN_RAD = 2 * np.pi + 1e-9
 # 2.0**63 itself is one more than an int64 holds.
 _LARGEST_ID = float(np.nextafter(2.0**63, 0.0))

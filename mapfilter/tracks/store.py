@@ -6,7 +6,6 @@ folder made by hand needs only ``{"crs": "EPSG:…"}`` in it; a table that is ab
 
 from __future__ import annotations
 
-import warnings
 from math import inf, isnan, nan
 from pathlib import Path
 from typing import Any, Literal
@@ -23,25 +22,36 @@ from mapfilter._io import (
     sha256_file,
     write_json,
 )
-from mapfilter.errors import Faults, InputError, StoreError, fail
+from mapfilter.errors import Faults, InputError, MapfilterError, StoreError, fail
+from mapfilter.tracks._folder import (
+    HEAD,
+    checked_parts,
+    ignored_files,
+    parts_by_name,
+    table_files,
+)
+from mapfilter.tracks._tables import read_table
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.schema import SCHEMA, TABLES
 
 FORMAT = "mapfilter track log"
 VERSION = 1
 
-_HEAD = "log.json"
 _KEYS = ("format", "version", "crs", "start_utc_s", "notes", "parts")
 _ARROW = {"number": pa.float64(), "integer": pa.int64(), "text": pa.string()}
 
 
-def write_log(log: TrackLog, folder: Path, format: Literal["parquet", "csv"] = "parquet") -> None:  # noqa: A002
+def write_log(
+    log: TrackLog,
+    folder: str | Path,
+    format: Literal["parquet", "csv"] = "parquet",  # noqa: A002
+) -> None:
     """Write a log as a folder, in one step; equal logs give equal bytes.
 
     Parameters
     ----------
     log : TrackLog
-    folder : Path
+    folder : str or Path
         Replaced when it is there; must be absent, empty or a log that mapfilter wrote.
     format : {"parquet", "csv"}
         Of the tables.
@@ -51,6 +61,7 @@ def write_log(log: TrackLog, folder: Path, format: Literal["parquet", "csv"] = "
     OutputError
         The folder cannot be written, or holds files that no log of mapfilter lists.
     """
+    folder = Path(folder)
     check_log_replaceable(folder)
     with atomic_dir(folder) as new:
         parts = []
@@ -77,10 +88,10 @@ def write_log(log: TrackLog, folder: Path, format: Literal["parquet", "csv"] = "
             "notes": list(log.notes),
             "parts": parts,
         }
-        write_json(new / _HEAD, head)
+        write_json(new / HEAD, head)
 
 
-def read_log(folder: Path) -> TrackLog:
+def read_log(folder: str | Path) -> TrackLog:
     """Read a log that :func:`write_log` or a person made.
 
     Raises
@@ -90,27 +101,28 @@ def read_log(folder: Path) -> TrackLog:
     StoreError
         A file is missing, cut off or changed since it was written, or of a newer version.
     """
+    folder = Path(folder)
     if not is_log(folder):
-        got = "a folder without it" if folder.is_dir() else "no such folder"
-        raise fail(InputError, str(folder), f"a track log (a folder with {_HEAD})", got)
-    where = str(folder / _HEAD)
-    head = read_json(folder / _HEAD)
+        raise _no_log(folder, f"a track log (a folder with {HEAD})")
+    where = str(folder / HEAD)
+    head = read_json(folder / HEAD)
     _check_head(head, where)
-    paths = _checked_parts(folder, head) if "parts" in head else _parts_by_name(folder)
-    tables = {table: _read_table(path) for table, path in paths.items()}
-    names = {table: str(path) for table, path in paths.items()}
+    paths = checked_parts(folder, head) if "parts" in head else parts_by_name(folder)
+    tables = {table: read_table(table, path) for table, path in paths.items()}
+    notes = [note for read in tables.values() for note in read.notes]
     return make_log(
         head.get("crs"),
-        **tables,
+        **{table: read.rows for table, read in tables.items()},
         start_utc_s=_start_utc_s(head),
-        notes=head.get("notes", ()),
-        names=names,
+        notes=(*head.get("notes", ()), *ignored_files(folder, paths.values()), *notes),
+        names={"log": where} | {table: str(path) for table, path in paths.items()},
+        row_numbers={table: read.row_numbers for table, read in tables.items()},
     )
 
 
-def is_log(path: Path) -> bool:
+def is_log(path: str | Path) -> bool:
     """Tell whether a path is a folder that holds a track log."""
-    return (path / _HEAD).is_file()
+    return (Path(path) / HEAD).is_file()
 
 
 def check_log_replaceable(folder: Path) -> None:
@@ -121,24 +133,43 @@ def check_log_replaceable(folder: Path) -> None:
     OutputError
         It holds other files, a log made by hand among them.
     """
-    check_replaceable(folder, _HEAD, FORMAT)
+    check_replaceable(folder, HEAD, FORMAT)
 
 
-def list_logs(path: Path) -> list[Path]:
+def list_logs(path: str | Path) -> list[Path]:
     """Return the log that ``path`` is, or the logs that lie in it, by name.
 
     Raises
     ------
     InputError
-        There is none.
+        There is none, or a folder in it holds tables without a head.
     """
+    path = Path(path)
     if is_log(path):
         return [path]
-    found = sorted(p for p in path.iterdir() if is_log(p)) if path.is_dir() else []
+    inner = sorted(path.iterdir()) if path.is_dir() else []
+    faults = Faults()
+    for folder in inner:
+        if table_files(folder) and not is_log(folder):
+            faults.found.extend(_no_log(folder, "a track log").faults)
+    faults.raise_if_any(InputError)
+    found = [folder for folder in inner if is_log(folder)]
     if not found:
-        got = "a folder without any" if path.is_dir() else "no such folder"
-        raise fail(InputError, str(path), "a track log, or a folder of logs", got)
+        raise _no_log(path, "a track log, or a folder of logs")
     return found
+
+
+def _no_log(path: Path, expected: str) -> MapfilterError:
+    """Return the error for what is no log, with what would make it one."""
+    tables = table_files(path)
+    if tables:
+        got = f"{tables[0].name} without a {HEAD} beside it"
+        expected = f'{HEAD} with the CRS, such as {{"crs": "EPSG:32635"}}'
+        return fail(InputError, str(path), expected, got, "left out when the log was made by hand")
+    if path.is_file():
+        return fail(InputError, str(path), expected, "a file", "name the folder that it lies in")
+    got = "a folder without any" if path.is_dir() else "no such folder"
+    return fail(InputError, str(path), expected, got)
 
 
 def _arrow(table: str, rows: pd.DataFrame) -> pa.Table:
@@ -169,70 +200,3 @@ def _start_utc_s(head: dict[str, Any]) -> float:
         return nan if start is None else float(start)
     except OverflowError:
         return inf
-
-
-def _checked_parts(folder: Path, head: dict[str, Any]) -> dict[str, Path]:
-    """Return the tables that the head lists, after a look at their sizes and checksums."""
-    faults = Faults()
-    paths = {}
-    allowed = {f"{table}.{suffix}": table for table in TABLES for suffix in ("parquet", "csv")}
-    listed = head["parts"] if isinstance(head["parts"], list) else [head["parts"]]
-    for part in listed:
-        if not isinstance(part, dict) or part.get("path") not in allowed:
-            faults.add(f"{folder / _HEAD}, parts", "tables of a log", repr(part))
-            continue
-        name = part["path"]
-        path = folder / name
-        if not path.is_file():
-            faults.add(str(path), "a table of the log", "no such file")
-        elif path.stat().st_size != part.get("bytes"):
-            size, bytes_ = path.stat().st_size, part.get("bytes")
-            hint = "cut off" if isinstance(bytes_, int) and size < bytes_ else "changed by hand"
-            faults.add(str(path), f"{bytes_} bytes", f"{size} bytes", hint)
-        elif sha256_file(path) != part.get("sha256"):
-            faults.add(str(path), f"SHA-256 {part.get('sha256')}", "another", "changed or damaged")
-        paths[allowed[name]] = path
-    faults.raise_if_any(StoreError)
-    return paths
-
-
-def _parts_by_name(folder: Path) -> dict[str, Path]:
-    faults = Faults()
-    paths = {}
-    for table in TABLES:
-        found = [folder / f"{table}.{suffix}" for suffix in ("parquet", "csv")]
-        found = [path for path in found if path.is_file()]
-        if len(found) > 1:
-            faults.add(str(folder), f"one file of {table}", "both Parquet and CSV")
-        elif found:
-            paths[table] = found[0]
-    faults.raise_if_any(InputError)
-    return paths
-
-
-def _read_table(path: Path) -> pd.DataFrame:
-    try:
-        if path.suffix == ".csv":
-            return _read_csv(path)
-        table = pq.read_table(path)
-        return table.to_pandas(types_mapper={pa.int64(): pd.Int64Dtype()}.get)
-    except pd.errors.EmptyDataError as error:
-        raise fail(InputError, str(path), "a header line", "an empty file", "cut off") from error
-    except (
-        pa.ArrowException,
-        pd.errors.ParserError,
-        pd.errors.ParserWarning,
-        UnicodeDecodeError,
-        OSError,
-    ) as error:
-        got = str(error).splitlines()[0]
-        raise fail(InputError, str(path), "a readable table", got, "cut off") from error
-
-
-def _read_csv(path: Path) -> pd.DataFrame:
-    with warnings.catch_warnings():
-        # pandas only warns when rows have more fields than the header, and drops the rest.
-        warnings.simplefilter("error", pd.errors.ParserWarning)
-        return pd.read_csv(
-            path, dtype=str, keep_default_na=False, index_col=False, encoding="utf-8-sig"
-        )

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mapfilter.errors import Faults
 from mapfilter.geodesy import wrap_rad
-from mapfilter.tracks.schema import NEIGHBOUR, SCHEMA, SERVING, Column
+from mapfilter.tracks.schema import MISSING_SIGNS, NEIGHBOUR, SCHEMA, SERVING, Column
 
 _SHOWN_ROWS = 3
 _SELDOM_S = 10.0
@@ -19,8 +20,24 @@ _SOMEWHERE_M = 25.0
 _SLOW_MPS = 0.04
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class _Door:
+    """Where a table comes in: what messages call it and its rows, and who collects them."""
+
+    where: str
+    row_numbers: NDArray[np.int64]
+    faults: Faults
+
+    def add(self, field: str, expected: str, got: object, hint: str = "") -> None:
+        self.faults.add(f"{self.where}{field}", expected, got, hint)
+
+
 def tidy_table(
-    table: str, given: pd.DataFrame | None, where: str, faults: Faults
+    table: str,
+    given: pd.DataFrame | None,
+    where: str,
+    faults: Faults,
+    row_numbers: ArrayLike | None = None,
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
     """Return a table with the columns of the schema, sorted by time, without exact duplicates.
 
@@ -31,9 +48,11 @@ def tidy_table(
     given : pandas.DataFrame or None
         As read or made; None is an empty table. Values may be text, as from CSV.
     where : str
-        The file's or table's name for messages. Row 1 is the first row of data.
+        The file's or table's name for messages.
     faults : Faults
         Collects what is wrong; the table returned then serves only to find further faults.
+    row_numbers : (N,) array_like of int, optional
+        What messages call each row; 1 to N without.
 
     Returns
     -------
@@ -44,44 +63,44 @@ def tidy_table(
     if given is None:
         given = pd.DataFrame({column.name: [] for column in SCHEMA[table]})
     given = given.reset_index(drop=True)
-    notes = _check_columns(table, given, where, faults)
-    tidy = pd.DataFrame(
-        {column.name: _column(column, given, where, faults) for column in SCHEMA[table]}
-    )
+    numbers = np.arange(1, len(given) + 1) if row_numbers is None else np.asarray(row_numbers)
+    door = _Door(where, numbers, faults)
+    notes = _check_columns(table, given, door)
+    tidy = pd.DataFrame({column.name: _column(column, given, door) for column in SCHEMA[table]})
     if table == "radio":
-        _check_roles(tidy["role"], where, faults)
+        _check_roles(tidy["role"], door)
         tidy["censored"] = tidy["censored"].fillna(0)
     if table == "gnss":
-        _check_covariance(tidy, where, faults)
+        _check_covariance(tidy, door)
     if table == "motion":
         tidy["heading_rad"] = wrap_rad(tidy["heading_rad"])
     else:
-        _check_degrees(tidy, where, faults)
-    _check_milliseconds(table, tidy, where, faults)
+        _check_degrees(tidy, door)
+    _check_milliseconds(table, tidy, door)
     return _sorted_unique(tidy, where, notes)
 
 
-def _check_columns(table: str, given: pd.DataFrame, where: str, faults: Faults) -> tuple[str, ...]:
+def _check_columns(table: str, given: pd.DataFrame, door: _Door) -> tuple[str, ...]:
     names = [column.name for column in SCHEMA[table]]
     notes = []
     for name in (str(name) for name in given.columns if name not in names):
         near = get_close_matches(name, [n for n in names if n not in given.columns], 1, 0.6)
         if near:
-            faults.add(f"{where}, column {name}", f"columns {', '.join(names)}", name, near[0])
+            door.add(f", column {name}", f"columns {', '.join(names)}", name, near[0])
         else:
-            notes.append(f"{where}: column {name} is not used")
+            notes.append(f"{door.where}: column {name} is not used")
     for column in SCHEMA[table]:
         if column.required and column.name not in given.columns:
-            faults.add(where, f"a column {column.name}", "none")
+            door.add("", f"a column {column.name}", "none")
     return tuple(notes)
 
 
-def _column(column: Column, given: pd.DataFrame, where: str, faults: Faults) -> Any:
+def _column(column: Column, given: pd.DataFrame, door: _Door) -> Any:
     values = given.get(column.name)
     if values is None:
         values = pd.Series([None] * len(given), dtype=object)
     if column.kind == "text":
-        return _text(column, values, where, faults)
+        return _text(column, values, door)
     number, readable = _numbers(values)
     missing = np.isnan(number)
     bad = ~readable | np.isinf(number) | (number < column.low) | (number > column.high)
@@ -89,7 +108,9 @@ def _column(column: Column, given: pd.DataFrame, where: str, faults: Faults) -> 
         bad |= ~missing & np.isfinite(number) & (number != np.round(number))
     if column.required and column.name in given.columns:
         bad |= missing
-    _add_rows(faults, bad, where, column, values)
+    elif not column.required:
+        bad |= np.isin(number, MISSING_SIGNS)
+    _add_rows(door, bad, column, values)
     if column.kind == "number":
         return number
     kept = np.where(bad | missing, 0.0, number).astype(np.int64)
@@ -98,10 +119,10 @@ def _column(column: Column, given: pd.DataFrame, where: str, faults: Faults) -> 
     return pd.arrays.IntegerArray(kept, bad | missing)
 
 
-def _text(column: Column, values: pd.Series, where: str, faults: Faults) -> Any:
+def _text(column: Column, values: pd.Series, door: _Door) -> Any:
     present = values.notna().to_numpy() & (values.astype(str) != "").to_numpy()
     if column.required:
-        _add_rows(faults, ~present, where, column, values)
+        _add_rows(door, ~present, column, values)
     texts = [str(v) if ok else None for v, ok in zip(values, present, strict=True)]
     # Without the dtype pandas 3 makes these strings, and None becomes NaN.
     return pd.Series(texts, dtype=object)
@@ -124,23 +145,28 @@ def _numbers(values: pd.Series) -> tuple[NDArray[np.float64], NDArray[np.bool_]]
     return number, readable
 
 
-def _add_rows(
-    faults: Faults, bad: NDArray[np.bool_], where: str, column: Column, values: pd.Series
-) -> None:
+def _add_rows(door: _Door, bad: NDArray[np.bool_], column: Column, values: pd.Series) -> None:
     rows = np.flatnonzero(bad)
     for row in rows[:_SHOWN_ROWS]:
         value = values.iloc[row]
         empty = value is None or value is pd.NA or value == ""
-        off_range = not empty and _is_finite_number(value)
-        faults.add(
-            f"{where} row {row + 1}, {column.name}",
+        door.add(
+            f" row {door.row_numbers[row]}, {column.name}",
             column.expected,
             "nothing" if empty else value,
-            column.hint if off_range else "",
+            "" if empty else _hint(column, value),
         )
     if len(rows) > _SHOWN_ROWS:
         more = f"{len(rows) - _SHOWN_ROWS} more rows like these"
-        faults.add(f"{where}, {column.name}", column.expected, more, column.hint)
+        door.add(f", {column.name}", column.expected, more, _hint(column, values.iloc[rows[-1]]))
+
+
+def _hint(column: Column, value: Any) -> str:
+    if not _is_finite_number(value):
+        return ""
+    if float(value) in MISSING_SIGNS:
+        return "a sign for a missing value; leave the field empty"
+    return column.hint
 
 
 def _is_finite_number(value: Any) -> bool:
@@ -150,19 +176,19 @@ def _is_finite_number(value: Any) -> bool:
         return False
 
 
-def _check_roles(role: pd.Series, where: str, faults: Faults) -> None:
+def _check_roles(role: pd.Series, door: _Door) -> None:
     bad = role.notna().to_numpy() & ~role.isin([SERVING, NEIGHBOUR]).to_numpy()
-    _add_rows(faults, bad, where, SCHEMA["radio"][1], role)
+    _add_rows(door, bad, SCHEMA["radio"][1], role)
 
 
-def _check_covariance(gnss: pd.DataFrame, where: str, faults: Faults) -> None:
+def _check_covariance(gnss: pd.DataFrame, door: _Door) -> None:
     product = gnss["var_east_m2"].to_numpy() * gnss["var_north_m2"].to_numpy()
     bad = gnss["cov_east_north_m2"].to_numpy() ** 2 > product * (1 + 1e-9)
     column = Column("cov_east_north_m2", expected="a covariance of at most √(var_east·var_north)")
-    _add_rows(faults, bad, where, column, gnss["cov_east_north_m2"])
+    _add_rows(door, bad, column, gnss["cov_east_north_m2"])
 
 
-def _check_degrees(table: pd.DataFrame, where: str, faults: Faults) -> None:
+def _check_degrees(table: pd.DataFrame, door: _Door) -> None:
     """Find positions that are longitudes and latitudes: near zero, and hardly moving for long."""
     if "east_m" not in table or len(table) < 2:
         return
@@ -173,10 +199,10 @@ def _check_degrees(table: pd.DataFrame, where: str, faults: Faults) -> None:
     extent = max(np.ptp(east), np.ptp(north))
     if 0 < extent < 0.5 and np.ptp(table["time_s"].to_numpy()) >= 10:
         got = f"all within {extent:.4g} of ({east[0]:.6g}, {north[0]:.6g})"
-        faults.add(f"{where}, east_m and north_m", "metres", got, "degrees given for metres")
+        door.add(", east_m and north_m", "metres", got, "degrees given for metres")
 
 
-def _check_milliseconds(table: str, rows: pd.DataFrame, where: str, faults: Faults) -> None:
+def _check_milliseconds(table: str, rows: pd.DataFrame, door: _Door) -> None:
     """Find times in milliseconds: rows seldom come, and what gets somewhere goes very slowly."""
     time = np.unique(rows["time_s"].to_numpy())
     if len(time) < 3 or table == "radio" or not np.isfinite(time).all():
@@ -190,7 +216,7 @@ def _check_milliseconds(table: str, rows: pd.DataFrame, where: str, faults: Faul
     speed_mps = moved_m / (time[-1] - time[0])
     if between_s >= _SELDOM_S and moved_m >= _SOMEWHERE_M and speed_mps < _SLOW_MPS:
         got = f"{between_s:g} between rows, hence {speed_mps:.2g} m/s"
-        faults.add(f"{where}, time_s", "seconds", got, "milliseconds for s")
+        door.add(", time_s", "seconds", got, "milliseconds for s")
 
 
 def _sorted_unique(

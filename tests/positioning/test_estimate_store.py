@@ -71,6 +71,16 @@ def test_everything_comes_back(tmp_path, estimate):
     assert [p.name for p in path.parent.iterdir()] == ["estimate.parquet"]
 
 
+def test_paths_may_be_text(tmp_path):
+    estimate = make_estimate()
+    for write, name in (
+        (write_estimate, "e.parquet"), (write_gpx, "e.gpx"), (write_geojson, "e.geojson")
+    ):  # fmt: skip
+        write(estimate, str(tmp_path / name))
+        assert (tmp_path / name).stat().st_size
+    assert_same(read_estimate(str(tmp_path / "e.parquet")), estimate)
+
+
 @settings(max_examples=30)
 @given(st.lists(st.tuples(*[st.floats(allow_nan=True, allow_infinity=False)] * 5), max_size=6))
 def test_all_floating_point_values_come_back(tmp_path_factory, rows):
