@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import difflib
-import io
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,9 @@ from pyproj import CRS
 
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import project, projected_crs, unproject
+from mapfilter.radio._cell_layouts import Arranged, Layout, arrange
 from mapfilter.radio._cell_rules import ANTENNAS, OPTIONAL, RANGES, antenna_fault, id_fault
+from mapfilter.radio._csv_table import number, read_table
 
 COLUMNS = (
     "cell", "site", "lat", "lon", "height_m", "azimuth_deg", "downtilt_deg",
@@ -26,8 +28,8 @@ COLUMNS = (
 _ALLOWED = {*COLUMNS, "east", "north", "crs"}
 _REQUIRED = ("cell", "height_m", "eirp_dbm", "frequency_mhz")
 _TRUE, _FALSE = {"1", "true", "yes", "y"}, {"0", "false", "no", "n"}
-_LARGEST_BYTES = 1 << 28
 _NEAR_DEG = 3.0
+_LONGEST_SHOWN = 80
 
 
 @dataclass(slots=True)
@@ -39,57 +41,46 @@ class Row:
     faulty: bool = False
 
 
-def read_rows(path: Path, crs: str, faults: Faults) -> list[Row]:
-    """Read and check every row; what is wrong is added to ``faults``.
+def read_plan(
+    path: Path,
+    crs: str,
+    faults: Faults,
+    layout: Layout = "plan",
+    columns: Mapping[str, str] | None = None,
+    defaults: Mapping[str, float] | None = None,
+) -> tuple[list[Row], tuple[str, ...]]:
+    """Read and check every row of a cell plan, or of a list of another layout.
+
+    What is wrong is added to ``faults``; also returned is what was filled in.
 
     Raises
     ------
     InputError
         The file cannot be read as a table, or its header is wrong.
     """
-    lines = list(_table(path))
-    if not lines:
-        raise fail(InputError, str(path), "a header line and rows", "nothing", "an empty file")
-    header = [name.strip() for name in lines[0][1]]
-    _check_header(path, header)
-    if len(lines) == 1:
+    table = read_table(path, "a cell plan")
+    if layout == "plan" and not columns:
+        _check_header(path, table.header, known_only=True)
+        arranged = Arranged(table.header, table.rows, {}, ())
+    else:
+        arranged = arrange(table, layout, columns or {}, defaults or {}, faults)
+        _check_header(path, arranged.header, known_only=False)
+    if not arranged.rows and not faults.found:
         raise fail(InputError, str(path), "at least one cell", "a header without rows")
-    rows = [_Reader(path, line, header, crs, faults).row(texts) for line, texts in lines[1:]]
+    reader = _Reader(path, arranged, crs, table.separator != ",", faults)
+    rows = [reader.row(line, texts) for line, texts in arranged.rows]
     systems = {row.values.get("crs", crs) for row in rows}
     if len(systems) > 1:
         faults.add(f"{path}, crs", "one CRS in all rows", ", ".join(sorted(systems)))
     _place(path, rows, crs, faults)
-    return rows
+    return rows, arranged.notes
 
 
-def _table(path: Path) -> list[tuple[int, list[str]]]:
-    try:
-        if path.stat().st_size > _LARGEST_BYTES:
-            raise fail(InputError, str(path), "a cell plan of at most 256 MiB", "a larger file")
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        got = f"other bytes at offset {error.start}"
-        hint = "saved in a Windows code page, or no text file"
-        raise fail(InputError, str(path), "text in UTF-8", got, hint) from error
-    except OSError as error:
-        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
-    if "\0" in text:
-        raise fail(InputError, str(path), "text in UTF-8", "NUL characters", "no text file")
-    head = text.split("\n", 1)[0]
-    reader = csv.reader(
-        io.StringIO(text, newline=""), delimiter=";" if head.count(";") > head.count(",") else ","
-    )
-    try:
-        return [(reader.line_num, row) for row in reader if any(field.strip() for field in row)]
-    except csv.Error as error:
-        raise fail(InputError, f"{path} row {reader.line_num}", "CSV", error) from error
-
-
-def _check_header(path: Path, header: list[str]) -> None:
+def _check_header(path: Path, header: tuple[str, ...], *, known_only: bool) -> None:
     faults = Faults()
     where = f"{path} header"
     for name in header:
-        if name not in _ALLOWED:
+        if name not in _ALLOWED and known_only:
             near = difflib.get_close_matches(name.lower(), sorted(_ALLOWED), n=1, cutoff=0.5)
             faults.add(where, "known columns only", repr(name), f"{near[0]} meant" if near else "")
     for name in sorted({name for name in header if header.count(name) > 1}):
@@ -105,14 +96,17 @@ def _check_header(path: Path, header: list[str]) -> None:
 
 
 class _Reader:
-    """Turns the texts of one line into values."""
+    """Turns the texts of lines into values."""
 
-    def __init__(self, path: Path, line: int, header: list[str], crs: str, faults: Faults) -> None:
-        self._path, self._line, self._header = path, line, header
-        self._crs, self._faults = crs, faults
+    def __init__(
+        self, path: Path, table: Arranged, crs: str, decimal_comma: bool, faults: Faults
+    ) -> None:
+        self._path, self._header, self._shown = path, table.header, table.shown
+        self._crs, self._decimal_comma, self._faults = crs, decimal_comma, faults
+        self._row = Row(0, {})
+
+    def row(self, line: int, texts: list[str]) -> Row:
         self._row = Row(line, {})
-
-    def row(self, texts: list[str]) -> Row:
         if len(texts) != len(self._header):
             hint = (
                 "a decimal comma, or an unquoted separator"
@@ -137,14 +131,15 @@ class _Reader:
         values["antenna"] = self._antenna(given.get("antenna", ""), default)
         if given.get("crs"):
             try:
-                values["crs"] = projected_crs(given["crs"], f"{self._path} row {self._line}, crs")
+                values["crs"] = projected_crs(given["crs"], f"{self._path} row {line}, crs")
             except InputError as error:
                 self._faults.found.extend(error.faults)
                 self._row.faulty = True
         return self._row
 
     def _fault(self, name: str, expected: str, got: str, hint: str = "") -> None:
-        self._faults.add(f"{self._path} row {self._line}, {name}", expected, got, hint)
+        shown = self._shown.get(name, name)
+        self._faults.add(f"{self._path} row {self._row.line}, {shown}", expected, got, hint)
         self._row.faulty = True
 
     def _identifier(self, name: str, text: str) -> str:
@@ -177,15 +172,15 @@ class _Reader:
             self._row.values[name] = int(value) if allowed.whole else value
 
     def _parse(self, name: str, text: str, expected: str) -> float | None:
-        try:
-            value = float("?" if "_" in text else text)
-        except ValueError:
-            hint = "a decimal comma" if text.replace(",", "", 1).lstrip("-").isdigit() else ""
-            self._fault(name, expected, repr(text) if text else "nothing", hint)
-            return None
-        if not math.isfinite(value):
-            self._fault(name, expected, text)
-            return None
+        value = number(text, decimal_comma=self._decimal_comma)
+        if value is None:
+            comma = text.replace(",", "", 1).lstrip("-").isdigit()
+            self._fault(
+                name,
+                expected,
+                _shown(text),
+                "a decimal comma" if comma and "," in text else "",
+            )
         return value
 
     def _truth(self, name: str, text: str) -> bool:
@@ -194,8 +189,15 @@ class _Reader:
         return text.lower() in _TRUE
 
 
+def _shown(text: str) -> str:
+    if text.lower().lstrip("+-") in ("nan", "inf", "infinity"):
+        return text
+    return repr(text[:_LONGEST_SHOWN]) if text else "nothing"
+
+
 def _place(path: Path, rows: list[Row], crs: str, faults: Faults) -> None:
     """Give every row its east and north in ``crs``, checking that they lie where the CRS is for."""
+    _project(rows, crs)
     for row in rows:
         if {"lat", "lon"} <= row.values.keys():
             fields, wrong = "lat, lon", _from_degrees(row.values, crs)
@@ -209,13 +211,18 @@ def _place(path: Path, rows: list[Row], crs: str, faults: Faults) -> None:
             row.faulty = True
 
 
+def _project(rows: list[Row], crs: str) -> None:
+    """Give rows in degrees their metres, all at once."""
+    some = [row.values for row in rows]
+    some = [v for v in some if v.get("lat") is not None and v.get("lon") is not None]
+    east_m, north_m = project(crs, [v["lon"] for v in some], [v["lat"] for v in some])
+    for values, east, north in zip(some, east_m.tolist(), north_m.tolist(), strict=True):
+        values["east_m"], values["north_m"] = east, north
+
+
 def _from_degrees(values: dict[str, Any], crs: str) -> tuple[str, str, str] | None:
     lat, lon = values["lat"], values["lon"]
-    if lat is None or lon is None:
-        return None
-    east_m, north_m = project(crs, lon, lat)
-    values["east_m"], values["north_m"] = float(east_m), float(north_m)
-    return _degree_fault(lat, lon, crs)
+    return None if lat is None or lon is None else _degree_fault(lat, lon, crs)
 
 
 def _from_metres(values: dict[str, Any], crs: str) -> tuple[str, str, str] | None:
@@ -254,9 +261,14 @@ def _degree_fault(lat: float, lon: float, crs: str) -> tuple[str, str, str] | No
     return f"a place where {crs} is used", got, hint
 
 
+@lru_cache(maxsize=16)
+def _area_of_use(crs: str) -> Any:
+    return CRS.from_user_input(crs).area_of_use
+
+
 def _near(crs: str, lon_deg: float, lat_deg: float) -> bool:
     """Tell whether a place lies in, or within a few degrees of, the area a CRS is made for."""
-    area = CRS.from_user_input(crs).area_of_use
+    area = _area_of_use(crs)
     if not (math.isfinite(lon_deg) and math.isfinite(lat_deg)):
         return False
     if area is None:
@@ -265,4 +277,4 @@ def _near(crs: str, lon_deg: float, lat_deg: float) -> bool:
     half = ((area.east - area.west) % 360) / 2 or 180.0
     offset = (lon_deg - middle + 180) % 360 - 180
     south, north = area.south - _NEAR_DEG, area.north + _NEAR_DEG
-    return abs(offset) <= half + _NEAR_DEG and south <= lat_deg <= north
+    return bool(abs(offset) <= half + _NEAR_DEG and south <= lat_deg <= north)

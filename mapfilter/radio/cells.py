@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
-from functools import cached_property, partial
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -16,15 +16,9 @@ import numpy as np
 from mapfilter._io import atomic_file
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import project, projected_crs, same_crs, unproject
-from mapfilter.radio._cell_rules import (
-    OPTIONAL,
-    POINTED,
-    RANGES,
-    antenna_fault,
-    id_fault,
-    looks_like_radians,
-)
-from mapfilter.radio._cell_table import COLUMNS, read_rows
+from mapfilter.radio._cell_checks import check_cells
+from mapfilter.radio._cell_layouts import Layout
+from mapfilter.radio._cell_table import COLUMNS, Row, read_plan
 
 Antenna = str
 
@@ -106,6 +100,8 @@ class CellPlan:
         Projected CRS in metres.
     cells : tuple of Cell
         At least one; ids are unique.
+    notes : tuple of str
+        What was filled in or left out when it was read.
 
     Raises
     ------
@@ -115,6 +111,7 @@ class CellPlan:
 
     crs: str
     cells: tuple[Cell, ...]
+    notes: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         faults = Faults()
@@ -123,7 +120,7 @@ class CellPlan:
         except InputError as error:
             faults.found.extend(error.faults)
         object.__setattr__(self, "cells", tuple(self.cells))
-        _check_cells(self.cells, lambda i, name: f"cell {self.cells[i].id!r}, {name}", faults)
+        check_cells(self.cells, lambda i, name: f"cell {self.cells[i].id!r}, {name}", faults)
         faults.raise_if_any(InputError)
 
     @property
@@ -145,12 +142,12 @@ class CellPlan:
                 found[key] = (*found.get(key, ()), cell.id)
         return found
 
-    def __getstate__(self) -> tuple[str, tuple[Cell, ...]]:
-        return self.crs, self.cells
+    def __getstate__(self) -> tuple[str, tuple[Cell, ...], tuple[str, ...]]:
+        return self.crs, self.cells, self.notes
 
-    def __setstate__(self, state: tuple[str, tuple[Cell, ...]]) -> None:
-        object.__setattr__(self, "crs", state[0])
-        object.__setattr__(self, "cells", state[1])
+    def __setstate__(self, state: tuple[str, tuple[Cell, ...], tuple[str, ...]]) -> None:
+        for name, value in zip(("crs", "cells", "notes"), state, strict=True):
+            object.__setattr__(self, name, value)
 
     def __len__(self) -> int:
         return len(self.cells)
@@ -184,16 +181,42 @@ class CellPlan:
         )
         east_m, north_m = project(target, lon_deg, lat_deg)
         moved = zip(self.cells, east_m.tolist(), north_m.tolist(), strict=True)
-        return CellPlan(target, tuple(replace(c, east_m=e, north_m=n) for c, e, n in moved))
+        cells = tuple(replace(c, east_m=e, north_m=n) for c, e, n in moved)
+        return CellPlan(target, cells, self.notes)
 
 
-def read_cell_plan(path: Path | str, crs: str) -> CellPlan:
+def read_cell_plan(
+    path: Path | str,
+    crs: str,
+    *,
+    layout: Layout = "plan",
+    columns: Mapping[str, str] | None = None,
+    defaults: Mapping[str, float] | None = None,
+    bounds_m: tuple[float, float, float, float] | None = None,
+) -> CellPlan:
     """Read a cell plan from a CSV file and bring it into ``crs``.
 
-    Commas or semicolons, UTF-8, one header line. Columns: cell, lat and lon (WGS 84) *or* east and
-    north (in the CRS of a ``crs`` column, else in ``crs``), height_m, eirp_dbm, frequency_mhz; and
-    when wanted site, azimuth_deg, antenna, and the other fields of :class:`Cell`. An empty field
-    takes the default; without an azimuth the antenna is omnidirectional.
+    Commas, semicolons or tabs, UTF-8, one header line; decimal commas where they separate nothing.
+    Columns: cell, lat and lon (WGS 84) *or* east and north (in the CRS of a ``crs`` column, else in
+    ``crs``), height_m, eirp_dbm, frequency_mhz; and when wanted site, azimuth_deg, antenna, and the
+    other fields of :class:`Cell`. An empty field takes the default; without an azimuth the antenna
+    is omnidirectional.
+
+    Parameters
+    ----------
+    path : Path or str
+    crs : str
+        Projected CRS of the plan.
+    layout : {"plan", "atoll", "opencellid"}
+        Of the columns: as above, those of a planning tool's transmitters, or those of OpenCellID
+        and the Mozilla Location Service, whose bad rows are left out and told. In the latter
+        two columns of other names are passed over.
+    columns : mapping of str to str, optional
+        The file's column by field, where it has another name; others are passed over, then.
+    defaults : mapping of str to float, optional
+        With ``columns`` or another layout: values of fields that have no column or are empty.
+    bounds_m : tuple of float, optional
+        West, south, east, north: cells beyond them are left out and told.
 
     Raises
     ------
@@ -203,13 +226,39 @@ def read_cell_plan(path: Path | str, crs: str) -> CellPlan:
     """
     path = Path(path)
     faults = Faults()
-    rows = read_rows(path, projected_crs(crs), faults)
-    known = {field.name for field in fields(Cell)}
+    rows, notes = read_plan(path, projected_crs(crs), faults, layout, columns, defaults)
+    known = {each.name for each in fields(Cell)}
     whole = [row for row in rows if not row.faulty]
+    if layout == "opencellid" and faults.found and whole:
+        notes += (f"{len(faults.found)} faulty rows left out, such as {faults.found[0]}",)
+        faults = Faults()
+        whole = list({row.values["id"]: row for row in reversed(whole)}.values())[::-1]
+    if bounds_m is not None:
+        whole, notes = _within(whole, bounds_m, notes, str(path))
     cells = tuple(Cell(**{k: v for k, v in row.values.items() if k in known}) for row in whole)
-    _check_cells(cells, lambda i, name: f"{path} row {whole[i].line}, {name}", faults, ranges=False)
+    check_cells(cells, lambda i, name: f"{path} row {whole[i].line}, {name}", faults, ranges=False)
     faults.raise_if_any(InputError)
-    return CellPlan(crs, cells)
+    return CellPlan(crs, cells, notes)
+
+
+def _within(
+    rows: list[Row],
+    bounds_m: tuple[float, float, float, float],
+    notes: tuple[str, ...],
+    where: str,
+) -> tuple[list[Row], tuple[str, ...]]:
+    west, south, east, north = bounds_m
+    inside = [
+        row
+        for row in rows
+        if west <= row.values["east_m"] <= east and south <= row.values["north_m"] <= north
+    ]
+    if rows and not inside:
+        bounds = ", ".join(f"{value:.0f}" for value in bounds_m)
+        raise fail(InputError, where, f"cells in {bounds}", "none", "cells of another area")
+    if len(inside) < len(rows):
+        notes += (f"{len(rows) - len(inside)} of {len(rows)} cells left out: far from the area",)
+    return inside, notes
 
 
 def write_cell_plan(plan: CellPlan, path: Path | str) -> None:
@@ -246,51 +295,3 @@ def _as_text(value: Any) -> str:
     if isinstance(value, bool):
         return "1" if value else "0"
     return str(value) if isinstance(value, str) else repr(value)
-
-
-def _check_cells(
-    cells: tuple[Cell, ...],
-    where: Callable[[int, str], str],
-    faults: Faults,
-    *,
-    ranges: bool = True,
-) -> None:
-    """Note what is wrong with cells: each field (unless checked already), and all together."""
-    if not cells and not faults.found:
-        faults.add("cell plan", "at least one cell", "none")
-    first: dict[str, int] = {}
-    for i, cell in enumerate(cells):
-        if ranges:
-            _check_fields(cell, partial(where, i), faults)
-        if cell.antenna in POINTED and cell.azimuth_deg is None:
-            faults.add(
-                where(i, "azimuth_deg"),
-                "an azimuth, as the antenna is a sector",
-                "nothing",
-                "azimuth left out, or the antenna is omni",
-            )
-        if cell.id in first:
-            faults.add(where(i, "cell"), "an id used once", repr(cell.id), "a row given twice")
-        first.setdefault(cell.id, i)
-    azimuths = [cell.azimuth_deg for cell in cells if cell.azimuth_deg is not None]
-    if looks_like_radians(azimuths):
-        shown = ", ".join(f"{azimuth:g}" for azimuth in azimuths[:3])
-        faults.add(
-            where(0, "azimuth_deg"),
-            "degrees in 0..360",
-            f"{shown}, …, none above 2π",
-            "radians given for degrees",
-        )
-
-
-def _check_fields(cell: Cell, where: Callable[[str], str], faults: Faults) -> None:
-    for name in ("id", "site"):
-        if wrong := id_fault(getattr(cell, name)):
-            faults.add(where(name), *wrong)
-    if wrong := antenna_fault(cell.antenna):
-        faults.add(where("antenna"), *wrong)
-    for name, allowed in RANGES.items():
-        value = getattr(cell, name)
-        if not allowed.holds(value) and not (value is None and name in OPTIONAL):
-            hint = allowed.hint(value) if isinstance(value, int | float) else ""
-            faults.add(where(name), allowed.expected, value, hint)

@@ -165,9 +165,19 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
         read_cell_plan(tmp_path, CRS)
 
 
+def test_decimal_commas_are_read_where_they_separate_nothing(tmp_path: Path) -> None:
+    for separator in (";", "\t"):
+        text = HEADER.replace(",", separator) + "A;S;60,17;24.94;30,5;120;50;1800;600;7\n".replace(
+            ";", separator
+        )
+        cell = _read(tmp_path, text)["A"]
+        assert (cell.height_m, cell.east_m) == (30.5, project(CRS, 24.94, 60.17)[0])
+    assert "row 2, lat" in _complaint(tmp_path, text.replace("60,17", "60,17,1"))
+
+
 def test_decimal_comma_is_told(tmp_path: Path) -> None:
-    text = HEADER.replace(",", ";") + "A;S;60,17;24.94;30;120;50;1800;600;7\n"
-    assert "a decimal comma" in _complaint(tmp_path, text)
+    text = HEADER + 'A,S,"60,17",24.94,30,120,50,1800,600,7\n'
+    assert "found '60,17' (likely: a decimal comma)" in _complaint(tmp_path, text)
 
 
 def test_degrees_given_for_metres_are_told(tmp_path: Path) -> None:

@@ -1,0 +1,160 @@
+"""Cell lists of others: which of their columns are the fields of a cell plan."""
+
+from __future__ import annotations
+
+import difflib
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from mapfilter.errors import Faults, InputError
+from mapfilter.radio._csv_table import Table
+
+Layout = Literal["plan", "atoll", "opencellid"]
+
+Columns = Mapping[str, tuple[str, ...]]
+"""By field, the names that its column may have; the first that is there counts."""
+
+ATOLL: Columns = {
+    "cell": ("TX_ID", "TX_NAME"),
+    "site": ("SITE_NAME", "SITE"),
+    "lat": ("LATITUDE",),
+    "lon": ("LONGITUDE",),
+    "east": ("X",),
+    "north": ("Y",),
+    "height_m": ("HEIGHT",),
+    "azimuth_deg": ("AZIMUT", "AZIMUTH"),
+    "downtilt_deg": ("ELECTRICAL_TILT",),
+    "mechanical_downtilt_deg": ("TILT", "MECHANICAL_TILT"),
+    "antenna": ("ANTENNA_NAME",),
+    "eirp_dbm": ("EIRP",),
+    "frequency_mhz": ("FREQUENCY",),
+    "mcc": ("MCC",),
+    "mnc": ("MNC",),
+    "lac": ("LAC",),
+    "ci": ("CELL_IDENTITY", "CI"),
+    "arfcn": ("CONTROL_CHANNEL", "BCCH"),
+    "bsic": ("BSIC",),
+}
+OPENCELLID: Columns = {
+    "lat": ("lat",),
+    "lon": ("lon",),
+    "mcc": ("mcc",),
+    "mnc": ("net", "mnc"),
+    "lac": ("area", "lac"),
+    "ci": ("cell", "cellid"),
+}
+OPENCELLID_HEADER = (
+    "radio", "mcc", "net", "area", "cell", "unit", "lon", "lat", "range", "samples", "changeable",
+    "created", "updated", "averageSignal",
+)  # fmt: skip
+"""Of the downloads of OpenCellID and of the Mozilla Location Service; the former leave it out."""
+LAYOUTS: Mapping[Layout, Columns] = {"plan": {}, "atoll": ATOLL, "opencellid": OPENCELLID}
+
+_RADIOS = {"GSM", "UMTS", "LTE", "CDMA", "NR"}
+_IDENTITY = ("mcc", "mnc", "lac", "ci")
+
+
+@dataclass(frozen=True, slots=True)
+class Arranged:
+    """A table with the columns of a cell plan.
+
+    Parameters
+    ----------
+    header : tuple of str
+        Fields.
+    rows : tuple of (int, list of str)
+        Line of the file, and its fields.
+    shown : mapping of str to str
+        How messages name a field: with the file's own column.
+    notes : tuple of str
+        Which values were filled in.
+    """
+
+    header: tuple[str, ...]
+    rows: tuple[tuple[int, list[str]], ...]
+    shown: Mapping[str, str]
+    notes: tuple[str, ...]
+
+
+def arrange(
+    table: Table,
+    layout: Layout,
+    columns: Mapping[str, str],
+    defaults: Mapping[str, float],
+    faults: Faults,
+) -> Arranged:
+    """Pick the columns of a cell plan from a list of another layout.
+
+    Parameters
+    ----------
+    table : Table
+    layout : {"plan", "atoll", "opencellid"}
+        Names the columns that ``columns`` does not.
+    columns : mapping of str to str
+        Column of the file, by field.
+    defaults : mapping of str to float
+        For fields without a column, or empty ones.
+    faults : Faults
+        Rows of another length are added, and left out.
+
+    Raises
+    ------
+    InputError
+        A column of ``columns`` is not in the file.
+    """
+    header, rows = table.header, table.rows
+    if layout == "opencellid" and header and header[0].upper() in _RADIOS:
+        header, rows = OPENCELLID_HEADER, ((1, list(table.header)), *rows)
+    picked = _pick(table, header, layout, columns)
+    fields = [*picked, *(name for name in defaults if name not in picked)]
+    composed = "cell" not in picked and all(name in picked for name in _IDENTITY)
+    filled: Counter[str] = Counter()
+    found = []
+    for line, texts in rows:
+        if len(texts) != len(header):
+            more = len(texts) > len(header)
+            hint = "a decimal comma, or an unquoted separator" if more else "the line is cut off"
+            faults.add(f"{table.path} row {line}, fields", f"{len(header)}", f"{len(texts)}", hint)
+            continue
+        values = {name: texts[at].strip() for name, at in picked.items()}
+        for name, default in defaults.items():
+            if not values.get(name):
+                values[name] = repr(default)
+                filled[name] += 1
+        if composed:
+            values["cell"] = "-".join(values[name] for name in _IDENTITY)
+        found.append((line, list(values.values())))
+    notes = tuple(
+        f"{name} = {defaults[name]:g} for {count} of {len(found)} cells that tell none"
+        for name, count in sorted(filled.items())
+    )
+    shown = {name: f"{header[at]} ({name})" for name, at in picked.items() if header[at] != name}
+    return Arranged((*fields, "cell") if composed else tuple(fields), tuple(found), shown, notes)
+
+
+def _pick(
+    table: Table, header: tuple[str, ...], layout: Layout, columns: Mapping[str, str]
+) -> dict[str, int]:
+    """Return the place of each field's column."""
+    faults = Faults()
+    places = {name: at for at, name in reversed(list(enumerate(header)))}
+    folded = {name.casefold(): at for name, at in places.items()}
+    picked = {}
+    for field, name in columns.items():
+        if name in places:
+            picked[field] = places[name]
+        else:
+            near = difflib.get_close_matches(name, places, n=1, cutoff=0.5)
+            hint = f"{near[0]} meant" if near else ""
+            faults.add(f"{table.path} header", f"a column {name} ({field})", "none", hint)
+    faults.raise_if_any(InputError)
+    for field, names in LAYOUTS[layout].items():
+        at = next((folded[name.casefold()] for name in names if name.casefold() in folded), None)
+        if at is not None:
+            picked.setdefault(field, at)
+    if {"lat", "lon", "east", "north"} <= picked.keys():
+        surplus = ("lat", "lon") if {"east", "north"} & columns.keys() else ("east", "north")
+        picked = {field: at for field, at in picked.items() if field not in surplus}
+    return picked
