@@ -18,7 +18,8 @@ from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import project, projected_crs, same_crs, unproject
 from mapfilter.radio._cell_checks import check_cells
 from mapfilter.radio._cell_layouts import Layout
-from mapfilter.radio._cell_table import COLUMNS, Row, read_plan
+from mapfilter.radio._cell_selection import once, within
+from mapfilter.radio._cell_table import COLUMNS, read_plan
 
 Antenna = str
 
@@ -229,36 +230,17 @@ def read_cell_plan(
     rows, notes = read_plan(path, projected_crs(crs), faults, layout, columns, defaults)
     known = {each.name for each in fields(Cell)}
     whole = [row for row in rows if not row.faulty]
-    if layout == "opencellid" and faults.found and whole:
-        notes += (f"{len(faults.found)} faulty rows left out, such as {faults.found[0]}",)
-        faults = Faults()
-        whole = list({row.values["id"]: row for row in reversed(whole)}.values())[::-1]
+    if layout == "opencellid" and whole:
+        if faults.found:
+            notes += (f"{len(faults.found)} faulty rows left out, such as {faults.found[0]}",)
+            faults = Faults()
+        whole, notes = once(whole, notes)
     if bounds_m is not None:
-        whole, notes = _within(whole, bounds_m, notes, str(path))
+        whole, notes = within(whole, bounds_m, notes, str(path))
     cells = tuple(Cell(**{k: v for k, v in row.values.items() if k in known}) for row in whole)
     check_cells(cells, lambda i, name: f"{path} row {whole[i].line}, {name}", faults, ranges=False)
     faults.raise_if_any(InputError)
     return CellPlan(crs, cells, notes)
-
-
-def _within(
-    rows: list[Row],
-    bounds_m: tuple[float, float, float, float],
-    notes: tuple[str, ...],
-    where: str,
-) -> tuple[list[Row], tuple[str, ...]]:
-    west, south, east, north = bounds_m
-    inside = [
-        row
-        for row in rows
-        if west <= row.values["east_m"] <= east and south <= row.values["north_m"] <= north
-    ]
-    if rows and not inside:
-        bounds = ", ".join(f"{value:.0f}" for value in bounds_m)
-        raise fail(InputError, where, f"cells in {bounds}", "none", "cells of another area")
-    if len(inside) < len(rows):
-        notes += (f"{len(rows) - len(inside)} of {len(rows)} cells left out: far from the area",)
-    return inside, notes
 
 
 def write_cell_plan(plan: CellPlan, path: Path | str) -> None:

@@ -77,6 +77,7 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     antennas = world.antennas
     notes = (
         world.buildings.told,
+        *plan.notes,
         *(note for antenna in antennas.values() for note in antenna.notes),
         *outside_validity(plan, lattice, model),
         *off_frequency(plan, antennas),

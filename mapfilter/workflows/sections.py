@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from mapfilter.workflows.cells_section import Cells
 from mapfilter.workflows.fields import (
     EMBEDDED_MAP,
     Box,
@@ -49,23 +50,6 @@ class Area(Section):
         if (self.southwest is None) != (self.size_m is None):
             raise ValueError("southwest and size_m together")
         return self
-
-
-class Cells(Section):
-    """``[cells]``: a cell plan from a file, or laid out by rule over the area.
-
-    ``antennas`` is the folder of the pattern files that the plan names.
-    """
-
-    plan: FilePath | None = None
-    antennas: FilePath | None = None
-    sites: Annotated[int, Field(ge=1, le=1000)] = 2
-    sectors: Annotated[int, Field(ge=1, le=6)] = 3
-    indoor: Annotated[int, Field(ge=0, le=1000)] = 4
-    frequency_mhz: Positive = 1800.0
-    eirp_dbm: Finite = 52.0
-    height_m: Positive = 30.0
-    seed: Seed = 0
 
 
 class BuildingsSection(Section):

@@ -14,7 +14,7 @@ from mapfilter._parallel import Progress
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs
 from mapfilter.radio._survey_trend import Covariate
-from mapfilter.radio.cells import CellPlan, read_cell_plan, write_cell_plan
+from mapfilter.radio.cells import CellPlan, write_cell_plan
 from mapfilter.radio.measurements import Measurements, named_after, read_measurements
 from mapfilter.radio.rasters import RxLevRasters, open_rasters
 from mapfilter.radio.survey import Survey, SurveyOptions, fit_survey
@@ -22,7 +22,12 @@ from mapfilter.radio.survey_rasters import predicted_levels, surveyed_plan, writ
 from mapfilter.radio.survey_validation import Validation, cross_validate
 from mapfilter.workflows.sections import Config
 from mapfilter.workflows.survey_section import SurveySection
-from mapfilter.workflows.world import LARGEST_AREA_PX, area_lattice, check_scale
+from mapfilter.workflows.world import (
+    LARGEST_AREA_PX,
+    area_lattice,
+    check_scale,
+    planned_cells,
+)
 
 
 @dataclass(frozen=True)
@@ -147,7 +152,7 @@ def _measurements(config: Config, lattice: Lattice | None) -> tuple[Measurements
         raise fail(InputError, "measurements", expected, "none")
     if config.cells.plan is None:
         return found, None
-    plan = read_cell_plan(config.cells.plan, found.crs)
+    plan = planned_cells(config, found.crs)
     return named_after(found, plan), plan
 
 

@@ -120,6 +120,36 @@ def planned_rasters(config: Config) -> RxLevRasters:
     )
 
 
+def planned_cells(config: Config, crs: str, area: Lattice | None = None) -> CellPlan:
+    """Read the cell plan of a configuration; of a public list, only what is near the area.
+
+    Raises
+    ------
+    InputError
+        There is none, or it is wrong.
+    """
+    cells = config.cells
+    if cells.plan is None:
+        raise fail(InputError, "cells.plan", "a cell plan", "none")
+    bounds_m = None
+    if cells.layout == "opencellid" and area is not None:
+        west, south, east, north = area.bounds_m
+        reach_m = cells.reach_m
+        bounds_m = west - reach_m, south - reach_m, east + reach_m, north + reach_m
+    return read_cell_plan(
+        cells.plan,
+        crs,
+        layout=cells.layout,
+        columns={name: column for name, column in cells.columns if column is not None},
+        defaults={
+            "height_m": cells.height_m,
+            "eirp_dbm": cells.eirp_dbm,
+            "frequency_mhz": cells.frequency_mhz,
+        },
+        bounds_m=bounds_m,
+    )
+
+
 @dataclass(frozen=True)
 class World:
     """The area of a configuration; each part is read when it is first asked for.
@@ -196,7 +226,7 @@ class World:
         """The cell plan: read, or laid out by rule."""
         cells = self.config.cells
         if cells.plan is not None:
-            return read_cell_plan(cells.plan, self.lattice.crs)
+            return planned_cells(self.config, self.lattice.crs, self.lattice)
         return lay_out_plan(
             self.lattice,
             cells.sites,

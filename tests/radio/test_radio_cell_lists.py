@@ -1,0 +1,137 @@
+"""Cell lists of planning tools and of public databases."""
+
+from pathlib import Path
+
+import pytest
+from fuzz import fuzz
+
+from mapfilter.errors import InputError
+from mapfilter.geodesy import project
+from mapfilter.radio.cells import CellPlan, read_cell_plan
+
+CRS = "EPSG:32635"
+DEFAULTS = {"height_m": 25.0, "eirp_dbm": 52.0, "frequency_mhz": 1800.0}
+
+ATOLL = """TX_ID;SITE_NAME;ANTENNA_NAME;HEIGHT;AZIMUT;TILT;LONGITUDE;LATITUDE;EIRP;BCCH;BSIC;COMMENT
+S1_1;S1;65deg_18dBi;32,5;120;2;24,9430;60,1669;50,3;612;17;"rooftop; north"
+S1_2;S1;;32,5;240;4;24,9430;60,1669;;618;;
+"""
+MLS = """radio,mcc,net,area,cell,unit,lon,lat,range,samples,changeable,created,updated,averageSignal
+GSM,244,91,801,1001,,24.943,60.1669,1200,4,1,1200000000,1300000000,0
+LTE,244,5,33,70657,,24.9501,60.1702,700,9,1,1200000000,1300000000,-97
+"""
+OLDER = """lat,lon,mcc,mnc,lac,cellid,averageSignalStrength,range,samples,changeable,radio
+60.1669,24.943,244,91,801,1001,-80,1200,4,1,GSM
+"""
+
+
+def _read(folder: Path, text: str, **options: object) -> CellPlan:
+    path = folder / "list.csv"
+    path.write_text(text, encoding="utf-8")
+    return read_cell_plan(path, CRS, **{"defaults": DEFAULTS, **options})  # type: ignore[arg-type]
+
+
+def _complaint(folder: Path, text: str, **options: object) -> str:
+    with pytest.raises(InputError) as caught:
+        _read(folder, text, **options)
+    return str(caught.value)
+
+
+def test_transmitters_of_a_planning_tool(tmp_path: Path) -> None:
+    plan = _read(tmp_path, ATOLL, layout="atoll")
+    first, second = plan.cells
+    east_m, north_m = project(CRS, 24.943, 60.1669)
+    assert (first.id, first.site, first.antenna) == ("S1_1", "S1", "65deg_18dBi")
+    assert (first.east_m, first.north_m) == (east_m, north_m)
+    assert (first.height_m, first.azimuth_deg, first.mechanical_downtilt_deg) == (32.5, 120, 2)
+    assert (first.eirp_dbm, first.arfcn, first.bsic) == (50.3, 612, 17)
+    assert (second.antenna, second.eirp_dbm, second.bsic) == ("sector", 52.0, None)
+    assert plan.notes == (
+        "eirp_dbm = 52 for 1 of 2 cells that tell none",
+        "frequency_mhz = 1800 for 2 of 2 cells that tell none",
+    )
+
+
+def test_without_defaults_what_is_missing_is_told(tmp_path: Path) -> None:
+    assert "a column frequency_mhz" in _complaint(tmp_path, ATOLL, layout="atoll", defaults=None)
+
+
+def test_faults_name_the_files_own_column(tmp_path: Path) -> None:
+    said = _complaint(tmp_path, ATOLL.replace(";120;", ";400;"), layout="atoll")
+    assert "list.csv row 2, AZIMUT (azimuth_deg): expected degrees" in said
+    said = _complaint(tmp_path, ATOLL.replace('"rooftop; north"', "rooftop; north"), layout="atoll")
+    assert "row 2, fields: expected 12, found 13" in said
+
+
+def test_projected_positions_of_a_planning_tool(tmp_path: Path) -> None:
+    text = "tx_id,X,Y,Height\nA,385500,6672000,30\n"
+    cell = _read(tmp_path, text, layout="atoll")["A"]
+    assert (cell.east_m, cell.north_m, cell.antenna) == (385500.0, 6672000.0, "omni")
+
+
+def test_a_map_of_columns(tmp_path: Path) -> None:
+    text = "Name,E,N,AGL,dBm,MHz,Remark\nA,385500,6672000,30,50,1800,x\n"
+    columns = {
+        "cell": "Name", "east": "E", "north": "N", "height_m": "AGL", "eirp_dbm": "dBm",
+        "frequency_mhz": "MHz",
+    }  # fmt: skip
+    plan = _read(tmp_path, text, columns=columns)
+    assert (plan["A"].height_m, plan["A"].eirp_dbm, plan.notes) == (30.0, 50.0, ())
+    said = _complaint(tmp_path, text, columns={**columns, "height_m": "AGI"})
+    assert "expected a column AGI (height_m), found none (likely: AGL meant)" in said
+    said = _complaint(tmp_path, text, columns={**columns, "cell": "E", "east": "Name"})
+    assert "row 2, Name (east): expected a number, found 'A'" in said
+
+
+def test_a_map_goes_before_the_layout(tmp_path: Path) -> None:
+    plan = _read(tmp_path, ATOLL, layout="atoll", columns={"cell": "BCCH", "antenna": "TX_ID"})
+    assert plan.ids == ("612", "618")
+    assert plan["612"].antenna == "S1_1"
+    text = "TX_ID,LATITUDE,LONGITUDE,x_m,y_m\nA,60.2,24.9,385500,6672000\n"
+    plan = _read(tmp_path, text, layout="atoll", columns={"east": "x_m", "north": "y_m"})
+    assert plan["A"].east_m == 385500.0
+
+
+@pytest.mark.parametrize("text", [MLS, MLS.partition("\n")[2], OLDER])
+def test_public_cell_lists(tmp_path: Path, text: str) -> None:
+    cell = _read(tmp_path, text, layout="opencellid")["244-91-801-1001"]
+    assert (cell.mcc, cell.mnc, cell.lac, cell.ci) == (244, 91, 801, 1001)
+    assert (cell.east_m, cell.north_m) == project(CRS, 24.943, 60.1669)
+    assert (cell.antenna, cell.height_m, cell.eirp_dbm) == ("omni", 25.0, 52.0)
+
+
+def test_bad_rows_of_public_lists_are_told_and_lose_nothing_else(tmp_path: Path) -> None:
+    bad = "GSM,244,91,801,x,,24.9,60.1,1,1,1,1,1,0\nGSM,244,91\nGSM,1,1,1,1,,24.9,120,1,1,1,1,1,0\n"
+    again = MLS.splitlines()[1] + "\n"
+    plan = _read(tmp_path, MLS + bad + again, layout="opencellid")
+    assert plan.ids == ("244-91-801-1001", "244-5-33-70657")
+    assert "3 faulty rows left out, such as" in plan.notes[-2]
+    assert plan.notes[-1] == "1 rows of cells told already left out"
+    said = _complaint(tmp_path, MLS.splitlines()[0] + "\n" + bad, layout="opencellid")
+    assert "cell (ci): expected a whole number" in said
+
+
+def test_cells_far_from_the_area_are_left_out_and_told(tmp_path: Path) -> None:
+    east_m, north_m = (float(value) for value in project(CRS, 24.943, 60.1669))
+    box = (east_m - 10, north_m - 10, east_m + 10, north_m + 10)
+    plan = _read(tmp_path, MLS, layout="opencellid", bounds_m=box)
+    assert plan.ids == ("244-91-801-1001",)
+    assert plan.notes[-1] == "1 of 2 cells left out: far from the area"
+    far = (0.0, 0.0, 1.0, 1.0)
+    assert "cells of another area" in _complaint(tmp_path, MLS, layout="opencellid", bounds_m=far)
+
+
+@pytest.mark.parametrize(
+    ("text", "layout"),
+    [(ATOLL, "atoll"), (MLS, "opencellid"), ("cell,lat,lon\nA,60.1,24.9\n", "plan")],
+)
+def test_damaged_lists(tmp_path: Path, text: str, layout: str, mutation_count: int) -> None:
+    path = tmp_path / "list.csv"
+
+    def read(data: bytes) -> None:
+        path.write_bytes(data)
+        read_cell_plan(path, CRS, layout=layout, defaults=DEFAULTS)  # type: ignore[arg-type]
+
+    tally = fuzz(text.encode(), read, mutation_count)
+    print(f"{layout}: {tally}")  # noqa: T201
+    assert tally.refused > 0.2 * mutation_count
