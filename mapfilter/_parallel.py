@@ -7,12 +7,17 @@ in the order of the tasks, so the number of workers never changes them.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import multiprocessing
-from collections.abc import Callable, Iterable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sized
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from typing import Any, ParamSpec, TypeVar
 
 from mapfilter.errors import MapfilterError, fail
+
+_CONNECT_S = 10
+_MOST_WORKERS = 256
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -49,6 +54,57 @@ def local_executor(workers: int) -> Iterator[Executor]:
             raise
 
 
+@contextlib.contextmanager
+def cluster_executor(address: str) -> Iterator[tuple[Executor, int]]:
+    """Give an executor of a Dask cluster, and its number of worker threads.
+
+    A worker that dies costs time only: its tasks are done again by the others.
+
+    Parameters
+    ----------
+    address : str
+        Of a scheduler, such as "tcp://10.0.0.5:8786"; or "local:4" for four workers on this
+        machine.
+
+    Raises
+    ------
+    MapfilterError
+        Dask is not installed, the address is none, nobody answers there, or workers die over and
+        over again.
+    """
+    try:
+        from distributed import Client, LocalCluster
+        from distributed.scheduler import KilledWorker
+    except ImportError as error:
+        hint = "install it by: pip install 'mapfilter[cluster]'"
+        raise fail(MapfilterError, "cluster", "the package distributed", "none", hint) from error
+    with contextlib.ExitStack() as stack:
+        place = address
+        if address.startswith("local:"):
+            count = address.removeprefix("local:")
+            if not (count.isascii() and count.isdigit() and 1 <= int(count) <= _MOST_WORKERS):
+                expected = f"local:N with N in 1..{_MOST_WORKERS}"
+                raise fail(MapfilterError, "cluster", expected, address)
+            place = stack.enter_context(
+                LocalCluster(  # type: ignore[no-untyped-call]
+                    n_workers=int(count), threads_per_worker=1, dashboard_address=None
+                )
+            )
+        try:
+            client = stack.enter_context(
+                Client(place, timeout=_CONNECT_S)  # type: ignore[no-untyped-call]
+            )
+        except (OSError, ValueError) as error:
+            expected = "a Dask scheduler such as tcp://10.0.0.5:8786, or local:N"
+            hint = "the scheduler is not running, or another port"
+            raise fail(MapfilterError, "cluster", expected, address, hint) from error
+        workers = sum(client.nthreads().values())
+        try:
+            yield client.get_executor(), max(workers, 1)
+        except KilledWorker as error:
+            raise _died() from error
+
+
 def ordered_results(
     executor: Executor,
     function: Callable[[Any], T],
@@ -59,28 +115,36 @@ def ordered_results(
 ) -> Iterator[T]:
     """Yield ``function(task)`` for every task, in order, with at most ``in_flight`` waiting.
 
-    Memory stays bounded by ``in_flight`` results, however many tasks there are; twice the number
-    of workers keeps all of them busy.
+    Tasks are taken as they are needed, so memory stays bounded by ``in_flight`` tasks and results,
+    however many there are; twice the number of workers keeps all of them busy. Only to tell
+    progress must they be counted first.
 
     Raises
     ------
     MapfilterError
         A worker process died.
     """
-    todo = list(tasks)
-    waiting: list[Future[T]] = []
-    submitted = 0
-    for done in range(len(todo)):
+    if progress is not None and not isinstance(tasks, Sized):
+        tasks = list(tasks)
+    total = len(tasks) if isinstance(tasks, Sized) else 0
+    todo = iter(tasks)
+    waiting: deque[Future[T]] = deque()
+    done = 0
+    while True:
         try:
-            while submitted < len(todo) and submitted - done < in_flight:
-                waiting.append(executor.submit(function, todo[submitted]))
-                submitted += 1
-            result = waiting.pop(0).result()
+            for task in itertools.islice(todo, in_flight - len(waiting)):
+                waiting.append(executor.submit(function, task))
+            if not waiting:
+                return
+            result = waiting.popleft().result()
         except BrokenExecutor as error:
-            hint = "out of memory: take fewer workers or a smaller tile_px"
-            raise fail(
-                MapfilterError, "worker processes", "all of them at work", "one that died", hint
-            ) from error
+            raise _died() from error
+        done += 1
         if progress is not None:
-            progress(done + 1, len(todo))
+            progress(done, total)
         yield result
+
+
+def _died() -> MapfilterError:
+    hint = "out of memory: take fewer workers or a smaller tile_px; finished work is kept"
+    return fail(MapfilterError, "worker processes", "all of them at work", "one that died", hint)

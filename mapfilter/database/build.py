@@ -2,41 +2,30 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict, dataclass
-from importlib.metadata import version
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-from numpy.typing import NDArray
 
-from mapfilter._io import atomic_dir, check_replaceable, write_json
+from mapfilter._io import atomic_dir, check_replaceable
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
-from mapfilter.database.manifest import (
-    CELLS,
-    FORMAT,
-    MANIFEST,
-    VERSION,
-    InputFile,
-    describe_part,
-)
-from mapfilter.database.parts import (
-    ROWS_IN_MEMORY,
-    PartWriter,
-    levels_tables,
-    places_table,
-    points_table,
-    z_order,
-)
+from mapfilter.database.assemble import Head, write_parts
+from mapfilter.database.finished import FinishedTiles, work_key
+from mapfilter.database.manifest import FORMAT, MANIFEST, InputFile
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.database.store import open_database, write_cells
-from mapfilter.database.tiles import Tile, pixel_offset, read_tile
+from mapfilter.database.sources import LaidRoutes, Routes, check_aligned, overlap
+from mapfilter.database.store import open_database
+from mapfilter.database.tiles import (
+    TileRows,
+    TileTask,
+    Window,
+    read_tiles,
+    tile_windows,
+)
 from mapfilter.errors import Faults, InputError, fail
+from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rasters import RxLevRasters, check_against_plan
 from mapfilter.roads.lattice import RouteLattice
@@ -45,40 +34,11 @@ MARGIN_DB = 6.0
 FLOOR_DBM = -104.0
 TILE_PX = 256
 
-_SAMPLED_TILES = 4
-_BYTES_PER_POINT_IN_MEMORY = 120
-_BYTES_PER_LEVEL_IN_MEMORY = 40
-
-
-@dataclass(frozen=True, slots=True)
-class BuildEstimate:
-    """What a build would give, extrapolated from a few of its tiles.
-
-    Parameters
-    ----------
-    points : int
-        Points of the route lattice on the rasters; exact, those that hear nothing included.
-    levels : int
-        Rows of all cells together.
-    bytes : int
-        Size of the database on disk.
-    memory_bytes : int
-        Most memory that the writing process needs.
-    seconds : float
-        Time with one worker.
-    """
-
-    points: int
-    levels: int
-    bytes: int
-    memory_bytes: int
-    seconds: float
-
 
 def build(
     rasters: RxLevRasters,
     plan: CellPlan,
-    routes: RouteLattice,
+    routes: RouteLattice | Routes,
     out: Path | str,
     *,
     margin_db: float = MARGIN_DB,
@@ -88,6 +48,9 @@ def build(
     attribution: str = "",
     executor: Executor | None = None,
     in_flight: int = 8,
+    tiles_a_task: int = 1,
+    writers: int = 1,
+    resume: bool = False,
     progress: Progress | None = None,
 ) -> RadioRouteDatabase:
     """Build a database folder and open it.
@@ -102,8 +65,10 @@ def build(
         Levels, or losses that are taken from the plan's EIRP. Their lattice is the database's.
     plan : CellPlan
         The same cells as in the rasters.
-    routes : RouteLattice
-        Aligned with the rasters' lattice; points beyond it are left out and counted.
+    routes : RouteLattice or Routes
+        Aligned with the rasters' lattice; points beyond it are left out and counted. Given as
+        layers (:class:`mapfilter.database.sources.LayerRoutes`), points are laid by the workers,
+        tile by tile.
     out : Path or str
         The folder; an older one is replaced once the new one is whole.
     margin_db, floor_dbm : float
@@ -117,7 +82,14 @@ def build(
     executor : Executor, optional
         Where tiles are read; the result does not depend on it.
     in_flight : int
-        Tiles handed to it at a time; twice its workers keeps all of them busy.
+        Tasks handed to it at a time; twice its workers keeps all of them busy.
+    tiles_a_task : int
+        Tiles in a task: many where handing one over takes long.
+    writers : int
+        Cells whose parts are written at a time.
+    resume : bool
+        Go on where a build of the same inputs stopped. Finished tiles lie beside the folder until
+        the build is done.
     progress : callable, optional
         Called with tiles done and tiles in all.
 
@@ -129,102 +101,121 @@ def build(
     OutputError
         The folder cannot be written, or holds other files than a database.
     """
-    _check_parameters(margin_db, floor_dbm, tile_px)
-    plan = plan.to_crs(rasters.lattice.crs)
-    places, tiles = _cut_into_tiles(rasters, plan, routes, floor_dbm, tile_px)
+    check_parameters(margin_db, floor_dbm, tile_px)
+    job = BuildJob.of(rasters, plan, routes, floor_dbm, tile_px)
     out = Path(out)
     check_replaceable(out, MANIFEST, FORMAT)
-    recorded = [*inputs, InputFile("rasters", rasters.path.name, rasters.sha256())]
-    with atomic_dir(out) as folder:
-        with PartWriter(folder, rasters.lattice.crs, plan.ids) as writer:
-            start, heard = 0, 0
-            results = ordered_results(
-                executor or SerialExecutor(),
-                read_tile,
-                tiles,
-                in_flight=in_flight,
-                progress=progress,
-            )
-            for tile, levels in zip(tiles, results, strict=True):
-                writer.add(places.slice(start, tile.row.size), levels)
-                start += tile.row.size
-                heard += int((levels.best >= 0).sum())
-            if heard == 0:
-                expected = f"a level of at least {floor_dbm:g} dBm at a point"
-                hint = "floor too high, or rasters hold no data along the roads"
-                raise fail(InputError, str(rasters.path), expected, "none", hint)
-            parts = writer.finish()
-        write_cells(plan, folder / CELLS)
-        parts.insert(0, describe_part(folder, folder / CELLS, len(plan.ids)))
-        write_json(
-            folder / MANIFEST,
-            {
-                "format": FORMAT,
-                "version": VERSION,
-                "software": f"mapfilter {version('mapfilter')}",
-                "crs": rasters.lattice.crs,
-                "lattice": asdict(rasters.lattice),
-                "cells": list(plan.ids),
-                "parameters": {
-                    "margin_db": float(margin_db),
-                    "floor_dbm": float(floor_dbm),
-                    "tile_px": tile_px,
-                },
-                "attribution": attribution,
-                "inputs": [asdict(file) for file in recorded],
-                "counts": {
-                    "points": heard,
-                    "points_below_floor": len(places) - heard,
-                    "points_off_rasters": len(routes) - len(places),
-                },
-                "parts": parts,
-            },
-        )
+    inputs = (*inputs, InputFile("rasters", rasters.path.name, rasters.sha256()))
+    parameters = {"margin_db": float(margin_db), "floor_dbm": float(floor_dbm), "tile_px": tile_px}
+    key = work_key(inputs[-1].sha256, rasters, job.plan, job.routes.digest(), parameters)
+    with FinishedTiles(out, key, keep=resume) as finished, atomic_dir(out) as folder:
+        made = job.made(executor or SerialExecutor(), finished, in_flight, tiles_a_task)
+        crs, ids = rasters.lattice.crs, job.plan.ids
+        written = write_parts(folder, crs, ids, made, len(job.windows), writers, progress)
+        if written.heard == 0:
+            expected = f"a level of at least {floor_dbm:g} dBm at a point"
+            hint = "floor too high, or rasters hold no data along the roads"
+            got = "none" if written.points else "no point of the roads on the rasters"
+            raise fail(InputError, str(rasters.path), expected, got, hint)
+        counts = {
+            "points": written.heard,
+            "points_below_floor": written.points - written.heard,
+            "points_off_rasters": job.off_rasters(written.points),
+        }
+        head = Head(rasters.lattice, job.plan, parameters, attribution, inputs, counts)
+        head.write(folder, written.parts)
     return open_database(out)
 
 
-def dry_run(
-    rasters: RxLevRasters,
-    plan: CellPlan,
-    routes: RouteLattice,
-    *,
-    margin_db: float = MARGIN_DB,
-    floor_dbm: float = FLOOR_DBM,
-    tile_px: int = TILE_PX,
-) -> BuildEstimate:
-    """Estimate a build from up to four of its tiles, writing nothing.
+@dataclass(frozen=True, slots=True, eq=False)
+class BuildJob:
+    """A build cut into tiles; no tile's points are laid before its turn.
 
-    Parameters and errors are those of :func:`build`.
+    Parameters
+    ----------
+    rasters : RxLevRasters
+    plan : CellPlan
+        In the rasters' CRS.
+    routes : Routes
+    floor_dbm : float
+    windows : tuple of (row, col, rows, cols)
+        Tiles on the rasters' lattice that may hold points, along the Z-order curve.
     """
-    _check_parameters(margin_db, floor_dbm, tile_px)
-    plan = plan.to_crs(rasters.lattice.crs)
-    places, tiles = _cut_into_tiles(rasters, plan, routes, floor_dbm, tile_px)
-    starts = np.cumsum([0, *(tile.row.size for tile in tiles)])
-    chosen = np.unique(np.linspace(0, len(tiles) - 1, _SAMPLED_TILES).round().astype(int))
-    began_s = time.perf_counter()
-    points, levels, size = 0, 0, 0
-    for i in chosen.tolist():
-        found = read_tile(tiles[i])
-        some = places.slice(int(starts[i]), tiles[i].row.size)
-        size += _parquet_bytes(points_table(some, found, plan.ids))
-        size += sum(_parquet_bytes(table) for _, table in levels_tables(some, found, plan.ids))
-        points += tiles[i].row.size
-        levels += found.cell.size
-    seconds = time.perf_counter() - began_s
-    scale = len(places) / points
-    waiting = min(levels * scale, ROWS_IN_MEMORY + levels / len(chosen))
-    window = tile_px * tile_px * 4 * min(len(plan.ids), 128) * 2
-    memory = len(places) * _BYTES_PER_POINT_IN_MEMORY + waiting * _BYTES_PER_LEVEL_IN_MEMORY
-    return BuildEstimate(
-        len(places),
-        round(levels * scale),
-        round(size * scale),
-        round(memory + window),
-        seconds * scale,
-    )
+
+    rasters: RxLevRasters
+    plan: CellPlan
+    routes: Routes
+    floor_dbm: float
+    windows: tuple[Window, ...]
+
+    @classmethod
+    def of(
+        cls,
+        rasters: RxLevRasters,
+        plan: CellPlan,
+        routes: RouteLattice | Routes,
+        floor_dbm: float,
+        tile_px: int,
+    ) -> BuildJob:
+        """Check that the inputs fit each other, and cut them.
+
+        Raises
+        ------
+        InputError
+            As :func:`build`.
+        """
+        source = LaidRoutes(routes) if isinstance(routes, RouteLattice) else routes
+        check_against_plan(rasters, plan)
+        check_aligned(rasters.lattice, source.lattice, f"{rasters.path} and roads")
+        job = cls(rasters, plan.to_crs(rasters.lattice.crs), source, floor_dbm, ())
+        windows = tuple(w for w in tile_windows(rasters.lattice, tile_px) if job._holds(w))
+        if not windows:
+            hint = "files of different areas"
+            raise fail(InputError, str(rasters.path), "points of the roads", "none", hint)
+        return cls(rasters, job.plan, source, floor_dbm, windows)
+
+    def task(self, number: int) -> TileTask:
+        """Return what a worker needs to make a tile."""
+        window = self.windows[number]
+        part = self.routes.part(self.covered(window))
+        return TileTask(self.rasters, self.plan, window, part, self.floor_dbm)
+
+    def covered(self, window: Window) -> Lattice:
+        """Return the part of a tile that the roads cover."""
+        inside = overlap(self.rasters.lattice, self.routes.lattice, window)
+        assert inside is not None
+        return self.rasters.lattice.window(*inside)
+
+    def made(
+        self, executor: Executor, finished: FinishedTiles, in_flight: int, tiles_a_task: int
+    ) -> Iterator[TileRows]:
+        """Yield the tiles in order: those that are finished already, and the others as made."""
+        missing = [n for n in range(len(self.windows)) if finished.load(n) is None]
+        groups = [missing[n : n + tiles_a_task] for n in range(0, len(missing), tiles_a_task)]
+        tasks = ([self.task(number) for number in group] for group in groups)
+        results = ordered_results(executor, read_tiles, tasks, in_flight=in_flight)
+        made = (rows for group in results for rows in group)
+        for number in range(len(self.windows)):
+            if missing and number == missing[0]:
+                rows = next(made)
+                finished.save(missing.pop(0), rows)
+                yield TileRows.from_bytes(rows)
+            elif (tile := finished.load(number)) is not None:
+                yield tile
+            else:
+                yield TileRows.from_bytes(read_tiles([self.task(number)])[0])
+
+    def off_rasters(self, points: int) -> int:
+        """Return how many points lie beyond the rasters, of routes that are laid already."""
+        return len(self.routes.points) - points if isinstance(self.routes, LaidRoutes) else 0
+
+    def _holds(self, window: Window) -> bool:
+        inside = overlap(self.rasters.lattice, self.routes.lattice, window)
+        return inside is not None and self.routes.holds(self.rasters.lattice.window(*inside))
 
 
-def _check_parameters(margin_db: float, floor_dbm: float, tile_px: int) -> None:
+def check_parameters(margin_db: float, floor_dbm: float, tile_px: int) -> None:
+    """Note every parameter that is out of range."""
     faults = Faults()
     if not (np.isfinite(margin_db) and margin_db >= 0):
         faults.add("margin_db", "dB >= 0", margin_db)
@@ -233,36 +224,3 @@ def _check_parameters(margin_db: float, floor_dbm: float, tile_px: int) -> None:
     if tile_px < 1:
         faults.add("tile_px", "pixels >= 1", tile_px)
     faults.raise_if_any(InputError)
-
-
-def _cut_into_tiles(
-    rasters: RxLevRasters, plan: CellPlan, routes: RouteLattice, floor_dbm: float, tile_px: int
-) -> tuple[pa.Table, list[Tile]]:
-    """Return the points tile by tile, and the tiles that hold any, in the same order."""
-    check_against_plan(rasters, plan)
-    down, right = pixel_offset(rasters, routes)
-    lattice = rasters.lattice
-    row, col = routes.row.astype(np.int64) + down, routes.col.astype(np.int64) + right
-    on_rasters = np.flatnonzero(lattice.contains(row, col))
-    row, col = row[on_rasters], col[on_rasters]
-    if not on_rasters.size:
-        hint = "files of different areas"
-        raise fail(InputError, str(rasters.path), "points of the roads", "none", hint)
-    tile = z_order(row // tile_px, col // tile_px)
-    order = np.lexsort((z_order(row, col), tile))
-    row, col, tile = row[order], col[order], tile[order]
-    places = places_table(routes, lattice, on_rasters[order])
-    starts: NDArray[np.int64] = np.flatnonzero(np.diff(tile, prepend=tile[:1] + np.uint64(1)))
-    tiles = []
-    for start, end in zip(starts, np.append(starts[1:], row.size), strict=True):
-        top, left = int(row[start] // tile_px * tile_px), int(col[start] // tile_px * tile_px)
-        rows, cols = min(tile_px, lattice.rows - top), min(tile_px, lattice.cols - left)
-        inside = row[start:end] - top, col[start:end] - left
-        tiles.append(Tile(rasters, plan, (top, left, rows, cols), *inside, floor_dbm))
-    return places, tiles
-
-
-def _parquet_bytes(table: Any) -> int:
-    sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, compression="zstd")
-    return int(sink.getvalue().size)

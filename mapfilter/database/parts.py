@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -10,55 +11,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import shapely
-from numpy.typing import NDArray
 
 from mapfilter.database.columns import open_writer, write_columns
 from mapfilter.database.manifest import POINTS, describe_part, levels_folders
-from mapfilter.database.tiles import TileLevels
-from mapfilter.geodesy import Floats, Lattice
-from mapfilter.roads.geoparquet import dictionary, geo_metadata, point_geometry
-from mapfilter.roads.lattice import RouteLattice
+from mapfilter.database.tiles import TileLevels, TileRows
+from mapfilter.geodesy import Floats
+from mapfilter.roads.geoparquet import dictionary, geo_metadata
 
 _ROWS_IN_A_GROUP = 1 << 16
 ROWS_IN_MEMORY = 1 << 22
-
-
-def z_order(row: NDArray[Any], col: NDArray[Any]) -> NDArray[np.uint64]:
-    """Return positions along the Z-order (Morton) curve: the bits of row and col in turns.
-
-    Examples
-    --------
-    >>> z_order(np.array([0, 0, 1, 1, 0]), np.array([0, 1, 0, 1, 2])).tolist()
-    [0, 1, 2, 3, 4]
-    """
-    return (_spread(row) << np.uint64(1)) | _spread(col)
-
-
-def places_table(routes: RouteLattice, lattice: Lattice, order: NDArray[np.int64]) -> pa.Table:
-    """Return what is known of points before anything is heard, in the order given.
-
-    Parameters
-    ----------
-    routes : RouteLattice
-    lattice : Lattice
-        The database's, aligned with that of the routes; rows, columns and point numbers are its.
-    order : numpy.ndarray of int64, shape (N,)
-        Which points, in which order.
-    """
-    east, north = (axis[order] for axis in routes.east_north_m)
-    row, col = lattice.row_col(east, north)
-    return pa.table(
-        {
-            "point": row * lattice.cols + col,
-            "row": row.astype(np.int32),
-            "col": col.astype(np.int32),
-            "way_id": routes.way_id[order],
-            "way_class": dictionary(routes.way_class[order], routes.class_names),
-            "on_square": routes.on_square[order],
-            "distance_to_way_m": routes.distance_to_way_m[order],
-            "geometry": point_geometry(east, north),
-        }
-    )
 
 
 def points_table(places: pa.Table, levels: TileLevels, cell_ids: tuple[str, ...]) -> pa.Table:
@@ -100,9 +61,12 @@ class PartWriter:
         The database folder under construction.
     crs : str
     cell_ids : tuple of str
+    writers : int
+        Cells written at a time; the parts do not depend on it.
     """
 
-    def __init__(self, folder: Path, crs: str, cell_ids: tuple[str, ...]) -> None:
+    def __init__(self, folder: Path, crs: str, cell_ids: tuple[str, ...], writers: int = 1) -> None:
+        self._writers = writers
         self._folder, self._crs, self._cell_ids = folder, crs, cell_ids
         self._folders = levels_folders(cell_ids)
         self._points: list[pa.Table] = []
@@ -120,8 +84,9 @@ class PartWriter:
         if self._points_file is not None:
             self._points_file.close()
 
-    def add(self, places: pa.Table, levels: TileLevels) -> None:
+    def add(self, tile: TileRows) -> None:
         """Take the rows of one tile."""
+        places, levels = tile.places, tile.levels
         points = points_table(places, levels, self._cell_ids)
         if points.num_rows:
             self._points.append(points)
@@ -149,8 +114,12 @@ class PartWriter:
     def _flush(self) -> None:
         if self._points:
             self._write_points(pa.concat_tables(self._points).unify_dictionaries())
-        for cell in sorted(self._levels):
-            self._write_levels(cell, pa.concat_tables(self._levels[cell]).unify_dictionaries())
+        if self._writers == 1:
+            for cell in sorted(self._levels):
+                self._write_levels(cell)
+        else:
+            with ThreadPoolExecutor(self._writers) as pool:
+                list(pool.map(self._write_levels, sorted(self._levels)))
         self._points, self._levels, self._waiting = [], {}, 0
 
     def _write_points(self, table: pa.Table) -> None:
@@ -164,24 +133,11 @@ class PartWriter:
         low, high = self._bounds
         self._bounds = np.minimum(low, corner.min(axis=0)), np.maximum(high, corner.max(axis=0))
 
-    def _write_levels(self, cell: int, table: pa.Table) -> None:
+    def _write_levels(self, cell: int) -> None:
         cell_id = self._cell_ids[cell]
+        table = pa.concat_tables(self._levels[cell]).unify_dictionaries()
         written = self._written.setdefault(cell, [])
         file = self._folder / self._folders[cell_id] / f"part-{len(written)}.parquet"
         file.parent.mkdir(parents=True, exist_ok=True)
         write_columns(table, file, _ROWS_IN_A_GROUP)
         written.append(describe_part(self._folder, file, table.num_rows, cell_id))
-
-
-def _spread(number: NDArray[Any]) -> NDArray[np.uint64]:
-    """Put a zero between any two bits of 32-bit numbers."""
-    bits = np.asarray(number).astype(np.uint64)
-    for shift, mask in (
-        (16, 0x0000FFFF0000FFFF),
-        (8, 0x00FF00FF00FF00FF),
-        (4, 0x0F0F0F0F0F0F0F0F),
-        (2, 0x3333333333333333),
-        (1, 0x5555555555555555),
-    ):
-        bits = (bits | (bits << np.uint64(shift))) & np.uint64(mask)
-    return bits

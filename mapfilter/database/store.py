@@ -34,9 +34,14 @@ _ARROW_TYPES = {
 
 def write_cells(plan: CellPlan, path: Path) -> None:
     """Write the cell table, one column per field of :class:`mapfilter.radio.cells.Cell`."""
+    write_columns(cells_table(plan), path)
+
+
+def cells_table(plan: CellPlan) -> pa.Table:
+    """Return the cell table."""
     schema = pa.schema([(field.name, _ARROW_TYPES[str(field.type)]) for field in fields(Cell)])
     rows = [asdict(cell) for cell in plan.cells]
-    write_columns(pa.Table.from_pylist(rows, schema), path)
+    return pa.Table.from_pylist(rows, schema)
 
 
 def read_cells(path: Path, crs: str) -> CellPlan:

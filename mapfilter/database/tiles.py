@@ -1,43 +1,46 @@
-"""One tile of a build: the levels of all cells at the tile's points."""
+"""One tile of a build: its points, and the levels of all cells there."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
-from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.database.sources import RoutePart
+from mapfilter.geodesy import Floats, Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rasters import RxLevRasters
+from mapfilter.roads.geoparquet import dictionary, point_geometry
 from mapfilter.roads.lattice import RouteLattice
 
 Floats32 = NDArray[np.float32]
+Window = tuple[int, int, int, int]
 
 _CELLS_AT_A_TIME = 128
-_ALIGNED_PX = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tile:
-    """A window of the rasters and the points in it; all that a worker needs.
+class TileTask:
+    """All that a worker needs to make a tile; small enough to be sent to it.
 
     Parameters
     ----------
     rasters : RxLevRasters
     plan : CellPlan
     window : (row, col, rows, cols)
-    row, col : numpy.ndarray, shape (N,)
-        The points, counted from the window's corner.
+        On the rasters' lattice.
+    part : RoutePart
+        What the points of the tile are made from.
     floor_dbm : float
     """
 
     rasters: RxLevRasters
     plan: CellPlan
-    window: tuple[int, int, int, int]
-    row: NDArray[np.int64]
-    col: NDArray[np.int64]
+    window: Window
+    part: RoutePart
     floor_dbm: float
 
 
@@ -51,7 +54,7 @@ class TileLevels:
         The strongest cell, the first in the plan's order of equals; -1 when none is above the
         floor.
     best_level_dbm, margin_db : numpy.ndarray of float32, shape (N,)
-        Its level, and how far above the second strongest it is.
+        Its level, and how far above the second strongest it is; NaN when no second one is heard.
     cell, which : numpy.ndarray of int32, shape (L,)
         Each level's cell, and its point as an index into the tile's points; sorted by both.
     level_dbm, below_best_db : numpy.ndarray of float32, shape (L,)
@@ -67,33 +70,99 @@ class TileLevels:
     below_best_db: Floats32
 
 
-def read_tile(tile: Tile) -> TileLevels:
-    """Read a tile's window, a few cells at a time, and keep the levels above the floor.
+@dataclass(frozen=True, slots=True, eq=False)
+class TileRows:
+    """A finished tile: its points, those that hear nothing included, and what they hear.
+
+    Parameters
+    ----------
+    places : pyarrow.Table, N rows
+        As :func:`places_table` gives them.
+    levels : TileLevels
+    """
+
+    places: pa.Table
+    levels: TileLevels
+
+    def to_bytes(self) -> bytes:
+        """Return the tile as two Arrow streams, one after the other."""
+        levels = self.levels
+        heard = {name: getattr(levels, name) for name in _AT_POINTS}
+        rows = {name: getattr(levels, name) for name in _AT_LEVELS}
+        sink = pa.BufferOutputStream()
+        for table in (_with(self.places, heard), pa.table(rows)):
+            with pa.ipc.new_stream(sink, table.schema) as stream:
+                stream.write_table(table)
+        return bytes(sink.getvalue().to_pybytes())
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> TileRows:
+        """Return the tile that :meth:`to_bytes` wrote."""
+        source = pa.BufferReader(data)
+        points = pa.ipc.open_stream(source).read_all()
+        rows = pa.ipc.open_stream(source).read_all()
+        columns = {name: points[name].to_numpy() for name in _AT_POINTS}
+        columns |= {name: rows[name].to_numpy() for name in _AT_LEVELS}
+        return cls(points.drop_columns(list(_AT_POINTS)), TileLevels(**columns))
+
+
+_AT_POINTS = ("best", "best_level_dbm", "margin_db")
+_AT_LEVELS = ("cell", "which", "level_dbm", "below_best_db")
+
+
+def read_tiles(tasks: Sequence[TileTask]) -> list[bytes]:
+    """Make some tiles; what a worker does.
 
     Raises
     ------
     InputError
         The rasters are cut off.
     """
-    ids = tile.plan.ids
-    level = np.empty((len(ids), tile.row.size), dtype=np.float64)
-    for first in range(0, len(ids), _CELLS_AT_A_TIME):
+    return [read_tile(task).to_bytes() for task in tasks]
+
+
+def read_tile(task: TileTask) -> TileRows:
+    """Lay the points of a tile, read its window, a few cells at a time, and keep what is heard.
+
+    Raises
+    ------
+    InputError
+        The rasters are cut off.
+    """
+    lattice, (top, left, _, _) = task.rasters.lattice, task.window
+    places = places_table(task.part.routes(), lattice)
+    row, col = (places[name].to_numpy().astype(np.int64) for name in ("row", "col"))
+    ids = task.plan.ids
+    level = np.empty((len(ids), row.size), dtype=np.float64)
+    for first in range(0, len(ids) if row.size else 0, _CELLS_AT_A_TIME):
         some = ids[first : first + _CELLS_AT_A_TIME]
-        window_dbm = tile.rasters.read_levels_dbm(tile.plan, tile.window, some)
-        level[first : first + len(some)] = window_dbm[:, tile.row, tile.col]
-    level = np.round(level, 2)
-    strength = np.where(np.isnan(level), -np.inf, level)
+        window_dbm = task.rasters.read_levels_dbm(task.plan, task.window, some)
+        level[first : first + len(some)] = window_dbm[:, row - top, col - left]
+    return TileRows(places, heard_levels(level, task.floor_dbm))
+
+
+def heard_levels(level_dbm: Floats, floor_dbm: float) -> TileLevels:
+    """Return what is heard of levels, shape (cells, points), NaN where there is none.
+
+    Examples
+    --------
+    >>> heard = heard_levels(np.array([[-80.0, -99.0], [-70.5, np.nan]]), -104.0)
+    >>> heard.best.tolist(), heard.margin_db.tolist()
+    ([1, 0], [9.5, nan])
+    """
+    level = np.round(level_dbm, 2)
+    strength = np.where(level >= floor_dbm, level, -np.inf)
     best = strength.argmax(axis=0)
     best_dbm = strength.max(axis=0)
     second_dbm = np.full_like(best_dbm, -np.inf)
-    if len(ids) > 1:
+    if len(strength) > 1:
         second_dbm = np.partition(strength, -2, axis=0)[-2]
     with np.errstate(invalid="ignore"):
         margin = np.where(np.isfinite(second_dbm), best_dbm - second_dbm, np.nan)
-    cell, which = np.nonzero(strength >= tile.floor_dbm)
+    cell, which = np.nonzero(np.isfinite(strength))
     kept_dbm = strength[cell, which]
     return TileLevels(
-        np.where(best_dbm >= tile.floor_dbm, best, -1).astype(np.int32),
+        np.where(np.isfinite(best_dbm), best, -1).astype(np.int32),
         best_dbm.astype(np.float32),
         np.round(margin, 2).astype(np.float32),
         cell.astype(np.int32),
@@ -103,40 +172,66 @@ def read_tile(tile: Tile) -> TileLevels:
     )
 
 
-def pixel_offset(rasters: RxLevRasters, routes: RouteLattice) -> tuple[int, int]:
-    """Return the rows and columns from the rasters' corner to the route lattice's corner.
+def tile_windows(lattice: Lattice, tile_px: int) -> list[Window]:
+    """Return the windows of a lattice's tiles along the Z-order curve."""
+    windows = lattice.tiles(tile_px)
+    row, col = (np.array([window[axis] for window in windows]) // tile_px for axis in (0, 1))
+    return [windows[i] for i in np.argsort(z_order(row, col)).tolist()]
 
-    Raises
-    ------
-    InputError
-        CRS, resolution or pixel edges differ, or the two do not overlap.
+
+def places_table(routes: RouteLattice, lattice: Lattice) -> pa.Table:
+    """Return what is known of points before anything is heard, along the Z-order curve.
+
+    Parameters
+    ----------
+    routes : RouteLattice
+    lattice : Lattice
+        The database's, aligned with that of the routes; rows, columns and point numbers are its.
     """
-    raster, lattice = rasters.lattice, routes.lattice
-    where, faults = f"{rasters.path} and roads", Faults()
-    hint = "make the route lattice on the rasters' lattice"
-    if not same_crs(raster.crs, lattice.crs):
-        faults.add(where, f"one CRS ({raster.crs})", lattice.crs, "files of different zones")
-    elif abs(raster.resolution_m - lattice.resolution_m) > 1e-6 * raster.resolution_m:
-        got = f"{raster.resolution_m:g} m and {lattice.resolution_m:g} m"
-        faults.add(where, "one resolution", got, hint)
-    faults.raise_if_any(InputError)
-    down = (raster.north_m - lattice.north_m) / raster.resolution_m
-    right = (lattice.west_m - raster.west_m) / raster.resolution_m
-    row, col = round(down), round(right)
-    if max(abs(down - row), abs(right - col)) > _ALIGNED_PX:
-        got = f"shifted by {right - col:+.3f} and {down - row:+.3f} pixels"
-        faults.add(where, "pixels that align", got, f"half-pixel convention; {hint}")
-    elif not _overlap(raster, lattice, row, col):
-        got = f"rasters {_box(raster)}, roads {_box(lattice)}"
-        faults.add(where, "areas that overlap", got, "files of different areas")
-    faults.raise_if_any(InputError)
-    return row, col
+    row, col = lattice.row_col(*routes.east_north_m)
+    order = np.argsort(z_order(row, col))
+    row, col = row[order], col[order]
+    return pa.table(
+        {
+            "point": row * lattice.cols + col,
+            "row": row.astype(np.int32),
+            "col": col.astype(np.int32),
+            "way_id": routes.way_id[order],
+            "way_class": dictionary(routes.way_class[order], routes.class_names),
+            "on_square": routes.on_square[order],
+            "distance_to_way_m": routes.distance_to_way_m[order],
+            # Of the database's pixels, so that no tile differs from the whole by a rounding.
+            "geometry": point_geometry(*lattice.east_north(row, col)),
+        }
+    )
 
 
-def _overlap(raster: Lattice, lattice: Lattice, row: int, col: int) -> bool:
-    return -lattice.rows < row < raster.rows and -lattice.cols < col < raster.cols
+def z_order(row: NDArray[np.int64], col: NDArray[np.int64]) -> NDArray[np.uint64]:
+    """Return positions along the Z-order (Morton) curve: the bits of row and col in turns.
+
+    Examples
+    --------
+    >>> z_order(np.array([0, 0, 1, 1, 0]), np.array([0, 1, 0, 1, 2])).tolist()
+    [0, 1, 2, 3, 4]
+    """
+    return (_spread(row) << np.uint64(1)) | _spread(col)
 
 
-def _box(lattice: Lattice) -> str:
-    west, south, east, north = lattice.bounds_m
-    return f"{west:.0f}..{east:.0f} E {south:.0f}..{north:.0f} N"
+def _spread(number: NDArray[np.int64]) -> NDArray[np.uint64]:
+    """Put a zero between any two bits of 32-bit numbers."""
+    bits = np.asarray(number).astype(np.uint64)
+    for shift, mask in (
+        (16, 0x0000FFFF0000FFFF),
+        (8, 0x00FF00FF00FF00FF),
+        (4, 0x0F0F0F0F0F0F0F0F),
+        (2, 0x3333333333333333),
+        (1, 0x5555555555555555),
+    ):
+        bits = (bits | (bits << np.uint64(shift))) & np.uint64(mask)
+    return bits
+
+
+def _with(table: pa.Table, columns: dict[str, NDArray[np.generic]]) -> pa.Table:
+    for name, values in columns.items():
+        table = table.append_column(name, pa.array(values))
+    return table

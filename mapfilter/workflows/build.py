@@ -8,7 +8,8 @@ from pathlib import Path
 
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress, local_executor
-from mapfilter.database.build import BuildEstimate, build, dry_run
+from mapfilter.database.build import build
+from mapfilter.database.estimate import BuildEstimate, dry_run
 from mapfilter.database.manifest import InputFile
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs

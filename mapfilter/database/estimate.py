@@ -1,0 +1,148 @@
+"""What a build would take, told from a few of its tiles."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from mapfilter.database.build import FLOOR_DBM, MARGIN_DB, TILE_PX, BuildJob, check_parameters
+from mapfilter.database.parts import ROWS_IN_MEMORY, levels_tables, points_table
+from mapfilter.database.sources import LaidRoutes, Routes
+from mapfilter.database.store import cells_table
+from mapfilter.database.tiles import read_tile
+from mapfilter.geodesy import Floats
+from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.rasters import RxLevRasters
+from mapfilter.roads.geoparquet import geo_metadata
+from mapfilter.roads.lattice import RouteLattice
+
+_SAMPLED_TILES = 16
+_BYTES_PER_LEVEL_IN_MEMORY = 40
+_BYTES_OF_A_PROCESS = 350 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class BuildEstimate:
+    """What a build would give, extrapolated from a few of its tiles.
+
+    Parameters
+    ----------
+    points : int
+        Points of the routes on the rasters, those that hear nothing included; exact where the
+        points are laid already.
+    levels : int
+        Rows of all cells together.
+    bytes : int
+        Size of the database on disk.
+    memory_bytes : int
+        Most memory that the process needs with one worker.
+    seconds : float
+        Time with one worker.
+    """
+
+    points: int
+    levels: int
+    bytes: int
+    memory_bytes: int
+    seconds: float
+
+
+def dry_run(
+    rasters: RxLevRasters,
+    plan: CellPlan,
+    routes: RouteLattice | Routes,
+    *,
+    margin_db: float = MARGIN_DB,
+    floor_dbm: float = FLOOR_DBM,
+    tile_px: int = TILE_PX,
+) -> BuildEstimate:
+    """Estimate a build from up to sixteen of its tiles, writing nothing.
+
+    Tiles are drawn systematically, with a chance proportional to the points expected in them
+    (Hansen & Hurwitz 1943, On the theory of sampling from finite populations): a sum over all
+    tiles is the mean of the drawn tiles' values per point expected, times all points expected.
+
+    Parameters and errors are those of :func:`mapfilter.database.build.build`.
+    """
+    check_parameters(margin_db, floor_dbm, tile_px)
+    job = BuildJob.of(rasters, plan, routes, floor_dbm, tile_px)
+    # A little for each, as a way outside a tile may reach points in it.
+    weight = np.array([job.routes.weight(job.covered(window)) for window in job.windows])
+    share = weight + 0.01 * weight.mean() + 1e-9
+    share /= share.sum()
+    if len(share) <= _SAMPLED_TILES:
+        drawn, scale = np.arange(len(share)), np.ones(len(share))
+    else:
+        middle = (np.arange(_SAMPLED_TILES) + 0.5) / _SAMPLED_TILES
+        drawn = share.cumsum().searchsorted(middle).clip(max=len(share) - 1)
+        scale = 1 / share[drawn] / _SAMPLED_TILES
+    # The first read opens files and compiles, which is no share of a tile's work.
+    read_tile(job.task(int(drawn[0])))
+    found = [_Sample.of(job, number) for number in drawn.tolist()]
+    points = float(scale @ [tile.places for tile in found])
+    if isinstance(job.routes, LaidRoutes):
+        points = float(weight.sum())
+    levels = float(scale @ [tile.levels for tile in found])
+    began_s = time.perf_counter()
+    size = _bytes(found, scale, job.plan)
+    writing_s = time.perf_counter() - began_s
+    of_levels = levels / max(sum(tile.levels for tile in found), 1)
+    waiting = min(levels, ROWS_IN_MEMORY + max(tile.levels for tile in found))
+    window = tile_px * tile_px * 4 * min(len(plan.ids), 128) * 2
+    return BuildEstimate(
+        round(points),
+        round(levels),
+        round(size),
+        round(_BYTES_OF_A_PROCESS + waiting * _BYTES_PER_LEVEL_IN_MEMORY + window),
+        float(scale @ [tile.seconds for tile in found]) + writing_s * of_levels,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sample:
+    """One tile as it would be written."""
+
+    places: int
+    levels: int
+    points_rows: pa.Table
+    levels_rows: dict[int, pa.Table]
+    seconds: float
+
+    @classmethod
+    def of(cls, job: BuildJob, number: int) -> _Sample:
+        began_s = time.perf_counter()
+        tile, ids = read_tile(job.task(number)), job.plan.ids
+        points = points_table(tile.places, tile.levels, ids)
+        levels = dict(levels_tables(tile.places, tile.levels, ids))
+        seconds = time.perf_counter() - began_s
+        return cls(tile.places.num_rows, tile.levels.cell.size, points, levels, seconds)
+
+
+def _bytes(found: list[_Sample], scale: Floats, plan: CellPlan) -> float:
+    """Return the size of all parts: rows as they compress in the drawn tiles, and the footers."""
+    by_cell: dict[int, list[pa.Table]] = {}
+    for tile in found:
+        for cell, rows in tile.levels_rows.items():
+            by_cell.setdefault(cell, []).append(rows)
+    points = pa.concat_tables([tile.points_rows for tile in found]).unify_dictionaries()
+    part = _parquet_bytes(points.slice(0, 1))
+    all_rows = float(scale @ [tile.points_rows.num_rows for tile in found])
+    size = part + (_parquet_bytes(points) - part) * all_rows / max(points.num_rows, 1)
+    size += _parquet_bytes(cells_table(plan)) + len(geo_metadata(plan.crs, None))
+    rows_bytes, drawn = 0.0, sum(tile.levels for tile in found)
+    for tables in by_cell.values():
+        table = pa.concat_tables(tables).unify_dictionaries()
+        part = _parquet_bytes(table.slice(0, 1))
+        rows_bytes += _parquet_bytes(table) - part
+    all_rows = float(scale @ [tile.levels for tile in found])
+    return float(size + part * len(plan.ids) + rows_bytes * all_rows / max(drawn, 1))
+
+
+def _parquet_bytes(table: pa.Table) -> int:
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
+    return int(sink.getvalue().size)

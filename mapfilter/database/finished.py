@@ -1,0 +1,108 @@
+"""Finished tiles of a build on disk, so that a build cut short goes on where it stopped."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import shutil
+import zlib
+from collections.abc import Mapping
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+
+from mapfilter._io import ensure_writable_folder
+from mapfilter.database.tiles import TileRows
+from mapfilter.errors import InputError, OutputError, fail
+from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.rasters import RxLevRasters
+
+_CHECKSUM_BYTES = 4
+
+
+def work_key(
+    rasters_sha256: str,
+    rasters: RxLevRasters,
+    plan: CellPlan,
+    routes_digest: str,
+    parameters: Mapping[str, Any],
+) -> str:
+    """Return a checksum of all that the tiles of a build depend on."""
+    read_as = (rasters.cell_ids, asdict(rasters.lattice), rasters.quantity, rasters.factor)
+    parts = (
+        version("mapfilter"), pa.__version__, rasters_sha256, read_as, rasters.resampling,
+        [asdict(cell) for cell in plan.cells], routes_digest,
+        {name: value for name, value in parameters.items() if name != "margin_db"},
+    )  # fmt: skip
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+class FinishedTiles:
+    """A hidden folder beside a database, with one file per finished tile.
+
+    It is left when the build is killed or interrupted or a worker dies, and removed when the build
+    is done or its inputs are wrong.
+
+    Parameters
+    ----------
+    database : Path
+        The folder that is being built.
+    key : str
+        Of the inputs: tiles of others are never taken.
+    keep : bool
+        Take tiles that are there already.
+    """
+
+    def __init__(self, database: Path, key: str, *, keep: bool = False) -> None:
+        self.folder = database.parent / f".{database.name}.tiles-{key[:16]}"
+        self._prefix = f".{database.name}.tiles-"
+        self._keep = keep
+
+    def __enter__(self) -> FinishedTiles:
+        if not self._keep:
+            shutil.rmtree(self.folder, ignore_errors=True)
+        ensure_writable_folder(self.folder.parent)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None or issubclass(kind, InputError):
+            shutil.rmtree(self.folder, ignore_errors=True)
+
+    def load(self, number: int) -> TileRows | None:
+        """Return a finished tile, or None when there is none or its file is damaged."""
+        try:
+            data = self._file(number).read_bytes()
+        except OSError:
+            return None
+        checksum, rows = data[:_CHECKSUM_BYTES], data[_CHECKSUM_BYTES:]
+        if zlib.crc32(rows).to_bytes(_CHECKSUM_BYTES, "big") != checksum:
+            return None
+        return TileRows.from_bytes(rows)
+
+    def save(self, number: int, rows: bytes) -> None:
+        """Put a finished tile on disk.
+
+        Raises
+        ------
+        OutputError
+            It cannot be written.
+        """
+        file = self._file(number)
+        temporary = file.with_name(f"{file.name}.{os.getpid()}")
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            temporary.write_bytes(zlib.crc32(rows).to_bytes(_CHECKSUM_BYTES, "big") + rows)
+            temporary.replace(file)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
+            got = error.strerror or error
+            raise fail(OutputError, str(file), "a place that can be written", got) from error
+
+    def _file(self, number: int) -> Path:
+        return self.folder / f"tile-{number}.arrow"

@@ -1,0 +1,273 @@
+"""Where the points of a build come from: a route lattice, or the layers it is made of, by tile."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import STRtree
+
+from mapfilter.errors import Faults, InputError
+from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.roads.lattice import RouteLattice
+from mapfilter.roads.near import WayIndex
+from mapfilter.roads.routable import AreaIndex, RouteSource
+
+_ALIGNED_PX = 1e-3
+
+
+class RoutePart(Protocol):
+    """The points of one tile, or what they are made from; it can be sent to other processes."""
+
+    def routes(self) -> RouteLattice:
+        """Return the points."""
+
+
+class Routes(Protocol):
+    """The points of an area, tile by tile."""
+
+    @property
+    def lattice(self) -> Lattice:
+        """Where the points lie."""
+
+    def holds(self, window: Lattice) -> bool:
+        """Tell whether there may be a point in a window within the lattice."""
+
+    def part(self, window: Lattice) -> RoutePart:
+        """Return the part for a window within the lattice."""
+
+    def weight(self, window: Lattice) -> float:
+        """Return about how many points a window holds, times a constant."""
+
+    def digest(self) -> str:
+        """Return a checksum of all that the points depend on."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Laid:
+    """Points that are laid already."""
+
+    points: RouteLattice
+
+    def routes(self) -> RouteLattice:
+        """Return the points."""
+        return self.points
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LaidRoutes:
+    """A whole route lattice, cut by tile."""
+
+    points: RouteLattice
+
+    @property
+    def lattice(self) -> Lattice:
+        """Where the points lie."""
+        return self.points.lattice
+
+    def holds(self, window: Lattice) -> bool:
+        """Tell whether there is a point in a window."""
+        return bool(self._inside(window).size)
+
+    def part(self, window: Lattice) -> Laid:
+        """Return the points within a window."""
+        inside = self._inside(window)
+        whole, (top, left) = self.points, self._corner(window)
+        return Laid(
+            RouteLattice(
+                window,
+                whole.row[inside] - np.int32(top),
+                whole.col[inside] - np.int32(left),
+                whole.way_id[inside],
+                whole.way_class[inside],
+                whole.class_names,
+                whole.distance_to_way_m[inside],
+                whole.on_square[inside],
+            )
+        )
+
+    def weight(self, window: Lattice) -> float:
+        """Return how many points lie within a window."""
+        return float(self._inside(window).size)
+
+    def digest(self) -> str:
+        """Return a checksum of the points."""
+        whole = self.points
+        columns = (whole.row, whole.col, whole.way_id, whole.way_class, whole.distance_to_way_m)
+        return _digest(repr(whole.lattice), repr(whole.class_names), *columns, whole.on_square)
+
+    def _corner(self, window: Lattice) -> tuple[int, int]:
+        return pixels_between(self.lattice, window)
+
+    def _inside(self, window: Lattice) -> NDArray[np.int64]:
+        # The points are in row-major order: only the rows of the window are looked at.
+        top, left = self._corner(window)
+        first, last = np.searchsorted(self.points.row, [top, top + window.rows])
+        col = self.points.col[first:last]
+        inside: NDArray[np.int64] = np.flatnonzero((col >= left) & (col < left + window.cols))
+        return inside + int(first)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LayerPart:
+    """The layers near one tile."""
+
+    layers: RouteSource
+    window: Lattice
+
+    def routes(self) -> RouteLattice:
+        """Lay the points."""
+        return self.layers.tile(self.window)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LayerRoutes:
+    """Ways, squares, buildings and water of an area; no point is laid before its tile's turn."""
+
+    layers: RouteSource
+    lattice: Lattice
+
+    def holds(self, window: Lattice) -> bool:
+        """Tell whether a way or a square is near a window."""
+        squares = _areas_near(self.layers.squares, window)
+        if squares is not None and squares.geometry.size:
+            return True
+        return bool(_reaching(self.layers.ways, window).size)
+
+    def part(self, window: Lattice) -> LayerPart:
+        """Return the layers near a window: the points are those of the whole layers."""
+        layers = self.layers
+        squares = _areas_near(layers.squares, window)
+        if squares is not None and not squares.geometry.size:
+            squares = None
+        ways = _ways_near(layers.ways, window, far=squares is not None)
+        near = RouteSource(
+            layers.crs,
+            ways,
+            squares,
+            _areas_near(layers.buildings, window),
+            _areas_near(layers.water, window),
+            None if layers.bridges is None else _ways_near(layers.bridges, window, far=False),
+        )
+        return LayerPart(near, window)
+
+    def weight(self, window: Lattice) -> float:
+        """Return the area of the ways' half widths and of the squares in a window."""
+        ways, box = self.layers.ways, shapely.box(*window.bounds_m)
+        near = ways.tree.query(box)
+        inside = shapely.intersection(ways.tree.geometries[near], box)
+        area = float((shapely.length(inside) * 2 * ways.half_width_m[near]).sum())
+        squares = _areas_near(self.layers.squares, window)
+        if squares is not None:
+            valid = shapely.make_valid(squares.geometry)
+            area += float(shapely.area(shapely.intersection(valid, box)).sum())
+        return area
+
+    def digest(self) -> str:
+        """Return a checksum of the layers."""
+        layers, ways = self.layers, self.layers.ways
+        areas = [
+            shapely.to_wkb(area.geometry).tolist() if area is not None else None
+            for area in (layers.squares, layers.buildings, layers.water)
+        ]
+        parts = (ways.ends_m, ways.half_width_m, ways.ways.way_id[ways.way])
+        names = (repr(self.lattice), repr(ways.ways.class_names), repr(areas))
+        return _digest(*names, *parts, ways.ways.way_class[ways.way])
+
+
+def check_aligned(raster: Lattice, lattice: Lattice, where: str) -> None:
+    """See that a route lattice lies on the pixels of the rasters.
+
+    Raises
+    ------
+    InputError
+        CRS, resolution or pixel edges differ, or the two do not overlap.
+    """
+    faults, hint = Faults(), "make the route lattice on the rasters' lattice"
+    if not same_crs(raster.crs, lattice.crs):
+        faults.add(where, f"one CRS ({raster.crs})", lattice.crs, "files of different zones")
+    elif abs(raster.resolution_m - lattice.resolution_m) > 1e-6 * raster.resolution_m:
+        got = f"{raster.resolution_m:g} m and {lattice.resolution_m:g} m"
+        faults.add(where, "one resolution", got, hint)
+    faults.raise_if_any(InputError)
+    down = (raster.north_m - lattice.north_m) / raster.resolution_m
+    right = (lattice.west_m - raster.west_m) / raster.resolution_m
+    row, col = round(down), round(right)
+    if max(abs(down - row), abs(right - col)) > _ALIGNED_PX:
+        got = f"shifted by {right - col:+.3f} and {down - row:+.3f} pixels"
+        faults.add(where, "pixels that align", got, f"half-pixel convention; {hint}")
+    elif overlap(raster, lattice, (0, 0, raster.rows, raster.cols)) is None:
+        got = f"rasters {_box(raster)}, roads {_box(lattice)}"
+        faults.add(where, "areas that overlap", got, "files of different areas")
+    faults.raise_if_any(InputError)
+
+
+def pixels_between(lattice: Lattice, other: Lattice) -> tuple[int, int]:
+    """Return the rows and columns from a lattice's corner to that of another aligned with it."""
+    down = (lattice.north_m - other.north_m) / lattice.resolution_m
+    right = (other.west_m - lattice.west_m) / lattice.resolution_m
+    return round(down), round(right)
+
+
+def overlap(
+    lattice: Lattice, other: Lattice, window: tuple[int, int, int, int]
+) -> tuple[int, int, int, int] | None:
+    """Return the part of a window of ``lattice`` that ``other``, aligned with it, covers."""
+    row, col, rows, cols = window
+    top, left = pixels_between(lattice, other)
+    first_row, first_col = max(row, top), max(col, left)
+    last_row, last_col = min(row + rows, top + other.rows), min(col + cols, left + other.cols)
+    if last_row <= first_row or last_col <= first_col:
+        return None
+    return first_row, first_col, last_row - first_row, last_col - first_col
+
+
+def _areas_near(areas: AreaIndex | None, window: Lattice) -> AreaIndex | None:
+    if areas is None:
+        return None
+    near = np.sort(areas.tree.query(shapely.box(*window.bounds_m)))
+    return AreaIndex.of(areas.geometry[near])
+
+
+def _reaching(index: WayIndex, window: Lattice, least_m: float = 0.0) -> NDArray[np.int64]:
+    """Return the segments that reach a window, or are at most ``least_m`` away from it."""
+    west, south, east, north = window.bounds_m
+    reach_m = max(float(index.half_width_m.max(initial=0.0)), least_m)
+    box = shapely.box(west - reach_m, south - reach_m, east + reach_m, north + reach_m)
+    return np.sort(index.tree.query(box))
+
+
+def _ways_near(index: WayIndex, window: Lattice, *, far: bool) -> WayIndex:
+    """Return the segments that reach a window; ``far``: and the nearest of each point in it."""
+    west, south, east, north = window.bounds_m
+    least_m = 0.0
+    if far:
+        # No point's nearest way is farther than the centre's is from the centre, and the way there.
+        centre = np.array([(west + east) / 2]), np.array([(south + north) / 2])
+        nearest_m = float(index.nearest(*centre)[1][0])
+        if math.isfinite(nearest_m):
+            least_m = nearest_m + math.hypot(east - west, north - south)
+    near = _reaching(index, window, least_m)
+    used, way = np.unique(index.way[near], return_inverse=True)
+    taken = np.zeros(len(index.ways), dtype=np.bool_)
+    taken[used] = True
+    ends_m = index.ends_m[near]
+    tree = STRtree(shapely.linestrings(ends_m))
+    return WayIndex(index.ways.select(taken), tree, way, ends_m, index.half_width_m[near])
+
+
+def _digest(*parts: str | NDArray[np.generic]) -> str:
+    digest = hashlib.sha256()
+    for part in parts:
+        digest.update(part.encode() if isinstance(part, str) else np.ascontiguousarray(part).data)
+    return digest.hexdigest()
+
+
+def _box(lattice: Lattice) -> str:
+    west, south, east, north = lattice.bounds_m
+    return f"{west:.0f}..{east:.0f} E {south:.0f}..{north:.0f} N"
