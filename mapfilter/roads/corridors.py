@@ -1,0 +1,282 @@
+"""Ways from repeated tracks, where there is no street map.
+
+Tracks of one street are drawn together to their common centre line, then added one after another:
+what runs along a way that is there already adds nothing, the rest becomes new ways that join it.
+After Cao and Krumm (2009), "From GPS traces to a routable road map", ACM GIS, whose two steps
+these are; here tracks are drawn across their direction only, by mean shift over what was measured.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.geodesy import Floats
+from mapfilter.roads._growth import grown_lines
+from mapfilter.roads.ways import Ways
+
+CORRIDOR_CLASS = "corridor"
+CORRIDOR_HALF_WIDTH_M = 15.0
+MAX_ACCURACY_M = 50.0
+MAX_GAP_M = 100.0
+
+_SHIFTS = 5
+_AT_A_TIME = 4096
+_SAME_DIRECTION = np.cos(np.radians(45.0))
+_UNKNOWN_ACCURACY_M = 10.0
+_BEST_ACCURACY_M = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Positions:
+    """Where one session was, in the order of time.
+
+    Parameters
+    ----------
+    east_m, north_m : numpy.ndarray, shape (N,)
+    accuracy_m : numpy.ndarray, shape (N,), or None
+        As the receiver tells it; NaN where unknown.
+    """
+
+    east_m: Floats
+    north_m: Floats
+    accuracy_m: Floats | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Corridors:
+    """Ways made of tracks.
+
+    Parameters
+    ----------
+    ways : Ways
+        Of one class, numbered from 1; they join in shared vertices.
+    sessions : numpy.ndarray of int64, shape (N,)
+        How many sessions went along each way, at its middle.
+    half_width_m : float
+        One may be so far from the line: the stated width of the corridor about it.
+    notes : tuple of str
+        What was left out, and what the corridor is.
+    """
+
+    ways: Ways
+    sessions: NDArray[np.int64]
+    half_width_m: float
+    notes: tuple[str, ...]
+
+
+def corridors(
+    crs: str,
+    sessions: Sequence[Positions],
+    half_width_m: float = CORRIDOR_HALF_WIDTH_M,
+    *,
+    max_accuracy_m: float = MAX_ACCURACY_M,
+    max_gap_m: float = MAX_GAP_M,
+    min_sessions: int = 1,
+) -> Corridors:
+    """Return the ways along which sessions went.
+
+    Parameters
+    ----------
+    crs : str
+        Projected CRS of the positions, in metres.
+    sessions : sequence of Positions
+    half_width_m : float
+        Tracks nearer to each other than this are of one way. It should not be below the
+        accuracy of the positions, nor above half the distance between parallel streets.
+    max_accuracy_m : float
+        Positions that are less accurate are left out; those of unknown accuracy are kept.
+    max_gap_m : float
+        Where positions that follow each other are farther apart, nobody knows the way between.
+    min_sessions : int
+        Keep what at least so many sessions passed within the half width.
+
+    Raises
+    ------
+    InputError
+        A length is not > 0, columns of a session differ in length, a position is not finite, or
+        no way is left.
+
+    Examples
+    --------
+    >>> there = Positions(np.arange(0.0, 100.0, 5.0), np.full(20, 3.0))
+    >>> back = Positions(np.arange(95.0, -5.0, -5.0), np.full(20, -3.0))
+    >>> found = corridors("EPSG:32618", [there, back], 10.0)
+    >>> len(found.ways), found.sessions.tolist(), shapely.length(found.ways.geometry).tolist()
+    (1, [2], [95.0])
+    """
+    _check(sessions, half_width_m, max_accuracy_m, max_gap_m, min_sessions)
+    step_m = half_width_m / 2
+    pieces, aside = [], 0
+    for session, positions in enumerate(sessions):
+        found, left_out = _pieces(positions, session, max_accuracy_m, max_gap_m, step_m)
+        pieces += found
+        aside += left_out
+    notes = [f"ways are corridors of {half_width_m:g} m to either side of tracks"]
+    if aside:
+        why = f"alone, or less accurate than {max_accuracy_m:g} m"
+        notes.append(f"{aside} positions left out: {why}")
+    if not pieces:
+        hint = "tracks with gaps: raise max_gap_m"
+        raise fail(InputError, "tracks", "positions that follow each other", "none", hint)
+    measured = cKDTree(np.concatenate([piece.place_m for piece in pieces]))
+    of_session = np.concatenate([np.full(len(p.place_m), p.session) for p in pieces])
+    drawn = _drawn_together(pieces, measured, half_width_m)
+    passed = _sessions_near(np.concatenate(drawn), measured, of_session, half_width_m)
+    kept = np.split(passed >= min_sessions, np.cumsum([len(part) for part in drawn])[:-1])
+    lines = grown_lines(drawn, kept, half_width_m)
+    if not lines:
+        expected = f"a way of at least {half_width_m:g} m that {min_sessions} sessions went along"
+        raise fail(InputError, "tracks", expected, "none")
+    middle = np.array([line[len(line) // 2] for line in lines])
+    count = len(lines)
+    ways = Ways(
+        crs,
+        np.arange(1, count + 1, dtype=np.int64),
+        np.zeros(count, dtype=np.int16),
+        (CORRIDOR_CLASS,),
+        np.array([shapely.LineString(line) for line in lines], dtype=object),
+        np.zeros(count, dtype=np.bool_),
+        np.zeros(count, dtype=np.int8),
+    )
+    sessions_each = _sessions_near(middle, measured, of_session, half_width_m)
+    return Corridors(ways, sessions_each, half_width_m, tuple(notes))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Piece:
+    """A part of a session without gaps, sampled evenly: places, directions, weights."""
+
+    session: int
+    place_m: Floats
+    along: Floats
+    weight: Floats
+
+
+def _check(
+    sessions: Sequence[Positions],
+    half_width_m: float,
+    max_accuracy_m: float,
+    max_gap_m: float,
+    min_sessions: int,
+) -> None:
+    faults = Faults()
+    lengths = {
+        "half_width_m": half_width_m,
+        "max_accuracy_m": max_accuracy_m,
+        "max_gap_m": max_gap_m,
+    }
+    for name, value in lengths.items():
+        if not (np.isfinite(value) and value > 0):
+            faults.add(name, "metres > 0", value)
+    if min_sessions < 1:
+        faults.add("min_sessions", "a whole number >= 1", min_sessions)
+    for number, positions in enumerate(sessions, start=1):
+        columns = [positions.east_m, positions.north_m]
+        if positions.accuracy_m is not None:
+            columns.append(positions.accuracy_m)
+        if len({column.shape for column in columns}) > 1:
+            faults.add(f"session {number}", "columns of one length", [c.shape for c in columns])
+        elif not np.isfinite(columns[:2]).all():
+            faults.add(f"session {number}", "finite positions", "NaN or infinity")
+    faults.raise_if_any(InputError)
+
+
+def _pieces(
+    positions: Positions, session: int, max_accuracy_m: float, max_gap_m: float, step_m: float
+) -> tuple[list[_Piece], int]:
+    """Return the parts of a session without gaps, and how many positions are in none."""
+    place_m = np.column_stack([positions.east_m, positions.north_m])
+    known = np.full(len(place_m), np.nan)
+    if positions.accuracy_m is not None:
+        known = positions.accuracy_m
+    good = ~(known > max_accuracy_m)
+    place_m, known = place_m[good], known[good]
+    accuracy_m = np.fmax(np.where(np.isnan(known), _UNKNOWN_ACCURACY_M, known), _BEST_ACCURACY_M)
+    gaps = np.flatnonzero(np.hypot(*np.diff(place_m, axis=0).T) > max_gap_m) + 1
+    pieces, aside = [], int((~good).sum())
+    for part in np.split(np.arange(len(place_m)), gaps):
+        kept = part[_moving(place_m[part], step_m)]
+        if len(kept) < 2:
+            aside += len(part)
+            continue
+        pieces.append(_sampled(session, place_m[kept], accuracy_m[kept], step_m))
+    return pieces, aside
+
+
+def _moving(place_m: Floats, step_m: float) -> NDArray[np.int64]:
+    """Return the positions that are a step from the last one taken: none of standing still."""
+    taken: list[int] = []
+    for i, place in enumerate(place_m):
+        if not taken or np.hypot(*(place - place_m[taken[-1]])) >= step_m:
+            taken.append(i)
+    return np.array(taken, dtype=np.int64)
+
+
+def _sampled(session: int, place_m: Floats, accuracy_m: Floats, step_m: float) -> _Piece:
+    length_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(place_m, axis=0).T))])
+    count = max(int(np.ceil(length_m[-1] / step_m)), 1) + 1
+    at_m = np.linspace(0.0, length_m[-1], count)
+    samples = np.column_stack([np.interp(at_m, length_m, axis) for axis in place_m.T])
+    accuracy = np.interp(at_m, length_m, accuracy_m)
+    return _Piece(session, samples, _directions(samples), 1.0 / accuracy**2)
+
+
+def _directions(place_m: Floats) -> Floats:
+    """Return unit vectors along a line, shape (N, 2); (1, 0) where it turns on the spot."""
+    along = np.gradient(place_m, axis=0)
+    length = np.hypot(*along.T)[:, None]
+    unit: Floats = np.divide(along, length, out=np.zeros_like(along), where=length > 0)
+    unit[length[:, 0] == 0, 0] = 1.0
+    return unit
+
+
+def _drawn_together(
+    pieces: Sequence[_Piece], measured: cKDTree, half_width_m: float
+) -> list[Floats]:
+    """Shift samples across their direction to the weighted mean of what was measured nearby."""
+    along = np.concatenate([piece.along for piece in pieces])
+    weight = np.concatenate([piece.weight for piece in pieces])
+    place_m = np.array(measured.data)
+    for first in range(0, len(place_m), _AT_A_TIME):
+        some = slice(first, first + _AT_A_TIME)
+        across = np.column_stack([-along[some, 1], along[some, 0]])
+        for _ in range(_SHIFTS):
+            of, near = _pairs(measured, place_m[some], half_width_m)
+            same = np.abs(np.sum(along[some][of] * along[near], axis=1)) >= _SAME_DIRECTION
+            of, near = of[same], near[same]
+            offset_m = np.sum((measured.data[near] - place_m[some][of]) * across[of], axis=1)
+            total = np.bincount(of, weights=weight[near], minlength=len(across))
+            moment = np.bincount(of, weights=weight[near] * offset_m, minlength=len(across))
+            mean_m = np.divide(moment, total, out=np.zeros_like(moment), where=total > 0)
+            place_m[some] += mean_m[:, None] * across
+    return list(np.split(place_m, np.cumsum([len(piece.place_m) for piece in pieces])[:-1]))
+
+
+def _sessions_near(
+    place_m: Floats, measured: cKDTree, of_session: NDArray[np.int64], reach_m: float
+) -> NDArray[np.int64]:
+    """Return how many sessions passed within reach of each place."""
+    counts = []
+    for first in range(0, len(place_m), _AT_A_TIME):
+        some = place_m[first : first + _AT_A_TIME]
+        of, near = _pairs(measured, some, reach_m)
+        heard = np.unique(np.column_stack([of, of_session[near]]), axis=0)[:, 0]
+        counts.append(np.bincount(heard, minlength=len(some)))
+    return np.concatenate(counts).astype(np.int64)
+
+
+def _pairs(
+    measured: cKDTree, place_m: Floats, reach_m: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return all pairs of a place and a measured one within reach, by their indices."""
+    found = measured.query_ball_point(place_m, reach_m, return_sorted=True)
+    of = np.repeat(np.arange(len(place_m)), [len(near) for near in found])
+    return of, np.fromiter(itertools.chain.from_iterable(found), np.int64, count=of.size)
