@@ -99,6 +99,13 @@ def build(
         bool, typer.Option("--dry-run", help="Only tell size, memory and time.")
     ] = False,
     workers: Annotated[int, typer.Option("--workers", min=1, help="Local processes.")] = 1,
+    cluster: Annotated[
+        str | None,
+        typer.Option("--cluster", metavar="ADDRESS", help="A Dask scheduler, or local:N."),
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on where a build was cut short.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Build a radio-route database from RxLev rasters and roads."""
@@ -110,7 +117,9 @@ def build(
         _print(run_dry_build(loaded), as_json)
         return
     with _progress("build") as progress:
-        result = run_build(loaded, workers=workers, progress=progress)
+        result = run_build(
+            loaded, workers=workers, cluster=cluster, resume=resume, progress=progress
+        )
     _print(result, as_json)
 
 
@@ -175,7 +184,8 @@ def replay(
 ) -> None:
     """Locate one log, or every log of a folder; exit code 3 if that was done in part only."""
     from mapfilter.workflows.config import load_config
-    from mapfilter.workflows.replay import replay_facts, run_replay
+    from mapfilter.workflows.replay import run_replay
+    from mapfilter.workflows.replayed import replay_facts
 
     given = _seeded(settings, seed, "journeys.seed")
     for key, value in (("database.path", database), ("track.path", log)):

@@ -58,7 +58,7 @@ class Accuracy:
         When, after how many true metres, and how far off; NaN if it never switched.
     error_mean_m, error_67_m, error_95_m : float
         Mean and percentiles of the error over all located epochs from the switch on.
-    epochs : int
+    scored_epochs : int
         How many those are.
     """
 
@@ -70,7 +70,7 @@ class Accuracy:
     error_mean_m: float
     error_67_m: float
     error_95_m: float
-    epochs: int
+    scored_epochs: int
 
 
 def position_errors_m(estimate: TrackEstimate, truth: Truth) -> Floats:

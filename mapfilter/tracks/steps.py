@@ -17,7 +17,9 @@ _SLOWEST_MPS = 0.02
 _LONG_S = 60.0
 _MOSTLY = 2 / 3
 _SOMEWHERE_M = 100.0
-_KILO_AT_LEAST = 100.0
+_KILO = (100.0, 1200.0)
+"""Between these, positions lie apart by the kilometres of the steps, or a part of them."""
+_FASTEST_KMPS = 0.1
 
 _EXPECTED = "metres moved in each interval"
 
@@ -60,7 +62,7 @@ def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) 
     elif moving.size >= _FEW_ROWS and np.mean(moving < 0) > _MOSTLY:
         got = f"{int(np.sum(moving < 0))} negative steps of {moving.size}"
         faults.add(column, f"{_EXPECTED} along its heading", got, "a sign the other way round")
-    elif extent_m > _SOMEWHERE_M and 0 < moved_m < extent_m / _KILO_AT_LEAST:
+    elif typical_mps < _FASTEST_KMPS and _in_kilometres(moved_m, extent_m):
         got = f"{moved_m:.3g} m in all, while positions lie {extent_m:.0f} m apart"
         faults.add(column, _EXPECTED, got, "kilometres given for metres")
     elif lasted_s >= _LONG_S and 0 < moved_m < _SLOWEST_MPS * lasted_s:
@@ -68,6 +70,11 @@ def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) 
             f"motion, step_m: only {moved_m:.3g} m in {lasted_s:.0f} s; kilometres for metres?",
         )
     return ()
+
+
+def _in_kilometres(moved_m: float, extent_m: float) -> bool:
+    low, high = _KILO
+    return extent_m > _SOMEWHERE_M and low * moved_m < extent_m <= high * moved_m
 
 
 def _grows(step_m: Floats, lasted_s: float) -> bool:

@@ -31,20 +31,23 @@ def facts(value: Any) -> Any:
 
 
 def text_lines(found: Mapping[str, Any], indent: str = "") -> Iterator[str]:
-    r"""Yield one line for each figure, nested ones indented.
+    r"""Yield one line for each figure, nested ones indented; none for what is empty.
 
     Examples
     --------
-    >>> print(*text_lines({"cells": 3, "seconds": {"build": 1.23456}}), sep="\n")
-    cells: 3
+    >>> print(*text_lines({"bounds_m": [385412.52], "seconds": {"build": 1.23456}}), sep="\n")
+    bounds_m:
+      385412.5
     seconds:
       build: 1.235
     """
     for key, value in found.items():
+        if isinstance(value, Mapping | list) and not value:
+            continue
         if isinstance(value, Mapping):
             yield f"{indent}{key}:"
             yield from text_lines(value, indent + "  ")
-        elif isinstance(value, list) and value:
+        elif isinstance(value, list):
             yield f"{indent}{key}:"
             for item in value:
                 shown = (
@@ -60,4 +63,6 @@ def text_lines(found: Mapping[str, Any], indent: str = "") -> Iterator[str]:
 def _short(value: Any) -> str:
     if value is None:
         return "-"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    if isinstance(value, float):
+        return f"{value:.1f}" if abs(value) >= 1000 else f"{value:.4g}"
+    return str(value)

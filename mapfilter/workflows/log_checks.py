@@ -9,6 +9,7 @@ import numpy as np
 
 from mapfilter.errors import Faults, InputError, MapfilterError
 from mapfilter.geodesy import Floats, Lattice, same_crs
+from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.schema import SERVING
 from mapfilter.tracks.store import read_log
@@ -47,11 +48,20 @@ def check_logs(folders: Sequence[Path], lattice: Lattice) -> None:
     faults.raise_if_any(InputError)
 
 
-def lacking(log: TrackLog) -> str:
-    """Return what a log lacks so that nothing can be located in it, or an empty text."""
+def lacking(log: TrackLog, estimate: TrackEstimate) -> str:
+    """Return what a log lacks so that nothing could be located in it, or an empty text."""
     serving = (log.radio["role"] == SERVING) & log.radio["cell"].notna()
-    lacks = [] if serving.any() else ["no serving cell"]
-    lacks += [] if log.motion["step_m"].notna().any() else ["no motion"]
+    moved = log.motion["step_m"].notna()
+    lacks = []
+    if not serving.any():
+        lacks.append("no serving cell")
+    elif not (estimate.hypotheses > 0).any():
+        lacks.append("no serving cell of which the database has points")
+    if not moved.any():
+        lacks.append("no motion")
+    elif not (moved & log.motion["heading_rad"].notna()).any():
+        turns = log.motion["turn_rad"].notna().any()
+        lacks.append("no heading" + (" (turns alone do not tell it)" if turns else ""))
     return " and ".join(lacks)
 
 

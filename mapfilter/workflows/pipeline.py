@@ -43,7 +43,7 @@ def run_pipeline(stages: Mapping[str, Stage], file: Path, argv: Sequence[str] | 
         for name, stage in stages.items():
             began_s = time.perf_counter()
             found[name] = facts(stage(config))
-            found[name]["stage_seconds"] = round(time.perf_counter() - began_s, 3)
+            found[name]["seconds"] = round(time.perf_counter() - began_s, 3)
             if not given.json:
                 sys.stdout.write("\n".join(text_lines({name: found[name]})) + "\n")
     except MapfilterError as error:

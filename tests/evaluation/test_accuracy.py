@@ -78,7 +78,7 @@ def test_a_track_scored_by_hand():
     assert (score.switched, score.success) == (True, True)
     assert (score.switch_time_s, score.switch_distance_m, score.error_at_switch_m) == (5, 50, 5)
     assert score.error_mean_m == pytest.approx(11 / 4)
-    assert (score.error_67_m, score.error_95_m, score.epochs) == (3.0, 5.0, 4)
+    assert (score.error_67_m, score.error_95_m, score.scored_epochs) == (3.0, 5.0, 4)
 
 
 @pytest.mark.parametrize(("off", "success"), [(49.99, True), (50.0, True), (50.01, False)])
@@ -92,7 +92,7 @@ def test_fifty_metres_at_the_switch_are_the_limit(off, success):
 @pytest.mark.parametrize("statuses", [[], [S, S], [S, L]])
 def test_never_switching_is_a_failure_without_figures(statuses):
     score = accuracy(estimate([(i, nan, nan, s) for i, s in enumerate(statuses)]), TRUTH)
-    assert (score.switched, score.success, score.epochs) == (False, False, 0)
+    assert (score.switched, score.success, score.scored_epochs) == (False, False, 0)
     assert isnan(score.switch_time_s)
     assert isnan(score.switch_distance_m)
     assert isnan(score.error_at_switch_m)
@@ -108,7 +108,7 @@ def test_the_first_switch_counts():
 
 def test_a_switch_outside_the_truth_is_no_success():
     score = accuracy(estimate([(30, 100, 100, C)]), TRUTH)
-    assert (score.switched, score.success, score.epochs) == (True, False, 0)
+    assert (score.switched, score.success, score.scored_epochs) == (True, False, 0)
     assert isnan(score.error_at_switch_m)
     assert isnan(score.error_67_m)
 

@@ -29,14 +29,14 @@ def test_a_log_made_by_hand_is_replayed(log, replay, tmp_path):
         ("truth", {"time_s": lambda t: t * 1000}, "milliseconds for s"),
         ("radio", {"time_s": lambda t: t * 1000}, "milliseconds for s"),
         ("motion", {"time_s": lambda t: t + 1.7e9}, "tables that overlap in time"),
-        ("motion", {"time_s": put("nan")}, "row 2, time_s: expected seconds, found nan"),
-        ("motion", {"time_s": put("inf")}, "row 2, time_s: expected seconds, found inf"),
-        ("radio", {"time_s": put("soon")}, "row 2, time_s: expected seconds, found soon"),
-        ("truth", {"east_m": put("inf")}, "row 2, east_m: expected metres east, found inf"),
-        ("truth", {"north_m": put("nan")}, "row 2, north_m: expected metres north, found nan"),
+        ("motion", {"time_s": put("nan")}, "row 3, time_s: expected seconds, found nan"),
+        ("motion", {"time_s": put("inf")}, "row 3, time_s: expected seconds, found inf"),
+        ("radio", {"time_s": put("soon")}, "row 3, time_s: expected seconds, found soon"),
+        ("truth", {"east_m": put("inf")}, "row 3, east_m: expected metres east, found inf"),
+        ("truth", {"north_m": put("nan")}, "row 3, north_m: expected metres north, found nan"),
         ("motion", {"heading_rad": lambda h: h * 180 / np.pi}, "degrees given for radians"),
         ("radio", {"level_dbm": lambda v: -v}, "raw RXLEV given for dBm"),
-        ("radio", {"role": put("servng")}, "row 2, role: expected serving or neighbour"),
+        ("radio", {"role": put("servng")}, "row 3, role: expected serving or neighbour"),
     ],
 )
 def test_values(table, columns, told, log, replay):
@@ -57,7 +57,7 @@ def test_all_faults_of_a_log_are_told_together(log, replay):
     change(log / "motion.csv", time_s=put("inf"))
     change(log / "truth.csv", east_m=put("nan"))
     (log / "log.json").write_text('{"crs": "EPSG:4326"}')
-    assert_log_refused(replay, log, "motion.csv row 2", "truth.csv row 2", "log, crs")
+    assert_log_refused(replay, log, "motion.csv row 3", "truth.csv row 3", "my-walk/log.json, crs")
 
 
 @pytest.mark.parametrize(

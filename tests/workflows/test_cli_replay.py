@@ -1,6 +1,7 @@
 """What replay writes and tells: of good logs, of logs that lack something, over older results."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -8,8 +9,10 @@ import pytest
 from command_line import ONE, assert_done, change, contents, mapfilter, put
 
 from mapfilter.filters.contract import Reason
+from mapfilter.geodesy import unproject
 from mapfilter.positioning.estimate_store import read_estimate
 from mapfilter.positioning.global_positioning import position_by_candidates
+from mapfilter.tracks.store import read_log, write_log
 from mapfilter.workflows.config import load_config
 from mapfilter.workflows.replay import run_replay
 
@@ -22,10 +25,11 @@ def test_some_cells_unknown(log, replay, tmp_path):
     outcome = replay(log, "--json")
     assert outcome.code == 3
     assert outcome.err == (
-        "mapfilter: some cells are unknown to the database; their readings are labelled "
-        "unknown_cell\n"
+        "mapfilter: 1 cell is unknown to the database (../new; in my-walk); their readings are "
+        "labelled unknown_cell\n"
     )
     assert outcome.json["unused"]["unknown_cell"] == late.sum()
+    assert outcome.json["unknown_cells"] == {"../new": late.sum()}
     estimate = read_estimate(tmp_path / "out" / "estimate.parquet")
     labelled = [u for u in estimate.unused if u.reason is Reason.UNKNOWN_CELL]
     assert {(u.kind, u.what) for u in labelled} == {("serving", "../new")}
@@ -74,9 +78,101 @@ def test_a_log_with_neighbours_only(log, replay):
     assert outcome.err == "mapfilter: nothing is located in my-walk: no serving cell\n"
 
 
-def test_a_log_without_truth_is_located(log, replay):
+TOLD_WITHOUT_TRUTH = {
+    "final_status", "switched", "switch_time_s", "epochs", "epochs_by_status", "last_lon_deg",
+    "last_lat_deg", "last_time_s", "unused", "unknown_cells", "notes",
+}  # fmt: skip
+
+
+def test_a_log_without_truth_is_located_and_told(log, replay, tmp_path):
+    with_truth = assert_done(replay(log, "--json")).json
     (log / "truth.csv").unlink()
-    assert "error_mean_m" not in assert_done(replay(log, "--json")).json
+    found = assert_done(replay(log, "--json")).json
+    assert "error_mean_m" not in found
+    assert {key: found[key] for key in TOLD_WITHOUT_TRUTH} == {
+        key: with_truth[key] for key in TOLD_WITHOUT_TRUTH
+    }
+    figures = json.loads((tmp_path / "out" / "figures.json").read_text())
+    assert {key: figures[key] for key in TOLD_WITHOUT_TRUTH} == {
+        key: found[key] for key in TOLD_WITHOUT_TRUTH
+    }
+    estimate = read_estimate(str(tmp_path / "out" / "estimate.parquet"))
+    assert (found["final_status"], found["switched"]) == ("TRACKING", True)
+    assert found["switch_time_s"] == estimate.time_s[estimate.converged_at]
+    assert found["epochs"] == len(estimate) == sum(found["epochs_by_status"].values())
+    assert found["epochs_by_status"]["CONVERGED"] == 1
+    lon, lat = unproject(estimate.crs, estimate.east_m[-1:], estimate.north_m[-1:])
+    assert (found["last_lon_deg"], found["last_lat_deg"]) == (lon[0], lat[0])
+    assert with_truth["scored_epochs"] <= found["epochs"]
+    text = assert_done(replay(log)).out
+    assert "final_status: TRACKING\nswitched: True\n" in text
+    assert "unknown_cells" not in text
+
+
+def test_a_search_that_ends_without_a_position_is_told(log, replay):
+    (log / "truth.csv").unlink()
+    change(log / "motion.csv", step_m=lambda m: m * 0.01)
+    found = assert_done(replay(log, "--json")).json
+    assert (found["final_status"], found["switched"]) == ("SEARCHING", False)
+    assert found["switch_time_s"] is None
+    assert found["last_lon_deg"] is None
+
+
+def test_notes_of_a_log_are_told(log, replay):
+    change(log / "motion.csv", time_s=put(0.0))
+    (log / "motion.txt").write_text("")
+    assert_done(replay(log))
+    told = [
+        f"{log / 'motion.txt'}: not a table of a log, not read",
+        f"{log / 'motion.csv'}: out of order in 1 places, sorted by time",
+    ]
+    assert assert_done(replay(log, "--json")).json["notes"] == told
+    assert f"notes:\n  {told[0]}\n  {told[1]}\n" in replay(log).out
+
+
+def test_several_logs_are_summed_up_without_truth(own_world, replay, tmp_path):
+    for folder in sorted(own_world.journeys.iterdir()):
+        log = read_log(folder)
+        radio = log.radio.assign(cell=log.radio["cell"].where(log.radio["cell"] != "C", "X"))
+        write_log(replace(log, radio=radio, truth=log.truth.iloc[:0]), folder, "csv")
+        (folder / "log.json").write_text(json.dumps({"crs": log.crs}))
+        (folder / "weather.txt").write_text("fine")
+    outcome = replay(own_world.journeys, "--json")
+    assert outcome.code == 3
+    found = outcome.json
+    each = [
+        json.loads((tmp_path / "out" / name / "figures.json").read_text())
+        for name in (ONE, "journey-0001-draw-000")
+    ]
+    assert found["switched"] == sum(figures["switched"] for figures in each)
+    assert sum(found["final_statuses"].values()) == found["logs"] == 2
+    assert "success" not in found
+    for reason, count in found["unused"].items():
+        assert count == sum(figures["unused"].get(reason, 0) for figures in each)
+    readings = sum(figures["unknown_cells"].get("X", 0) for figures in each)
+    assert found["unknown_cells"] == {"X": readings}
+    assert set(found["logs_with_unknown_cells"]) <= {ONE, "journey-0001-draw-000"}
+    assert "1 cell is unknown to the database (X; in journey-" in outcome.err
+    note = "weather.txt: not a table of a log, not read"
+    assert found["notes"] == [f"{note} (in {ONE}, journey-0001-draw-000)"]
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert {key: found[key] for key in summary} == summary
+
+
+@pytest.mark.parametrize(
+    ("columns", "lack"),
+    [
+        (["time_s", "step_m"], "no heading"),
+        (["time_s", "step_m", "turn_rad"], "no heading (turns alone do not tell it)"),
+        (["time_s", "heading_rad"], "no motion"),
+    ],
+)
+def test_logs_whose_motion_lacks_something(columns, lack, log, replay):
+    motion = pd.read_csv(log / "motion.csv").assign(turn_rad=0.1)
+    motion[columns].to_csv(log / "motion.csv", index=False)
+    outcome = replay(log)
+    assert outcome.code == 3
+    assert outcome.err == f"mapfilter: nothing is located in my-walk: {lack}\n"
 
 
 def test_a_log_with_a_header_and_no_rows(log, replay):

@@ -1,0 +1,61 @@
+"""What is told of a track without its truth, by hand."""
+
+from dataclasses import astuple
+from math import nan
+
+import numpy as np
+import pytest
+
+from mapfilter.evaluation.outcome import outcome
+from mapfilter.filters.contract import Reason, Status
+from mapfilter.geodesy import project
+from mapfilter.positioning.estimate import Fix, TrackEstimate, UnusedReading
+
+CRS = "EPSG:32635"
+
+
+def estimate(*epochs, unused=()):
+    fixes = [
+        Fix(
+            float(time_s), east_m, north_m, np.full((2, 2), nan), np.full(3, nan), status,
+            1, nan, 0, nan, Reason.USED,
+        )
+        for time_s, (status, east_m, north_m) in enumerate(epochs)
+    ]  # fmt: skip
+    return TrackEstimate.of_fixes(CRS, "candidate", fixes, unused=unused)
+
+
+def test_a_track_that_is_found_and_lost():
+    places = project(CRS, [24.94, 24.95], [60.17, 60.18])
+    (east_a, east_b), (north_a, north_b) = places
+    unused = [
+        UnusedReading(0.0, "serving", "X", Reason.UNKNOWN_CELL),
+        UnusedReading(1.0, "serving", "Y", Reason.UNKNOWN_CELL),
+        UnusedReading(2.0, "serving", "X", Reason.UNKNOWN_CELL),
+        UnusedReading(2.0, "motion", "", Reason.NO_STEP),
+    ]
+    found = outcome(
+        estimate(
+            (Status.SEARCHING, nan, nan),
+            (Status.CONVERGED, east_a, north_a),
+            (Status.TRACKING, east_b, north_b),
+            (Status.LOST, nan, nan),
+            unused=unused,
+        )
+    )
+    assert (found.final_status, found.switched, found.switch_time_s) == ("LOST", True, 1.0)
+    assert found.epochs == 4
+    assert found.epochs_by_status == {"SEARCHING": 1, "CONVERGED": 1, "TRACKING": 1, "LOST": 1}
+    assert (found.last_lon_deg, found.last_lat_deg) == pytest.approx((24.95, 60.18), abs=1e-9)
+    assert found.last_time_s == 2.0
+    assert found.unused == {"no_step": 1, "unknown_cell": 3}
+    assert found.unknown_cells == {"X": 2, "Y": 1}
+
+
+@pytest.mark.parametrize("epochs", [(), ((Status.SEARCHING, nan, nan),)])
+def test_a_track_that_is_nowhere(epochs):
+    found = outcome(estimate(*epochs))
+    assert found.final_status == ("SEARCHING" if epochs else "")
+    assert not found.switched
+    assert np.isnan([found.switch_time_s, found.last_lon_deg, found.last_lat_deg]).all()
+    assert astuple(found)[-2:] == ({}, {})
