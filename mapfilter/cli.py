@@ -73,6 +73,27 @@ def demo(
 
 
 @app.command()
+def check(
+    config: ConfigOption = None,
+    settings: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Look at all inputs together before anything runs; exit code 2 if something is wrong."""
+    from mapfilter.workflows.check import run_check
+    from mapfilter.workflows.config import load_config
+    from mapfilter.workflows.findings import paragraphs
+
+    with _progress("check") as progress:
+        result = run_check(load_config(config, settings or ()), progress)
+    if as_json:
+        _print(result, as_json)
+    else:
+        sys.stdout.write("\n\n".join(paragraphs(result)) + "\n")
+    if not result.ok:
+        raise typer.Exit(WRONG)
+
+
+@app.command()
 def predict(
     config: ConfigOption = None,
     settings: SetOption = None,

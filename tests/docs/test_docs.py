@@ -21,6 +21,7 @@ from mapfilter.positioning.estimate_store import _COLUMNS as ESTIMATE_COLUMNS
 from mapfilter.radio._cell_table import COLUMNS as PLAN_COLUMNS
 from mapfilter.tracks.schema import SCHEMA
 from mapfilter.workflows.config import load_config
+from mapfilter.workflows.findings import REMEDIES
 from mapfilter.workflows.sections import Config
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -58,7 +59,7 @@ def test_quickstart_commands_run(tmp_path, monkeypatch):
     (tmp_path / "helsinki.toml").write_text(textwrap.dedent(toml[1]), encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     commands = re.findall(r"^   \$ mapfilter (.+)$", text, flags=re.MULTILINE)
-    assert len(commands) == 11
+    assert len(commands) == 12
     for command in commands:
         if command.startswith("demo"):
             continue
@@ -128,6 +129,10 @@ def test_command_line_page_names_every_command_and_option():
             for option in parameter.opts:
                 if option.startswith("-") and option != "--help":
                     assert option in text, (name, option)
+
+
+def test_command_line_page_names_every_finding_of_check():
+    assert set(REMEDIES) <= named(page("cli.rst"))
 
 
 def test_quickstart_shows_only_commands_that_exist():

@@ -1,0 +1,198 @@
+"""``mapfilter check``: all inputs of a configuration looked at together before anything runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import rasterio
+from rasterio.errors import RasterioError
+
+from mapfilter._parallel import Progress
+from mapfilter.errors import MapfilterError
+from mapfilter.geodesy import Lattice
+from mapfilter.radio._cell_rules import ANTENNAS
+from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.predict import off_frequency
+from mapfilter.radio.rasters import RxLevRasters
+from mapfilter.roads.maps import resolve_map
+from mapfilter.workflows.check_lobes import check_against_sites, check_power
+from mapfilter.workflows.check_places import (
+    check_pixels,
+    check_rasters_place,
+    check_same_pixels,
+    check_sites,
+    check_ways,
+    has_box,
+)
+from mapfilter.workflows.check_rasters import check_ids, sampled
+from mapfilter.workflows.findings import CheckResult, Findings, Severity, listed
+from mapfilter.workflows.sections import Config
+from mapfilter.workflows.world import World, area_lattice, planned_rasters
+
+_STAGES = 5
+
+
+@dataclass(frozen=True, slots=True)
+class _Inputs:
+    """What could be read of a configuration; None where it could not, or is not there yet."""
+
+    config: Config
+    lattice: Lattice | None
+    rasters: RxLevRasters | None
+
+
+def run_check(config: Config, progress: Progress | None = None) -> CheckResult:
+    """Look at area, map, plan, antennas, rasters and land use together, and change nothing.
+
+    Rasters that are still to be predicted are passed over. Large rasters are looked at in a square
+    of four million pixels about each site.
+
+    Raises
+    ------
+    MapfilterError
+        Nothing that has to do with the inputs: what is wrong with them is a finding.
+    """
+    findings = Findings()
+
+    def done(stages: int) -> None:
+        if progress is not None:
+            progress(stages, _STAGES)
+
+    area = _area(config, findings)
+    rasters = _rasters(config, findings)
+    placed = area is not None and (
+        rasters is None or check_rasters_place(rasters, config, findings)
+    )
+    done(1)
+    lattice = rasters.lattice if rasters is not None else area
+    inputs = _Inputs(config, lattice if placed or area is None else None, rasters)
+    plan = _plan(inputs, findings)
+    done(2)
+    if rasters is not None and inputs.lattice is not None:
+        _check_rasters(rasters, plan, config, findings)
+    elif plan is not None and inputs.lattice is not None:
+        where = _plan_name(config)
+        check_sites(plan, inputs.lattice, where, findings)
+        check_power((), plan, where, findings)
+    done(3)
+    if plan is not None and inputs.lattice is not None:
+        _check_antennas(plan, inputs, findings)
+    done(4)
+    if area is not None and placed:
+        _check_roads(inputs, area, findings)
+    done(5)
+    return findings.result()
+
+
+def _area(config: Config, findings: Findings) -> Lattice | None:
+    """Return the lattice of the area; faults of the map are told apart from those of the box."""
+    try:
+        resolve_map(config.area.map)
+    except MapfilterError as error:
+        findings.add_faults(error, "map-invalid")
+        return None
+    try:
+        return area_lattice(config.area)
+    except MapfilterError as error:
+        findings.add_faults(error, "area-invalid")
+        return None
+
+
+def _rasters(config: Config, findings: Findings) -> RxLevRasters | None:
+    path = config.rasters_path
+    if not path.exists():
+        if config.rasters.path is not None:
+            findings.add("rasters-missing", str(path), "There is nothing yet.", "warning")
+        return None
+    try:
+        rasters = planned_rasters(config)
+    except MapfilterError as error:
+        findings.add_faults(error, "rasters-invalid")
+        return None
+    if rasters.quantity == "deviation":
+        evidence = "The file holds the deviations of a survey, not its levels."
+        findings.add("values-implausible", str(path), evidence)
+        return None
+    return rasters
+
+
+def _plan(inputs: _Inputs, findings: Findings) -> CellPlan | None:
+    if inputs.lattice is None:
+        return None
+    try:
+        return World(inputs.config, inputs.lattice).plan
+    except MapfilterError as error:
+        findings.add_faults(error, "plan-invalid")
+        return None
+
+
+def _check_rasters(
+    rasters: RxLevRasters, plan: CellPlan | None, config: Config, findings: Findings
+) -> None:
+    check_pixels(rasters, config, findings)
+    before = len(findings.found)
+    samples = sampled(rasters, plan, findings)
+    as_declared = len(findings.found) == before
+    if plan is None:
+        return
+    name, where = _plan_name(config), str(rasters.path)
+    outside = check_sites(plan, rasters.lattice, name, findings)
+    check_ids(rasters, plan, name, findings)
+    in_place = check_against_sites(samples, plan, outside, where, findings)
+    levels = in_place if rasters.quantity == "level" and as_declared else []
+    check_power(levels, plan, name, findings)
+
+
+def _check_antennas(plan: CellPlan, inputs: _Inputs, findings: Findings) -> None:
+    named = sorted({cell.antenna for cell in plan.cells} - set(ANTENNAS))
+    if not named or inputs.lattice is None:
+        return
+    # Rasters that are there already do not need them.
+    severity: Severity = "error" if inputs.rasters is None else "warning"
+    if inputs.config.cells.antennas is None:
+        evidence = f"It names pattern files ({listed(named)}), and cells.antennas no folder."
+        findings.add("antenna-missing", _plan_name(inputs.config), evidence, severity)
+        return
+    try:
+        antennas = World(inputs.config, inputs.lattice).antennas
+    except MapfilterError as error:
+        findings.add_faults(error, "antenna-invalid", severity)
+        return
+    for note in off_frequency(plan, antennas):
+        findings.add("antenna-frequency", _plan_name(inputs.config), f"{note}.", "warning")
+
+
+def _check_roads(inputs: _Inputs, area: Lattice, findings: Findings) -> None:
+    config, rasters = inputs.config, inputs.rasters
+    lattice = rasters.lattice if rasters is not None and not has_box(config.area) else area
+    world = World(config, lattice)
+    if config.roads.landuse is None:
+        try:
+            ways = world.ways
+        except MapfilterError as error:
+            findings.add_faults(error, "map-invalid")
+            return
+        if rasters is not None:
+            check_ways(ways, rasters, f"{config.area.map} and {rasters.path}", findings)
+        return
+    try:
+        _ = world.landuse
+    except MapfilterError as error:
+        findings.add_faults(error, "landuse-invalid")
+        return
+    if rasters is not None:
+        _check_landuse_pixels(config.roads.landuse, rasters, findings)
+
+
+def _check_landuse_pixels(path: Path, rasters: RxLevRasters, findings: Findings) -> None:
+    try:
+        with rasterio.open(path) as source:
+            transform = source.transform
+    except RasterioError:
+        return
+    check_same_pixels(str(path), (transform.c, transform.a, transform.f), rasters, findings)
+
+
+def _plan_name(config: Config) -> str:
+    return str(config.cells.plan or "plan by rule")

@@ -1,0 +1,229 @@
+"""Whether each raster is strong about its own site, into its own direction, as its EIRP allows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapfilter.radio.azimuths import AzimuthMistake, azimuth_mistakes
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.radio.lobes import Lobe, falls_with_distance, find_lobe, peak_m
+from mapfilter.radio.plausibility import RasterSample, above_free_space_db
+from mapfilter.workflows.findings import Findings, listed
+
+_FAR_PX, _FAR_M = 10.0, 150.0
+_CLEARLY_WORSE, _FITS = 0.35, 0.35
+_TURNED_BETTER, _TURNED_FITS = 0.25, 0.4
+_TURNED_SLIGHTLY, _LOBES_BETTER = 0.1, 0.3
+_MUCH_ABOVE_DB = 15.0
+_SMALL_EIRP_DBM, _MAST_M = 25.0, 10.0
+
+_TURNS: tuple[tuple[str, Callable[[NDArray[np.float32]], NDArray[np.float32]]], ...] = (
+    ("rows and columns exchanged", lambda v: v.T),
+    ("rows from south to north", lambda v: v[::-1]),
+    ("columns from east to west", lambda v: v[:, ::-1]),
+    ("rows and columns both reversed", lambda v: v[::-1, ::-1]),
+    ("a quarter turn", lambda v: v.T[::-1]),
+    ("a quarter turn the other way", lambda v: v.T[:, ::-1]),
+)
+"""How exporters turn rasters, as what undoes it."""
+
+
+def check_against_sites(
+    samples: Sequence[RasterSample],
+    plan: CellPlan,
+    outside: frozenset[str],
+    where: str,
+    findings: Findings,
+) -> list[RasterSample]:
+    """See that each raster is strong about its own site, and into its own direction.
+
+    Parameters
+    ----------
+    samples : sequence of RasterSample
+        From :func:`sampled`.
+    plan : CellPlan
+        In the CRS of the rasters.
+    outside : frozenset of str
+        Cells whose site is not on the rasters; they are passed over.
+    where : str
+        The rasters.
+    findings : Findings
+
+    Returns
+    -------
+    list of RasterSample
+        Those that are strong about their own site.
+    """
+    seen = [s for s in samples if s.cell_id in plan and s.cell_id not in outside]
+    if not seen or _check_turned(seen, plan, where, findings):
+        return []
+    off = _check_peaks(seen, plan, where, findings)
+    in_place = [s for s in seen if s.cell_id not in off]
+    lobes = _lobes(in_place, plan)
+    cells = [plan[s.cell_id] for s in seen]
+    for mistake in azimuth_mistakes(cells, lobes):
+        findings.add(mistake.mistake, f"{where}, cells {listed(mistake.cells)}", _told(mistake))
+    return in_place
+
+
+def check_power(
+    samples: Sequence[RasterSample], plan: CellPlan, where: str, findings: Findings
+) -> None:
+    """See that levels are possible with the EIRP of the plan, and the EIRP with a mast."""
+    cells = [cell for cell in plan.cells if _on_mast(cell)]
+    small = [cell for cell in cells if 0 < cell.eirp_dbm <= _SMALL_EIRP_DBM]
+    above = {
+        s.cell_id: above_free_space_db(s, plan[s.cell_id])
+        for s in samples
+        if s.cell_id in plan and not plan[s.cell_id].indoor
+    }
+    too_high = {i: excess for i, excess in above.items() if excess > _MUCH_ABOVE_DB}
+    if too_high:
+        ids = list(too_high)
+        evidence = (
+            f"Levels are up to {max(too_high.values()):.0f} dB above those of free space with the "
+            f"plan's EIRP (1 % of the pixels; {_MUCH_ABOVE_DB:g} dB would be much)."
+        )
+        watts = {cell.id for cell in small}
+        if watts & set(ids):
+            cell = next(cell for cell in small if cell.id in too_high)
+            evidence += f" {_as_watts(cell)}"
+            findings.add("eirp-watts", f"{where}, cells {listed(ids)}", evidence)
+        else:
+            findings.add("levels-above-eirp", f"{where}, cells {listed(ids)}", evidence, "warning")
+    elif small and 2 * len(small) > len(cells):
+        evidence = f"That is little for a sector on a mast. {_as_watts(small[0])}"
+        ids = [cell.id for cell in small]
+        findings.add("eirp-watts", f"{where}, cells {listed(ids)}", evidence, "warning")
+
+
+def _told(mistake: AzimuthMistake) -> str:
+    seen = f"Azimuths and lobes of the rasters differ by {mistake.offset_deg:.0f}° (median)"
+    if mistake.mistake == "azimuth-off-lobe":
+        return f"{seen}: {mistake.reading}."
+    how = "if" if mistake.mistake == "sector-labels-swapped" else "if azimuths are"
+    return f"{seen}; by {mistake.offset_read_deg:.0f}° {how} {mistake.reading}."
+
+
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    """How well rasters fit their sites: all about them, and the sectors into their directions."""
+
+    distance: float
+    direction: float
+
+
+def _check_turned(
+    seen: Sequence[RasterSample], plan: CellPlan, where: str, findings: Findings
+) -> bool:
+    """Tell whether rasters fit their sites much better when they are turned."""
+    given = _fit(seen, plan)
+    if given.distance > 1 - _TURNED_SLIGHTLY:
+        return False
+    best: tuple[float, str, _Fit] | None = None
+    for words, turn in _TURNS:
+        fit = _fit([_turned(sample, turn(sample.values)) for sample in seen], plan)
+        nearer, straighter = fit.distance - given.distance, fit.direction - given.direction
+        clear = nearer > _TURNED_BETTER or (
+            nearer > _TURNED_SLIGHTLY and straighter > _LOBES_BETTER
+        )
+        if clear and fit.distance > _TURNED_FITS and (best is None or nearer > best[0]):
+            best = nearer, words, fit
+    if best is None:
+        return False
+    evidence = (
+        f"Levels and nearness to the sites correlate by {given.distance:.2f} (mean of {len(seen)} "
+        f"cells), and by {best[2].distance:.2f} if the file holds {best[1]}."
+    )
+    findings.add("axes-swapped", where, evidence)
+    return True
+
+
+def _fit(samples: Sequence[RasterSample], plan: CellPlan) -> _Fit:
+    cells = [plan[sample.cell_id] for sample in samples]
+    falls = [
+        falls_with_distance(sample, cell.east_m, cell.north_m)
+        for sample, cell in zip(samples, cells, strict=True)
+    ]
+    lobes = _lobes(samples, plan)
+    scores = [lobes[c.id].score(c.azimuth_deg or 0.0) for c in cells if c.id in lobes]
+    return _Fit(float(np.mean(falls)), float(np.mean(scores)) if scores else 0.0)
+
+
+def _turned(sample: RasterSample, values: NDArray[np.float32]) -> RasterSample:
+    rows, cols = values.shape
+    return replace(sample, values=values, lattice=replace(sample.lattice, rows=rows, cols=cols))
+
+
+def _lobes(samples: Sequence[RasterSample], plan: CellPlan) -> dict[str, Lobe]:
+    found = {}
+    for sample in samples:
+        cell = plan[sample.cell_id]
+        if cell.azimuth_deg is None or cell.indoor:
+            continue
+        lobe = find_lobe(sample, cell.east_m, cell.north_m, cell.beamwidth_deg)
+        if lobe is not None:
+            found[cell.id] = lobe
+    return found
+
+
+def _check_peaks(
+    seen: Sequence[RasterSample], plan: CellPlan, where: str, findings: Findings
+) -> frozenset[str]:
+    """Find rasters that are strong elsewhere than about their site, perhaps about another's."""
+    off: list[tuple[str, float, float, float]] = []
+    exchanged: list[tuple[str, str]] = []
+    for sample in seen:
+        cell = plan[sample.cell_id]
+        east_m, north_m = peak_m(sample)
+        away_m = float(np.hypot(east_m - cell.east_m, north_m - cell.north_m))
+        if away_m < max(_FAR_M, _FAR_PX * sample.lattice.resolution_m):
+            continue
+        own = falls_with_distance(sample, cell.east_m, cell.north_m)
+        there = falls_with_distance(sample, east_m, north_m)
+        if own > _FITS or there - own < _CLEARLY_WORSE:
+            continue
+        other = _nearest_site(plan, cell, east_m, north_m)
+        if other is not None and _fits(sample, other, own):
+            exchanged.append((cell.id, other.site))
+        else:
+            off.append((cell.id, away_m, own, there))
+    if exchanged:
+        told = ", ".join(f"{cell_id} about {site}" for cell_id, site in exchanged[:8])
+        ids = listed([cell_id for cell_id, _ in exchanged])
+        evidence = f"These rasters are strong about the site of another cell: {told}."
+        findings.add("site-labels-swapped", f"{where}, cells {ids}", evidence)
+    if off:
+        worst = max(off, key=lambda one: one[1])
+        evidence = (
+            f"Rasters are strongest up to {worst[1]:.0f} m from the site; levels and nearness "
+            f"correlate by {worst[2]:.2f}, about the peak by {worst[3]:.2f}."
+        )
+        ids = listed([one[0] for one in off])
+        findings.add("site-off-peak", f"{where}, cells {ids}", evidence)
+    return frozenset([*(one[0] for one in off), *(one[0] for one in exchanged)])
+
+
+def _nearest_site(plan: CellPlan, cell: Cell, east_m: float, north_m: float) -> Cell | None:
+    others = [other for other in plan.cells if other.site != cell.site]
+    if not others:
+        return None
+    return min(others, key=lambda o: float(np.hypot(o.east_m - east_m, o.north_m - north_m)))
+
+
+def _fits(sample: RasterSample, other: Cell, own: float) -> bool:
+    fit = falls_with_distance(sample, other.east_m, other.north_m)
+    return fit > _TURNED_FITS and fit - own > _CLEARLY_WORSE
+
+
+def _on_mast(cell: Cell) -> bool:
+    return cell.azimuth_deg is not None and not cell.indoor and cell.height_m >= _MAST_M
+
+
+def _as_watts(cell: Cell) -> str:
+    dbm = 10 * np.log10(1000 * cell.eirp_dbm)
+    return f"{cell.id} has {cell.eirp_dbm:g}, which as watts would be {dbm:.0f} dBm."

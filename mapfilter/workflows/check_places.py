@@ -1,0 +1,262 @@
+"""Whether plan, rasters, area and roads are at the same place, and on the same pixels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from mapfilter.errors import InputError
+from mapfilter.geodesy import Lattice, project, projected_crs, same_crs, unproject, utm_crs
+from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.rasters import RxLevRasters
+from mapfilter.roads.maps import box_deg, map_bounds_deg
+from mapfilter.roads.ways import Ways
+from mapfilter.workflows.findings import Findings, listed
+from mapfilter.workflows.sections import Area, Config
+from mapfilter.workflows.world import area_lattice
+
+Floats = NDArray[np.float64]
+BoxDeg = tuple[float, float, float, float]
+Move = Callable[[Floats, Floats], tuple[Floats, Floats]]
+
+_HALF_TOLERANCE_PX = 0.02
+_SAME_SIDE = 1e-6
+_OUTSIDE_SHARE = 0.01
+_MOST_ZONES = 2
+_NEARLY_ALL = 0.9
+
+
+def has_box(area: Area) -> bool:
+    """Tell whether an area says where it is, rather than leaving it to the map."""
+    return area.bbox is not None or area.southwest is not None
+
+
+def check_rasters_place(rasters: RxLevRasters, config: Config, findings: Findings) -> bool:
+    """See that rasters and area, or map, overlap; tell when their numbers fit another CRS.
+
+    Returns
+    -------
+    bool
+        Whether they do, so that it makes sense to look at more.
+    """
+    lattice, area = rasters.lattice, config.area
+    where = str(rasters.path)
+    if area.crs is not None:
+        wanted = projected_crs(area.crs, "area.crs")
+        if not same_crs(wanted, lattice.crs):
+            evidence = f"The rasters are in {lattice.crs}, the area in {wanted}."
+            findings.add("crs-mixed", where, evidence)
+            return False
+    box = box_deg(lattice.crs, lattice.bounds_m)
+    wanted_box = _area_box(area)
+    if _overlap(box, wanted_box):
+        return True
+    seen = f"The rasters cover {_shown(box)}, the area {_shown(wanted_box)} (degrees)."
+    for crs in _other_systems(wanted_box):
+        if not same_crs(crs, lattice.crs) and _overlap(box_deg(crs, lattice.bounds_m), wanted_box):
+            evidence = f"{seen} As numbers of {crs} instead of {lattice.crs} they would overlap."
+            findings.add("crs-mixed", where, evidence)
+            return False
+    findings.add("roads-outside-rasters", where, seen)
+    return False
+
+
+def check_sites(plan: CellPlan, lattice: Lattice, where: str, findings: Findings) -> frozenset[str]:
+    """See that sites lie in the area, and tell which mistake would put them there.
+
+    Returns
+    -------
+    frozenset of str
+        Ids of the cells that lie outside.
+    """
+    east = np.array([cell.east_m for cell in plan.cells])
+    north = np.array([cell.north_m for cell in plan.cells])
+    outside = ~_inside(east, north, lattice)
+    if not outside.any():
+        return frozenset()
+    ids = [cell.id for cell, out in zip(plan.cells, outside, strict=True) if out]
+    west, south, right, top = lattice.bounds_m
+    beyond_m = np.hypot(
+        np.maximum(np.maximum(west - east, east - right), 0),
+        np.maximum(np.maximum(south - north, north - top), 0),
+    )[outside]
+    named = f"{where}, cells {listed(ids)}"
+    seen = f"{len(ids)} of {len(plan)} cells lie up to {_metres(beyond_m.max())} outside the area."
+    for code, words, move in _moves(lattice):
+        moved = _inside(*move(east[outside], north[outside]), lattice)
+        if moved.mean() >= _NEARLY_ALL:
+            evidence = f"{seen} {words}, {int(moved.sum())} of them lie inside."
+            findings.add(code, named, evidence)
+            return frozenset(ids)
+    findings.add("site-outside-area", named, seen, "warning")
+    return frozenset(ids)
+
+
+def check_pixels(rasters: RxLevRasters, config: Config, findings: Findings) -> None:
+    """See whether rasters are half a pixel off the area's lattice, or off one another."""
+    lattice = rasters.lattice
+    names: list[str] = []
+    steps: list[tuple[float, float]] = []
+    for file in rasters.files:
+        step = _half_step(file.lattice, lattice.west_m, lattice.north_m)
+        if step is not None:
+            names.append(file.path.name)
+            steps.append(step)
+    if names:
+        evidence = f"{_step(steps[0])} off the other rasters."
+        where = f"{rasters.path}, {listed(names)}"
+        findings.add("half-pixel-shift", where, evidence, "warning")
+        return
+    side_m = config.area.resolution_m
+    if not math.isclose(side_m, lattice.resolution_m, rel_tol=_SAME_SIDE):
+        return
+    step = _half_step(lattice, 0.0, 0.0)
+    if step is not None:
+        corner = f"{lattice.west_m:.10g}, {lattice.north_m:.10g}"
+        evidence = f"{_step(step)} off multiples of {side_m:g} m: their corner is {corner}."
+        findings.add("half-pixel-shift", str(rasters.path), evidence, "warning")
+
+
+def check_same_pixels(
+    path: str, transform: Sequence[float], rasters: RxLevRasters, findings: Findings
+) -> None:
+    """See whether another raster of the same resolution is half a pixel off the levels.
+
+    Parameters
+    ----------
+    path : str
+    transform : sequence of float
+        West edge, pixel width, north edge.
+    rasters : RxLevRasters
+    findings : Findings
+    """
+    lattice = rasters.lattice
+    west_m, side_m, north_m = transform
+    if not math.isclose(side_m, lattice.resolution_m, rel_tol=_SAME_SIDE):
+        return
+    step = _half_step(lattice, west_m, north_m)
+    if step is not None:
+        where = f"{rasters.path} and {path}"
+        evidence = f"The first lie {_step(step)} off the pixels of the second."
+        findings.add("half-pixel-shift", where, evidence, "warning")
+
+
+def check_ways(ways: Ways, rasters: RxLevRasters, where: str, findings: Findings) -> None:
+    """See that the rasters cover the ways."""
+    length_m = float(shapely.length(ways.geometry).sum())
+    inside = shapely.clip_by_rect(ways.geometry, *rasters.lattice.bounds_m)
+    outside_m = length_m - float(shapely.length(inside).sum())
+    if outside_m > _OUTSIDE_SHARE * length_m:
+        evidence = (
+            f"{outside_m / 1000:.1f} of {length_m / 1000:.1f} km of ways in the area lie outside "
+            f"the rasters."
+        )
+        nothing = outside_m > (1 - _OUTSIDE_SHARE) * length_m
+        findings.add("roads-outside-rasters", where, evidence, "error" if nothing else "warning")
+
+
+def _area_box(area: Area) -> BoxDeg:
+    if has_box(area):
+        lattice = area_lattice(area)
+        return box_deg(lattice.crs, lattice.bounds_m)
+    return map_bounds_deg(area.map)
+
+
+def _overlap(a: BoxDeg, b: BoxDeg) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+def _inside(east: Floats, north: Floats, lattice: Lattice) -> NDArray[np.bool_]:
+    west, south, right, top = lattice.bounds_m
+    return np.asarray((east >= west) & (east <= right) & (north >= south) & (north <= top))
+
+
+def _other_systems(box: BoxDeg) -> Iterator[str]:
+    """Yield the UTM zones of a place and about it, and Web Mercator."""
+    lon, lat = (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
+    for zones in sorted(range(-_MOST_ZONES, _MOST_ZONES + 1), key=abs):
+        yield utm_crs((lon + 6 * zones + 180) % 360 - 180, lat)
+    yield "EPSG:3857"
+
+
+def _moves(lattice: Lattice) -> Iterator[tuple[str, str, Move]]:
+    """Yield mistakes that may have moved sites: code, words, and what undoes them."""
+
+    def swapped_degrees(east: Floats, north: Floats) -> tuple[Floats, Floats]:
+        lon, lat = unproject(lattice.crs, east, north)
+        return _projected(lattice.crs, lat, lon)
+
+    def mirrored(east: Floats, north: Floats) -> tuple[Floats, Floats]:
+        lon, lat = unproject(lattice.crs, east, north)
+        return _projected(lattice.crs, -lon, lat)
+
+    yield "lon-lat-swapped", "With longitude and latitude exchanged", swapped_degrees
+    yield "east-north-swapped", "With east and north exchanged", lambda east, north: (north, east)
+    box = box_deg(lattice.crs, lattice.bounds_m)
+    for crs in _other_systems(box):
+        if same_crs(crs, lattice.crs):
+            continue
+        yield (
+            "crs-mixed",
+            f"With their numbers read as {lattice.crs}, not {crs}",
+            _into(crs, lattice),
+        )
+        yield "crs-mixed", f"With their numbers read as {crs}", _from(crs, lattice)
+    yield "lon-lat-swapped", "With the other sign of longitude", mirrored
+
+
+def _into(crs: str, lattice: Lattice) -> Move:
+    """Undo that numbers of the lattice's CRS were said to be of another."""
+
+    def move(east: Floats, north: Floats) -> tuple[Floats, Floats]:
+        return _projected(crs, *unproject(lattice.crs, east, north))
+
+    return move
+
+
+def _from(crs: str, lattice: Lattice) -> Move:
+    """Undo that numbers of another CRS were taken for those of the lattice's."""
+
+    def move(east: Floats, north: Floats) -> tuple[Floats, Floats]:
+        return _projected(lattice.crs, *unproject(crs, east, north))
+
+    return move
+
+
+def _projected(crs: str, lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
+    nowhere = np.full(np.shape(lon), np.inf)
+    with np.errstate(invalid="ignore"):
+        on_earth = (np.abs(lon) <= 180) & (np.abs(lat) <= 90)
+    if not on_earth.any():
+        return nowhere, nowhere
+    try:
+        east, north = project(crs, np.where(on_earth, lon, 0.0), np.where(on_earth, lat, 0.0))
+    except InputError:
+        return nowhere, nowhere
+    return np.where(on_earth, east, np.inf), np.where(on_earth, north, np.inf)
+
+
+def _half_step(lattice: Lattice, west_m: float, north_m: float) -> tuple[float, float] | None:
+    """Return by which parts of a pixel a lattice is off a corner, if that is half of one."""
+    right = (lattice.west_m - west_m) / lattice.resolution_m
+    up = (lattice.north_m - north_m) / lattice.resolution_m
+    off = right - math.floor(right), up - math.floor(up)
+    half = [abs(part - 0.5) <= _HALF_TOLERANCE_PX for part in off]
+    whole = [min(part, 1 - part) <= _HALF_TOLERANCE_PX for part in off]
+    return off if any(half) and all(h or w for h, w in zip(half, whole, strict=True)) else None
+
+
+def _step(off: tuple[float, float]) -> str:
+    return f"{off[0] % 1:.2f} pixels east and {off[1] % 1:.2f} north"
+
+
+def _metres(value: float) -> str:
+    return f"{value / 1000:.1f} km" if value >= 10_000 else f"{value:.0f} m"
+
+
+def _shown(box: BoxDeg) -> str:
+    return ", ".join(f"{value:.4f}" for value in box)

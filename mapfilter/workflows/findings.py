@@ -1,0 +1,195 @@
+"""Findings of a check: what is wrong, where, by which numbers, and what helps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from mapfilter.errors import Fault, MapfilterError
+
+Severity = Literal["error", "warning"]
+
+REMEDIES = {
+    "antenna-frequency": "Name the pattern measured for the cell's band.",
+    "antenna-invalid": "Correct the pattern file, or take another.",
+    "antenna-missing": "Put the pattern file into the folder cells.antennas, or correct the name.",
+    "area-invalid": "Correct the area; a box is west, south, east, north in degrees.",
+    "axes-swapped": "Export the rasters anew with rows from north to south and columns from west "
+    "to east.",
+    "azimuth-counter-clockwise": "Turn the azimuths into degrees clockwise from true north.",
+    "azimuth-off-by-90": "Count azimuths from true north (0), with east at 90.",
+    "azimuth-off-by-180": "Give the direction into which the antenna radiates, clockwise from "
+    "true north.",
+    "azimuth-off-lobe": "Correct the azimuth, or take the raster that belongs to the cell.",
+    "azimuth-radians": "Turn the azimuths into degrees.",
+    "cell-without-raster": "Add the rasters, or take the cells out of the plan.",
+    "crs-mixed": "Say the CRS that the numbers were made in (column crs of the plan, rasters.crs, "
+    "area.crs), or project the file.",
+    "degrees-for-metres": "Name columns of degrees lat and lon, or give metres in a projected CRS.",
+    "duplicate-id": "Give each cell an id of its own.",
+    "east-north-swapped": "Exchange the columns east and north.",
+    "eirp-watts": "Turn watts into dBm, 10 log10(1000 W), antenna gain included.",
+    "field-strength": "Export received levels in dBm, not field strengths (dBµV/m).",
+    "frequency-unit": "Give the frequency in MHz.",
+    "half-pixel-shift": "Find out whether the exporter wrote centres for corners of pixels; if so, "
+    "move the raster by half a pixel.",
+    "identical-rasters": "Export the raster of each cell anew; one was copied over the other.",
+    "landuse-classes": "Add the classes to the table, or export the raster without blending.",
+    "landuse-invalid": "Correct the land-use raster or its table.",
+    "landuse-outside": "Take the land-use raster of this area.",
+    "level-as-loss": 'Say rasters.quantity = "level".',
+    "levels-above-eirp": "Check the EIRP, or what the rasters hold.",
+    "lon-lat-swapped": "Exchange longitude and latitude.",
+    "loss-as-level": 'Say rasters.quantity = "loss"; levels are then taken from the EIRP.',
+    "map-invalid": "Correct area.map.",
+    "metres-for-degrees": "Name columns of metres east and north, or give degrees.",
+    "nodata-as-level": "Say rasters.nodata, or write the raster with its nodata value.",
+    "plan-invalid": "Correct the field.",
+    "quantity-unknown": "Say rasters.quantity: level (dBm) or loss (dB).",
+    "raster-constant": "Export the raster anew.",
+    "raster-empty": "Export the raster anew, or take the cell out.",
+    "raster-upside-down": "Write row 0 in the north and column 0 in the west.",
+    "raster-without-cell": "Add the cells to the plan, or take the rasters out.",
+    "rasters-invalid": "Correct or export the raster anew.",
+    "rasters-missing": "Run `mapfilter predict`, or correct rasters.path.",
+    "roads-outside-rasters": "Take rasters, map and area of the same place; build leaves out roads "
+    "without rasters.",
+    "rxlev-as-level": "Turn RXLEV into dBm (RXLEV - 110.5), or export levels.",
+    "rxlev-as-loss": "Turn RXLEV into dBm (RXLEV - 110.5) and say quantity level.",
+    "sector-labels-swapped": "Exchange the labels of the rasters, or the azimuths in the plan.",
+    "site-labels-swapped": "Exchange the labels of the rasters, or the positions in the plan.",
+    "site-off-peak": "Correct the site's position, or take the raster that belongs to the cell.",
+    "site-outside-area": "Correct the position, or take the cell out if it is not of this area.",
+    "values-implausible": "Check rasters.factor and rasters.quantity.",
+}
+"""What helps, by code."""
+
+_BY_HINT = {
+    "longitude and latitude swapped": "lon-lat-swapped",
+    "metres given for degrees": "metres-for-degrees",
+    "degrees given for metres": "degrees-for-metres",
+    "east and north swapped, or another CRS": "east-north-swapped",
+    "radians given for degrees": "azimuth-radians",
+    "watts or milliwatts given for dBm": "eirp-watts",
+    "GHz given for MHz": "frequency-unit",
+    "Hz given for MHz": "frequency-unit",
+    "a row given twice": "duplicate-id",
+    "a cell of another place, or another CRS": "crs-mixed",
+    "two systems mixed up": "crs-mixed",
+    "another zone": "crs-mixed",
+    "raster of another zone": "crs-mixed",
+    "a CRS of another region": "crs-mixed",
+    "a CRS of another region, or Web Mercator": "crs-mixed",
+    "a raster upside down or mirrored": "raster-upside-down",
+    "say quantity = level or loss": "quantity-unknown",
+    "misspelt, or no folder of antennas": "antenna-missing",
+    "a class left out, or colours blended by compression or resampling": "landuse-classes",
+    "wrong table": "landuse-classes",
+    "raster of another area": "landuse-outside",
+    "the area lies outside the map": "roads-outside-rasters",
+    "no folder of antennas there": "antenna-missing",
+    "half a pixel: a corner where the header has to hold the pixel's centre": "half-pixel-shift",
+}
+_BY_EXPECTED = {
+    "each cell once": "duplicate-id",
+    "a pattern file": "antenna-missing",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that is wrong with the inputs of a configuration, or looks so.
+
+    Parameters
+    ----------
+    code : str
+        A short name that programs can rely on.
+    severity : {"error", "warning"}
+        Errors stop a command or spoil its result.
+    where : str
+        File, cells or fields.
+    evidence : str
+        What was found, in numbers.
+    remedy : str
+    """
+
+    code: str
+    severity: Severity
+    where: str
+    evidence: str
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"{self.severity} {self.code}: {self.where}: {self.evidence} {self.remedy}"
+
+
+@dataclass(frozen=True, slots=True)
+class CheckResult:
+    """What a check found.
+
+    Parameters
+    ----------
+    ok : bool
+        Whether no finding is an error.
+    findings : tuple of Finding
+        Errors first.
+    """
+
+    ok: bool
+    findings: tuple[Finding, ...]
+
+
+@dataclass(slots=True)
+class Findings:
+    """Collects findings."""
+
+    found: list[Finding] = field(default_factory=list)
+
+    def add(self, code: str, where: str, evidence: str, severity: Severity = "error") -> None:
+        """Note one finding; its remedy is the one of its code."""
+        finding = Finding(code, severity, where, evidence, REMEDIES[code])
+        if finding not in self.found:
+            self.found.append(finding)
+
+    def add_faults(
+        self, error: MapfilterError, otherwise: str, severity: Severity = "error"
+    ) -> None:
+        """Note the faults that reading an input told.
+
+        Parameters
+        ----------
+        error : MapfilterError
+        otherwise : str
+            Code of faults that have none of their own.
+        severity : {"error", "warning"}
+        """
+        for fault in error.faults:
+            hint = f" ({fault.hint})" if fault.hint else ""
+            evidence = f"Expected {fault.expected}, found {fault.got}{hint}."
+            self.add(_code(fault, otherwise), fault.where, evidence, severity)
+
+    def result(self) -> CheckResult:
+        """Return everything found, errors first."""
+        ordered = sorted(self.found, key=lambda finding: finding.severity)
+        return CheckResult(all(f.severity != "error" for f in ordered), tuple(ordered))
+
+
+def paragraphs(result: CheckResult) -> Iterable[str]:
+    """Yield one paragraph for each finding, or one that says that there is none."""
+    if not result.findings:
+        yield "Nothing found that looks wrong."
+    for finding in result.findings:
+        yield str(finding)
+
+
+def listed(ids: Sequence[str], most: int = 8) -> str:
+    """Return ids in one line, the first of many only."""
+    return ", ".join(ids[:most]) + (f" and {len(ids) - most} more" if len(ids) > most else "")
+
+
+def _code(fault: Fault, otherwise: str) -> str:
+    if fault.hint in _BY_HINT:
+        return _BY_HINT[fault.hint]
+    known = (code for start, code in _BY_EXPECTED.items() if fault.expected.startswith(start))
+    return next(known, otherwise)
