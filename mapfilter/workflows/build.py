@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mapfilter._io import ensure_writable_folder
-from mapfilter._parallel import Progress, local_executor
+from mapfilter._parallel import Progress, cluster_executor, local_executor
 from mapfilter.database.build import build
 from mapfilter.database.estimate import BuildEstimate, dry_run
 from mapfilter.database.manifest import InputFile
@@ -16,9 +17,12 @@ from mapfilter.geodesy import Lattice, projected_crs, same_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rasters import RxLevRasters
 from mapfilter.roads.maps import resolve_map
+from mapfilter.workflows.cover import check_cells_near, map_cover, raster_cover
 from mapfilter.workflows.sections import Area, Config
 from mapfilter.workflows.world import World, area_lattice, check_scale, planned_rasters
 
+PIXELS_A_TASK = 10_000_000
+MOST_TILES_A_TASK = 64
 ATTRIBUTION = "© OpenStreetMap contributors (ODbL)"
 
 
@@ -37,7 +41,7 @@ class BuildResult:
     seconds : float
         Wall time.
     notes : tuple of str
-        What was done to the inputs, such as rasters resampled.
+        What was done to the inputs, such as rasters resampled, and what covers the area in part.
     """
 
     points: int
@@ -48,8 +52,27 @@ class BuildResult:
     notes: tuple[str, ...] = ()
 
 
-def run_build(config: Config, *, workers: int = 1, progress: Progress | None = None) -> BuildResult:
+def run_build(
+    config: Config,
+    *,
+    workers: int = 1,
+    cluster: str | None = None,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> BuildResult:
     """Build the database of a configuration; an older one is replaced when the new one is whole.
+
+    Parameters
+    ----------
+    config : Config
+    workers : int
+        Local processes.
+    cluster : str, optional
+        Address of a Dask scheduler whose workers do it instead, or "local:N"; they must reach the
+        rasters by the same paths.
+    resume : bool
+        Go on where a build of the same inputs was cut short.
+    progress : callable, optional
 
     Raises
     ------
@@ -61,12 +84,18 @@ def run_build(config: Config, *, workers: int = 1, progress: Progress | None = N
     target = config.database_path
     rasters, plan, world = _raster_world(config)
     ensure_writable_folder(target.parent)
-    routes = world.routes
-    with local_executor(workers) as executor:
+    with contextlib.ExitStack() as stack:
+        tiles_a_task = 1
+        if cluster is None:
+            executor = stack.enter_context(local_executor(workers))
+        else:
+            executor, workers = stack.enter_context(cluster_executor(cluster))
+            pixels = config.database.tile_px**2 * len(plan.ids)
+            tiles_a_task = min(max(PIXELS_A_TASK // pixels, 1), MOST_TILES_A_TASK)
         database = build(
             rasters,
             plan,
-            routes,
+            world.route_tiles,
             target,
             margin_db=config.database.margin_db,
             floor_dbm=config.database.floor_dbm,
@@ -75,15 +104,23 @@ def run_build(config: Config, *, workers: int = 1, progress: Progress | None = N
             attribution=ATTRIBUTION,
             executor=executor,
             in_flight=2 * workers,
+            tiles_a_task=tiles_a_task,
+            writers=workers,
+            resume=resume,
             progress=progress,
         )
     return BuildResult(
         int(database.manifest["counts"]["points"]),
         len(database.cell_ids),
-        len(routes),
+        sum(int(database.manifest["counts"][name]) for name in database.manifest["counts"]),
         target,
         time.perf_counter() - began_s,
-        (*rasters.notes, *(world.landuse.notes if world.landuse is not None else ())),
+        (
+            *rasters.notes,
+            *raster_cover(config.area, world.lattice),
+            *map_cover(config.area, world.lattice),
+            *(world.landuse.notes if world.landuse is not None else ()),
+        ),
     )
 
 
@@ -95,16 +132,21 @@ def run_dry_build(config: Config) -> BuildEstimate:
     MapfilterError
         As for :func:`run_build`.
     """
+    began_s = time.perf_counter()
     rasters, plan, world = _raster_world(config)
-    section = config.database
-    return dry_run(
+    section, routes = config.database, world.route_tiles
+    _inputs(config)
+    reading_s = time.perf_counter() - began_s
+    estimate = dry_run(
         rasters,
         plan,
-        world.routes,
+        routes,
         margin_db=section.margin_db,
         floor_dbm=section.floor_dbm,
         tile_px=section.tile_px,
     )
+    # A build reads the same map, plan and headers first.
+    return replace(estimate, seconds=estimate.seconds + reading_s)
 
 
 def _raster_world(config: Config) -> tuple[RxLevRasters, CellPlan, World]:
@@ -121,6 +163,7 @@ def _raster_world(config: Config) -> tuple[RxLevRasters, CellPlan, World]:
             raise fail(InputError, f"{rasters.path}, CRS", expected, lattice.crs, "another zone")
     check_scale(lattice.crs, lattice.bounds_m, f"{rasters.path}, CRS")
     whole = World(config, lattice)
+    check_cells_near(whole.plan, lattice, str(config.cells.plan or "cells"))
     if area.bbox is None and area.southwest is None:
         return rasters, whole.plan, whole
     cut = _cut(lattice, area, str(rasters.path))

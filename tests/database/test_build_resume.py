@@ -1,0 +1,208 @@
+"""Builds that are cut short, go on, run on a cluster, and lay their points in the workers."""
+
+import multiprocessing
+import os
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from small_world import CRS, FLOOR_DBM, LATTICE, make_plan, make_routes, make_world
+
+from mapfilter._parallel import SerialExecutor, cluster_executor, local_executor
+from mapfilter.database.build import build
+from mapfilter.database.estimate import dry_run
+from mapfilter.database.sources import LayerRoutes
+from mapfilter.database.store import info, open_database
+from mapfilter.errors import InputError, MapfilterError
+from mapfilter.radio.rasters import open_rasters
+from mapfilter.roads.routable import RouteSource, route_lattice
+from mapfilter.roads.ways import Buildings, Squares, Ways
+
+OPTIONS = {"floor_dbm": FLOOR_DBM, "tile_px": 8}
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory):
+    return make_world(tmp_path_factory.mktemp("rasters"))
+
+
+@pytest.fixture(scope="module")
+def whole(world, tmp_path_factory):
+    out = tmp_path_factory.mktemp("whole") / "db"
+    return contents(build(world.rasters, world.plan, world.routes, out, **OPTIONS).path)
+
+
+def contents(folder: Path):
+    return {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def again(world, out, **more):
+    return build(world.rasters, world.plan, world.routes, out, **OPTIONS, **more)
+
+
+class Counting(SerialExecutor):
+    """Counts tasks, and is interrupted at one of them."""
+
+    def __init__(self, last=10**9):
+        self.tasks, self.last = 0, last
+
+    def submit(self, fn, /, *args, **kwargs):
+        self.tasks += 1
+        if self.tasks > self.last:
+            raise KeyboardInterrupt
+        return super().submit(fn, *args, **kwargs)
+
+
+def interrupted(world, out, after):
+    with pytest.raises(KeyboardInterrupt):
+        again(world, out, executor=Counting(after), in_flight=1)
+
+
+def test_a_build_goes_on_where_it_stopped_and_gives_the_same_bytes(world, whole, tmp_path):
+    out = tmp_path / "db"
+    everything = Counting()
+    again(world, tmp_path / "other", executor=everything)
+    assert everything.tasks > 6
+    interrupted(world, out, 4)
+    assert not out.exists()
+    rest = Counting()
+    assert contents(again(world, out, executor=rest, resume=True).path) == whole
+    assert rest.tasks == everything.tasks - 4
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["db", "other"]
+
+
+def test_without_resume_a_build_starts_anew(world, whole, tmp_path):
+    interrupted(world, tmp_path / "db", 4)
+    everything, anew = Counting(), Counting()
+    again(world, tmp_path / "other", executor=everything)
+    assert contents(again(world, tmp_path / "db", executor=anew).path) == whole
+    assert anew.tasks == everything.tasks
+
+
+def test_tiles_of_other_inputs_or_damaged_ones_are_made_again(world, whole, tmp_path):
+    out = tmp_path / "db"
+    interrupted(world, out, 4)
+    (tiles,) = tmp_path.glob(".db.tiles-*")
+    cut, changed, *_ = sorted(tiles.iterdir())
+    cut.write_bytes(cut.read_bytes()[:50])
+    changed.write_bytes(changed.read_bytes()[:-1] + b"x")
+    other = build(
+        world.rasters, world.plan, world.routes, out, tile_px=8, floor_dbm=-95, resume=True
+    )
+    assert other.floor_dbm == -95
+    assert tiles.is_dir()
+    assert contents(again(world, out, resume=True).path) == whole
+    assert not tiles.exists()
+
+
+def test_wrong_inputs_leave_no_tiles(world, tmp_path):
+    with pytest.raises(InputError, match="floor too high"):
+        build(world.rasters, world.plan, world.routes, tmp_path / "db", floor_dbm=0)
+    assert list(tmp_path.iterdir()) == []
+
+
+def dies_once(path):
+    """Kill the worker that runs this, the first time."""
+    if not path.exists():
+        path.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+class KillsOneWorker:
+    """Passes tasks on, and a deadly one among them."""
+
+    def __init__(self, executor, mark):
+        self.executor, self.mark, self.tasks, self.deaths = executor, mark, 0, []
+
+    def submit(self, fn, /, *args, **kwargs):
+        self.tasks += 1
+        if self.tasks == 3:
+            self.deaths.append(self.executor.submit(dies_once, self.mark))
+        return self.executor.submit(fn, *args, **kwargs)
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_dask_worker_killed_in_mid_build_loses_nothing(world, whole, tmp_path):
+    with cluster_executor("local:2") as (executor, workers):
+        assert workers == 2
+        deadly = KillsOneWorker(executor, tmp_path / "died")
+        out = tmp_path / "db"
+        database = again(world, out, executor=deadly, tiles_a_task=2, in_flight=4)
+        deadly.deaths[0].result()
+    assert (tmp_path / "died").exists()
+    assert contents(database.path) == whole
+
+
+@pytest.mark.parametrize("address", ["local:0", "local:many", "tcp://127.0.0.1:9", "nonsense://"])
+@pytest.mark.filterwarnings("default")
+def test_a_cluster_that_is_not_there(address, monkeypatch):
+    monkeypatch.setattr("mapfilter._parallel._CONNECT_S", 0.5)
+    with pytest.raises(MapfilterError, match="cluster"), cluster_executor(address):
+        pass
+
+
+def test_many_tiles_a_task_give_the_same_bytes(world, whole, tmp_path):
+    with local_executor(2) as executor:
+        built = again(world, tmp_path / "db", executor=executor, tiles_a_task=3, writers=2)
+    assert contents(built.path) == whole
+
+
+def keep_building(rasters, out, ready):
+    """Build one database after another, each with another margin."""
+    plan, routes, opened = make_plan(), make_routes(), open_rasters(rasters)
+    ready.set()
+    for margin_db in range(1, 1000):
+        build(opened, plan, routes, out, margin_db=margin_db, **OPTIONS)
+
+
+def test_a_build_killed_at_any_moment_leaves_the_old_or_the_new_database(
+    world, whole, tmp_path, kill_count
+):
+    out, rng = tmp_path / "db", np.random.default_rng(5)
+    again(world, out)
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["mapfilter.database.build", "small_world"])
+    for _ in range(kill_count):
+        ready = context.Event()
+        process = context.Process(target=keep_building, args=(world.rasters.path, out, ready))
+        process.start()
+        assert ready.wait(60)
+        time.sleep(rng.uniform(0, 0.5))
+        process.kill()
+        process.join()
+        found = open_database(out, verify="full")
+        assert len(found.points()) == info(found)["points"] > 0
+    assert contents(again(world, out, resume=True).path) == whole
+
+
+def layers():
+    west, _, _, north = LATTICE.bounds_m
+    lines = [
+        shapely.LineString(np.add([(5, -20), (200, -20), (200, -180)], (west, north))),
+        shapely.LineString(np.add([(-30, -150), (90, -150), (90, -40)], (west, north))),
+        shapely.LineString(np.add([(258, 0), (258, -200)], (west, north))),
+    ]
+    ways = Ways(
+        CRS, np.array([77, 12, 99]), np.array([0, 1, 0], np.int16), ("residential", "footway"),
+        np.array(lines), np.zeros(3, bool), np.zeros(3, np.int8),
+    )  # fmt: skip
+    place = shapely.box(west + 20, north - 190, west + 40, north - 170)
+    house = shapely.box(west + 80, north - 30, west + 100, north - 10)
+    buildings = Buildings(CRS, np.array([house]), np.array([9.0]), 1, 0, 0)
+    return ways, Squares(CRS, np.array([5]), np.array([place])), buildings
+
+
+@pytest.mark.parametrize("tile_px", [7, 16])
+def test_points_laid_by_the_workers_are_those_of_the_whole_lattice(world, tmp_path, tile_px):
+    ways, squares, buildings = layers()
+    options = {"floor_dbm": FLOOR_DBM, "tile_px": tile_px}
+    laid = route_lattice(ways, squares, buildings, LATTICE)
+    tiled = LayerRoutes(RouteSource.of(ways, squares, buildings), LATTICE)
+    for name, routes in (("laid", laid), ("tiled", tiled)):
+        build(world.rasters, world.plan, routes, tmp_path / name, **options)
+    assert contents(tmp_path / "laid") == contents(tmp_path / "tiled")
+    estimate = dry_run(world.rasters, world.plan, tiled, **options)
+    assert estimate.points == pytest.approx(len(laid), rel=0.3)
