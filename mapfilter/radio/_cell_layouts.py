@@ -16,6 +16,13 @@ Layout = Literal["plan", "atoll", "opencellid"]
 Columns = Mapping[str, tuple[str, ...]]
 """By field, the names that its column may have; the first that is there counts."""
 
+COLUMNS = (
+    "cell", "site", "lat", "lon", "height_m", "azimuth_deg", "downtilt_deg",
+    "mechanical_downtilt_deg", "antenna", "beamwidth_deg", "max_attenuation_db",
+    "vertical_beamwidth_deg", "side_lobe_db", "eirp_dbm", "frequency_mhz", "indoor",
+    "penetration_loss_db", "mcc", "mnc", "lac", "ci", "arfcn", "bsic",
+)  # fmt: skip
+"""Columns of a file that mapfilter writes, in order."""
 ATOLL: Columns = {
     "cell": ("TX_ID", "TX_NAME"),
     "site": ("SITE_NAME", "SITE"),
@@ -50,7 +57,12 @@ OPENCELLID_HEADER = (
     "created", "updated", "averageSignal",
 )  # fmt: skip
 """Of the downloads of OpenCellID and of the Mozilla Location Service; the former leave it out."""
-LAYOUTS: Mapping[Layout, Columns] = {"plan": {}, "atoll": ATOLL, "opencellid": OPENCELLID}
+_OWN: Columns = {name: (name,) for name in (*COLUMNS, "east", "north", "crs")}
+LAYOUTS: Mapping[Layout, Columns] = {
+    "plan": _OWN,
+    "atoll": {name: (*ATOLL.get(name, ()), name) for name in _OWN},
+    "opencellid": OPENCELLID,
+}
 
 _RADIOS = {"GSM", "UMTS", "LTE", "CDMA", "NR"}
 _IDENTITY = ("mcc", "mnc", "lac", "ci")

@@ -14,17 +14,10 @@ from pyproj import CRS
 
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import project, projected_crs, unproject
-from mapfilter.radio._cell_layouts import Arranged, Layout, arrange
+from mapfilter.radio._cell_layouts import COLUMNS, Arranged, Layout, arrange
 from mapfilter.radio._cell_rules import ANTENNAS, OPTIONAL, RANGES, antenna_fault, id_fault
 from mapfilter.radio._csv_table import number, read_table
 
-COLUMNS = (
-    "cell", "site", "lat", "lon", "height_m", "azimuth_deg", "downtilt_deg",
-    "mechanical_downtilt_deg", "antenna", "beamwidth_deg", "max_attenuation_db",
-    "vertical_beamwidth_deg", "side_lobe_db", "eirp_dbm", "frequency_mhz", "indoor",
-    "penetration_loss_db", "mcc", "mnc", "lac", "ci", "arfcn", "bsic",
-)  # fmt: skip
-"""Columns of a file that mapfilter writes, in order."""
 _ALLOWED = {*COLUMNS, "east", "north", "crs"}
 _REQUIRED = ("cell", "height_m", "eirp_dbm", "frequency_mhz")
 _TRUE, _FALSE = {"1", "true", "yes", "y"}, {"0", "false", "no", "n"}

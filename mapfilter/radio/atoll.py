@@ -92,8 +92,10 @@ class IndexRow:
         if _near(west, _HALF_PX, south, _HALF_PX, east, -_HALF_PX, north, -_HALF_PX):
             return "area limits are centres of pixels in the index"
         if _near(west, east, south, north):
-            got = f"{self.path.name} shifted by {-west:+.2f} pixels east, {-south:+.2f} north"
-            half = _near(abs(west), _HALF_PX, abs(south), _HALF_PX)
+            got = f"{self.path.name} shifted by {_told(-west)} pixels east, {_told(-south)} north"
+            half = all(
+                min(abs(shift), abs(abs(shift) - _HALF_PX)) <= _SAME_PX for shift in (west, south)
+            )
             hint = (
                 "half a pixel: a corner where the header has to hold the pixel's centre"
                 if half
@@ -220,6 +222,10 @@ def _within(folder: Path, name: str, names: dict[str, str]) -> Path | None:
     except (OSError, ValueError):
         return None
     return path if inside and len(str(path)) < 4096 else None
+
+
+def _told(shift_px: float) -> str:
+    return f"{round(shift_px, 2) + 0.0:+.2f}"
 
 
 def _near(*pairs: float) -> bool:

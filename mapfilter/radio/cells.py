@@ -17,9 +17,9 @@ from mapfilter._io import atomic_file
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import project, projected_crs, same_crs, unproject
 from mapfilter.radio._cell_checks import check_cells
-from mapfilter.radio._cell_layouts import Layout
+from mapfilter.radio._cell_layouts import COLUMNS, Layout
 from mapfilter.radio._cell_selection import once, within
-from mapfilter.radio._cell_table import COLUMNS, read_plan
+from mapfilter.radio._cell_table import read_plan
 
 Antenna = str
 

@@ -18,7 +18,7 @@ from mapfilter.cli import app
 from mapfilter.filters.candidate_options import CandidateOptions
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate_store import _COLUMNS as ESTIMATE_COLUMNS
-from mapfilter.radio._cell_table import COLUMNS as PLAN_COLUMNS
+from mapfilter.radio._cell_layouts import COLUMNS as PLAN_COLUMNS
 from mapfilter.tracks.schema import SCHEMA
 from mapfilter.workflows.config import load_config
 from mapfilter.workflows.findings import REMEDIES

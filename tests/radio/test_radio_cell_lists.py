@@ -23,6 +23,10 @@ LTE,244,5,33,70657,,24.9501,60.1702,700,9,1,1200000000,1300000000,-97
 OLDER = """lat,lon,mcc,mnc,lac,cellid,averageSignalStrength,range,samples,changeable,radio
 60.1669,24.943,244,91,801,1001,-80,1200,4,1,GSM
 """
+PLAN = """cell,site,lat,lon,height_m,azimuth_deg,eirp_dbm,frequency_mhz,antenna,mcc,arfcn,bsic
+A,S,60.1669,24.943,30,60,50,1825.2,sector,244,612,17
+B,S,60.1669,24.943,30,,50,1825.2,omni,244,613,17
+"""
 
 
 def _read(folder: Path, text: str, **options: object) -> CellPlan:
@@ -83,6 +87,12 @@ def test_a_map_of_columns(tmp_path: Path) -> None:
     assert "row 2, Name (east): expected a number, found 'A'" in said
 
 
+def test_columns_with_the_plans_own_names_need_no_map(tmp_path: Path) -> None:
+    text = PLAN.replace("height_m", "AGL").replace("cell,", "Cell ID,")
+    plan = _read(tmp_path, text, columns={"height_m": "AGL", "cell": "Cell ID"})
+    assert (plan["A"].azimuth_deg, plan["B"].arfcn, plan.notes) == (60.0, 613, ())
+
+
 def test_a_map_goes_before_the_layout(tmp_path: Path) -> None:
     plan = _read(tmp_path, ATOLL, layout="atoll", columns={"cell": "BCCH", "antenna": "TX_ID"})
     assert plan.ids == ("612", "618")
@@ -123,7 +133,7 @@ def test_cells_far_from_the_area_are_left_out_and_told(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "layout"),
-    [(ATOLL, "atoll"), (MLS, "opencellid"), ("cell,lat,lon\nA,60.1,24.9\n", "plan")],
+    [(ATOLL, "atoll"), (MLS, "opencellid"), (PLAN, "plan")],
 )
 def test_damaged_lists(tmp_path: Path, text: str, layout: str, mutation_count: int) -> None:
     path = tmp_path / "list.csv"
