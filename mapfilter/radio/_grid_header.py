@@ -159,6 +159,11 @@ def _side_m(header: GridHeader, faults: Faults) -> float | None:
     return known[0]
 
 
+def crs_file(path: Path) -> Path | None:
+    """Return the file beside a plain grid that tells its CRS, if there is one."""
+    return next((p for s in (".prj", ".PRJ") if (p := path.with_suffix(s)).is_file()), None)
+
+
 def crs_beside(path: Path, declared: str | None) -> str:
     """Return the CRS of a plain grid: that of the ``.prj`` file beside it, else the declared one.
 
@@ -167,7 +172,7 @@ def crs_beside(path: Path, declared: str | None) -> str:
     InputError
         There is neither, or both and they differ, or the file is wrong and nothing is declared.
     """
-    found = next((p for s in (".prj", ".PRJ") if (p := path.with_suffix(s)).is_file()), None)
+    found = crs_file(path)
     if found is None:
         if declared is None:
             hint = "plain grids do not tell it; say crs in [rasters]"

@@ -58,6 +58,6 @@ def without_nodata(values: Floats32, nodata: Sequence[float]) -> Floats32:
     return values
 
 
-def existing(paths: Sequence[Path]) -> tuple[Path, ...]:
+def existing(*paths: Path | None) -> tuple[Path, ...]:
     """Return the paths at which there is a file."""
-    return tuple(path for path in paths if path.is_file())
+    return tuple(path for path in paths if path is not None and path.is_file())

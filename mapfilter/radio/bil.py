@@ -19,7 +19,7 @@ import numpy as np
 
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
-from mapfilter.radio._grid_header import GridHeader, crs_beside, grid_lattice, is_placed
+from mapfilter.radio._grid_header import GridHeader, crs_beside, crs_file, grid_lattice, is_placed
 from mapfilter.radio._raster_files import Floats32, Window, existing, without_nodata
 
 _ORDERS = {"I": "<", "LSBFIRST": "<", "M": ">", "MSBFIRST": ">"}
@@ -64,7 +64,7 @@ class Bil:
     @property
     def parts(self) -> tuple[Path, ...]:
         """The file, its header and its CRS."""
-        return existing([self.path, header_of(self.path), self.path.with_suffix(".prj")])
+        return existing(self.path, header_of(self.path), crs_file(self.path))
 
     def read(self, bands: Sequence[int], window: Window) -> Floats32:
         """Read a window row by row; see :class:`~mapfilter.radio._raster_files.RasterFile`."""

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
-from mapfilter.radio._grid_header import GridHeader, crs_beside, grid_lattice
+from mapfilter.radio._grid_header import GridHeader, crs_beside, crs_file, grid_lattice
 from mapfilter.radio._raster_files import Floats32, Window, existing, without_nodata
 
 _NODATA = -9999.0
@@ -57,7 +57,7 @@ class AsciiGrid:
     @property
     def parts(self) -> tuple[Path, ...]:
         """The file and its CRS."""
-        return existing([self.path, self.path.with_suffix(".prj")])
+        return existing(self.path, crs_file(self.path))
 
     def read(self, bands: Sequence[int], window: Window) -> Floats32:
         """Read a window line by line; see :class:`~mapfilter.radio._raster_files.RasterFile`."""

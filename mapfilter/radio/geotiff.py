@@ -55,7 +55,7 @@ class GeoTiff:
     @property
     def parts(self) -> tuple[Path, ...]:
         """The file alone."""
-        return existing([self.path])
+        return existing(self.path)
 
     def read(self, bands: Sequence[int], window: Window) -> Floats32:
         """Read bands in a window; see :class:`~mapfilter.radio._raster_files.RasterFile`."""

@@ -21,9 +21,9 @@ from mapfilter.radio._raster_checks import Quantity, check_plausible
 from mapfilter.radio._raster_files import Floats32, RasterFile, Window
 from mapfilter.radio._raster_sets import Declared, open_files
 from mapfilter.radio._raster_sets import is_raster_folder as is_raster_folder
-from mapfilter.radio._raster_write import write_rasters as write_rasters
 from mapfilter.radio._resampling import Resampling, common_lattice, read_on
 from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.raster_writer import write_rasters as write_rasters
 
 _LARGEST_READ_BYTES = 4 << 30
 

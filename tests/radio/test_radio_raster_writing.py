@@ -7,8 +7,8 @@ import pytest
 
 from mapfilter.errors import OutputError
 from mapfilter.geodesy import Lattice
-from mapfilter.radio import rasters
-from mapfilter.radio.rasters import write_rasters
+from mapfilter.radio import raster_writer
+from mapfilter.radio.raster_writer import write_rasters
 
 LATTICE = Lattice("EPSG:32629", 531_000.0, 4_556_000.0, 5.0, 512, 512)
 
@@ -36,11 +36,11 @@ def test_the_bands_do_not_fit(tmp_path, limit_files, size):
 
 @pytest.mark.parametrize("size", [0, 100_000, 500_000])
 def test_the_final_file_does_not_fit(tmp_path, limit_files, monkeypatch, size):
-    copy = rasters.copy_raster
+    copy = raster_writer.copy_raster
 
     def copy_to_a_full_disk(*args, **options):
         limit_files(size)
         return copy(*args, **options)
 
-    monkeypatch.setattr(rasters, "copy_raster", copy_to_a_full_disk)
+    monkeypatch.setattr(raster_writer, "copy_raster", copy_to_a_full_disk)
     assert_told(tmp_path / "x.tif")
