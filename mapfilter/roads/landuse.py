@@ -25,6 +25,7 @@ _COLOUR = ("r", "g", "b")
 _LARGEST_WINDOW_PX = 1 << 24
 _MOST_DIGITS = 10
 _ALIGNED_PX = 1e-3
+_NEARLY_ALL = 0.95
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,7 +36,8 @@ class LandUse:
     ----------
     walkable : numpy.ndarray of bool, shape (rows, cols) of the lattice
     notes : tuple of str
-        What was done to the raster; empty when it lay on the lattice already.
+        What was done to the raster, and how much of the lattice it covers if not nearly all; empty
+        when it lay there already.
     """
 
     walkable: NDArray[np.bool_]
@@ -87,6 +89,8 @@ def read_landuse(path: Path | str, table_path: Path | str, lattice: Lattice) -> 
         got = "none" if known.any() else "no point of the raster"
         hint = "wrong table" if known.any() else "raster of another area"
         raise fail(InputError, str(path), "walkable points in the area", got, hint)
+    if known.mean() < _NEARLY_ALL:
+        notes = (*notes, f"{path}: covers {known.mean():.0%} of the area")
     return LandUse(mask, notes)
 
 

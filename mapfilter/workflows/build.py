@@ -83,6 +83,7 @@ def run_build(
     began_s = time.perf_counter()
     target = config.database_path
     rasters, plan, world = _raster_world(config)
+    check_cells_near(plan, world.lattice, str(config.cells.plan or "cells"))
     ensure_writable_folder(target.parent)
     with contextlib.ExitStack() as stack:
         tiles_a_task = 1
@@ -134,6 +135,7 @@ def run_dry_build(config: Config) -> BuildEstimate:
     """
     began_s = time.perf_counter()
     rasters, plan, world = _raster_world(config)
+    check_cells_near(plan, world.lattice, str(config.cells.plan or "cells"))
     section, routes = config.database, world.route_tiles
     _inputs(config)
     reading_s = time.perf_counter() - began_s
@@ -163,7 +165,6 @@ def _raster_world(config: Config) -> tuple[RxLevRasters, CellPlan, World]:
             raise fail(InputError, f"{rasters.path}, CRS", expected, lattice.crs, "another zone")
     check_scale(lattice.crs, lattice.bounds_m, f"{rasters.path}, CRS")
     whole = World(config, lattice)
-    check_cells_near(whole.plan, lattice, str(config.cells.plan or "cells"))
     if area.bbox is None and area.southwest is None:
         return rasters, whole.plan, whole
     cut = _cut(lattice, area, str(rasters.path))

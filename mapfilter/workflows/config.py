@@ -28,6 +28,11 @@ _EXPECTED = {
     "tuple_type": "a list",
     "bool_type": "true or false",
 }
+_LISTS = {
+    "bbox": "four numbers: west, south, east, north",
+    "southwest": "two numbers: longitude, latitude",
+    "size_m": "two numbers: metres east, metres north",
+}
 
 
 def load_config(
@@ -164,6 +169,10 @@ def _fault(file: Path | None, changed: Sequence[list[str]], detail: Mapping[str,
         given = detail["input"]
         got = ", ".join(given) if isinstance(given, Mapping) else shown(given)
         return Fault(where, str(detail["ctx"]["error"]), got)
+    whole = keys[-2:-1] if detail["type"] == "missing" else keys[-1:]
+    if detail["type"] in ("missing", "too_short", "too_long") and whole and whole[0] in _LISTS:
+        place = where.removesuffix(f".{keys[-1]}") if detail["type"] == "missing" else where
+        return Fault(place, _LISTS[whole[0]], shown(detail["input"]))
     if detail["type"] in ("too_short", "too_long"):
         wanted = detail["ctx"].get("max_length", detail["ctx"].get("min_length"))
         return Fault(where, f"{wanted} values", f"{len(detail['input'])}")

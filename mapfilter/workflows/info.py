@@ -12,6 +12,10 @@ from mapfilter.radio.rasters import is_raster_folder, open_rasters
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import is_log, read_log
 
+_MAPS = (".pbf", ".osm", ".osm.gz", ".osm.bz2")
+_INDEX_COLUMN = b"TX_NAME"
+_LONGEST_LINE_BYTES = 1 << 16
+
 
 def run_info(path: Path) -> dict[str, Any]:
     """Return what is at a path, ready for JSON; a database's checksums are compared.
@@ -24,6 +28,8 @@ def run_info(path: Path) -> dict[str, Any]:
     if not path.exists():
         raise fail(InputError, str(path), "a database, raster file or log", "nothing there")
     if path.is_file():
+        if hint := _no_raster(path):
+            raise fail(InputError, str(path), "a database, raster or log folder", "a file", hint)
         return _raster_info(path)
     if (path / MANIFEST).exists():
         return {"kind": "database", **info(open_database(path, verify="full"))}
@@ -36,6 +42,28 @@ def run_info(path: Path) -> dict[str, Any]:
         return {"kind": "logs", "logs": len(logs), "first": logs[0].name, "last": logs[-1].name}
     hint = "a folder that was not written whole" if any(path.iterdir()) else "an empty folder"
     raise fail(InputError, str(path), f"{MANIFEST}, a log, or logs", "none", hint)
+
+
+def _no_raster(path: Path) -> str:
+    """Return what a file is for that is no raster, or an empty text."""
+    name = path.name.lower()
+    if name.endswith(_MAPS):
+        return "a map; use it as area.map"
+    if path.stem in TABLES or is_log(path.parent):
+        return "a part of a log; name the folder that it lies in"
+    if path.suffix == ".toml":
+        return "a configuration; give it to a command with -c"
+    if path.suffix == ".csv" and _INDEX_COLUMN not in _first_line(path):
+        return "a cell plan; use it as cells.plan"
+    return ""
+
+
+def _first_line(path: Path) -> bytes:
+    try:
+        with path.open("rb") as stream:
+            return stream.readline(_LONGEST_LINE_BYTES)
+    except OSError as error:
+        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
 
 
 def _raster_info(path: Path) -> dict[str, Any]:

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
 from mapfilter.errors import Faults, InputError, MapfilterError
 from mapfilter.geodesy import Floats, Lattice, same_crs
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.schema import SERVING
 from mapfilter.tracks.store import read_log
+from mapfilter.workflows.cover import outside_m
 from mapfilter.workflows.paths import path_fault, shown
 
 _AWAY_M = 5000.0
@@ -68,11 +67,11 @@ def lacking(log: TrackLog, estimate: TrackEstimate) -> str:
 def _check_near(
     where: str, east_m: Floats, north_m: Floats, lattice: Lattice, faults: Faults
 ) -> None:
-    if not east_m.size or _away_m(east_m, north_m, lattice) <= _AWAY_M:
+    if not east_m.size or outside_m(east_m, north_m, lattice).min() <= _AWAY_M:
         return
     box = lattice.bounds_m
     found = east_m.min(), north_m.min(), east_m.max(), north_m.max()
-    swapped = _away_m(north_m, east_m, lattice) <= _AWAY_M
+    swapped = outside_m(north_m, east_m, lattice).min() <= _AWAY_M
     faults.add(
         where,
         f"positions near the database's {_box(*box)}",
@@ -83,11 +82,3 @@ def _check_near(
 
 def _box(west_m: float, south_m: float, east_m: float, north_m: float) -> str:
     return f"{west_m:.0f}..{east_m:.0f} m east, {south_m:.0f}..{north_m:.0f} m north"
-
-
-def _away_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> float:
-    """Return how far outside a lattice the nearest of some positions lies."""
-    west, south, east, north = lattice.bounds_m
-    off_east = np.maximum(np.maximum(west - east_m, east_m - east), 0.0)
-    off_north = np.maximum(np.maximum(south - north_m, north_m - north), 0.0)
-    return float(np.hypot(off_east, off_north).min())

@@ -20,6 +20,7 @@ from mapfilter.radio.predict import (
     realise,
 )
 from mapfilter.radio.rasters import write_rasters
+from mapfilter.workflows.cover import check_cells_near, map_cover
 from mapfilter.workflows.reality import reality_tags
 from mapfilter.workflows.sections import Config, Prediction
 from mapfilter.workflows.world import World
@@ -43,8 +44,9 @@ class PredictResult:
     plan : Path
         The cell plan used, as CSV.
     notes : tuple of str
-        Where building heights come from, what lies outside the model's published range, and which
-        antennas were measured at another frequency.
+        How much of the area the map covers if not nearly all, where building heights come from,
+        what lies outside the model's published range, and which antennas were measured at another
+        frequency.
     """
 
     cells: int
@@ -74,8 +76,10 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     for folder in (target.parent, reality.parent, config.output.dir):
         ensure_writable_folder(folder)
     plan, lattice, model = world.plan, world.lattice, _model(name, config.prediction)
+    check_cells_near(plan, lattice, str(config.cells.plan or "cells"))
     antennas = world.antennas
     notes = (
+        *map_cover(config.area, lattice),
         world.buildings.told,
         *plan.notes,
         *(note for antenna in antennas.values() for note in antenna.notes),

@@ -18,6 +18,23 @@ def reality_tags(prediction: Path) -> dict[str, str]:
     return {"PLAYS": "reality", _PREDICTION_TAG: sha256_file(prediction)}
 
 
+def check_reality_there(config: Config) -> None:
+    """See that there is reality to simulate in.
+
+    Raises
+    ------
+    InputError
+        It was not predicted yet.
+    """
+    if config.rasters.reality is None and not config.reality_path.exists():
+        hint = (
+            "not predicted yet; predict with prediction.reality.write = true, "
+            'or set journeys.radio = "as_predicted"'
+        )
+        got = "no such file"
+        raise fail(InputError, str(config.reality_path), "rasters that play reality", got, hint)
+
+
 def check_reality(config: Config) -> None:
     """See that reality was played to the prediction that lies in the output folder now.
 

@@ -18,7 +18,8 @@ from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel, level_sampler
 from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
 from mapfilter.tracks.store import check_log_replaceable, is_log, write_log
-from mapfilter.workflows.reality import check_reality
+from mapfilter.workflows.cover import check_cells_near
+from mapfilter.workflows.reality import check_reality, check_reality_there
 from mapfilter.workflows.sections import Config
 from mapfilter.workflows.world import World, planned_rasters
 
@@ -53,10 +54,13 @@ def run_simulate(config: Config, progress: Progress | None = None) -> SimulateRe
     world = World.of(config)
     section = config.journeys
     as_predicted = section.radio == "as_predicted"
+    if not as_predicted:
+        check_reality_there(config)
     rasters = planned_rasters(config) if as_predicted else open_rasters(config.reality_path)
     if not as_predicted:
         check_reality(config)
     check_against_plan(rasters, world.plan)
+    check_cells_near(world.plan, world.lattice, str(config.cells.plan or "cells"))
     if not same_crs(rasters.lattice.crs, world.lattice.crs):
         expected = f"{world.lattice.crs}, the CRS of the area"
         where = f"{rasters.path}, CRS"

@@ -109,6 +109,11 @@ def planned_rasters(config: Config) -> RxLevRasters:
         They are wrong, or do not fit what the configuration says of them.
     """
     section = config.rasters
+    if section.path is None and not config.rasters_path.exists():
+        hint = "not predicted yet; run mapfilter predict first, or set rasters.path"
+        raise fail(
+            InputError, str(config.rasters_path), "rasters", "No such file or directory", hint
+        )
     return open_rasters(
         config.rasters_path,
         section.quantity,

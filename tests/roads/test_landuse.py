@@ -70,8 +70,14 @@ def test_resampling_is_told_and_alignment_is_not(write):
     assert read_landuse(*files, LATTICE).notes == ()
     for west_m, size_m in ((LATTICE.west_m - 2.5, 5.0), (LATTICE.west_m, 10.0)):
         files = write(VALUES, lattice=Lattice(CRS, west_m, LATTICE.north_m, size_m, 4, 6))
-        (note,) = read_landuse(*files, LATTICE).notes
+        note, *_ = read_landuse(*files, LATTICE).notes
         assert f"landuse.tif: pixels of {size_m:g} m resampled" in note
+
+
+def test_a_raster_of_a_part_of_the_area_is_told(write):
+    part = Lattice(CRS, LATTICE.west_m, LATTICE.north_m, 5.0, 4, 3)
+    (note,) = read_landuse(*write(VALUES[:, :3], lattice=part), LATTICE).notes
+    assert note.endswith("landuse.tif: covers 50% of the area")
 
 
 def test_a_value_below_zero_is_unknown_and_not_outside(write):

@@ -73,8 +73,11 @@ def test_all_faults_are_told_together_with_the_near_match(write):
         ("[cells]\nsites = true", "cells.sites: expected a whole number, found True"),
         ("[area]\nresolution_m = '5'", "area.resolution_m: expected a number, found '5'"),
         ("[area]\nmap = 5", "area.map: expected a text, found 5"),
-        ("[area]\nbbox = [1, 2, 3]", "area.bbox.3: expected one value more, found [1, 2, 3]"),
-        ("[area]\nbbox = [1, 2, 3, 4, 5]", "area.bbox: expected 4 values, found 5"),
+        ("[area]\nbbox = [1, 2, 3]", "area.bbox: expected four numbers: west, south, east, north"),
+        (
+            "[area]\nbbox = [1, 2, 3, 4, 5]",
+            "area.bbox: expected four numbers: west, south, east, north",
+        ),
         ("[area]\nbbox = [1, 2, nan, 4]", "area.bbox.2: expected a finite number, found nan"),
         ("[area]\nresolution_m = inf", "area.resolution_m: expected a finite number, found inf"),
         ("[area]\nsouthwest = [24.9, 60.1]", "area: expected southwest and size_m together"),
