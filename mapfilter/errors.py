@@ -16,9 +16,12 @@ mapfilter.errors.InputError: cells.csv row 3, lat: expected degrees in -90..90, 
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 
 _MAX_SHOWN = 20
+_MAX_ALIKE = 3
+_NUMBER = re.compile(r"[0-9]+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +56,20 @@ class MapfilterError(Exception):
         super().__init__(faults)
 
     def __str__(self) -> str:
-        lines = [str(fault) for fault in self.faults[:_MAX_SHOWN]]
-        if len(self.faults) > _MAX_SHOWN:
-            lines.append(f"… and {len(self.faults) - _MAX_SHOWN} more faults")
+        """Return a line for each fault; of many that differ in numbers only, the first three."""
+        alike: dict[tuple[str, ...], list[Fault]] = {}
+        for fault in self.faults:
+            kind = (_NUMBER.sub("#", fault.where), _NUMBER.sub("#", fault.expected), fault.hint)
+            alike.setdefault(kind, []).append(fault)
+        lines, told = [], 0
+        for faults in alike.values():
+            if len(lines) + min(len(faults), _MAX_ALIKE) > _MAX_SHOWN:
+                lines.append(f"… and {len(self.faults) - told} more faults")
+                break
+            lines += [str(fault) for fault in faults[:_MAX_ALIKE]]
+            told += len(faults)
+            if len(faults) > _MAX_ALIKE:
+                lines[-1] += f" … and {len(faults) - _MAX_ALIKE} more like this"
         return "\n".join(lines)
 
 

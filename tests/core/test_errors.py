@@ -46,17 +46,33 @@ def test_no_fault_raises_nothing_and_collectors_are_apart():
 
 @pytest.mark.parametrize(("count", "lines"), [(19, 19), (20, 20), (21, 21), (500, 21)])
 def test_twenty_faults_are_shown_and_the_rest_are_counted(count, lines):
-    faults = Faults()
-    for row in range(count):
-        faults.add(f"row {row}", "a number", "text")
-    with pytest.raises(StoreError) as caught:
-        faults.raise_if_any(StoreError)
-    shown = str(caught.value).splitlines()
-    assert len(caught.value.faults) == count
+    names = [f"{a}{b}" for a in "abcdefghijklmnopqrstuvwxyz" for b in "abcdefghijklmnopqrst"]
+    error = StoreError(tuple(Fault(name, "a number", "text") for name in names[:count]))
+    shown = str(error).splitlines()
+    assert len(error.faults) == count
     assert len(shown) == lines
-    assert shown[19 if count > 20 else -1].startswith("row 19" if count > 19 else "row 18")
+    assert shown[min(count, 20) - 1].startswith(names[min(count, 20) - 1])
     if count > 20:
         assert shown[-1] == f"… and {count - 20} more faults"
+
+
+def test_of_faults_that_differ_in_their_numbers_three_are_shown():
+    faults = [Fault(f"cells.csv row {row}, lat", "degrees", f"{row}e6") for row in range(2, 17)]
+    faults.insert(5, Fault("cells.csv row 6, lon", "degrees", "x"))
+    assert str(InputError(tuple(faults))).splitlines() == [
+        "cells.csv row 2, lat: expected degrees, found 2e6",
+        "cells.csv row 3, lat: expected degrees, found 3e6",
+        "cells.csv row 4, lat: expected degrees, found 4e6 … and 12 more like this",
+        "cells.csv row 6, lon: expected degrees, found x",
+    ]
+
+
+def test_faults_beyond_the_twentieth_line_are_counted_not_their_lines():
+    letters = "abcdefghijklmnopqrstuvwxyz"
+    faults = [Fault(f"{name} row {row}", "1", "2") for name in letters for row in range(10)]
+    shown = str(InputError(tuple(faults))).splitlines()
+    assert len(shown) == 6 * 3 + 1
+    assert shown[-1] == f"… and {20 * 10} more faults"
 
 
 @pytest.mark.parametrize("kind", KINDS)
