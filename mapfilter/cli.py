@@ -145,14 +145,35 @@ def build(
 
 
 @app.command()
+def merge(
+    databases: Annotated[list[Path], typer.Argument(metavar="DB...", help="One or more.")],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DB", help="The new one.", callback=_given_path)
+    ],
+    without: Annotated[
+        list[str] | None, typer.Option("--without-cell", metavar="CELL", help="Repeatable.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Merge databases of other areas or cells; a later one replaces what it covers."""
+    from mapfilter.workflows.merge import run_merge
+
+    given = [_given_path(path) or path for path in databases]
+    with _progress("merge") as progress:
+        result = run_merge(given, out.absolute(), without=without or (), progress=progress)
+    _print(result, as_json)
+
+
+@app.command()
 def export(
     database: Annotated[Path, typer.Argument(metavar="DB", callback=_given_path)],
     to: Annotated[
-        Path, typer.Option("--to", metavar="FILE", help="A .gpkg file.", callback=_given_path)
+        Path,
+        typer.Option("--to", metavar="FILE", help="A .gpkg or .tif file.", callback=_given_path),
     ],
     as_json: JsonOption = False,
 ) -> None:
-    """Write a radio-route database as GeoPackage."""
+    """Write a radio-route database as GeoPackage, or best server and margin as GeoTIFF."""
     from mapfilter.workflows.export import run_export
 
     _print(run_export(database, to), as_json)

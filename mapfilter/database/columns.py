@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 from mapfilter.errors import MapfilterError, StoreError, fail
 
 # A damaged footer or page header can ask for absurd amounts of memory or name other columns.
-_DAMAGE = (OSError, pa.ArrowException, ValueError, KeyError, MemoryError)
+DAMAGE = (OSError, pa.ArrowException, ValueError, KeyError, MemoryError)
 
 
 def write_columns(table: pa.Table, path: Path, rows_in_a_group: int | None = None) -> None:
@@ -38,8 +38,8 @@ def read_columns(path: Path, columns: Sequence[str]) -> pa.Table:
         with pq.ParquetFile(path, page_checksum_verification=True) as source:
             table = source.read(list(columns))
         table.validate(full=True)
-    except _DAMAGE as error:
-        raise _damaged(path, error) from error
+    except DAMAGE as error:
+        raise damaged(path, error) from error
     if missing := [name for name in columns if name not in table.column_names]:
         raise fail(StoreError, str(path), f"column {missing[0]}", "none", "damaged")
     return table.select(list(columns))
@@ -55,11 +55,12 @@ def count_rows(path: Path) -> int:
     """
     try:
         return int(pq.read_metadata(path).num_rows)
-    except _DAMAGE as error:
-        raise _damaged(path, error) from error
+    except DAMAGE as error:
+        raise damaged(path, error) from error
 
 
-def _damaged(path: Path, error: Exception) -> MapfilterError:
+def damaged(path: Path, error: Exception) -> MapfilterError:
+    """Return what to tell of a part that cannot be read."""
     if isinstance(error, FileNotFoundError):
         return fail(StoreError, str(path), "a part of the database", "no such file")
     said = (str(error).splitlines() or [type(error).__name__])[0]

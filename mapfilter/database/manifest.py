@@ -21,7 +21,10 @@ MANIFEST = "manifest.json"
 CELLS = "cells.parquet"
 POINTS = "points.parquet"
 
-InputRole = Literal["map", "plan", "landuse", "landuse_table", "rasters"]
+InputRole = Literal[
+    "map", "roads", "tracks", "buildings", "water", "landuse", "landuse_table", "plan", "rasters",
+    "database",
+]  # fmt: skip
 
 _LONGEST_NAME = 200
 _DAMAGED = "edited or damaged"
@@ -33,7 +36,8 @@ class InputFile:
 
     Parameters
     ----------
-    role : {"map", "plan", "landuse", "landuse_table", "rasters"}
+    role : {"map", "roads", "tracks", "buildings", "water", "landuse", "landuse_table", "plan", \
+            "rasters", "database"}
     name : str
         Its name without its folder.
     sha256 : str
@@ -87,8 +91,8 @@ class _Input(_Strict):
 
 class _Counts(_Strict):
     points: _Count
-    points_below_floor: _Count
-    points_off_rasters: _Count
+    points_below_floor: _Count | None
+    points_off_rasters: _Count | None
 
 
 class _Part(_Strict):

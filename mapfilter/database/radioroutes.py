@@ -101,7 +101,8 @@ class RadioRouteDatabase:
         return str(self.manifest.get("attribution", ""))
 
     @cached_property
-    def _parts(self) -> Mapping[str, tuple[Path, ...]]:
+    def level_parts(self) -> Mapping[str, tuple[Path, ...]]:
+        """The files with each cell's levels; cells that no point hears have none."""
         parts: dict[str, tuple[Path, ...]] = {}
         for part in self.manifest["parts"]:
             if part.get("cell") is not None:
@@ -228,7 +229,7 @@ class RadioRouteDatabase:
         columns = ["point", "row", "col", "level_dbm", "below_best_db"]
         kinds = (np.int64, np.int32, np.int32, np.float32, np.float32)
         tables = []
-        for part in self._parts.get(cell_id, ()):
+        for part in self.level_parts.get(cell_id, ()):
             tables.append(read_columns(part, columns))
             self._check_places(part, *(tables[-1][name].to_numpy() for name in columns[:3]))
         point, row, col, level, below = (

@@ -155,6 +155,28 @@ def export_geopackage(
     write_geopackage(database, Path(path), cells)
 
 
+def export_cog(database: RadioRouteDatabase, path: Path | str) -> None:
+    """Write best server and margin as a cloud-optimised GeoTIFF on the database's lattice.
+
+    Bands: ``best_server`` (index into the JSON list in the tag ``CELLS``), ``best_level_dbm`` and
+    ``margin_db``; NaN where there is no point.
+
+    Parameters
+    ----------
+    database : RadioRouteDatabase
+    path : Path or str
+        Ends in .tif; an older file is replaced.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    from mapfilter.database.cog import write_cog
+
+    write_cog(database, Path(path))
+
+
 def _check_parts(path: Path, parts: Sequence[Mapping[str, Any]], verify: str) -> None:
     faults = Faults()
     for part in parts:

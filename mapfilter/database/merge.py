@@ -1,0 +1,284 @@
+"""Databases to one: other areas, other cells, newer cells in place of older ones, fewer cells."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from mapfilter._io import atomic_dir, check_replaceable, sha256_file
+from mapfilter._parallel import Progress
+from mapfilter.database.assemble import Head, write_parts
+from mapfilter.database.manifest import FORMAT, MANIFEST, POINTS, InputFile
+from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.database.sources import overlap, pixels_between
+from mapfilter.database.store import open_database
+from mapfilter.database.tiles import (
+    TileLevels,
+    TileRows,
+    Window,
+    heard_levels,
+    tile_windows,
+    z_order,
+)
+from mapfilter.database.windows import WindowReader
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.roads.geoparquet import point_geometry
+
+_PLACE = ("row", "col", "way_id", "way_class", "on_square", "distance_to_way_m")
+
+
+def merge(
+    databases: Sequence[RadioRouteDatabase],
+    out: Path | str,
+    *,
+    without: Sequence[str] = (),
+    progress: Progress | None = None,
+) -> RadioRouteDatabase:
+    """Write a database of all points and cells of some databases, tile by tile, and open it.
+
+    Within its own area a later database has the only word on its own cells: what the earlier ones
+    say of these cells there is dropped. So new cells or a new area are added, and cells or areas
+    built anew replace the older ones, without building the rest again. Databases of the same inputs
+    but for cells or area give, merged, the parts that one build of all would have given. Of a cell
+    in several of them the data in the last one's cell table are kept.
+
+    Parameters
+    ----------
+    databases : sequence of RadioRouteDatabase
+        One or more, with one CRS, one resolution, aligned pixels, and the same margin and floor.
+    out : Path or str
+        The folder; an older database is replaced once the new one is whole. It may be one of those
+        merged.
+    without : sequence of str
+        Cells that are left out.
+    progress : callable, optional
+        Called with tiles done and tiles in all.
+
+    Raises
+    ------
+    InputError
+        The databases do not fit each other, a cell to leave out is unknown, or nothing is left.
+    StoreError
+        A part is damaged.
+    OutputError
+        The folder cannot be written, or holds other files than a database.
+    """
+    lattice, plan = _check(databases, without)
+    parameters = databases[0].manifest["parameters"]
+    windows = [
+        window
+        for window in tile_windows(lattice, parameters["tile_px"])
+        if any(overlap(lattice, database.lattice, window) for database in databases)
+    ]
+    out = Path(out)
+    check_replaceable(out, MANIFEST, FORMAT)
+    inputs = tuple(
+        InputFile("database", database.path.name, sha256_file(database.path / MANIFEST))
+        for database in databases
+    )
+    attribution = "; ".join(dict.fromkeys(filter(None, (d.attribution for d in databases))))
+    with atomic_dir(out) as folder:
+        tiles = _tiles(databases, lattice, plan, windows)
+        written = write_parts(folder, lattice.crs, plan.ids, tiles, len(windows), 1, progress)
+        if written.heard == 0:
+            raise fail(InputError, "merge", "a point that hears a cell", "none")
+        # Points that hear nothing are in no database, so they cannot be counted.
+        counts = {
+            "points": written.heard, "points_below_floor": None, "points_off_rasters": None,
+        }  # fmt: skip
+        Head(lattice, plan, parameters, attribution, inputs, counts).write(folder, written.parts)
+    return open_database(out)
+
+
+@dataclass(frozen=True)
+class _Source:
+    """One of the databases, read by windows of the merged lattice."""
+
+    database: RadioRouteDatabase
+    lattice: Lattice
+
+    @cached_property
+    def _points(self) -> WindowReader:
+        return WindowReader([self.database.path / POINTS], _PLACE, self.database.lattice)
+
+    @cached_property
+    def _cells(self) -> dict[str, WindowReader]:
+        columns = ("row", "col", "level_dbm")
+        return {
+            cell_id: WindowReader(parts, columns, self.database.lattice)
+            for cell_id, parts in self.database.level_parts.items()
+        }
+
+    def window(self, window: Window) -> Window | None:
+        """Return the part of a window that this database covers, on the merged lattice."""
+        return overlap(self.lattice, self.database.lattice, window)
+
+    def points(self, window: Window) -> dict[str, Any]:
+        """Return the places in a window, with their pixels on the merged lattice."""
+        return self._moved(self._points, window)
+
+    def levels(self, window: Window) -> Iterator[tuple[str, dict[str, Any]]]:
+        """Yield the cells heard in a window, with their rows there."""
+        for cell_id, reader in self._cells.items():
+            found = self._moved(reader, window)
+            if found and found["row"].size:
+                yield cell_id, found
+
+    def _moved(self, reader: WindowReader, window: Window) -> dict[str, Any]:
+        down, right = pixels_between(self.lattice, self.database.lattice)
+        row, col, rows, cols = window
+        found: dict[str, Any] = reader.read((row - down, col - right, rows, cols))
+        if found:
+            found["row"] = found["row"].astype(np.int64) + down
+            found["col"] = found["col"].astype(np.int64) + right
+        return found
+
+
+def _tiles(
+    databases: Sequence[RadioRouteDatabase],
+    lattice: Lattice,
+    plan: CellPlan,
+    windows: Sequence[Window],
+) -> Iterator[TileRows]:
+    sources = [_Source(database, lattice) for database in databases]
+    floor_dbm = databases[0].floor_dbm
+    for window in windows:
+        places = _places(sources, lattice, window)
+        yield TileRows(places, _levels(sources, plan, places["point"].to_numpy(), lattice, window,
+                                       floor_dbm))  # fmt: skip
+
+
+def _places(sources: Sequence[_Source], lattice: Lattice, window: Window) -> pa.Table:
+    """Return the places of a tile; of one that several databases have, what the last one says."""
+    found = [
+        rows
+        for source in sources
+        if (inside := source.window(window)) is not None and (rows := source.points(inside))
+    ]
+    tables = [
+        pa.table(
+            {
+                "point": rows["row"] * lattice.cols + rows["col"],
+                "row": rows["row"].astype(np.int32),
+                "col": rows["col"].astype(np.int32),
+                **{name: rows[name] for name in _PLACE[2:]},
+                "geometry": point_geometry(*lattice.east_north(rows["row"], rows["col"])),
+            }
+        )
+        for rows in found
+    ]
+    if not tables:
+        return pa.table({name: np.empty(0, np.int64) for name in ("point", "row", "col")})
+    table = pa.concat_tables(tables).unify_dictionaries().combine_chunks()
+    point = table["point"].to_numpy()
+    # The first among the rows in reversed order is the last.
+    _, last = np.unique(point[::-1], return_index=True)
+    chosen = point.size - 1 - last
+    order = z_order(table["row"].to_numpy()[chosen], table["col"].to_numpy()[chosen]).argsort()
+    return table.take(pa.array(chosen[order]))
+
+
+def _levels(
+    sources: Sequence[_Source],
+    plan: CellPlan,
+    point: NDArray[np.int64],
+    lattice: Lattice,
+    window: Window,
+    floor_dbm: float,
+) -> TileLevels:
+    """Return what is heard at the places of a tile."""
+    sorter = point.argsort()
+    row, col = np.divmod(point, lattice.cols)
+    by_cell: dict[int, NDArray[np.float64]] = {}
+    for source in sources:
+        inside = source.window(window)
+        if inside is None:
+            continue
+        own = (row >= inside[0]) & (row < inside[0] + inside[2])
+        own &= (col >= inside[1]) & (col < inside[1] + inside[3])
+        for cell_id in source.database.cell_ids:
+            if cell_id in plan and (older := by_cell.get(plan.index(cell_id))) is not None:
+                older[own] = np.nan
+        for cell_id, rows in source.levels(inside):
+            if cell_id not in plan:
+                continue
+            level = by_cell.setdefault(plan.index(cell_id), np.full(point.size, np.nan))
+            at = np.searchsorted(point, rows["row"] * lattice.cols + rows["col"], sorter=sorter)
+            level[sorter[at]] = rows["level_dbm"]
+    cells = np.array(sorted(by_cell), dtype=np.int32)
+    if not cells.size:
+        return heard_levels(np.full((1, point.size), np.nan), floor_dbm)
+    found = heard_levels(np.stack([by_cell[cell] for cell in cells.tolist()]), floor_dbm)
+    best = np.where(found.best >= 0, cells[found.best], -1).astype(np.int32)
+    return TileLevels(
+        best, found.best_level_dbm, found.margin_db, cells[found.cell], found.which,
+        found.level_dbm, found.below_best_db,
+    )  # fmt: skip
+
+
+def _check(
+    databases: Sequence[RadioRouteDatabase], without: Sequence[str]
+) -> tuple[Lattice, CellPlan]:
+    """Return the lattice and the plan of all together."""
+    faults = Faults()
+    if not databases:
+        raise fail(InputError, "merge", "at least one database", "none")
+    first, cells = databases[0], dict[str, Cell]()
+    for database in databases:
+        _note_misfit(first, database, faults)
+        for cell in database.plan.cells:
+            older = cells.get(cell.id, cell)
+            places = [(one.east_m, one.north_m) for one in (older, cell)]
+            if places[0] != places[1]:
+                where, hint = f"{database.path}, cell {cell.id!r}", "databases of other networks"
+                faults.add(where, "one place", "another one in an earlier database", hint)
+            cells[cell.id] = cell
+    for cell_id in without:
+        if cell_id not in cells:
+            faults.add("without", "a cell of the databases", repr(cell_id))
+    left = tuple(cell for cell in cells.values() if cell.id not in set(without))
+    if not left:
+        faults.add("without", "a cell that is left", "none")
+    faults.raise_if_any(InputError)
+    boxes = np.array([_pixel_box(first.lattice, database.lattice) for database in databases])
+    (top, left_col), (bottom, right) = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
+    base = first.lattice
+    lattice = Lattice(
+        base.crs,
+        base.west_m + int(left_col) * base.resolution_m,
+        base.north_m - int(top) * base.resolution_m,
+        base.resolution_m,
+        int(bottom - top),
+        int(right - left_col),
+    )
+    return lattice, CellPlan(base.crs, left)
+
+
+def _note_misfit(first: RadioRouteDatabase, other: RadioRouteDatabase, faults: Faults) -> None:
+    a, b, where = first.lattice, other.lattice, f"{other.path}, compared with {first.path}"
+    for name in ("margin_db", "floor_dbm"):
+        if getattr(first, name) != getattr(other, name):
+            expected = f"{name} {getattr(first, name):g}"
+            faults.add(where, expected, f"{getattr(other, name):g}", "built with other parameters")
+    if not same_crs(a.crs, b.crs):
+        faults.add(where, f"one CRS ({a.crs})", b.crs)
+    elif abs(a.resolution_m - b.resolution_m) > 1e-6 * a.resolution_m:
+        faults.add(where, f"{a.resolution_m:g} m pixels", f"{b.resolution_m:g} m")
+    else:
+        shift = np.array([a.north_m - b.north_m, b.west_m - a.west_m]) / a.resolution_m
+        if np.abs(shift - shift.round()).max() > 1e-3:
+            faults.add(where, "pixels that align", "shifted pixels", "rasters of another lattice")
+
+
+def _pixel_box(base: Lattice, other: Lattice) -> tuple[int, int, int, int]:
+    top, left = pixels_between(base, other)
+    return top, left, top + other.rows, left + other.cols

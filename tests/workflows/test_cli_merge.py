@@ -1,0 +1,56 @@
+"""Merging and exporting databases, and building them on a cluster, from the command line."""
+
+import json
+
+import pytest
+import rasterio
+from command_line import assert_done, assert_refused, contents, mapfilter
+
+from mapfilter.database.store import open_database
+
+
+def test_a_database_without_a_cell(world, tmp_path):
+    out = tmp_path / "new folder" / "db"
+    given = ("merge", world.database, "--without-cell", "B", "--out", out, "--json")
+    found = assert_done(mapfilter(*given)).json
+    assert found["cells"] == 2
+    assert open_database(out, verify="full").cell_ids == ("A", "C")
+    assert (
+        assert_done(mapfilter("info", out, "--json")).json["counts"]["points_off_rasters"] is None
+    )
+    back = assert_done(mapfilter("merge", out, world.database, "--out", out, "--json")).json
+    whole = open_database(world.database)
+    assert back["points"] == len(whole.points())
+    assert set(open_database(out).cell_ids) == set(whole.cell_ids)
+
+
+def test_databases_that_cannot_be_merged(world, tmp_path):
+    out = ("--out", tmp_path / "db")
+    assert_refused(mapfilter("merge", tmp_path / "none", world.database, *out), "none")
+    assert_refused(mapfilter("merge", world.database, "--without-cell=X", *out), "'X'")
+    assert not (tmp_path / "db").exists()
+
+
+def test_best_server_as_geotiff(world, tmp_path):
+    file = tmp_path / "best.tif"
+    assert_done(mapfilter("export", world.database, "--to", file))
+    with rasterio.open(file) as source:
+        assert json.loads(source.tags()["CELLS"]) == ["A", "B", "C"]
+        assert source.count == 3
+
+
+def test_resume_of_nothing_is_a_build(own_world):
+    before = contents(own_world.database)
+    assert_done(mapfilter("build", "-c", own_world.toml, "--resume"))
+    assert contents(own_world.database) == before
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_cluster_gives_the_same_bytes(own_world):
+    before = contents(own_world.database)
+    assert_done(mapfilter("build", "-c", own_world.toml, "--cluster", "local:1"))
+    assert contents(own_world.database) == before
+
+
+def test_a_wrong_cluster(world):
+    assert_refused(mapfilter("build", "-c", world.toml, "--cluster", "local:x"), "local:N")
