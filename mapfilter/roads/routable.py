@@ -20,6 +20,7 @@ from mapfilter.roads.ways import Buildings, Geometries, Squares, Water, Ways
 
 SQUARE_CLASS = "square"
 LANDUSE_CLASS = "land use"
+TILE_PX = 512
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,6 +105,29 @@ class RouteSource:
                 allowed &= ~wet | (self.bridges.reaching(window)[0] >= 0)
         return _described(allowed, window, on_square, self.ways, (way, distance_m), SQUARE_CLASS)
 
+    def over(
+        self, lattice: Lattice, tile_px: int = TILE_PX, progress: Progress | None = None
+    ) -> RouteLattice:
+        """Return the route lattice of a whole area, made tile by tile.
+
+        Raises
+        ------
+        InputError
+            No point is left.
+        """
+        tiles = lattice.tiles(tile_px)
+        parts = []
+        for done, (row, col, rows, cols) in enumerate(tiles, start=1):
+            parts.append((row, col, self.tile(lattice.window(row, col, rows, cols))))
+            if progress is not None:
+                progress(done, len(tiles))
+        routes = _joined(lattice, parts)
+        if not len(routes):
+            expected = "a point near a way or in a square"
+            hint = "roads and rasters of different areas"
+            raise fail(InputError, "route lattice", expected, "none", hint)
+        return routes
+
 
 def route_lattice(
     ways: Ways,
@@ -114,7 +138,7 @@ def route_lattice(
     *,
     half_width_by_class_m: Mapping[str, float] | None = None,
     water: Water | None = None,
-    tile_px: int = 512,
+    tile_px: int = TILE_PX,
     progress: Progress | None = None,
 ) -> RouteLattice:
     """Return the lattice points near a way or in a square, outside buildings and water.
@@ -155,22 +179,7 @@ def route_lattice(
         half_width_by_class_m=half_width_by_class_m,
         water=water,
     )
-    tiles = lattice.tiles(tile_px)
-    parts = []
-    for done, (row, col, rows, cols) in enumerate(tiles, start=1):
-        parts.append((row, col, source.tile(lattice.window(row, col, rows, cols))))
-        if progress is not None:
-            progress(done, len(tiles))
-    routes = _joined(lattice, parts)
-    if not len(routes):
-        raise fail(
-            InputError,
-            "route lattice",
-            "a point near a way or in a square",
-            "none",
-            "roads and rasters of different areas",
-        )
-    return routes
+    return source.over(lattice, tile_px, progress)
 
 
 def route_lattice_from_landuse(
@@ -205,7 +214,7 @@ def route_lattice_from_landuse(
     if not mask.any():
         raise fail(InputError, "land use", "a walkable point", "none", "no class is walkable")
     index = WayIndex.of(
-        _no_ways(lattice.crs) if ways is None else ways, half_width_m, half_width_by_class_m or {}
+        Ways.none(lattice.crs) if ways is None else ways, half_width_m, half_width_by_class_m or {}
     )
     return landuse_tile(mask, lattice, index)
 
@@ -274,9 +283,3 @@ def _joined(lattice: Lattice, parts: list[tuple[int, int, RouteLattice]]) -> Rou
         np.concatenate([tile.distance_to_way_m for tile in tiles])[order],
         np.concatenate([tile.on_square for tile in tiles])[order],
     )
-
-
-def _no_ways(crs: str) -> Ways:
-    none = np.empty(0, dtype=np.int64)
-    lines = np.empty(0, dtype=object)
-    return Ways(crs, none, none.astype(np.int16), (), lines, none == 1, none.astype(np.int8))

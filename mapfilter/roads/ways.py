@@ -61,6 +61,14 @@ class Ways:
             faults.add("ways, way_id", "numbers > 0", int(self.way_id.min()))
         faults.raise_if_any(InputError)
 
+    @classmethod
+    def none(cls, crs: str) -> Ways:
+        """Return no ways."""
+        number = np.empty(0, dtype=np.int64)
+        lines = np.empty(0, dtype=object)
+        code, flag = number.astype(np.int16), number.astype(np.bool_)
+        return cls(crs, number, code, (), lines, flag, number.astype(np.int8))
+
     def __len__(self) -> int:
         return int(self.way_id.size)
 

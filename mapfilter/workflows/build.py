@@ -16,14 +16,12 @@ from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rasters import RxLevRasters
-from mapfilter.roads.maps import resolve_map
 from mapfilter.workflows.cover import check_cells_near, map_cover, raster_cover
 from mapfilter.workflows.sections import Area, Config
 from mapfilter.workflows.world import World, area_lattice, check_scale, planned_rasters
 
 PIXELS_A_TASK = 10_000_000
 MOST_TILES_A_TASK = 64
-ATTRIBUTION = "© OpenStreetMap contributors (ODbL)"
 
 
 @dataclass(frozen=True)
@@ -101,8 +99,8 @@ def run_build(
             margin_db=config.database.margin_db,
             floor_dbm=config.database.floor_dbm,
             tile_px=config.database.tile_px,
-            inputs=_inputs(config),
-            attribution=ATTRIBUTION,
+            inputs=_inputs(world),
+            attribution=world.streets.attribution,
             executor=executor,
             in_flight=2 * workers,
             tiles_a_task=tiles_a_task,
@@ -120,7 +118,7 @@ def run_build(
             *rasters.notes,
             *raster_cover(config.area, world.lattice),
             *map_cover(config.area, world.lattice),
-            *(world.landuse.notes if world.landuse is not None else ()),
+            *world.streets.notes,
         ),
     )
 
@@ -137,7 +135,7 @@ def run_dry_build(config: Config) -> BuildEstimate:
     rasters, plan, world = _raster_world(config)
     check_cells_near(plan, world.lattice, str(config.cells.plan or "cells"))
     section, routes = config.database, world.route_tiles
-    _inputs(config)
+    _inputs(world)
     reading_s = time.perf_counter() - began_s
     estimate = dry_run(
         rasters,
@@ -189,12 +187,7 @@ def _cut(lattice: Lattice, area: Area, name: str) -> Lattice:
     return lattice.window(top, left, rows, cols)
 
 
-def _inputs(config: Config) -> list[InputFile]:
-    roads = config.roads
-    found = [InputFile.of("map", resolve_map(config.area.map))]
-    if config.cells.plan is not None:
-        found.append(InputFile.of("plan", config.cells.plan))
-    if roads.landuse is not None and roads.landuse_table is not None:
-        found.append(InputFile.of("landuse", roads.landuse))
-        found.append(InputFile.of("landuse_table", roads.landuse_table))
-    return found
+def _inputs(world: World) -> list[InputFile]:
+    plan = world.config.cells.plan
+    files = (*world.streets.files, *((("plan", plan),) if plan is not None else ()))
+    return [InputFile.of(name, path) for name, path in files]

@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import BaseModel, BeforeValidator, ValidationError
 
 from mapfilter.errors import ConfigError, Fault, Faults, fail
-from mapfilter.workflows.fields import EMBEDDED_MAP, resolve_map, resolve_path
+from mapfilter.workflows.fields import MAP_NAMES, resolve_map, resolve_path
 from mapfilter.workflows.paths import path_fault, shown
 from mapfilter.workflows.sections import Config
 
@@ -126,7 +126,7 @@ def _apply(values: dict[str, Any], setting: str, faults: Faults) -> None:
 
 
 def _absolute(value: str) -> str:
-    as_it_is = value in ("", EMBEDDED_MAP) or value.startswith("~")
+    as_it_is = value in ("", *MAP_NAMES) or value.startswith("~")
     return value if as_it_is else str(Path(value).absolute())
 
 

@@ -10,6 +10,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationIn
 from mapfilter.workflows.paths import path_fault
 
 EMBEDDED_MAP = "helsinki"
+NO_MAP = "none"
+MAP_NAMES = (EMBEDDED_MAP, NO_MAP)
 
 
 def resolve_path(value: Any, info: ValidationInfo) -> Any:
@@ -27,8 +29,8 @@ def resolve_path(value: Any, info: ValidationInfo) -> Any:
 
 
 def resolve_map(value: Any, info: ValidationInfo) -> Any:
-    """Make a map's path absolute; the embedded map has a name."""
-    found = value if value == EMBEDDED_MAP else resolve_path(value, info)
+    """Make a map's path absolute; the embedded map and no map have names."""
+    found = value if value in MAP_NAMES else resolve_path(value, info)
     return str(found) if isinstance(found, Path) else value
 
 

