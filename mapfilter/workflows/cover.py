@@ -9,7 +9,6 @@ from mapfilter.geodesy import Floats, Lattice, unproject
 from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.maps import map_bounds_deg
 from mapfilter.workflows.fields import NO_MAP
-from mapfilter.workflows.fields import NO_MAP
 from mapfilter.workflows.sections import Area
 from mapfilter.workflows.world import area_lattice
 
