@@ -28,8 +28,9 @@ def plot_candidates(
 ) -> None:
     """Draw the hypotheses at up to six moments, one panel each, with truth and estimate.
 
-    Every panel shows the whole area and says how far the journey has gone and how many hypotheses
-    are left; a hypothesis fades with its share of the belief.
+    Every panel shows the whole area and says how far the journey has gone, in true metres where the
+    truth is known, and how many hypotheses are left; a hypothesis fades with its share of the
+    belief.
 
     Parameters
     ----------
@@ -63,7 +64,7 @@ def plot_candidates(
                 continue
             frame = draw_base(axes, base, scale_bar=index == 0)
             _draw_snapshot(axes, frame, snapshots[index], truth)
-            axes.set_title(_title(index, snapshots[index]), fontsize=10.5)
+            axes.set_title(_title(index, snapshots[index], truth), fontsize=10.5)
             if index % columns:
                 axes.set_ylabel("")
                 axes.set_yticklabels([])
@@ -83,10 +84,13 @@ def plot_candidates(
         )
 
 
-def _title(index: int, snapshot: Snapshot) -> str:
+def _title(index: int, snapshot: Snapshot, truth: Truth | None) -> str:
     left = snapshot.hypothesis_east_m.size
     noun = "candidate" if left == 1 else "candidates"
-    return f"({'abcdef'[index]}) {snapshot.travelled_m:.0f} m travelled, {grouped(left)} {noun}"
+    gone = f"{snapshot.travelled_m:.0f} m by dead reckoning"
+    if truth is not None and truth.time_s.size:
+        gone = f"{float(truth.distance_at(snapshot.time_s)):.0f} m travelled"
+    return f"({'abcdef'[index]}) {gone}, {grouped(left)} {noun}"
 
 
 def _draw_snapshot(axes: Axes, frame: LocalFrame, snapshot: Snapshot, truth: Truth | None) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth, position_errors_m
+from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.report.basemap import HALO, BaseMap, Bounds, attribute, draw_base, map_height_in
 from mapfilter.report.canvas import BLACK, BLUE, GREEN, ORANGE, VERMILLION, picture
@@ -40,7 +41,7 @@ def plot_track(
     path : Path
         PNG to write.
     title : str
-        Above the map; without one, the filter's name.
+        Above the map; without one, the filter's name and what came of the track.
     zoom : bool
         Show only the surroundings of truth and estimate, not the whole area.
 
@@ -91,10 +92,24 @@ def plot_track(
                     true_x, true_y, s=70, marker="D", facecolors="white", edgecolors=GREEN,
                     linewidths=2.0, zorder=9.5, label="truth at the switch",
                 )  # fmt: skip
-        axes.set_title(title or f"Filter: {estimate.filter}")
+        axes.set_title(title or f"{estimate.filter}: {_verdict(estimate, truth)}")
         attribute(axes, shown)
         if axes.get_legend_handles_labels()[0]:
             figure.legend(loc="outside lower center", ncols=5, frameon=False)
+
+
+def _verdict(estimate: TrackEstimate, truth: Truth | None) -> str:
+    """Return in words what came of a track: success, wrong or never switched, and whether lost."""
+    switch = estimate.converged_at
+    said = "never switched"
+    if switch is not None:
+        said = f"switched after {estimate.time_s[switch]:.0f} s"
+        if truth is not None and truth.time_s.size:
+            error_m = float(position_errors_m(estimate, truth)[switch])
+            kind = "success" if error_m <= SUCCESS_RADIUS_M else "wrong"
+            said = f"{kind}, {error_m:.0f} m off at the switch" if np.isfinite(error_m) else said
+    lost = len(estimate) and estimate.status[-1] is Status.LOST
+    return f"{said}; lost at the end" if lost else said
 
 
 def _surroundings(estimate: TrackEstimate, truth: Truth | None) -> Bounds | None:

@@ -1,0 +1,90 @@
+"""What the titles of pictures say."""
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+
+from mapfilter.evaluation.accuracy import Truth
+from mapfilter.filters.contract import Reason, Status
+from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.snapshot import Snapshot
+from mapfilter.report.basemap import BaseMap
+from mapfilter.report.candidates import plot_candidates
+from mapfilter.report.track import plot_track
+
+CRS = "EPSG:32635"
+EAST_M, NORTH_M = 385_000.0, 6_672_000.0
+BASE = BaseMap((EAST_M, NORTH_M - 100, EAST_M + 300, NORTH_M + 100))
+TRUTH = Truth(np.array([0.0, 200.0]), EAST_M + np.array([0.0, 280.0]), np.full(2, NORTH_M))
+NOTHING = Truth(np.empty(0), np.empty(0), np.empty(0))
+
+
+@pytest.fixture
+def titles(monkeypatch):
+    """Titles in the order in which they are set."""
+    found, own = [], Axes.set_title
+
+    def set_title(self, label, *args, **kwargs):
+        found.append(label)
+        return own(self, label, *args, **kwargs)
+
+    monkeypatch.setattr(Axes, "set_title", set_title)
+    return found
+
+
+def track(*statuses, error_m=0.0):
+    fixes = []
+    for index, status in enumerate(statuses):
+        time_s = 50.0 * index
+        on = status in (Status.CONVERGED, Status.TRACKING)
+        east_m = EAST_M + 1.4 * time_s if on else np.nan
+        north_m = NORTH_M + error_m if on else np.nan
+        fixes.append(
+            Fix(
+                time_s, east_m, north_m, np.full((2, 2), np.nan), np.full(3, np.nan), status,
+                1, np.nan, 0, np.nan, Reason.USED,
+            )
+        )  # fmt: skip
+    return TrackEstimate.of_fixes(CRS, "candidate", fixes)
+
+
+SEARCHING, CONVERGED, TRACKING, LOST = Status
+
+
+@pytest.mark.parametrize(
+    ("estimate", "truth", "title"),
+    [
+        (track(SEARCHING, SEARCHING), TRUTH, "never switched"),
+        (track(SEARCHING, LOST), TRUTH, "never switched; lost at the end"),
+        (track(SEARCHING, CONVERGED), None, "switched after 50 s"),
+        (track(SEARCHING, CONVERGED), NOTHING, "switched after 50 s"),
+        (track(CONVERGED, TRACKING, error_m=7.2), TRUTH, "success, 7 m off at the switch"),
+        (
+            track(CONVERGED, LOST, error_m=80.0),
+            TRUTH,
+            "wrong, 80 m off at the switch; lost at the end",
+        ),
+        (track(*[SEARCHING] * 5, CONVERGED), TRUTH, "switched after 250 s"),
+        (track(), TRUTH, "never switched"),
+    ],
+)
+def test_a_track_says_what_came_of_it(estimate, truth, title, titles, tmp_path):
+    plot_track(estimate, truth, BASE, tmp_path / "track.png")
+    assert titles == [f"candidate: {title}"]
+
+
+@pytest.mark.parametrize(
+    ("truth", "title"),
+    [
+        (TRUTH, "(a) 140 m travelled, 2 candidates"),
+        (None, "(a) 153 m by dead reckoning, 2 candidates"),
+        (NOTHING, "(a) 153 m by dead reckoning, 2 candidates"),
+    ],
+)
+def test_panels_say_true_metres_where_they_are_known(truth, title, titles, tmp_path):
+    east_m, north_m = EAST_M + np.array([10.0, 20.0]), np.full(2, NORTH_M)
+    seen = Snapshot(
+        100.0, 153.0, east_m, north_m, np.full(2, 0.5), np.nan, np.nan, Status.SEARCHING
+    )
+    plot_candidates([seen], truth, BASE, tmp_path / "candidates.png")
+    assert titles == [title]
