@@ -15,7 +15,6 @@ from mapfilter.radio._cell_rules import ANTENNAS
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.predict import off_frequency
 from mapfilter.radio.rasters import RxLevRasters
-from mapfilter.roads.maps import resolve_map
 from mapfilter.workflows.check_lobes import check_against_sites, check_power
 from mapfilter.workflows.check_places import (
     check_pixels,
@@ -86,16 +85,11 @@ def run_check(config: Config, progress: Progress | None = None) -> CheckResult:
 
 
 def _area(config: Config, findings: Findings) -> Lattice | None:
-    """Return the lattice of the area; faults of the map are told apart from those of the box."""
-    try:
-        resolve_map(config.area.map)
-    except MapfilterError as error:
-        findings.add_faults(error, "map-invalid")
-        return None
     try:
         return area_lattice(config.area)
     except MapfilterError as error:
-        findings.add_faults(error, "area-invalid")
+        of_map = all(fault.where.startswith(str(config.area.map)) for fault in error.faults)
+        findings.add_faults(error, "map-invalid" if of_map else "area-invalid")
         return None
 
 
@@ -171,7 +165,7 @@ def _check_roads(inputs: _Inputs, area: Lattice, findings: Findings) -> None:
         try:
             ways = world.ways
         except MapfilterError as error:
-            findings.add_faults(error, "map-invalid")
+            findings.add_faults(error, "roads-invalid")
             return
         if rasters is not None:
             check_ways(ways, rasters, f"{config.area.map} and {rasters.path}", findings)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +64,8 @@ def check_against_sites(
     off = _check_peaks(seen, plan, where, findings)
     in_place = [s for s in seen if s.cell_id not in off]
     lobes = _lobes(in_place, plan)
-    cells = [plan[s.cell_id] for s in seen]
+    held = {sample.cell_id for sample in in_place}
+    cells = [cell for cell in plan.cells if cell.id in held]
     for mistake in azimuth_mistakes(cells, lobes):
         findings.add(mistake.mistake, f"{where}, cells {listed(mistake.cells)}", _told(mistake))
     return in_place
@@ -109,49 +110,42 @@ def _told(mistake: AzimuthMistake) -> str:
     return f"{seen}; by {mistake.offset_read_deg:.0f}° {how} {mistake.reading}."
 
 
-@dataclass(frozen=True, slots=True)
-class _Fit:
-    """How well rasters fit their sites: all about them, and the sectors into their directions."""
-
-    distance: float
-    direction: float
-
-
 def _check_turned(
     seen: Sequence[RasterSample], plan: CellPlan, where: str, findings: Findings
 ) -> bool:
     """Tell whether rasters fit their sites much better when they are turned."""
-    given = _fit(seen, plan)
-    if given.distance > 1 - _TURNED_SLIGHTLY:
-        return False
-    best: tuple[float, str, _Fit] | None = None
+    given = _mean_fall(seen, plan)
+    best: tuple[float, str] | None = None
     for words, turn in _TURNS:
-        fit = _fit([_turned(sample, turn(sample.values)) for sample in seen], plan)
-        nearer, straighter = fit.distance - given.distance, fit.direction - given.direction
-        clear = nearer > _TURNED_BETTER or (
-            nearer > _TURNED_SLIGHTLY and straighter > _LOBES_BETTER
-        )
-        if clear and fit.distance > _TURNED_FITS and (best is None or nearer > best[0]):
-            best = nearer, words, fit
+        turned = [_turned(sample, turn(sample.values)) for sample in seen]
+        fit = _mean_fall(turned, plan)
+        if fit < _TURNED_FITS or fit - given < _TURNED_SLIGHTLY or (best and fit < best[0]):
+            continue
+        if (
+            fit - given > _TURNED_BETTER
+            or _mean_score(turned, plan) - _mean_score(seen, plan) > _LOBES_BETTER
+        ):
+            best = fit, words
     if best is None:
         return False
     evidence = (
-        f"Levels and nearness to the sites correlate by {given.distance:.2f} (mean of {len(seen)} "
-        f"cells), and by {best[2].distance:.2f} if the file holds {best[1]}."
+        f"Levels and nearness to the sites correlate by {given:.2f} (mean of {len(seen)} "
+        f"cells), and by {best[0]:.2f} if the file holds {best[1]}."
     )
     findings.add("axes-swapped", where, evidence)
     return True
 
 
-def _fit(samples: Sequence[RasterSample], plan: CellPlan) -> _Fit:
-    cells = [plan[sample.cell_id] for sample in samples]
-    falls = [
-        falls_with_distance(sample, cell.east_m, cell.north_m)
-        for sample, cell in zip(samples, cells, strict=True)
-    ]
+def _mean_fall(samples: Sequence[RasterSample], plan: CellPlan) -> float:
+    pairs = ((sample, plan[sample.cell_id]) for sample in samples)
+    return float(np.mean([falls_with_distance(s, c.east_m, c.north_m) for s, c in pairs]))
+
+
+def _mean_score(samples: Sequence[RasterSample], plan: CellPlan) -> float:
+    """Return how well the plan's azimuths explain the rasters, on average."""
     lobes = _lobes(samples, plan)
-    scores = [lobes[c.id].score(c.azimuth_deg or 0.0) for c in cells if c.id in lobes]
-    return _Fit(float(np.mean(falls)), float(np.mean(scores)) if scores else 0.0)
+    scores = [lobe.score(plan[cell_id].azimuth_deg or 0.0) for cell_id, lobe in lobes.items()]
+    return float(np.mean(scores)) if scores else 0.0
 
 
 def _turned(sample: RasterSample, values: NDArray[np.float32]) -> RasterSample:

@@ -25,7 +25,7 @@ Move = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
 _HALF_TOLERANCE_PX = 0.02
 _SAME_SIDE = 1e-6
-_OUTSIDE_SHARE = 0.01
+_OUTSIDE_SHARE = 0.05
 _MOST_ZONES = 2
 _NEARLY_ALL = 0.9
 
