@@ -165,6 +165,18 @@ def merge(
 
 
 @app.command()
+def bench(
+    stage: Annotated[str, typer.Argument(metavar="[NAME]", help="build.")] = "build",
+    runs: Annotated[int, typer.Option("--runs", min=1, help="Runs that medians are of.")] = 5,
+    as_json: JsonOption = False,
+) -> None:
+    """Tell how fast a stage is on this machine."""
+    from mapfilter.workflows.bench import run_bench
+
+    _print(run_bench(stage, runs=runs), as_json)
+
+
+@app.command()
 def export(
     database: Annotated[Path, typer.Argument(metavar="DB", callback=_given_path)],
     to: Annotated[
