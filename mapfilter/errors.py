@@ -61,7 +61,8 @@ class MapfilterError(Exception):
         for fault in self.faults:
             kind = (_NUMBER.sub("#", fault.where), _NUMBER.sub("#", fault.expected), fault.hint)
             alike.setdefault(kind, []).append(fault)
-        lines, told = [], 0
+        lines: list[str] = []
+        told = 0
         for faults in alike.values():
             if len(lines) + min(len(faults), _MAX_ALIKE) > _MAX_SHOWN:
                 lines.append(f"… and {len(self.faults) - told} more faults")

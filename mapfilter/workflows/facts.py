@@ -35,9 +35,11 @@ def text_lines(found: Mapping[str, Any], indent: str = "") -> Iterator[str]:
 
     Examples
     --------
-    >>> print(*text_lines({"bounds_m": [385412.52], "seconds": {"build": 1.23456}}), sep="\n")
+    >>> found = {"bounds_m": [385412.52], "lon_deg": 24.9412341, "seconds": {"build": 1.23456}}
+    >>> print(*text_lines(found), sep="\n")
     bounds_m:
       385412.5
+    lon_deg: 24.941234
     seconds:
       build: 1.235
     """
@@ -51,18 +53,21 @@ def text_lines(found: Mapping[str, Any], indent: str = "") -> Iterator[str]:
             yield f"{indent}{key}:"
             for item in value:
                 shown = (
-                    ", ".join(f"{k} {_short(v)}" for k, v in item.items())
+                    ", ".join(f"{k} {_short(v, k)}" for k, v in item.items())
                     if isinstance(item, Mapping)
-                    else _short(item)
+                    else _short(item, key)
                 )
                 yield f"{indent}  {shown}"
         else:
-            yield f"{indent}{key}: {_short(value)}"
+            yield f"{indent}{key}: {_short(value, key)}"
 
 
-def _short(value: Any) -> str:
+def _short(value: Any, name: str) -> str:
+    """Return a figure rounded to what one reads: metres to decimetres, degrees to as much."""
     if value is None:
         return "-"
     if isinstance(value, float):
+        if name.endswith(("lon_deg", "lat_deg")):
+            return f"{value:.6f}"
         return f"{value:.1f}" if abs(value) >= 1000 else f"{value:.4g}"
     return str(value)
