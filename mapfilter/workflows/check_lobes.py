@@ -16,6 +16,7 @@ from mapfilter.workflows.findings import Findings, listed
 
 _FAR_PX, _FAR_M = 10.0, 150.0
 _CLEARLY_WORSE, _FITS = 0.35, 0.35
+_MILDLY_WORSE = 0.1
 _TURNED_BETTER, _TURNED_FITS = 0.25, 0.4
 _TURNED_SLIGHTLY, _LOBES_BETTER = 0.1, 0.3
 _MUCH_ABOVE_DB = 15.0
@@ -186,6 +187,9 @@ def _check_peaks(
             exchanged.append((cell.id, other.site))
         else:
             off.append((cell.id, away_m, own, there))
+    exchanged += _counterparts(seen, plan, exchanged)
+    moved = {cell_id for cell_id, _ in exchanged}
+    off = [one for one in off if one[0] not in moved]
     if exchanged:
         told = ", ".join(f"{cell_id} about {site}" for cell_id, site in exchanged[:8])
         ids = listed([cell_id for cell_id, _ in exchanged])
@@ -199,7 +203,25 @@ def _check_peaks(
         )
         ids = listed([one[0] for one in off])
         findings.add("site-off-peak", f"{where}, cells {ids}", evidence)
-    return frozenset([*(one[0] for one in off), *(one[0] for one in exchanged)])
+    return frozenset([*(one[0] for one in off), *moved])
+
+
+def _counterparts(
+    seen: Sequence[RasterSample], plan: CellPlan, exchanged: Sequence[tuple[str, str]]
+) -> list[tuple[str, str]]:
+    """Return the rasters that took the place of exchanged ones, by a milder measure."""
+    known = {cell_id for cell_id, _ in exchanged}
+    found = []
+    for sample in seen:
+        cell = plan[sample.cell_id]
+        own = falls_with_distance(sample, cell.east_m, cell.north_m)
+        for cell_id, site in exchanged:
+            other = plan[cell_id]
+            fit = falls_with_distance(sample, other.east_m, other.north_m)
+            if cell.id not in known and cell.site == site and fit - own > _MILDLY_WORSE:
+                found.append((cell.id, other.site))
+                known.add(cell.id)
+    return found
 
 
 def _nearest_site(plan: CellPlan, cell: Cell, east_m: float, north_m: float) -> Cell | None:

@@ -220,6 +220,22 @@ def test_landuse_colours_that_the_table_does_not_have(world):
     assert "value 7 at " in found["evidence"]
 
 
+@pytest.mark.parametrize(
+    ("name", "code"),
+    [("rxlev.tif", "rasters-invalid"), ("cells.csv", "plan-invalid"), ("landuse.tif", None)],
+)
+@pytest.mark.parametrize("share", [0, 0.3, 0.9])
+def test_damaged_files_are_findings(name, code, share, world):
+    world.write()
+    whole = (world.folder / name).read_bytes()
+    (world.folder / name).write_bytes(whole[: int(share * len(whole))])
+    outcome = mapfilter("check", "-c", world.toml, "--json")
+    assert (outcome.code, outcome.err) == (2, "")
+    codes = {f["code"] for f in outcome.json["findings"]}
+    assert (code or "landuse-invalid") in codes
+    assert all(str(name) in f["where"] for f in outcome.json["findings"] if f["code"] == code)
+
+
 def test_rasters_upside_down(world):
     world.write()
     with rasterio.open(world.rasters, "r+") as target:
