@@ -6,23 +6,32 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from mapfilter.errors import Faults, InputError
+from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.report.basemap import HALO, BaseMap, Floats, attribute, draw_base, map_height_in
-from mapfilter.report.canvas import distinct_colours, grouped, picture
+from mapfilter.report.basemap import BaseMap, Floats, attribute, draw_base
+from mapfilter.report.canvas import distinct_colours, grouped
+from mapfilter.report.layers import (
+    MAP_IN,
+    OVER_RASTER,
+    is_indoor,
+    keep_extent,
+    map_picture,
+    name_group,
+    named_groups,
+    raster_extent,
+    shape_faults,
+    short_names,
+    side_legend,
+)
 from mapfilter.report.network import draw_cells, network_legend
 
-_MAP_IN = 7.0
 _SIDE_IN = 2.7
 _BAR_IN = 1.7
-_OVER_RASTER = "#00000030"
 
 
 def plot_points_per_cell(
@@ -61,19 +70,20 @@ def plot_points_per_cell(
         The picture cannot be written.
     """
     colours = distinct_colours(len(points_by_cell))
-    pitch_pt = 72 * _MAP_IN * resolution_m / (base.bounds_m[2] - base.bounds_m[0])
+    pitch_pt = 72 * MAP_IN * resolution_m / (base.bounds_m[2] - base.bounds_m[0])
     size = float(np.clip((1.05 * pitch_pt) ** 2, 1.2, 25.0))
-    with picture(path, _MAP_IN + _SIDE_IN, map_height_in(base, _MAP_IN) + 0.85) as figure:
-        axes = figure.subplots()
+    with map_picture(path, base, _SIDE_IN) as (figure, axes):
         frame = draw_base(axes, base)
         handles = []
-        for (cell_id, (east_m, north_m)), colour in zip(
-            points_by_cell.items(), colours, strict=True
-        ):
+        counts = [len(east_m) for east_m, _ in points_by_cell.values()]
+        names = short_names(list(points_by_cell))
+        named = named_groups(counts)
+        for index, (cell_id, (east_m, north_m)) in enumerate(points_by_cell.items()):
+            colour = colours[index]
             x, y = frame(east_m, north_m)
             axes.scatter(x, y, s=size, color=colour, marker="s", linewidths=0, zorder=3)
-            if x.size and not _is_indoor(plan, cell_id):
-                _name_group(axes, x, y, cell_id)
+            if index in named and not is_indoor(plan, cell_id):
+                name_group(axes, x, y, names[index])
             label = f"{cell_id}: {grouped(x.size)}"
             handles.append(
                 Line2D([], [], linestyle="", marker="o", markersize=6, color=colour, label=label)
@@ -81,7 +91,7 @@ def plot_points_per_cell(
         draw_cells(axes, frame, plan, base.bounds_m)
         axes.set_title(title)
         attribute(axes, base)
-        _legend(figure, "cell: points", handles + network_legend(plan))
+        side_legend(figure, "cell: points", handles, counts, network_legend(plan))
 
 
 def plot_best_server(
@@ -114,36 +124,38 @@ def plot_best_server(
     OutputError
         The picture cannot be written.
     """
-    faults = _shape_faults(best_server, lattice)
+    faults = shape_faults(best_server, lattice)
     if best_server.size and int(best_server.max()) >= len(cell_ids):
         faults.add("best server", f"indices below {len(cell_ids)}", int(best_server.max()))
     faults.raise_if_any(InputError)
     colours = distinct_colours(len(cell_ids))
     shown = np.ma.masked_less(best_server, 0)
-    with picture(path, _MAP_IN + _SIDE_IN, map_height_in(base, _MAP_IN) + 0.85) as figure:
-        axes = figure.subplots()
-        frame = draw_base(axes, base, streets=_OVER_RASTER)
+    with map_picture(path, base, _SIDE_IN) as (figure, axes):
+        frame = draw_base(axes, base, streets=OVER_RASTER)
         axes.imshow(
-            shown, extent=_extent(lattice, base, frame.unit_m), cmap=ListedColormap(colours or "w"),
+            shown, extent=raster_extent(lattice, base, frame.unit_m),
+            cmap=ListedColormap(colours or "w"),
             vmin=-0.5, vmax=max(len(cell_ids), 1) - 0.5, interpolation="nearest", alpha=0.85,
             zorder=1,
         )  # fmt: skip
-        _keep_extent(axes, base, frame.unit_m)
+        keep_extent(axes, base, frame.unit_m)
         handles = []
+        counts = np.bincount(best_server[best_server >= 0], minlength=len(cell_ids)).tolist()
+        names = short_names(cell_ids)
+        named = named_groups(counts)
         for index, (cell_id, colour) in enumerate(zip(cell_ids, colours, strict=True)):
-            own = best_server == index
-            label = f"{cell_id}: {100 * own.mean():.1f} %"
+            label = f"{cell_id}: {100 * counts[index] / best_server.size:.1f} %"
             handles.append(
                 Line2D([], [], linestyle="", marker="s", markersize=7, color=colour, label=label)
             )
-            if own.any() and not _is_indoor(plan, cell_id):
-                rows, cols = np.nonzero(own)
+            if index in named and not is_indoor(plan, cell_id):
+                rows, cols = np.nonzero(best_server == index)
                 x, y = frame(*lattice.east_north(rows, cols))
-                _name_group(axes, x, y, cell_id)
+                name_group(axes, x, y, names[index])
         draw_cells(axes, frame, plan, base.bounds_m)
         axes.set_title(title)
         attribute(axes, base)
-        _legend(figure, "cell: share of area", handles + network_legend(plan))
+        side_legend(figure, "cell: share of area", handles, counts, network_legend(plan))
 
 
 def plot_level(
@@ -176,66 +188,17 @@ def plot_level(
     OutputError
         The picture cannot be written.
     """
-    _shape_faults(level_dbm, lattice).raise_if_any(InputError)
-    with picture(path, _MAP_IN + _BAR_IN, map_height_in(base, _MAP_IN) + 0.85) as figure:
-        axes = figure.subplots()
-        frame = draw_base(axes, base, streets=_OVER_RASTER)
+    shape_faults(level_dbm, lattice).raise_if_any(InputError)
+    with map_picture(path, base, _BAR_IN) as (figure, axes):
+        frame = draw_base(axes, base, streets=OVER_RASTER)
         image = axes.imshow(
-            np.ma.masked_invalid(level_dbm), extent=_extent(lattice, base, frame.unit_m),
+            np.ma.masked_invalid(level_dbm), extent=raster_extent(lattice, base, frame.unit_m),
             cmap="viridis", vmin=range_dbm[0], vmax=range_dbm[1], interpolation="nearest",
             zorder=1,
         )  # fmt: skip
-        _keep_extent(axes, base, frame.unit_m)
+        keep_extent(axes, base, frame.unit_m)
         draw_cells(axes, frame, plan, base.bounds_m)
         bar = figure.colorbar(image, ax=axes, shrink=0.75, pad=0.02, aspect=32, extend="both")
         bar.set_label("level / dBm")
         axes.set_title(title)
         attribute(axes, base)
-
-
-def _shape_faults(raster: NDArray[np.generic], lattice: Lattice) -> Faults:
-    faults = Faults()
-    if raster.shape != (lattice.rows, lattice.cols):
-        faults.add("raster", f"{lattice.rows} x {lattice.cols} pixels", raster.shape)
-    return faults
-
-
-def _extent(lattice: Lattice, base: BaseMap, unit_m: float) -> tuple[float, float, float, float]:
-    """Return left, right, bottom, top of a raster in the units of the axes."""
-    west, south, east, north = lattice.bounds_m
-    west0, south0 = base.bounds_m[:2]
-    return (
-        (west - west0) / unit_m,
-        (east - west0) / unit_m,
-        (south - south0) / unit_m,
-        (north - south0) / unit_m,
-    )
-
-
-def _keep_extent(axes: Axes, base: BaseMap, unit_m: float) -> None:
-    """Undo the zoom of ``imshow`` to its own raster."""
-    west, south, east, north = base.bounds_m
-    axes.set_xlim(0.0, (east - west) / unit_m)
-    axes.set_ylim(0.0, (north - south) / unit_m)
-
-
-def _is_indoor(plan: CellPlan, cell_id: str) -> bool:
-    """Tell whether a cell is named beside its own mark, not amid its points."""
-    return cell_id in plan and plan[cell_id].indoor
-
-
-def _name_group(axes: Axes, x: Floats, y: Floats, name: str) -> None:
-    """Write a group's name on that one of its points that lies nearest to their median."""
-    middle = int(np.argmin(np.hypot(x - np.median(x), y - np.median(y))))
-    axes.text(
-        float(x[middle]), float(y[middle]), name, ha="center", va="center", fontsize=8,
-        fontweight="bold", path_effects=list(HALO), zorder=12, clip_on=True,
-    )  # fmt: skip
-
-
-def _legend(figure: Figure, heading: str, handles: list[Line2D]) -> None:
-    """Put a legend to the right of the map."""
-    figure.legend(
-        handles=handles, title=heading, alignment="left", labelspacing=0.4, frameon=False,
-        loc="outside right upper", borderpad=0.9,
-    )  # fmt: skip

@@ -15,10 +15,11 @@ from mapfilter.database.store import open_database
 from mapfilter.radio.rasters import open_rasters
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.config import load_config
-from mapfilter.workflows.pictures import draw_coverage, draw_database, draw_site
+from mapfilter.workflows.pictures import classes_of_map, draw_network
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.replay import run_replay
 from mapfilter.workflows.simulate import run_simulate
+from mapfilter.workflows.world import World
 
 _STAGES = ("predict", "build", "simulate", "replay", "pictures")
 
@@ -107,14 +108,12 @@ def run_demo(
         replayed = run_replay(config, out / "replay")
     with stage("pictures"):
         database = open_database(built.database)
-        pictures = (
-            draw_coverage(open_rasters(predicted.rasters), database, out / "coverage.png"),
-            draw_database(database, out / "points-per-cell.png"),
-            draw_site(
-                database,
-                database.plan.cells[0].site,
-                out / "points-of-one-site.png",
-            ),
+        heights_m = World(config, database.lattice).heights_m
+        pictures = draw_network(
+            open_rasters(predicted.rasters),
+            database,
+            out,
+            landuse=classes_of_map(database, heights_m),
         )
     walk = replayed.logs[0]
     if walk.accuracy is None:
