@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from dataclasses import dataclass
 
@@ -39,7 +40,8 @@ class BuildEstimate:
     bytes : int
         Size of the database on disk.
     memory_bytes : int
-        Most memory that the process needs with one worker.
+        Most memory that a process needs which does it alone: what this one has taken to read a few
+        tiles, and the rows that wait to be written.
     seconds : float
         Time with one worker.
     """
@@ -92,14 +94,23 @@ def dry_run(
     writing_s = time.perf_counter() - began_s
     of_levels = levels / max(sum(tile.levels for tile in found), 1)
     waiting = min(levels, ROWS_IN_MEMORY + max(tile.levels for tile in found))
-    window = tile_px * tile_px * 4 * min(len(plan.ids), 128) * 2
     return BuildEstimate(
         round(points),
         round(levels),
         round(size),
-        round(_BYTES_OF_A_PROCESS + waiting * _BYTES_PER_LEVEL_IN_MEMORY + window),
+        round(peak_memory_bytes() + waiting * _BYTES_PER_LEVEL_IN_MEMORY),
         float(scale @ [tile.seconds for tile in found]) + writing_s * of_levels,
     )
+
+
+def peak_memory_bytes() -> int:
+    """Return the most memory that this process has taken, or a usual figure where nobody tells."""
+    try:
+        import resource
+    except ImportError:
+        return _BYTES_OF_A_PROCESS
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 import subprocess
 import sys
 import tempfile
@@ -16,7 +15,7 @@ import numpy as np
 
 from mapfilter._parallel import local_executor
 from mapfilter.database.build import BuildJob, build
-from mapfilter.database.estimate import dry_run
+from mapfilter.database.estimate import dry_run, peak_memory_bytes
 from mapfilter.database.tiles import read_tile
 from mapfilter.errors import ConfigError, fail
 from mapfilter.geodesy import Floats, Lattice
@@ -137,7 +136,7 @@ def build_made(rasters_path: Path, points: int) -> int:
     rasters = open_rasters(rasters_path)
     plan = made_plan(rasters.lattice, len(rasters.cell_ids))
     build(rasters, plan, made_routes(rasters.lattice, points), rasters_path.with_name("peak"))
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    return peak_memory_bytes()
 
 
 def _bench_build(folder: Path, cells: int, side_px: int, points: int, runs: int) -> BuildBench:

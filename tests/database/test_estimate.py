@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from mapfilter.database.build import build
-from mapfilter.database.estimate import dry_run
+from mapfilter.database.estimate import dry_run, peak_memory_bytes
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.database.store import info
 from mapfilter.geodesy import Lattice
@@ -72,4 +72,4 @@ def test_an_estimate_is_within_30_percent_of_the_build(tmp_path, size_px, cells,
     assert estimate.points == pytest.approx(points, rel=TOLERANCE)
     assert estimate.levels == pytest.approx(found["levels"], rel=TOLERANCE)
     assert estimate.bytes == pytest.approx(found["bytes"], rel=TOLERANCE)
-    assert 100e6 < estimate.memory_bytes < 1e9
+    assert estimate.memory_bytes >= peak_memory_bytes() * (1 - TOLERANCE)
