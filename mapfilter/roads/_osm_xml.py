@@ -133,7 +133,7 @@ def _faults_of(path: Path) -> Iterator[None]:
     except expat.ExpatError as error:
         where = f"{path} line {error.lineno}"
         raise fail(InputError, where, expected, expat.ErrorString(error.code), hint) from error
-    except (OSError, EOFError, zlib.error) as error:
+    except (OSError, EOFError, LookupError, ValueError, zlib.error) as error:
         raise fail(InputError, str(path), expected, error, hint) from error
 
 

@@ -12,6 +12,7 @@ from geopandas import GeoDataFrame
 from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
 from pyrosm.exceptions import PBFException
 from pyrosm.utils import get_bounding_box
+from shapely.errors import GEOSException
 
 from mapfilter.errors import InputError, fail
 from mapfilter.roads._elements import BoxDeg, Query
@@ -19,6 +20,11 @@ from mapfilter.roads._elements import BoxDeg, Query
 # Elements cut by the box and empty layers are expected here; anything else is still shown.
 _EXPECTED_WARNINGS = (r".*extend beyond the bounding box", r"Could not find any")
 _WHOLE_WORLD_DEG = 90.0
+# What decoding trips over when numbers in a file are not what they were.
+_DAMAGES = (
+    PBFException, DecodeError, EOFError, OSError, ValueError, TypeError, LookupError,
+    ArithmeticError, MemoryError, GEOSException,
+)  # fmt: skip
 
 
 def read_pbf(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | None:
@@ -69,7 +75,7 @@ def _guarded(path: Path, read: Callable[[], Any]) -> Any:
             for message in _EXPECTED_WARNINGS:
                 warnings.filterwarnings("ignore", message=message, category=UserWarning)
             return read()
-    except (PBFException, DecodeError, EOFError, OSError) as error:
+    except _DAMAGES as error:
         reason = str(error).split(". ")[0].strip() or type(error).__name__
         hint = "cut off, or another format under this name"
         raise fail(InputError, str(path), "a whole .osm.pbf file", reason, hint) from error

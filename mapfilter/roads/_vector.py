@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import warnings
 import zipfile
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,7 @@ from pyproj.exceptions import CRSError, ProjError
 from shapely.errors import GEOSException
 
 from mapfilter.errors import InputError, MapfilterError, fail
+from mapfilter.roads.clip import on_earth
 from mapfilter.roads.maps import box_deg
 from mapfilter.roads.ways import Bounds, Geometries
 
@@ -35,6 +37,13 @@ _HEAD_BYTES = 4096
 _POINTERS = (b"<OGRVRTDataSource", b"<OGRWFSDataSource", b"<OGRCSWDataSource", b"gdal_streamed_alg",
              b"<WFS_Capabilities", b"<VRTDataset")  # fmt: skip
 _MOST_DEG = 360.0
+# What reading trips over when a file is not what its format wants; a name that is not bound is
+# pyogrio's way of saying that a CRS cannot be written out.
+_DAMAGES = (
+    RuntimeError, ValueError, TypeError, LookupError, ArithmeticError, OSError, EOFError,
+    MemoryError, UnboundLocalError, GEOSException, ArrowException, CRSError, ProjError,
+    zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
 _SHP_LENGTH = slice(24, 28)
 
 
@@ -125,10 +134,10 @@ def _features(
     number = frame.index.to_numpy().astype(np.int64) + 1
     frame = _guarded(path, lambda: frame.to_crs(crs))
     geometry = shapely.force_2d(frame.geometry.to_numpy())
-    finite = np.isfinite(shapely.bounds(geometry)).all(axis=1) | shapely.is_empty(geometry)
-    if not finite.all():
-        notes.append(f"{path}: {(~finite).sum()} features left out: {crs} has no such places")
-    kept = finite & shapely.intersects(shapely.box(*bounds_m), geometry)
+    kept = on_earth(geometry)
+    if not kept.all():
+        notes.append(f"{path}: {(~kept).sum()} features left out: {crs} has no such places")
+    kept[kept] = shapely.intersects(shapely.box(*bounds_m), geometry[kept])
     values = {name: frame[name].to_numpy(dtype=object)[kept] for name in columns}
     return Features(geometry[kept], number[kept], values, tuple(notes))
 
@@ -155,12 +164,16 @@ def _check_file(path: Path) -> None:
         if size_bytes < told_bytes:
             raise fail(InputError, str(path), f"{told_bytes} bytes", size_bytes, "cut off")
     if zipfile.is_zipfile(path):
-        with zipfile.ZipFile(path) as archive:
-            unpacked_bytes = sum(inner.file_size for inner in archive.infolist())
+        unpacked_bytes = _guarded(path, lambda: _unpacked_bytes(path))
         allowed_bytes = _LARGEST_RATIO * size_bytes + _ALWAYS_ALLOWED_BYTES
         if unpacked_bytes > allowed_bytes:
             expected = f"at most {allowed_bytes >> 20} MB when unpacked"
             raise fail(InputError, str(path), expected, f"{unpacked_bytes >> 20} MB", "a bomb")
+
+
+def _unpacked_bytes(path: Path) -> int:
+    with zipfile.ZipFile(path) as archive:
+        return sum(inner.file_size for inner in archive.infolist())
 
 
 def _layer(path: Path, wanted: str | None) -> str:
@@ -214,9 +227,7 @@ def _guarded(path: Path, read: Callable[[], T]) -> T:
             warnings.simplefilter("ignore", RuntimeWarning)
             warnings.simplefilter("ignore", UserWarning)
             return read()
-    except (RuntimeError, ValueError, TypeError, OverflowError, OSError) as error:
-        raise _unreadable(path, error) from error
-    except (GEOSException, ArrowException, CRSError, ProjError) as error:
+    except _DAMAGES as error:
         raise _unreadable(path, error) from error
 
 

@@ -10,7 +10,20 @@ from mapfilter.roads.ways import Bounds, Geometries, Ways
 
 _LINE, _RING, _POLYGON = 1, 2, 3
 
+_FARTHEST_M = 1e8
+"""No map's coordinates are larger, and much larger ones overflow in products."""
+
 Indices = NDArray[np.int64]
+
+
+def on_earth(geometry: Geometries) -> NDArray[np.bool_]:
+    """Tell which geometries, in metres, have only coordinates that can be places."""
+    corner, origin = shapely.get_coordinates(geometry, return_index=True)
+    # Written so that NaN is no place.
+    is_place = (np.abs(corner) < _FARTHEST_M).all(axis=1)
+    good = np.ones(len(geometry), dtype=np.bool_)
+    good[origin[~is_place]] = False
+    return good
 
 
 def lines_inside(geometry: Geometries, bounds_m: Bounds) -> tuple[Geometries, Indices]:

