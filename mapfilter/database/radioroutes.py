@@ -16,6 +16,7 @@ from mapfilter.database.columns import read_columns
 from mapfilter.database.field import RadioField as RadioField
 from mapfilter.database.field import fill_field
 from mapfilter.database.manifest import POINTS
+from mapfilter.database.windows import WindowReader
 from mapfilter.errors import InputError, StoreError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
@@ -176,6 +177,8 @@ class RadioRouteDatabase:
     def field(self, bounds_m: tuple[float, float, float, float] | None = None) -> RadioField:
         """Return the levels of all cells over an area, also off the ways.
 
+        Only what lies in the area is read, save for rows stored together with it.
+
         Parameters
         ----------
         bounds_m : tuple of float, optional
@@ -187,22 +190,23 @@ class RadioRouteDatabase:
             The database has no point there.
         """
         top, left, window = self._window(bounds_m)
-        points = self.points()
-        row, col = points.row - top, points.col - left
-        inside = np.flatnonzero(window.contains(row, col))
-        if not inside.size:
+        area = (top, left, window.rows, window.cols)
+        columns = ("row", "col", "way_id", "on_square", "distance_to_way_m")
+        points = WindowReader([self.path / POINTS], columns, self.lattice).read(area)
+        if not points or not points["row"].size:
             where = "whole lattice" if bounds_m is None else f"area {bounds_m}"
             raise fail(InputError, where, "points of the database", "none", "another area or CRS")
+        order = np.lexsort((points["col"], points["row"]))
+        points = {name: values[order] for name, values in points.items()}
         heard: list[tuple[str, Rows, Rows, Floats32]] = []
         for cell_id in self.cell_ids:
-            _, cell_row, cell_col, level, _ = self._cell_levels(cell_id)
-            there = window.contains(cell_row - top, cell_col - left)
-            if there.any():
-                pixel = cell_row[there] - top, cell_col[there] - left
-                heard.append((cell_id, *pixel, level[there]))
-        on_way_m = np.where(points.on_square, np.float32(0), points.distance_to_way_m)[inside]
-        pixels = row[inside], col[inside]
-        return fill_field(window, pixels, points.way_id[inside], on_way_m, heard)
+            parts = self.level_parts.get(cell_id, ())
+            found = WindowReader(parts, ("row", "col", "level_dbm"), self.lattice).read(area)
+            if found and found["row"].size:
+                heard.append((cell_id, found["row"] - top, found["col"] - left, found["level_dbm"]))
+        on_way_m = np.where(points["on_square"], np.float32(0), points["distance_to_way_m"])
+        pixels = points["row"] - top, points["col"] - left
+        return fill_field(window, pixels, points["way_id"], on_way_m, heard)
 
     def _window(
         self, bounds_m: tuple[float, float, float, float] | None

@@ -84,12 +84,14 @@ class WindowReader:
         part, group = self._groups[number]
         try:
             with pq.ParquetFile(part, page_checksum_verification=True) as source:
-                table = source.read_row_group(group, columns=self._columns)
+                table = source.read_row_group(group, columns=["point", *self._columns])
             table.validate(full=True)
         except DAMAGE as error:
             raise damaged(part, error) from error
         at = table["row"].to_numpy(), table["col"].to_numpy()
-        if not self._lattice.contains(*at).all():
+        number = at[0].astype(np.int64) * self._lattice.cols + at[1]
+        placed = np.array_equal(number, table["point"].to_numpy())
+        if not (placed and self._lattice.contains(*at).all()):
             expected = "points on the database's lattice"
             raise fail(StoreError, str(part), expected, "others", "parts mixed up")
         return table
