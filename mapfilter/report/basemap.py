@@ -22,6 +22,7 @@ HALO = (withStroke(linewidth=2.5, foreground="white"),)
 """White rim that keeps text and marks readable on any ground."""
 
 _KILOMETRE_FROM_M = 1500.0
+_MOST_PX = 2400
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,14 +148,14 @@ def attribute(axes: Axes, base: BaseMap) -> None:
 
 
 def _draw_points(axes: Axes, frame: LocalFrame, points_m: Floats, resolution_m: float) -> None:
-    """Draw points as the pixels that they are the centres of."""
-    low = points_m.min(axis=0)
-    col, row = np.rint((points_m - low) / resolution_m).astype(np.int64).T
-    pixels = np.zeros((int(row.max()) + 1, int(col.max()) + 1, 4))
+    """Draw points as the pixels that they are the centres of; of large areas, as larger pixels."""
+    low = points_m.min(axis=0) - resolution_m / 2
+    side_m = max(resolution_m, float(np.ptp(points_m, axis=0).max()) / _MOST_PX)
+    col, row = ((points_m - low) / side_m).astype(np.int64).T
+    pixels = np.zeros((int(row.max()) + 1, int(col.max()) + 1, 4), dtype=np.float32)
     pixels[..., :3] = to_rgb(STREET)
     pixels[row, col, 3] = 0.75
-    edges = low - resolution_m / 2, points_m.max(axis=0) + resolution_m / 2
-    x, y = frame(*np.transpose(edges))
+    x, y = frame(*np.transpose([low, low + side_m * np.array(pixels.shape[1::-1])]))
     axes.imshow(pixels, extent=(x[0], x[1], y[0], y[1]), origin="lower", zorder=1)
 
 

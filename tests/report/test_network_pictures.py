@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from mapfilter.database.build import build
@@ -14,7 +15,7 @@ from mapfilter.radio.rasters import open_rasters, write_rasters
 from mapfilter.radio.survey import SurveyOptions, fit_survey
 from mapfilter.radio.survey_rasters import write_survey
 from mapfilter.radio.survey_validation import cross_validate
-from mapfilter.report.basemap import BaseMap
+from mapfilter.report.basemap import BaseMap, draw_base
 from mapfilter.report.canvas import BLUE, ORANGE
 from mapfilter.report.landuse import LandUseClasses, plot_landuse
 from mapfilter.report.layers import largest
@@ -89,13 +90,13 @@ def test_same_data_give_same_bytes(tmp_path):
 
 
 def test_margin_is_dark_where_cells_are_equal(tmp_path):
-    path, dark, alone = tmp_path / "m.png", "#00224e", "#fff7bc"
-    plan = plan_of("S1A")
-    counts = []
-    for margin_db in (0.5, np.inf, np.nan):
-        plot_margin(np.full((40, 50), margin_db), LATTICE, plan, BASE, path)
-        counts.append((pixels_near(path, dark) > 10**5, pixels_near(path, alone) > 10**5))
-    assert counts == [(True, False), (False, True), (False, False)]
+    path, plan = tmp_path / "m.png", plan_of("S1A")
+    margin_db = np.full((40, 50), np.nan)
+    margin_db[:, :20], margin_db[:, 20:30] = 0.5, np.inf
+    plot_margin(margin_db, LATTICE, plan, BASE, path)
+    dark, alone = (pixels_near(path, colour) for colour in ("#00224e", "#fff7bc"))
+    # Twenty and ten of fifty columns of a map of some 1050 x 840 pixels, less its marks.
+    assert np.allclose([dark, alone], [0.4 * 1050 * 840, 0.2 * 1050 * 840], rtol=0.1)
     with pytest.raises(InputError, match="dB >= 0"):
         plot_margin(np.full((40, 50), -1.0), LATTICE, plan, BASE, path)
     with pytest.raises(InputError, match="40 x 50 pixels"):
@@ -143,6 +144,22 @@ def test_survey_pictures_are_checked(tmp_path):
     with pytest.raises(OutputError):
         plot_left_out(np.zeros(3), np.zeros(3), tmp_path / "file" / "s.png")
     assert not path.exists()
+
+
+def test_points_of_large_areas_are_drawn_as_larger_pixels():
+    axes = Figure().subplots()
+    corner = np.array([385_000.0, 6_600_000.0])
+    # A country: pixel for pixel this would be 40 GB.
+    points_m = corner + np.array([[2.5, 2.5], [150_002.5, 2.5], [300_002.5, 400_002.5]])
+    west, south = corner
+    draw_base(axes, BaseMap((west, south, west + 4e5, south + 4e5), points_m=points_m))
+    image = axes.images[0]
+    alpha = image.get_array()[..., 3]
+    assert alpha.shape == (2401, 1801)
+    assert np.argwhere(alpha).tolist() == [[0, 0], [0, 900], [2400, 1800]]
+    # In km of the axes, which begin at the corner.
+    assert image.get_extent()[0::2] == [0.0, 0.0]
+    assert image.get_extent()[1] >= 300.005
 
 
 def test_the_largest_groups_are_kept():
