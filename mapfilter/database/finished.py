@@ -46,7 +46,7 @@ class FinishedTiles:
     """A hidden folder beside a database, with one file per finished tile.
 
     It is left when the build is killed or interrupted or a worker dies, and removed when the build
-    is done or its inputs are wrong.
+    is done, its inputs are wrong, or it cannot be written.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class FinishedTiles:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None or issubclass(kind, InputError):
+        if kind is None or issubclass(kind, InputError | OutputError):
             shutil.rmtree(self.folder, ignore_errors=True)
 
     def load(self, number: int) -> TileRows | None:

