@@ -67,7 +67,7 @@ def map_bounds_deg(name_or_path: str | Path) -> BoxDeg:
         The map is missing, damaged or holds no way.
     """
     path = resolve_map(name_or_path)
-    told = pbf_bounds_deg(path) if _is_pbf(path) else xml_bounds_deg(path)
+    told = _told_bounds_deg(path)
     if told is not None:
         return told
     found = _read(path, None, _ANY_WAY)
@@ -133,14 +133,15 @@ def read_elements(
 
 
 def check_on_map(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> None:
-    """See that a box in metres overlaps what the map covers.
+    """See that a box in metres overlaps what the map's header says that it covers.
 
     Raises
     ------
     InputError
         It does not, with the likely mistake; or the map is missing or damaged.
     """
-    if not _overlap(box_deg(crs, bounds_m), map_bounds_deg(name_or_path)):
+    told = _told_bounds_deg(resolve_map(name_or_path))
+    if told is not None and not _overlap(box_deg(crs, bounds_m), told):
         raise nothing_there(name_or_path, crs, bounds_m)
 
 
@@ -156,6 +157,10 @@ def nothing_there(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> Mapfi
     extent = ", ".join(f"{value:.4f}" for value in covered)
     where = f"{name_or_path}, area {numbers}"
     return fail(InputError, where, f"ways; the map covers {extent}", "none", hint)
+
+
+def _told_bounds_deg(path: Path) -> BoxDeg | None:
+    return pbf_bounds_deg(path) if _is_pbf(path) else xml_bounds_deg(path)
 
 
 def _is_pbf(path: Path) -> bool:
