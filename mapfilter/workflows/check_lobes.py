@@ -16,7 +16,7 @@ from mapfilter.workflows.findings import Findings, listed
 
 _FAR_PX, _FAR_M = 10.0, 150.0
 _CLEARLY_WORSE, _FITS = 0.35, 0.35
-_MILDLY_WORSE = 0.1
+_MILDLY_WORSE = 0.2
 _TURNED_BETTER, _TURNED_FITS = 0.25, 0.4
 _TURNED_SLIGHTLY, _LOBES_BETTER = 0.1, 0.3
 _MUCH_ABOVE_DB = 15.0
@@ -182,12 +182,14 @@ def _check_peaks(
         there = falls_with_distance(sample, east_m, north_m)
         if own > _FITS or there - own < _CLEARLY_WORSE:
             continue
+        off.append((cell.id, away_m, own, there))
         other = _nearest_site(plan, cell, east_m, north_m)
         if other is not None and _fits(sample, other, own):
             exchanged.append((cell.id, other.site))
-        else:
-            off.append((cell.id, away_m, own, there))
     exchanged += _counterparts(seen, plan, exchanged)
+    # Where no raster came in return, it is the site that is wrong.
+    given = {plan[cell_id].site for cell_id, _ in exchanged}
+    exchanged = [(cell_id, site) for cell_id, site in exchanged if site in given]
     moved = {cell_id for cell_id, _ in exchanged}
     off = [one for one in off if one[0] not in moved]
     if exchanged:
