@@ -237,3 +237,10 @@ def test_what_is_no_vector_file(tmp_path):
     ):
         with pytest.raises(InputError, match=message):
             read_layer_roads(tmp_path / name, *AREA)
+
+
+@pytest.mark.parametrize("name", ["a.shp", "a.gpkg", "a.geojson", "a.fgb", "a.parquet"])
+def test_empty_layers(tmp_path, name):
+    path = write(ROADS[:0], tmp_path / name)
+    with pytest.raises(InputError, match=name):
+        read_layer_roads(path, *AREA)
