@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import shapely
 from command_line import assert_done, assert_refused, mapfilter
-from conftest import PLAN
 
 from mapfilter.database.store import open_database
 from mapfilter.geodesy import unproject
@@ -17,6 +16,11 @@ from mapfilter.workflows.world import World
 CRS = "EPSG:32635"
 WEST, SOUTH = 385_800.0, 6_671_700.0
 BOX = ["area.bbox=24.9420,60.1660,24.9495,60.1697", "area.crs=EPSG:32635"]
+
+PLAN = """cell,site,lat,lon,height_m,azimuth_deg,eirp_dbm,frequency_mhz
+A,S1,60.16690,24.94300,30,60,50,1825.2
+B,S2,60.16890,24.94880,25,240,50,1827.6
+"""
 
 LAYERS = """[area]
 map = "none"
