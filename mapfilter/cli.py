@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import json
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
 from mapfilter import __version__
 from mapfilter.errors import ConfigError, MapfilterError, fail
-
-if TYPE_CHECKING:
-    from mapfilter._parallel import Progress
+from mapfilter.workflows.terminal import print_result, progress_bar, say
 
 DONE, WRONG, PARTIAL = 0, 2, 3
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -65,11 +61,11 @@ def demo(
     """Run the whole chain on the embedded map of central Helsinki."""
     from mapfilter.workflows.demo import run_demo
 
-    with _progress("demo") as progress:
+    with progress_bar("demo") as progress:
         result = run_demo(
             (out or Path("mapfilter-demo")).absolute(), settings or (), seed=seed, progress=progress
         )
-    _print(result, as_json)
+    print_result(result, as_json)
 
 
 @app.command()
@@ -83,10 +79,10 @@ def check(
     from mapfilter.workflows.config import load_config
     from mapfilter.workflows.findings import paragraphs
 
-    with _progress("check") as progress:
+    with progress_bar("check") as progress:
         result = run_check(load_config(config, settings or ()), progress)
     if as_json:
-        _print(result, as_json)
+        print_result(result, as_json)
     else:
         sys.stdout.write("\n\n".join(paragraphs(result)) + "\n")
     if not result.ok:
@@ -106,9 +102,9 @@ def predict(
     from mapfilter.workflows.predict import run_predict
 
     seeded = _seeded(settings, seed, "prediction.seed", "prediction.reality.seed")
-    with _progress("predict") as progress:
+    with progress_bar("predict") as progress:
         result = run_predict(load_config(config, seeded, out=out), progress)
-    _print(result, as_json)
+    print_result(result, as_json)
 
 
 @app.command()
@@ -135,13 +131,13 @@ def build(
 
     loaded = load_config(config, settings or (), out=out)
     if dry_run:
-        _print(run_dry_build(loaded), as_json)
+        print_result(run_dry_build(loaded), as_json)
         return
-    with _progress("build") as progress:
+    with progress_bar("build") as progress:
         result = run_build(
             loaded, workers=workers, cluster=cluster, resume=resume, progress=progress
         )
-    _print(result, as_json)
+    print_result(result, as_json)
 
 
 @app.command()
@@ -159,9 +155,9 @@ def merge(
     from mapfilter.workflows.merge import run_merge
 
     given = [_given_path(path) or path for path in databases]
-    with _progress("merge") as progress:
+    with progress_bar("merge") as progress:
         result = run_merge(given, out.absolute(), without=without or (), progress=progress)
-    _print(result, as_json)
+    print_result(result, as_json)
 
 
 @app.command()
@@ -173,7 +169,7 @@ def bench(
     """Tell how fast a stage is on this machine."""
     from mapfilter.workflows.bench import run_bench
 
-    _print(run_bench(stage, runs=runs), as_json)
+    print_result(run_bench(stage, runs=runs), as_json)
 
 
 @app.command()
@@ -188,7 +184,7 @@ def export(
     """Write a radio-route database as GeoPackage, or best server and margin as GeoTIFF."""
     from mapfilter.workflows.export import run_export
 
-    _print(run_export(database, to), as_json)
+    print_result(run_export(database, to), as_json)
 
 
 @app.command()
@@ -196,7 +192,7 @@ def info(path: PathArgument, as_json: JsonOption = False) -> None:
     """Tell what a database, raster set or log holds."""
     from mapfilter.workflows.info import run_info
 
-    _print(run_info(path), as_json)
+    print_result(run_info(path), as_json)
 
 
 @app.command()
@@ -212,9 +208,9 @@ def simulate(
     from mapfilter.workflows.simulate import run_simulate
 
     seeded = _seeded(settings, seed, "journeys.seed")
-    with _progress("simulate") as progress:
+    with progress_bar("simulate") as progress:
         result = run_simulate(load_config(config, seeded, out=out), progress)
-    _print(result, as_json)
+    print_result(result, as_json)
 
 
 @app.command()
@@ -251,11 +247,11 @@ def replay(
         given.append(f"track.without={_toml([kind.strip() for kind in without.split(',')])}")
     loaded = load_config(config, given)
     folder = (out or loaded.output.dir / "replay").absolute()
-    with _progress("replay") as progress:
+    with progress_bar("replay") as progress:
         result = run_replay(loaded, folder, progress=progress)
-    _print(replay_facts(result), as_json)
+    print_result(replay_facts(result), as_json)
     for warning in result.warnings:
-        _say(warning)
+        say(warning)
     if result.partial:
         raise typer.Exit(PARTIAL)
 
@@ -274,17 +270,17 @@ def main() -> None:
     try:
         app()
     except MapfilterError as error:
-        _say(str(error), "error: ")
+        say(str(error), "error: ")
         sys.exit(WRONG)
     except MemoryError:
         hint = "too large an area, too fine a resolution, or a value in the wrong unit"
-        _say(f"memory: expected enough of it, found none left (likely: {hint})", "error: ")
+        say(f"memory: expected enough of it, found none left (likely: {hint})", "error: ")
         sys.exit(WRONG)
     except OSError as error:
         if error.errno not in _NO_SPACE:
             raise
         where = error.filename or "the output"
-        _say(f"{where}: expected space on the disk, found none left", "error: ")
+        say(f"{where}: expected space on the disk, found none left", "error: ")
         sys.exit(WRONG)
 
 
@@ -298,34 +294,3 @@ def _toml(value: str | list[str]) -> str:
     """Return a text, or a list of texts, as TOML writes it."""
     # Escapes of JSON in the ASCII form are pairs of surrogates, which TOML does not know.
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _say(text: str, kind: str = "") -> None:
-    for line in text.splitlines():
-        sys.stderr.write(f"mapfilter: {kind}{line}\n")
-
-
-@contextlib.contextmanager
-def _progress(label: str) -> Iterator[Progress | None]:
-    """Give a progress bar on stderr, or nothing when nobody watches."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import Progress as Bar
-
-    with Bar(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(label)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
-
-
-def _print(result: Any, as_json: bool) -> None:
-    """Print a result: one JSON line, or one line for each figure."""
-    from mapfilter.workflows.facts import facts, text_lines
-
-    found = facts(result)
-    if as_json:
-        sys.stdout.write(json.dumps(found, ensure_ascii=False, allow_nan=False) + "\n")
-        return
-    for line in text_lines(found):
-        sys.stdout.write(line + "\n")

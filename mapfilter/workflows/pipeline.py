@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
-import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -12,8 +10,9 @@ from typing import Any
 
 from mapfilter.errors import MapfilterError
 from mapfilter.workflows.config import load_config
-from mapfilter.workflows.facts import facts, text_lines
+from mapfilter.workflows.facts import facts
 from mapfilter.workflows.sections import Config
+from mapfilter.workflows.terminal import print_result, say
 
 Stage = Callable[[Config], Any]
 
@@ -45,10 +44,10 @@ def run_pipeline(stages: Mapping[str, Stage], file: Path, argv: Sequence[str] | 
             found[name] = facts(stage(config))
             found[name]["seconds"] = round(time.perf_counter() - began_s, 3)
             if not given.json:
-                sys.stdout.write("\n".join(text_lines({name: found[name]})) + "\n")
+                print_result({name: found[name]}, as_json=False)
     except MapfilterError as error:
-        sys.stderr.write("".join(f"mapfilter: error: {line}\n" for line in str(error).splitlines()))
+        say(str(error), "error: ")
         return 2
     if given.json:
-        sys.stdout.write(json.dumps(found, ensure_ascii=False, allow_nan=False) + "\n")
+        print_result(found, as_json=True)
     return 3 if any(stage.get("partial") for stage in found.values()) else 0
