@@ -1,5 +1,6 @@
 """Rasters on a disk that is full at either step of writing them."""
 
+import contextlib
 import resource
 
 import numpy as np
@@ -13,34 +14,40 @@ from mapfilter.radio.raster_writer import write_rasters
 LATTICE = Lattice("EPSG:32629", 531_000.0, 4_556_000.0, 5.0, 512, 512)
 
 
-@pytest.fixture
-def limit_files():
-    """Let no file grow beyond a size, as a full disk would, until the test is over."""
+@contextlib.contextmanager
+def limited_files(size):
+    """Let no file grow beyond a size, as a full disk would.
+
+    Only for the block: pytest itself must be able to write its report to a file.
+    """
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-def assert_told(path):
+def assert_told(path, limit=contextlib.nullcontext):
     noise = np.random.default_rng(1).uniform(-120, -40, (512, 512))
-    with pytest.raises(OutputError, match=r"x\.tif: expected a raster that can be written"):
+    with limit(), pytest.raises(OutputError) as caught:
         write_rasters(path, LATTICE, [("A", noise)], ["A"])
+    assert "x.tif: expected a raster that can be written" in str(caught.value)
     assert list(path.parent.iterdir()) == []
 
 
 @pytest.mark.parametrize("size", [0, 100_000, 1_000_000])
-def test_the_bands_do_not_fit(tmp_path, limit_files, size):
-    limit_files(size)
-    assert_told(tmp_path / "x.tif")
+def test_the_bands_do_not_fit(tmp_path, size):
+    assert_told(tmp_path / "x.tif", lambda: limited_files(size))
 
 
 @pytest.mark.parametrize("size", [0, 100_000, 500_000])
-def test_the_final_file_does_not_fit(tmp_path, limit_files, monkeypatch, size):
+def test_the_final_file_does_not_fit(tmp_path, monkeypatch, size):
     copy = raster_writer.copy_raster
 
     def copy_to_a_full_disk(*args, **options):
-        limit_files(size)
-        return copy(*args, **options)
+        with limited_files(size):
+            return copy(*args, **options)
 
     monkeypatch.setattr(raster_writer, "copy_raster", copy_to_a_full_disk)
     assert_told(tmp_path / "x.tif")
