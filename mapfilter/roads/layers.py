@@ -6,6 +6,7 @@ has no access rules: what one must not use is left out by its class, with a half
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,13 +36,21 @@ class LayerRoads:
     ----------
     ways : Ways
     areas : Squares
+    area_class : tuple of str
+        Kind of each area.
     notes : tuple of str
         What was left out.
     """
 
     ways: Ways
     areas: Squares
+    area_class: tuple[str, ...]
     notes: tuple[str, ...]
+
+    def areas_without(self, classes: Container[str]) -> Squares:
+        """Return the areas that are not of some classes."""
+        kept = np.array([name not in classes for name in self.area_class], dtype=np.bool_)
+        return Squares(self.areas.crs, self.areas.area_id[kept], self.areas.geometry[kept])
 
 
 def read_layer_roads(
@@ -100,7 +109,8 @@ def read_layer_roads(
         none.astype(bool),
         none,
     )
-    return LayerRoads(ways, Squares(crs, number[of_area], areas), found.notes)
+    squares = Squares(crs, number[of_area], areas)
+    return LayerRoads(ways, squares, tuple(map(str, words[of_area])), found.notes)
 
 
 def read_layer_buildings(

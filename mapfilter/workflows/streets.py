@@ -159,7 +159,9 @@ class Streets:
                 class_column=roads.class_column,
                 id_column=roads.id_column,
             )
-            return layer.ways, layer.areas if roads.squares else None, layer.notes
+            left_out = [name for name, m in roads.half_width_by_class_m.items() if m == 0]
+            areas = layer.areas_without(left_out) if roads.squares else None
+            return layer.ways, areas, layer.notes
         if not self._has_map and roads.landuse is not None:
             return Ways.none(lattice.crs), None, ()
         if not self._has_map:

@@ -122,6 +122,8 @@ def test_polygons_of_roads_are_areas(tmp_path):
     assert shapely.area(found.areas.geometry).sum() == pytest.approx(300 + 800)
     routes = route_lattice(found.ways, found.areas, None, Lattice.covering(CRS, AREA[1], 5.0))
     assert routes.on_square.all()
+    named = read_layer_roads(tmp_path / "a.fgb", *AREA, class_column="a")
+    assert set(named.areas_without(["2"]).area_id.tolist()) == {1}
 
 
 def test_heights_and_missing_shapes_are_no_trouble(tmp_path):
