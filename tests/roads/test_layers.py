@@ -122,7 +122,7 @@ def test_polygons_of_roads_are_areas(tmp_path):
     assert shapely.area(found.areas.geometry).sum() == pytest.approx(300 + 800)
     routes = route_lattice(found.ways, found.areas, None, Lattice.covering(CRS, AREA[1], 5.0))
     assert routes.on_square.all()
-    named = read_layer_roads(tmp_path / "a.fgb", *AREA, class_column="a")
+    named = read_layer_roads(tmp_path / "a.fgb", *AREA, class_column="a", id_column="a")
     assert set(named.areas_without(["2"]).area_id.tolist()) == {1}
 
 
