@@ -1,0 +1,1 @@
+"""How things move and how they are heard, as equations over arrays."""
