@@ -1,0 +1,71 @@
+"""The command line: parses, calls one workflow, prints. Logs and progress go to stderr."""
+
+from __future__ import annotations
+
+import errno
+import sys
+from typing import Annotated
+
+import typer
+
+from mapfilter import __version__
+from mapfilter.cli.databases import build, check, export, info, merge, predict
+from mapfilter.cli.experiments import bench
+from mapfilter.cli.options import DONE, WRONG
+from mapfilter.cli.tracks import demo, replay, simulate
+from mapfilter.errors import MapfilterError
+from mapfilter.workflows.terminal import say
+
+__all__ = ["app", "main"]
+
+_NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+app = typer.Typer(
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    no_args_is_help=True,
+    help="Find where a phone or a vehicle is without GNSS.",
+)
+
+for _command in (
+    demo,
+    check,
+    predict,
+    build,
+    merge,
+    export,
+    info,
+    simulate,
+    replay,
+    bench,
+):
+    app.command()(_command)
+
+
+@app.callback(invoke_without_command=True)
+def _version(
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    if version:
+        sys.stdout.write(f"mapfilter {__version__}\n")
+        raise typer.Exit(DONE)
+
+
+def main() -> None:
+    """Run the command line; a user's error is one clear message and exit code 2."""
+    try:
+        app()
+    except MapfilterError as error:
+        say(str(error), "error: ")
+        sys.exit(WRONG)
+    except MemoryError:
+        hint = "too large an area, too fine a resolution, or a value in the wrong unit"
+        say(f"memory: expected enough of it, found none left (likely: {hint})", "error: ")
+        sys.exit(WRONG)
+    except OSError as error:
+        if error.errno not in _NO_SPACE:
+            raise
+        where = error.filename or "the output"
+        say(f"{where}: expected space on the disk, found none left", "error: ")
+        sys.exit(WRONG)

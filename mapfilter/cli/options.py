@@ -1,0 +1,51 @@
+"""Options that several commands share, and how they become settings."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mapfilter.errors import ConfigError, fail
+
+DONE, WRONG, PARTIAL = 0, 2, 3
+"""Exit codes."""
+
+
+def given_path(path: Path | None) -> Path | None:
+    """Refuse what cannot be a path, before anything is opened."""
+    from mapfilter.workflows.paths import path_fault, shown
+
+    if path is not None and (wrong := path_fault(path)):
+        raise fail(ConfigError, "command line", wrong, shown(str(path)))
+    return path
+
+
+ConfigOption = Annotated[
+    Path | None, typer.Option("-c", "--config", metavar="FILE", help="Configuration (TOML).")
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Change one setting; repeatable."),
+]
+OutOption = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Output folder.", callback=given_path),
+]
+SeedOption = Annotated[int | None, typer.Option("--seed", min=0, help="Seed of what is drawn.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on one line.")]
+PathArgument = Annotated[Path, typer.Argument(metavar="PATH", callback=given_path)]
+
+
+def seeded(settings: list[str] | None, seed: int | None, *keys: str) -> list[str]:
+    """Return the settings with a seed for each key, after what was set by name."""
+    seeds = [] if seed is None else [f"{key}={seed}" for key in keys]
+    return [*(settings or ()), *seeds]
+
+
+def toml(value: str | list[str]) -> str:
+    """Return a text, or a list of texts, as TOML writes it."""
+    # Escapes of JSON in the ASCII form are pairs of surrogates, which TOML does not know.
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
