@@ -116,7 +116,7 @@ def ordered_results(
     """Yield ``function(task)`` for every task, in order, with at most ``in_flight`` waiting.
 
     Tasks are taken as they are needed, so memory stays bounded by ``in_flight`` tasks and results,
-    however many there are; twice the number of workers keeps all of them busy. Only to tell
+    however many there are; four times the number of workers keeps all of them busy. Only to tell
     progress must they be counted first.
 
     Raises

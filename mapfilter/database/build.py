@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -82,7 +83,7 @@ def build(
     executor : Executor, optional
         Where tiles are read; the result does not depend on it.
     in_flight : int
-        Tasks handed to it at a time; twice its workers keeps all of them busy.
+        Tasks handed to it at a time; four for each worker keep all of them busy.
     tiles_a_task : int
         Tiles in a task: many where handing one over takes long.
     writers : int
@@ -105,10 +106,17 @@ def build(
     job = BuildJob.of(rasters, plan, routes, floor_dbm, tile_px)
     out = Path(out)
     check_replaceable(out, MANIFEST, FORMAT)
-    inputs = (*inputs, InputFile("rasters", rasters.path.name, rasters.sha256()))
     parameters = {"margin_db": float(margin_db), "floor_dbm": float(floor_dbm), "tile_px": tile_px}
-    key = work_key(inputs[-1].sha256, rasters, job.plan, job.routes.digest(), parameters)
-    with FinishedTiles(out, key, keep=resume) as finished, atomic_dir(out) as folder:
+    with ThreadPoolExecutor(1) as aside, ExitStack() as stack:
+        # The rasters are hashed while the first tiles are made.
+        digest = aside.submit(rasters.sha256)
+
+        def key() -> str:
+            laid = job.routes.digest()
+            return work_key(digest.result(), rasters, job.plan, laid, parameters)
+
+        finished = stack.enter_context(FinishedTiles(out, key, keep=resume))
+        folder = stack.enter_context(atomic_dir(out))
         made = job.made(executor or SerialExecutor(), finished, in_flight, tiles_a_task)
         crs, ids = rasters.lattice.crs, job.plan.ids
         written = write_parts(folder, crs, ids, made, len(job.windows), writers, progress)
@@ -122,6 +130,7 @@ def build(
             "points_below_floor": written.points - written.heard,
             "points_off_rasters": job.off_rasters(written.points),
         }
+        inputs = (*inputs, InputFile("rasters", rasters.path.name, digest.result()))
         head = Head(rasters.lattice, job.plan, parameters, attribution, inputs, counts)
         head.write(folder, written.parts)
     return open_database(out)
@@ -190,7 +199,7 @@ class BuildJob:
         self, executor: Executor, finished: FinishedTiles, in_flight: int, tiles_a_task: int
     ) -> Iterator[TileRows]:
         """Yield the tiles in order: those that are finished already, and the others as made."""
-        missing = [n for n in range(len(self.windows)) if finished.load(n) is None]
+        missing = finished.missing(len(self.windows))
         groups = [missing[n : n + tiles_a_task] for n in range(0, len(missing), tiles_a_task)]
         tasks = ([self.task(number) for number in group] for group in groups)
         results = ordered_results(executor, read_tiles, tasks, in_flight=in_flight)

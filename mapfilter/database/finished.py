@@ -8,8 +8,9 @@ import json
 import os
 import shutil
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -52,26 +53,35 @@ class FinishedTiles:
     ----------
     database : Path
         The folder that is being built.
-    key : str
-        Of the inputs: tiles of others are never taken.
+    key : callable
+        Gives a checksum of the inputs, when it is first needed: tiles of others are never taken.
     keep : bool
         Take tiles that are there already.
     """
 
-    def __init__(self, database: Path, key: str, *, keep: bool = False) -> None:
-        self.folder = database.parent / f".{database.name}.tiles-{key[:16]}"
-        self._prefix = f".{database.name}.tiles-"
-        self._keep = keep
+    def __init__(self, database: Path, key: Callable[[], str], *, keep: bool = False) -> None:
+        self._database, self._key = database, key
+        self.keep = keep
+
+    @cached_property
+    def folder(self) -> Path:
+        """Where the tiles lie; emptied at first, unless they are kept."""
+        folder = self._database.parent / f".{self._database.name}.tiles-{self._key()[:16]}"
+        if not self.keep:
+            shutil.rmtree(folder, ignore_errors=True)
+        return folder
 
     def __enter__(self) -> FinishedTiles:
-        if not self._keep:
-            shutil.rmtree(self.folder, ignore_errors=True)
-        ensure_writable_folder(self.folder.parent)
+        ensure_writable_folder(self._database.parent)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is None or issubclass(kind, InputError | OutputError):
             shutil.rmtree(self.folder, ignore_errors=True)
+
+    def missing(self, total: int) -> list[int]:
+        """Return the tiles, of so many, that are still to be made."""
+        return [n for n in range(total) if not self.keep or self.load(n) is None]
 
     def load(self, number: int) -> TileRows | None:
         """Return a finished tile, or None when there is none or its file is damaged."""

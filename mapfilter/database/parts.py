@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-import shapely
 
 from mapfilter.database.columns import open_writer, write_columns
 from mapfilter.database.manifest import POINTS, describe_part, levels_folders
 from mapfilter.database.tiles import TileLevels, TileRows
 from mapfilter.geodesy import Floats
-from mapfilter.roads.geoparquet import dictionary, geo_metadata
+from mapfilter.roads.geoparquet import dictionary, geo_metadata, point_coordinates
 
 _ROWS_IN_A_GROUP = 1 << 16
 ROWS_IN_MEMORY = 1 << 22
@@ -62,7 +62,7 @@ class PartWriter:
     crs : str
     cell_ids : tuple of str
     writers : int
-        Cells written at a time; the parts do not depend on it.
+        Parts written at a time; they do not depend on it.
     """
 
     def __init__(self, folder: Path, crs: str, cell_ids: tuple[str, ...], writers: int = 1) -> None:
@@ -112,26 +112,23 @@ class PartWriter:
         return [points, *(part for cell in sorted(self._written) for part in self._written[cell])]
 
     def _flush(self) -> None:
-        if self._points:
-            self._write_points(pa.concat_tables(self._points).unify_dictionaries())
-        if self._writers == 1:
-            for cell in sorted(self._levels):
-                self._write_levels(cell)
-        else:
-            with ThreadPoolExecutor(self._writers) as pool:
-                list(pool.map(self._write_levels, sorted(self._levels)))
+        parts: list[Callable[[], None]] = [self._write_points] if self._points else []
+        parts += [partial(self._write_levels, cell) for cell in sorted(self._levels)]
+        with ThreadPoolExecutor(self._writers) as pool:
+            for written in [pool.submit(write) for write in parts]:
+                written.result()
         self._points, self._levels, self._waiting = [], {}, 0
 
-    def _write_points(self, table: pa.Table) -> None:
-        table = table.replace_schema_metadata(None)
+    def _write_points(self) -> None:
+        table = pa.concat_tables(self._points).unify_dictionaries().replace_schema_metadata(None)
         if self._points_file is None:
             self._points_file = open_writer(table.schema, self._folder / POINTS)
         self._points_file.write_table(table, row_group_size=_ROWS_IN_A_GROUP)
         self._points_written += table.num_rows
-        geometry = shapely.from_wkb(table["geometry"].to_numpy(zero_copy_only=False))
-        corner = shapely.get_coordinates(geometry)
-        low, high = self._bounds
-        self._bounds = np.minimum(low, corner.min(axis=0)), np.maximum(high, corner.max(axis=0))
+        for chunk in table["geometry"].chunks:
+            places = point_coordinates(chunk)
+            low, high = self._bounds
+            self._bounds = np.minimum(low, places.min(axis=0)), np.maximum(high, places.max(axis=0))
 
     def _write_levels(self, cell: int) -> None:
         cell_id = self._cell_ids[cell]

@@ -55,23 +55,28 @@ def check_plausible(values: NDArray[np.float32], quantity: Quantity, path: Path)
     InputError
         They cannot; the likely mistake is told.
     """
-    known = values[~np.isnan(values)]
-    if not known.size:
+    lowest, highest = (extreme.reduce(values, axis=None) for extreme in (np.fmin, np.fmax))
+    if np.isnan(lowest):
         return
     where = f"{path} pixels"
     low, high, hint = _PLAUSIBLE[quantity]
-    lowest, highest = known.min(), known.max()
     got = f"{lowest:g}..{highest:g}"
     if not (low <= lowest and highest <= high):
         unit = "dBm" if quantity == "level" else "dB"
         expected = f"a {quantity} in {low:g}..{high:g} {unit}"
+        known = values[~np.isnan(values)]
         raise fail(InputError, where, expected, got, _hint(known, low, high) or hint)
-    if quantity == "level" and 2 * (known >= 0).sum() > known.size:
+    if quantity == "level" and highest >= 0 and _most(values >= 0, values):
         got = f"{got}, mostly 0 and above"
         raise fail(InputError, where, "levels in dBm, mostly below 0", got, hint)
-    if quantity == "loss" and 2 * (known < _LEAST_LOSS_DB).sum() > known.size:
+    if quantity == "loss" and lowest < _LEAST_LOSS_DB and _most(values < _LEAST_LOSS_DB, values):
         expected = f"path losses, mostly above {_LEAST_LOSS_DB:g} dB"
         raise fail(InputError, where, expected, got, "a factor that is not the file's, or RXLEV")
+
+
+def _most(chosen: NDArray[np.bool_], values: NDArray[np.float32]) -> bool:
+    """Tell whether more than half of the known values are chosen."""
+    return bool(2 * np.count_nonzero(chosen) > np.count_nonzero(~np.isnan(values)))
 
 
 def _hint(known: NDArray[np.float32], low: float, high: float) -> str:

@@ -65,8 +65,8 @@ class GeoTiff:
             with rasterio.open(self.path, driver="GTiff") as source:
                 part = RasterioWindow(col, row, cols, rows)
                 values = _masked(source, numbers, part)
-                scales = np.array([source.scales[n - 1] for n in numbers])
-                offsets = np.array([source.offsets[n - 1] for n in numbers])
+                scales = np.array(source.scales)[bands]
+                offsets = np.array(source.offsets)[bands]
         except (RasterioError, UnicodeDecodeError) as error:
             raise fail(
                 InputError, str(self.path), "readable pixels", reason(error), "cut off or damaged"
@@ -130,8 +130,10 @@ def open_geotiff(
 
 def _masked(source: Any, bands: list[int], window: Any) -> Floats32:
     """Read bands with NaN where the file's own mask or nodata value says so."""
-    flags = {flag.name for band in bands for flag in source.mask_flag_enums[band - 1]}
-    own = {source.nodatavals[band - 1] for band in bands}
+    # Each of these properties asks the file about all of its bands.
+    masks, empty = source.mask_flag_enums, source.nodatavals
+    flags = {flag.name for band in bands for flag in masks[band - 1]}
+    own = {empty[band - 1] for band in bands}
     if flags <= {"all_valid", "nodata"} and all(n is None or math.isnan(n) for n in own):
         return np.asarray(source.read(bands, window=window, out_dtype=np.float32))
     data = source.read(bands, window=window, masked=True)

@@ -22,6 +22,7 @@ from mapfilter.workflows.world import World, area_lattice, check_scale, planned_
 
 PIXELS_A_TASK = 10_000_000
 MOST_TILES_A_TASK = 64
+_TASKS_A_WORKER = 4
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ def run_build(
             inputs=_inputs(world),
             attribution=world.streets.attribution,
             executor=executor,
-            in_flight=2 * workers,
+            in_flight=_TASKS_A_WORKER * workers,
             tiles_a_task=tiles_a_task,
             writers=workers,
             resume=resume,
