@@ -78,6 +78,8 @@ def position_by_candidates(
     log: TrackLog,
     options: CandidateOptions,
     rng: np.random.Generator,
+    *,
+    ways: bool = True,
 ) -> PositionedTrack:
     """Locate a log with the candidate filter (Khalaf-Allah 2007, Tables 2 and 3).
 
@@ -96,6 +98,8 @@ def position_by_candidates(
         The reading of the paper.
     rng : numpy.random.Generator
         Part of the filter contract; this filter draws nothing.
+    ways : bool
+        Whether positions are matched to ways.
 
     Raises
     ------
@@ -126,7 +130,7 @@ def position_by_candidates(
     estimate = TrackEstimate.of_fixes(
         database.lattice.crs,
         "candidate",
-        _with_ways(database, fixes),
+        _with_ways(database, fixes) if ways else fixes,
         start_utc_s=log.start_utc_s,
         unused=sorted(unused, key=lambda reading: reading.time_s),
     )

@@ -10,23 +10,20 @@ from mapfilter.database.store import open_database
 from mapfilter.evaluation.accuracy import accuracy
 from mapfilter.evaluation.outcome import outcome
 from mapfilter.evaluation.success import summarise
-from mapfilter.filters.candidate_options import CandidateOptions
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
-from mapfilter.positioning.global_positioning import (
-    PositionedTrack,
-    cell_points,
-    position_by_candidates,
-)
+from mapfilter.positioning.global_positioning import PositionedTrack
+from mapfilter.positioning.locators import open_locator
 from mapfilter.radio.shadowing import named_rng
 from mapfilter.tracks.leave_out import leave_out
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.store import list_logs, read_log
 from mapfilter.workflows.facts import facts
+from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.log_checks import check_logs, lacking
 from mapfilter.workflows.pictures import draw_track
 from mapfilter.workflows.replayed import ReplayedLog, ReplayResult, summary_figures
 from mapfilter.workflows.results import ESTIMATES, FIGURES, SUMMARY, clear_results
-from mapfilter.workflows.sections import Config, FilterSection
+from mapfilter.workflows.sections import Config
 from mapfilter.workflows.truth import truth_of
 
 
@@ -57,13 +54,13 @@ def run_replay(
     check_logs(folders, database.lattice)
     ensure_writable_folder(out)
     clear_results(out)
-    points_of = cell_points(database, config.filter.margin_db)
-    options = candidate_options(config.filter, database.lattice.resolution_m)
+    choice = filter_choice(config.filter, database.lattice.resolution_m)
+    locate = open_locator(database, choice)
     logs: list[ReplayedLog] = []
     for index, folder in enumerate(folders):
         log = leave_out(read_log(folder), config.track.without)
         rng = named_rng(config.journeys.seed, "replay", folder.name)
-        track = position_by_candidates(database, points_of, log, options, rng)
+        track = locate(log, rng)
         into = out if len(folders) == 1 else out / folder.name
         drawn = config.output.pictures == "all" or (config.output.pictures == "first" and not index)
         pictures: tuple[Path, ...] = ()
@@ -73,25 +70,10 @@ def run_replay(
         if progress is not None:
             progress(index + 1, len(folders))
     scores = [log.accuracy for log in logs if log.accuracy is not None]
-    result = ReplayResult("candidate", tuple(logs), summarise(scores) if scores else None, out)
+    result = ReplayResult(choice.name, tuple(logs), summarise(scores) if scores else None, out)
     if len(folders) > 1:
         write_json(out / SUMMARY, facts(summary_figures(result)))
     return result
-
-
-def candidate_options(section: FilterSection, resolution_m: float) -> CandidateOptions:
-    """Return the reading of the paper that a configuration asks for."""
-    return CandidateOptions(
-        resolution_m=resolution_m,
-        update_length_m=section.update_length_m,
-        tracking_length_m=section.tracking_length_m,
-        prediction=section.prediction,
-        duplicates=section.duplicates,
-        threshold=section.threshold,
-        at_threshold=section.at_threshold,
-        switch_check=section.switch_check,
-        when_empty=section.when_empty,
-    )
 
 
 def _write(

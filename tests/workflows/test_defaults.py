@@ -8,12 +8,14 @@ from pydantic import ValidationError
 
 from mapfilter.errors import ConfigError
 from mapfilter.filters.candidate_options import CandidateOptions
+from mapfilter.positioning.locators import FilterChoice
 from mapfilter.radio.predict import PredictionModel, RealityErrors
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.simulation.layout import lay_out_plan
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.simulate import SimulationSettings
-from mapfilter.workflows import predict, replay, simulate
+from mapfilter.workflows import predict, simulate
+from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.sections import Config, Journeys
 
 CONFIG = Config()
@@ -31,7 +33,7 @@ def test_simulation():
 
 
 def test_filter():
-    assert replay.candidate_options(CONFIG.filter, 5.0) == CandidateOptions(resolution_m=5.0)
+    assert filter_choice(CONFIG.filter, 5.0) == FilterChoice(CandidateOptions(resolution_m=5.0))
 
 
 def test_buildings_and_cells():

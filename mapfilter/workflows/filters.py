@@ -1,0 +1,25 @@
+"""The filter that a configuration asks for."""
+
+from __future__ import annotations
+
+from mapfilter.filters.candidate_options import CandidateOptions
+from mapfilter.positioning.locators import FilterChoice
+from mapfilter.workflows.sections import FilterSection
+
+
+def filter_choice(section: FilterSection, resolution_m: float) -> FilterChoice:
+    """Return filter and options of a configuration, for a database of a resolution."""
+    match section.name:
+        case "candidate":
+            options = CandidateOptions(
+                resolution_m=resolution_m,
+                update_length_m=section.update_length_m,
+                tracking_length_m=section.tracking_length_m,
+                prediction=section.prediction,
+                duplicates=section.duplicates,
+                threshold=section.threshold,
+                at_threshold=section.at_threshold,
+                switch_check=section.switch_check,
+                when_empty=section.when_empty,
+            )
+            return FilterChoice(options, section.margin_db)
