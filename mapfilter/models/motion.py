@@ -1,0 +1,149 @@
+"""Linear models of motion: ``x(k+1) = Φ x(k) + w``, w normal with covariance Q."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import block_diag
+
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.models.clock import QUARTZ, Oscillator, clock_noise
+from mapfilter.models.protocols import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class LinearMotion:
+    """How a state changes over one interval.
+
+    Parameters
+    ----------
+    transition : (n, n) array
+        Φ.
+    noise : (n, n) array
+        Q, positive semidefinite; it may be singular.
+    """
+
+    transition: Floats
+    noise: Floats
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        phi, noise = self.transition, self.noise
+        if phi.ndim != 2 or phi.shape[0] != phi.shape[1] or phi.shape != noise.shape:
+            faults.add("motion", "two square matrices alike", f"{phi.shape} and {noise.shape}")
+            faults.raise_if_any(InputError)
+        if not (np.isfinite(phi).all() and np.isfinite(noise).all()):
+            faults.add("motion", "finite numbers", "NaN or infinity")
+        elif not np.allclose(noise, noise.T, rtol=1e-9):
+            faults.add("motion, noise", "a symmetric matrix", "one that is not")
+        elif np.linalg.eigvalsh(noise)[0] < -1e-9 * max(np.abs(noise).max(), 1e-300):
+            faults.add("motion, noise", "no negative eigenvalue", np.linalg.eigvalsh(noise)[0])
+        faults.raise_if_any(InputError)
+
+    @property
+    def size(self) -> int:
+        """Number of components of the state."""
+        return int(self.transition.shape[0])
+
+    def sample(self, state: Floats, rng: np.random.Generator) -> Floats:
+        """Draw the next states for states of shape (..., n)."""
+        values, vectors = np.linalg.eigh(self.noise)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        drawn = rng.standard_normal(np.shape(state)) @ root.T
+        return np.asarray(state @ self.transition.T + drawn)
+
+
+def constant_velocity(
+    interval_s: float,
+    sigma_mps2: ArrayLike,
+    dimensions: int = 2,
+    noise: Literal["piecewise", "continuous"] = "piecewise",
+) -> LinearMotion:
+    """Return motion at nearly constant velocity: position and rate for each dimension.
+
+    Parameters
+    ----------
+    interval_s : float
+        T.
+    sigma_mps2 : float or (dimensions,) array_like
+        With ``piecewise`` noise the standard deviation of an acceleration that is constant within
+        an interval, ``Q = σ² γγᵀ`` with ``γ = [T²/2, T]`` (Fritsche & Klein 2009, eq. 8; Zhang et
+        al. 2006, eqs. 1 and 2). With ``continuous`` noise the root of the power density of white
+        acceleration, m/s^1.5: ``Q = σ² [[T³/3, T²/2], [T²/2, T]]`` (Bar-Shalom, Li & Kirubarajan
+        2001, eq. 6.2.2-4), whose sum does not depend on how time is cut up.
+    dimensions : int
+    noise : {"piecewise", "continuous"}
+
+    Examples
+    --------
+    >>> constant_velocity(2.0, 1.0, dimensions=1).noise.tolist()
+    [[4.0, 4.0], [4.0, 4.0]]
+    """
+    t = _positive("interval_s", interval_s)
+    sigma = np.broadcast_to(np.asarray(sigma_mps2, dtype=np.float64), (dimensions,))
+    if not (np.isfinite(sigma) & (sigma >= 0)).all():
+        raise fail(InputError, "sigma_mps2", "m/s² >= 0", sigma)
+    if noise == "piecewise":
+        gain = np.array([t**2 / 2, t])
+        unit = np.outer(gain, gain)
+    else:
+        unit = np.array([[t**3 / 3, t**2 / 2], [t**2 / 2, t]])
+    phi = np.asarray(np.kron(np.eye(dimensions), [[1.0, t], [0.0, 1.0]]), dtype=np.float64)
+    return LinearMotion(phi, np.asarray(block_diag(*(one**2 * unit for one in sigma))))
+
+
+def random_walk(interval_s: float, sigma_m: float, dimensions: int = 2) -> LinearMotion:
+    """Return a random walk: ``Q = σ² T I``, σ in metres per root second.
+
+    Examples
+    --------
+    >>> random_walk(4.0, 3.0).noise.tolist()
+    [[36.0, 0.0], [0.0, 36.0]]
+    """
+    t = _positive("interval_s", interval_s)
+    if not (np.isfinite(sigma_m) and sigma_m >= 0):
+        raise fail(InputError, "sigma_m", "metres >= 0", sigma_m)
+    return LinearMotion(np.eye(dimensions), sigma_m**2 * t * np.eye(dimensions))
+
+
+def clock_motion(
+    interval_s: float,
+    oscillator: Oscillator = QUARTZ,
+    cross_term: Literal["as_printed", "textbook"] = "as_printed",
+) -> LinearMotion:
+    """Return the motion of a receiver clock's bias (m) and drift (m/s), see :mod:`.clock`."""
+    t = _positive("interval_s", interval_s)
+    return LinearMotion(np.array([[1.0, t], [0.0, 1.0]]), clock_noise(t, oscillator, cross_term))
+
+
+def together(parts: Sequence[LinearMotion]) -> LinearMotion:
+    """Return the motion of several independent parts of a state, one after the other."""
+    if not parts:
+        raise fail(InputError, "motion", "at least one part", "none")
+    return LinearMotion(
+        np.asarray(block_diag(*(part.transition for part in parts))),
+        np.asarray(block_diag(*(part.noise for part in parts))),
+    )
+
+
+def scaled(motion: LinearMotion, factor: float) -> LinearMotion:
+    """Return the same motion with its noise times a factor, as filters assume more than there is.
+
+    Raises
+    ------
+    InputError
+        The factor is negative.
+    """
+    if not (np.isfinite(factor) and factor >= 0):
+        raise fail(InputError, "factor", "a number >= 0", factor)
+    return LinearMotion(motion.transition, factor * motion.noise)
+
+
+def _positive(where: str, value: float) -> float:
+    if not (np.isfinite(value) and value > 0):
+        raise fail(InputError, where, "seconds above 0", value)
+    return float(value)

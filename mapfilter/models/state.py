@@ -1,0 +1,69 @@
+"""Which component of a state vector is what."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mapfilter.errors import InputError, fail
+
+
+@dataclass(frozen=True, slots=True)
+class StateLayout:
+    """Where position and receiver clock stand in a state vector.
+
+    Parameters
+    ----------
+    size : int
+        Number of components, n.
+    east, north : int
+        Their indices.
+    up : int or None
+        Index of the height; None where the receiver stays at ``height_m``.
+    clock : int or None
+        Index of the receiver clock's bias in metres, c₀·δt; None where there is none.
+    height_m : float
+        Height of the receiver where ``up`` is None; 0, with transmitters at 0, for a plane.
+    """
+
+    size: int
+    east: int
+    north: int
+    up: int | None = None
+    clock: int | None = None
+    height_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        found = self.uses
+        if len(set(found)) != len(found) or not all(0 <= index < self.size for index in found):
+            expected = f"different indices in 0..{self.size - 1}"
+            raise fail(InputError, "state layout", expected, found)
+
+    @property
+    def uses(self) -> tuple[int, ...]:
+        """Indices of the components that measurements depend on: east, north, up, clock."""
+        optional = (self.up, self.clock)
+        return (self.east, self.north, *(index for index in optional if index is not None))
+
+    @property
+    def velocity(self) -> tuple[int, ...]:
+        """Indices of the velocities, which stand behind their positions."""
+        return tuple(i + 1 for i in (self.east, self.north, self.up) if i is not None)
+
+
+POSITION = StateLayout(2, 0, 1)
+"""East, north."""
+
+POSITION_CLOCK_3D = StateLayout(4, 0, 1, 2, 3)
+"""East, north, up, clock bias: what a static fix with pseudoranges solves for."""
+
+MOVING = StateLayout(4, 0, 2)
+"""East, its rate, north, its rate (Zhang et al. 2006; the GSM method of Fritsche & Klein 2009)."""
+
+MOVING_CLOCK = StateLayout(6, 0, 2, clock=4)
+"""East, its rate, north, its rate, clock bias, clock drift (Fritsche & Klein 2009, eq. 8)."""
+
+MOVING_3D = StateLayout(6, 0, 2, 4)
+"""East, north and up, each followed by its rate."""
+
+MOVING_CLOCK_3D = StateLayout(8, 0, 2, 4, 6)
+"""East, north, up and clock bias, each followed by its rate."""
