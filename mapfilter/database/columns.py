@@ -14,16 +14,30 @@ from mapfilter.errors import MapfilterError, StoreError, fail
 DAMAGE = (OSError, pa.ArrowException, ValueError, KeyError, MemoryError)
 
 
-def write_columns(table: pa.Table, path: Path, rows_in_a_group: int | None = None) -> None:
+def write_columns(
+    table: pa.Table, where: Path | pa.NativeFile, rows_in_a_group: int | None = None
+) -> None:
     """Write a table as Parquet with page checksums."""
-    pq.write_table(
-        table, path, compression="zstd", row_group_size=rows_in_a_group, write_page_checksum=True
+    with open_writer(table.schema, where) as writer:
+        writer.write_table(table, rows_in_a_group)
+
+
+def open_writer(schema: pa.Schema, where: Path | pa.NativeFile) -> pq.ParquetWriter:
+    """Return a writer that adds row groups as :func:`write_columns` writes them.
+
+    Whole numbers, which differ little from row to row along the Z-order curve, are kept as
+    differences; what else repeats itself, as numbers into a dictionary.
+    """
+    whole = [field.name for field in schema if pa.types.is_integer(field.type)]
+    unique = {*whole, "geometry"}
+    return pq.ParquetWriter(
+        where,
+        schema,
+        compression="zstd",
+        write_page_checksum=True,
+        use_dictionary=[name for name in schema.names if name not in unique],
+        column_encoding=dict.fromkeys(whole, "DELTA_BINARY_PACKED"),
     )
-
-
-def open_writer(schema: pa.Schema, path: Path) -> pq.ParquetWriter:
-    """Return a writer that adds row groups as :func:`write_columns` writes them."""
-    return pq.ParquetWriter(path, schema, compression="zstd", write_page_checksum=True)
 
 
 def read_columns(path: Path, columns: Sequence[str]) -> pa.Table:

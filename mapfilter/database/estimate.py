@@ -8,10 +8,16 @@ from dataclasses import dataclass
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from mapfilter.database.build import FLOOR_DBM, MARGIN_DB, TILE_PX, BuildJob, check_parameters
-from mapfilter.database.parts import ROWS_IN_MEMORY, levels_tables, points_table
+from mapfilter.database.columns import write_columns
+from mapfilter.database.parts import (
+    ROWS_IN_MEMORY,
+    LevelsRows,
+    levels_rows,
+    levels_table,
+    points_table,
+)
 from mapfilter.database.sources import LaidRoutes, Routes
 from mapfilter.database.store import cells_table
 from mapfilter.database.tiles import read_tile
@@ -120,7 +126,7 @@ class _Sample:
     places: int
     levels: int
     points_rows: pa.Table
-    levels_rows: dict[int, pa.Table]
+    levels_rows: dict[int, LevelsRows]
     seconds: float
 
     @classmethod
@@ -128,14 +134,14 @@ class _Sample:
         began_s = time.perf_counter()
         tile, ids = read_tile(job.task(number)), job.plan.ids
         points = points_table(tile.places, tile.levels, ids)
-        levels = dict(levels_tables(tile.places, tile.levels, ids))
+        levels = dict(levels_rows(tile.places, tile.levels))
         seconds = time.perf_counter() - began_s
         return cls(tile.places.num_rows, tile.levels.cell.size, points, levels, seconds)
 
 
 def _bytes(found: list[_Sample], scale: Floats, plan: CellPlan) -> float:
     """Return the size of all parts: rows as they compress in the drawn tiles, and the footers."""
-    by_cell: dict[int, list[pa.Table]] = {}
+    by_cell: dict[int, list[LevelsRows]] = {}
     for tile in found:
         for cell, rows in tile.levels_rows.items():
             by_cell.setdefault(cell, []).append(rows)
@@ -145,8 +151,8 @@ def _bytes(found: list[_Sample], scale: Floats, plan: CellPlan) -> float:
     size = part + (_parquet_bytes(points) - part) * all_rows / max(points.num_rows, 1)
     size += _parquet_bytes(cells_table(plan)) + len(geo_metadata(plan.crs, None))
     rows_bytes, drawn = 0.0, sum(tile.levels for tile in found)
-    for tables in by_cell.values():
-        table = pa.concat_tables(tables).unify_dictionaries()
+    for cell, some in by_cell.items():
+        table = levels_table(plan.ids[cell], some)
         part = _parquet_bytes(table.slice(0, 1))
         rows_bytes += _parquet_bytes(table) - part
     all_rows = float(scale @ [tile.levels for tile in found])
@@ -155,5 +161,5 @@ def _bytes(found: list[_Sample], scale: Floats, plan: CellPlan) -> float:
 
 def _parquet_bytes(table: pa.Table) -> int:
     sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
+    write_columns(table, sink)
     return int(sink.getvalue().size)

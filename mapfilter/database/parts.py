@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -11,12 +11,15 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from mapfilter.database.columns import open_writer, write_columns
 from mapfilter.database.manifest import POINTS, describe_part, levels_folders
 from mapfilter.database.tiles import TileLevels, TileRows
 from mapfilter.geodesy import Floats
 from mapfilter.roads.geoparquet import dictionary, geo_metadata, point_coordinates
+
+LevelsRows = dict[str, NDArray[Any]]
 
 _ROWS_IN_A_GROUP = 1 << 16
 ROWS_IN_MEMORY = 1 << 22
@@ -36,20 +39,24 @@ def points_table(places: pa.Table, levels: TileLevels, cell_ids: tuple[str, ...]
     return table
 
 
-def levels_tables(
-    places: pa.Table, levels: TileLevels, cell_ids: tuple[str, ...]
-) -> Iterator[tuple[int, pa.Table]]:
-    """Yield (cell, rows of its ``levels`` part) for every cell heard at some of the places."""
-    columns = {name: places[name].to_numpy() for name in ("point", "row", "col")}
+def levels_rows(places: pa.Table, levels: TileLevels) -> Iterator[tuple[int, LevelsRows]]:
+    """Yield (cell, what its ``levels`` part says of it) for every cell heard at the places."""
+    columns: LevelsRows = {
+        **{name: places[name].to_numpy()[levels.which] for name in ("point", "row", "col")},
+        "level_dbm": levels.level_dbm,
+        "below_best_db": levels.below_best_db,
+    }
     heard, first = np.unique(levels.cell, return_index=True)
     ends = np.append(first, levels.cell.size)[1:]
     for cell, start, end in zip(heard.tolist(), first.tolist(), ends.tolist(), strict=True):
-        which = levels.which[start:end]
-        table = {name: values[which] for name, values in columns.items()}
-        table["cell"] = dictionary(np.zeros(which.size, np.int32), (cell_ids[cell],))
-        table["level_dbm"] = levels.level_dbm[start:end]
-        table["below_best_db"] = levels.below_best_db[start:end]
-        yield cell, pa.table(table)
+        yield cell, {name: values[start:end] for name, values in columns.items()}
+
+
+def levels_table(cell_id: str, rows: Sequence[LevelsRows]) -> pa.Table:
+    """Return the rows of a cell's ``levels`` part, those of some tiles one after the other."""
+    table = {name: pa.array(np.concatenate([some[name] for some in rows])) for name in rows[0]}
+    cell = dictionary(np.zeros(len(table["point"]), np.int32), (cell_id,))
+    return pa.table(table).add_column(3, "cell", cell)
 
 
 class PartWriter:
@@ -70,7 +77,7 @@ class PartWriter:
         self._folder, self._crs, self._cell_ids = folder, crs, cell_ids
         self._folders = levels_folders(cell_ids)
         self._points: list[pa.Table] = []
-        self._levels: dict[int, list[pa.Table]] = {}
+        self._levels: dict[int, list[LevelsRows]] = {}
         self._waiting = 0
         self._points_file: pq.ParquetWriter | None = None
         self._points_written = 0
@@ -90,8 +97,8 @@ class PartWriter:
         points = points_table(places, levels, self._cell_ids)
         if points.num_rows:
             self._points.append(points)
-        for cell, table in levels_tables(places, levels, self._cell_ids):
-            self._levels.setdefault(cell, []).append(table)
+        for cell, rows in levels_rows(places, levels):
+            self._levels.setdefault(cell, []).append(rows)
         self._waiting += levels.cell.size
         if self._waiting >= ROWS_IN_MEMORY:
             self._flush()
@@ -132,7 +139,7 @@ class PartWriter:
 
     def _write_levels(self, cell: int) -> None:
         cell_id = self._cell_ids[cell]
-        table = pa.concat_tables(self._levels[cell]).unify_dictionaries()
+        table = levels_table(cell_id, self._levels[cell])
         written = self._written.setdefault(cell, [])
         file = self._folder / self._folders[cell_id] / f"part-{len(written)}.parquet"
         file.parent.mkdir(parents=True, exist_ok=True)
