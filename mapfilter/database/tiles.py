@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pyarrow as pa
@@ -69,6 +69,12 @@ class TileLevels:
     level_dbm: Floats32
     below_best_db: Floats32
 
+    def of_cells(self, numbers: Sequence[int]) -> TileLevels:
+        """Return the same with its cells numbered anew: those of a plan, in its order."""
+        # The last one is that of "none".
+        number = np.array([*numbers, -1], dtype=np.int32)
+        return replace(self, best=number[self.best], cell=number[self.cell])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TileRows:
@@ -132,13 +138,15 @@ def read_tile(task: TileTask) -> TileRows:
     lattice, (top, left, _, _) = task.rasters.lattice, task.window
     places = places_table(task.part.routes(), lattice)
     row, col = (places[name].to_numpy().astype(np.int64) for name in ("row", "col"))
-    ids = task.plan.ids
+    reaching = frozenset(task.rasters.reaching(task.window))
+    numbers = [n for n, cell_id in enumerate(task.plan.ids) if cell_id in reaching]
+    ids = [task.plan.ids[n] for n in numbers]
     level = np.empty((len(ids), row.size), dtype=np.float64)
     for first in range(0, len(ids) if row.size else 0, _CELLS_AT_A_TIME):
         some = ids[first : first + _CELLS_AT_A_TIME]
         window_dbm = task.rasters.read_levels_dbm(task.plan, task.window, some)
         level[first : first + len(some)] = window_dbm[:, row - top, col - left]
-    return TileRows(places, heard_levels(level, task.floor_dbm))
+    return TileRows(places, heard_levels(level, task.floor_dbm).of_cells(numbers))
 
 
 def heard_levels(level_dbm: Floats, floor_dbm: float) -> TileLevels:
@@ -152,6 +160,8 @@ def heard_levels(level_dbm: Floats, floor_dbm: float) -> TileLevels:
     """
     level = np.round(level_dbm, 2)
     strength = np.where(level >= floor_dbm, level, -np.inf)
+    if not len(strength):
+        strength = np.full((1, *strength.shape[1:]), -np.inf)
     best = strength.argmax(axis=0)
     best_dbm = strength.max(axis=0)
     second_dbm = np.full_like(best_dbm, -np.inf)

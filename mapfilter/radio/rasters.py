@@ -75,6 +75,19 @@ class RxLevRasters:
         ]
         return hashlib.sha256("".join(lines).encode()).hexdigest()
 
+    def reaching(self, window: Window) -> tuple[str, ...]:
+        """Return the cells whose files lie over some of a window; others have no data there."""
+        west, south, east, north = self.lattice.window(*window).bounds_m
+        found: list[str] = []
+        for file in self.files:
+            left, bottom, right, top = file.lattice.bounds_m
+            # Half a pixel may be rounded away, where a file is put on the lattice.
+            pad_m = max(file.lattice.resolution_m, self.lattice.resolution_m)
+            across = left - pad_m < east and west < right + pad_m
+            if across and bottom - pad_m < north and south < top + pad_m:
+                found.extend(file.cell_ids)
+        return tuple(found)
+
     def read(self, window: Window | None = None, cells: Sequence[str] | None = None) -> Floats32:
         """Read values of some or all cells in a window, or everywhere.
 

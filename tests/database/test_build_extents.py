@@ -1,0 +1,88 @@
+"""Rasters that each cover the surroundings of their own cell, as planning tools export them."""
+
+import dataclasses
+
+import numpy as np
+import pyarrow.parquet as pq
+from small_world import FLOOR_DBM, IDS, LATTICE, make_plan, make_routes, make_world
+
+from mapfilter.database.build import build
+from mapfilter.geodesy import Lattice
+from mapfilter.radio.rasters import RxLevRasters, open_rasters, write_rasters
+
+# row, col, rows, cols of each cell's own raster: none covers the square's middle alone.
+EXTENTS = ((0, 0, 20, 30), (0, 25, 40, 25), (18, 5, 22, 20))
+
+
+def parts_of(database):
+    return {
+        path.relative_to(database.path).as_posix(): path.read_bytes()
+        for path in sorted(database.path.rglob("*.parquet"))
+    }
+
+
+def cut(world):
+    """Yield each cell's levels, NaN beyond its own raster."""
+    for cell_id, (row, col, rows, cols), whole in zip(IDS, EXTENTS, world.levels_dbm, strict=True):
+        values = np.full_like(whole, np.nan)
+        values[row : row + rows, col : col + cols] = whole[row : row + rows, col : col + cols]
+        yield cell_id, values
+
+
+def test_only_what_reaches_a_tile_is_read_and_nothing_else_changes(tmp_path, monkeypatch):
+    world = make_world(tmp_path)
+    write_rasters(tmp_path / "whole.tif", LATTICE, cut(world), IDS)
+    (tmp_path / "cells").mkdir()
+    for number, ((cell_id, values), (row, col, rows, cols)) in enumerate(
+        zip(cut(world), EXTENTS, strict=True)
+    ):
+        part = values[row : row + rows, col : col + cols]
+        window = LATTICE.window(row, col, rows, cols)
+        write_rasters(tmp_path / f"cells/{number}.tif", window, [(cell_id, part)], (cell_id,))
+    options = {"floor_dbm": FLOOR_DBM, "tile_px": 8}
+    one = open_rasters(tmp_path / "whole.tif")
+    expected = build(one, make_plan(), make_routes(), tmp_path / "a", **options)
+    asked = []
+    read = RxLevRasters.read
+
+    def counted(self, window=None, cells=None):
+        asked.append(len(cells))
+        return read(self, window, cells)
+
+    monkeypatch.setattr(RxLevRasters, "read", counted)
+    many = open_rasters(tmp_path / "cells")
+    found = build(many, make_plan(), make_routes(), tmp_path / "b", **options)
+    assert parts_of(found) == parts_of(expected)
+    assert sorted(set(asked)) == [1, 2]
+
+
+def test_a_tile_that_no_raster_reaches_has_points_and_no_levels(tmp_path):
+    world = make_world(tmp_path)
+    window = LATTICE.window(0, 0, 8, 8)
+    ids = IDS[:1]
+    write_rasters(tmp_path / "corner.tif", window, [(ids[0], world.levels_dbm[0, :8, :8])], ids)
+    corner = open_rasters(tmp_path / "corner.tif")
+    spread = dataclasses.replace(corner, lattice=LATTICE)
+    database = build(
+        spread, make_plan(ids), make_routes(), tmp_path / "db", floor_dbm=FLOOR_DBM, tile_px=8
+    )
+    row, col = (pq.read_table(database.path / "points.parquet")[name] for name in ("row", "col"))
+    assert max(row.to_pylist()) < 8
+    assert max(col.to_pylist()) < 8
+    counts = database.manifest["counts"]
+    assert counts["points"] + counts["points_below_floor"] == len(make_routes())
+
+
+def test_reaching_is_told_by_the_files_own_extent(tmp_path):
+    lattices = [Lattice(LATTICE.crs, LATTICE.west_m + 500 * n, LATTICE.north_m, 5.0, 20, 20)
+                for n in range(3)]  # fmt: skip
+    (tmp_path / "cells").mkdir()
+    for cell_id, lattice in zip(IDS, lattices, strict=True):
+        values = [(cell_id, np.full((20, 20), -80.0))]
+        write_rasters(tmp_path / f"cells/{cell_id}.tif", lattice, values, (cell_id,))
+    rasters = open_rasters(tmp_path / "cells")
+    found = {cell for col in range(30, 90) for cell in rasters.reaching((0, col, 20, 1))}
+    assert rasters.reaching((0, 0, 20, 10)) == ("S1.A",)
+    assert rasters.reaching((0, 50, 20, 20)) == ()
+    assert set(rasters.reaching((0, 0, 20, rasters.lattice.cols))) == set(IDS)
+    assert found == set()
