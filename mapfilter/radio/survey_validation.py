@@ -13,7 +13,9 @@ from mapfilter.errors import InputError
 from mapfilter.radio._survey_trend import Covariate
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.measurements import Measurements
-from mapfilter.radio.survey import SurveyOptions, fit_survey
+from mapfilter.radio.survey import Survey, SurveyOptions, fit_survey
+
+Floats = NDArray[np.float64]
 
 _MOST_FOLDS = 20
 _PARTS_OF_ONE_SESSION = 5
@@ -57,15 +59,67 @@ class Validation:
     deviation_factor: float
 
 
-def cross_validate(
+@dataclass(frozen=True, slots=True, eq=False)
+class LeftOut:
+    """Levels measured in what was left out, and what the map of the rest tells of them.
+
+    Parameters
+    ----------
+    folds : int
+        Times that the map was made anew.
+    sessions : int
+        Of the measurements; of one alone, parts in time were left out.
+    measurements : int
+        Left out in all.
+    measured_dbm : numpy.ndarray, shape (N,)
+        Of those that the map could tell: cell known, within reach.
+    predicted_dbm, deviation_db : numpy.ndarray, shape (N,)
+        By the map of the rest.
+    trend_dbm, mean_dbm : numpy.ndarray, shape (N,)
+        By its trend alone, and by each cell's mean level.
+    """
+
+    folds: int
+    sessions: int
+    measurements: int
+    measured_dbm: Floats
+    predicted_dbm: Floats
+    deviation_db: Floats
+    trend_dbm: Floats
+    mean_dbm: Floats
+
+    def __len__(self) -> int:
+        return len(self.measured_dbm)
+
+    @property
+    def validation(self) -> Validation:
+        """The errors in a few figures."""
+        error_db = self.measured_dbm - self.predicted_dbm
+        relative = np.abs(error_db) / self.deviation_db
+        return Validation(
+            self.folds,
+            self.sessions > 1,
+            self.measurements,
+            len(self),
+            _rms(error_db),
+            _rms(self.measured_dbm - self.trend_dbm),
+            _rms(self.measured_dbm - self.mean_dbm),
+            _mean(error_db),
+            _mean(relative <= 1),
+            _mean(relative <= 2),
+            float(np.quantile(relative, _WITHIN_1)) if len(self) else 1.0,
+        )
+
+
+def leave_out(
     measurements: Measurements,
     options: SurveyOptions,
     *,
     plan: CellPlan | None = None,
     predicted: Mapping[str, Covariate] | None = None,
     progress: Progress | None = None,
-) -> Validation:
-    """Leave each session out, make the map of the others, and compare.
+) -> LeftOut:
+    """Leave each session out, make the map of the others, and tell what they say of it.
 
     Everything is learnt anew for each fold, the shadowing and the antennas' places too. With more
     than 20 sessions several are left out together.
@@ -77,81 +131,69 @@ def cross_validate(
     progress : callable, optional
         Called with (folds done, folds in all).
     """
-    fold, by_session = _folds(measurements)
+    fold, sessions = _folds(measurements)
     count = int(fold.max()) + 1 if len(fold) else 0
-    found = []
+    found = [np.empty((0, 5))]
     for number in range(count):
         out = fold == number
         try:
-            errors = _errors(
-                measurements.where(~out), measurements.where(out), options, plan, predicted
-            )
-            found.append(errors)
+            others = fit_survey(measurements.where(~out), options, plan=plan, predicted=predicted)
         except InputError:
             # The other sessions alone are too little for any cell.
-            found.append(np.empty((0, 4)))
+            pass
+        else:
+            found.extend(_told(others, measurements.where(out)))
         if progress is not None:
             progress(number + 1, count)
-    table = np.concatenate([*found, np.empty((0, 4))])
-    error_db, deviation_db = table[:, 0], table[:, 3]
-    return Validation(
-        count,
-        by_session,
-        len(measurements),
-        len(table),
-        _rms(error_db),
-        _rms(table[:, 1]),
-        _rms(table[:, 2]),
-        _mean(error_db),
-        _mean(np.abs(error_db) <= deviation_db),
-        _mean(np.abs(error_db) <= 2 * deviation_db),
-        float(np.quantile(np.abs(error_db) / deviation_db, _WITHIN_1)) if len(table) else 1.0,
-    )
+    table = np.concatenate(found)
+    table = table[np.isfinite(table).all(axis=1)]
+    return LeftOut(count, sessions, len(measurements), *table.T)
 
 
-def _folds(measurements: Measurements) -> tuple[NDArray[np.int64], bool]:
+def cross_validate(
+    measurements: Measurements,
+    options: SurveyOptions,
+    *,
+    plan: CellPlan | None = None,
+    predicted: Mapping[str, Covariate] | None = None,
+    progress: Progress | None = None,
+) -> Validation:
+    """Return the errors of what :func:`leave_out` finds, in a few figures."""
+    return leave_out(
+        measurements, options, plan=plan, predicted=predicted, progress=progress
+    ).validation
+
+
+def _folds(measurements: Measurements) -> tuple[NDArray[np.int64], int]:
+    """Return the fold of each measurement, and the number of sessions."""
     sessions, which = np.unique(measurements.session, return_inverse=True)
     if len(sessions) > 1:
-        return which % _MOST_FOLDS, True
+        return which % _MOST_FOLDS, len(sessions)
     order = np.argsort(measurements.time_s, kind="stable")
     fold = np.empty(len(order), dtype=np.int64)
     fold[order] = np.arange(len(order)) * _PARTS_OF_ONE_SESSION // max(len(order), 1)
-    return fold, False
+    return fold, len(sessions)
 
 
-def _errors(
-    known: Measurements,
-    left_out: Measurements,
-    options: SurveyOptions,
-    plan: CellPlan | None,
-    predicted: Mapping[str, Covariate] | None,
-) -> NDArray[np.float64]:
-    """Return errors of map, trend and mean, and the deviation, a row per measurement in reach."""
-    survey = fit_survey(known, options, plan=plan, predicted=predicted)
-    found = [np.empty((0, 4))]
+def _told(survey: Survey, left_out: Measurements) -> list[Floats]:
+    """Return for each cell the columns of :class:`LeftOut`, a row per measurement in reach."""
+    reach_m, found = survey.options.reach_m, []
     for index in np.unique(left_out.cell):
         cell = survey.cells.get(left_out.cell_ids[index])
         if cell is None:
             continue
         some = left_out.where(left_out.cell == index)
-        near = cell.distance_m(some.east_m, some.north_m, options.reach_m) <= options.reach_m
-        east_m, north_m = some.east_m[near], some.north_m[near]
-        mean_dbm, deviation_db = cell.predict(east_m, north_m)
-        told = np.column_stack(
-            [
-                mean_dbm,
-                cell.trend.level_dbm(east_m, north_m),
-                np.full(len(east_m), cell.points.level_dbm.mean()),
-            ]
-        )
-        rows = np.column_stack([some.level_dbm[near][:, None] - told, deviation_db])
-        found.append(rows[np.isfinite(rows).all(axis=1)])
-    return np.concatenate(found)
+        near = cell.distance_m(some.east_m, some.north_m, reach_m) <= reach_m
+        place = some.east_m[near], some.north_m[near]
+        mean_dbm = np.full(len(place[0]), cell.points.level_dbm.mean())
+        told = some.level_dbm[near], *cell.predict(*place), cell.trend.level_dbm(*place), mean_dbm
+        found.append(np.column_stack(told))
+    return found
 
 
-def _rms(values: NDArray[np.float64]) -> float:
+def _rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
 
 
-def _mean(values: NDArray[np.float64] | NDArray[np.bool_]) -> float:
+def _mean(values: Floats | NDArray[np.bool_]) -> float:
     return float(np.mean(values)) if values.size else float("nan")

@@ -41,6 +41,7 @@ def plot_points_per_cell(
     path: Path,
     *,
     title: str = "",
+    counts: Sequence[int] | None = None,
     resolution_m: float = 5.0,
 ) -> None:
     """Draw the points that belong to each cell in a colour of its own.
@@ -61,6 +62,8 @@ def plot_points_per_cell(
         PNG to write.
     title : str
         Above the map.
+    counts : sequence of int, optional
+        Points of each cell, where only some of them are given to be drawn.
     resolution_m : float
         Distance between neighbouring points, which sets the size of their marks.
 
@@ -75,16 +78,17 @@ def plot_points_per_cell(
     with map_picture(path, base, _SIDE_IN) as (figure, axes):
         frame = draw_base(axes, base)
         handles = []
-        counts = [len(east_m) for east_m, _ in points_by_cell.values()]
+        if counts is None:
+            counts = [len(east_m) for east_m, _ in points_by_cell.values()]
         names = short_names(list(points_by_cell))
         named = named_groups(counts)
         for index, (cell_id, (east_m, north_m)) in enumerate(points_by_cell.items()):
             colour = colours[index]
             x, y = frame(east_m, north_m)
             axes.scatter(x, y, s=size, color=colour, marker="s", linewidths=0, zorder=3)
-            if index in named and not is_indoor(plan, cell_id):
+            if x.size and index in named and not is_indoor(plan, cell_id):
                 name_group(axes, x, y, names[index])
-            label = f"{cell_id}: {grouped(x.size)}"
+            label = f"{cell_id}: {grouped(counts[index])}"
             handles.append(
                 Line2D([], [], linestyle="", marker="o", markersize=6, color=colour, label=label)
             )

@@ -30,26 +30,57 @@ _NEARLY_ALL = 0.95
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LandUse:
-    """Where a land-use raster lets one be.
+    """Classes of land use on a lattice, and in which of them one can be.
 
     Parameters
     ----------
-    walkable : numpy.ndarray of bool, shape (rows, cols) of the lattice
+    code : numpy.ndarray of int, shape (rows, cols) of the lattice
+        Index into ``names``; negative where nothing is known.
+    names : tuple of str
+        Of the classes.
+    can_walk : tuple of bool
+        Whether one can walk in each class.
+    colours : tuple of str
+        Of the classes, such as "#8c8c8c"; empty where they have none.
     notes : tuple of str
         What was done to the raster, and how much of the lattice it covers if not nearly all; empty
         when it lay there already.
+
+    Raises
+    ------
+    InputError
+        Names, ``can_walk`` and colours differ in number, or a code has no name.
     """
 
-    walkable: NDArray[np.bool_]
+    code: NDArray[np.integer]
+    names: tuple[str, ...]
+    can_walk: tuple[bool, ...]
+    colours: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        if len(self.names) != len(self.can_walk):
+            faults.add("land use, can_walk", f"{len(self.names)} of them", len(self.can_walk))
+        if self.colours and len(self.names) != len(self.colours):
+            faults.add("land use, colours", f"{len(self.names)} of them", len(self.colours))
+        if self.code.size and int(self.code.max()) >= len(self.names):
+            faults.add("land use, code", f"below {len(self.names)}", int(self.code.max()))
+        faults.raise_if_any(InputError)
+
+    @property
+    def walkable(self) -> NDArray[np.bool_]:
+        """Where one can walk, shape (rows, cols)."""
+        # The last entry is that of the negative codes.
+        return np.asarray(np.array([*self.can_walk, False])[np.maximum(self.code, -1)])
 
 
 def read_landuse(path: Path | str, table_path: Path | str, lattice: Lattice) -> LandUse:
-    """Return which lattice points lie in a walkable class of land use.
+    """Return the class of land use at each lattice point.
 
     Each lattice point takes the class of the pixel that holds it (nearest neighbour), whatever
-    the raster's resolution; points off the raster and no-data pixels are not walkable. The raster
-    is read by windows of bounded size.
+    the raster's resolution; nothing is known of points off the raster and of no-data pixels. The
+    raster is read by windows of bounded size. Classes of a colour raster have its colours.
 
     Parameters
     ----------
@@ -83,15 +114,26 @@ def read_landuse(path: Path | str, table_path: Path | str, lattice: Lattice) -> 
             hint = "a class left out, or colours blended by compression or resampling"
             faults.add(str(path), f"classes of {table_path}", f"{shown} at {count} points", hint)
     faults.raise_if_any(InputError)
-    walkable = [code for code, (_, can_walk) in keys.items() if can_walk]
-    mask = np.isin(codes, walkable) & known
-    if not mask.any():
+    index = np.full(codes.shape, -1, dtype=np.int16)
+    rank = {code: number for number, code in enumerate(keys)}
+    places = np.array([rank[code] for code in found.tolist()], dtype=np.int16)
+    for row in range(lattice.rows):
+        here = known[row]
+        index[row, here] = places[np.searchsorted(found, codes[row, here])]
+    if known.mean() < _NEARLY_ALL:
+        notes = (*notes, f"{path}: covers {known.mean():.0%} of the area")
+    landuse = LandUse(
+        index,
+        tuple(name for name, _ in keys.values()),
+        tuple(can_walk for _, can_walk in keys.values()),
+        tuple(f"#{code:06x}" for code in keys) if is_colour else (),
+        notes,
+    )
+    if not landuse.walkable.any():
         got = "none" if known.any() else "no point of the raster"
         hint = "wrong table" if known.any() else "raster of another area"
         raise fail(InputError, str(path), "walkable points in the area", got, hint)
-    if known.mean() < _NEARLY_ALL:
-        notes = (*notes, f"{path}: covers {known.mean():.0%} of the area")
-    return LandUse(mask, notes)
+    return landuse
 
 
 def _read_table(path: Path) -> tuple[dict[int, tuple[str, bool]], bool]:

@@ -12,11 +12,14 @@ from mapfilter._parallel import Progress, cluster_executor, local_executor
 from mapfilter.database.build import build
 from mapfilter.database.estimate import BuildEstimate, dry_run
 from mapfilter.database.manifest import InputFile
+from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rasters import RxLevRasters
 from mapfilter.workflows.cover import check_cells_near, map_cover, raster_cover
+from mapfilter.workflows.network_pictures import NETWORK_PICTURES, draw_network
+from mapfilter.workflows.results import clear_pictures
 from mapfilter.workflows.sections import Area, Config
 from mapfilter.workflows.world import World, area_lattice, check_scale, planned_rasters
 
@@ -38,9 +41,11 @@ class BuildResult:
     database : Path
         The folder.
     seconds : float
-        Wall time.
+        Wall time, without that of the pictures.
     notes : tuple of str
         What was done to the inputs, such as rasters resampled, and what covers the area in part.
+    pictures : tuple of Path
+        What was drawn of the database, in the folder ``pictures`` of the output.
     """
 
     points: int
@@ -49,6 +54,7 @@ class BuildResult:
     database: Path
     seconds: float
     notes: tuple[str, ...] = ()
+    pictures: tuple[Path, ...] = ()
 
 
 def run_build(
@@ -109,18 +115,20 @@ def run_build(
             resume=resume,
             progress=progress,
         )
+    seconds = time.perf_counter() - began_s
     return BuildResult(
         int(database.manifest["counts"]["points"]),
         len(database.cell_ids),
         sum(int(database.manifest["counts"][name]) for name in database.manifest["counts"]),
         target,
-        time.perf_counter() - began_s,
+        seconds,
         (
             *rasters.notes,
             *raster_cover(config.area, world.lattice),
             *map_cover(config.area, world.lattice),
             *world.streets.notes,
         ),
+        _draw(config, rasters, database, world),
     )
 
 
@@ -186,6 +194,23 @@ def _cut(lattice: Lattice, area: Area, name: str) -> Lattice:
         expected = f"an area that overlaps the rasters {name} ({covered})"
         raise fail(InputError, "area", expected, asked, "rasters and roads of different places")
     return lattice.window(top, left, rows, cols)
+
+
+def _draw(
+    config: Config, rasters: RxLevRasters, database: RadioRouteDatabase, world: World
+) -> tuple[Path, ...]:
+    """Draw the database; pictures of an older one make way in any case."""
+    folder = config.pictures_path
+    if config.output.pictures == "none":
+        clear_pictures(folder, NETWORK_PICTURES)
+        return ()
+    return draw_network(
+        rasters,
+        database,
+        folder,
+        landuse=world.landuse,
+        buildings=world.buildings if config.roads.cut_buildings else None,
+    )
 
 
 def _inputs(world: World) -> list[InputFile]:

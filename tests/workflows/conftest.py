@@ -31,6 +31,7 @@ margin_db = 0.0
 update_length_m = 10.0
 [output]
 dir = "out"
+pictures = "none"
 """
 
 

@@ -189,7 +189,7 @@ def test_demo_prints_the_documented_keys_on_the_last_line(tmp_path):
     found = assert_done(mapfilter("demo", "--out", tmp_path, *small, "--json"))
     assert len(found.out.splitlines()) == 1
     assert list(found.json) == DEMO_KEYS
-    assert list(found.json["seconds"]) == ["predict", "build", "simulate", "replay", "pictures"]
+    assert list(found.json["seconds"]) == ["predict", "build", "simulate", "replay"]
     assert found.json["cells"] == 13
     assert all(Path(path).exists() for path in found.json["outputs"])
 

@@ -38,15 +38,22 @@ def survey(world, tmp_path_factory):
     (folder / "survey.toml").write_text(
         '[cells]\nplan = "cells.csv"\n[prediction]\nmodel = "survey"\n'
         '[prediction.survey]\nfiles = ["drives"]\nreach_m = 60\n[output]\ndir = "out"\n'
+        'pictures = "none"\n'
     )
     return folder
 
 
 def test_a_survey_becomes_rasters_and_a_database(survey, world, tmp_path):
     config = survey / "survey.toml"
-    found = assert_done(mapfilter("predict", "-c", config, "--out", tmp_path, "--json")).json
+    drawn = settings(output__pictures="first")
+    found = assert_done(
+        mapfilter("predict", "-c", config, "--out", tmp_path, "--json", *drawn)
+    ).json
     names = {path.name for path in tmp_path.iterdir()}
-    assert names == {"rxlev.tif", "rxlev-deviation.tif", "cells.csv"}
+    assert names == {"rxlev.tif", "rxlev-deviation.tif", "cells.csv", "pictures"}
+    pictures = [tmp_path / "pictures" / f"survey-{name}.png" for name in ("levels", "left-out")]
+    assert found["pictures"] == [str(path) for path in pictures]
+    assert sorted((tmp_path / "pictures").iterdir()) == sorted(pictures)
     assert (found["cells"], found["sessions"], found["measurements"]) == (3, 3, 1350)
     assert found["reality"] is None
     told = found["validation"]

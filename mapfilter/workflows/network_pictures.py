@@ -1,0 +1,194 @@
+"""Which pictures a database gets, and the rasters that it was built from."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapfilter._io import ensure_writable_folder
+from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.radio.rasters import RxLevRasters
+from mapfilter.report.basemap import BaseMap
+from mapfilter.report.canvas import BLUE, ORANGE
+from mapfilter.report.coverage import plot_best_server, plot_level, plot_points_per_cell
+from mapfilter.report.landuse import plot_landuse
+from mapfilter.report.margin import plot_margin
+from mapfilter.roads.buildings import rasterise_heights
+from mapfilter.roads.landuse import LandUse
+from mapfilter.roads.ways import Buildings
+from mapfilter.workflows.results import clear_pictures
+from mapfilter.workflows.served import (
+    MOST_READ_PX,
+    ServedPoints,
+    best_servers,
+    common_window,
+    served_points,
+    thinned_lattice,
+)
+
+NETWORK_PICTURES = (
+    "coverage.png",
+    "best-server.png",
+    "margin.png",
+    "points-per-cell.png",
+    "points-of-one-site.png",
+    "land-use.png",
+)
+
+_NEARLY_ALL = (1.0, 99.0)
+_IF_NONE_DBM = (-110.0, -50.0)
+_PART = 0.5
+_AROUND = 0.15
+_LEAST_PX = 20
+
+
+def draw_network(
+    rasters: RxLevRasters,
+    database: RadioRouteDatabase,
+    folder: Path,
+    *,
+    landuse: LandUse | None = None,
+    buildings: Buildings | None = None,
+) -> tuple[Path, ...]:
+    """Draw a database and the rasters that it was built from.
+
+    Coverage, best server, margin, points per cell, points of the site with the most cells, and
+    land use where it is known. Memory is bounded whatever the area: it is thinned to what a
+    picture can show, and of very large sets of rasters only the database's points are shown.
+
+    Parameters
+    ----------
+    rasters : RxLevRasters
+        Levels or losses.
+    database : RadioRouteDatabase
+    folder : Path
+        Made where it is missing; pictures of an older database in it make way.
+    landuse : LandUse, optional
+        On the database's lattice: what its points were made from.
+    buildings : Buildings, optional
+        Without ``landuse``: drawn beside ways and squares.
+
+    Returns
+    -------
+    tuple of Path
+        The pictures, in this order.
+
+    Raises
+    ------
+    InputError
+        Rasters and database are of different areas, or a raster is damaged.
+    OutputError
+        A picture cannot be written.
+    """
+    _, _, rows, cols = common_window(rasters.lattice, database)
+    ensure_writable_folder(folder)
+    clear_pictures(folder, NETWORK_PICTURES)
+    points = served_points(database)
+    at_points = rows * cols * len(rasters.cell_ids) > MOST_READ_PX
+    best = points.best if at_points else best_servers(rasters, database)
+    lattice, plan = best.lattice, database.plan
+    base = BaseMap(lattice.bounds_m, attribution=database.attribution)
+    drawn = [folder / name for name in NETWORK_PICTURES[:5]]
+    ends_dbm = _ends(best.level_dbm)
+    plot_level(best.level_dbm, lattice, plan, base, drawn[0], range_dbm=ends_dbm)
+    plot_best_server(best.server, plan.ids, lattice, plan, base, drawn[1])
+    plot_margin(best.margin_db, lattice, plan, base, drawn[2])
+    _draw_points(database, points, database.cell_ids, drawn[3], "Points by best server")
+    draw_largest_site(database, points, drawn[4])
+    shown = None
+    if landuse is not None:
+        _, step = thinned_lattice(database.lattice)
+        shown = replace(landuse, code=landuse.code[::step, ::step])
+    elif buildings is not None and len(buildings):
+        shown = land_use_of_map(points, buildings)
+    if shown is not None:
+        drawn.append(folder / NETWORK_PICTURES[5])
+        area = points.best.lattice
+        whole = BaseMap(area.bounds_m, attribution=database.attribution)
+        plot_landuse(shown, area, whole, drawn[-1])
+    return tuple(drawn)
+
+
+def draw_largest_site(database: RadioRouteDatabase, points: ServedPoints, path: Path) -> None:
+    """Draw the points that the sectors of the site with the most cells serve (Fig. 2).
+
+    In an area much larger than what the site serves, only its surroundings are shown.
+    """
+    plan, lattice = database.plan, database.lattice
+    site = Counter(cell.site for cell in plan.cells).most_common(1)[0][0]
+    cells = [cell.id for cell in plan.cells if cell.site == site]
+    own = np.isin(points.best.server, [plan.index(cell_id) for cell_id in cells])
+    row, col = np.nonzero(own)
+    length = int(max(np.ptp(row), np.ptp(col))) if row.size else max(own.shape)
+    if length < _PART * max(own.shape):
+        step = round(points.best.lattice.resolution_m / lattice.resolution_m)
+        around = int(_AROUND * max(length, _LEAST_PX)) + 1
+        top, left = (step * max(int(at.min()) - around, 0) for at in (row, col))
+        bottom = min(step * (int(row.max()) + around + 1), lattice.rows)
+        right = min(step * (int(col.max()) + around + 1), lattice.cols)
+        points = served_points(database, (top, left, bottom - top, right - left))
+    _draw_points(database, points, cells, path, f"Points served by site {site}")
+
+
+def land_use_of_map(points: ServedPoints, buildings: Buildings) -> LandUse:
+    """Return the land use that a street map tells: ways, squares, buildings, and the rest.
+
+    Parameters
+    ----------
+    points : ServedPoints
+        What is walkable.
+    buildings : Buildings
+        In the CRS of the points.
+    """
+    code = np.where(rasterise_heights(buildings, points.best.lattice) > 0, 2, 3).astype(np.int16)
+    there = points.best.server >= 0
+    code[there] = np.where(points.on_square[there], 1, 0)
+    return LandUse(
+        code,
+        ("way", "square", "building", "other"),
+        (True, True, False, False),
+        (BLUE, ORANGE, "#8c8c8c", "#eee9dd"),
+    )
+
+
+def street_map(database: RadioRouteDatabase, points: ServedPoints) -> BaseMap:
+    """Return the base map of some points: they, and whose map they come from."""
+    lattice = points.best.lattice
+    return BaseMap(
+        lattice.bounds_m,
+        points_m=np.stack(points.places(), axis=-1),
+        attribution=database.attribution,
+        resolution_m=lattice.resolution_m,
+    )
+
+
+def _ends(level_dbm: NDArray[np.float32]) -> tuple[float, float]:
+    """Return tens of dBm between which nearly all levels lie."""
+    known = level_dbm[np.isfinite(level_dbm)]
+    low, high = np.percentile(known, _NEARLY_ALL) if known.size else _IF_NONE_DBM
+    low, high = 10 * np.floor(low / 10), 10 * np.ceil(high / 10)
+    return float(low), float(max(high, low + 10))
+
+
+def _draw_points(
+    database: RadioRouteDatabase,
+    points: ServedPoints,
+    cells: Sequence[str],
+    path: Path,
+    title: str,
+) -> None:
+    numbers = [database.plan.index(cell_id) for cell_id in cells]
+    plot_points_per_cell(
+        {cell_id: points.places(number) for cell_id, number in zip(cells, numbers, strict=True)},
+        database.plan,
+        street_map(database, points),
+        path,
+        title=title,
+        counts=points.counts[numbers].tolist(),
+        resolution_m=points.best.lattice.resolution_m,
+    )

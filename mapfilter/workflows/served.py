@@ -1,0 +1,193 @@
+"""Which cell serves where, thinned to what a picture can show, whatever the size of the area."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import ceil
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from mapfilter.database.manifest import POINTS
+from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.database.windows import WindowReader
+from mapfilter.errors import InputError, fail
+from mapfilter.geodesy import Floats, Lattice, same_crs
+from mapfilter.radio.rasters import RxLevRasters
+
+MOST_PX = 1200
+"""Pixels along the longer side of a thinned area; a map in a picture is some 1 000 wide."""
+MOST_READ_PX = 4_000_000_000
+"""Of larger sets of rasters (pixels times cells) pictures show what is heard at the points."""
+
+_STRIP_PX = 20_000_000
+_BLOCK_PX = 2048
+_COLUMNS = ("row", "col", "best_server", "best_level_dbm", "margin_db", "on_square")
+
+Window = tuple[int, int, int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class BestServers:
+    """The strongest cell at every pixel of an area, thinned to what a picture shows.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        Of the arrays.
+    server : numpy.ndarray of int32, shape (rows, cols)
+        Index into the database's cells; -1 where none is heard.
+    level_dbm : numpy.ndarray of float32, shape (rows, cols)
+        NaN where nothing is predicted.
+    margin_db : numpy.ndarray of float32, shape (rows, cols)
+        Above the second best; infinite where there is none, NaN where none is heard.
+    """
+
+    lattice: Lattice
+    server: NDArray[np.int32]
+    level_dbm: NDArray[np.float32]
+    margin_db: NDArray[np.float32]
+
+    @classmethod
+    def nowhere(cls, lattice: Lattice) -> BestServers:
+        """Return a lattice on which nothing is heard yet."""
+        shape = lattice.rows, lattice.cols
+        unknown = np.full(shape, np.nan, dtype=np.float32)
+        return cls(lattice, np.full(shape, -1, dtype=np.int32), unknown, unknown.copy())
+
+
+@dataclass(frozen=True, eq=False)
+class ServedPoints:
+    """The points of a database, at most one for each pixel of a picture.
+
+    Parameters
+    ----------
+    best : BestServers
+        At the pixels that hold a point.
+    on_square : numpy.ndarray of bool, shape (rows, cols)
+    counts : numpy.ndarray of int64, shape (cells,)
+        Points that each cell serves best, all of them.
+    """
+
+    best: BestServers
+    on_square: NDArray[np.bool_]
+    counts: NDArray[np.int64]
+
+    def places(self, cell: int | None = None) -> tuple[Floats, Floats]:
+        """Return east and north of the points, or of those that a cell serves."""
+        server = self.best.server
+        row, col = np.nonzero(server >= 0 if cell is None else server == cell)
+        east_m, north_m = self.best.lattice.east_north(row, col)
+        return np.asarray(east_m), np.asarray(north_m)
+
+
+def thinned_lattice(lattice: Lattice) -> tuple[Lattice, int]:
+    """Return a lattice of larger pixels over another, and how many times larger they are.
+
+    Examples
+    --------
+    >>> lattice, step = thinned_lattice(Lattice("EPSG:32635", 0.0, 0.0, 5.0, 3000, 1000))
+    >>> step, lattice.rows, lattice.cols, lattice.resolution_m
+    (3, 1000, 334, 15.0)
+    """
+    step = ceil(max(lattice.rows, lattice.cols) / MOST_PX)
+    rows, cols = ceil(lattice.rows / step), ceil(lattice.cols / step)
+    side_m = step * lattice.resolution_m
+    return replace(lattice, resolution_m=side_m, rows=rows, cols=cols), step
+
+
+def best_servers(rasters: RxLevRasters, database: RadioRouteDatabase) -> BestServers:
+    """Return the best server, its level and its margin over the area of a database.
+
+    Cells below the database's floor are not heard. Of large areas every second, third... pixel is
+    taken, cell by cell and strip by strip.
+
+    Raises
+    ------
+    InputError
+        Rasters and database are of different areas, or a raster is damaged.
+    """
+    window = common_window(rasters.lattice, database)
+    lattice, step = thinned_lattice(rasters.lattice.window(*window))
+    found = BestServers.nowhere(lattice)
+    shape = lattice.rows, lattice.cols
+    best_dbm, second_dbm = (np.full(shape, -np.inf, dtype=np.float32) for _ in range(2))
+    # The middle of a larger pixel is one of the rasters' own.
+    thinned = replace(rasters, lattice=lattice, resampling="nearest") if step > 1 else rasters
+    top, left = (0, 0) if step > 1 else window[:2]
+    strip = max(_STRIP_PX // (step * step * lattice.cols), 1)
+    for cell_id in rasters.cell_ids:
+        if cell_id not in database.plan:
+            continue
+        number = database.plan.index(cell_id)
+        for first in range(0, lattice.rows, strip):
+            rows = min(strip, lattice.rows - first)
+            at = top + first, left, rows, lattice.cols
+            level_dbm = thinned.read_levels_dbm(database.plan, at, (cell_id,))[0]
+            level_dbm[np.isnan(level_dbm)] = -np.inf
+            here = slice(first, first + rows)
+            better = level_dbm > best_dbm[here]
+            beaten_dbm = np.where(better, best_dbm[here], level_dbm)
+            second_dbm[here] = np.maximum(second_dbm[here], beaten_dbm)
+            best_dbm[here][better] = level_dbm[better]
+            found.server[here][better] = number
+    floor_dbm = np.float32(database.floor_dbm)
+    second_dbm[second_dbm < floor_dbm] = -np.inf
+    heard, known = best_dbm >= floor_dbm, np.isfinite(best_dbm)
+    found.server[~heard] = -1
+    found.level_dbm[known] = best_dbm[known]
+    found.margin_db[heard] = best_dbm[heard] - second_dbm[heard]
+    return found
+
+
+def served_points(database: RadioRouteDatabase, window: Window | None = None) -> ServedPoints:
+    """Return the points of a database, or of a window of its lattice, read block by block.
+
+    Raises
+    ------
+    StoreError
+        A part of the database is damaged.
+    """
+    top, left, rows, cols = window or (0, 0, database.lattice.rows, database.lattice.cols)
+    lattice, step = thinned_lattice(database.lattice.window(top, left, rows, cols))
+    best = BestServers.nowhere(lattice)
+    on_square = np.zeros(best.server.shape, dtype=np.bool_)
+    counts = np.zeros(len(database.cell_ids), dtype=np.int64)
+    ids = pa.array(database.cell_ids, type=pa.string())
+    reader = WindowReader([database.path / POINTS], _COLUMNS, database.lattice)
+    for row, col, height, width in database.lattice.window(top, left, rows, cols).tiles(_BLOCK_PX):
+        read = reader.read((top + row, left + col, height, width))
+        if not read or not len(read["row"]):
+            continue
+        at = (read["row"] - top) // step, (read["col"] - left) // step
+        server = pc.index_in(read["best_server"].cast(pa.string()), value_set=ids).to_numpy()
+        margin_db = np.asarray(read["margin_db"])
+        best.server[at], best.level_dbm[at] = server, read["best_level_dbm"]
+        best.margin_db[at] = np.where(np.isnan(margin_db), np.inf, margin_db)
+        on_square[at] = read["on_square"]
+        counts += np.bincount(server, minlength=len(counts))
+    return ServedPoints(best, on_square, counts)
+
+
+def common_window(lattice: Lattice, database: RadioRouteDatabase) -> Window:
+    """Return the pixels of the rasters that the database covers: row, col, rows, cols.
+
+    Raises
+    ------
+    InputError
+        There are none.
+    """
+    west, south, east, north = database.lattice.bounds_m
+    # A hair inside, so that an edge on a pixel's edge takes no pixel beyond it.
+    hair_m = 1e-6 * lattice.resolution_m
+    top, left = lattice.row_col(west + hair_m, north - hair_m)
+    bottom, right = lattice.row_col(east - hair_m, south + hair_m)
+    top, left = max(int(top), 0), max(int(left), 0)
+    rows = min(int(bottom), lattice.rows - 1) - top + 1
+    cols = min(int(right), lattice.cols - 1) - left + 1
+    if not same_crs(lattice.crs, database.lattice.crs) or rows < 1 or cols < 1:
+        expected = "rasters of the database's area and CRS"
+        raise fail(InputError, str(database.path), expected, "others", "built from other rasters")
+    return top, left, rows, cols

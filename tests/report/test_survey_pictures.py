@@ -1,0 +1,115 @@
+"""Pictures of surveys: the data shown, whole files, the same bytes."""
+
+import numpy as np
+import pytest
+
+from mapfilter.errors import InputError, OutputError
+from mapfilter.geodesy import Lattice
+from mapfilter.radio.measurements import Measurements
+from mapfilter.radio.rasters import open_rasters, write_rasters
+from mapfilter.radio.survey import SurveyOptions, fit_survey
+from mapfilter.radio.survey_rasters import write_survey
+from mapfilter.radio.survey_validation import LeftOut, cross_validate, leave_out
+from mapfilter.report.basemap import BaseMap
+from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
+from mapfilter.workflows.survey_pictures import SurveyEvidence, draw_survey
+
+CRS = "EPSG:32635"
+LATTICE = Lattice(CRS, 385_000.0, 6_672_000.0, 5.0, 40, 50)
+BASE = BaseMap(LATTICE.bounds_m, attribution="© OpenStreetMap contributors")
+
+
+def surveyed(cell_id: str = "A") -> SurveyedLevels:
+    row, col = np.mgrid[:40, :50]
+    level_dbm = -70.0 - 0.5 * col
+    deviation_db = np.where(row > 20, 4.0, np.nan)
+    places = np.array([25, 30, 35])
+    east_m, north_m = LATTICE.east_north(places, places)
+    return SurveyedLevels(
+        cell_id, np.where(row > 20, level_dbm, np.nan), deviation_db, east_m, north_m,
+        -70.0 - 0.5 * places,
+    )  # fmt: skip
+
+
+def test_same_data_give_same_bytes(tmp_path):
+    rng = np.random.default_rng(1)
+    measured_dbm = rng.uniform(-110, -60, 300)
+    predicted_dbm = measured_dbm + rng.normal(0, 4, 300)
+    for name in "ab":
+        folder = tmp_path / name
+        cells = [surveyed("A"), surveyed("B")]
+        plot_surveyed_levels(cells, LATTICE, BASE, folder / "levels.png")
+        plot_left_out(
+            measured_dbm, predicted_dbm, folder / "left-out.png", trend_dbm=measured_dbm + 6.0,
+            attribution="somebody's",
+        )  # fmt: skip
+    for picture in ("levels.png", "left-out.png"):
+        one, other = ((tmp_path / name / picture).read_bytes() for name in "ab")
+        assert one[:8] == b"\x89PNG\r\n\x1a\n"
+        assert one == other
+    assert len(list(tmp_path.rglob("*.*"))) == 4
+
+
+def test_survey_pictures_are_checked(tmp_path):
+    path = tmp_path / "s.png"
+    for cells in ([], [surveyed()] * 5):
+        with pytest.raises(InputError, match="1 to 4"):
+            plot_surveyed_levels(cells, LATTICE, BASE, path)
+    small = Lattice(CRS, 0.0, 0.0, 5.0, 4, 5)
+    with pytest.raises(InputError, match="4 x 5 pixels"):
+        plot_surveyed_levels([surveyed()], small, BASE, path)
+    with pytest.raises(InputError, match="3 of them"):
+        plot_left_out(np.zeros(3), np.zeros(2), path)
+    for bad in (np.empty(0), np.array([np.nan])):
+        with pytest.raises(InputError, match="finite levels"):
+            plot_left_out(bad, bad, path)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError):
+        plot_left_out(np.zeros(3), np.zeros(3), tmp_path / "file" / "s.png")
+    assert not path.exists()
+
+
+def walks(sessions: int) -> Measurements:
+    """Two cells heard along a line, with a fixed disturbance per reading."""
+    rng = np.random.default_rng(5)
+    count = 120
+    row, col = np.full(count, 20), rng.integers(2, 48, count)
+    east_m, north_m = LATTICE.east_north(row, col)
+    cell = (np.arange(count) % 2).astype(np.int32)
+    level_dbm = -60.0 - 0.3 * col - 10.0 * cell + rng.normal(0, 3, count)
+    session = (np.arange(count) * sessions // count).astype(np.int32)
+    return Measurements(
+        CRS, ("A", "B"), {}, tuple(str(i) for i in range(sessions)), cell, session,
+        np.arange(count, dtype=float), east_m, north_m, level_dbm, np.full(count, 5.0),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("sessions", "folds"), [(1, 5), (3, 3)])
+def test_a_survey_gets_its_pictures(sessions, folds, tmp_path):
+    measured, options = walks(sessions), SurveyOptions(method="knn", trend="mean")
+    survey = fit_survey(measured, options)
+    paths = tmp_path / "mean.tif", tmp_path / "deviation.tif"
+    write_survey(survey, LATTICE, *paths)
+    left_out = leave_out(measured, options)
+    told = cross_validate(measured, options)
+    assert told == left_out.validation
+    assert (len(left_out), left_out.folds) == (told.predicted, folds)
+    error_db = left_out.measured_dbm - left_out.predicted_dbm
+    assert np.sqrt(np.mean(error_db**2)) == pytest.approx(told.rmse_db)
+    rasters = [open_rasters(path) for path in paths]
+    evidence = SurveyEvidence(measured, options.reach_m, *rasters, left_out)
+    drawn = draw_survey(evidence, tmp_path / "out")
+    assert [path.name for path in drawn] == ["survey-levels.png", "survey-left-out.png"]
+    nothing = LeftOut(folds, sessions, len(measured), *np.empty((5, 0)))
+    for told_nothing in (None, nothing):
+        evidence = SurveyEvidence(measured, options.reach_m, *rasters, told_nothing)
+        assert len(draw_survey(evidence, tmp_path / "one")) == 1
+
+
+def test_a_survey_of_other_cells_is_told(tmp_path):
+    level_dbm = np.full((40, 50), -70.0, np.float32)
+    write_rasters(tmp_path / "other.tif", LATTICE, [("S1A", level_dbm)], ["S1A"])
+    rasters = open_rasters(tmp_path / "other.tif")
+    evidence = SurveyEvidence(walks(2), 100.0, rasters, rasters)
+    with pytest.raises(InputError, match="measurements of cells"):
+        draw_survey(evidence, tmp_path)
