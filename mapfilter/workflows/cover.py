@@ -8,7 +8,6 @@ from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Floats, Lattice, unproject
 from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.maps import map_bounds_deg
-from mapfilter.workflows.fields import NO_MAP
 from mapfilter.workflows.sections import Area
 from mapfilter.workflows.world import area_lattice
 
@@ -61,7 +60,7 @@ def outside_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> Floats:
 
 def map_cover(area: Area, lattice: Lattice) -> tuple[str, ...]:
     """Return a note when a map covers but a part of the area that is asked for."""
-    if not _has_box(area) or area.map == NO_MAP:
+    if not _has_box(area) or not area.map_is_a_file:
         return ()
     along = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
     rows, cols = np.meshgrid(along * lattice.rows - 0.5, along * lattice.cols - 0.5, indexing="ij")

@@ -11,7 +11,10 @@ from mapfilter.workflows.paths import path_fault
 
 EMBEDDED_MAP = "helsinki"
 NO_MAP = "none"
-MAP_NAMES = (EMBEDDED_MAP, NO_MAP)
+SYNTHETIC_MAP = "synthetic"
+MANHATTAN_MAP = "manhattan"
+MADE_MAPS = (SYNTHETIC_MAP, MANHATTAN_MAP)
+MAP_NAMES = (EMBEDDED_MAP, NO_MAP, *MADE_MAPS)
 
 
 def resolve_path(value: Any, info: ValidationInfo) -> Any:
@@ -29,7 +32,7 @@ def resolve_path(value: Any, info: ValidationInfo) -> Any:
 
 
 def resolve_map(value: Any, info: ValidationInfo) -> Any:
-    """Make a map's path absolute; the embedded map and no map have names."""
+    """Make a map's path absolute; the embedded map, made ones and no map have names."""
     found = value if value in MAP_NAMES else resolve_path(value, info)
     return str(found) if isinstance(found, Path) else value
 

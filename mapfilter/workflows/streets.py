@@ -24,7 +24,8 @@ from mapfilter.roads.osm import read_squares, read_ways
 from mapfilter.roads.routable import RouteSource
 from mapfilter.roads.water import read_layer_water, read_water
 from mapfilter.roads.ways import Bounds, Buildings, Squares, Water, Ways
-from mapfilter.workflows.fields import NO_MAP
+from mapfilter.simulation.city import SyntheticCity
+from mapfilter.workflows.made_city import made_city
 from mapfilter.workflows.sections import Config
 
 OSM_ATTRIBUTION = "© OpenStreetMap contributors (ODbL)"
@@ -61,6 +62,8 @@ class Streets:
                 default_height_m=section.default_height_m,
                 storey_height_m=section.storey_m,
             )
+        if self._city is not None:
+            return self._city.buildings
         if not self._has_map:
             return Buildings(crs, np.empty(0, dtype=object), np.empty(0), 0, 0, 0)
         return read_buildings(
@@ -105,7 +108,7 @@ class Streets:
             return self.landuse.notes
         roads, told = self.config.roads, list(self._roads[2])
         told += _unused(roads.half_width_by_class_m, self._roads[0].class_names)
-        if roads.cut_buildings:
+        if roads.cut_buildings and len(self.buildings):
             told.append(f"{len(self.buildings)} buildings cut out")
         if self._water is not None:
             told.append(f"{len(self._water)} waters cut out, save under bridges")
@@ -135,7 +138,11 @@ class Streets:
 
     @property
     def _has_map(self) -> bool:
-        return self.config.area.map != NO_MAP
+        return self.config.area.map_is_a_file
+
+    @property
+    def _city(self) -> SyntheticCity | None:
+        return made_city(self.config.area, self.lattice.crs)
 
     @cached_property
     def _roads(self) -> _Roads:
@@ -162,6 +169,8 @@ class Streets:
             left_out = [name for name, m in roads.half_width_by_class_m.items() if m == 0]
             areas = layer.areas_without(left_out) if roads.squares else None
             return layer.ways, areas, layer.notes
+        if self._city is not None:
+            return _made_roads(self._city, self.config)
         if not self._has_map and roads.landuse is not None:
             return Ways.none(lattice.crs), None, ()
         if not self._has_map:
@@ -181,12 +190,23 @@ class Streets:
         waters = []
         if self._has_map:
             waters.append(read_water(self.config.area.map, crs, bounds_m))
+        elif self._city is not None:
+            waters.append(self._city.water)
         if roads.water_layer is not None:
             name = roads.water_layer_name
             waters.append(read_layer_water(roads.water_layer, crs, bounds_m, layer_name=name))
         if not any(map(len, waters)):
             return None
         return Water(crs, np.concatenate([water.geometry for water in waters]))
+
+
+def _made_roads(city: SyntheticCity, config: Config) -> _Roads:
+    """Return the ways and squares of a made city that a profile may use."""
+    area, roads = config.area, config.roads
+    walking = roads.profile == "walking"
+    ways = city.ways if walking else city.driving_ways
+    squares = city.squares if roads.squares and walking else None
+    return ways, squares, (f"streets of a city that does not exist: {area.map}, seed {area.seed}",)
 
 
 def _parts(path: Path) -> list[Path]:

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from mapfilter.database.sources import LaidRoutes, LayerRoutes, Routes
-from mapfilter.errors import ConfigError, Faults, InputError, fail
-from mapfilter.geodesy import Lattice, check_bbox, project, projected_crs, unproject, utm_crs
+from mapfilter.errors import InputError, fail
+from mapfilter.geodesy import Lattice
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan, read_cell_plan
 from mapfilter.radio.msi import read_antennas
@@ -17,89 +17,15 @@ from mapfilter.radio.rasters import RxLevRasters, open_rasters
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.lattice import RouteLattice
-from mapfilter.roads.maps import check_on_map, map_bounds_deg, resolve_map
+from mapfilter.roads.maps import resolve_map
 from mapfilter.roads.routable import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings, Ways
 from mapfilter.simulation.layout import lay_out_plan
-from mapfilter.workflows.fields import NO_MAP
-from mapfilter.workflows.sections import Area, Config
+from mapfilter.workflows.area import LARGEST_AREA_PX as LARGEST_AREA_PX
+from mapfilter.workflows.area import area_lattice as area_lattice
+from mapfilter.workflows.area import check_scale as check_scale
+from mapfilter.workflows.sections import Config
 from mapfilter.workflows.streets import Streets
-
-LARGEST_AREA_PX = 400_000_000
-EARTH_RADIUS_M = 6_371_000.0
-
-_SHORT_M = 100.0
-_SCALE_TOLERANCE = 0.03
-
-
-def area_lattice(area: Area, *, on_map: bool = True) -> Lattice:
-    """Return the lattice over an area; without ``on_map`` the map need not cover it.
-
-    Raises
-    ------
-    InputError, ConfigError
-        The box or the CRS is wrong, the map is missing or of another place, or the lattice would
-        be absurdly large.
-    """
-    if area.southwest is not None and area.size_m is not None:
-        lon, lat = area.southwest
-        check_bbox((lon, lat, lon + 1e-6, lat + 1e-6), "area.southwest")
-        crs = projected_crs(area.crs, "area.crs") if area.crs else utm_crs(lon, lat)
-        # Snapped first, so that the size asked for is the size of the lattice.
-        corner = np.concatenate(project(crs, [lon], [lat])) // area.resolution_m * area.resolution_m
-        bounds_m = (*corner, *(corner + area.size_m))
-        if max(area.size_m) < area.resolution_m:
-            expected = f"metres, at least {area.resolution_m:g}"
-            raise fail(InputError, "area.size_m", expected, area.size_m, "degrees given for metres")
-    else:
-        box = area.bbox or map_bounds_deg(area.map)
-        check_bbox(box, "area.bbox")
-        west, south, east, north = box
-        centre = (west + east) / 2, (south + north) / 2
-        crs = projected_crs(area.crs, "area.crs") if area.crs else utm_crs(*centre)
-        edges = project(crs, [west, east, east, west], [south, south, north, north])
-        bounds_m = (*np.min(edges, axis=1), *np.max(edges, axis=1))
-    faults = Faults()
-    if not np.all(np.isfinite(bounds_m)):
-        faults.add("area", f"a box that {crs} can show", bounds_m, "a CRS of another region")
-        faults.raise_if_any(InputError)
-    width_m, height_m = bounds_m[2] - bounds_m[0], bounds_m[3] - bounds_m[1]
-    if max(width_m, height_m) < area.resolution_m:
-        expected = f"metres, at most the area's {max(width_m, height_m):.0f}"
-        faults.add("area.resolution_m", expected, area.resolution_m, "a resolution in another unit")
-    pixels = width_m * height_m / area.resolution_m**2
-    if pixels > LARGEST_AREA_PX:
-        faults.add(
-            "area",
-            f"at most {LARGEST_AREA_PX:.0e} pixels",
-            f"{pixels:.1e} at {area.resolution_m:g} m",
-            "a box or a resolution in the wrong unit",
-        )
-    faults.raise_if_any(ConfigError)
-    if on_map and area.map != NO_MAP:
-        check_on_map(area.map, crs, bounds_m)
-    check_scale(crs, bounds_m, "area.crs")
-    return Lattice.covering(crs, bounds_m, area.resolution_m)
-
-
-def check_scale(crs: str, bounds_m: tuple[float, float, float, float], where: str) -> None:
-    """See that metres of a CRS are metres on the ground in the middle of an area.
-
-    Raises
-    ------
-    InputError
-        They differ by more than 3 %: the CRS is made for another region or is Web Mercator.
-    """
-    west, south, east, north = bounds_m
-    middle_m = np.array([[(west + east) / 2], [(south + north) / 2]])
-    ends_m = middle_m + np.array([[0.0, _SHORT_M], [0.0, 0.0]])
-    lon_rad, lat_rad = np.radians(unproject(crs, *ends_m))
-    along_rad = np.hypot(np.diff(lon_rad) * np.cos(lat_rad[0]), np.diff(lat_rad))
-    ground_m = float(along_rad[0] * EARTH_RADIUS_M)
-    if not abs(ground_m / _SHORT_M - 1) <= _SCALE_TOLERANCE:
-        expected = "a CRS whose metres are metres on the ground in this area"
-        got = f"{crs}, of which {_SHORT_M:g} m are {ground_m:.0f} m"
-        raise fail(InputError, where, expected, got, "a CRS of another region, or Web Mercator")
 
 
 def planned_rasters(config: Config) -> RxLevRasters:
@@ -184,9 +110,9 @@ class World:
 
     @property
     def map_name(self) -> str:
-        """Name of the map's file, without its folder."""
-        name = self.config.area.map
-        return name if name == NO_MAP else resolve_map(name).name
+        """Name of the map's file, without its folder, or of what stands for one."""
+        area = self.config.area
+        return resolve_map(area.map).name if area.map_is_a_file else area.map
 
     @property
     def buildings(self) -> Buildings:
@@ -231,8 +157,10 @@ class World:
 
     @cached_property
     def plan(self) -> CellPlan:
-        """The cell plan: read, or laid out by rule."""
-        cells = self.config.cells
+        """The cell plan: read, written with a survey, or laid out by rule."""
+        cells, surveyed = self.config.cells, self.config.surveyed_plan
+        if surveyed is not None:
+            return read_cell_plan(surveyed, self.lattice.crs)
         if cells.plan is not None:
             return planned_cells(self.config, self.lattice.crs, self.lattice)
         return lay_out_plan(

@@ -1,0 +1,133 @@
+"""Houses about the blocks of a made city: closed fronts, villas with gardens, tall slabs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+
+from mapfilter.geodesy import Floats
+from mapfilter.roads.ways import Geometries
+from mapfilter.simulation.city_streets import GRID, INNER, OLD_TOWN, PARK, VILLAS
+
+STOREY_M = 3.2
+_ROOF_M = 1.5
+_LEAST_HOUSE_M2 = 30.0
+_LEAST_COURT_M2 = 60.0
+_CORNER_RAD = np.radians(25.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Manner:
+    """How a block is built up.
+
+    Parameters
+    ----------
+    depth_m, front_m : float
+        Of a house.
+    apart_m : float
+        From each house to the border of its plot.
+    garden_m : float
+        Between street and plots.
+    storeys : tuple of float
+        Least and most of a block's mean.
+    """
+
+    depth_m: float
+    front_m: float
+    apart_m: float
+    garden_m: float
+    storeys: tuple[float, float]
+
+
+_MANNERS = {
+    OLD_TOWN: Manner(10.0, 9.0, 0.0, 0.0, (3.0, 5.0)),
+    INNER: Manner(12.5, 17.0, 0.0, 0.0, (4.0, 6.5)),
+    GRID: Manner(13.0, 20.0, 0.0, 0.0, (4.0, 7.0)),
+    VILLAS: Manner(13.0, 18.0, 2.5, 3.5, (1.6, 3.2)),
+}
+_SLABS = Manner(20.0, 45.0, 4.0, 2.0, (7.0, 13.0))
+_SLAB_SHARE = 0.1
+
+
+def houses(
+    blocks: Geometries, style: NDArray[np.int64], rng: np.random.Generator
+) -> tuple[Geometries, Floats]:
+    """Build on blocks.
+
+    Parameters
+    ----------
+    blocks : numpy.ndarray of shapely geometries, shape (N,)
+        What streets leave of each.
+    style : numpy.ndarray of int64, shape (N,)
+        In what style; parks stay free.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    footprints : numpy.ndarray of shapely.Polygon, shape (M,)
+    height_m : numpy.ndarray, shape (M,)
+    """
+    built: list[Polygon] = []
+    heights: list[Floats] = []
+    for block, kind in zip(blocks, style, strict=True):
+        if kind == PARK:
+            continue
+        is_slabs = kind in (GRID, VILLAS) and rng.random() < _SLAB_SHARE
+        manner = _SLABS if is_slabs else _MANNERS[int(kind)]
+        mean = rng.uniform(*manner.storeys)
+        for part in shapely.get_parts(shapely.buffer(block, -manner.garden_m, join_style="mitre")):
+            found = _about(part, manner, rng)
+            storeys = np.maximum(np.round(mean + rng.normal(0, 0.7, len(found))), 1)
+            built += found
+            heights.append(np.round(STOREY_M * storeys + _ROOF_M, 1))
+    footprints = np.empty(len(built), dtype=object)
+    footprints[:] = built
+    return footprints, np.concatenate([np.empty(0), *heights])
+
+
+def _about(plot: Polygon, manner: Manner, rng: np.random.Generator) -> list[Polygon]:
+    """Return the houses along the edge of a plot, which leave a court in its middle."""
+    if plot.area < _LEAST_HOUSE_M2:
+        return []
+    plot = Polygon(plot.exterior).simplify(0.3)
+    court = shapely.buffer(plot, -manner.depth_m, join_style="mitre")
+    if court.area < _LEAST_COURT_M2:
+        court = shapely.buffer(plot, -0.7 * manner.depth_m, join_style="mitre")
+    ring = plot.difference(court)
+    walls = _party_walls(plot, manner, rng)
+    cut = shapely.union_all([ring.boundary, *walls])
+    parts = shapely.get_parts(shapely.polygonize([cut]))
+    parts = parts[shapely.contains(ring, shapely.point_on_surface(parts))]
+    if manner.apart_m:
+        parts = shapely.get_parts(shapely.buffer(parts, -manner.apart_m, join_style="mitre"))
+    return [part for part in parts if part.area >= _LEAST_HOUSE_M2]
+
+
+def _party_walls(plot: Polygon, manner: Manner, rng: np.random.Generator) -> Geometries:
+    """Return lines inward from the edge of a plot, clear of its corners."""
+    edge = shapely.get_coordinates(shapely.orient_polygons(plot).exterior)
+    side = np.diff(edge, axis=0)
+    length_m = np.hypot(side[:, 0], side[:, 1])
+    side /= length_m[:, None]
+    turn = np.abs(
+        np.arctan2(_cross(side, np.roll(side, -1, 0)), (side * np.roll(side, -1, 0)).sum(1))
+    )
+    end_m = np.cumsum(length_m)
+    corner_m = np.concatenate([[0.0], end_m])[np.concatenate([[turn[-1]], turn]) > _CORNER_RAD]
+    count = max(int(end_m[-1] / manner.front_m), 1)
+    place_m = (np.arange(count) + rng.uniform(0.2, 0.8, count)) * end_m[-1] / count
+    off_m = np.abs(place_m[:, None] - corner_m[None, :]).min(axis=1, initial=np.inf)
+    place_m = place_m[off_m > 0.9 * manner.depth_m]
+    on = np.minimum(np.searchsorted(end_m, place_m), len(side) - 1)
+    foot = edge[on] + side[on] * (place_m - end_m[on] + length_m[on])[:, None]
+    inward = np.column_stack([-side[on, 1], side[on, 0]])
+    ends = np.stack([foot - 0.5 * inward, foot + (manner.depth_m + 0.5) * inward], axis=1)
+    return np.asarray(shapely.linestrings(ends))
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
