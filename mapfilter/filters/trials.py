@@ -1,0 +1,181 @@
+"""Kalman-type filters over many trials of one experiment, by compiled kernels.
+
+All trials share motion, measurement and noise; each has its own first belief and its own readings,
+of which any component may be absent at any step. What the filters are is told in
+:mod:`mapfilter.filters.kalman` and :mod:`mapfilter.filters.sigma_point`; the arithmetic is the
+same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mapfilter.errors import Faults, InputError
+from mapfilter.filters._runs import run_lanes
+from mapfilter.filters.gaussian import Method, factor_of
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+LANES = 64
+"""Trials that a kernel takes at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledMeasurement:
+    """A measurement that compiled kernels can call.
+
+    Parameters
+    ----------
+    measure : callable
+        Compiled with the arguments (points, slots, rows, patterns, mean, slope, derive), see
+        :data:`mapfilter.filters._runs.MEASURE_SIGNATURE`.
+    slots : (4,) integer array
+    uses : (q,) integer array
+        Components of the state that it depends on.
+    rows : (m, c) array
+    patterns : (p,) array
+    noise : (m, m) array
+        Covariance of its noise, positive definite.
+    """
+
+    measure: Callable[..., None]
+    slots: Ints
+    uses: Ints
+    rows: Floats
+    patterns: Floats
+    noise: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class TrialRun:
+    """What filters made of T trials of K steps.
+
+    Parameters
+    ----------
+    means : (T, K, n) array
+        Updated means.
+    covariances : (T, K, n, n) array
+        Updated covariances; K is 0 unless they were asked for.
+    evidence : (T, K) array
+        Log density of each reading given those before it; NaN where an update failed and the
+        prediction was kept.
+    nis : (T, K) array
+        Normalised innovations squared.
+    """
+
+    means: Floats
+    covariances: Floats
+    evidence: Floats
+    nis: Floats
+
+
+def run_trials(
+    measurement: CompiledMeasurement,
+    transition: Floats,
+    process: Floats,
+    method: Method,
+    first_mean: ArrayLike,
+    first_covariance: ArrayLike,
+    readings: Floats,
+    *,
+    covariances: bool = False,
+) -> TrialRun:
+    """Run a filter over trials: predict, then update, at each step.
+
+    Parameters
+    ----------
+    measurement : CompiledMeasurement
+    transition, process : (n, n) arrays
+        Φ and Q.
+    method : Method
+        Which update.
+    first_mean : (T, n) or (n,) array_like
+        The beliefs before the first step.
+    first_covariance : (n, n) array_like
+        Of all of them.
+    readings : (T, K, m) array
+        NaN where absent.
+    covariances : bool
+        Whether to keep the covariances.
+
+    Raises
+    ------
+    InputError
+        Sizes that do not fit, a covariance that is none, infinite readings.
+    """
+    n = transition.shape[0]
+    trials, steps = _checked_sizes(measurement, transition, readings)
+    starts = np.broadcast_to(np.asarray(first_mean, dtype=np.float64), (trials, n))
+    factor = factor_of(first_covariance, n)
+    entry = np.nonzero(transition)
+    arguments: tuple[Any, ...] = (
+        _update_of(method), measurement.measure, measurement.slots, measurement.uses,
+        np.ascontiguousarray(measurement.rows), np.ascontiguousarray(measurement.patterns),
+        np.ascontiguousarray(measurement.noise), is_diagonal(measurement.noise),
+        *method_numbers(method, n), *(np.ascontiguousarray(index) for index in entry),
+        np.ascontiguousarray(transition[entry]),
+        np.ascontiguousarray(process),
+    )  # fmt: skip
+    kept = steps if covariances else 0
+    means, found = np.empty((trials, steps, n)), np.empty((trials, kept, n, n))
+    evidence, nis = np.empty((trials, steps)), np.empty((trials, steps))
+    for first in range(0, trials, LANES):
+        block = slice(first, min(first + LANES, trials))
+        lanes = block.stop - first
+        lane_means, lane_found = np.empty((steps, n, lanes)), np.empty((kept, lanes, n, n))
+        lane_evidence, lane_nis = np.empty((steps, lanes)), np.empty((steps, lanes))
+        run_lanes(
+            *arguments, np.ascontiguousarray(readings[block].transpose(1, 2, 0)),
+            np.array(starts[block].T, order="C"),
+            np.ascontiguousarray(np.repeat(factor[:, :, None], lanes, axis=2)),
+            lane_means, lane_found, lane_evidence, lane_nis,
+        )  # fmt: skip
+        means[block] = lane_means.transpose(2, 0, 1)
+        found[block] = lane_found.transpose(1, 0, 2, 3)
+        evidence[block], nis[block] = lane_evidence.T, lane_nis.T
+    return TrialRun(means, found, evidence, nis)
+
+
+def is_diagonal(matrix: Floats) -> bool:
+    """Tell whether a matrix has nothing off its diagonal."""
+    return not np.any(matrix - np.diag(np.diagonal(matrix)))
+
+
+def method_numbers(method: Method, size: int) -> tuple[int, float, float]:
+    """Return a method as kernels take it: iterations, γ and β - α²."""
+    if method.sigma is not None:
+        return 1, method.sigma.spread(size), method.sigma.bend_weight
+    return method.iterations, 1.0, 0.0
+
+
+def _update_of(method: Method) -> Callable[..., None]:
+    """Return the compiled update; each is compiled when it is first wanted."""
+    update: Callable[..., None]
+    if method.sigma is not None:
+        from mapfilter.filters._sigma import by_sigma_points as update
+    elif method.iterations > 1:
+        from mapfilter.filters._iterated import iterated as update
+    else:
+        from mapfilter.filters._linear import linearised as update
+    return update
+
+
+def _checked_sizes(
+    measurement: CompiledMeasurement, transition: Floats, readings: Floats
+) -> tuple[int, int]:
+    faults = Faults()
+    n, m = transition.shape[0], measurement.rows.shape[0]
+    if readings.ndim != 3 or readings.shape[2] != m:
+        faults.add("readings", f"shape (trials, steps, {m})", readings.shape)
+    if np.isinf(readings).any():
+        faults.add("readings", "finite numbers, or NaN where absent", "infinity")
+    if measurement.uses.size and measurement.uses.max() >= n:
+        faults.add("measurement", f"a state of {n} components", f"{measurement.uses.max() + 1}")
+    faults.raise_if_any(InputError)
+    return readings.shape[0], readings.shape[1]
