@@ -10,7 +10,7 @@ import typer
 
 from mapfilter import __version__
 from mapfilter.cli.databases import build, check, export, info, merge, predict
-from mapfilter.cli.experiments import bench
+from mapfilter.cli.experiments import bench, sweep
 from mapfilter.cli.options import DONE, WRONG
 from mapfilter.cli.tracks import demo, replay, simulate
 from mapfilter.errors import MapfilterError
@@ -38,6 +38,7 @@ for _command in (
     info,
     simulate,
     replay,
+    sweep,
     bench,
 ):
     app.command()(_command)

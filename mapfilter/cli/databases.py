@@ -10,12 +10,15 @@ import typer
 
 from mapfilter.cli.options import (
     WRONG,
+    ClusterOption,
     ConfigOption,
     JsonOption,
     OutOption,
     PathArgument,
+    ResumeOption,
     SeedOption,
     SetOption,
+    WorkersOption,
     given_path,
     seeded,
 )
@@ -66,14 +69,9 @@ def build(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Only tell size, memory and time.")
     ] = False,
-    workers: Annotated[int, typer.Option("--workers", min=1, help="Local processes.")] = 1,
-    cluster: Annotated[
-        str | None,
-        typer.Option("--cluster", metavar="ADDRESS", help="A Dask scheduler, or local:N."),
-    ] = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on where a build was cut short.")
-    ] = False,
+    workers: WorkersOption = 1,
+    cluster: ClusterOption = None,
+    resume: ResumeOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Build a radio-route database from RxLev rasters and roads."""

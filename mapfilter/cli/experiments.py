@@ -1,4 +1,4 @@
-"""Commands that measure."""
+"""Commands that run experiments, and that measure."""
 
 from __future__ import annotations
 
@@ -6,8 +6,44 @@ from typing import Annotated
 
 import typer
 
-from mapfilter.cli.options import JsonOption
-from mapfilter.workflows.terminal import print_result
+from mapfilter.cli.options import (
+    PARTIAL,
+    ClusterOption,
+    ConfigOption,
+    JsonOption,
+    OutOption,
+    ResumeOption,
+    SeedOption,
+    SetOption,
+    WorkersOption,
+    seeded,
+)
+from mapfilter.workflows.terminal import print_result, rate_bar, say
+
+
+def sweep(
+    config: ConfigOption = None,
+    settings: SetOption = None,
+    out: OutOption = None,
+    seed: SeedOption = None,
+    workers: WorkersOption = 1,
+    cluster: ClusterOption = None,
+    resume: ResumeOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Run a filter over a grid of inertial noise; exit code 3 if it was stopped on the way."""
+    from mapfilter.workflows.sweep import load_sweep, run_sweep
+
+    loaded = load_sweep(config, seeded(settings, seed, "sweep.seed"), out=out)
+    try:
+        with rate_bar("sweep", "runs") as progress:
+            result = run_sweep(
+                loaded, workers=workers, cluster=cluster, resume=resume, progress=progress
+            )
+    except KeyboardInterrupt:
+        say("stopped; finished batches are kept: go on with --resume")
+        raise typer.Exit(PARTIAL) from None
+    print_result(result, as_json)
 
 
 def bench(

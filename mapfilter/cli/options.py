@@ -36,6 +36,12 @@ OutOption = Annotated[
 ]
 SeedOption = Annotated[int | None, typer.Option("--seed", min=0, help="Seed of what is drawn.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on one line.")]
+WorkersOption = Annotated[int, typer.Option("--workers", min=1, help="Local processes.")]
+ClusterOption = Annotated[
+    str | None,
+    typer.Option("--cluster", metavar="ADDRESS", help="A Dask scheduler, or local:N."),
+]
+ResumeOption = Annotated[bool, typer.Option("--resume", help="Go on where it was cut short.")]
 PathArgument = Annotated[Path, typer.Argument(metavar="PATH", callback=given_path)]
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Accuracy
 
@@ -23,15 +24,55 @@ def wilson_interval(successes: int, runs: int, z: float = _Z_95) -> tuple[float,
     """
     if not 0 <= successes <= runs:
         raise ValueError(f"successes must lie in 0..{runs}, got {successes}")
-    if runs == 0:
-        return 0.0, 1.0
-    share = successes / runs
+    return _wilson(successes / runs, runs, z) if runs else (0.0, 1.0)
+
+
+def wilson_interval_of_routes(
+    successes: ArrayLike, runs: ArrayLike, z: float = _Z_95
+) -> tuple[float, float]:
+    """Return the Wilson interval of a share over all routes, from that of some routes.
+
+    Runs on one route are alike, so many runs on few routes say less than their number. The variance
+    of the share is taken from the scatter of the routes (the ratio estimator of cluster sampling),
+    and the interval is Wilson's for as many independent runs as have that variance (Korn and
+    Graubard 1998). Where all routes succeed or all fail, each route counts as one run.
+
+    Parameters
+    ----------
+    successes, runs : array_like of int, shape (routes,)
+        Of each route.
+
+    Returns
+    -------
+    low, high : float
+        NaN for a single route, which tells nothing of others.
+
+    Examples
+    --------
+    >>> [round(end, 3) for end in wilson_interval_of_routes([10, 0, 10, 0], [10, 10, 10, 10])]
+    [0.125, 0.875]
+    >>> [round(end, 3) for end in wilson_interval(20, 40)]
+    [0.352, 0.648]
+    """
+    good, of = np.asarray(successes, dtype=np.float64), np.asarray(runs, dtype=np.float64)
+    routes, total = good.size, float(of.sum())
+    if routes < 2:
+        return float("nan"), float("nan")
+    share = float(good.sum()) / total
+    if share in (0.0, 1.0):
+        return _wilson(share, routes, z)
+    variance = routes / (routes - 1) * float(np.sum((good - share * of) ** 2)) / total**2
+    independent = share * (1 - share) / variance if variance > 0 else total
+    return _wilson(share, min(max(independent, 1.0), total), z)
+
+
+def _wilson(share: float, runs: float, z: float) -> tuple[float, float]:
     centre = share + z * z / (2 * runs)
     spread = z * sqrt(share * (1 - share) / runs + z * z / (4 * runs * runs))
     scale = 1 + z * z / runs
     # The ends are exactly 0 and 1 there; rounding must not push the share out of its interval.
-    low = 0.0 if successes == 0 else (centre - spread) / scale
-    high = 1.0 if successes == runs else (centre + spread) / scale
+    low = 0.0 if share == 0 else (centre - spread) / scale
+    high = 1.0 if share == 1 else (centre + spread) / scale
     return low, high
 
 

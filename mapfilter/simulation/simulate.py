@@ -146,14 +146,14 @@ def simulate_log(
     truth = journey(along, settings.journey)
     return make_log(
         crs,
-        motion=noisy_motion(_at_ticks(truth, settings.imu_period_s), settings.imu, imu_rng),
+        motion=noisy_motion(at_ticks(truth, settings.imu_period_s), settings.imu, imu_rng),
         radio=reports(truth, levels, plan, settings.reports, radio_rng),
         truth=truth,
         start_utc_s=settings.start_utc_s,
     )
 
 
-def _at_ticks(truth: pd.DataFrame, period_s: float) -> pd.DataFrame:
+def at_ticks(truth: pd.DataFrame, period_s: float) -> pd.DataFrame:
     """Return where one was at the unit's ticks, from the start on."""
     time_s = truth["time_s"].to_numpy()
     # A whole number of periods must not lose the last tick to rounding.

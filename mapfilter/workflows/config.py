@@ -61,6 +61,48 @@ def load_config(
     >>> config.cells.sites, config.area.bbox
     (3, (24.94, 60.16, 24.95, 60.17))
     """
+    values, folder = _given(file, settings, out)
+    try:
+        return Config.model_validate(values, context={"folder": folder})
+    except ValidationError as error:
+        changed = [_keys(setting) for setting in settings]
+        raise ConfigError(
+            tuple(_fault(file, changed, detail) for detail in error.errors())
+        ) from None
+
+
+def load_keys(
+    file: Path | None, settings: Sequence[str], out: Path | None, keys: Sequence[str]
+) -> Config | None:
+    """Return what some keys of a configuration say, however wrong others are.
+
+    Parameters
+    ----------
+    file, settings, out
+        As for :func:`load_config`.
+    keys : sequence of str
+        Such as ``database.path``; all others have their defaults.
+
+    Returns
+    -------
+    config : Config or None
+        None where the keys themselves are wrong.
+    """
+    try:
+        values, folder = _given(file, settings, out)
+        chosen: dict[str, dict[str, Any]] = {}
+        for section, _, key in (name.partition(".") for name in keys):
+            if isinstance(values.get(section), dict) and key in values[section]:
+                chosen.setdefault(section, {})[key] = values[section][key]
+        return Config.model_validate(chosen, context={"folder": folder})
+    except (ConfigError, ValidationError):
+        return None
+
+
+def _given(
+    file: Path | None, settings: Sequence[str], out: Path | None
+) -> tuple[dict[str, Any], Path]:
+    """Return the values of file and settings, unchecked, and the folder that paths start from."""
     values = _read_toml(file) if file is not None else {}
     faults = Faults()
     for setting in settings:
@@ -72,13 +114,7 @@ def load_config(
         if out is not None:
             output["dir"] = str(out.absolute())
         output.setdefault("dir", str(Path.cwd() / "out"))
-    try:
-        return Config.model_validate(values, context={"folder": folder})
-    except ValidationError as error:
-        changed = [_keys(setting) for setting in settings]
-        raise ConfigError(
-            tuple(_fault(file, changed, detail) for detail in error.errors())
-        ) from None
+    return values, folder
 
 
 def _read_toml(file: Path) -> dict[str, Any]:
@@ -173,6 +209,10 @@ def _fault(file: Path | None, changed: Sequence[list[str]], detail: Mapping[str,
     if detail["type"] in ("missing", "too_short", "too_long") and whole and whole[0] in _LISTS:
         place = where.removesuffix(f".{keys[-1]}") if detail["type"] == "missing" else where
         return Fault(place, _LISTS[whole[0]], shown(detail["input"]))
+    if detail["type"] == "missing" and isinstance(detail["input"], Mapping):
+        return Fault(where, "a value", "none")
+    if detail["type"] == "too_short" and not detail["input"]:
+        return Fault(where, "at least one value", "none")
     if detail["type"] in ("too_short", "too_long"):
         wanted = detail["ctx"].get("max_length", detail["ctx"].get("min_length"))
         return Fault(where, f"{wanted} values", f"{len(detail['input'])}")
@@ -191,5 +231,7 @@ def _said(detail: Mapping[str, Any]) -> str:
 def _known_keys(parents: Sequence[str]) -> list[str]:
     model: Any = Config
     for parent in parents:
-        model = model.model_fields[parent].annotation
+        # A number is a place in a list of sections.
+        inner = parent.isdecimal()
+        model = model.__args__[0] if inner else model.model_fields[parent].annotation
     return list(model.model_fields)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import sys
+import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -42,3 +43,49 @@ def progress_bar(label: str) -> Iterator[Progress | None]:
     with Bar(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(label)
         yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+@contextlib.contextmanager
+def rate_bar(label: str, unit: str, every_s: float = 30.0) -> Iterator[Progress]:
+    """Give a progress on stderr with rate and time left; a line now and then where nobody watches.
+
+    Parameters
+    ----------
+    label, unit : str
+        What is done, and what is counted.
+    every_s : float
+        Seconds between two lines.
+    """
+    began_s = told_s = time.monotonic()
+    first = -1
+
+    def rate(done: int) -> float:
+        return (done - first) / max(time.monotonic() - began_s, 1e-6)
+
+    def tell(done: int, total: int) -> None:
+        nonlocal first, told_s
+        first = done if first < 0 else first
+        if time.monotonic() - told_s >= every_s and done > first:
+            told_s = time.monotonic()
+            left_s = (total - done) / rate(done)
+            many = f"{done} of {total} {unit}, {rate(done):.1f} {unit}/s, {left_s:.0f} s left"
+            say(f"{label}: {many}")
+
+    if not sys.stderr.isatty():
+        yield tell
+        return
+    from rich.console import Console
+    from rich.progress import Progress as Bar
+    from rich.progress import TextColumn
+
+    columns = (*Bar.get_default_columns(), TextColumn("{task.fields[rate]}"))
+    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(label, rate="")
+
+        def show(done: int, total: int) -> None:
+            nonlocal first
+            first = done if first < 0 else first
+            told = f"{rate(done):.1f} {unit}/s"
+            bar.update(task, completed=done, total=total, rate=told)
+
+        yield show

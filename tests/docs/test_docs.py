@@ -15,6 +15,7 @@ from pydantic import BaseModel
 from typer.testing import CliRunner
 
 from mapfilter.cli import app
+from mapfilter.experiments.sweep.table import SCHEMA as SWEEP_SCHEMA
 from mapfilter.filters.candidate_options import CandidateOptions
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate_store import _COLUMNS as ESTIMATE_COLUMNS
@@ -93,6 +94,10 @@ def test_files_name_every_column_of_a_database():
     assert {"level_dbm", "below_best_db", "cell", "geometry"} <= listed
 
 
+def test_files_name_every_column_of_a_sweep():
+    assert set(SWEEP_SCHEMA.names) <= named(page("file-formats.rst"))
+
+
 def test_filter_page_tells_every_option_with_its_default():
     text = page("explanation/candidate-filter.rst")
     told = dict(re.findall(r"\* - ``(\w+)``\n     - ``([^`]+)``", text))
@@ -139,4 +144,4 @@ def test_quickstart_shows_only_commands_that_exist():
     commands = set(typer.main.get_command(app).commands)
     shown = set(re.findall(r"^   \$ mapfilter (\w+)", page("quickstart.rst"), flags=re.MULTILINE))
     assert shown <= commands
-    assert commands - shown <= {"merge", "bench"}
+    assert commands - shown <= {"merge", "bench", "sweep", "reproduce"}

@@ -1,0 +1,1 @@
+"""Published experiments, as they were set up: one module for each paper."""

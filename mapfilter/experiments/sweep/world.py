@@ -1,0 +1,111 @@
+"""The world of a sweep on disk: streets, cells and levels, which every worker maps into memory."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapfilter._io import atomic_dir, read_json, sha256_file, write_json
+from mapfilter.database.store import read_cells, write_cells
+from mapfilter.errors import StoreError, fail
+from mapfilter.geodesy import Lattice
+from mapfilter.radio.cells import CellPlan
+from mapfilter.roads.network import StreetNetwork
+
+_HEAD, _CELLS, _STREETS = "world.json", "cells.parquet", "streets.npz"
+_ARRAYS = (
+    "east_m", "north_m", "node_a", "node_b", "length_m", "way_id", "way_class", "oneway",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class SweepWorld:
+    """Where journeys go and what is heard there.
+
+    Parameters
+    ----------
+    network : StreetNetwork
+        In the lattice's CRS.
+    plan : CellPlan
+    lattice : Lattice
+        Of the levels.
+    levels_dbm : mapping of str to ndarray, shape (cells, rows, cols)
+        By the radio's name; NaN where a cell is not heard. Read from disk, they are mapped.
+    """
+
+    network: StreetNetwork
+    plan: CellPlan
+    lattice: Lattice
+    levels_dbm: Mapping[str, NDArray[np.float32]]
+
+
+def write_world(world: SweepWorld, folder: Path) -> str:
+    """Write a world, and return the SHA-256 by which it is known.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be written.
+    """
+    names = sorted(world.levels_dbm)
+    with atomic_dir(folder) as into:
+        write_cells(world.plan, into / _CELLS)
+        arrays: dict[str, Any] = {name: getattr(world.network, name) for name in _ARRAYS}
+        np.savez(into / _STREETS, **arrays)
+        for number, name in enumerate(names):
+            levels = np.ascontiguousarray(world.levels_dbm[name], dtype=np.float32)
+            np.save(into / _levels(number), levels)
+        lattice = world.lattice
+        parts = (_CELLS, _STREETS, *(_levels(number) for number in range(len(names))))
+        head = {
+            "crs": lattice.crs,
+            "west_m": lattice.west_m,
+            "north_m": lattice.north_m,
+            "resolution_m": lattice.resolution_m,
+            "rows": lattice.rows,
+            "cols": lattice.cols,
+            "class_names": list(world.network.class_names),
+            "levels": names,
+            "sha256": {part: sha256_file(into / part) for part in parts},
+        }
+        write_json(into / _HEAD, head)
+    return sha256_file(folder / _HEAD)
+
+
+def open_world(folder: Path) -> SweepWorld:
+    """Open a world; its levels are mapped into memory, not read.
+
+    Raises
+    ------
+    StoreError
+        Something of it is missing or damaged.
+    """
+    head = read_json(folder / _HEAD)
+    try:
+        lattice = Lattice(
+            str(head["crs"]),
+            float(head["west_m"]),
+            float(head["north_m"]),
+            float(head["resolution_m"]),
+            int(head["rows"]),
+            int(head["cols"]),
+        )
+        with np.load(folder / _STREETS, allow_pickle=False) as arrays:
+            streets = {name: arrays[name] for name in _ARRAYS}
+        network = StreetNetwork(crs=lattice.crs, class_names=tuple(head["class_names"]), **streets)
+        levels = {
+            str(name): np.load(folder / _levels(number), mmap_mode="r", allow_pickle=False)
+            for number, name in enumerate(head["levels"])
+        }
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise fail(StoreError, str(folder), "the world of a sweep", error, "cut off") from error
+    return SweepWorld(network, read_cells(folder / _CELLS, lattice.crs), lattice, levels)
+
+
+def _levels(number: int) -> str:
+    return f"levels-{number}.npy"

@@ -1,0 +1,133 @@
+"""The plan of a sweep from a configuration; everything that is wrong with it is told together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.database.store import open_database
+from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError
+from mapfilter.experiments.sweep.plan import (
+    AS_PREDICTED,
+    Radio,
+    Reading,
+    SweepPlan,
+    noise_grid,
+)
+from mapfilter.workflows.filters import filter_choice
+from mapfilter.workflows.sections import Config, FilterSection
+from mapfilter.workflows.simulate import simulation_settings
+from mapfilter.workflows.sweep_section import ReadingSection
+
+REALITY = "reality"
+
+
+def sweep_databases(config: Config) -> dict[str, Path]:
+    """Return the databases of a sweep by name: that of the folder, or the path where two agree."""
+    paths = [Path(path) for path in config.sweep.databases] or [config.database_path]
+    names = [path.name for path in paths]
+    return {str(path) if names.count(path.name) > 1 else path.name: path for path in paths}
+
+
+def sweep_plan(config: Config) -> tuple[SweepPlan, dict[str, RadioRouteDatabase]]:
+    """Return the plan of a configuration's sweep, and its databases by name, checked.
+
+    Raises
+    ------
+    ConfigError, InputError
+        With every fault: databases that are missing or damaged, of different resolutions or CRS,
+        readings with one name, axes that hold a value twice.
+    """
+    faults = Faults()
+    databases: dict[str, RadioRouteDatabase] = {}
+    paths = sweep_databases(config)
+    if len(paths) < len(config.sweep.databases):
+        faults.add("sweep.databases", "every folder once", "one twice")
+    for name, path in paths.items():
+        try:
+            databases[name] = open_database(path, verify="full")
+        except MapfilterError as error:
+            faults.found.extend(error.faults)
+    resolution_m = _one_resolution(databases, faults)
+    plan = None
+    try:
+        plan = _plan(config, tuple(paths), resolution_m)
+    except ConfigError as error:
+        faults.found.extend(error.faults)
+    if plan is None or faults.found:
+        faults.raise_if_any(ConfigError if plan is None else InputError)
+        raise AssertionError
+    return plan, databases
+
+
+def _one_resolution(databases: Mapping[str, RadioRouteDatabase], faults: Faults) -> float:
+    found = {name: database.lattice.resolution_m for name, database in databases.items()}
+    if len(set(found.values())) > 1:
+        faults.add("sweep.databases", "databases of one resolution", found)
+    return next(iter(found.values()), 5.0)
+
+
+def _plan(config: Config, databases: tuple[str, ...], resolution_m: float) -> SweepPlan:
+    section, imu, settings = config.sweep, config.imu, simulation_settings(config)
+    readings = _readings(config, resolution_m)
+    # No candidate filter uses neighbours, and what serves does not depend on them.
+    neighbours = 0 if all(one.choice.name == "candidate" for one in readings) else None
+    reports = settings.reports
+    if neighbours is not None:
+        reports = replace(reports, max_neighbours=neighbours)
+    return SweepPlan(
+        readings=readings,
+        databases=databases,
+        noises=noise_grid(
+            _axis(section.sigma_trans_m, imu.sigma_trans_m),
+            _axis(section.sigma_orient_deg, imu.sigma_orient_deg),
+            _axis(section.bias_deg, imu.bias_deg),
+            _axis(section.drift_deg_per_sqrt_s, imu.drift_deg_per_sqrt_s),
+            _axis(section.scale, imu.scale),
+        ),
+        radios=_radios(config),
+        report_periods_s=_axis(section.report_period_s, config.journeys.report_period_s),
+        imu_periods_s=_axis(section.imu_period_s, imu.period_s),
+        routes=section.routes,
+        draws=section.draws,
+        length_m=settings.journey.length_m,
+        profile=settings.journey.profile,
+        speed_mps=settings.journey.speed_mps,
+        reports=reports,
+        translation_noise=imu.translation_noise,
+        seed=section.seed,
+    )
+
+
+def _axis(values: Sequence[float] | None, otherwise: float) -> tuple[float, ...]:
+    return tuple(map(float, values)) if values is not None else (float(otherwise),)
+
+
+def _radios(config: Config) -> tuple[Radio, ...]:
+    errors_db = config.sweep.prediction_error_db
+    if errors_db is not None:
+        return tuple(Radio(f"{REALITY} {error_db:g} dB", float(error_db)) for error_db in errors_db)
+    if config.journeys.radio == AS_PREDICTED:
+        return (Radio(),)
+    return (Radio(REALITY, math.nan),)
+
+
+def _readings(config: Config, resolution_m: float) -> tuple[Reading, ...]:
+    named = config.sweep.readings or (ReadingSection(name=config.filter.name),)
+    readings = []
+    for one in named:
+        given: dict[str, Any] = one.model_dump(exclude_none=True, exclude={"name", "filter"})
+        if one.filter is not None:
+            given["name"] = one.filter
+        section = FilterSection(**{**config.filter.model_dump(), **given})
+        lengths_m = config.sweep.update_length_m
+        if lengths_m is None or one.update_length_m is not None:
+            lengths_m = (section.update_length_m,)
+        for length_m in lengths_m:
+            chosen = section.model_copy(update={"update_length_m": float(length_m)})
+            readings.append(Reading(one.name, filter_choice(chosen, resolution_m), float(length_m)))
+    return tuple(readings)

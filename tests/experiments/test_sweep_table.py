@@ -1,0 +1,69 @@
+"""The table of a sweep: null where undefined, parts that are cut off, memory that stays flat."""
+
+from math import nan
+
+import pyarrow.parquet as pq
+import pytest
+
+from mapfilter.errors import StoreError
+from mapfilter.evaluation.accuracy import Accuracy
+from mapfilter.experiments.sweep.plan import Reading, SweepPlan
+from mapfilter.experiments.sweep.table import (
+    SCHEMA,
+    is_part,
+    join_parts,
+    read_runs,
+    row,
+    to_table,
+    write_part,
+)
+from mapfilter.positioning.locators import FilterChoice
+
+NEVER = Accuracy(False, False, nan, nan, nan, nan, nan, nan, 0)
+RIGHT = Accuracy(True, True, 60.0, 84.0, 3.0, 4.0, 5.0, 9.0, 10)
+PLAN = SweepPlan((Reading("set", FilterChoice()),), draws=25)
+
+
+def rows(first, end, score=RIGHT):
+    return to_table([row(run, score, "TRACKING") for run in PLAN.select(first, end)])
+
+
+def test_a_row_tells_run_and_score_and_null_where_there_is_none():
+    table = to_table([row(next(PLAN.select(3, 4)), NEVER, "SEARCHING")])
+    assert table.schema.equals(SCHEMA)
+    found = table.to_pylist()[0]
+    assert (found["draw"], found["filter"], found["sigma_trans_m"]) == (3, "candidate", 0.2)
+    assert found["success"] is False
+    assert found["error_mean_m"] is found["switch_distance_m"] is found["update_length_m"] is None
+
+
+def test_parts_join_to_the_whole(tmp_path):
+    parts = []
+    for number, (first, end) in enumerate(PLAN.batches()):
+        parts.append(tmp_path / f"{number}.parquet")
+        write_part(rows(first, end), parts[-1])
+        assert is_part(parts[-1], end - first)
+        assert not is_part(parts[-1], end - first + 1)
+    join_parts(parts, tmp_path / "runs.parquet")
+    found = read_runs(tmp_path / "runs.parquet")
+    assert found["draw"].tolist() == list(range(25))
+    assert found["success"].all()
+
+
+def test_a_part_that_is_cut_off_is_none(tmp_path):
+    part = tmp_path / "part.parquet"
+    assert not is_part(part, 5)
+    write_part(rows(0, 5), part)
+    part.write_bytes(part.read_bytes()[:-20])
+    assert not is_part(part, 5)
+    pq.write_table(rows(0, 5).drop_columns(["draw"]), part)
+    assert not is_part(part, 5)
+
+
+def test_another_table_is_refused(tmp_path):
+    other = tmp_path / "other.parquet"
+    with pytest.raises(StoreError, match="table of a sweep"):
+        read_runs(other)
+    pq.write_table(rows(0, 5).drop_columns(["draw", "route"]), other)
+    with pytest.raises(StoreError, match="columns of a sweep"):
+        read_runs(other)

@@ -1,0 +1,278 @@
+"""Sweeps by the command: the same table however it is done, cut short, gone on with, refused."""
+
+import os
+import shutil
+import signal
+
+import pytest
+from command_line import assert_done, assert_refused, mapfilter, settings
+
+from mapfilter._parallel import SerialExecutor, cluster_executor, local_executor
+from mapfilter.errors import ConfigError, MapfilterError
+from mapfilter.experiments.sweep.run import sweep
+from mapfilter.experiments.sweep.table import read_runs
+from mapfilter.workflows.config import load_config
+from mapfilter.workflows.simulate import run_simulate
+from mapfilter.workflows.sweep import load_sweep, run_sweep
+from mapfilter.workflows.sweep_plan import sweep_plan
+from mapfilter.workflows.sweep_world import sweep_world
+
+GRID = settings(
+    sweep__sigma_orient_deg="0,6",
+    sweep__sigma_trans_m="0,0.3",
+    sweep__update_length_m="5,20",
+    sweep__routes=3,
+    sweep__draws=4,
+    output__pictures="none",
+)
+GIVEN = [text.removeprefix("--set=") for text in GRID]
+RUNS = 2 * 2 * 2 * 3 * 4
+
+
+@pytest.fixture(scope="module")
+def parts(world):
+    """Plan, world and databases of one sweep."""
+    config = load_config(world.toml, GIVEN)
+    plan, databases = sweep_plan(config)
+    return plan, sweep_world(config, plan), {name: one.path for name, one in databases.items()}
+
+
+@pytest.fixture(scope="module")
+def whole(parts, tmp_path_factory):
+    """The table, as one process makes it."""
+    return sweep(*parts, tmp_path_factory.mktemp("whole")).read_bytes()
+
+
+def test_the_command_and_what_it_tells(world, whole, tmp_path):
+    shutil.copytree(world.folder, tmp_path / "world")
+    toml = tmp_path / "world" / "world.toml"
+    found = assert_done(mapfilter("sweep", "-c", toml, *GRID, "--json")).json
+    assert found["runs"] == RUNS
+    assert len(found["cells"]) == 8
+    cell = found["cells"][0]
+    assert (cell["runs"], cell["routes"], cell["filter"]) == (12, 3, "candidate")
+    assert cell["low"] <= cell["success"] <= cell["high"]
+    out = tmp_path / "world" / "out" / "sweep"
+    assert (out / "runs.parquet").read_bytes() == whole
+    assert {file.name for file in out.iterdir()} == {"runs.parquet", "sweep.json"}
+    runs = read_runs(out / "runs.parquet")
+    assert runs["success"].sum() == sum(round(c["success"] * 12) for c in found["cells"])
+    assert (runs["switched"] | ~runs["success"]).all()
+
+
+def test_logs_of_a_sweep_are_as_sound_as_checked_ones(parts):
+    """The logs of a sweep pass the checks that logs of others pass, and stay as they are."""
+    from mapfilter.experiments.sweep import journeys
+    from mapfilter.tracks.log import make_log
+
+    plan, world, _ = parts
+    run = next(plan.select(0, 1))
+    truth = journeys.true_path(world, plan, run.route)
+    log = journeys.heard(world, plan, truth, run.route, run.radio, run.report_period_s)
+    sensed = journeys.sensed(plan, log, run)
+    checked = make_log(sensed.crs, motion=sensed.motion, radio=sensed.radio, truth=sensed.truth)
+    for name in ("motion", "radio", "truth"):
+        assert getattr(checked, name).equals(getattr(sensed, name)), name
+
+
+def test_two_processes_give_the_same_bytes(parts, whole, tmp_path):
+    with local_executor(2) as executor:
+        assert sweep(*parts, tmp_path, executor=executor).read_bytes() == whole
+
+
+class KillsOneWorker:
+    """Passes tasks on, and a deadly one among them."""
+
+    def __init__(self, executor, mark):
+        self.executor, self.mark, self.tasks, self.deaths = executor, mark, 0, []
+
+    def submit(self, fn, /, *args, **kwargs):
+        self.tasks += 1
+        if self.tasks == 3:
+            self.deaths.append(self.executor.submit(dies_once, self.mark))
+        return self.executor.submit(fn, *args, **kwargs)
+
+
+def dies_once(path):
+    if not path.exists():
+        path.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+@pytest.mark.filterwarnings("default")
+def test_dask_gives_the_same_bytes_though_a_worker_is_killed(parts, whole, tmp_path):
+    with cluster_executor("local:2") as (executor, workers):
+        assert workers == 2
+        deadly = KillsOneWorker(executor, tmp_path / "died")
+        table = sweep(*parts, tmp_path / "out", executor=deadly, in_flight=4)
+        deadly.deaths[0].result()
+    assert (tmp_path / "died").exists()
+    assert table.read_bytes() == whole
+
+
+class StopsAfter(SerialExecutor):
+    """Is interrupted, as by Ctrl-C, when so many tasks are done."""
+
+    def __init__(self, tasks):
+        self.left, self.done = tasks, 0
+
+    def submit(self, fn, /, *args, **kwargs):
+        if self.left == 0:
+            raise KeyboardInterrupt
+        self.left -= 1
+        self.done += 1
+        return super().submit(fn, *args, **kwargs)
+
+
+@pytest.mark.parametrize("stops", [[1], [0, 3, 2]], ids=str)
+def test_interrupted_and_resumed_nothing_is_lost_or_done_twice(parts, whole, tmp_path, stops):
+    plan = parts[0]
+    total, done = len(list(plan.batches())), 0
+    for tasks in stops:
+        stopping = StopsAfter(tasks)
+        with pytest.raises(KeyboardInterrupt):
+            sweep(*parts, tmp_path, executor=stopping, in_flight=1, resume=True)
+        done += stopping.done
+    last = StopsAfter(total)
+    told = []
+    table = sweep(
+        *parts, tmp_path, executor=last, in_flight=1, resume=True,
+        progress=lambda *at: told.append(at),
+    )  # fmt: skip
+    assert done + last.done == total
+    assert told[0][0] > 0 or stops == [0]
+    assert told[-1] == (RUNS, RUNS)
+    assert table.read_bytes() == whole
+    again = StopsAfter(0)
+    assert sweep(*parts, tmp_path, executor=again, resume=True).read_bytes() == whole
+
+
+def test_a_batch_that_was_cut_off_is_done_again(parts, whole, tmp_path):
+    with pytest.raises(KeyboardInterrupt):
+        sweep(*parts, tmp_path, executor=StopsAfter(3), in_flight=1)
+    batch = min((tmp_path / "unfinished" / "batches").iterdir())
+    batch.write_bytes(batch.read_bytes()[:100])
+    assert sweep(*parts, tmp_path, resume=True).read_bytes() == whole
+
+
+def test_another_sweep_is_not_resumed(parts, world, tmp_path):
+    with pytest.raises(KeyboardInterrupt):
+        sweep(*parts, tmp_path, executor=StopsAfter(1), in_flight=1)
+    config = load_config(world.toml, [*GIVEN, "sweep.seed=5"])
+    plan, _ = sweep_plan(config)
+    with pytest.raises(ConfigError, match="another the plan"):
+        sweep(plan, *parts[1:], tmp_path, resume=True)
+    # Without --resume it starts anew.
+    assert len(read_runs(sweep(plan, *parts[1:], tmp_path))) == RUNS
+
+
+def test_a_stopped_command_tells_how_to_go_on(own_world, monkeypatch):
+    def stopped(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("mapfilter.workflows.sweep.sweep", stopped)
+    outcome = mapfilter("sweep", "-c", own_world.toml, *GRID)
+    assert outcome.code == 3
+    assert "--resume" in outcome.err
+
+
+def test_axes_of_everything_else(world, tmp_path):
+    """Filters, databases, periods and prediction errors side by side; pictures of each group."""
+    shutil.copytree(world.folder, tmp_path / "world")
+    toml = tmp_path / "world" / "world.toml"
+    toml.write_text(
+        toml.read_text()
+        + """[sweep]
+prediction_error_db = [0, 7]
+report_period_s = [2.0, 8.0]
+imu_period_s = 2
+bias_deg = 20
+sigma_orient_deg = [0.0, 6.0]
+routes = 2
+draws = 1
+[[sweep.readings]]
+name = "printed"
+prediction = "last_heading"
+margin_db = 3.0
+[[sweep.readings]]
+name = "list"
+duplicates = "list"
+threshold = 10
+update_length_m = 5.0
+"""
+    )
+    found = run_sweep(load_sweep(toml, ["output.pictures=first"]))
+    assert found.runs == 2 * 2 * 2 * 2 * 2
+    runs = read_runs(found.table)
+    assert set(runs["radio"]) == {"reality 0 dB", "reality 7 dB"}
+    assert set(runs["prediction_error_db"]) == {0.0, 7.0}
+    lengths = dict(zip(runs["reading"], runs["update_length_m"], strict=True))
+    assert lengths == {"printed": 10.0, "list": 5.0}
+    assert len(found.pictures) == 3 * 2 * 2 * 2
+    assert all(picture.stat().st_size > 10_000 for picture in found.pictures)
+
+
+def test_reality_must_have_been_predicted(own_world):
+    (own_world.out / "rxlev-reality.tif").unlink()
+    reality = settings(journeys__radio="reality")
+    assert_refused(
+        mapfilter("sweep", "-c", own_world.toml, *GRID, *reality), "rxlev-reality.tif", "reality"
+    )
+
+
+def test_every_fault_of_a_bad_plan_in_one_message(own_world):
+    own_world.toml.write_text(
+        own_world.toml.read_text()
+        + """[sweep]
+sigma_trans_m = []
+sigma_orient_deg = [-3, 3]
+scale = [2.0]
+databases = ["nowhere"]
+runs = 3
+[[sweep.readings]]
+naem = "x"
+threshold = 0
+"""
+    )
+    assert_refused(
+        mapfilter("sweep", "-c", own_world.toml),
+        "sweep.sigma_trans_m", "at least one value", "sweep.sigma_orient_deg.0", "sweep.scale.0",
+        "nowhere", "not built yet", "sweep.runs", "'name'", "sweep.readings.0.threshold",
+    )  # fmt: skip
+    assert not (own_world.out / "sweep").exists()
+
+
+def test_faults_that_only_the_whole_plan_shows(own_world):
+    twice = """[[sweep.readings]]
+name = "same"
+[[sweep.readings]]
+name = "same"
+"""
+    own_world.toml.write_text(own_world.toml.read_text() + twice)
+    with pytest.raises(MapfilterError) as caught:
+        run_sweep(
+            load_sweep(own_world.toml, ["sweep.sigma_trans_m=1,1", 'sweep.databases=["gone"]'])
+        )
+    text = str(caught.value)
+    assert "sweep, readings" in text
+    assert "sweep, noise" in text
+    assert "gone" in text
+
+
+def test_sweeps_and_simulate_hear_alike(world, parts, tmp_path):
+    """A place hears what ``simulate`` lets it hear: the same cells serve as predicted."""
+    from mapfilter.tracks.store import read_log
+
+    config = load_config(world.toml, ["journeys.count=1"], out=world.out)
+    config = config.model_copy(
+        update={"track": config.track.model_copy(update={"path": tmp_path / "logs"})}
+    )
+    run_simulate(config)
+    log = read_log(next((tmp_path / "logs").iterdir()))
+    _, swept, _ = parts
+    serving = log.radio[log.radio["role"] == "serving"]
+    row, col = swept.lattice.row_col(
+        log.truth["east_m"].to_numpy(), log.truth["north_m"].to_numpy()
+    )
+    best = swept.levels_dbm["as_predicted"][:, row, col].argmax(axis=0)
+    assert [swept.plan.ids[i] for i in best] == serving["cell"].tolist()
