@@ -75,6 +75,32 @@ class UnusedReading:
     reason: Reason
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackEvidence:
+    """How sure a filter that holds probabilities is, as arrays over N epochs; NaN before it starts.
+
+    Parameters
+    ----------
+    runner_up_east_m, runner_up_north_m : (N,) arrays
+        The second hypothesis, in the CRS of the positions; NaN where there is none.
+    runner_up_mass : (N,) array
+        Its share of the belief.
+    entropy_bits : (N,) array
+        Of the belief over bins of 25 m.
+    log_evidence : (N,) array
+        Log probability of all readings so far; its fall is how surprising they are.
+    settled : (N,) array of bool
+        What comes later will hardly change the epoch's position.
+    """
+
+    runner_up_east_m: Floats
+    runner_up_north_m: Floats
+    runner_up_mass: Floats
+    entropy_bits: Floats
+    log_evidence: Floats
+    settled: NDArray[np.bool_]
+
+
 @dataclass(frozen=True)
 class TrackEstimate:
     """The fixes of one track as arrays over N epochs.
@@ -98,6 +124,8 @@ class TrackEstimate:
     reason : tuple of Reason
     unused : tuple of UnusedReading
         Every reading not used, and why.
+    evidence : TrackEvidence or None
+        What filters that hold probabilities say besides.
     """
 
     crs: str
@@ -115,11 +143,12 @@ class TrackEstimate:
     way_probability: Floats
     reason: tuple[Reason, ...]
     unused: tuple[UnusedReading, ...] = ()
+    evidence: TrackEvidence | None = None
 
     def __post_init__(self) -> None:
         faults = Faults()
         count = self.time_s.size
-        for column in fields(self)[3:-1]:
+        for column in fields(self)[3:-2]:
             found = len(getattr(self, column.name))
             if found != count:
                 faults.add(f"estimate, {column.name}", f"{count} epochs", found)
@@ -162,6 +191,7 @@ class TrackEstimate:
         *,
         start_utc_s: float = float("nan"),
         unused: Sequence[UnusedReading] = (),
+        evidence: TrackEvidence | None = None,
     ) -> TrackEstimate:
         """Put the fixes of a track together."""
         count = len(fixes)
@@ -181,4 +211,5 @@ class TrackEstimate:
             np.array([f.way_probability for f in fixes], dtype=np.float64),
             tuple(f.reason for f in fixes),
             tuple(unused),
+            evidence,
         )

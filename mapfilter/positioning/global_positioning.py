@@ -21,32 +21,13 @@ from mapfilter.geodesy import same_crs
 from mapfilter.positioning.estimate import Fix, TrackEstimate, UnusedReading
 from mapfilter.positioning.events import serving_events
 from mapfilter.positioning.snapshot import Snapshot
+from mapfilter.positioning.track import PositionedTrack as PositionedTrack
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.schema import SERVING
 
 PointsOf = Callable[[str], CellPointIndex | None]
 
 _NOWHERE = Estimate(nan, nan, np.full((2, 2), nan), np.full(3, nan))
-
-
-@dataclass(frozen=True, slots=True)
-class PositionedTrack:
-    """One log, located.
-
-    Parameters
-    ----------
-    estimate : TrackEstimate
-        A fix per epoch and a reason for every reading not used.
-    snapshots : tuple of Snapshot
-        The candidates at the start and whenever an update left another number of them, until the
-        filter switched (or failed).
-    filter_s : float
-        Processor time that the filter took, databases already in memory.
-    """
-
-    estimate: TrackEstimate
-    snapshots: tuple[Snapshot, ...]
-    filter_s: float
 
 
 def cell_points(database: RadioRouteDatabase, margin_db: float | None = None) -> PointsOf:

@@ -9,6 +9,8 @@ import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.filters.candidate_options import CandidateOptions
+from mapfilter.positioning.bayes import position_by_bayes
+from mapfilter.positioning.bayes_options import BayesOptions, open_area
 from mapfilter.positioning.global_positioning import (
     PositionedTrack,
     cell_points,
@@ -26,13 +28,13 @@ class FilterChoice:
 
     Parameters
     ----------
-    options : CandidateOptions
+    options : CandidateOptions or BayesOptions
     margin_db : float, optional
         A point belongs to every cell within this margin of its best server; None takes the
         margin that the database was built with.
     """
 
-    options: CandidateOptions = field(default_factory=CandidateOptions)
+    options: CandidateOptions | BayesOptions = field(default_factory=CandidateOptions)
     margin_db: float | None = None
 
     @property
@@ -41,6 +43,8 @@ class FilterChoice:
         match self.options:
             case CandidateOptions():
                 return "candidate"
+            case BayesOptions():
+                return "bayes"
 
 
 def open_locator(
@@ -69,3 +73,10 @@ def open_locator(
                 return position_by_candidates(database, points_of, log, options, rng, ways=ways)
 
             return locate
+        case BayesOptions() as bayes:
+            positioner = bayes.over(open_area(database))
+
+            def locate_by_bayes(log: TrackLog, rng: np.random.Generator) -> PositionedTrack:
+                return position_by_bayes(positioner, log, rng, pictures=ways)
+
+            return locate_by_bayes

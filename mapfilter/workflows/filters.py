@@ -23,3 +23,5 @@ def filter_choice(section: FilterSection, resolution_m: float) -> FilterChoice:
                 when_empty=section.when_empty,
             )
             return FilterChoice(options, section.margin_db)
+        case "bayes":
+            return FilterChoice(section.bayes.options)

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from mapfilter.workflows.bayes_section import BayesSection
 from mapfilter.workflows.cells_section import Cells
 from mapfilter.workflows.fields import (
     EMBEDDED_MAP,
@@ -199,7 +200,7 @@ class Track(Section):
 class FilterSection(Section):
     """``[filter]``: which filter, and its reading of the paper (see the candidate filter)."""
 
-    name: Literal["candidate"] = "candidate"
+    name: Literal["candidate", "bayes"] = "candidate"
     margin_db: NotNegative | None = None
     update_length_m: NotNegative = 22.0
     tracking_length_m: NotNegative | None = None
@@ -209,6 +210,7 @@ class FilterSection(Section):
     at_threshold: Literal["switch", "stall"] = "switch"
     switch_check: Literal["next_call", "same_call"] = "same_call"
     when_empty: Literal["fail", "reinitialise"] = "fail"
+    bayes: BayesSection = BayesSection()
 
 
 class Output(Section):

@@ -1,0 +1,225 @@
+"""What a cloud of weighted positions says: where it leads, how sure it is, what else there is.
+
+The plane is cut into square bins. The leading hypothesis is the neighbourhood of 3 × 3 bins with
+the largest mass, its position the mean of what lies within 50 m of it; the runners-up are what
+leads when that is taken away. Radii hold shares of the *whole* belief about the leading position,
+so that a belief of two places has a radius that reaches from one to the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, log, nan
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
+
+NEAR_M = 50.0
+SHARES = (0.50, 0.67, 0.95)
+_RADIUS_BINS = 2048
+
+
+@dataclass(frozen=True, slots=True)
+class Bins:
+    """The bins of an area, from its south-western corner.
+
+    Parameters
+    ----------
+    west_m, south_m : float
+    size_m : float
+        Side of a bin.
+    cols, rows : int
+    """
+
+    west_m: float
+    south_m: float
+    size_m: float
+    cols: int
+    rows: int
+
+    @classmethod
+    def over(cls, bounds_m: tuple[float, float, float, float], size_m: float = 25.0) -> Bins:
+        """Return bins over west, south, east, north, with a margin of one."""
+        west, south, east, north = bounds_m
+        cols, rows = (max(ceil(side / size_m), 1) + 2 for side in (east - west, north - south))
+        return cls(west - size_m, south - size_m, size_m, cols, rows)
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """What a belief says.
+
+    Parameters
+    ----------
+    mean : ndarray of float64, shape (R,)
+        Mean state of what lies within 50 m of the leading hypothesis.
+    covariance_m2 : ndarray, shape (2, 2)
+        Of the same, east and north.
+    radii_m : ndarray, shape (3,)
+        About the mean, for 50, 67 and 95 % of the belief.
+    mass_50m : float
+        Share of the belief within 50 m of the mean.
+    runners_up : ndarray, shape (K, 3)
+        East, north and mass of up to two other hypotheses.
+    entropy_bits : float
+        Of the bins' masses.
+    """
+
+    mean: Floats
+    covariance_m2: Floats
+    radii_m: Floats
+    mass_50m: float
+    runners_up: Floats
+    entropy_bits: float
+
+    @property
+    def effective_bins(self) -> float:
+        """Return two to the power of the entropy: how many bins the belief covers."""
+        return float(2.0**self.entropy_bits)
+
+
+def summarise(state: Floats32, weight: Floats32, bins: Bins) -> Summary:
+    """Return what a cloud says.
+
+    Parameters
+    ----------
+    state : ndarray of float32, shape (R, N)
+        The first two rows are east and north.
+    weight : ndarray of float32, shape (N,)
+        Summing to one.
+    bins : Bins
+    """
+    rows = state.shape[0]
+    found = np.zeros(rows + 3 + 3 + 1 + 6 + 1)
+    mass = np.zeros((bins.rows, bins.cols), dtype=np.float32)
+    _summarise(state, weight, bins.west_m, bins.south_m, bins.size_m, mass, found)
+    mean, rest = found[:rows], found[rows:]
+    covariance = np.array([[rest[0], rest[2]], [rest[2], rest[1]]])
+    others = rest[7:13].reshape(2, 3)
+    return Summary(
+        mean, covariance, rest[3:6], float(rest[6]), others[others[:, 2] > 0], float(rest[13])
+    )
+
+
+def nothing(rows: int) -> Summary:
+    """Return the summary of a belief that holds nothing."""
+    unknown = np.full((2, 2), nan)
+    return Summary(np.full(rows, nan), unknown, np.full(3, nan), 0.0, np.empty((0, 3)), nan)
+
+
+@njit(error_model="numpy", cache=True)
+def _leader(mass: Floats32, touched: NDArray[np.int32]) -> tuple[int, float]:
+    """Return the touched bin whose neighbourhood is the heaviest, and that mass."""
+    rows, cols = mass.shape
+    best, most = -1, 0.0
+    for k in range(touched.size):
+        row, col = touched[k] // cols, touched[k] % cols
+        total = 0.0
+        for r in range(max(row - 1, 0), min(row + 2, rows)):
+            for c in range(max(col - 1, 0), min(col + 2, cols)):
+                total += mass[r, c]
+        if total > most:
+            best, most = touched[k], total
+    return best, most
+
+
+@njit(error_model="numpy", cache=True)
+def _bin_masses(
+    east: Floats32, north: Floats32, weight: Floats32, west_m: float, south_m: float,
+    size_m: float, mass: Floats32, touched: NDArray[np.int32],
+) -> int:  # fmt: skip
+    rows, cols = mass.shape
+    per_m, w, s = np.float32(1 / size_m), np.float32(west_m), np.float32(south_m)
+    flat, count = mass.ravel(), 0
+    for i in range(east.size):
+        col = min(max(np.int32((east[i] - w) * per_m), 0), cols - 1)
+        row = min(max(np.int32((north[i] - s) * per_m), 0), rows - 1)
+        at = row * cols + col
+        if flat[at] == 0:
+            touched[count] = at
+            count += 1
+        # A weight of zero must not make its bin look untouched.
+        flat[at] += max(weight[i], np.float32(1e-30))
+    return count
+
+
+@njit(error_model="numpy", cache=True)
+def _summarise(
+    state: Floats32, weight: Floats32, west_m: float, south_m: float, size_m: float,
+    mass: Floats32, found: Floats,
+) -> None:  # fmt: skip
+    size, cols = state.shape[0], mass.shape[1]
+    east, north = state[0], state[1]
+    touched = np.empty(weight.size, dtype=np.int32)
+    count = _bin_masses(east, north, weight, west_m, south_m, size_m, mass, touched)
+    touched = touched[:count]
+    flat, entropy = mass.ravel(), 0.0
+    for k in range(count):
+        share = float(flat[touched[k]])
+        entropy -= share * log(share)
+    place = size + 7
+    x = y = 0.0
+    for hypothesis in range(3):
+        best, most = _leader(mass, touched)
+        if best < 0 or (hypothesis > 0 and most < 1e-4):
+            break
+        cx = west_m + (best % cols + 0.5) * size_m
+        cy = south_m + (best // cols + 0.5) * size_m
+        if hypothesis == 0:
+            for _ in range(2):
+                total = sx = sy = 0.0
+                for i in range(weight.size):
+                    if (east[i] - cx) ** 2 + (north[i] - cy) ** 2 <= NEAR_M**2:
+                        total += weight[i]
+                        sx += weight[i] * east[i]
+                        sy += weight[i] * north[i]
+                if total > 0:
+                    cx, cy = sx / total, sy / total
+            x, y = cx, cy
+        else:
+            found[place], found[place + 1], found[place + 2] = cx, cy, most
+            place += 3
+        # What lies in the 5 x 5 bins about it is taken away.
+        row, col = best // cols, best % cols
+        for r in range(max(row - 2, 0), min(row + 3, mass.shape[0])):
+            for c in range(max(col - 2, 0), min(col + 3, cols)):
+                mass[r, c] = 0
+    _moments(state, weight, x, y, found)
+    found[size + 13] = entropy / log(2.0)
+
+
+@njit(error_model="numpy", cache=True)
+def _moments(state: Floats32, weight: Floats32, x: float, y: float, found: Floats) -> None:
+    """Fill mean, covariance, radii and the mass near a place."""
+    size = state.shape[0]
+    east, north = state[0], state[1]
+    near = 0.0
+    by_radius = np.zeros(_RADIUS_BINS + 1)
+    # Ever wider rings: half a centimetre for the first, 40 km for the last.
+    for i in range(weight.size):
+        dx, dy = east[i] - x, north[i] - y
+        square, w = dx * dx + dy * dy, float(weight[i])
+        if square <= NEAR_M**2:
+            near += w
+            for r in range(size):
+                found[r] += w * state[r, i]
+            found[size] += w * dx * dx
+            found[size + 1] += w * dy * dy
+            found[size + 2] += w * dx * dy
+        ring = int(200.0 * square**0.25)
+        by_radius[min(ring, _RADIUS_BINS)] += w
+    if near > 0:
+        for r in range(size + 3):
+            found[r] /= near
+    passed, ring = 0.0, 0
+    for k in range(3):
+        while ring <= _RADIUS_BINS and passed + by_radius[ring] < SHARES[k]:
+            passed += by_radius[ring]
+            ring += 1
+        inside = (SHARES[k] - passed) / by_radius[ring] if ring <= _RADIUS_BINS else 1.0
+        found[size + 3 + k] = ((ring + inside) / 200.0) ** 2
+    found[size + 6] = near

@@ -1,0 +1,205 @@
+"""The regularised particle filter, under the common contract.
+
+It knows no equations: a model moves particles and weighs them. The filter keeps weights as
+logarithms, resamples when too few particles carry them, parts the copies by a little noise
+(regularisation; Musso, Oudjane & Le Gland 2001), spends as many particles as the belief is wide,
+and tells when it has found itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import isfinite, nan
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapfilter._kernels import draw_key
+from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
+from mapfilter.filters.hypotheses import Bins, Summary, nothing, summarise
+from mapfilter.filters.particle_options import ParticleOptions
+from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
+
+Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
+
+PriorT = TypeVar("PriorT", contravariant=True)
+ReadingT = TypeVar("ReadingT", contravariant=True)
+
+
+class ParticleModel(Protocol[PriorT, ReadingT]):
+    """What a particle filter needs to know of the world."""
+
+    @property
+    def bins(self) -> Bins:
+        """The area, in bins."""
+
+    def start(self, prior: PriorT, most: int, rng: np.random.Generator) -> tuple[Floats32, Floats]:
+        """Return the first particles, shape (R, N), and their log weights, shape (N,)."""
+
+    def move(
+        self, state: Floats32, log_weight: Floats, motion: MotionStep, key: np.uint64
+    ) -> tuple[Floats32, Floats]:
+        """Return particles and log weights after a step of finite length."""
+
+    def weigh(self, state: Floats32, log_weight: Floats, reading: ReadingT) -> Reason:
+        """Add a reading's log-likelihood to the log weights, in place; say why if it has none."""
+
+
+@dataclass(frozen=True, eq=False)
+class ParticleBelief:
+    """Particles, their weights, and how the filter stands.
+
+    Parameters
+    ----------
+    state : ndarray of float32, shape (R, N)
+        The first two rows are east and north in the model's frame.
+    log_weight : ndarray of float64, shape (N,)
+        After an update they sum to one.
+    bins : Bins
+    travelled_m : float
+        By dead reckoning since the start.
+    log_evidence : float
+        Log probability of all readings so far.
+    status : Status
+    agreed_at_m : float
+        Distance travelled when the switch rule began to hold; NaN where it does not.
+    """
+
+    state: Floats32
+    log_weight: Floats
+    bins: Bins
+    travelled_m: float = 0.0
+    log_evidence: float = 0.0
+    status: Status = Status.SEARCHING
+    agreed_at_m: float = nan
+
+    @cached_property
+    def weight(self) -> Floats32:
+        """Weights that sum to one, shape (N,)."""
+        weight = np.empty(self.log_weight.size, dtype=np.float32)
+        normalise(self.log_weight.copy(), weight)
+        return weight
+
+    @cached_property
+    def summary(self) -> Summary:
+        """What the belief says."""
+        if not self.log_weight.size:
+            return nothing(self.state.shape[0])
+        return summarise(self.state, self.weight, self.bins)
+
+    def __getstate__(self) -> dict[str, object]:
+        return {name: self.__dict__[name] for name in self.__dataclass_fields__}
+
+
+@dataclass(frozen=True, slots=True)
+class ParticleFilter(Generic[PriorT, ReadingT]):
+    """A regularised particle filter.
+
+    Parameters
+    ----------
+    model : ParticleModel
+    options : ParticleOptions
+    """
+
+    model: ParticleModel[PriorT, ReadingT]
+    options: ParticleOptions = field(default_factory=ParticleOptions)
+
+    def init(self, prior: PriorT, rng: np.random.Generator) -> ParticleBelief:
+        """Draw the first particles."""
+        state, log_weight = self.model.start(prior, self.options.most, rng)
+        weight = np.empty(log_weight.size, dtype=np.float32)
+        log_total, _ = normalise(log_weight, weight)
+        if not isfinite(log_total):
+            log_weight[:] = -np.log(max(log_weight.size, 1))
+        return ParticleBelief(state, log_weight, self.model.bins)
+
+    def predict(
+        self, belief: ParticleBelief, motion: MotionStep, rng: np.random.Generator
+    ) -> tuple[ParticleBelief, Reason]:
+        """Move all particles and weigh them by the map.
+
+        Without a heading they spread to all sides, as far as the step is long.
+        """
+        if not isfinite(motion.step_m):
+            return belief, Reason.NO_STEP
+        reason = Reason.USED if isfinite(motion.heading_rad) else Reason.NO_HEADING
+        if motion.step_m == 0:
+            return belief, reason
+        key = draw_key(rng)
+        state, log_weight = self.model.move(belief.state, belief.log_weight, motion, key)
+        moved = replace(
+            belief,
+            state=state,
+            log_weight=log_weight,
+            travelled_m=belief.travelled_m + abs(motion.step_m),
+        )
+        return moved, reason
+
+    def update(
+        self, belief: ParticleBelief, reading: ReadingT, rng: np.random.Generator
+    ) -> tuple[ParticleBelief, UpdateInfo]:
+        """Weigh all particles, resample where that is due, and look whether they agree."""
+        log_weight = belief.log_weight.copy()
+        reason = self.model.weigh(belief.state, log_weight, reading)
+        if reason is not Reason.USED:
+            return belief, UpdateInfo(reason, belief.status, belief.log_weight.size)
+        weight = np.empty(log_weight.size, dtype=np.float32)
+        log_total, effective = normalise(log_weight, weight)
+        if not isfinite(log_total):
+            return belief, UpdateInfo(
+                Reason.NO_CANDIDATES_LEFT, belief.status, belief.log_weight.size
+            )
+        weighed = ParticleBelief(
+            belief.state,
+            log_weight,
+            belief.bins,
+            belief.travelled_m,
+            belief.log_evidence + log_total,
+        )
+        weighed.__dict__["weight"] = weight
+        status, agreed_at_m = self._agreed(belief, weighed.summary)
+        wanted = self._wanted(weighed.summary)
+        state, now = weighed.state, weighed
+        if effective < self.options.resample_below * weight.size or 2 * wanted < weight.size:
+            state, log_weight = self._resampled(state, weight, wanted, rng)
+        now = replace(
+            weighed, state=state, log_weight=log_weight, status=status, agreed_at_m=agreed_at_m
+        )
+        # The summary before resampling is the better one of the same belief.
+        now.__dict__["summary"] = weighed.summary
+        return now, UpdateInfo(Reason.USED, status, int(now.log_weight.size))
+
+    def locate(self, belief: ParticleBelief) -> Estimate:
+        """Return the leading hypothesis."""
+        said = belief.summary
+        return Estimate(float(said.mean[0]), float(said.mean[1]), said.covariance_m2, said.radii_m)
+
+    def _wanted(self, summary: Summary) -> int:
+        wanted = self.options.per_bin * summary.effective_bins
+        return int(min(max(wanted, self.options.least), self.options.most))
+
+    def _resampled(
+        self, state: Floats32, weight: Floats32, wanted: int, rng: np.random.Generator
+    ) -> tuple[Floats32, Floats]:
+        chosen = np.empty(wanted, dtype=np.int32)
+        systematic(weight, rng.random(), chosen)
+        copies = np.empty((state.shape[0], wanted), dtype=np.float32)
+        jitter = np.asarray(self.options.jitter, dtype=np.float32)
+        copy_with_jitter(state, chosen, jitter, draw_key(rng), copies)
+        return copies, np.full(wanted, -np.log(wanted))
+
+    def _agreed(self, belief: ParticleBelief, summary: Summary) -> tuple[Status, float]:
+        """Return the status after an update, and since when the switch rule holds."""
+        if belief.status is Status.CONVERGED:
+            return Status.TRACKING, belief.agreed_at_m
+        if belief.status is not Status.SEARCHING:
+            return belief.status, belief.agreed_at_m
+        if summary.mass_50m < self.options.switch_mass:
+            return Status.SEARCHING, nan
+        since_m = belief.agreed_at_m if isfinite(belief.agreed_at_m) else belief.travelled_m
+        if belief.travelled_m - since_m >= self.options.switch_hold_m:
+            return Status.CONVERGED, since_m
+        return Status.SEARCHING, since_m

@@ -1,0 +1,54 @@
+"""How a particle filter spends its particles, and when it says that it has found itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+
+from mapfilter.errors import ConfigError, Faults
+
+
+@dataclass(frozen=True, slots=True)
+class ParticleOptions:
+    """Numbers of particles, resampling and the switch rule.
+
+    Parameters
+    ----------
+    most, least : int
+        Limits of the number of particles.
+    per_bin : float
+        Particles for each bin of 25 m that the belief covers (two to the power of its entropy).
+    resample_below : float
+        Share of the particles that the effective sample size must not fall below.
+    jitter : tuple of float
+        Standard deviation of the noise that parts copies, for each row of the state.
+    switch_mass : float
+        The filter has converged when so much of the belief lies within 50 m of the leading
+        hypothesis,
+    switch_hold_m : float
+        and has done so for so many metres travelled.
+    """
+
+    most: int = 20_000
+    least: int = 1000
+    per_bin: float = 60.0
+    resample_below: float = 0.5
+    jitter: tuple[float, ...] = (1.0, 1.0, 0.005, 0.003, 0.0)
+    switch_mass: float = 0.98
+    switch_hold_m: float = 14.0
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        if not 1 <= self.least <= self.most:
+            got = f"{self.least} and {self.most}"
+            faults.add("particles, least and most", "1 <= least <= most", got)
+        if not (isfinite(self.per_bin) and self.per_bin > 0):
+            faults.add("particles, per_bin", "a finite number > 0", self.per_bin)
+        for name in ("resample_below", "switch_mass"):
+            if not 0 < getattr(self, name) < 1:
+                faults.add(f"particles, {name}", "a share between 0 and 1", getattr(self, name))
+        if not (isfinite(self.switch_hold_m) and self.switch_hold_m >= 0):
+            faults.add("particles, switch_hold_m", "metres >= 0", self.switch_hold_m)
+        if not all(isfinite(sd) and sd >= 0 for sd in self.jitter):
+            faults.add("particles, jitter", "finite numbers >= 0", self.jitter)
+        faults.raise_if_any(ConfigError)

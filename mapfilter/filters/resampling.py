@@ -1,0 +1,118 @@
+"""Weights of particles: logarithms that are brought to sum to one, and systematic resampling.
+
+Systematic resampling takes N equally spaced points of the cumulative weights, all shifted by one
+uniform number (Kitagawa 1996). The mean number of copies of a particle is N times its weight.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from mapfilter._kernels import exp32, hashed, normals
+
+Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
+
+
+@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+def normalise(log_weight: Floats, weight: Floats32) -> tuple[float, float]:
+    """Bring log weights to sum to one, in place, and fill the weights.
+
+    Parameters
+    ----------
+    log_weight : ndarray of float64, shape (N,)
+    weight : ndarray of float32, shape (N,)
+        Filled.
+
+    Returns
+    -------
+    log_total, effective : float
+        Logarithm of the sum before, and the effective sample size, one over the sum of squares;
+        minus infinity and 0 where no weight is left.
+    """
+    highest = -np.inf
+    for i in range(log_weight.size):
+        highest = log_weight[i] if log_weight[i] > highest else highest
+    if not np.isfinite(highest):
+        return -np.inf, 0.0
+    for i in range(log_weight.size):
+        weight[i] = exp32(np.float32(log_weight[i] - highest))
+    # Eight sums side by side: one alone would wait for itself, and lose digits.
+    sums, squares = np.zeros(8), np.zeros(8)
+    whole = log_weight.size // 8 * 8
+    for i in range(0, whole, 8):
+        for j in range(8):
+            w = np.float64(weight[i + j])
+            sums[j] += w
+            squares[j] += w * w
+    for i in range(whole, log_weight.size):
+        w = np.float64(weight[i])
+        sums[0] += w
+        squares[0] += w * w
+    total = sums.sum()
+    log_total = highest + np.log(total)
+    share = np.float32(1.0 / total)
+    for i in range(log_weight.size):
+        weight[i] *= share
+        log_weight[i] -= log_total
+    return log_total, total * total / squares.sum()
+
+
+@njit(error_model="numpy", cache=True)
+def systematic(weight: Floats32, offset: float, chosen: NDArray[np.int32]) -> None:
+    """Fill which particle each of M new ones copies.
+
+    Parameters
+    ----------
+    weight : ndarray of float32, shape (N,)
+        Summing to one.
+    offset : float
+        Uniform in [0, 1).
+    chosen : ndarray of int32, shape (M,)
+        Filled in ascending order.
+
+    Examples
+    --------
+    >>> chosen = np.empty(4, dtype=np.int32)
+    >>> systematic(np.float32([0.5, 0.125, 0.375]), 0.5, chosen)
+    >>> chosen.tolist()
+    [0, 0, 2, 2]
+    """
+    count, last = chosen.size, weight.size - 1
+    passed, i = float(weight[0]), 0
+    for j in range(count):
+        place = (j + offset) / count
+        while passed <= place and i < last:
+            i += 1
+            passed += weight[i]
+        chosen[j] = i
+
+
+@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+def copy_with_jitter(
+    state: Floats32, chosen: NDArray[np.int32], jitter: Floats32, key: np.uint64, copies: Floats32
+) -> None:
+    """Copy particles and move each copy by normal noise, so that copies of one part.
+
+    Parameters
+    ----------
+    state : ndarray of float32, shape (R, N)
+    chosen : ndarray of int32, shape (M,)
+    jitter : ndarray of float32, shape (R,)
+        Standard deviation for each row; rows of 0 are copied as they are.
+    key : numpy.uint64
+    copies : ndarray of float32, shape (R, M)
+        Filled.
+    """
+    rows = state.shape[0]
+    for r in range(rows):
+        source, target, sd = state[r], copies[r], jitter[r]
+        for j in range(chosen.size):
+            target[j] = source[np.uint32(chosen[j])]
+        if sd > 0:
+            first = np.uint64(r) << np.uint64(40)
+            for j in range(chosen.size):
+                a, _ = normals(hashed(key, first + np.uint64(j)))
+                target[j] += sd * a

@@ -1,0 +1,238 @@
+"""Motion over a map of streets: dead reckoning with lasting errors, and where one can walk.
+
+A hypothesis holds its position, the lasting error of its headings, the logarithm of its step scale,
+and how probably it is off the map. One step of dead reckoning (Khalaf-Allah 2007, eqs. 3-10) moves
+it; the map then weighs it by the metre. White noise of standard deviation σ on headings shortens
+the mean displacement by exp(-σ²/2), which is put back.
+
+The map is a hidden Markov model of two modes. *On* it, a position d metres from the nearest way
+costs ``-log(0.97 exp(-d²/2s²) + 0.03 exp(-d/30 m))`` times a weight for each metre travelled;
+the weight is small, because the offset from the centre line lasts for tens of metres. *Off* it,
+where ways are missing, each metre costs the same everywhere. The probability of being off is kept
+for each hypothesis and summed out exactly, so that no hypotheses are spent on it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import exp
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from mapfilter._kernels import cos_sin32, exp32, hashed, log32, normals, wrap32
+
+Floats32 = NDArray[np.float32]
+Floats = NDArray[np.float64]
+
+EAST, NORTH, BIAS, LOG_SCALE, OFF = range(5)
+"""Rows of the state: metres from the frame's origin, radians, a number, a probability."""
+STATES = 5
+
+_F = np.float32
+
+
+@dataclass(frozen=True, slots=True)
+class MotionErrors:
+    """How wrong dead reckoning is; what lasts is estimated with the position.
+
+    Parameters
+    ----------
+    step_sd_m : float
+        White noise of a step of ``typical_step_m``; its variance grows with the length.
+    typical_step_m : float
+    heading_sd_rad : float
+        White noise of a heading.
+    bias_sd_rad : float
+        Of the lasting heading error at the start.
+    bias_drift_rad_per_sqrt_m : float
+        The lasting heading error walks at random by this.
+    scale_sd : float
+        Of the logarithm of the step scale at the start.
+    scale_drift_per_sqrt_m : float
+    """
+
+    step_sd_m: float = 0.2
+    typical_step_m: float = 1.4
+    heading_sd_rad: float = 0.1
+    bias_sd_rad: float = 0.02
+    bias_drift_rad_per_sqrt_m: float = 0.0005
+    scale_sd: float = 0.01
+    scale_drift_per_sqrt_m: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class MapWeights:
+    """How much the map counts.
+
+    Parameters
+    ----------
+    sd_m : float
+        Offset from the centre line of one who is on the map.
+    weight_per_m : float
+        Of the logarithm of the map's likelihood.
+    off_cost_per_m : float
+        What being off the map costs.
+    leave_per_m, return_per_m : float
+        Rates of leaving the map and of coming back.
+    """
+
+    sd_m: float = 5.0
+    weight_per_m: float = 1 / 12
+    off_cost_per_m: float = 0.1
+    leave_per_m: float = 1e-3
+    return_per_m: float = 1e-2
+
+
+def map_log_likelihood(distance_m: Floats32, sd_m: float) -> Floats32:
+    """Return the logarithm of the map's likelihood at distances from the nearest way.
+
+    Examples
+    --------
+    >>> map_log_likelihood(np.float32([0, 5, 60]), 5.0).round(2).tolist()
+    [0.0, -0.49, -5.51]
+    """
+    d = np.asarray(distance_m, dtype=np.float64)
+    near, far = 0.97 * np.exp(-0.5 * (d / sd_m) ** 2), 0.03 * np.exp(-d / 30.0)
+    return np.log(near + far).astype(np.float32)
+
+
+def move(
+    state: Floats32,
+    step_m: float,
+    heading_rad: float,
+    errors: MotionErrors,
+    key: np.uint64,
+) -> Floats32:
+    """Return all hypotheses after one step; a step of nothing changes nothing.
+
+    Parameters
+    ----------
+    state : ndarray of float32, shape (5, N)
+    step_m, heading_rad : float
+        As measured; the lasting error is added to the heading.
+    errors : MotionErrors
+    key : numpy.uint64
+        From :func:`mapfilter._kernels.draw_key`.
+    """
+    moved = np.empty_like(state)
+    length = abs(step_m)
+    root = length**0.5
+    stretch = exp(0.5 * errors.heading_sd_rad**2)
+    _move(
+        state, _F(step_m * stretch), _F(heading_rad),
+        _F(errors.step_sd_m * (length / errors.typical_step_m) ** 0.5),
+        _F(length * errors.heading_sd_rad), _F(errors.bias_drift_rad_per_sqrt_m * root),
+        _F(errors.scale_drift_per_sqrt_m * root), key, moved,
+    )  # fmt: skip
+    return moved
+
+
+@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+def _move(
+    state: Floats32,
+    step_m: np.float32,
+    heading_rad: np.float32,
+    along_sd_m: np.float32,
+    across_sd_m: np.float32,
+    bias_sd_rad: np.float32,
+    scale_sd: np.float32,
+    key: np.uint64,
+    moved: Floats32,
+) -> None:
+    count = state.shape[1]
+    east, north, bias, scale = state[0], state[1], state[2], state[3]
+    to_east, to_north, to_bias, to_scale = moved[0], moved[1], moved[2], moved[3]
+    for i in range(count):
+        a, b = normals(hashed(key, np.uint64(2 * i)))
+        c, d = normals(hashed(key, np.uint64(2 * i + 1)))
+        turned = wrap32(bias[i] + bias_sd_rad * c)
+        stretched = scale[i] + scale_sd * d
+        cosine, sine = cos_sin32(wrap32(heading_rad + turned))
+        along = step_m * exp32(stretched) + along_sd_m * a
+        across = across_sd_m * b
+        to_bias[i] = turned
+        to_scale[i] = stretched
+        to_east[i] = east[i] + (along * cosine - across * sine)
+        to_north[i] = north[i] + (along * sine + across * cosine)
+    moved[4] = state[4]
+
+
+@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+def interpolate(
+    state: Floats32,
+    raster: Floats32,
+    west_m: np.float32,
+    north_m: np.float32,
+    per_m: np.float32,
+    found: Floats32,
+) -> None:
+    """Look positions up in a raster, bilinear between the pixels' centres.
+
+    Parameters
+    ----------
+    state : ndarray of float32, shape (5, N)
+    raster : ndarray of float32, shape (rows, cols)
+    west_m, north_m : float32
+        Centre of the first pixel.
+    per_m : float32
+        Pixels per metre.
+    found : ndarray of float32, shape (N,)
+        Filled; beyond the raster's edge with the edge's.
+    """
+    rows, cols = raster.shape
+    flat = raster.ravel()
+    zero, one = _F(0.0), _F(1.0)
+    last_col, last_row = np.int32(cols - 2), np.int32(rows - 2)
+    below, width = np.uint32(cols), np.int32(cols)
+    east, north = state[0], state[1]
+    for i in range(state.shape[1]):
+        # Plain comparisons vectorise; min and max, which care for NaN, do not.
+        x = (east[i] - west_m) * per_m
+        y = (north_m - north[i]) * per_m
+        x = x if x > zero else zero
+        y = y if y > zero else zero
+        col, row = np.int32(x), np.int32(y)
+        col = col if col < last_col else last_col
+        row = row if row < last_row else last_row
+        u, v = x - _F(col), y - _F(row)
+        u = u if u < one else one
+        v = v if v < one else one
+        at = np.uint32(np.int32(row * width) + col)
+        upper = flat[at] + u * (flat[at + np.uint32(1)] - flat[at])
+        under = flat[at + below] + u * (flat[at + below + np.uint32(1)] - flat[at + below])
+        found[i] = upper + v * (under - upper)
+
+
+@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+def weigh_by_map(
+    log_map: Floats32,
+    off: Floats32,
+    weight: np.float32,
+    off_cost: np.float32,
+    leave: np.float32,
+    come_back: np.float32,
+    log_weight: Floats,
+) -> None:
+    """Add the map's log-likelihood to weights and update the probability of being off, in place.
+
+    Parameters
+    ----------
+    log_map : ndarray of float32, shape (N,)
+        At the hypotheses.
+    off : ndarray of float32, shape (N,)
+        Probability of being off the map.
+    weight, off_cost, leave, come_back : float32
+        For the length of the step: the map's exponent, the likelihood off the map, and the
+        probabilities of changing the mode.
+    log_weight : ndarray of float64, shape (N,)
+    """
+    one = _F(1.0)
+    for i in range(off.size):
+        on = exp32(weight * log_map[i])
+        before = off[i]
+        away = before * (one - come_back) + (one - before) * leave
+        total = away * off_cost + (one - away) * on
+        off[i] = away * off_cost / total
+        log_weight[i] += log32(total)

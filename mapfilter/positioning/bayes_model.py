@@ -1,0 +1,231 @@
+"""The map filter's model: where models meet the filter.
+
+It moves hypotheses by dead reckoning, weighs them by the map, by the serving cell, by levels and by
+fixes, and draws the first ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import exp, isfinite, pi, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapfilter.filters.contract import MotionStep, Reason
+from mapfilter.filters.hypotheses import Bins
+from mapfilter.filters.resampling import systematic
+from mapfilter.models import cell_id, fingerprint
+from mapfilter.models.street_motion import (
+    BIAS,
+    EAST,
+    LOG_SCALE,
+    NORTH,
+    OFF,
+    STATES,
+    MapWeights,
+    MotionErrors,
+    interpolate,
+    move,
+    weigh_by_map,
+)
+from mapfilter.positioning.area_map import AreaMap
+from mapfilter.positioning.epochs import GnssFix
+from mapfilter.positioning.evidence import EvidenceOptions, RadioReading
+
+Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
+
+_F = np.float32
+_OFF_AT_START = 0.05
+_FIX_SD_M = 10.0
+_FIX_CLIP = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """What the first belief is made of.
+
+    Parameters
+    ----------
+    reading : RadioReading or None
+        The first report, for an unknown start.
+    compass : bool
+        Whether headings are those of a compass; else the lasting error is uniform.
+    east_m, north_m, sd_m : float
+        A known start, in the CRS of the database; NaN for an unknown one.
+    """
+
+    reading: RadioReading | None
+    compass: bool = True
+    east_m: float = float("nan")
+    north_m: float = float("nan")
+    sd_m: float = float("nan")
+
+
+@dataclass(frozen=True)
+class BayesModel:
+    """Streets and radio of an area, and the errors of what is measured there.
+
+    Parameters
+    ----------
+    area : AreaMap
+    motion : MotionErrors
+    weights : MapWeights
+    evidence : EvidenceOptions
+    """
+
+    area: AreaMap
+    motion: MotionErrors = field(default_factory=MotionErrors)
+    weights: MapWeights = field(default_factory=MapWeights)
+    evidence: EvidenceOptions = field(default_factory=EvidenceOptions)
+
+    @cached_property
+    def bins(self) -> Bins:
+        """The area, in bins of 25 m."""
+        return Bins.over((0.0, 0.0, *self.area.size_m))
+
+    @cached_property
+    def log_map(self) -> Floats32:
+        """Log-likelihood of the map at every pixel."""
+        return self.area.log_map(self.weights.sd_m)
+
+    @cached_property
+    def _serving_table(self) -> Floats32:
+        return cell_id.serving_table(self.evidence.serving)
+
+    @cached_property
+    def _bound_table(self) -> Floats32:
+        return fingerprint.bound_table()
+
+    def start(self, prior: Start, most: int, rng: np.random.Generator) -> tuple[Floats32, Floats]:
+        """Draw the first hypotheses: where the first report can be heard, or about a known start.
+
+        They are spread by their probability over all points where one can be, each anywhere in its
+        pixel.
+        """
+        resolution_m = _F(self.area.lattice.resolution_m)
+        if isfinite(prior.east_m):
+            west, south = self.area.origin_m
+            place = np.array([[prior.east_m - west], [prior.north_m - south]])
+            position = place + prior.sd_m * rng.standard_normal((2, most))
+        else:
+            points = self.area.points
+            chosen = self._likely_points(points, prior.reading, most, rng)
+            spread = rng.random((2, most), dtype=np.float32) - _F(0.5)
+            position = points[:, chosen] + resolution_m * spread
+        state = np.empty((STATES, most), dtype=np.float32)
+        state[EAST : NORTH + 1] = position
+        bias = rng.standard_normal(most) * self.motion.bias_sd_rad
+        state[BIAS] = bias if prior.compass else pi * (2 * rng.random(most) - 1)
+        state[LOG_SCALE] = self.motion.scale_sd * rng.standard_normal(most)
+        state[OFF] = _OFF_AT_START
+        log_weight = np.full(most, -np.log(most))
+        if isfinite(prior.east_m) and prior.reading is not None:
+            self.weigh(state, log_weight, prior.reading)
+        return state, log_weight
+
+    def _likely_points(
+        self, points: Floats32, reading: RadioReading | None, count: int, rng: np.random.Generator
+    ) -> NDArray[np.int32]:
+        state = np.zeros((STATES, points.shape[1]), dtype=np.float32)
+        state[EAST : NORTH + 1] = points
+        log_weight = np.zeros(points.shape[1])
+        if reading is not None:
+            self.weigh(state, log_weight, reading)
+        weight = np.exp(log_weight - log_weight.max())
+        chosen = np.empty(count, dtype=np.int32)
+        systematic((weight / weight.sum()).astype(np.float32), rng.random(), chosen)
+        return chosen
+
+    def any_heading(self, state: Floats32, rng: np.random.Generator) -> Floats32:
+        """Return hypotheses that know nothing of their lasting heading error."""
+        turned = state.copy()
+        turned[BIAS] = pi * (2 * rng.random(state.shape[1]) - 1)
+        return turned
+
+    def move(
+        self, state: Floats32, log_weight: Floats, motion: MotionStep, key: np.uint64
+    ) -> tuple[Floats32, Floats]:
+        """Move by one step and weigh by the map, by the metre."""
+        length_m = abs(motion.step_m)
+        if isfinite(motion.heading_rad):
+            moved = move(state, motion.step_m, motion.heading_rad, self.motion, key)
+        else:
+            # Anywhere on a disc that a step of this length can reach.
+            sd_m = length_m / sqrt(2.0)
+            unknown = MotionErrors(step_sd_m=sd_m, typical_step_m=length_m, heading_sd_rad=0.0)
+            moved = move(state, 0.0, 0.0, self.motion, key)
+            noise = np.random.default_rng(int(key)).standard_normal((2, state.shape[1]))
+            moved[: NORTH + 1] += (unknown.step_sd_m * noise).astype(np.float32)
+        weighed = log_weight.copy()
+        found = np.empty(weighed.size, dtype=np.float32)
+        lattice, weights = self.area.lattice, self.weights
+        step = lattice.resolution_m
+        interpolate(
+            moved, self.log_map, _F(step / 2), _F((lattice.rows - 0.5) * step), _F(1 / step), found
+        )
+        weigh_by_map(
+            found, moved[OFF], _F(weights.weight_per_m * length_m),
+            _F(exp(-weights.off_cost_per_m * length_m)),
+            _F(1 - exp(-weights.leave_per_m * length_m)),
+            _F(1 - exp(-weights.return_per_m * length_m)), weighed,
+        )  # fmt: skip
+        return moved, weighed
+
+    def weigh(self, state: Floats32, log_weight: Floats, reading: RadioReading) -> Reason:
+        """Add the log-likelihood of a report and of a fix, in place."""
+        flat = self.area.flat_level_dbm
+        bands = len(self.area.cell_ids) + 2
+        used = False
+        if reading.serving >= 0 or reading.levels is not None or reading.bounds:
+            now = self._pixels(state, 0.0, 0.0)
+            used = True
+            if reading.serving >= 0 and reading.serving_weight > 0:
+                cell_id.weigh_by_serving(
+                    now, flat, bands, reading.serving, self._serving_table,
+                    reading.serving_weight, log_weight,
+                )  # fmt: skip
+            if reading.levels is not None:
+                levels = reading.levels
+                then = self._pixels(state, levels.back_east_m, levels.back_north_m)
+                fingerprint.weigh_by_levels(
+                    now, then, flat, bands, levels.cell, levels.offset_db, levels.rho,
+                    levels.scale, levels.common, levels.weight, levels.clip, log_weight,
+                )  # fmt: skip
+            for bound in reading.bounds:
+                fingerprint.weigh_by_bound(
+                    now, flat, bands, bound.cells, bound.level_dbm, bound.censored, bound.sd_db,
+                    bound.weight, self._bound_table, log_weight,
+                )  # fmt: skip
+        if reading.fix is not None:
+            self._weigh_by_fix(state, log_weight, reading.fix)
+            used = True
+        return Reason.USED if used else Reason.NO_READING
+
+    def _pixels(
+        self, state: Floats32, back_east_m: float, back_north_m: float
+    ) -> NDArray[np.int32]:
+        lattice = self.area.lattice
+        pixel = np.empty(state.shape[1], dtype=np.int32)
+        step = lattice.resolution_m
+        fingerprint.pixels(
+            state, back_east_m, back_north_m, 0.0, lattice.rows * step, 1 / step, lattice.rows,
+            lattice.cols, pixel,
+        )  # fmt: skip
+        return pixel
+
+    def _weigh_by_fix(self, state: Floats32, log_weight: Floats, fix: GnssFix) -> None:
+        west, south = self.area.origin_m
+        dx = state[EAST] - _F(fix.east_m - west)
+        dy = state[NORTH] - _F(fix.north_m - south)
+        known = isfinite(fix.var_east_m2) and isfinite(fix.var_north_m2)
+        var_x = max(fix.var_east_m2, 1.0) if known else _FIX_SD_M**2
+        var_y = max(fix.var_north_m2, 1.0) if known else _FIX_SD_M**2
+        cross = fix.cov_east_north_m2 if known and isfinite(fix.cov_east_north_m2) else 0.0
+        cross = float(np.clip(cross, -0.99 * sqrt(var_x * var_y), 0.99 * sqrt(var_x * var_y)))
+        det = var_x * var_y - cross**2
+        square = (var_y * dx**2 - 2 * cross * dx * dy + var_x * dy**2) / det
+        # A fix far off is an outlier: it counts no more than one at five deviations.
+        log_weight -= 0.5 * np.minimum(square, _FIX_CLIP**2)

@@ -1,0 +1,46 @@
+"""Everything that can be set of the Bayes map filter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.filters.particle_options import ParticleOptions
+from mapfilter.models.street_motion import MapWeights, MotionErrors
+from mapfilter.positioning.area_map import AreaMap
+from mapfilter.positioning.bayes import BayesPositioner
+from mapfilter.positioning.bayes_model import BayesModel
+from mapfilter.positioning.evidence import EvidenceOptions
+
+
+@dataclass(frozen=True, slots=True)
+class BayesOptions:
+    """Options of the Bayes map filter.
+
+    Parameters
+    ----------
+    motion : MotionErrors
+        How wrong dead reckoning is.
+    map : MapWeights
+        How much the streets count.
+    evidence : EvidenceOptions
+        How much serving cells and levels count.
+    particles : ParticleOptions
+        Numbers of particles, and the switch rule.
+    """
+
+    motion: MotionErrors = field(default_factory=MotionErrors)
+    map: MapWeights = field(default_factory=MapWeights)
+    evidence: EvidenceOptions = field(default_factory=EvidenceOptions)
+    particles: ParticleOptions = field(default_factory=ParticleOptions)
+
+    def over(self, area: AreaMap) -> BayesPositioner:
+        """Return the filter over an area."""
+        return BayesPositioner(
+            BayesModel(area, self.motion, self.map, self.evidence), self.particles
+        )
+
+
+def open_area(database: RadioRouteDatabase) -> AreaMap:
+    """Read a whole database into the map that the filter looks up."""
+    return AreaMap.of_field(database.field(), database.plan, database.floor_dbm)
