@@ -21,7 +21,7 @@ Mistake = Literal[
 ]
 
 _FAR_OFF_DEG = 45.0
-_WORSE = 0.25
+_WORSE = 0.4
 _CLEAR_SCORE = 0.25
 _CLEAR_CONTRAST_DB = 6.0
 _BETTER = 0.3

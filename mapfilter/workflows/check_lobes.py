@@ -10,16 +10,14 @@ from numpy.typing import NDArray
 
 from mapfilter.radio.azimuths import AzimuthMistake, azimuth_mistakes
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.radio.lobes import Lobe, falls_with_distance, find_lobe, peak_m
+from mapfilter.radio.lobes import Lobe, falls_with_distance, find_lobe
 from mapfilter.radio.plausibility import RasterSample, above_free_space_db
+from mapfilter.workflows.check_peaks import check_peaks
 from mapfilter.workflows.findings import Findings, listed
 
-_FAR_PX, _FAR_M = 10.0, 150.0
-_CLEARLY_WORSE, _FITS = 0.35, 0.35
-_MILDLY_WORSE = 0.2
 _TURNED_BETTER, _TURNED_FITS = 0.25, 0.4
 _TURNED_SLIGHTLY, _LOBES_BETTER = 0.1, 0.3
-_MUCH_ABOVE_DB = 15.0
+_MUCH_ABOVE_DB, _FAR_ABOVE_DB = 15.0, 25.0
 _SMALL_EIRP_DBM, _MAST_M = 25.0, 10.0
 
 _TURNS: tuple[tuple[str, Callable[[NDArray[np.float32]], NDArray[np.float32]]], ...] = (
@@ -62,7 +60,7 @@ def check_against_sites(
     seen = [s for s in samples if s.cell_id in plan and s.cell_id not in outside]
     if not seen or _check_turned(seen, plan, where, findings):
         return []
-    off = _check_peaks(seen, plan, where, findings)
+    off = check_peaks(seen, plan, where, findings)
     in_place = [s for s in seen if s.cell_id not in off]
     lobes = _lobes(in_place, plan)
     held = {sample.cell_id for sample in in_place}
@@ -83,14 +81,16 @@ def check_power(
         for s in samples
         if s.cell_id in plan and not plan[s.cell_id].indoor
     }
-    too_high = {i: excess for i, excess in above.items() if excess > _MUCH_ABOVE_DB}
+    watts = {cell.id for cell in small}
+    too_high = {
+        i: db for i, db in above.items() if db > (_MUCH_ABOVE_DB if i in watts else _FAR_ABOVE_DB)
+    }
     if too_high:
         ids = list(too_high)
         evidence = (
             f"Levels are up to {max(too_high.values()):.0f} dB above those of free space with the "
-            f"plan's EIRP (1 % of the pixels; {_MUCH_ABOVE_DB:g} dB would be much)."
+            f"plan's EIRP (1 % of the pixels; {_FAR_ABOVE_DB:g} dB would be much)."
         )
-        watts = {cell.id for cell in small}
         if watts & set(ids):
             cell = next(cell for cell in small if cell.id in too_high)
             evidence += f" {_as_watts(cell)}"
@@ -164,78 +164,6 @@ def _lobes(samples: Sequence[RasterSample], plan: CellPlan) -> dict[str, Lobe]:
         if lobe is not None:
             found[cell.id] = lobe
     return found
-
-
-def _check_peaks(
-    seen: Sequence[RasterSample], plan: CellPlan, where: str, findings: Findings
-) -> frozenset[str]:
-    """Find rasters that are strong elsewhere than about their site, perhaps about another's."""
-    off: list[tuple[str, float, float, float]] = []
-    exchanged: list[tuple[str, str]] = []
-    for sample in seen:
-        cell = plan[sample.cell_id]
-        east_m, north_m = peak_m(sample)
-        away_m = float(np.hypot(east_m - cell.east_m, north_m - cell.north_m))
-        if away_m < max(_FAR_M, _FAR_PX * sample.lattice.resolution_m):
-            continue
-        own = falls_with_distance(sample, cell.east_m, cell.north_m)
-        there = falls_with_distance(sample, east_m, north_m)
-        if own > _FITS or there - own < _CLEARLY_WORSE:
-            continue
-        off.append((cell.id, away_m, own, there))
-        other = _nearest_site(plan, cell, east_m, north_m)
-        if other is not None and _fits(sample, other, own):
-            exchanged.append((cell.id, other.site))
-    exchanged += _counterparts(seen, plan, exchanged)
-    # Where no raster came in return, it is the site that is wrong.
-    given = {plan[cell_id].site for cell_id, _ in exchanged}
-    exchanged = [(cell_id, site) for cell_id, site in exchanged if site in given]
-    moved = {cell_id for cell_id, _ in exchanged}
-    off = [one for one in off if one[0] not in moved]
-    if exchanged:
-        told = ", ".join(f"{cell_id} about {site}" for cell_id, site in exchanged[:8])
-        ids = listed([cell_id for cell_id, _ in exchanged])
-        evidence = f"These rasters are strong about the site of another cell: {told}."
-        findings.add("site-labels-swapped", f"{where}, cells {ids}", evidence)
-    if off:
-        worst = max(off, key=lambda one: one[1])
-        evidence = (
-            f"Rasters are strongest up to {worst[1]:.0f} m from the site; levels and nearness "
-            f"correlate by {worst[2]:.2f}, about the peak by {worst[3]:.2f}."
-        )
-        ids = listed([one[0] for one in off])
-        findings.add("site-off-peak", f"{where}, cells {ids}", evidence)
-    return frozenset([*(one[0] for one in off), *moved])
-
-
-def _counterparts(
-    seen: Sequence[RasterSample], plan: CellPlan, exchanged: Sequence[tuple[str, str]]
-) -> list[tuple[str, str]]:
-    """Return the rasters that took the place of exchanged ones, by a milder measure."""
-    known = {cell_id for cell_id, _ in exchanged}
-    found = []
-    for sample in seen:
-        cell = plan[sample.cell_id]
-        own = falls_with_distance(sample, cell.east_m, cell.north_m)
-        for cell_id, site in exchanged:
-            other = plan[cell_id]
-            fit = falls_with_distance(sample, other.east_m, other.north_m)
-            if cell.id not in known and cell.site == site and fit - own > _MILDLY_WORSE:
-                found.append((cell.id, other.site))
-                known.add(cell.id)
-    return found
-
-
-def _nearest_site(plan: CellPlan, cell: Cell, east_m: float, north_m: float) -> Cell | None:
-    others = [other for other in plan.cells if other.site != cell.site]
-    if not others:
-        return None
-    return min(others, key=lambda o: float(np.hypot(o.east_m - east_m, o.north_m - north_m)))
-
-
-def _fits(sample: RasterSample, other: Cell, own: float) -> bool:
-    fit = falls_with_distance(sample, other.east_m, other.north_m)
-    return fit > _TURNED_FITS and fit - own > _CLEARLY_WORSE
 
 
 def _on_mast(cell: Cell) -> bool:

@@ -72,6 +72,21 @@ def swap_metres(world):
         row["east"], row["north"] = row["north"], row["east"]
 
 
+def exchange_sites(world):
+    """Give the rasters of all sectors of two sites the labels of one another."""
+    there = {f"S1{sector}": f"S3{sector}" for sector in "ABC"}
+    world.rename(there | {new: old for old, new in there.items()})
+
+
+def move_site(world, beside=None):
+    """Put a site where it is not: in the west, or beside another."""
+    lat, lon = 60.1725, 24.9400
+    if beside is not None:
+        lat, lon = world.row(f"{beside}A")["lat"] + 0.0004, world.row(f"{beside}A")["lon"] + 0.0008
+    for sector in "ABC":
+        put(world, f"S3{sector}", lat=lat, lon=lon)
+
+
 def drop_cells(world):
     world.rows = [row for row in world.rows if row["cell"] != "S1B"]
 
@@ -109,7 +124,10 @@ ERRORS = [
     ("sector-labels-swapped", lambda w: w.rename({"S2A": "S2B", "S2B": "S2C", "S2C": "S2A"})),
     ("azimuth-off-lobe", lambda w: put(w, "S3A", azimuth_deg=250)),
     ("site-labels-swapped", lambda w: w.rename({"S1A": "S2B", "S2B": "S1A"})),
+    ("site-labels-swapped", exchange_sites),
     ("site-off-peak", lambda w: put(w, "I1", lat=60.1755, lon=24.9590)),
+    ("site-off-peak", move_site),
+    ("site-off-peak", lambda w: move_site(w, "S2")),
     ("cell-without-raster", lambda w: w.levels.pop("S3B")),
     ("raster-without-cell", drop_cells),
     ("duplicate-id", lambda w: put(w, "S1B", cell="S1A")),
@@ -149,7 +167,7 @@ WARNINGS = [
     ("half-pixel-shift", lambda w: setattr(w, "landuse_shift_m", 5.0)),
     ("site-outside-area", lambda w: put(w, "I1", lat=60.1700, lon=24.9180)),
     ("eirp-watts", lambda w: in_watts(w)),
-    ("levels-above-eirp", lambda w: w.each(lambda v: v + 40)),
+    ("levels-above-eirp", lambda w: w.each(lambda v: v + 50)),
     ("antenna-missing", pattern_files),
     ("raster-empty", lambda w: w.levels.update(I1=np.full_like(w.levels["I1"], np.nan))),
     ("rasters-missing", lambda w: w.levels.clear()),
