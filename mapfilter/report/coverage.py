@@ -74,7 +74,7 @@ def plot_points_per_cell(
     """
     colours = distinct_colours(len(points_by_cell))
     pitch_pt = 72 * MAP_IN * resolution_m / (base.bounds_m[2] - base.bounds_m[0])
-    size = float(np.clip((1.05 * pitch_pt) ** 2, 1.2, 25.0))
+    size = float(np.clip((1.05 * pitch_pt) ** 2, 1.2, 400.0))
     with map_picture(path, base, _SIDE_IN) as (figure, axes):
         frame = draw_base(axes, base)
         handles = []

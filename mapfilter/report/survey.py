@@ -108,8 +108,8 @@ def plot_surveyed_levels(
                          deviations_db, "deviation / dB", scale_bar=False)  # fmt: skip
             x, y = frame(cell.east_m, cell.north_m)
             left.scatter(
-                x, y, s=26, c=cell.measured_dbm, cmap=_LEVELS, vmin=levels_dbm[0],
-                vmax=levels_dbm[1], edgecolors="white", linewidths=0.7, zorder=5,
+                x, y, s=15, c=cell.measured_dbm, cmap=_LEVELS, vmin=levels_dbm[0],
+                vmax=levels_dbm[1], edgecolors="white", linewidths=0.25, zorder=5,
             )  # fmt: skip
             right.scatter(x, y, s=3, color=BLACK, linewidths=0, zorder=5)
             right.set_ylabel("")

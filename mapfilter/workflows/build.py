@@ -214,6 +214,6 @@ def _draw(
 
 
 def _inputs(world: World) -> list[InputFile]:
-    plan = world.config.cells.plan
+    plan = world.config.surveyed_plan or world.config.cells.plan
     files = (*world.streets.files, *((("plan", plan),) if plan is not None else ()))
     return [InputFile.of(name, path) for name, path in files]

@@ -27,6 +27,7 @@ from mapfilter.workflows.check_places import (
 from mapfilter.workflows.check_rasters import check_ids, sampled
 from mapfilter.workflows.findings import CheckResult, Findings, Severity, listed
 from mapfilter.workflows.sections import Config
+from mapfilter.workflows.survey import survey_inputs
 from mapfilter.workflows.world import World, area_lattice, planned_rasters
 
 _STAGES = 5
@@ -42,7 +43,7 @@ class _Inputs:
 
 
 def run_check(config: Config, progress: Progress | None = None) -> CheckResult:
-    """Look at area, map, plan, antennas, rasters and land use together, and change nothing.
+    """Look at area, map, plan, antennas, rasters, measurements and land use together.
 
     Rasters that are still to be predicted are passed over. Large rasters are looked at in a square
     of four million pixels about each site.
@@ -58,10 +59,12 @@ def run_check(config: Config, progress: Progress | None = None) -> CheckResult:
         if progress is not None:
             progress(stages, _STAGES)
 
-    area = _area(config, findings)
     rasters = _rasters(config, findings)
+    area = _area(config, rasters, findings)
     placed = area is not None and (
-        rasters is None or check_rasters_place(rasters, config, findings)
+        rasters is None
+        or not config.area.has_extent
+        or check_rasters_place(rasters, config, findings)
     )
     done(1)
     lattice = rasters.lattice if rasters is not None else area
@@ -84,7 +87,17 @@ def run_check(config: Config, progress: Progress | None = None) -> CheckResult:
     return findings.result()
 
 
-def _area(config: Config, findings: Findings) -> Lattice | None:
+def _area(config: Config, rasters: RxLevRasters | None, findings: Findings) -> Lattice | None:
+    about = rasters.lattice if rasters is not None else None
+    if config.surveyed_plan is not None:
+        try:
+            about = survey_inputs(config).lattice
+        except MapfilterError as error:
+            findings.add_faults(error, "measurements-invalid")
+            if not config.area.has_extent:
+                return None
+    if about is not None and not config.area.has_extent:
+        return about
     try:
         return area_lattice(config.area)
     except MapfilterError as error:
@@ -112,7 +125,8 @@ def _rasters(config: Config, findings: Findings) -> RxLevRasters | None:
 
 
 def _plan(inputs: _Inputs, findings: Findings) -> CellPlan | None:
-    if inputs.lattice is None:
+    surveyed_plan = inputs.config.surveyed_plan
+    if inputs.lattice is None or (surveyed_plan is not None and not surveyed_plan.exists()):
         return None
     try:
         return World(inputs.config, inputs.lattice).plan
@@ -131,8 +145,11 @@ def _check_rasters(
     if plan is None:
         return
     name, where = _plan_name(config), str(rasters.path)
-    outside = check_sites(plan, rasters.lattice, name, findings)
     check_ids(rasters, plan, name, findings)
+    if config.surveyed_plan is not None and config.cells.plan is None:
+        # Antennas were located from the same levels, and may well stand outside.
+        return
+    outside = check_sites(plan, rasters.lattice, name, findings)
     in_place = check_against_sites(samples, plan, outside, where, findings)
     levels = in_place if rasters.quantity == "level" and as_declared else []
     check_power(levels, plan, name, findings)
@@ -189,4 +206,4 @@ def _check_landuse_pixels(path: Path, rasters: RxLevRasters, findings: Findings)
 
 
 def _plan_name(config: Config) -> str:
-    return str(config.cells.plan or "plan by rule")
+    return str(config.surveyed_plan or config.cells.plan or "plan by rule")

@@ -44,6 +44,7 @@ REMEDIES = {
     "lon-lat-swapped": "Exchange longitude and latitude.",
     "loss-as-level": 'Say rasters.quantity = "loss"; levels are then taken from the EIRP.',
     "map-invalid": "Correct area.map.",
+    "measurements-invalid": "Correct the files of prediction.survey, or what is said of them.",
     "metres-for-degrees": "Name columns of metres east and north, or give degrees.",
     "nodata-as-level": "Say rasters.nodata, or write the raster with its nodata value.",
     "plan-invalid": "Correct the field.",

@@ -42,7 +42,6 @@ NETWORK_PICTURES = (
 
 _NEARLY_ALL = (1.0, 99.0)
 _IF_NONE_DBM = (-110.0, -50.0)
-_PART = 0.5
 _AROUND = 0.15
 _LEAST_PX = 20
 
@@ -57,9 +56,10 @@ def draw_network(
 ) -> tuple[Path, ...]:
     """Draw a database and the rasters that it was built from.
 
-    Coverage, best server, margin, points per cell, points of the site with the most cells, and
-    land use where it is known. Memory is bounded whatever the area: it is thinned to what a
-    picture can show, and of very large sets of rasters only the database's points are shown.
+    Coverage, best server, margin, points per cell, points of the site with the most sectors if
+    any has several, and land use where it is known. Memory is bounded whatever the area: it is
+    thinned to what a picture can show, and of very large sets of rasters only the database's points
+    are shown.
 
     Parameters
     ----------
@@ -93,13 +93,16 @@ def draw_network(
     best = points.best if at_points else best_servers(rasters, database)
     lattice, plan = best.lattice, database.plan
     base = BaseMap(lattice.bounds_m, attribution=database.attribution)
-    drawn = [folder / name for name in NETWORK_PICTURES[:5]]
+    drawn = [folder / name for name in NETWORK_PICTURES[:4]]
     ends_dbm = _ends(best.level_dbm)
     plot_level(best.level_dbm, lattice, plan, base, drawn[0], range_dbm=ends_dbm)
     plot_best_server(best.server, plan.ids, lattice, plan, base, drawn[1])
     plot_margin(best.margin_db, lattice, plan, base, drawn[2])
     _draw_points(database, points, database.cell_ids, drawn[3], "Points by best server")
-    draw_largest_site(database, points, drawn[4])
+    site, cells = Counter(cell.site for cell in plan.cells).most_common(1)[0]
+    if cells > 1:
+        drawn.append(folder / NETWORK_PICTURES[4])
+        draw_site(database, points, site, drawn[-1])
     shown = None
     if landuse is not None:
         _, step = thinned_lattice(database.lattice)
@@ -114,20 +117,18 @@ def draw_network(
     return tuple(drawn)
 
 
-def draw_largest_site(database: RadioRouteDatabase, points: ServedPoints, path: Path) -> None:
-    """Draw the points that the sectors of the site with the most cells serve (Fig. 2).
+def draw_site(database: RadioRouteDatabase, points: ServedPoints, site: str, path: Path) -> None:
+    """Draw the points that the sectors of one site serve best (the paper's Fig. 2).
 
-    In an area much larger than what the site serves, only its surroundings are shown.
+    In an area that had to be thinned, only the surroundings of these points are shown.
     """
     plan, lattice = database.plan, database.lattice
-    site = Counter(cell.site for cell in plan.cells).most_common(1)[0][0]
     cells = [cell.id for cell in plan.cells if cell.site == site]
     own = np.isin(points.best.server, [plan.index(cell_id) for cell_id in cells])
     row, col = np.nonzero(own)
-    length = int(max(np.ptp(row), np.ptp(col))) if row.size else max(own.shape)
-    if length < _PART * max(own.shape):
-        step = round(points.best.lattice.resolution_m / lattice.resolution_m)
-        around = int(_AROUND * max(length, _LEAST_PX)) + 1
+    step = round(points.best.lattice.resolution_m / lattice.resolution_m)
+    if step > 1 and row.size:
+        around = int(_AROUND * max(int(np.ptp(row)), int(np.ptp(col)), _LEAST_PX)) + 1
         top, left = (step * max(int(at.min()) - around, 0) for at in (row, col))
         bottom = min(step * (int(row.max()) + around + 1), lattice.rows)
         right = min(step * (int(col.max()) + around + 1), lattice.cols)

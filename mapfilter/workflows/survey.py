@@ -83,17 +83,12 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         cannot be written.
     """
     section = config.prediction.survey
-    if not section.files:
-        raise fail(ConfigError, "prediction.survey.files", "measurement files", "none")
     target, deviation = config.rasters_path, config.deviation_path
     for folder in (target.parent, deviation.parent, config.output.dir):
         ensure_writable_folder(folder)
-    rasters = open_rasters(section.calibrate) if section.calibrate is not None else None
-    given = _given_lattice(config, rasters)
-    measurements, plan = _measurements(config, given)
-    lattice = given or _lattice_about(measurements, section.reach_m, config.area.resolution_m)
-    _check_inside(measurements, lattice, section.reach_m)
-    predicted = _predicted(rasters, plan)
+    inputs = survey_inputs(config)
+    measurements, plan, lattice = inputs.measurements, inputs.plan, inputs.lattice
+    predicted = _predicted(inputs.predicted, plan)
     options = _options(section)
     left_out = None
     if section.cross_validate:
@@ -148,6 +143,47 @@ def _draw(config: Config, evidence: SurveyEvidence) -> tuple[Path, ...]:
     folder = config.pictures_path
     clear_pictures(folder, SURVEY_PICTURES)
     return () if config.output.pictures == "none" else draw_survey(evidence, folder)
+
+
+@dataclass(frozen=True, eq=False)
+class SurveyInputs:
+    """What a survey is made of.
+
+    Parameters
+    ----------
+    measurements : Measurements
+        In the CRS of the lattice.
+    plan : CellPlan or None
+        Of the cells whose antennas are known.
+    lattice : Lattice
+        Of the rasters to be made.
+    predicted : RxLevRasters or None
+        To calibrate.
+    """
+
+    measurements: Measurements
+    plan: CellPlan | None
+    lattice: Lattice
+    predicted: RxLevRasters | None
+
+
+def survey_inputs(config: Config) -> SurveyInputs:
+    """Read what the survey of a configuration is made of.
+
+    Raises
+    ------
+    MapfilterError
+        Measurements, area, plan or rasters are wrong or do not fit each other.
+    """
+    section = config.prediction.survey
+    if not section.files:
+        raise fail(ConfigError, "prediction.survey.files", "measurement files", "none")
+    predicted = open_rasters(section.calibrate) if section.calibrate is not None else None
+    given = _given_lattice(config, predicted)
+    measurements, plan = _measurements(config, given)
+    lattice = given or _lattice_about(measurements, section.reach_m, config.area.resolution_m)
+    _check_inside(measurements, lattice, section.reach_m)
+    return SurveyInputs(measurements, plan, lattice, predicted)
 
 
 def _measurements(config: Config, lattice: Lattice | None) -> tuple[Measurements, CellPlan | None]:

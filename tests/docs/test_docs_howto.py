@@ -26,7 +26,7 @@ def blocks(path, kind):
 
 
 def configuration(path, folder):
-    (text,) = blocks(path, "toml")
+    text = blocks(path, "toml")[0]
     file = folder / "page.toml"
     file.write_text(text, encoding="utf-8")
     return file
@@ -34,7 +34,12 @@ def configuration(path, folder):
 
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: path.stem)
 def test_configurations_of_the_how_to_pages_are_read(path, tmp_path):
-    assert load_config(configuration(path, tmp_path)) != load_config(None)
+    texts = blocks(path, "toml")
+    assert texts
+    for text in texts:
+        file = tmp_path / "page.toml"
+        file.write_text(text, encoding="utf-8")
+        assert load_config(file) != load_config(None)
 
 
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: path.stem)

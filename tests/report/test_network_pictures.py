@@ -207,7 +207,6 @@ def test_of_a_country_only_points_are_drawn(network, tmp_path, monkeypatch):
     rasters, database = network
     monkeypatch.setattr(network_pictures, "MOST_READ_PX", 10)
     monkeypatch.setattr(network_pictures, "best_servers", None)
-    monkeypatch.setattr(network_pictures, "_PART", 2.0)
     monkeypatch.setattr(served, "MOST_PX", 20)
     landuse = LandUse(np.zeros((40, 50), np.int16), ("way",), (True,))
     drawn = draw_network(rasters, database, tmp_path, landuse=landuse)

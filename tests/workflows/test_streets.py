@@ -168,7 +168,7 @@ def test_tracks_become_ways(tmp_path):
 @pytest.mark.parametrize(
     ("settings", "told"),
     [
-        (["area.map=none"], "area: expected bbox, or southwest with size_m, where map is none"),
+        (["area.map=none"], "roads without a map: roads.layer or roads.tracks.files"),
         ([*BOX, "area.map=none"], "roads without a map: roads.layer or roads.tracks.files"),
         (["roads.class_column=kind"], "layer with layer_name, class_column and id_column"),
         (["buildings.levels_column=x"], "layer with layer_name, height_column and levels_column"),
