@@ -10,6 +10,7 @@ import typer
 
 from mapfilter import __version__
 from mapfilter.cli.databases import build, check, export, info, merge, predict
+from mapfilter.cli.evaluate import evaluate
 from mapfilter.cli.experiments import bench, sweep
 from mapfilter.cli.options import DONE, WRONG
 from mapfilter.cli.tracks import demo, replay, simulate
@@ -39,6 +40,7 @@ for _command in (
     simulate,
     replay,
     sweep,
+    evaluate,
     bench,
 ):
     app.command()(_command)

@@ -59,7 +59,7 @@ def replay(
         Path | None, typer.Option("--log", metavar="LOG", help="A log, or a folder of logs.")
     ] = None,
     filter_name: Annotated[
-        str | None, typer.Option("--filter", metavar="NAME", help="candidate.")
+        str | None, typer.Option("--filter", metavar="NAME", help="candidate or bayes.")
     ] = None,
     without: Annotated[
         str | None,

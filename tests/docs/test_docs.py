@@ -144,4 +144,4 @@ def test_quickstart_shows_only_commands_that_exist():
     commands = set(typer.main.get_command(app).commands)
     shown = set(re.findall(r"^   \$ mapfilter (\w+)", page("quickstart.rst"), flags=re.MULTILINE))
     assert shown <= commands
-    assert commands - shown <= {"merge", "bench", "sweep", "reproduce"}
+    assert commands - shown <= {"merge", "bench", "evaluate", "sweep", "reproduce"}
