@@ -1,0 +1,71 @@
+"""The command that runs accuracy benchmarks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mapfilter.cli.options import (
+    ConfigOption,
+    JsonOption,
+    OutOption,
+    ResumeOption,
+    SetOption,
+    given_path,
+    toml,
+)
+from mapfilter.workflows.terminal import print_result, rate_bar
+
+
+def evaluate(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="global-positioning.")],
+    map_file: Annotated[
+        Path | None,
+        typer.Option("--map", metavar="FILE", help="An OpenStreetMap file.", callback=given_path),
+    ] = None,
+    bbox: Annotated[
+        str | None, typer.Option("--bbox", metavar="W,S,E,N", help="The box, in degrees.")
+    ] = None,
+    cases: Annotated[
+        list[str] | None,
+        typer.Option("--case", metavar="NAME", help="A case; repeatable. Default: all."),
+    ] = None,
+    filter_name: Annotated[
+        str, typer.Option("--filter", metavar="NAME", help="bayes or candidate.")
+    ] = "bayes",
+    runs: Annotated[int, typer.Option("--runs", min=1, help="Routes for each case.")] = 20,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of what is drawn.")] = 0,
+    workers: Annotated[int, typer.Option("--workers", min=1, help="Local processes.")] = 2,
+    resume: ResumeOption = False,
+    config: ConfigOption = None,
+    settings: SetOption = None,
+    out: OutOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Tell how well a filter finds itself, in many cases, on any map."""
+    from mapfilter.workflows.config import load_config
+    from mapfilter.workflows.evaluate import check_benchmark, run_global_positioning
+
+    check_benchmark(name)
+    given = list(settings or ())
+    if map_file is not None:
+        given.append(f"area.map={toml(str(map_file))}")
+    if bbox is not None:
+        given.append(f"area.bbox={bbox}")
+    given.append(f"filter.name={toml(filter_name)}")
+    loaded = load_config(config, given)
+    folder = (out or loaded.output.dir / name).absolute()
+    with rate_bar("evaluate", "batches") as progress:
+        result = run_global_positioning(
+            loaded,
+            folder,
+            runs=runs,
+            seed=seed,
+            cases=cases or (),
+            workers=workers,
+            resume=resume,
+            progress=progress,
+        )
+    print_result(result, as_json)

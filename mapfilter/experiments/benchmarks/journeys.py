@@ -1,0 +1,94 @@
+"""Journeys of the benchmark: routes, what is heard on them, and displacements nobody measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from mapfilter.experiments.benchmarks.cases import Case
+from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.shadowing import named_rng
+from mapfilter.roads.network import StreetNetwork
+from mapfilter.simulation.imu import noisy_motion
+from mapfilter.simulation.journeys import JourneyPlan, journey
+from mapfilter.simulation.reports import Levels, ReportModel, reports
+from mapfilter.simulation.routes import route
+from mapfilter.tracks.log import TrackLog, make_log
+
+LENGTH_M = 1940.0
+_BEFORE_M = 800.0
+_AFTER_M = 1000.0
+_NEAREST_M, _FARTHEST_M = 200.0, 1000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """A journey's truth.
+
+    Parameters
+    ----------
+    truth : pandas.DataFrame
+        time_s, east_m, north_m, way_id.
+    displaced_at_s : float
+        Time of the last row before the displacement; infinite without one.
+    """
+
+    truth: pd.DataFrame
+    displaced_at_s: float = float("inf")
+
+
+def walk(network: StreetNetwork, seed: int, number: int) -> Walk:
+    """Walk 1 940 m along a random route."""
+    rng = named_rng(seed, "route", str(number))
+    return Walk(journey(route(network, LENGTH_M, rng), JourneyPlan(LENGTH_M)))
+
+
+def displaced_walk(network: StreetNetwork, seed: int, number: int) -> Walk:
+    """Walk 800 m, be carried 200 m to 1 km away without anything being measured, and walk 1 km.
+
+    Both parts lie on one route: the first place behind the cut that is as far away as was drawn.
+    """
+    rng = named_rng(seed, "displacement", str(number))
+    while True:
+        # Short legs turn back soon; some routes never get as far away as is wanted.
+        length_m = _BEFORE_M + 4 * _FARTHEST_M
+        whole = journey(route(network, length_m, rng), JourneyPlan(length_m))
+        wanted_m = rng.uniform(_NEAREST_M, _FARTHEST_M)
+        east, north = whole["east_m"].to_numpy(), whole["north_m"].to_numpy()
+        walked_m = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(east), np.diff(north)))])
+        cut = int(np.searchsorted(walked_m, _BEFORE_M))
+        away = np.hypot(east[cut:] - east[cut], north[cut:] - north[cut]) >= wanted_m
+        again = cut + int(np.argmax(away))
+        end = int(np.searchsorted(walked_m, walked_m[again] + _AFTER_M))
+        if away.any() and end < len(walked_m):
+            break
+    kept = pd.concat([whole.iloc[: cut + 1], whole.iloc[again:end]], ignore_index=True)
+    time_s = float(whole["time_s"].iloc[1]) * np.arange(len(kept))
+    return Walk(kept.assign(time_s=time_s), float(time_s[cut]))
+
+
+def log_of(
+    case: Case, walked: Walk, levels: Levels, plan: CellPlan, crs: str, seed: int, number: int
+) -> TrackLog:
+    """Return what the phone and its unit tell of a walk.
+
+    Cases of one noise see the same noise, and all the same reports.
+    """
+    truth = walked.truth
+    radio = reports(truth, levels, plan, ReportModel(), named_rng(seed, "radio", str(number)))
+    if not case.levels:
+        serving = radio[radio["role"] == "serving"]
+        radio = serving.assign(level_dbm=np.nan, censored=np.int8(0)).reset_index(drop=True)
+    motion = noisy_motion(truth, case.imu, named_rng(seed, "imu", str(number)))
+    if np.isfinite(walked.displaced_at_s):
+        # The interval of the displacement is as if one had stood still.
+        carried = motion["time_s"].to_numpy().searchsorted(walked.displaced_at_s, side="right")
+        motion.loc[carried, "step_m"] = 0.0
+        motion.loc[carried, "turn_rad"] = 0.0
+    if not case.compass:
+        motion["heading_rad"] = np.nan
+    log = make_log(crs, motion=motion, radio=radio)
+    # The truth of a displacement is not a path that anybody walked.
+    return replace(log, truth=truth)

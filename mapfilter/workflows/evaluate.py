@@ -1,0 +1,176 @@
+"""``mapfilter evaluate``: accuracy benchmarks, on any map and on published data."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mapfilter._io import ensure_writable_folder, write_json
+from mapfilter._parallel import Progress, local_executor
+from mapfilter.database.build import build
+from mapfilter.database.sources import LaidRoutes
+from mapfilter.errors import ConfigError, Faults, fail
+from mapfilter.experiments.benchmarks.cases import CASES
+from mapfilter.experiments.benchmarks.global_positioning import benchmark
+from mapfilter.experiments.benchmarks.missing_ways import without_ways
+from mapfilter.experiments.benchmarks.scores import CaseResult
+from mapfilter.experiments.benchmarks.world import FULL, HEIGHTS, STREETS, THINNED, BenchmarkWorld
+from mapfilter.experiments.sweep.world import SweepWorld, write_world
+from mapfilter.radio.predict import PredictionModel, predict
+from mapfilter.radio.rasters import open_rasters, write_rasters
+from mapfilter.radio.shadowing import named_rng
+from mapfilter.roads.network import street_network
+from mapfilter.workflows.facts import facts
+from mapfilter.workflows.filters import filter_choice
+from mapfilter.workflows.sections import Config
+from mapfilter.workflows.world import World
+
+NAMES = ("global-positioning",)
+TABLE = "table.json"
+_MISSING = 0.1
+
+
+@dataclass(frozen=True)
+class EvaluateResult:
+    """What a benchmark found.
+
+    Parameters
+    ----------
+    map : str
+        Name of the map's file.
+    seed : int
+    points : int
+        Of the database.
+    cases : tuple of CaseResult
+    seconds : float
+        Wall time.
+    out : Path
+    """
+
+    map: str
+    seed: int
+    points: int
+    cases: tuple[CaseResult, ...]
+    seconds: float
+    out: Path
+
+
+def check_benchmark(name: str) -> None:
+    """See that there is such a benchmark.
+
+    Raises
+    ------
+    ConfigError
+        There is not.
+    """
+    if name not in NAMES:
+        raise fail(ConfigError, "evaluate", ", ".join(NAMES), name)
+
+
+def check_cases(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the cases that are asked for, or all of them.
+
+    Raises
+    ------
+    ConfigError
+        There is no such case.
+    """
+    faults = Faults()
+    for name in names:
+        if name not in CASES:
+            faults.add("--case", ", ".join(CASES), name)
+    faults.raise_if_any(ConfigError)
+    return tuple(dict.fromkeys(names)) or tuple(CASES)
+
+
+def run_global_positioning(
+    config: Config,
+    out: Path,
+    *,
+    runs: int,
+    seed: int,
+    cases: Sequence[str] = (),
+    workers: int = 2,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> EvaluateResult:
+    """Predict, build, and run the cases of the benchmark on a map.
+
+    Parameters
+    ----------
+    config : Config
+        Its area, cells, roads, prediction, database and filter sections count.
+    out : Path
+        Gets the world, the finished batches and ``table.json``.
+    runs : int
+        Routes for each case.
+    seed : int
+        Of routes, reality and noise.
+    cases : sequence of str
+        All without one.
+    workers : int
+        Local processes.
+    resume : bool
+        Keep what the same benchmark has finished.
+    progress : callable, optional
+        Called with batches done and batches in all.
+
+    Raises
+    ------
+    MapfilterError
+        The map, the box or a case is wrong, or the output cannot be written.
+    """
+    began_s = time.perf_counter()
+    wanted = check_cases(cases)
+    ensure_writable_folder(out)
+    world, points = _world(World.of(config), out / "world", seed)
+    choice = filter_choice(config.filter, config.area.resolution_m)
+    with local_executor(workers) as executor:
+        found = benchmark(
+            world,
+            choice,
+            wanted,
+            runs,
+            seed,
+            out,
+            executor=executor,
+            in_flight=2 * workers,
+            resume=resume,
+            progress=progress,
+        )
+    result = EvaluateResult(
+        Path(config.area.map).name, seed, points, tuple(found), time.perf_counter() - began_s, out
+    )
+    write_json(out / TABLE, facts(result))
+    return result
+
+
+def _world(world: World, folder: Path, seed: int) -> tuple[BenchmarkWorld, int]:
+    """Predict the cells, and build a database of all ways and one that lacks every tenth."""
+    folder.mkdir(parents=True, exist_ok=True)
+    model, config = PredictionModel(), world.config
+    rasters_path = folder / "rxlev.tif"
+    levels = predict(world.plan, world.lattice, world.heights_m, model)
+    write_rasters(rasters_path, world.lattice, levels, world.plan.ids)
+    rasters = open_rasters(rasters_path)
+    rng = named_rng(seed, "missing ways")
+    thinned = without_ways(world.routes, world.ways, _MISSING, config.roads.half_width_m, rng)
+    count = 0
+    for name, routes in ((FULL, world.routes), (THINNED, thinned)):
+        database = build(
+            rasters,
+            world.plan,
+            LaidRoutes(routes),
+            folder / name,
+            margin_db=config.database.margin_db,
+            floor_dbm=config.database.floor_dbm,
+        )
+        count = count or int(database.manifest["counts"]["points"])
+    np.save(folder / HEIGHTS, world.heights_m)
+    network = street_network(world.ways, world.routes)
+    write_world(SweepWorld(network, world.plan, world.lattice, {}), folder / STREETS)
+    return BenchmarkWorld(folder, model), count
