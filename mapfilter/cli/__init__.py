@@ -11,7 +11,7 @@ import typer
 from mapfilter import __version__
 from mapfilter.cli.databases import build, check, export, info, merge, predict
 from mapfilter.cli.evaluate import evaluate
-from mapfilter.cli.experiments import bench, sweep
+from mapfilter.cli.experiments import bench, reproduce, sweep
 from mapfilter.cli.options import DONE, WRONG
 from mapfilter.cli.tracks import demo, replay, simulate
 from mapfilter.errors import MapfilterError
@@ -40,6 +40,7 @@ for _command in (
     simulate,
     replay,
     sweep,
+    reproduce,
     evaluate,
     bench,
 ):

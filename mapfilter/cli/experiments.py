@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -16,6 +17,7 @@ from mapfilter.cli.options import (
     SeedOption,
     SetOption,
     WorkersOption,
+    numbers,
     seeded,
 )
 from mapfilter.workflows.terminal import print_result, rate_bar, say
@@ -46,8 +48,42 @@ def sweep(
     print_result(result, as_json)
 
 
+def reproduce(
+    paper: Annotated[str, typer.Argument(metavar="PAPER", help="khalaf-allah-2007.")],
+    area_map: Annotated[
+        str | None,
+        typer.Option("--map", metavar="FILE", help="An .osm.pbf file; else a made city."),
+    ] = None,
+    bbox: Annotated[
+        str | None, typer.Option("--bbox", metavar="W,S,E,N", help="Degrees; else the map's own.")
+    ] = None,
+    trials: Annotated[int, typer.Option("--trials", min=1, help="Runs in each cell.")] = 100,
+    seed: SeedOption = None,
+    out: OutOption = None,
+    workers: WorkersOption = 1,
+    cluster: ClusterOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Repeat a paper's experiments: figure, table, and every reading of what it leaves open."""
+    from mapfilter.workflows.reproduce import run_reproduce
+
+    with rate_bar("reproduce", "runs") as progress:
+        result = run_reproduce(
+            paper,
+            (out or Path("out") / paper).absolute(),
+            map_name=area_map,
+            bbox=numbers(bbox, 4, "--bbox"),
+            trials=trials,
+            seed=seed or 0,
+            workers=workers,
+            cluster=cluster,
+            progress=progress,
+        )
+    print_result(result, as_json)
+
+
 def bench(
-    stage: Annotated[str, typer.Argument(metavar="[NAME]", help="build.")] = "build",
+    stage: Annotated[str, typer.Argument(metavar="[NAME]", help="build or sweep.")] = "build",
     runs: Annotated[int, typer.Option("--runs", min=1, help="Runs that medians are of.")] = 5,
     as_json: JsonOption = False,
 ) -> None:

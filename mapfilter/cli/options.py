@@ -55,3 +55,16 @@ def toml(value: str | list[str]) -> str:
     """Return a text, or a list of texts, as TOML writes it."""
     # Escapes of JSON in the ASCII form are pairs of surrogates, which TOML does not know.
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def numbers(text: str | None, count: int, where: str) -> list[float] | None:
+    """Return so many numbers that commas separate, or None without a text."""
+    if text is None:
+        return None
+    try:
+        found = [float(part) for part in text.split(",")]
+    except ValueError:
+        found = []
+    if len(found) != count:
+        raise fail(ConfigError, where, f"{count} numbers with commas between them", repr(text))
+    return found

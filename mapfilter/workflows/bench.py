@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,8 +24,11 @@ from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.rasters import RxLevRasters, open_rasters, write_rasters
 from mapfilter.roads.lattice import RouteLattice
 
+if TYPE_CHECKING:
+    from mapfilter.workflows.bench_sweep import SweepBench
+
 CRS = "EPSG:32629"
-STAGES = ("build",)
+STAGES = ("build", "sweep")
 _FLOOR_DBM = -104.0
 _BLOCK_PX = 256
 
@@ -71,8 +75,8 @@ class BuildBench:
 
 def run_bench(
     stage: str, *, rasters: int = 10, side_px: int = 3000, points: int = 100_000, runs: int = 5
-) -> BuildBench:
-    """Measure a stage on made inputs.
+) -> BuildBench | SweepBench:
+    """Measure a stage on made inputs; a sweep on the embedded map.
 
     Raises
     ------
@@ -83,6 +87,10 @@ def run_bench(
     """
     if stage not in STAGES:
         raise fail(ConfigError, "bench", f"one of {', '.join(STAGES)}", repr(stage))
+    if stage == "sweep":
+        from mapfilter.workflows.bench_sweep import bench_sweep
+
+        return bench_sweep(runs=runs)
     with tempfile.TemporaryDirectory(prefix="mapfilter-bench-") as name:
         return _bench_build(Path(name), rasters, side_px, points, runs)
 

@@ -105,7 +105,7 @@ def run_sweep(
     began_s = time.perf_counter()
     plan, databases = sweep_plan(config)
     out = config.output.dir / "sweep"
-    world = sweep_world(config, plan)
+    world = sweep_world(config, plan.radios)
     ensure_writable_folder(out)
     with sweep_executor(workers, cluster) as (executor, in_flight):
         table = sweep(

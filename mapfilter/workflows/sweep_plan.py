@@ -124,10 +124,13 @@ def _readings(config: Config, resolution_m: float) -> tuple[Reading, ...]:
         if one.filter is not None:
             given["name"] = one.filter
         section = FilterSection(**{**config.filter.model_dump(), **given})
+        if section.name != "candidate":
+            readings.append(Reading(one.name, filter_choice(section, resolution_m)))
+            continue
         lengths_m = config.sweep.update_length_m
         if lengths_m is None or one.update_length_m is not None:
             lengths_m = (section.update_length_m,)
-        for length_m in lengths_m:
-            chosen = section.model_copy(update={"update_length_m": float(length_m)})
-            readings.append(Reading(one.name, filter_choice(chosen, resolution_m), float(length_m)))
+        for length_m in map(float, lengths_m):
+            chosen = section.model_copy(update={"update_length_m": length_m})
+            readings.append(Reading(one.name, filter_choice(chosen, resolution_m), length_m))
     return tuple(readings)

@@ -29,7 +29,7 @@ class ReadingSection(Section):
     """``[[sweep.readings]]``: a filter by a name, and what it has otherwise than ``[filter]``."""
 
     name: Annotated[str, Field(min_length=1)]
-    filter: Literal["candidate"] | None = None
+    filter: Literal["candidate", "bayes"] | None = None
     margin_db: NotNegative | None = None
     update_length_m: NotNegative | None = None
     tracking_length_m: NotNegative | None = None

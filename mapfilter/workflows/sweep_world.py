@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from mapfilter.errors import InputError, fail
-from mapfilter.experiments.sweep.plan import AS_PREDICTED, Radio, SweepPlan
+from mapfilter.experiments.sweep.plan import AS_PREDICTED, Radio
 from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.radio.cells import CellPlan
@@ -20,10 +22,10 @@ from mapfilter.workflows.sweep_plan import REALITY
 from mapfilter.workflows.world import World, planned_rasters
 
 
-def sweep_world(config: Config, plan: SweepPlan) -> SweepWorld:
+def sweep_world(config: Config, radios: Sequence[Radio]) -> SweepWorld:
     """Read streets, cells and levels, as ``simulate`` takes them.
 
-    A prediction error of the plan adds a correlated field of that deviation, with the correlation,
+    A prediction error adds a correlated field of that deviation, with the correlation,
     the share of sites and the seed of ``[prediction.reality]``, to the predicted levels.
 
     Raises
@@ -31,25 +33,34 @@ def sweep_world(config: Config, plan: SweepPlan) -> SweepWorld:
     MapfilterError
         The area, map, plan or rasters are wrong, or reality is wanted and not predicted yet.
     """
-    names = {radio.name for radio in plan.radios}
+    names = {radio.name for radio in radios}
     if REALITY in names:
         check_reality_there(config)
         check_reality(config)
     world = World.of(config)
-    rasters = open_rasters(config.reality_path) if names == {REALITY} else planned_rasters(config)
-    check_against_plan(rasters, world.plan)
-    check_cells_near(world.plan, world.lattice, str(config.cells.plan or "cells"))
-    if not same_crs(rasters.lattice.crs, world.lattice.crs):
-        expected = f"{world.lattice.crs}, the CRS of the area"
-        where = f"{rasters.path}, CRS"
-        raise fail(InputError, where, expected, rasters.lattice.crs, "another zone: set area.crs")
-    network = street_network(world.ways, world.routes)
-    predicted = _levels(rasters, world.plan)
-    levels = {
-        radio.name: _heard(config, radio, predicted, rasters.lattice, world.plan)
-        for radio in plan.radios
+    opened = {
+        real: open_rasters(config.reality_path) if real else planned_rasters(config)
+        for real in sorted({name == REALITY for name in names})
     }
-    return SweepWorld(network, world.plan, rasters.lattice, levels)
+    for rasters in opened.values():
+        check_against_plan(rasters, world.plan)
+        if not same_crs(rasters.lattice.crs, world.lattice.crs):
+            expected = f"{world.lattice.crs}, the CRS of the area"
+            where, found = f"{rasters.path}, CRS", rasters.lattice.crs
+            raise fail(InputError, where, expected, found, "another zone: set area.crs")
+    lattices = [rasters.lattice for rasters in opened.values()]
+    if len(set(lattices)) > 1:
+        expected = "rasters that play reality on the lattice of the predicted ones"
+        raise fail(InputError, str(config.reality_path), expected, "another")
+    check_cells_near(world.plan, world.lattice, str(config.cells.plan or "cells"))
+    levels_dbm = {real: _levels(rasters, world.plan) for real, rasters in opened.items()}
+    heard = {
+        radio.name: _heard(
+            config, radio, levels_dbm[radio.name == REALITY], lattices[0], world.plan
+        )
+        for radio in radios
+    }
+    return SweepWorld(street_network(world.ways, world.routes), world.plan, lattices[0], heard)
 
 
 def _levels(rasters: RxLevRasters, plan: CellPlan) -> NDArray[np.float32]:

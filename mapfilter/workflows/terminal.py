@@ -63,8 +63,9 @@ def rate_bar(label: str, unit: str, every_s: float = 30.0) -> Iterator[Progress]
         return (done - first) / max(time.monotonic() - began_s, 1e-6)
 
     def tell(done: int, total: int) -> None:
-        nonlocal first, told_s
-        first = done if first < 0 else first
+        nonlocal began_s, first, told_s
+        if first < 0:
+            began_s, first = time.monotonic(), done
         if time.monotonic() - told_s >= every_s and done > first:
             told_s = time.monotonic()
             left_s = (total - done) / rate(done)
@@ -83,8 +84,9 @@ def rate_bar(label: str, unit: str, every_s: float = 30.0) -> Iterator[Progress]
         task = bar.add_task(label, rate="")
 
         def show(done: int, total: int) -> None:
-            nonlocal first
-            first = done if first < 0 else first
+            nonlocal began_s, first
+            if first < 0:
+                began_s, first = time.monotonic(), done
             told = f"{rate(done):.1f} {unit}/s"
             bar.update(task, completed=done, total=total, rate=told)
 

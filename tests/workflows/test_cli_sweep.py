@@ -34,7 +34,7 @@ def parts(world):
     """Plan, world and databases of one sweep."""
     config = load_config(world.toml, GIVEN)
     plan, databases = sweep_plan(config)
-    return plan, sweep_world(config, plan), {name: one.path for name, one in databases.items()}
+    return plan, sweep_world(config, plan.radios), {name: one.path for name, one in databases.items()}
 
 
 @pytest.fixture(scope="module")
