@@ -19,11 +19,11 @@ from mapfilter.radio.rasters import RxLevRasters
 
 MOST_PX = 1200
 """Pixels along the longer side of a thinned area; a map in a picture is some 1 000 wide."""
-MOST_READ_PX = 4_000_000_000
+MOST_READ_PX = 1_000_000_000
 """Of larger sets of rasters (pixels times cells) pictures show what is heard at the points."""
 
-_STRIP_PX = 20_000_000
-_BLOCK_PX = 2048
+_BLOCK_PX = 1024
+_READ_PX = 40_000_000
 _COLUMNS = ("row", "col", "best_server", "best_level_dbm", "margin_db", "on_square")
 
 Window = tuple[int, int, int, int]
@@ -102,7 +102,7 @@ def best_servers(rasters: RxLevRasters, database: RadioRouteDatabase) -> BestSer
     """Return the best server, its level and its margin over the area of a database.
 
     Cells below the database's floor are not heard. Of large areas every second, third... pixel is
-    taken, cell by cell and strip by strip.
+    taken, block by block.
 
     Raises
     ------
@@ -117,22 +117,21 @@ def best_servers(rasters: RxLevRasters, database: RadioRouteDatabase) -> BestSer
     # The middle of a larger pixel is one of the rasters' own.
     thinned = replace(rasters, lattice=lattice, resampling="nearest") if step > 1 else rasters
     top, left = (0, 0) if step > 1 else window[:2]
-    strip = max(_STRIP_PX // (step * step * lattice.cols), 1)
-    for cell_id in rasters.cell_ids:
-        if cell_id not in database.plan:
-            continue
-        number = database.plan.index(cell_id)
-        for first in range(0, lattice.rows, strip):
-            rows = min(strip, lattice.rows - first)
-            at = top + first, left, rows, lattice.cols
-            level_dbm = thinned.read_levels_dbm(database.plan, at, (cell_id,))[0]
-            level_dbm[np.isnan(level_dbm)] = -np.inf
-            here = slice(first, first + rows)
-            better = level_dbm > best_dbm[here]
-            beaten_dbm = np.where(better, best_dbm[here], level_dbm)
-            second_dbm[here] = np.maximum(second_dbm[here], beaten_dbm)
-            best_dbm[here][better] = level_dbm[better]
-            found.server[here][better] = number
+    ids = [cell_id for cell_id in rasters.cell_ids if cell_id in database.plan]
+    # Together, as bands of one file often lie pixel by pixel, and reading one reads all.
+    at_a_time = max(_READ_PX // _BLOCK_PX**2, 1)
+    for row, col, rows, cols in lattice.tiles(max(_BLOCK_PX // step, 1)):
+        at, here = (top + row, left + col, rows, cols), np.s_[row : row + rows, col : col + cols]
+        for first in range(0, len(ids), at_a_time):
+            some = ids[first : first + at_a_time]
+            levels = thinned.read_levels_dbm(database.plan, at, some)
+            for cell_id, level_dbm in zip(some, levels, strict=True):
+                level_dbm[np.isnan(level_dbm)] = -np.inf
+                better = level_dbm > best_dbm[here]
+                beaten_dbm = np.where(better, best_dbm[here], level_dbm)
+                second_dbm[here] = np.maximum(second_dbm[here], beaten_dbm)
+                best_dbm[here][better] = level_dbm[better]
+                found.server[here][better] = database.plan.index(cell_id)
     floor_dbm = np.float32(database.floor_dbm)
     second_dbm[second_dbm < floor_dbm] = -np.inf
     heard, known = best_dbm >= floor_dbm, np.isfinite(best_dbm)

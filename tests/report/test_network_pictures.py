@@ -163,10 +163,11 @@ def test_best_servers_are_those_of_the_points(network):
     assert best.server[10, [2, 24, 25, 26, 49]].tolist() == [0, 0, 0, 1, 1]
 
 
-def test_large_areas_are_thinned_and_read_in_strips(network, monkeypatch):
+def test_large_areas_are_thinned_and_read_block_by_block(network, monkeypatch):
     whole = best_servers(*network)
     monkeypatch.setattr(served, "MOST_PX", 20)
-    monkeypatch.setattr(served, "_STRIP_PX", 1)
+    monkeypatch.setattr(served, "_BLOCK_PX", 7)
+    monkeypatch.setattr(served, "_READ_PX", 50)
     thinned = best_servers(*network)
     assert (thinned.lattice.rows, thinned.lattice.cols) == (14, 17)
     assert thinned.lattice.resolution_m == 15.0
