@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import sys
 from typing import Annotated
 
@@ -12,14 +11,11 @@ from mapfilter import __version__
 from mapfilter.cli.databases import build, check, export, info, merge, predict
 from mapfilter.cli.evaluate import evaluate
 from mapfilter.cli.experiments import bench, reproduce, sweep
-from mapfilter.cli.options import DONE, WRONG
+from mapfilter.cli.options import DONE
 from mapfilter.cli.tracks import demo, replay, simulate
-from mapfilter.errors import MapfilterError
-from mapfilter.workflows.terminal import say
+from mapfilter.workflows.guard import guarded
 
 __all__ = ["app", "main"]
-
-_NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 app = typer.Typer(
     add_completion=False,
@@ -58,18 +54,4 @@ def _version(
 
 def main() -> None:
     """Run the command line; a user's error is one clear message and exit code 2."""
-    try:
-        app()
-    except MapfilterError as error:
-        say(str(error), "error: ")
-        sys.exit(WRONG)
-    except MemoryError:
-        hint = "too large an area, too fine a resolution, or a value in the wrong unit"
-        say(f"memory: expected enough of it, found none left (likely: {hint})", "error: ")
-        sys.exit(WRONG)
-    except OSError as error:
-        if error.errno not in _NO_SPACE:
-            raise
-        where = error.filename or "the output"
-        say(f"{where}: expected space on the disk, found none left", "error: ")
-        sys.exit(WRONG)
+    sys.exit(guarded(app))

@@ -148,7 +148,7 @@ def check_on_map(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> None:
 def nothing_there(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> MapfilterError:
     """Return the error for an area in which the map has no ways, with the likely mistake."""
     area, covered = box_deg(crs, bounds_m), map_bounds_deg(name_or_path)
-    hint = "the area lies outside the map"
+    hint = "the area lies outside the map; name another, or none where other files replace it"
     if _overlap((area[1], area[0], area[3], area[2]), covered):
         hint = "longitude and latitude swapped"
     elif _overlap(area, covered):

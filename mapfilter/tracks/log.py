@@ -2,7 +2,7 @@
 
 Missing values stay missing: nothing is dropped because one of its fields is unknown. Rows out of
 order are sorted and exact duplicates dropped, and the log's notes tell of both. Rows of equal time
-are processed in the order :data:`mapfilter.tracks.schema.EVENT_ORDER`.
+are processed in the order motion, gnss, radio: first move, then measure.
 """
 
 from __future__ import annotations

@@ -11,9 +11,6 @@ from typing import Literal
 
 import numpy as np
 
-EVENT_ORDER = ("motion", "gnss", "radio")
-"""The order in which rows of equal time are processed: first move, then measure."""
-
 TABLES = ("motion", "radio", "gnss", "truth")
 """The tables of a log, in the order in which they are stored."""
 

@@ -125,7 +125,7 @@ def run_build(
         (
             *rasters.notes,
             *raster_cover(config.area, world.lattice),
-            *map_cover(config.area, world.lattice),
+            *map_cover(world),
             *world.streets.notes,
         ),
         _draw(config, rasters, database, world),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +16,7 @@ from mapfilter.geodesy import Lattice
 from mapfilter.radio._cell_rules import ANTENNAS
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.predict import off_frequency
-from mapfilter.radio.rasters import RxLevRasters
+from mapfilter.radio.rasters import RxLevRasters, open_rasters
 from mapfilter.workflows.check_lobes import check_against_sites, check_power
 from mapfilter.workflows.check_places import (
     check_pixels,
@@ -24,7 +26,7 @@ from mapfilter.workflows.check_places import (
     check_ways,
     has_box,
 )
-from mapfilter.workflows.check_rasters import check_ids, sampled
+from mapfilter.workflows.check_rasters import check_ids, is_surveyed, sampled
 from mapfilter.workflows.findings import CheckResult, Findings, Severity, listed
 from mapfilter.workflows.sections import Config
 from mapfilter.workflows.survey import survey_inputs
@@ -62,9 +64,7 @@ def run_check(config: Config, progress: Progress | None = None) -> CheckResult:
     rasters = _rasters(config, findings)
     area = _area(config, rasters, findings)
     placed = area is not None and (
-        rasters is None
-        or not config.area.has_extent
-        or check_rasters_place(rasters, config, findings)
+        rasters is None or not _says_where(config) or check_rasters_place(rasters, config, findings)
     )
     done(1)
     lattice = rasters.lattice if rasters is not None else area
@@ -77,6 +77,12 @@ def run_check(config: Config, progress: Progress | None = None) -> CheckResult:
         where = _plan_name(config)
         check_sites(plan, inputs.lattice, where, findings)
         check_power((), plan, where, findings)
+    reality = _reality(config, findings) if area is not None else None
+    if reality is not None and (
+        not _says_where(config) or check_rasters_place(reality, config, findings)
+    ):
+        plan_there = _plan(_Inputs(config, reality.lattice, reality), findings)
+        _check_rasters(reality, plan_there, config, findings)
     done(3)
     if plan is not None and inputs.lattice is not None:
         _check_antennas(plan, inputs, findings)
@@ -96,7 +102,7 @@ def _area(config: Config, rasters: RxLevRasters | None, findings: Findings) -> L
             findings.add_faults(error, "measurements-invalid")
             if not config.area.has_extent:
                 return None
-    if about is not None and not config.area.has_extent:
+    if about is not None and not _says_where(config):
         return about
     try:
         return area_lattice(config.area)
@@ -106,14 +112,37 @@ def _area(config: Config, rasters: RxLevRasters | None, findings: Findings) -> L
         return None
 
 
+def _says_where(config: Config) -> bool:
+    """Tell whether box or map say where rasters should be; layers and tracks replace the map."""
+    area, roads = config.area, config.roads
+    replaced = roads.layer is not None or bool(roads.tracks.files)
+    return has_box(area) or (area.has_extent and not replaced)
+
+
 def _rasters(config: Config, findings: Findings) -> RxLevRasters | None:
     path = config.rasters_path
     if not path.exists():
         if config.rasters.path is not None:
             findings.add("rasters-missing", str(path), "There is nothing yet.", "warning")
         return None
+    return _opened(path, lambda: planned_rasters(config), findings)
+
+
+def _reality(config: Config, findings: Findings) -> RxLevRasters | None:
+    path = config.rasters.reality
+    if path is None:
+        return None
+    if not path.exists():
+        findings.add("reality-missing", str(path), "There is nothing.", "warning")
+        return None
+    return _opened(path, lambda: open_rasters(path), findings)
+
+
+def _opened(
+    path: Path, open_them: Callable[[], RxLevRasters], findings: Findings
+) -> RxLevRasters | None:
     try:
-        rasters = planned_rasters(config)
+        rasters = open_them()
     except MapfilterError as error:
         findings.add_faults(error, "rasters-invalid")
         return None
@@ -150,6 +179,9 @@ def _check_rasters(
         # Antennas were located from the same levels, and may well stand outside.
         return
     outside = check_sites(plan, rasters.lattice, name, findings)
+    if is_surveyed(rasters):
+        # Measured along some ways only; its lobes say nothing, nor is the plan's EIRP measured.
+        return
     in_place = check_against_sites(samples, plan, outside, where, findings)
     levels = in_place if rasters.quantity == "level" and as_declared else []
     check_power(levels, plan, name, findings)
@@ -163,6 +195,7 @@ def _check_antennas(plan: CellPlan, inputs: _Inputs, findings: Findings) -> None
     severity: Severity = "error" if inputs.rasters is None else "warning"
     if inputs.config.cells.antennas is None:
         evidence = f"It names pattern files ({listed(named)}), and cells.antennas no folder."
+        evidence += "".join(_misspelt(named))
         findings.add("antenna-missing", _plan_name(inputs.config), evidence, severity)
         return
     try:
@@ -172,6 +205,13 @@ def _check_antennas(plan: CellPlan, inputs: _Inputs, findings: Findings) -> None
         return
     for note in off_frequency(plan, antennas):
         findings.add("antenna-frequency", _plan_name(inputs.config), f"{note}.", "warning")
+
+
+def _misspelt(named: Sequence[str]) -> Iterator[str]:
+    """Yield what names that are nearly those of antennas by formula may mean."""
+    for name in named:
+        for close in difflib.get_close_matches(name.lower(), ANTENNAS, n=1):
+            yield f" Did you mean {close!r} where it says {name!r}?"
 
 
 def _check_roads(inputs: _Inputs, area: Lattice, findings: Findings) -> None:
@@ -185,7 +225,9 @@ def _check_roads(inputs: _Inputs, area: Lattice, findings: Findings) -> None:
             findings.add_faults(error, "roads-invalid")
             return
         if rasters is not None:
-            check_ways(ways, rasters, f"{config.area.map} and {rasters.path}", findings)
+            files = (config.roads.layer, *config.roads.tracks.files)
+            source = next((str(path) for path in files if path is not None), config.area.map)
+            check_ways(ways, rasters, f"{source} and {rasters.path}", findings)
         return
     try:
         _ = world.landuse

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import rasterio
+from rasterio.errors import RasterioError
 
 from mapfilter.errors import InputError
 from mapfilter.radio.cells import CellPlan
@@ -29,6 +31,17 @@ _MISREAD: dict[tuple[str, Kind], str] = {
     ("loss", "unclear"): "values-implausible",
 }
 _FALLS = 0.3
+
+
+def is_surveyed(rasters: RxLevRasters) -> bool:
+    """Tell whether rasters were made of measurements, not predicted."""
+    if not rasters.path.is_file():
+        return False
+    try:
+        with rasterio.open(rasters.path) as source:
+            return str(source.tags().get("MODEL", "")).startswith("survey")
+    except RasterioError:
+        return False
 
 
 def check_ids(rasters: RxLevRasters, plan: CellPlan, where: str, findings: Findings) -> None:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
+import shapely
 
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Floats, Lattice, unproject
 from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.maps import map_bounds_deg
 from mapfilter.workflows.sections import Area
-from mapfilter.workflows.world import area_lattice
+from mapfilter.workflows.world import World, area_lattice
 
 FARTHEST_M = 50_000.0
 """No cell is heard from farther away."""
 
 _ENOUGH = 0.95
+_ABOUT_WAYS_M = 100.0
 _SAMPLES = 64
 _NAMED = 3
 
@@ -58,16 +60,35 @@ def outside_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> Floats:
     return np.asarray(np.hypot(off_east_m, off_north_m))
 
 
-def map_cover(area: Area, lattice: Lattice) -> tuple[str, ...]:
-    """Return a note when a map covers but a part of the area that is asked for."""
-    if not _has_box(area) or not area.map_is_a_file:
+def map_cover(world: World) -> tuple[str, ...]:
+    """Return a note when the ways of a map extend over but a part of the area that is asked for.
+
+    What a map's header says is only taken as a reason to look: maps often hold more, as whole ways
+    are kept. The share is that of the ways' convex hull, 100 m about it included.
+    """
+    config, lattice = world.config, world.lattice
+    area, roads = config.area, config.roads
+    replaced = roads.layer is not None or roads.tracks.files
+    if not _has_box(area) or not area.map_is_a_file or replaced:
         return ()
+    if _told_share(area, lattice) >= _ENOUGH:
+        return ()
+    box = shapely.box(*lattice.bounds_m)
+    try:
+        hull = shapely.convex_hull(shapely.geometrycollections(world.ways.geometry))
+    except InputError:
+        return _note(f"the map {area.map}", 0.0)
+    near = shapely.intersection(shapely.buffer(hull, _ABOUT_WAYS_M), box)
+    return _note(f"the map {area.map}", float(near.area / box.area))
+
+
+def _told_share(area: Area, lattice: Lattice) -> float:
     along = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
     rows, cols = np.meshgrid(along * lattice.rows - 0.5, along * lattice.cols - 0.5, indexing="ij")
     lon, lat = unproject(lattice.crs, *lattice.east_north(rows.ravel(), cols.ravel()))
     west, south, east, north = map_bounds_deg(area.map)
     inside = (lon >= west) & (lon <= east) & (lat >= south) & (lat <= north)
-    return _note(f"the map {area.map}", float(inside.mean()))
+    return float(inside.mean())
 
 
 def raster_cover(area: Area, lattice: Lattice) -> tuple[str, ...]:

@@ -15,7 +15,8 @@ REMEDIES = {
     "antenna-invalid": "Correct the pattern file, or take another.",
     "antenna-missing": "Put the pattern file into the folder cells.antennas, or correct the name.",
     "area-invalid": "Correct the area; a box is west, south, east, north in degrees.",
-    "area-outside-map": "Take a map of the area, or correct the area.",
+    "area-outside-map": 'Take a map of the area, correct the area, or say area.map = "none" where '
+    "layers, tracks or land use replace it.",
     "axes-swapped": "Export the rasters anew with rows from north to south and columns from west "
     "to east.",
     "azimuth-counter-clockwise": "Turn the azimuths into degrees clockwise from true north.",
@@ -55,6 +56,7 @@ REMEDIES = {
     "raster-without-cell": "Add the cells to the plan, or take the rasters out.",
     "rasters-invalid": "Correct or export the raster anew.",
     "rasters-missing": "Run `mapfilter predict`, or correct rasters.path.",
+    "reality-missing": "Correct rasters.reality, or leave it out and predict.",
     "roads-invalid": "Correct the layer of roads, or its settings.",
     "roads-outside-rasters": "Take rasters, map and area of the same place; build leaves out roads "
     "without rasters.",
@@ -90,7 +92,9 @@ _BY_HINT = {
     "a class left out, or colours blended by compression or resampling": "landuse-classes",
     "wrong table": "landuse-classes",
     "raster of another area": "landuse-outside",
-    "the area lies outside the map": "area-outside-map",
+    "the area lies outside the map; name another, or none where other files replace it": (
+        "area-outside-map"
+    ),
     "no folder of antennas there": "antenna-missing",
     "half a pixel: a corner where the header has to hold the pixel's centre": "half-pixel-shift",
 }

@@ -8,11 +8,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from mapfilter.errors import MapfilterError
 from mapfilter.workflows.config import load_config
 from mapfilter.workflows.facts import facts
+from mapfilter.workflows.guard import guarded
 from mapfilter.workflows.sections import Config
-from mapfilter.workflows.terminal import print_result, say
+from mapfilter.workflows.terminal import print_result
 
 Stage = Callable[[Config], Any]
 
@@ -36,18 +36,18 @@ def run_pipeline(stages: Mapping[str, Stage], file: Path, argv: Sequence[str] | 
     parser.add_argument("--out", metavar="DIR", type=Path)
     parser.add_argument("--json", action="store_true", help="one JSON object, last on stdout")
     given = parser.parse_args(argv)
+    return guarded(lambda: _run(stages, given))
+
+
+def _run(stages: Mapping[str, Stage], given: argparse.Namespace) -> int:
     found: dict[str, Any] = {}
-    try:
-        config = load_config(given.config, given.set, out=given.out)
-        for name, stage in stages.items():
-            began_s = time.perf_counter()
-            found[name] = facts(stage(config))
-            found[name]["seconds"] = round(time.perf_counter() - began_s, 3)
-            if not given.json:
-                print_result({name: found[name]}, as_json=False)
-    except MapfilterError as error:
-        say(str(error), "error: ")
-        return 2
+    config = load_config(given.config, given.set, out=given.out)
+    for name, stage in stages.items():
+        began_s = time.perf_counter()
+        found[name] = facts(stage(config))
+        found[name]["seconds"] = round(time.perf_counter() - began_s, 3)
+        if not given.json:
+            print_result({name: found[name]}, as_json=False)
     if given.json:
         print_result(found, as_json=True)
     return 3 if any(stage.get("partial") for stage in found.values()) else 0

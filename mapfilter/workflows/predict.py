@@ -79,12 +79,13 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     check_cells_near(plan, lattice, str(config.cells.plan or "cells"))
     antennas = world.antennas
     notes = (
-        *map_cover(config.area, lattice),
+        *map_cover(world),
         world.buildings.told,
         *plan.notes,
         *(note for antenna in antennas.values() for note in antenna.notes),
         *outside_validity(plan, lattice, model),
         *off_frequency(plan, antennas),
+        *_made_shadowing(config),
     )
     heights_m = world.heights_m
     wanted = 2 if config.prediction.reality.write else 1
@@ -107,6 +108,18 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
         reality if wanted == 2 else None,
         plan_path,
         notes,
+    )
+
+
+def _made_shadowing(config: Config) -> tuple[str, ...]:
+    """Return a note when levels of somebody's own cells get shadowing that nobody asked for."""
+    section = config.prediction
+    asked_for = "shadowing_db" in section.model_fields_set or section.shadowing_db == 0
+    if config.cells.plan is None or asked_for:
+        return ()
+    return (
+        f"{section.shadowing_db:g} dB of made shadowing are in the levels, as for a simulation; "
+        "set prediction.shadowing_db = 0 for the model's own levels",
     )
 
 

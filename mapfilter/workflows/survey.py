@@ -20,6 +20,7 @@ from mapfilter.radio.rasters import RxLevRasters, open_rasters
 from mapfilter.radio.survey import Survey, SurveyOptions, fit_survey
 from mapfilter.radio.survey_rasters import predicted_levels, surveyed_plan, write_survey
 from mapfilter.radio.survey_validation import Validation, leave_out
+from mapfilter.workflows.cover import check_cells_near
 from mapfilter.workflows.results import clear_pictures
 from mapfilter.workflows.sections import Config
 from mapfilter.workflows.survey_pictures import SURVEY_PICTURES, SurveyEvidence, draw_survey
@@ -28,6 +29,7 @@ from mapfilter.workflows.world import (
     LARGEST_AREA_PX,
     area_lattice,
     check_scale,
+    open_as_said,
     planned_cells,
 )
 
@@ -178,11 +180,16 @@ def survey_inputs(config: Config) -> SurveyInputs:
     section = config.prediction.survey
     if not section.files:
         raise fail(ConfigError, "prediction.survey.files", "measurement files", "none")
-    predicted = open_rasters(section.calibrate) if section.calibrate is not None else None
+    predicted = None
+    if section.calibrate is not None:
+        predicted = open_as_said(section.calibrate, config.rasters)
     given = _given_lattice(config, predicted)
     measurements, plan = _measurements(config, given)
     lattice = given or _lattice_about(measurements, section.reach_m, config.area.resolution_m)
     _check_inside(measurements, lattice, section.reach_m)
+    # A public list holds the cells of whole countries.
+    if plan is not None and config.cells.layout != "opencellid":
+        check_cells_near(plan, lattice, str(config.cells.plan))
     return SurveyInputs(measurements, plan, lattice, predicted)
 
 

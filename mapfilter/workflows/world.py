@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from mapfilter.simulation.layout import lay_out_plan
 from mapfilter.workflows.area import LARGEST_AREA_PX as LARGEST_AREA_PX
 from mapfilter.workflows.area import area_lattice as area_lattice
 from mapfilter.workflows.area import check_scale as check_scale
-from mapfilter.workflows.sections import Config
+from mapfilter.workflows.sections import Config, Rasters
 from mapfilter.workflows.streets import Streets
 
 
@@ -37,13 +38,27 @@ def planned_rasters(config: Config) -> RxLevRasters:
         They are wrong, or do not fit what the configuration says of them.
     """
     section = config.rasters
+    if config.prediction.model == "survey" and config.prediction.survey.calibrate is not None:
+        # What is said of rasters is said of those to calibrate; a survey's own tell it all.
+        section = Rasters(path=section.path)
     if section.path is None and not config.rasters_path.exists():
         hint = "not predicted yet; run mapfilter predict first, or set rasters.path"
         raise fail(
             InputError, str(config.rasters_path), "rasters", "No such file or directory", hint
         )
+    return open_as_said(config.rasters_path, section)
+
+
+def open_as_said(path: Path, section: Rasters) -> RxLevRasters:
+    """Open rasters as ``[rasters]`` says that they are.
+
+    Raises
+    ------
+    InputError
+        They are wrong, or do not fit what is said of them.
+    """
     return open_rasters(
-        config.rasters_path,
+        path,
         section.quantity,
         crs=section.crs,
         factor=section.factor,

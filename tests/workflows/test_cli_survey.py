@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import rasterio
 from command_line import assert_done, assert_refused, contents, mapfilter, settings
 
 from mapfilter.geodesy import unproject
@@ -91,6 +92,39 @@ def test_a_survey_calibrates_a_prediction(survey, world, tmp_path):
     error = values - open_rasters(world.rasters).read()
     assert np.sqrt(np.mean(error**2)) < 1.5
     assert found["validation"]["rmse_db"] < 2.5
+
+
+def test_what_is_said_of_rasters_is_said_of_those_to_calibrate(survey, world, tmp_path):
+    """Levels as tenths of dB, without the unit that would tell it."""
+    rasters = open_rasters(world.rasters)
+    tenths, lattice = tmp_path / "tenths.tif", rasters.lattice
+    with rasterio.open(
+        tenths, "w", driver="GTiff", count=3, dtype="float32", crs=lattice.crs, height=lattice.rows,
+        width=lattice.cols, transform=rasterio.Affine.from_gdal(*lattice.gdal_transform),
+    ) as target:  # fmt: skip
+        target.write(rasters.read() * 10)
+        target.descriptions = rasters.cell_ids
+    more = settings(
+        prediction__survey__calibrate=tenths,
+        prediction__survey__cross_validate="false",
+        prediction__survey__fill="true",
+        rasters__path=tmp_path / "made.tif",
+        rasters__quantity="level",
+        rasters__factor=0.1,
+    )
+    given = ("-c", survey / "survey.toml", "--out", tmp_path / "out", *more)
+    assert_done(mapfilter("predict", *given))
+    error = open_rasters(tmp_path / "made.tif").read() - rasters.read()
+    assert np.sqrt(np.mean(error**2)) < 1.5
+    assert assert_done(mapfilter("build", *given, "--json")).json["points"] > 1000
+
+
+def test_surveyed_cells_far_off_are_refused(survey, tmp_path):
+    plan = tmp_path / "cells.csv"
+    plan.write_text((survey / "cells.csv").read_text().replace("60.16890", "61.16890"))
+    given = ("-c", survey / "survey.toml", "--out", tmp_path, *settings(cells__plan=plan))
+    told = f"{plan}: expected cells within 50 km of the area, found 1 of 3 up to"
+    assert_refused(mapfilter("predict", *given), told, "(C)")
 
 
 def test_equal_surveys_give_equal_bytes(survey, tmp_path):

@@ -71,6 +71,31 @@ def test_a_part_of_the_map_and_of_the_rasters(own_world):
     assert 35 < share_of("the map helsinki", found["notes"]) < 45
 
 
+def test_a_header_that_tells_too_little_is_no_reason_for_a_note(own_world, monkeypatch):
+    """The ways reach all over the box that the header says to be covered by a third."""
+    third = (24.9420, 60.1660, 24.9445, 60.1697)
+    monkeypatch.setattr("mapfilter.workflows.cover.map_bounds_deg", lambda _: third)
+    given = ("-c", own_world.toml, f"--set=output.dir={own_world.folder / 'again'}")
+    found = assert_done(mapfilter("predict", *given, "--json")).json
+    assert not any("covers" in note for note in found["notes"])
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [((), 0), (("--set=prediction.shadowing_db=6",), 0), (("--set=prediction.seed=1",), 1)],
+)
+def test_made_shadowing_of_own_cells_is_told(given, told, own_world):
+    """The world's file asks for its shadowing; without that line nobody did."""
+    if told:
+        text = own_world.toml.read_text().replace("shadowing_db = 8.0\n", "")
+        own_world.toml.write_text(text)
+    out = f"--set=output.dir={own_world.folder / 'again'}"
+    found = assert_done(mapfilter("predict", "-c", own_world.toml, out, *given, "--json")).json
+    notes = [note for note in found["notes"] if "made shadowing" in note]
+    assert len(notes) == told
+    assert all("6 dB" in note and "prediction.shadowing_db = 0" in note for note in notes)
+
+
 def test_a_part_of_the_land_use(own_world):
     lattice = open_rasters(own_world.rasters).lattice
     east = Lattice(
