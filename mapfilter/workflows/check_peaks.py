@@ -18,6 +18,7 @@ _FAR_PX, _FAR_M = 10.0, 150.0
 _CLEARLY_BETTER = 0.1
 _BETTER = 0.05
 _MILDLY_BETTER = 0.02
+_FITS = 0.65
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,6 +30,11 @@ class _Fit:
     best: float
     away_m: float
     far: bool
+
+    @property
+    def explained(self) -> bool:
+        """Whether a place far from the site is where the antenna may well stand."""
+        return self.far and self.best > _FITS
 
     def gain(self, site: str) -> float:
         return self.by_site[site] - self.own
@@ -149,7 +155,7 @@ def _off(
     better = {
         cell_id: fit.best - fit.own
         for cell_id, fit in fits.items()
-        if cell_id not in moved and fit.far and fit.best - fit.own > _BETTER
+        if cell_id not in moved and fit.explained and fit.best - fit.own > _BETTER
     }
     # Two rasters of a site are as good as one that is clear.
     count = Counter(site_of[cell_id] for cell_id in better)
