@@ -82,7 +82,7 @@ def plans(trials: int, seed: int) -> tuple[SweepPlan, ...]:
     every = noise_grid(SIGMA_TRANS_M, SIGMA_ORIENT_DEG)
     some = noise_grid((ONE_SIGMA_TRANS_M,), SIGMA_ORIENT_DEG)
     best = CandidateOptions(RESOLUTION_M, RESOLUTION_M)
-    last_heading = CandidateOptions(RESOLUTION_M, RESOLUTION_M, prediction="last_heading")
+    projected = CandidateOptions(RESOLUTION_M, UPDATE_LENGTH_M, prediction="last_heading")
     next_call = CandidateOptions(RESOLUTION_M, RESOLUTION_M, switch_check="next_call")
     as_list = CandidateOptions(RESOLUTION_M, RESOLUTION_M, duplicates="list", threshold=10)
     at_22_m = CandidateOptions(RESOLUTION_M, UPDATE_LENGTH_M)
@@ -99,7 +99,6 @@ def plans(trials: int, seed: int) -> tuple[SweepPlan, ...]:
         _plan((_reading(ONE_ROUTE, best),), every, Radio(), row, 1, trials, seed),
         _plan(
             (
-                _reading("set, projected along the last heading", last_heading),
                 _reading("set, switch at the next call", next_call),
                 _reading("list, α = 10", as_list),
             ),
@@ -114,7 +113,11 @@ def plans(trials: int, seed: int) -> tuple[SweepPlan, ...]:
             some, REALITY, row, routes, draws, seed,
         ),
         _plan(
-            (_reading("set, 1 Hz", at_22_m), _reading("set, 1 Hz, as printed", printed)),
+            (
+                _reading("set, 1 Hz", at_22_m),
+                _reading("set, 1 Hz, projected along the last heading", projected),
+                _reading("set, 1 Hz, as printed", printed),
+            ),
             some, Radio(), second, routes, draws, seed,
         ),
         _plan(
