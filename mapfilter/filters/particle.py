@@ -47,6 +47,9 @@ class ParticleModel(Protocol[PriorT, ReadingT]):
     def weigh(self, state: Floats32, log_weight: Floats, reading: ReadingT) -> Reason:
         """Add a reading's log-likelihood to the log weights, in place; say why if it has none."""
 
+    def credible(self, summary: Summary) -> bool:
+        """Tell whether a belief may count as having converged, if it agrees on a place."""
+
 
 @dataclass(frozen=True, eq=False)
 class ParticleBelief:
@@ -161,7 +164,7 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         )
         weighed.__dict__["weight"] = weight
         status, agreed_at_m = self._agreed(belief, weighed.summary)
-        wanted = self._wanted(weighed.summary)
+        wanted = self._wanted(weighed.summary, status)
         state, now = weighed.state, weighed
         if effective < self.options.resample_below * weight.size or 2 * wanted < weight.size:
             state, log_weight = self._resampled(state, weight, wanted, rng)
@@ -177,9 +180,10 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         said = belief.summary
         return Estimate(float(said.mean[0]), float(said.mean[1]), said.covariance_m2, said.radii_m)
 
-    def _wanted(self, summary: Summary) -> int:
-        wanted = self.options.per_bin * summary.effective_bins
-        return int(min(max(wanted, self.options.least), self.options.most))
+    def _wanted(self, summary: Summary, status: Status) -> int:
+        options = self.options
+        least = options.searching if status is Status.SEARCHING else options.least
+        return int(min(max(options.per_bin * summary.effective_bins, least), options.most))
 
     def _resampled(
         self, state: Floats32, weight: Floats32, wanted: int, rng: np.random.Generator
@@ -197,7 +201,7 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             return Status.TRACKING, belief.agreed_at_m
         if belief.status is not Status.SEARCHING:
             return belief.status, belief.agreed_at_m
-        if summary.mass_50m < self.options.switch_mass:
+        if summary.mass_50m < self.options.switch_mass or not self.model.credible(summary):
             return Status.SEARCHING, nan
         since_m = belief.agreed_at_m if isfinite(belief.agreed_at_m) else belief.travelled_m
         if belief.travelled_m - since_m >= self.options.switch_hold_m:

@@ -16,6 +16,9 @@ class ParticleOptions:
     ----------
     most, least : int
         Limits of the number of particles.
+    searching : int
+        Least number until the filter has converged: a place that is improbable at first must keep
+        enough of them to be followed.
     per_bin : float
         Particles for each bin of 25 m that the belief covers (two to the power of its entropy).
     resample_below : float
@@ -29,7 +32,8 @@ class ParticleOptions:
         and has done so for so many metres travelled.
     """
 
-    most: int = 20_000
+    most: int = 30_000
+    searching: int = 20_000
     least: int = 1000
     per_bin: float = 60.0
     resample_below: float = 0.5
@@ -42,6 +46,8 @@ class ParticleOptions:
         if not 1 <= self.least <= self.most:
             got = f"{self.least} and {self.most}"
             faults.add("particles, least and most", "1 <= least <= most", got)
+        if self.searching < 1:
+            faults.add("particles, searching", ">= 1", self.searching)
         if not (isfinite(self.per_bin) and self.per_bin > 0):
             faults.add("particles, per_bin", "a finite number > 0", self.per_bin)
         for name in ("resample_below", "switch_mass"):

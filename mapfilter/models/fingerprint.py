@@ -12,6 +12,7 @@ inverse is known in closed form. Innovations are clipped, because predictions er
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import exp
 
 import numpy as np
 from numba import njit
@@ -39,8 +40,10 @@ class LevelErrors:
     correlation_m : float
         Distance after which its correlation is 1/e.
     measurement_db : float
-        Independent error of each report; that of a pixel's edge not being where it was predicted
-        is part of it.
+        Independent error of each report.
+    roughness_db : float
+        How much the prediction itself varies over ``correlation_m``: a hypothesis that lies some
+        metres beside the truth is told the levels of another place.
     common : float
         Correlation of the errors of different cells.
     clip_sd : float
@@ -51,10 +54,15 @@ class LevelErrors:
 
     sd_db: float = 8.0
     correlation_m: float = 50.0
-    measurement_db: float = 3.0
+    measurement_db: float = 1.5
+    roughness_db: float = 6.0
     common: float = 0.3
     clip_sd: float = 3.0
     weight: float = 0.7
+
+    def beside_db2(self, grain_m: float) -> float:
+        """Return the variance of a prediction so far beside the truth."""
+        return 2 * self.roughness_db**2 * (1 - exp(-grain_m / self.correlation_m))
 
 
 @dataclass(frozen=True, slots=True)

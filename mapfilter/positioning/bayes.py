@@ -7,31 +7,32 @@ every one that comes in: equal epochs give equal bytes.
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field, replace
-from math import isfinite, nan
+from math import isfinite, nan, sqrt
 
 import numpy as np
 
-from mapfilter.errors import InputError, fail
-from mapfilter.filters.contract import MotionStep, Reason, Status
+from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import Summary, nothing
 from mapfilter.filters.particle import ParticleBelief, ParticleFilter
 from mapfilter.filters.particle_options import ParticleOptions
-from mapfilter.geodesy import same_crs
-from mapfilter.models.fingerprint import BoundReading, LevelReading
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.area_map import AreaMap
 from mapfilter.positioning.bayes_model import BayesModel, Start
-from mapfilter.positioning.epochs import Epoch, epochs, headed
-from mapfilter.positioning.estimate import Fix, TrackEstimate, TrackEvidence, UnusedReading
+from mapfilter.positioning.challenger import (
+    Challenger,
+    ChallengeRules,
+    Doubt,
+    Verdict,
+    judge,
+)
+from mapfilter.positioning.epochs import Epoch, headed
+from mapfilter.positioning.estimate import Fix, UnusedReading
 from mapfilter.positioning.evidence import Memory, RadioReading, reading_of
 from mapfilter.positioning.matched_way import matched_way
-from mapfilter.positioning.snapshot import Snapshot
-from mapfilter.positioning.track import PositionedTrack
-from mapfilter.tracks.log import TrackLog
 
-_SNAPSHOT_EVERY_M = 20.0
+_STREET_SHARE = 0.3
+_FIRST_GRAIN_M, _LEAST_GRAIN_M = 5.0, 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +50,9 @@ class BayesTrack:
     compass : bool
         Whether headings are a compass's.
     status : Status
+    doubt : Doubt
+    challenger : Challenger or None
+        Beside a belief in doubt.
     """
 
     memory: Memory
@@ -56,6 +60,14 @@ class BayesTrack:
     heading_rad: float = nan
     compass: bool = True
     status: Status = Status.SEARCHING
+    doubt: Doubt = field(default_factory=Doubt)
+    challenger: Challenger | None = None
+
+    @property
+    def leading(self) -> ParticleBelief | None:
+        """The belief to go by: the challenger's where the first one is lost."""
+        lost = self.status is Status.LOST and self.challenger is not None
+        return self.challenger.belief if lost and self.challenger else self.belief
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,10 +95,12 @@ class BayesPositioner:
     ----------
     model : BayesModel
     options : ParticleOptions
+    rules : ChallengeRules
     """
 
     model: BayesModel
     options: ParticleOptions = field(default_factory=ParticleOptions)
+    rules: ChallengeRules = field(default_factory=ChallengeRules)
 
     @property
     def area(self) -> AreaMap:
@@ -116,7 +130,7 @@ class BayesPositioner:
         """Take one epoch in."""
         track, unused = self._move(track, epoch, rng)
         memory, reading, reason, unplaced = reading_of(
-            self.area, self.model.evidence, track.memory, epoch
+            self.area, self.model.evidence, track.memory, epoch, _grain_m(track)
         )
         unused += [
             UnusedReading(epoch.time_s, row.role, _name(row.cell, row.arfcn, row.bsic), why)
@@ -125,28 +139,74 @@ class BayesPositioner:
         belief = track.belief
         if belief is None:
             if reading is not None:
-                belief = self.filter.init(Start(reading, track.compass), rng)
+                start = Start(reading, track.compass)
+                track = replace(track, belief=self.filter.init(start, rng))
         elif reading is not None:
-            belief, info = self.filter.update(belief, reading, rng)
-            if info.reason is not Reason.USED:
-                reason = info.reason
+            track, why = self._weigh(track, belief, reading, epoch, rng)
+            reason = reason if why is Reason.USED else why
+        elif track.status is Status.CONVERGED:
+            # CONVERGED is one epoch, also where nothing is heard in the next.
+            following = replace(belief, status=Status.TRACKING)
+            track = replace(track, belief=following, status=Status.TRACKING)
         if reason not in (Reason.USED, Reason.NOT_MOVED_ENOUGH, Reason.NO_READING):
             cell = next((str(row.cell) for row in epoch.heard if row.cell is not None), "")
             unused.append(UnusedReading(epoch.time_s, "serving", cell, reason))
-        status = track.status if belief is None else belief.status
-        if reading is None and status is Status.CONVERGED:
-            # CONVERGED is one epoch, also where nothing is heard in the next.
-            belief = replace(belief, status=Status.TRACKING) if belief is not None else None
-            status = Status.TRACKING
-        after = replace(track, memory=memory, belief=belief, status=status)
+        after = replace(track, memory=memory)
         return after, self._news(after, epoch.time_s, reason, tuple(unused))
+
+    def _weigh(
+        self,
+        track: BayesTrack,
+        before: ParticleBelief,
+        reading: RadioReading,
+        epoch: Epoch,
+        rng: np.random.Generator,
+    ) -> tuple[BayesTrack, Reason]:
+        """Weigh the belief, and its challenger, which may start, win or give up."""
+        belief, info = self.filter.update(before, reading, rng)
+        status = Status.LOST if track.status is Status.LOST else belief.status
+        if info.reason is not Reason.USED:
+            return replace(track, belief=belief, status=status), info.reason
+        gained = belief.log_evidence - before.log_evidence
+        doubt = track.doubt.after(reading.expected, gained, reading.length_m)
+        challenger = track.challenger
+        travelled_m = track.memory.travelled_m
+        if challenger is not None:
+            other, _ = self.filter.update(challenger.belief, reading, rng)
+            challenger = replace(challenger, belief=other)
+            verdict = judge(self.rules, belief, challenger, travelled_m)
+            if verdict is Verdict.WON:
+                belief = replace(other, status=Status.TRACKING)
+            if verdict not in (Verdict.OPEN, Verdict.AHEAD):
+                doubt, challenger = replace(doubt, sum=0.0), None
+            lost = verdict is Verdict.AHEAD
+            status = Status.LOST if lost else Status.TRACKING
+        elif status is Status.TRACKING and doubt.sum >= self._doubt_at(reading):
+            challenger = self._challenger(track, belief, epoch, rng)
+        now = replace(track, belief=belief, status=status, doubt=doubt, challenger=challenger)
+        return now, Reason.USED
+
+    def _doubt_at(self, reading: RadioReading) -> float:
+        told = reading.levels is not None or reading.bounds
+        return self.rules.doubt if told else self.rules.doubt_of_cells
+
+    def _challenger(
+        self, track: BayesTrack, main: ParticleBelief, epoch: Epoch, rng: np.random.Generator
+    ) -> Challenger | None:
+        """Start from scratch: from the report alone, as if it were the first."""
+        empty = Memory.empty(len(self.area.cell_ids))
+        _, reading, _, _ = reading_of(self.area, self.model.evidence, empty, epoch)
+        if reading is None:
+            return None
+        belief = self.filter.init(Start(reading, track.compass), rng)
+        return Challenger(belief, track.memory.travelled_m, main.log_evidence)
 
     def _move(
         self, track: BayesTrack, epoch: Epoch, rng: np.random.Generator
     ) -> tuple[BayesTrack, list[UnusedReading]]:
         unused: list[UnusedReading] = []
         belief, memory, heading_rad = track.belief, track.memory, track.heading_rad
-        compass = track.compass
+        compass, challenger = track.compass, track.challenger
         for raw in epoch.motion:
             step, heading_rad = headed(raw, heading_rad)
             if belief is None:
@@ -159,10 +219,18 @@ class BayesPositioner:
                 belief = self._without_compass(belief, rng)
             belief, why = self.filter.predict(belief, step, rng)
             memory = memory.moved(step)
+            if challenger is not None:
+                other, _ = self.filter.predict(challenger.belief, step, rng)
+                challenger = replace(challenger, belief=other)
             if why is not Reason.USED:
                 unused.append(UnusedReading(epoch.time_s, "motion", "", why))
         moved = replace(
-            track, belief=belief, memory=memory, heading_rad=heading_rad, compass=compass
+            track,
+            belief=belief,
+            memory=memory,
+            heading_rad=heading_rad,
+            compass=compass,
+            challenger=challenger,
         )
         return moved, unused
 
@@ -172,7 +240,7 @@ class BayesPositioner:
     def _news(
         self, track: BayesTrack, time_s: float, reason: Reason, unused: tuple[UnusedReading, ...]
     ) -> News:
-        belief, (west, south) = track.belief, self.area.origin_m
+        belief, (west, south) = track.leading, self.area.origin_m
         if belief is None:
             said, count, way = nothing(STATES), 0, (0, nan)
         else:
@@ -194,6 +262,15 @@ class BayesPositioner:
         return News(fix, evidence, unused)
 
 
+def _grain_m(track: BayesTrack) -> float:
+    """Return how far hypotheses lie apart where the belief is, and no less than they are good."""
+    belief = track.belief
+    if belief is None or not belief.log_weight.size:
+        return _FIRST_GRAIN_M
+    area_m2 = _STREET_SHARE * belief.bins.size_m**2 * belief.summary.effective_bins
+    return max(sqrt(area_m2 / belief.log_weight.size), _LEAST_GRAIN_M)
+
+
 def _evidence(
     said: Summary, west: float, south: float, log_evidence: float
 ) -> tuple[float, float, float, float, float]:
@@ -208,109 +285,3 @@ def _name(cell: str | None, arfcn: int | None, bsic: int | None) -> str:
     if cell is not None:
         return cell
     return "" if arfcn is None else f"ARFCN {arfcn}, BSIC {'unknown' if bsic is None else bsic}"
-
-
-def position_by_bayes(
-    positioner: BayesPositioner, log: TrackLog, rng: np.random.Generator, *, pictures: bool = False
-) -> PositionedTrack:
-    """Locate a log with the Bayes map filter, from an unknown start.
-
-    Nothing aborts a track: what cannot be used is labelled and passed over.
-
-    Parameters
-    ----------
-    positioner : BayesPositioner
-        Shared by many logs.
-    log : TrackLog
-        In the database's CRS.
-    rng : numpy.random.Generator
-    pictures : bool
-        Whether to keep the belief's hypotheses until it has converged, for figures.
-
-    Raises
-    ------
-    InputError
-        The log is in another CRS than the database.
-    """
-    crs = positioner.area.lattice.crs
-    if not same_crs(log.crs, crs):
-        raise fail(InputError, "log, crs", crs, log.crs, "log of another area or zone")
-    merged = epochs(log)
-    _warm_up(positioner)
-    began_s = time.process_time()
-    track, told = positioner.begin(), list[News]()
-    snapshots: list[Snapshot] = []
-    for epoch in merged:
-        track, news = positioner.advance(track, epoch, rng)
-        told.append(news)
-        if pictures and _worth_a_picture(track, snapshots):
-            snapshots.append(_snapshot(track, news, positioner.area))
-    filter_s = time.process_time() - began_s
-    return PositionedTrack(
-        estimate_of(crs, "bayes", told, log.start_utc_s),
-        tuple(snapshots),
-        filter_s,
-    )
-
-
-def estimate_of(
-    crs: str, filter_name: str, told: list[News], start_utc_s: float = nan
-) -> TrackEstimate:
-    """Put the news of a track's epochs together."""
-    unused = [reading for news in told for reading in news.unused]
-    east_m, north_m, mass, entropy, log_evidence = (
-        np.array([news.evidence for news in told], dtype=np.float64).reshape(-1, 5).T
-    )
-    return TrackEstimate.of_fixes(
-        crs,
-        filter_name,
-        [news.fix for news in told],
-        start_utc_s=start_utc_s,
-        unused=unused,
-        evidence=TrackEvidence(
-            east_m, north_m, mass, entropy, log_evidence, np.zeros(len(told), dtype=np.bool_)
-        ),
-    )
-
-
-def _worth_a_picture(track: BayesTrack, snapshots: list[Snapshot]) -> bool:
-    """Tell whether a belief on its way to converging has changed since the last picture."""
-    if track.belief is None or track.status is Status.TRACKING:
-        return False
-    if not snapshots or track.status is not snapshots[-1].status:
-        return True
-    return track.memory.travelled_m - snapshots[-1].travelled_m >= _SNAPSHOT_EVERY_M
-
-
-def _snapshot(track: BayesTrack, news: News, area: AreaMap) -> Snapshot:
-    belief, (west, south), fix = track.belief, area.origin_m, news.fix
-    if belief is None:
-        raise AssertionError("only beliefs are drawn")
-    return Snapshot(
-        fix.time_s,
-        track.memory.travelled_m,
-        belief.state[0].astype(np.float64) + west,
-        belief.state[1].astype(np.float64) + south,
-        belief.weight.astype(np.float64),
-        fix.east_m,
-        fix.north_m,
-        track.status,
-    )
-
-
-def _warm_up(positioner: BayesPositioner) -> None:
-    """Load what is compiled, and prepare the area, before the clock starts."""
-    model, rng = positioner.model, np.random.default_rng(0)
-    west, south = model.area.origin_m
-    small = replace(positioner, options=replace(positioner.options, most=64, least=32))
-    track = small.begin_at(west, south, 1.0, rng)
-    epoch = Epoch(0.0, (MotionStep(1.0, 0.0),))
-    track, _ = small.advance(track, epoch, rng)
-    if track.belief is not None and model.area.cell_ids:
-        small.filter.update(track.belief, _every_kind(), rng)
-
-
-def _every_kind() -> RadioReading:
-    one, none = np.ones(1, dtype=np.float32), np.zeros(1, dtype=np.int32)
-    levels = LevelReading(none, one, one, one, 0.3, 1.0, 3.0, 0.0, 0.0)
-    return RadioReading(0, 1.0, levels, (BoundReading(none, -60.0, 1, 8.0, 1.0),))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.filters.hypotheses import Bins
+from mapfilter.filters.hypotheses import Bins, Summary
 from mapfilter.filters.resampling import systematic
 from mapfilter.models import cell_id, fingerprint
 from mapfilter.models.street_motion import (
@@ -203,6 +203,10 @@ class BayesModel:
             self._weigh_by_fix(state, log_weight, reading.fix)
             used = True
         return Reason.USED if used else Reason.NO_READING
+
+    def credible(self, summary: Summary) -> bool:
+        """Tell whether the leading hypothesis is on the map rather than off it."""
+        return bool(summary.mean[OFF] < 0.5)
 
     def _pixels(
         self, state: Floats32, back_east_m: float, back_north_m: float

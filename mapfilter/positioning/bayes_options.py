@@ -10,6 +10,7 @@ from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.positioning.area_map import AreaMap
 from mapfilter.positioning.bayes import BayesPositioner
 from mapfilter.positioning.bayes_model import BayesModel
+from mapfilter.positioning.challenger import ChallengeRules
 from mapfilter.positioning.evidence import EvidenceOptions
 
 
@@ -27,17 +28,20 @@ class BayesOptions:
         How much serving cells and levels count.
     particles : ParticleOptions
         Numbers of particles, and the switch rule.
+    challenge : ChallengeRules
+        When a belief in doubt is challenged, and when it is replaced.
     """
 
     motion: MotionErrors = field(default_factory=MotionErrors)
     map: MapWeights = field(default_factory=MapWeights)
     evidence: EvidenceOptions = field(default_factory=EvidenceOptions)
     particles: ParticleOptions = field(default_factory=ParticleOptions)
+    challenge: ChallengeRules = field(default_factory=ChallengeRules)
 
     def over(self, area: AreaMap) -> BayesPositioner:
         """Return the filter over an area."""
         return BayesPositioner(
-            BayesModel(area, self.motion, self.map, self.evidence), self.particles
+            BayesModel(area, self.motion, self.map, self.evidence), self.particles, self.challenge
         )
 
 

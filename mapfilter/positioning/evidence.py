@@ -22,6 +22,11 @@ from mapfilter.tracks.schema import SERVING
 
 Floats = NDArray[np.float64]
 
+_FIRST_GRAIN_M = 5.0
+_SERVING_NATS = 0.5
+_MAP_NATS_PER_M = 0.03
+"""Less log probability than none, on average: of a serving cell at full weight, of the map."""
+
 
 @dataclass(frozen=True, slots=True)
 class EvidenceOptions:
@@ -59,6 +64,10 @@ class RadioReading:
     bounds : tuple of BoundReading
         Levels at an end of the scale, and those of several candidates.
     fix : GnssFix or None
+    expected : float
+        Log probability on average where the belief is right.
+    length_m : float
+        Travelled since the last report that was used.
     """
 
     serving: int = -1
@@ -66,6 +75,8 @@ class RadioReading:
     levels: LevelReading | None = None
     bounds: tuple[BoundReading, ...] = ()
     fix: GnssFix | None = None
+    expected: float = 0.0
+    length_m: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,9 +124,22 @@ Unplaced = tuple[Heard, Reason]
 
 
 def reading_of(
-    area: AreaMap, options: EvidenceOptions, memory: Memory, epoch: Epoch
+    area: AreaMap,
+    options: EvidenceOptions,
+    memory: Memory,
+    epoch: Epoch,
+    grain_m: float = _FIRST_GRAIN_M,
 ) -> tuple[Memory, RadioReading | None, Reason, list[Unplaced]]:
     """Make one report ready.
+
+    Parameters
+    ----------
+    area : AreaMap
+    options : EvidenceOptions
+    memory : Memory
+    epoch : Epoch
+    grain_m : float
+        How far the hypotheses nearest to the truth may lie beside it.
 
     Returns
     -------
@@ -145,7 +169,7 @@ def reading_of(
         unplaced += unknown
         bounds = tuple(_bound(options, band, row, counted_m) for band, row in others)
         if inside:
-            levels = _levels(options, memory, inside)
+            levels = _levels(options, memory, inside, grain_m)
             level_dbm, heard_at_m = level_dbm.copy(), heard_at_m.copy()
             bands = list(inside)
             level_dbm[bands] = list(inside.values())
@@ -153,8 +177,19 @@ def reading_of(
     if serving < 0 and levels is None and not bounds:
         fix_only = RadioReading(fix=epoch.fix) if epoch.fix is not None else None
         return memory, fix_only, reason, unplaced
+    weight = counted_m * options.serving.weight_per_m
+    surprise = _SERVING_NATS * weight * (serving >= 0) + _MAP_NATS_PER_M * min(since_m, 100.0)
+    by_levels = 0.0
+    if levels is not None:
+        by_levels = 0.5 * levels.weight * float(np.sum(_news(options, memory, levels.cell)))
     reading = RadioReading(
-        serving, counted_m * options.serving.weight_per_m, levels, bounds, epoch.fix
+        serving,
+        weight,
+        levels,
+        bounds,
+        epoch.fix,
+        -surprise - by_levels,
+        0.0 if first else since_m,
     )
     memory = replace(
         memory,
@@ -214,7 +249,9 @@ def _placed(
     return inside, others, unplaced
 
 
-def _levels(options: EvidenceOptions, memory: Memory, inside: dict[int, float]) -> LevelReading:
+def _levels(
+    options: EvidenceOptions, memory: Memory, inside: dict[int, float], grain_m: float
+) -> LevelReading:
     errors = options.levels
     count = len(inside)
     cell = np.fromiter(inside, np.int32, count)
@@ -226,7 +263,8 @@ def _levels(options: EvidenceOptions, memory: Memory, inside: dict[int, float]) 
     before = np.where(together, memory.level_dbm[cell], 0.0)
     # A level that was missing from the last report alone is no news of a whole new error.
     news = np.where(together, 1.0, 1.0 - correlation**2)
-    lasting, white = errors.sd_db**2, errors.measurement_db**2
+    lasting = errors.sd_db**2
+    white = errors.measurement_db**2 + errors.beside_db2(grain_m)
     variance = lasting * (1 - rho**2) + white * (1 + rho**2)
     return LevelReading(
         cell,
@@ -239,6 +277,14 @@ def _levels(options: EvidenceOptions, memory: Memory, inside: dict[int, float]) 
         memory.back_east_m,
         memory.back_north_m,
     )
+
+
+def _news(options: EvidenceOptions, memory: Memory, cell: NDArray[np.int32]) -> Floats:
+    """Return how much of each level is new: 1 where it was in the last report, or never heard."""
+    together = memory.heard_at_m[cell] == memory.used_at_m
+    away_m = memory.travelled_m - memory.heard_at_m[cell]
+    correlation = np.exp(-away_m / options.levels.correlation_m)
+    return np.where(together, 1.0, 1.0 - correlation**2)
 
 
 def _bound(

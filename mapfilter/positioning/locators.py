@@ -9,8 +9,8 @@ import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.filters.candidate_options import CandidateOptions
-from mapfilter.positioning.bayes import position_by_bayes
 from mapfilter.positioning.bayes_options import BayesOptions, open_area
+from mapfilter.positioning.bayes_replay import position_by_bayes
 from mapfilter.positioning.global_positioning import (
     PositionedTrack,
     cell_points,

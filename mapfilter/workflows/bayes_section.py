@@ -35,7 +35,8 @@ class BayesSection(Section):
     level_correlation_m: Positive = 50.0
     level_weight: Annotated[float, Field(gt=0, le=1)] = 0.7
     report_spacing_m: NotNegative = 5.0
-    most_particles: Annotated[int, Field(ge=100, le=10_000_000)] = 20_000
+    most_particles: Annotated[int, Field(ge=100, le=10_000_000)] = 30_000
+    searching_particles: Annotated[int, Field(ge=10, le=10_000_000)] = 20_000
     least_particles: Annotated[int, Field(ge=10, le=10_000_000)] = 1000
     switch_mass: Annotated[float, Field(gt=0, lt=1)] = 0.98
     switch_hold_m: NotNegative = 14.0
@@ -63,6 +64,7 @@ class BayesSection(Section):
             ),
             ParticleOptions(
                 most=self.most_particles,
+                searching=self.searching_particles,
                 least=self.least_particles,
                 switch_mass=self.switch_mass,
                 switch_hold_m=self.switch_hold_m,
