@@ -65,7 +65,8 @@ def plot_run_distributions(
             axes.set_axisbelow(True)
             axes.spines[["top", "right"]].set_visible(False)
         figure.suptitle(title, fontsize=11)
-        figure.legend(loc="outside lower center", ncols=4, frameon=False)
+        if groups:
+            figure.legend(loc="outside lower center", ncols=4, frameon=False)
 
 
 def _draw(axes: Axes, values: pd.Series, total: int, colour: str, name: str) -> None:

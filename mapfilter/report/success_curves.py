@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from mapfilter.evaluation.success_cells import SuccessCell
-from mapfilter.report.canvas import GREY, VERMILLION, distinct_colours, picture
+from mapfilter.report.canvas import BLACK, distinct_colours, picture
 
 _SIZE_IN = (8.4, 5.2)
 
@@ -55,7 +55,7 @@ def plot_success_curves(
         widest = max((c.sigma_orient_deg for _, cells in curves for c in cells), default=1.0)
         _draw_claims(axes, claims, claimant)
         # Bars of curves that lie on each other stand side by side.
-        apart = 0.012 * max(widest, 1.0)
+        apart = min(0.012, 0.06 / max(len(curves), 1)) * max(widest, 1.0)
         shifts = apart * (np.arange(len(curves)) - (len(curves) - 1) / 2)
         for (name, cells), shift, colour in zip(
             curves, shifts, distinct_colours(len(curves)), strict=True
@@ -75,19 +75,22 @@ def plot_success_curves(
         axes.grid(color="#e8e8e8", linewidth=0.7)
         axes.set_axisbelow(True)
         axes.spines[["top", "right"]].set_visible(False)
-        figure.legend(loc="outside lower center", ncols=3, frameon=False)
+        if curves or claims:
+            figure.legend(loc="outside lower center", ncols=3, frameon=False)
 
 
 def _draw_claims(axes: Axes, claims: Sequence[Claim], claimant: str) -> None:
-    left = 0.0
-    for claim in sorted(claims, key=lambda one: one.sigma_orient_deg):
+    """Draw each claim as a line up to its deviation, with one entry for all in the legend."""
+    told = ", ".join(
+        f"over {100 * claim.success:.0f} % up to {claim.sigma_orient_deg:g}°" for claim in claims
+    )
+    for index, claim in enumerate(claims):
         axes.plot(
-            [left, claim.sigma_orient_deg], [100 * claim.success] * 2, color=VERMILLION,
-            linewidth=2.2, linestyle=(0, (4, 2)), zorder=3,
+            [0.0, claim.sigma_orient_deg], [100 * claim.success] * 2, color=BLACK, linewidth=2.6,
+            linestyle=(0, (3, 1.2)), zorder=4,
+            label=f"{claimant}: {told}" if index == 0 else None,
         )  # fmt: skip
-        axes.annotate(
-            f"{claimant}: over {100 * claim.success:.0f} % up to {claim.sigma_orient_deg:g}°",
-            (claim.sigma_orient_deg, 100 * claim.success), xytext=(6, 0),
-            textcoords="offset points", va="center", fontsize=8.5, color=GREY,
+        axes.plot(
+            [claim.sigma_orient_deg], [100 * claim.success], color=BLACK, marker="|",
+            markersize=11, markeredgewidth=2.6, zorder=4,
         )  # fmt: skip
-        left = 0.0

@@ -1,5 +1,6 @@
 """The plan of a sweep: its grid, its batches, its seeds, and what is refused."""
 
+import pickle
 from dataclasses import replace
 from itertools import pairwise
 from math import inf, nan
@@ -162,3 +163,11 @@ def test_digest_changes_with_everything_that_changes_runs():
     )
     assert len({plan(**change).digest for change in changes}) == len(changes)
     assert plan().digest == plan().digest
+
+
+def test_a_plan_is_sent_to_workers_as_it_is():
+    whole = plan()
+    sent = pickle.loads(pickle.dumps(whole))
+    assert sent == whole
+    assert hash(sent) == hash(whole)
+    assert len(pickle.dumps(whole)) < 5000

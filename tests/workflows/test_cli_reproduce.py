@@ -68,8 +68,8 @@ def test_a_reading_that_holds_all_claims_fits_best():
     found = paper.fits([*none, *short, *good, *far])
     assert [fit.reading for fit in found] == ["good", "short", "far", "none"]
     assert found[0].misfit == 0
-    assert found[1].misfit == pytest.approx((0.18 + 0.15) / 5)
-    assert found[2].misfit == pytest.approx(20 / 20 / 5)
+    assert found[1].misfit == pytest.approx((0.18 + 0.15) / 2 / 2)
+    assert found[2].misfit == pytest.approx(20 / 20 / 3 / 2)
     assert (found[0].success_3_deg, found[0].success_6_deg) == (0.82, 0.7)
 
 

@@ -1,0 +1,83 @@
+"""Pictures of sweeps: they are drawn of few cells and of many, and of runs that never switched."""
+
+import matplotlib.image
+import numpy as np
+import pandas as pd
+import pytest
+
+from mapfilter.evaluation.success_cells import SuccessCell
+from mapfilter.report.run_distributions import plot_run_distributions
+from mapfilter.report.success_curves import Claim, plot_success_curves
+from mapfilter.report.success_map import plot_success_map
+
+CLAIMS = (Claim(3.0, 0.8), Claim(6.0, 0.65))
+
+
+def cell(sigma_deg, sigma_m, success):
+    place = dict.fromkeys(SuccessCell.__dataclass_fields__, 0.0)
+    place |= {"sigma_orient_deg": sigma_deg, "sigma_trans_m": sigma_m, "success": success}
+    place |= {"low": max(success - 0.1, 0.0), "high": min(success + 0.1, 1.0)}
+    return SuccessCell(**place)
+
+
+def grid(orient=6, trans=3):
+    return [cell(3.0 * i, 0.2 * j, 1 - i / 6) for i in range(orient) for j in range(trans)]
+
+
+def runs(count, switched=True):
+    rng = np.random.default_rng(1)
+    error_m = rng.gamma(2, 20, count) if switched else np.full(count, np.nan)
+    return pd.DataFrame(
+        {
+            "success": error_m <= 50,
+            "error_at_switch_m": error_m,
+            "error_mean_m": error_m / 2,
+            "switch_distance_m": 10 * error_m,
+        }
+    )
+
+
+def inked(path):
+    picture = matplotlib.image.imread(path)[:, :, :3]
+    return float((picture.min(axis=2) < 0.9).mean())
+
+
+@pytest.mark.parametrize(("curves", "claims"), [(1, ()), (1, CLAIMS), (11, CLAIMS), (0, CLAIMS)])
+def test_curves(tmp_path, curves, claims):
+    path = tmp_path / "curves.png"
+    drawn = [(f"reading {n}", grid(6, 1)) for n in range(curves)]
+    plot_success_curves(drawn, path, title="a town", claims=claims, claimant="paper")
+    assert inked(path) > 0.005
+
+
+def test_equal_curves_give_equal_bytes(tmp_path):
+    for name in ("a", "b"):
+        plot_success_curves([("set", grid())], tmp_path / name, title="a town", claims=CLAIMS)
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+@pytest.mark.parametrize(("orient", "trans"), [(1, 1), (6, 6), (12, 2)])
+def test_map_of_numbers(tmp_path, orient, trans):
+    path = tmp_path / "map.png"
+    plot_success_map(grid(orient, trans), path, title="a town")
+    assert inked(path) > 0.2
+
+
+def test_map_with_a_hole(tmp_path):
+    path = tmp_path / "map.png"
+    plot_success_map(grid()[:-1], path, title="a town")
+    assert path.is_file()
+
+
+@pytest.mark.parametrize("groups", [[], [("heading 3°", 40)], [(f"{n}°", 7) for n in range(8)]])
+def test_distributions(tmp_path, groups):
+    path = tmp_path / "cdf.png"
+    plot_run_distributions([(name, runs(n)) for name, n in groups], path, title="a town")
+    assert inked(path) > 0.005
+
+
+def test_distributions_of_runs_that_never_switched(tmp_path):
+    path = tmp_path / "cdf.png"
+    groups = [("never", runs(9, switched=False)), ("some", runs(9))]
+    plot_run_distributions(groups, path, title="a town")
+    assert path.is_file()
