@@ -87,7 +87,8 @@ class SigmaPoints:
         >>> mean.tolist(), covariance.tolist()
         ([0.0, 0.25, 0.25, 0.25, 0.25], [2.0, 0.25, 0.25, 0.25, 0.25])
         """
-        wide = self.spread(size) ** 2
+        self.spread(size)
+        wide = self.alpha**2 * (size + self.kappa)
         mean = np.full(2 * size + 1, 1 / (2 * wide))
         mean[0] = (wide - size) / wide
         covariance = mean.copy()

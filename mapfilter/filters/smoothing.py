@@ -1,6 +1,6 @@
 """The smoother of Rauch, Tung & Striebel (1965): what later readings say of earlier states.
 
-``G = P Φᵀ P⁻`` inverse, ``x_s = x + G (x_s⁺ - Φ x)``, with P⁻ the covariance predicted. It takes the
+``G = P Φᵀ M⁻¹``, ``x_s = x + G (x_s⁺ - Φ x)``, with M the covariance predicted. It takes the
 means and covariances of any filter whose motion is linear, and goes backwards over them.
 """
 

@@ -97,8 +97,8 @@ def run_trials(
         Which update.
     first_mean : (T, n) or (n,) array_like
         The beliefs before the first step.
-    first_covariance : (n, n) array_like
-        Of all of them.
+    first_covariance : (n, n) or (T, n, n) array_like
+        Of all of them, or of each.
     readings : (T, K, m) array
         NaN where absent.
     covariances : bool
@@ -110,12 +110,12 @@ def run_trials(
         Sizes that do not fit, a covariance that is none, infinite readings.
     """
     n = transition.shape[0]
-    trials, steps = _checked_sizes(measurement, transition, readings)
+    trials, steps = checked_sizes(measurement, transition, readings)
     starts = np.broadcast_to(np.asarray(first_mean, dtype=np.float64), (trials, n))
-    factor = factor_of(first_covariance, n)
+    factors = factors_of(first_covariance, n, trials)
     entry = np.nonzero(transition)
     arguments: tuple[Any, ...] = (
-        _update_of(method), measurement.measure, measurement.slots, measurement.uses,
+        kernel_of(method), measurement.measure, measurement.slots, measurement.uses,
         np.ascontiguousarray(measurement.rows), np.ascontiguousarray(measurement.patterns),
         np.ascontiguousarray(measurement.noise), is_diagonal(measurement.noise),
         *method_numbers(method, n), *(np.ascontiguousarray(index) for index in entry),
@@ -130,16 +130,24 @@ def run_trials(
         lanes = block.stop - first
         lane_means, lane_found = np.empty((steps, n, lanes)), np.empty((kept, lanes, n, n))
         lane_evidence, lane_nis = np.empty((steps, lanes)), np.empty((steps, lanes))
-        run_lanes(
+        run_lanes(  # type: ignore[call-arg]
             *arguments, np.ascontiguousarray(readings[block].transpose(1, 2, 0)),
             np.array(starts[block].T, order="C"),
-            np.ascontiguousarray(np.repeat(factor[:, :, None], lanes, axis=2)),
+            np.array(factors[block].transpose(1, 2, 0), order="C"),
             lane_means, lane_found, lane_evidence, lane_nis,
         )  # fmt: skip
         means[block] = lane_means.transpose(2, 0, 1)
         found[block] = lane_found.transpose(1, 0, 2, 3)
         evidence[block], nis[block] = lane_evidence.T, lane_nis.T
     return TrialRun(means, found, evidence, nis)
+
+
+def factors_of(covariance: ArrayLike, size: int, trials: int) -> Floats:
+    """Return a factor of each trial's covariance, (T, n, n), from one for all or one each."""
+    given = np.asarray(covariance, dtype=np.float64)
+    if given.ndim == 3 and len(given) == trials:
+        return np.array([factor_of(one, size) for one in given]).reshape(trials, size, size)
+    return np.broadcast_to(factor_of(given, size), (trials, size, size))
 
 
 def is_diagonal(matrix: Floats) -> bool:
@@ -154,7 +162,7 @@ def method_numbers(method: Method, size: int) -> tuple[int, float, float]:
     return method.iterations, 1.0, 0.0
 
 
-def _update_of(method: Method) -> Callable[..., None]:
+def kernel_of(method: Method) -> Callable[..., None]:
     """Return the compiled update; each is compiled when it is first wanted."""
     update: Callable[..., None]
     if method.sigma is not None:
@@ -166,9 +174,10 @@ def _update_of(method: Method) -> Callable[..., None]:
     return update
 
 
-def _checked_sizes(
+def checked_sizes(
     measurement: CompiledMeasurement, transition: Floats, readings: Floats
 ) -> tuple[int, int]:
+    """Check that measurement, state and readings (T, K, m) fit; return T and K."""
     faults = Faults()
     n, m = transition.shape[0], measurement.rows.shape[0]
     if readings.ndim != 3 or readings.shape[2] != m:

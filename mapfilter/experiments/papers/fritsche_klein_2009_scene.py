@@ -106,26 +106,19 @@ class Layout:
         return self.satellite_distance_m * np.hstack([flat, up])
 
 
-def hard_layout(layout: Layout | None = None) -> Layout:
-    """Return the layout in which linearisation fails: all antennas look at the serving station.
+def hard_layout(distance_m: float = 1000.0) -> Layout:
+    """Return a layout in which linearisation fails: all antennas look at the serving station.
 
-    Sites stand 1000 m apart in place of 800 m, about the serving one, and there are 400 steps.
+    The six other sites stand around the serving one, at 0°, 60° ... 300°; the serving antenna looks
+    back along the road. There are 400 steps.
     """
-    given = layout or Layout()
-    sites = np.array(given.sites_m)
-    centre = sites[given.serving]
-    spread = centre + (sites - centre) * (1000.0 / 800.0)
-    towards = centre - spread
-    angles = np.degrees(np.arctan2(towards[:, 1], towards[:, 0])) % 360.0
-    angles[given.serving] = given.boresights_deg[given.serving]
+    angles = np.radians(60.0 * np.arange(6))
+    east_m, north_m = Layout().sites_m[0]
+    ring = [(east_m + distance_m * np.cos(a), north_m + distance_m * np.sin(a)) for a in angles]
     return Layout(
-        tuple((float(east), float(north)) for east, north in spread),
-        tuple(float(angle) for angle in angles),
-        given.serving,
-        given.satellite_azimuths_deg,
-        given.satellite_elevation_deg,
-        given.satellite_distance_m,
-        400,
+        ((east_m, north_m), *((float(east), float(north)) for east, north in ring)),
+        (225.0, *(float((180.0 + 60.0 * index) % 360.0) for index in range(6))),
+        steps=400,
     )
 
 

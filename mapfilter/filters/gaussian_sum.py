@@ -1,0 +1,200 @@
+"""Gaussian sums: a belief as a mixture, each component a Kalman-type filter of its own.
+
+Where a start is so vague that measurements bend strongly over it, one Gaussian goes wrong and stays
+so. A Gaussian sum cuts the start into narrow components, updates each by itself and weighs them by
+the evidence of their readings (Alspach & Sorenson 1972). Components that have lost all weight are
+dropped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mapfilter.errors import Faults, InputError
+from mapfilter.filters._mixture_runs import run_mixture
+from mapfilter.filters.gaussian import Method, factor_of
+from mapfilter.filters.trials import (
+    CompiledMeasurement,
+    checked_sizes,
+    is_diagonal,
+    kernel_of,
+    method_numbers,
+)
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Mixture:
+    """Weighted Gaussians of n components of the state.
+
+    Parameters
+    ----------
+    weights : (c,) array
+        They sum to one.
+    means : (c, n) array
+    covariance : (n, n) array
+        Of each of them.
+    """
+
+    weights: Floats
+    means: Floats
+    covariance: Floats
+
+
+def split(
+    mean: ArrayLike, covariance: ArrayLike, parts: Mapping[int, int], reach: float = 2.5
+) -> Mixture:
+    """Cut a Gaussian into narrower ones along some components of the state.
+
+    Along a component cut into c parts, the parts' means are spaced evenly over ± ``reach``
+    standard deviations, and their deviation is that spacing, at most what it was; weights are such
+    that mean and variance are kept, up to the cut tails. Components must be independent at the
+    start.
+
+    Parameters
+    ----------
+    mean : (n,) array_like
+    covariance : (n, n) array_like
+        Without correlation between what is cut and anything else.
+    parts : mapping of int to int
+        Number of parts for each index that is cut.
+    reach : float
+        Standard deviations over which means are spread.
+
+    Raises
+    ------
+    InputError
+        The covariance is none, a part is not at least 1, or what is cut is correlated.
+
+    Examples
+    --------
+    >>> cut = split([0.0, 5.0], np.diag([4.0, 1.0]), {0: 3}, reach=1.5)
+    >>> cut.means.tolist()
+    [[-3.0, 5.0], [0.0, 5.0], [3.0, 5.0]]
+    >>> round(float(cut.weights @ cut.means[:, 0] ** 2 + cut.covariance[0, 0]), 9)
+    4.0
+    """
+    centre, wide = np.asarray(mean, dtype=np.float64), np.array(covariance, dtype=np.float64)
+    n = centre.size
+    factor_of(wide, n)
+    faults = Faults()
+    for index, count in parts.items():
+        if not 0 <= index < n or count < 1:
+            faults.add("parts", f"indices below {n} and counts >= 1", f"{index}: {count}")
+        elif np.any(np.delete(wide[index], index)):
+            faults.add(f"covariance, row {index}", "no correlation with the rest", "some")
+    faults.raise_if_any(InputError)
+    axes, shares = [], []
+    for index, count in parts.items():
+        if count == 1:
+            continue
+        places = np.linspace(-reach, reach, count)
+        narrow = min(places[1] - places[0], 0.9) ** 2
+        # The weights' own variance is 1 - narrow: searched for, as the ends are cut.
+        share = _shares(places, 1.0 - narrow)
+        kept = 1.0 - float(share @ places**2)
+        deviation = np.sqrt(wide[index, index])
+        axes.append([(index, deviation * place) for place in places])
+        shares.append(share)
+        wide[index, index] *= kept
+    means, weights = [], []
+    for chosen, factors in zip(product(*axes), product(*shares), strict=True):
+        shifted = centre.copy()
+        for index, shift in chosen:
+            shifted[index] += shift
+        means.append(shifted)
+        weights.append(np.prod(factors))
+    return Mixture(np.array(weights), np.array(means), wide)
+
+
+def _shares(places: Floats, variance: float) -> Floats:
+    """Return normal weights on places, of a variance as near to the one wanted as they can be."""
+    low, high = 1e-3, 1e3
+    for _ in range(80):
+        middle = np.sqrt(low * high)
+        share = np.exp(-0.5 * places**2 / middle)
+        share /= share.sum()
+        low, high = (middle, high) if share @ places**2 < variance else (low, middle)
+    return np.asarray(share)
+
+
+@dataclass(frozen=True, eq=False)
+class MixtureRun:
+    """What Gaussian sums made of T trials of K steps.
+
+    Parameters
+    ----------
+    means : (T, K, n) array
+        Means of the mixtures.
+    covariances : (T, K, n, n) array
+    evidence : (T, K) array
+        Log density of each reading given those before it.
+    counts : (T, K) integer array
+        Components left.
+    """
+
+    means: Floats
+    covariances: Floats
+    evidence: Floats
+    counts: Ints
+
+
+def run_mixtures(
+    measurement: CompiledMeasurement,
+    transition: Floats,
+    process: Floats,
+    method: Method,
+    first: Mixture,
+    first_mean: ArrayLike,
+    readings: Floats,
+    *,
+    least_weight: float = 1e-8,
+) -> MixtureRun:
+    """Run Gaussian sums over trials.
+
+    Parameters
+    ----------
+    measurement, transition, process, readings
+        As :func:`mapfilter.filters.trials.run_trials` takes them.
+    method : Method
+        How each component takes readings in.
+    first : Mixture
+        The first components, about 0.
+    first_mean : (T, n) or (n,) array_like
+        What is added to their means in each trial.
+    least_weight : float
+        Components of less weight are dropped.
+
+    Raises
+    ------
+    InputError
+        Sizes that do not fit, a covariance that is none, infinite readings.
+    """
+    n = transition.shape[0]
+    trials, steps = checked_sizes(measurement, transition, readings)
+    starts = np.broadcast_to(np.asarray(first_mean, dtype=np.float64), (trials, n))
+    factor = factor_of(first.covariance, n)
+    lanes = first.weights.size
+    row, col = np.nonzero(transition)
+    means, evidence = np.empty((trials, steps, n)), np.empty((trials, steps))
+    covariances = np.empty((trials, steps, n, n))
+    counts = np.empty((trials, steps), dtype=np.int64)
+    for trial in range(trials):
+        run_mixture(
+            kernel_of(method), measurement.measure, measurement.slots, measurement.uses,
+            measurement.rows, measurement.patterns, measurement.noise,
+            is_diagonal(measurement.noise), *method_numbers(method, n),
+            np.ascontiguousarray(row), np.ascontiguousarray(col), transition[row, col], process,
+            np.ascontiguousarray(readings[trial]),
+            np.ascontiguousarray((starts[trial] + first.means).T),
+            np.repeat(factor[:, :, None], lanes, axis=2), first.weights.copy(), least_weight,
+            means[trial], covariances[trial], evidence[trial], counts[trial],
+        )  # fmt: skip
+    return MixtureRun(means, covariances, evidence, counts)
