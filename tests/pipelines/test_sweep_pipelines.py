@@ -1,0 +1,43 @@
+"""The pipelines of sweeps run, on a small part of the embedded map."""
+
+from __future__ import annotations
+
+import json
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+
+from mapfilter.workflows.config import load_config
+
+PIPELINES = Path(__file__).resolve().parents[2] / "pipelines"
+SMALL = ["--set", "area.bbox=24.938,60.164,24.950,60.170"]
+
+
+def run_script(name: str, capsys: pytest.CaptureFixture[str], *given: str) -> dict:
+    argv, sys.argv = sys.argv, [name, "--json", *given]
+    try:
+        with pytest.raises(SystemExit) as ended:
+            runpy.run_path(str(PIPELINES / f"{name}.py"), run_name="__main__")
+    finally:
+        sys.argv = argv
+    out = capsys.readouterr()
+    assert ended.value.code == 0, out.err
+    return json.loads(out.out.splitlines()[-1])
+
+
+def test_build_and_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = ["--out", str(tmp_path)]
+    run_script("build_database", capsys, *SMALL, *out)
+    few = ["--set", "sweep.routes=2", "--set", "sweep.draws=1"]
+    found = run_script("sweep_imu_noise", capsys, *SMALL, *out, *few)["sweep"]
+    assert found["runs"] == 36 * 2
+    assert len(found["cells"]) == 36
+    assert all(Path(picture).is_file() for picture in found["pictures"])
+
+
+def test_settings_of_the_reproduction() -> None:
+    config = load_config(PIPELINES / "reproduce_papers.toml")
+    assert config.area.map == "synthetic"
+    assert config.sweep.routes * config.sweep.draws == 100
