@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from mapfilter.models.gaussian import stack
+from mapfilter.models.motion import constant_velocity
+from mapfilter.models.position_fix import position_fix
 from mapfilter.models.pseudorange import pseudoranges
 from mapfilter.models.signal_strength import levels
 from mapfilter.models.state import MOVING, MOVING_CLOCK
@@ -13,6 +15,8 @@ from mapfilter.models.timing_advance import timing_advances
 
 CASES = json.loads((Path(__file__).parent / "fusion_cases.json").read_text(encoding="utf-8"))
 LAYOUT = CASES["fk_layout"]
+PHI = np.array(CASES["fk_process"]["Phi"])
+Q = np.array(CASES["fk_process"]["GQGt_filter"])
 
 
 def hybrid(satellites):
@@ -41,3 +45,30 @@ def zhang(combination, sigma_db=4.0):
             levels(MOVING, sites, sigma_db, loss_at_km_db=132.85, exponent=3.8, quantity="loss")
         )
     return stack(parts)
+
+
+def linear_problem(trials=5, steps=40):
+    """Fixes with correlated noise, some absent."""
+    motion = constant_velocity(1.0, 0.3)
+    model = position_fix(MOVING, [[9.0, 3.0], [3.0, 16.0]])
+    rng = np.random.default_rng(7)
+    states = np.empty((trials, steps, 4))
+    now = np.zeros((trials, 4))
+    for k in range(steps):
+        now = motion.sample(now, rng)
+        states[:, k] = now
+    readings = model.sample(states, rng)
+    readings[rng.random(readings.shape) < 0.2] = np.nan
+    return motion, model, readings
+
+
+def hybrid_readings(steps, trials=1):
+    model = hybrid(2)
+    states = np.zeros((trials, steps, 6))
+    states[:, :, [0, 2]] = (-200 + 8.84 * 0.48 * np.arange(1, steps + 1))[:, None]
+    states[:, :, [1, 3]] = 8.84
+    return model, states, model.sample(states, np.random.default_rng(11))
+
+
+FIRST = np.array([-120.0, 3.0, -260.0, 14.0, 90.0, 4.0])
+FIRST_COVARIANCE = np.diag([200.0, 10.0, 200.0, 10.0, 300 / 3**0.5, 10 / 3**0.5]) ** 2

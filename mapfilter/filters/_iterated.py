@@ -48,6 +48,7 @@ def iterated(
     information, half = np.empty((n, n, lanes)), np.empty((n, lanes))
     z, trial, target = np.zeros((n, lanes)), np.zeros((n, lanes)), np.zeros((n, lanes))
     best, length = np.full(lanes, np.inf), np.ones(lanes)
+    settled = np.zeros(lanes, dtype=np.bool_)
     for _ in range(iterations):
         for a in range(uses.size):
             points[a] = mean[uses[a]]
@@ -62,6 +63,8 @@ def iterated(
         whiten_lanes(noise_factor, diagonal, slope, trial_r)
         through_lanes(slope, uses, lower, trial_seen)
         for w in range(lanes):
+            if settled[w]:
+                continue
             value = 0.0
             for k in range(n):
                 value += trial[k, w] ** 2
@@ -80,12 +83,19 @@ def iterated(
             else:
                 length[w] *= 0.5
         solve_lanes(seen, r, information, half, target)
-        moved = 0.0
-        for k in range(n):
-            for w in range(lanes):
+        open_lanes = 0
+        for w in range(lanes):
+            if settled[w]:
+                continue
+            moved = 0.0
+            for k in range(n):
                 trial[k, w] = z[k, w] + length[w] * (target[k, w] - z[k, w])
                 moved = max(moved, abs(trial[k, w] - z[k, w]))
-        if moved < _SETTLED:
+            if moved < _SETTLED:
+                settled[w] = True
+            else:
+                open_lanes += 1
+        if open_lanes == 0:
             break
     evidence_lanes(present, noise_factor, r, information, half, evidence, nis)
     settle_lanes(lower, information, target if iterations == 1 else trial, mean, factor)
