@@ -187,7 +187,13 @@ class BuildJob:
         """Return what a worker needs to make a tile."""
         window = self.windows[number]
         part = self.routes.part(self.covered(window))
-        return TileTask(self.rasters, self.plan, window, part, self.floor_dbm)
+        rasters, plan = self.rasters.reaching(window), self.plan
+        numbers = tuple(range(len(plan)))
+        if rasters is not self.rasters:
+            numbers = tuple(sorted(plan.index(cell_id) for cell_id in rasters.cell_ids))
+            # A plan of no cells is none.
+            plan = CellPlan(plan.crs, tuple(plan.cells[n] for n in numbers or (0,)))
+        return TileTask(rasters, plan, numbers, window, part, self.floor_dbm)
 
     def covered(self, window: Window) -> Lattice:
         """Return the part of a tile that the roads cover."""

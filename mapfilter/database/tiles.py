@@ -29,7 +29,11 @@ class TileTask:
     Parameters
     ----------
     rasters : RxLevRasters
+        Those that reach the tile.
     plan : CellPlan
+        Their cells; when no raster does, any.
+    numbers : tuple of int
+        Which cells of the whole plan these are.
     window : (row, col, rows, cols)
         On the rasters' lattice.
     part : RoutePart
@@ -39,6 +43,7 @@ class TileTask:
 
     rasters: RxLevRasters
     plan: CellPlan
+    numbers: tuple[int, ...]
     window: Window
     part: RoutePart
     floor_dbm: float
@@ -138,15 +143,13 @@ def read_tile(task: TileTask) -> TileRows:
     lattice, (top, left, _, _) = task.rasters.lattice, task.window
     places = places_table(task.part.routes(), lattice)
     row, col = (places[name].to_numpy().astype(np.int64) for name in ("row", "col"))
-    reaching = frozenset(task.rasters.reaching(task.window))
-    numbers = [n for n, cell_id in enumerate(task.plan.ids) if cell_id in reaching]
-    ids = [task.plan.ids[n] for n in numbers]
+    ids = task.plan.ids if task.numbers else ()
     level = np.empty((len(ids), row.size), dtype=np.float64)
     for first in range(0, len(ids) if row.size else 0, _CELLS_AT_A_TIME):
         some = ids[first : first + _CELLS_AT_A_TIME]
         window_dbm = task.rasters.read_levels_dbm(task.plan, task.window, some)
         level[first : first + len(some)] = window_dbm[:, row - top, col - left]
-    return TileRows(places, heard_levels(level, task.floor_dbm).of_cells(numbers))
+    return TileRows(places, heard_levels(level, task.floor_dbm).of_cells(task.numbers))
 
 
 def heard_levels(level_dbm: Floats, floor_dbm: float) -> TileLevels:

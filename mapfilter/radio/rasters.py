@@ -9,14 +9,15 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from mapfilter._io import sha256_file
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Lattice, projected_crs
+from mapfilter.geodesy import Floats, Lattice, projected_crs
 from mapfilter.radio._raster_checks import Quantity, check_plausible
 from mapfilter.radio._raster_files import Floats32, RasterFile, Window
 from mapfilter.radio._raster_sets import Declared, open_files
@@ -75,18 +76,29 @@ class RxLevRasters:
         ]
         return hashlib.sha256("".join(lines).encode()).hexdigest()
 
-    def reaching(self, window: Window) -> tuple[str, ...]:
-        """Return the cells whose files lie over some of a window; others have no data there."""
+    @cached_property
+    def _reach_m(self) -> Floats:
+        """West, south, east and north of what each file has data for, shape (files, 4)."""
+        bounds_m = np.array([file.lattice.bounds_m for file in self.files])
+        # Half a pixel may be rounded away, where a file is put on the lattice.
+        own_m = np.array([file.lattice.resolution_m for file in self.files])
+        pad_m = np.maximum(own_m, self.lattice.resolution_m)
+        return np.asarray(bounds_m + pad_m[:, None] * [-1, -1, 1, 1])
+
+    def reaching(self, window: Window) -> RxLevRasters:
+        """Return the set of those files that lie over some of a window; others say nothing there.
+
+        It may be a set of no files.
+        """
         west, south, east, north = self.lattice.window(*window).bounds_m
-        found: list[str] = []
-        for file in self.files:
-            left, bottom, right, top = file.lattice.bounds_m
-            # Half a pixel may be rounded away, where a file is put on the lattice.
-            pad_m = max(file.lattice.resolution_m, self.lattice.resolution_m)
-            across = left - pad_m < east and west < right + pad_m
-            if across and bottom - pad_m < north and south < top + pad_m:
-                found.extend(file.cell_ids)
-        return tuple(found)
+        low, high = self._reach_m[:, :2], self._reach_m[:, 2:]
+        there = (low < (east, north)).all(axis=1) & (high > (west, south)).all(axis=1)
+        if there.all():
+            return self
+        files = tuple(self.files[n] for n in np.flatnonzero(there).tolist())
+        ids = tuple(cell_id for file in files for cell_id in file.cell_ids)
+        parts = tuple(part for file in files for part in file.parts)
+        return replace(self, files=files, cell_ids=ids, parts=parts)
 
     def read(self, window: Window | None = None, cells: Sequence[str] | None = None) -> Floats32:
         """Read values of some or all cells in a window, or everywhere.
