@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import multiprocessing
+import signal
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sized
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
@@ -50,7 +51,7 @@ def local_executor(workers: int) -> Iterator[Executor]:
         yield SerialExecutor()
         return
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context, initializer=_keep_freed_memory) as pool:
+    with ProcessPoolExecutor(workers, context, initializer=_start_worker) as pool:
         try:
             yield pool
         except BaseException:
@@ -147,6 +148,12 @@ def ordered_results(
         if progress is not None:
             progress(done, total)
         yield result
+
+
+def _start_worker() -> None:
+    """Leave Ctrl-C to the process that hands out the tasks, which ends its workers."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _keep_freed_memory()
 
 
 def _keep_freed_memory() -> None:

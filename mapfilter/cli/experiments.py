@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -35,6 +36,7 @@ def sweep(
 ) -> None:
     """Run a filter over a grid of inertial noise; exit code 3 if it was stopped on the way."""
     from mapfilter.workflows.sweep import load_sweep, run_sweep
+    from mapfilter.workflows.sweep_brief import brief
 
     loaded = load_sweep(config, seeded(settings, seed, "sweep.seed"), out=out)
     try:
@@ -45,7 +47,8 @@ def sweep(
     except KeyboardInterrupt:
         say("stopped; finished batches are kept: go on with --resume")
         raise typer.Exit(PARTIAL) from None
-    print_result(result, as_json)
+    told = asdict(result) | ({} if as_json else {"cells": brief(result.cells)})
+    print_result(told, as_json)
 
 
 def reproduce(
@@ -66,6 +69,7 @@ def reproduce(
 ) -> None:
     """Repeat a paper's experiments: figure, table, and every reading of what it leaves open."""
     from mapfilter.workflows.reproduce import run_reproduce
+    from mapfilter.workflows.sweep_brief import brief
 
     with rate_bar("reproduce", "runs") as progress:
         result = run_reproduce(
@@ -79,7 +83,8 @@ def reproduce(
             cluster=cluster,
             progress=progress,
         )
-    print_result(result, as_json)
+    told = asdict(result) | ({} if as_json else {"success": brief(result.success)})
+    print_result(told, as_json)
 
 
 def bench(
