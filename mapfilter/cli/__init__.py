@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from mapfilter import __version__
-from mapfilter.cli.databases import build, check, export, info, merge, predict
+from mapfilter.cli.databases import bound, build, check, export, info, merge, predict
 from mapfilter.cli.evaluate import evaluate
 from mapfilter.cli.experiments import bench, reproduce, sweep
 from mapfilter.cli.options import DONE
@@ -33,6 +33,7 @@ for _command in (
     merge,
     export,
     info,
+    bound,
     simulate,
     replay,
     sweep,

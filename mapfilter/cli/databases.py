@@ -127,3 +127,34 @@ def info(path: PathArgument, as_json: JsonOption = False) -> None:
     from mapfilter.workflows.info import run_info
 
     print_result(run_info(path), as_json)
+
+
+def bound(
+    database: Annotated[Path, typer.Argument(metavar="DB", callback=given_path)],
+    out: OutOption = None,
+    spacing_m: Annotated[
+        float, typer.Option("--spacing", metavar="M", help="Metres between starts.")
+    ] = 50.0,
+    journeys: Annotated[int, typer.Option("--journeys", help="From each start.")] = 2,
+    level_error_db: Annotated[
+        float, typer.Option("--level-error", metavar="DB", help="Of predicted levels.")
+    ] = 7.0,
+    correlation_m: Annotated[
+        float, typer.Option("--correlation", metavar="M", help="How far these errors last.")
+    ] = 50.0,
+    seed: SeedOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Tell where a database will work: accuracy, metres to convergence, places that look alike."""
+    from mapfilter.evaluation.first_fix import FirstFixOptions
+    from mapfilter.evaluation.radio_map import ErrorModel
+    from mapfilter.workflows.bound import run_bound
+
+    errors = ErrorModel(level_error_db, correlation_m)
+    options = FirstFixOptions(spacing_m=spacing_m, journeys=journeys)
+    folder = (out or Path("bound")).absolute()
+    with progress_bar("bound") as progress:
+        result = run_bound(
+            database, folder, errors=errors, options=options, seed=seed or 0, progress=progress
+        )
+    print_result(result, as_json)

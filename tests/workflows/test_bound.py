@@ -1,0 +1,75 @@
+"""``mapfilter bound``: a small made city from its database to raster, tables and pictures."""
+
+import pandas as pd
+import pytest
+import rasterio
+from command_line import assert_done, assert_refused, mapfilter
+
+from mapfilter.evaluation.map_bound import BANDS
+
+FILES = {
+    "bound.tif",
+    "ways.parquet",
+    "twins.parquet",
+    "position-bound.png",
+    "metres-to-fix.png",
+    "twins.png",
+}
+
+
+@pytest.fixture(scope="module")
+def database(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("town")
+    settings = ["area.map=synthetic", "area.size_m=700,700", "cells.indoor=1"]
+    settings += ["output.pictures=none", f"output.dir={folder}"]
+    given = [word for setting in settings for word in ("--set", setting)]
+    assert_done(mapfilter("predict", *given))
+    assert_done(mapfilter("build", *given))
+    return folder / "database"
+
+
+def test_a_database_is_bound(database, tmp_path):
+    found = assert_done(mapfilter("bound", database, "--out", tmp_path / "b", "--json")).json
+    assert {path.name for path in (tmp_path / "b").iterdir()} == FILES
+    assert found["points"] > 3000
+    assert 0 < found["along_bound_m"] < found["plane_bound_m"] < 700
+    assert 0 < found["levels_to_fix_m"] < 1500
+    assert 0 <= found["levels_wrong"] < 0.1
+    assert sum(note.startswith("exact") for note in found["notes"]) == 2
+    with rasterio.open(tmp_path / "b" / "bound.tif") as raster:
+        assert raster.descriptions == tuple(name for name, _ in BANDS)
+        assert raster.units[0] == "m"
+        assert raster.crs.to_epsg() == 32631
+    ways = pd.read_parquet(tmp_path / "b" / "ways.parquet")
+    assert ways["points"].sum() == found["points"]
+    assert ways["starts"].sum() == found["starts"]
+
+
+def test_equal_seeds_give_equal_bytes_and_others_other_journeys(database, tmp_path):
+    few = ["--spacing", "200", "--journeys", "1"]
+    for name, seed in (("a", 1), ("b", 1), ("c", 2)):
+        assert_done(mapfilter("bound", database, "--out", tmp_path / name, "--seed", seed, *few))
+    raster, ways = (
+        [(tmp_path / name / file).read_bytes() for name in "abc"]
+        for file in ("bound.tif", "ways.parquet")
+    )
+    assert raster[0] == raster[1] != raster[2]
+    assert ways[0] == ways[1] != ways[2]
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (["--spacing", "0"], "bound, spacing_m"),
+        (["--journeys", "0"], "bound, journeys"),
+        (["--level-error", "-1"], "error model, deviation_db"),
+        (["--correlation", "nan"], "error model, correlation_m"),
+    ],
+)
+def test_impossible_options_are_refused(database, tmp_path, given, told):
+    assert_refused(mapfilter("bound", database, "--out", tmp_path / "b", *given), told)
+    assert not (tmp_path / "b").exists()
+
+
+def test_what_is_no_database_is_refused(tmp_path):
+    assert_refused(mapfilter("bound", tmp_path / "none", "--out", tmp_path / "b"), "none")
