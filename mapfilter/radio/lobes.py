@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from mapfilter.geodesy import azimuth_from_heading_deg, grid_convergence_rad, unproject
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.plausibility import RasterSample
 
@@ -82,18 +81,13 @@ def find_lobe(
     Lobe or None
         None where too few directions or pixels are to be seen, as for a site at the raster's edge.
     """
-    east, north = sample.positions_m()
     value = sample.values
-    distance_m = np.hypot(east - east_m, north - north_m)
+    distance_m, azimuth_deg = sample.seen_from(east_m, north_m)
     used = ~np.isnan(value) & (distance_m > 2 * sample.lattice.resolution_m)
     if not used.any():
         return None
-    lon, lat = unproject(sample.lattice.crs, east_m, north_m)
-    convergence_rad = grid_convergence_rad(sample.lattice.crs, float(lon), float(lat))
-    heading_rad = np.arctan2((north - north_m)[used], (east - east_m)[used])
-    azimuth_deg = azimuth_from_heading_deg(heading_rad, convergence_rad)
     far = np.log10(distance_m[used])
-    mean, log_m, direction, weight = _binned(far, azimuth_deg, value[used])
+    mean, log_m, direction, weight = _binned(far, azimuth_deg[used], value[used])
     if mean.size < _LEAST_BINS or np.unique(direction).size < _LEAST_DIRECTIONS * _DIRECTIONS:
         return None
     middle_deg = (direction + 0.5) * STEP_DEG

@@ -9,11 +9,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mapfilter.geodesy import Lattice
+from mapfilter.geodesy import (
+    Lattice,
+    azimuth_from_heading_deg,
+    grid_convergence_rad,
+    unproject,
+)
 from mapfilter.radio._resampling import read_on
 from mapfilter.radio.cells import Cell
 from mapfilter.radio.rasters import RxLevRasters
 
+Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 Kind = Literal["level", "loss", "rxlev", "empty", "unclear"]
 
@@ -28,6 +34,9 @@ _TELLING_SHARE = 0.01
 _MOST_SHARE = 0.5
 _NEAR_ZERO = 1.0
 _MANY_TIMES = 10
+_PHONE_M = 1.5
+_NEAREST_RING_M = 64.0
+_LEAST_IN_RING = 50
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,11 +64,20 @@ class RasterSample:
         """The values that are not NaN."""
         return self.values[~np.isnan(self.values)]
 
-    def positions_m(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def positions_m(self) -> tuple[Floats, Floats]:
         """Return east and north of every sampled pixel, shape (rows, cols) each."""
         rows, cols = np.mgrid[: self.lattice.rows, : self.lattice.cols]
         east_m, north_m = self.lattice.east_north(rows, cols)
         return east_m, north_m
+
+    def seen_from(self, east_m: float, north_m: float) -> tuple[Floats, Floats]:
+        """Return distance (m) and azimuth (degrees from true north) of every sampled pixel."""
+        east, north = self.positions_m()
+        lon, lat = unproject(self.lattice.crs, east_m, north_m)
+        convergence_rad = grid_convergence_rad(self.lattice.crs, float(lon), float(lat))
+        heading_rad = np.arctan2(north - north_m, east - east_m)
+        distance_m = np.hypot(east - east_m, north - north_m)
+        return distance_m, azimuth_from_heading_deg(heading_rad, convergence_rad)
 
 
 def sample_raster(rasters: RxLevRasters, cell_id: str, cell: Cell | None) -> RasterSample:
@@ -151,18 +169,27 @@ def nodata_taken_as_level(values: Floats32) -> tuple[float, float] | None:
 
 
 def above_free_space_db(sample: RasterSample, cell: Cell) -> float:
-    """Return by how much levels exceed those of free space: only 1 % of the pixels by more.
+    """Return by how much levels in the main lobe exceed those of free space.
 
-    Levels above ``EIRP - 32.44 - 20 log10(d / km) - 20 log10(f / MHz)`` (Friis 1946; ITU-R P.525)
-    need reflections or shadowing; many dB of them need another EIRP.
+    Levels of ``EIRP - 32.44 - 20 log10(d / km) - 20 log10(f / MHz)`` (Friis 1946; ITU-R P.525) are
+    exceeded here and there by reflections and shadowing, but by the median of a whole ring about
+    the site only where the EIRP is another. Rings are octaves of the distance from 64 m on, as
+    obstacles cost the less the nearer they are; the one that exceeds most counts. Minus infinity
+    where too few pixels are to be seen.
     """
-    east_m, north_m = sample.positions_m()
-    ground_m = np.hypot(east_m - cell.east_m, north_m - cell.north_m)
-    least_m = max(sample.lattice.resolution_m / 2, 1.0)
-    distance_km = np.maximum(np.hypot(ground_m, cell.height_m - 1.5), least_m) / 1000
+    ground_m, azimuth_deg = sample.seen_from(cell.east_m, cell.north_m)
+    used = ~np.isnan(sample.values) & (ground_m >= _NEAREST_RING_M)
+    if cell.azimuth_deg is not None:
+        off_deg = (azimuth_deg - cell.azimuth_deg + 180.0) % 360.0 - 180.0
+        used &= np.abs(off_deg) <= cell.beamwidth_deg / 2
+    ground_m = ground_m[used]
+    distance_km = np.hypot(ground_m, cell.height_m - _PHONE_M) / 1000
     loss_db = 32.44 + 20 * np.log10(distance_km) + 20 * np.log10(cell.frequency_mhz)
-    above_db = (sample.values - cell.eirp_dbm + loss_db)[~np.isnan(sample.values)]
-    return float(np.percentile(above_db, 99)) if above_db.size else -np.inf
+    above_db = sample.values[used] - cell.eirp_dbm + loss_db
+    ring = np.log2(ground_m).astype(np.int64)
+    rings = (above_db[ring == number] for number in np.unique(ring))
+    medians_db = [float(np.median(some)) for some in rings if some.size >= _LEAST_IN_RING]
+    return max(medians_db, default=-np.inf)
 
 
 def _window(lattice: Lattice, cell: Cell | None) -> tuple[int, int, int, int]:

@@ -6,9 +6,10 @@ import pytest
 from mapfilter.geodesy import Lattice, heading_from_azimuth_rad
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.azimuths import azimuth_mistakes
-from mapfilter.radio.cells import Cell
+from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.lobes import best_labels, falls_with_distance, find_lobe, peak_m
 from mapfilter.radio.plausibility import RasterSample, above_free_space_db, nodata_taken_as_level
+from mapfilter.radio.predict import PredictionModel, RealityErrors, realise
 
 # On the central meridian, so that grid north is true north.
 LATTICE = Lattice("EPSG:32635", 499_000.0, 6_670_000.0, 20.0, 80, 100)
@@ -114,6 +115,25 @@ def test_free_space_is_not_exceeded_by_itself():
     for above in (0.0, 7.5):
         sample = RasterSample("A", LATTICE, (levels + above).astype(np.float32), "")
         assert above_free_space_db(sample, cell) == pytest.approx(above, abs=1e-4)
+    behind = north < SITE[1]
+    sample = RasterSample("A", LATTICE, np.where(behind, levels + 30, levels - 7).astype("f4"), "")
+    assert above_free_space_db(sample, cell) == pytest.approx(-7, abs=1e-4)
+    empty = RasterSample("A", LATTICE, np.full(levels.shape, np.nan, np.float32), "")
+    assert above_free_space_db(empty, cell) == -np.inf
+
+
+@pytest.mark.parametrize(
+    "model",
+    ["friis", "log_distance", "okumura_hata", "cost231_walfisch_ikegami", "tr38901_umi"],
+)
+def test_levels_tell_an_eirp_that_is_forty_db_off(model):
+    """Of six cells of any model, with the shadowing of prediction and reality together."""
+    cells = [Cell(f"{n}", f"{n}", *SITE, 30.0, 60.0 * n, 43.0, 1800.0) for n in range(6)]
+    plan, wanted = CellPlan(LATTICE.crs, tuple(cells)), PredictionModel(model=model)
+    real = dict(realise(plan, LATTICE, None, wanted, RealityErrors()))
+    samples = [RasterSample(cell.id, LATTICE, real[cell.id], "") for cell in cells]
+    above_db = np.median([above_free_space_db(s, c) for s, c in zip(samples, cells, strict=True)])
+    assert above_db < 10 < above_db + 40
 
 
 def test_zero_beside_levels_near_zero_is_a_level():

@@ -167,7 +167,7 @@ WARNINGS = [
     ("half-pixel-shift", lambda w: setattr(w, "landuse_shift_m", 5.0)),
     ("site-outside-area", lambda w: put(w, "I1", lat=60.1700, lon=24.9180)),
     ("eirp-watts", lambda w: in_watts(w)),
-    ("levels-above-eirp", lambda w: w.each(lambda v: v + 50)),
+    ("levels-above-eirp", lambda w: w.each(lambda v: v + 40)),
     ("antenna-missing", pattern_files),
     ("raster-empty", lambda w: w.levels.update(I1=np.full_like(w.levels["I1"], np.nan))),
     ("rasters-missing", lambda w: w.levels.clear()),
