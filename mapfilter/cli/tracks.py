@@ -17,6 +17,7 @@ from mapfilter.cli.options import (
     seeded,
     toml,
 )
+from mapfilter.errors import ConfigError, fail
 from mapfilter.workflows.terminal import print_result, progress_bar, say
 
 
@@ -65,6 +66,9 @@ def replay(
         str | None,
         typer.Option("--without", metavar="KINDS", help="What to leave out: gnss,ta,neighbours."),
     ] = None,
+    smooth: Annotated[
+        bool, typer.Option("--smooth", help="Positions in hindsight, by the whole log (bayes).")
+    ] = False,
     config: ConfigOption = None,
     settings: SetOption = None,
     out: OutOption = None,
@@ -84,7 +88,11 @@ def replay(
         given.append(f"filter.name={toml(filter_name)}")
     if without is not None:
         given.append(f"track.without={toml([kind.strip() for kind in without.split(',')])}")
+    if smooth:
+        given.append("filter.bayes.smooth=true")
     loaded = load_config(config, given)
+    if smooth and loaded.filter.name != "bayes":
+        raise fail(ConfigError, "--smooth", "the filter bayes", loaded.filter.name)
     folder = (out or loaded.output.dir / "replay").absolute()
     with progress_bar("replay") as progress:
         result = run_replay(loaded, folder, progress=progress)

@@ -166,8 +166,16 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         status, agreed_at_m = self._agreed(belief, weighed.summary)
         wanted = self._wanted(weighed.summary, status)
         state, now = weighed.state, weighed
+        power = self.options.flatten if status is Status.SEARCHING else 1.0
+        if power < 1:
+            flat = weight ** np.float32(power)
+            flat /= flat.sum()
+            effective = 1.0 / float(np.dot(flat, flat))
+        else:
+            flat = weight
         if effective < self.options.resample_below * weight.size or 2 * wanted < weight.size:
-            state, log_weight = self._resampled(state, weight, wanted, rng)
+            state, chosen = self._resampled(state, flat, wanted, rng)
+            log_weight = _left_over(log_weight[chosen], power)
         now = replace(
             weighed, state=state, log_weight=log_weight, status=status, agreed_at_m=agreed_at_m
         )
@@ -187,13 +195,13 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
 
     def _resampled(
         self, state: Floats32, weight: Floats32, wanted: int, rng: np.random.Generator
-    ) -> tuple[Floats32, Floats]:
+    ) -> tuple[Floats32, NDArray[np.int32]]:
         chosen = np.empty(wanted, dtype=np.int32)
         systematic(weight, rng.random(), chosen)
         copies = np.empty((state.shape[0], wanted), dtype=np.float32)
         jitter = np.asarray(self.options.jitter, dtype=np.float32)
         copy_with_jitter(state, chosen, jitter, draw_key(rng), copies)
-        return copies, np.full(wanted, -np.log(wanted))
+        return copies, chosen
 
     def _agreed(self, belief: ParticleBelief, summary: Summary) -> tuple[Status, float]:
         """Return the status after an update, and since when the switch rule holds."""
@@ -207,3 +215,12 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         if belief.travelled_m - since_m >= self.options.switch_hold_m:
             return Status.CONVERGED, since_m
         return Status.SEARCHING, since_m
+
+
+def _left_over(log_weight: Floats, power: float) -> Floats:
+    """Return the log weights of copies that were chosen by their weights to a power."""
+    if power == 1:
+        return np.full(log_weight.size, -np.log(log_weight.size))
+    left = (1.0 - power) * log_weight
+    normalise(left, np.empty(left.size, dtype=np.float32))
+    return left

@@ -23,6 +23,10 @@ class ParticleOptions:
         Particles for each bin of 25 m that the belief covers (two to the power of its entropy).
     resample_below : float
         Share of the particles that the effective sample size must not fall below.
+    flatten : float
+        Until the filter has converged, particles are resampled by their weights to this power and
+        keep the rest of them as weights: improbable places stay well covered. 1 for plain
+        resampling.
     jitter : tuple of float
         Standard deviation of the noise that parts copies, for each row of the state.
     switch_mass : float
@@ -37,6 +41,7 @@ class ParticleOptions:
     least: int = 1000
     per_bin: float = 60.0
     resample_below: float = 0.5
+    flatten: float = 0.5
     jitter: tuple[float, ...] = (1.0, 1.0, 0.005, 0.003, 0.0)
     switch_mass: float = 0.98
     switch_hold_m: float = 14.0
@@ -50,6 +55,8 @@ class ParticleOptions:
             faults.add("particles, searching", ">= 1", self.searching)
         if not (isfinite(self.per_bin) and self.per_bin > 0):
             faults.add("particles, per_bin", "a finite number > 0", self.per_bin)
+        if not 0 < self.flatten <= 1:
+            faults.add("particles, flatten", "a power in (0, 1]", self.flatten)
         for name in ("resample_below", "switch_mass"):
             if not 0 < getattr(self, name) < 1:
                 faults.add(f"particles, {name}", "a share between 0 and 1", getattr(self, name))

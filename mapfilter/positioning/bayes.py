@@ -53,6 +53,8 @@ class BayesTrack:
     doubt : Doubt
     challenger : Challenger or None
         Beside a belief in doubt.
+    wins : int
+        How many challengers have taken over.
     """
 
     memory: Memory
@@ -62,6 +64,7 @@ class BayesTrack:
     status: Status = Status.SEARCHING
     doubt: Doubt = field(default_factory=Doubt)
     challenger: Challenger | None = None
+    wins: int = 0
 
     @property
     def leading(self) -> ParticleBelief | None:
@@ -169,21 +172,23 @@ class BayesPositioner:
             return replace(track, belief=belief, status=status), info.reason
         gained = belief.log_evidence - before.log_evidence
         doubt = track.doubt.after(reading.expected, gained, reading.length_m)
-        challenger = track.challenger
+        challenger, wins = track.challenger, track.wins
         travelled_m = track.memory.travelled_m
         if challenger is not None:
             other, _ = self.filter.update(challenger.belief, reading, rng)
             challenger = replace(challenger, belief=other)
             verdict = judge(self.rules, belief, challenger, travelled_m)
             if verdict is Verdict.WON:
-                belief = replace(other, status=Status.TRACKING)
+                belief, wins = replace(other, status=Status.TRACKING), wins + 1
             if verdict not in (Verdict.OPEN, Verdict.AHEAD):
                 doubt, challenger = replace(doubt, sum=0.0), None
             lost = verdict is Verdict.AHEAD
             status = Status.LOST if lost else Status.TRACKING
         elif status is Status.TRACKING and doubt.sum >= self._doubt_at(reading):
             challenger = self._challenger(track, belief, epoch, rng)
-        now = replace(track, belief=belief, status=status, doubt=doubt, challenger=challenger)
+        now = replace(
+            track, belief=belief, status=status, doubt=doubt, challenger=challenger, wins=wins
+        )
         return now, Reason.USED
 
     def _doubt_at(self, reading: RadioReading) -> float:

@@ -30,6 +30,8 @@ class BayesOptions:
         Numbers of particles, and the switch rule.
     challenge : ChallengeRules
         When a belief in doubt is challenged, and when it is replaced.
+    smooth : bool
+        Whether positions are those in hindsight, by the whole log.
     """
 
     motion: MotionErrors = field(default_factory=MotionErrors)
@@ -37,6 +39,7 @@ class BayesOptions:
     evidence: EvidenceOptions = field(default_factory=EvidenceOptions)
     particles: ParticleOptions = field(default_factory=ParticleOptions)
     challenge: ChallengeRules = field(default_factory=ChallengeRules)
+    smooth: bool = False
 
     def over(self, area: AreaMap) -> BayesPositioner:
         """Return the filter over an area."""

@@ -14,6 +14,7 @@ from mapfilter.geodesy import same_crs
 from mapfilter.models.fingerprint import BoundReading, LevelReading
 from mapfilter.positioning.area_map import AreaMap
 from mapfilter.positioning.bayes import BayesPositioner, BayesTrack, News
+from mapfilter.positioning.bayes_smoothing import History, settled, smoothed
 from mapfilter.positioning.epochs import Epoch, epochs
 from mapfilter.positioning.estimate import TrackEstimate, TrackEvidence
 from mapfilter.positioning.evidence import RadioReading
@@ -25,7 +26,12 @@ _SNAPSHOT_EVERY_M = 20.0
 
 
 def position_by_bayes(
-    positioner: BayesPositioner, log: TrackLog, rng: np.random.Generator, *, pictures: bool = False
+    positioner: BayesPositioner,
+    log: TrackLog,
+    rng: np.random.Generator,
+    *,
+    smooth: bool = False,
+    pictures: bool = False,
 ) -> PositionedTrack:
     """Locate a log with the Bayes map filter, from an unknown start.
 
@@ -38,6 +44,8 @@ def position_by_bayes(
     log : TrackLog
         In the database's CRS.
     rng : numpy.random.Generator
+    smooth : bool
+        Whether positions are those in hindsight, by the whole log.
     pictures : bool
         Whether to keep the belief's hypotheses until it has converged, for figures.
 
@@ -54,17 +62,22 @@ def position_by_bayes(
     began_s = time.process_time()
     track, told = positioner.begin(), list[News]()
     snapshots: list[Snapshot] = []
+    history = History()
     for epoch in merged:
-        track, news = positioner.advance(track, epoch, rng)
+        before = track
+        track, news = positioner.advance(before, epoch, rng)
         told.append(news)
+        if smooth:
+            history.add(before, track)
         if pictures and _worth_a_picture(track, snapshots):
             snapshots.append(_snapshot(track, news, positioner.area))
+    estimate = estimate_of(crs, "bayes", told, log.start_utc_s)
+    if smooth:
+        history.close(track)
+        model = positioner.model
+        estimate = smoothed(estimate, history, positioner.area, model.motion, rng)
     filter_s = time.process_time() - began_s
-    return PositionedTrack(
-        estimate_of(crs, "bayes", told, log.start_utc_s),
-        tuple(snapshots),
-        filter_s,
-    )
+    return PositionedTrack(estimate, tuple(snapshots), filter_s)
 
 
 def estimate_of(
@@ -75,16 +88,17 @@ def estimate_of(
     east_m, north_m, mass, entropy, log_evidence = (
         np.array([news.evidence for news in told], dtype=np.float64).reshape(-1, 5).T
     )
-    return TrackEstimate.of_fixes(
+    none = np.zeros(len(told), dtype=np.bool_)
+    estimate = TrackEstimate.of_fixes(
         crs,
         filter_name,
         [news.fix for news in told],
         start_utc_s=start_utc_s,
         unused=unused,
-        evidence=TrackEvidence(
-            east_m, north_m, mass, entropy, log_evidence, np.zeros(len(told), dtype=np.bool_)
-        ),
+        evidence=TrackEvidence(east_m, north_m, mass, entropy, log_evidence, none),
     )
+    evidence = TrackEvidence(east_m, north_m, mass, entropy, log_evidence, settled(estimate))
+    return replace(estimate, evidence=evidence)
 
 
 def _worth_a_picture(track: BayesTrack, snapshots: list[Snapshot]) -> bool:

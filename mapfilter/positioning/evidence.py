@@ -85,8 +85,8 @@ class Memory:
 
     Parameters
     ----------
-    travelled_m, heading_rad : float
-        By dead reckoning.
+    travelled_m, east_m, north_m : float
+        By dead reckoning since the start; east and north in the frame of its headings.
     used_at_m : float
         Distance at the last report that was used; minus infinity before the first.
     back_east_m, back_north_m : float
@@ -98,6 +98,8 @@ class Memory:
     level_dbm: Floats
     heard_at_m: Floats
     travelled_m: float = 0.0
+    east_m: float = 0.0
+    north_m: float = 0.0
     used_at_m: float = -inf
     back_east_m: float = 0.0
     back_north_m: float = 0.0
@@ -112,11 +114,14 @@ class Memory:
         if not isfinite(step.step_m):
             return self
         heading = step.heading_rad if isfinite(step.heading_rad) else 0.0
+        east_m, north_m = step.step_m * cos(heading), step.step_m * sin(heading)
         return replace(
             self,
             travelled_m=self.travelled_m + abs(step.step_m),
-            back_east_m=self.back_east_m + step.step_m * cos(heading),
-            back_north_m=self.back_north_m + step.step_m * sin(heading),
+            east_m=self.east_m + east_m,
+            north_m=self.north_m + north_m,
+            back_east_m=self.back_east_m + east_m,
+            back_north_m=self.back_north_m + north_m,
         )
 
 

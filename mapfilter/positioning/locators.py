@@ -77,6 +77,8 @@ def open_locator(
             positioner = bayes.over(open_area(database))
 
             def locate_by_bayes(log: TrackLog, rng: np.random.Generator) -> PositionedTrack:
-                return position_by_bayes(positioner, log, rng, pictures=ways)
+                return position_by_bayes(
+                    positioner, log, rng, smooth=bayes.smooth, pictures=ways
+                )
 
             return locate_by_bayes

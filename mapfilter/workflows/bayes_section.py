@@ -40,6 +40,7 @@ class BayesSection(Section):
     least_particles: Annotated[int, Field(ge=10, le=10_000_000)] = 1000
     switch_mass: Annotated[float, Field(gt=0, lt=1)] = 0.98
     switch_hold_m: NotNegative = 14.0
+    smooth: bool = False
 
     @property
     def options(self) -> BayesOptions:
@@ -69,4 +70,5 @@ class BayesSection(Section):
                 switch_mass=self.switch_mass,
                 switch_hold_m=self.switch_hold_m,
             ),
+            smooth=self.smooth,
         )

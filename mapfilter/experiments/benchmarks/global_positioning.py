@@ -78,7 +78,8 @@ def told(choice: FilterChoice, case: str) -> FilterChoice:
     """Return a filter that knows the data sheet of a case's dead reckoning."""
     match choice.options:
         case BayesOptions() as options:
-            return replace(choice, options=replace(options, motion=CASES[case].told))
+            known = replace(options, motion=CASES[case].told, smooth=CASES[case].smooth)
+            return replace(choice, options=known)
     return choice
 
 
