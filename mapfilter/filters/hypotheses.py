@@ -20,7 +20,8 @@ Floats32 = NDArray[np.float32]
 
 NEAR_M = 50.0
 SHARES = (0.50, 0.67, 0.95)
-_RADIUS_BINS = 2048
+_RADIUS_BINS = 4096
+_RINGS_PER_SQRT_M = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +200,7 @@ def _moments(state: Floats32, weight: Floats32, x: float, y: float, found: Float
     east, north = state[0], state[1]
     near = 0.0
     by_radius = np.zeros(_RADIUS_BINS + 1)
-    # Ever wider rings: half a centimetre for the first, 40 km for the last.
+    # Ever wider rings, of a decimetre at 2 m and of a metre at 200 m; the last ends at 18 km.
     for i in range(weight.size):
         dx, dy = east[i] - x, north[i] - y
         square, w = dx * dx + dy * dy, float(weight[i])
@@ -210,7 +211,7 @@ def _moments(state: Floats32, weight: Floats32, x: float, y: float, found: Float
             found[size] += w * dx * dx
             found[size + 1] += w * dy * dy
             found[size + 2] += w * dx * dy
-        ring = int(200.0 * square**0.25)
+        ring = int(_RINGS_PER_SQRT_M * square**0.25)
         by_radius[min(ring, _RADIUS_BINS)] += w
     if near > 0:
         for r in range(size + 3):
@@ -221,5 +222,5 @@ def _moments(state: Floats32, weight: Floats32, x: float, y: float, found: Float
             passed += by_radius[ring]
             ring += 1
         inside = (SHARES[k] - passed) / by_radius[ring] if ring <= _RADIUS_BINS else 1.0
-        found[size + 3 + k] = ((ring + inside) / 200.0) ** 2
+        found[size + 3 + k] = ((ring + inside) / _RINGS_PER_SQRT_M) ** 2
     found[size + 6] = near

@@ -240,7 +240,10 @@ class BayesPositioner:
         return moved, unused
 
     def _without_compass(self, belief: ParticleBelief, rng: np.random.Generator) -> ParticleBelief:
-        return replace(belief, state=self.model.any_heading(belief.state, rng))
+        state = self.model.any_heading(belief.state, rng)
+        times = state.shape[1] // max(belief.log_weight.size, 1)
+        log_weight = np.tile(belief.log_weight, times) - np.log(max(times, 1))
+        return replace(belief, state=state, log_weight=log_weight)
 
     def _news(
         self, track: BayesTrack, time_s: float, reason: Reason, unused: tuple[UnusedReading, ...]

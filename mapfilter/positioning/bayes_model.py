@@ -39,6 +39,7 @@ Floats32 = NDArray[np.float32]
 
 _F = np.float32
 _OFF_AT_START = 0.05
+_TIMES_WITHOUT_COMPASS = 4
 _FIX_SD_M = 10.0
 _FIX_CLIP = 5.0
 
@@ -106,6 +107,8 @@ class BayesModel:
         pixel.
         """
         resolution_m = _F(self.area.lattice.resolution_m)
+        if not prior.compass:
+            most *= _TIMES_WITHOUT_COMPASS
         if isfinite(prior.east_m):
             west, south = self.area.origin_m
             place = np.array([[prior.east_m - west], [prior.north_m - south]])
@@ -140,9 +143,9 @@ class BayesModel:
         return chosen
 
     def any_heading(self, state: Floats32, rng: np.random.Generator) -> Floats32:
-        """Return hypotheses that know nothing of their lasting heading error."""
-        turned = state.copy()
-        turned[BIAS] = pi * (2 * rng.random(state.shape[1]) - 1)
+        """Return four times as many hypotheses that know nothing of their heading error."""
+        turned = np.tile(state, _TIMES_WITHOUT_COMPASS)
+        turned[BIAS] = pi * (2 * rng.random(turned.shape[1]) - 1)
         return turned
 
     def move(

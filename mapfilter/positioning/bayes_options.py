@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from math import radians
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.filters.particle_options import ParticleOptions
@@ -12,6 +13,9 @@ from mapfilter.positioning.bayes import BayesPositioner
 from mapfilter.positioning.bayes_model import BayesModel
 from mapfilter.positioning.challenger import ChallengeRules
 from mapfilter.positioning.evidence import EvidenceOptions
+
+_NARROW_BIAS_RAD, _NARROW_SCALE = radians(1.5), 0.015
+_MOST_TIMES = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +31,8 @@ class BayesOptions:
     evidence : EvidenceOptions
         How much serving cells and levels count.
     particles : ParticleOptions
-        Numbers of particles, and the switch rule.
+        Numbers of particles, and the switch rule. The numbers are those for a compass and a step
+        length that are nearly right; wide errors get up to five times as many.
     challenge : ChallengeRules
         When a belief in doubt is challenged, and when it is replaced.
     smooth : bool
@@ -43,9 +48,16 @@ class BayesOptions:
 
     def over(self, area: AreaMap) -> BayesPositioner:
         """Return the filter over an area."""
-        return BayesPositioner(
-            BayesModel(area, self.motion, self.map, self.evidence), self.particles, self.challenge
-        )
+        model = BayesModel(area, self.motion, self.map, self.evidence)
+        return BayesPositioner(model, self._particles, self.challenge)
+
+    @property
+    def _particles(self) -> ParticleOptions:
+        """Numbers that cover the lasting errors of heading and scale, too."""
+        motion, given = self.motion, self.particles
+        width = (motion.bias_sd_rad / _NARROW_BIAS_RAD) * (motion.scale_sd / _NARROW_SCALE)
+        times = min(max(width**0.5, 1.0), _MOST_TIMES)
+        return replace(given, most=int(times * given.most), searching=int(times * given.searching))
 
 
 def open_area(database: RadioRouteDatabase) -> AreaMap:

@@ -1,0 +1,62 @@
+"""Numbers by counting, and functions that vectorise."""
+
+import numpy as np
+import pytest
+from numba import njit
+from scipy import stats
+
+from mapfilter._kernels import cos_sin32, draw_key, exp32, hashed, log32, normals, wrap32
+
+
+@njit
+def fill_normals(key, out):
+    for i in range(out.shape[1]):
+        out[0, i], out[1, i] = normals(hashed(key, np.uint64(i)))
+
+
+@njit
+def elementary(x, out):
+    for i in range(x.size):
+        out[0, i] = log32(x[i])
+        out[1, i] = exp32(-x[i])
+        out[2, i], out[3, i] = cos_sin32(wrap32(x[i]))
+        out[4, i] = wrap32(x[i])
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    out = np.empty((2, 200_000), dtype=np.float32)
+    fill_normals(draw_key(np.random.default_rng(5)), out)
+    return out
+
+
+def test_normals_are_normal(drawn):
+    for row in drawn:
+        # Fixed numbers; at a random key each would fail once in ten thousand.
+        assert stats.kstest(row, "norm").pvalue > 1e-4
+    assert abs(np.corrcoef(drawn)[0, 1]) < 0.01
+
+
+def test_neighbours_are_independent(drawn):
+    for lag in (1, 2, 7, 64):
+        assert abs(np.corrcoef(drawn[0, :-lag], drawn[0, lag:])[0, 1]) < 0.01
+
+
+def test_same_key_same_numbers(drawn):
+    again = np.empty_like(drawn)
+    fill_normals(draw_key(np.random.default_rng(5)), again)
+    assert again.tobytes() == drawn.tobytes()
+
+
+def test_functions_agree_with_numpy():
+    x = np.linspace(1e-3, 20.0, 5001).astype(np.float32)
+    out = np.empty((5, x.size), dtype=np.float32)
+    elementary(x, out)
+    exact = x.astype(np.float64)
+    np.testing.assert_allclose(out[0], np.log(exact), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(out[1], np.exp(-exact), rtol=1e-5)
+    np.testing.assert_allclose(out[2], np.cos(exact), atol=2e-5)
+    np.testing.assert_allclose(out[3], np.sin(exact), atol=2e-5)
+    assert np.abs(out[4]).max() <= np.float32(np.pi) + 1e-6
+    turns = (out[4] - exact) / (2 * np.pi)
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-6)

@@ -1,0 +1,61 @@
+"""Weights that sum to one, and resampling that is fair."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mapfilter._kernels import draw_key
+from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
+
+
+def test_log_weights_are_brought_to_sum_to_one():
+    log_weight = np.log(np.array([1.0, 2.0, 5.0])) - 1000.0
+    weight = np.empty(3, dtype=np.float32)
+    log_total, effective = normalise(log_weight, weight)
+    np.testing.assert_allclose(weight, [0.125, 0.25, 0.625], rtol=1e-5)
+    np.testing.assert_allclose(np.exp(log_weight), weight, rtol=1e-5)
+    assert log_total == pytest.approx(np.log(8.0) - 1000.0, abs=1e-5)
+    assert effective == pytest.approx(1 / (0.125**2 + 0.25**2 + 0.625**2), rel=1e-5)
+
+
+def test_no_weight_is_told():
+    assert normalise(np.full(3, -np.inf), np.empty(3, dtype=np.float32)) == (-np.inf, 0.0)
+
+
+@given(
+    st.lists(st.floats(0.01, 1.0), min_size=1, max_size=30),
+    st.floats(0, 1, exclude_max=True),
+    st.integers(1, 60),
+)
+@settings(max_examples=200, deadline=None)
+def test_copies_differ_by_less_than_one_from_their_due(shares, offset, count):
+    weight = np.array(shares, dtype=np.float32)
+    weight /= weight.sum()
+    chosen = np.empty(count, dtype=np.int32)
+    systematic(weight, offset, chosen)
+    copies = np.bincount(chosen, minlength=weight.size)
+    assert np.all(np.abs(copies - count * weight.astype(np.float64)) < 1 + 1e-3)
+    assert np.all(np.diff(chosen) >= 0)
+
+
+def test_resampling_is_unbiased():
+    weight, chosen = np.array([0.4, 0.3, 0.2, 0.1], dtype=np.float32), np.empty(4, dtype=np.int32)
+    rng, runs = np.random.default_rng(1), 20_000
+    copies = np.zeros(4)
+    for _ in range(runs):
+        systematic(weight, rng.random(), chosen)
+        copies += np.bincount(chosen, minlength=4)
+    # Each count is off by less than one: five standard errors are 5 · 0.5 / √20 000 at most.
+    np.testing.assert_allclose(copies / runs, 4 * weight, atol=0.018)
+
+
+def test_copies_part_by_the_jitter():
+    state = np.array([[1.0, 2.0], [10.0, 20.0], [7.0, 7.0]], dtype=np.float32)
+    chosen = np.zeros(50_000, dtype=np.int32)
+    copies = np.empty((3, chosen.size), dtype=np.float32)
+    jitter = np.array([2.0, 0.5, 0.0], dtype=np.float32)
+    copy_with_jitter(state, chosen, jitter, draw_key(np.random.default_rng(0)), copies)
+    np.testing.assert_allclose(copies.mean(axis=1), [1.0, 10.0, 7.0], atol=0.04)
+    np.testing.assert_allclose(copies.std(axis=1), [2.0, 0.5, 0.0], rtol=0.02)
+    assert abs(np.corrcoef(copies[:2])[0, 1]) < 0.02
