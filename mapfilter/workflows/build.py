@@ -208,6 +208,7 @@ def _draw(
         rasters,
         database,
         folder,
+        area=world.lattice,
         landuse=world.landuse,
         buildings=world.buildings if config.roads.cut_buildings else None,
     )

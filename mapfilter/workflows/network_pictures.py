@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mapfilter._io import ensure_writable_folder
 from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.geodesy import Lattice
 from mapfilter.radio.rasters import RxLevRasters
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import BLUE, ORANGE
@@ -40,10 +41,15 @@ NETWORK_PICTURES = (
     "land-use.png",
 )
 
+_TITLES = (
+    "Level of the best server",
+    "Best server",
+    "Margin of the best server over the second",
+    "Points by best server",
+    "Land use",
+)
 _NEARLY_ALL = (1.0, 99.0)
 _IF_NONE_DBM = (-110.0, -50.0)
-_AROUND = 0.15
-_LEAST_PX = 20
 
 
 def draw_network(
@@ -51,6 +57,7 @@ def draw_network(
     database: RadioRouteDatabase,
     folder: Path,
     *,
+    area: Lattice | None = None,
     landuse: LandUse | None = None,
     buildings: Buildings | None = None,
 ) -> tuple[Path, ...]:
@@ -59,7 +66,8 @@ def draw_network(
     Coverage, best server, margin, points per cell, points of the site with the most sectors if
     any has several, and land use where it is known. Memory is bounded whatever the area: it is
     thinned to what a picture can show, and of very large sets of rasters only the database's points
-    are shown.
+    are shown. Where nearly all points lie in less than half of the area, only that is shown, and
+    the titles tell so.
 
     Parameters
     ----------
@@ -68,8 +76,10 @@ def draw_network(
     database : RadioRouteDatabase
     folder : Path
         Made where it is missing; pictures of an older database in it make way.
+    area : Lattice, optional
+        The part of the database's lattice that its roads were laid on, when that is not all.
     landuse : LandUse, optional
-        On the database's lattice: what its points were made from.
+        On that part: what the points were made from.
     buildings : Buildings, optional
         Without ``landuse``: drawn beside ways and squares.
 
@@ -85,35 +95,46 @@ def draw_network(
     OutputError
         A picture cannot be written.
     """
-    _, _, rows, cols = common_window(rasters.lattice, database)
+    _ = common_window(rasters.lattice, database.lattice, str(database.path))
+    within = common_window(database.lattice, area or database.lattice, str(database.path))
     ensure_writable_folder(folder)
     clear_pictures(folder, NETWORK_PICTURES)
-    points = served_points(database)
-    at_points = rows * cols * len(rasters.cell_ids) > MOST_READ_PX
-    best = points.best if at_points else best_servers(rasters, database)
+    everywhere = served_points(database, within)
+    window, points, told = everywhere.crowded_window(database.lattice), everywhere, ""
+    if window != within:
+        points = served_points(database, window)
+        share = 100 * points.counts.sum() // everywhere.counts.sum()
+        told = f", where {share} % of the points lie"
+    shown = database.lattice.window(*window)
+    at_points = shown.rows * shown.cols * len(rasters.cell_ids) > MOST_READ_PX
+    best = points.best if at_points else best_servers(rasters, database, shown)
     lattice, plan = best.lattice, database.plan
     base = BaseMap(lattice.bounds_m, attribution=database.attribution)
     drawn = [folder / name for name in NETWORK_PICTURES[:4]]
+    titles = [f"{title}{told}" for title in _TITLES]
     ends_dbm = _ends(best.level_dbm)
-    plot_level(best.level_dbm, lattice, plan, base, drawn[0], range_dbm=ends_dbm)
-    plot_best_server(best.server, plan.ids, lattice, plan, base, drawn[1])
-    plot_margin(best.margin_db, lattice, plan, base, drawn[2])
-    _draw_points(database, points, database.cell_ids, drawn[3], "Points by best server")
+    plot_level(
+        best.level_dbm, lattice, plan, base, drawn[0], title=titles[0], range_dbm=ends_dbm
+    )  # fmt: skip
+    plot_best_server(best.server, plan.ids, lattice, plan, base, drawn[1], title=titles[1])
+    plot_margin(best.margin_db, lattice, plan, base, drawn[2], title=titles[2])
+    _draw_points(database, points, database.cell_ids, drawn[3], titles[3])
     site, cells = Counter(cell.site for cell in plan.cells).most_common(1)[0]
     if cells > 1:
         drawn.append(folder / NETWORK_PICTURES[4])
-        draw_site(database, points, site, drawn[-1])
-    shown = None
+        draw_site(database, everywhere, site, drawn[-1])
+    classes = None
     if landuse is not None:
-        _, step = thinned_lattice(database.lattice)
-        shown = replace(landuse, code=landuse.code[::step, ::step])
+        _, step = thinned_lattice(shown)
+        top, left = window[0] - within[0], window[1] - within[1]
+        code = landuse.code[top : top + window[2] : step, left : left + window[3] : step]
+        classes = replace(landuse, code=code)
     elif buildings is not None and len(buildings):
-        shown = land_use_of_map(points, buildings)
-    if shown is not None:
+        classes = land_use_of_map(points, buildings)
+    if classes is not None:
         drawn.append(folder / NETWORK_PICTURES[5])
-        area = points.best.lattice
-        whole = BaseMap(area.bounds_m, attribution=database.attribution)
-        plot_landuse(shown, area, whole, drawn[-1])
+        below = BaseMap(points.best.lattice.bounds_m, attribution=database.attribution)
+        plot_landuse(classes, points.best.lattice, below, drawn[-1], title=titles[4])
     return tuple(drawn)
 
 
@@ -126,13 +147,9 @@ def draw_site(database: RadioRouteDatabase, points: ServedPoints, site: str, pat
     cells = [cell.id for cell in plan.cells if cell.site == site]
     own = np.isin(points.best.server, [plan.index(cell_id) for cell_id in cells])
     row, col = np.nonzero(own)
-    step = round(points.best.lattice.resolution_m / lattice.resolution_m)
-    if step > 1 and row.size:
-        around = int(_AROUND * max(int(np.ptp(row)), int(np.ptp(col)), _LEAST_PX)) + 1
-        top, left = (step * max(int(at.min()) - around, 0) for at in (row, col))
-        bottom = min(step * (int(row.max()) + around + 1), lattice.rows)
-        right = min(step * (int(col.max()) + around + 1), lattice.cols)
-        points = served_points(database, (top, left, bottom - top, right - left))
+    if points.best.lattice.resolution_m > lattice.resolution_m and row.size:
+        rows, cols = ((int(at.min()), int(at.max())) for at in (row, col))
+        points = served_points(database, points.window_about(rows, cols, lattice))
     _draw_points(database, points, cells, path, f"Points served by site {site}")
 
 

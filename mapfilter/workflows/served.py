@@ -24,6 +24,9 @@ MOST_READ_PX = 1_000_000_000
 
 _BLOCK_PX = 1024
 _READ_PX = 40_000_000
+_NEARLY_ALL = (0.01, 0.99)
+_AROUND = 0.15
+_LEAST_PX = 20
 _COLUMNS = ("row", "col", "best_server", "best_level_dbm", "margin_db", "on_square")
 
 Window = tuple[int, int, int, int]
@@ -64,14 +67,20 @@ class ServedPoints:
 
     Parameters
     ----------
+    window : (row, col, rows, cols)
+        Where they lie on the database's lattice.
     best : BestServers
         At the pixels that hold a point.
+    number : numpy.ndarray of int64, shape (rows, cols)
+        Points at each pixel.
     on_square : numpy.ndarray of bool, shape (rows, cols)
     counts : numpy.ndarray of int64, shape (cells,)
         Points that each cell serves best, all of them.
     """
 
+    window: Window
     best: BestServers
+    number: NDArray[np.int64]
     on_square: NDArray[np.bool_]
     counts: NDArray[np.int64]
 
@@ -81,6 +90,49 @@ class ServedPoints:
         row, col = np.nonzero(server >= 0 if cell is None else server == cell)
         east_m, north_m = self.best.lattice.east_north(row, col)
         return np.asarray(east_m), np.asarray(north_m)
+
+    def window_about(
+        self, rows: tuple[int, int], cols: tuple[int, int], lattice: Lattice
+    ) -> Window:
+        """Return a window of the database's lattice that holds some pixels with room about them.
+
+        Parameters
+        ----------
+        rows, cols : (first, last)
+            Of the pixels.
+        lattice : Lattice
+            The database's.
+        """
+        step = round(self.best.lattice.resolution_m / lattice.resolution_m)
+        around = int(_AROUND * max(rows[1] - rows[0], cols[1] - cols[0], _LEAST_PX)) + 1
+        top, left, high, wide = self.window
+        first_row, first_col = max(rows[0] - around, 0), max(cols[0] - around, 0)
+        last_row = min(step * (rows[1] + around + 1), high)
+        last_col = min(step * (cols[1] + around + 1), wide)
+        first_row, first_col = step * first_row, step * first_col
+        return top + first_row, left + first_col, last_row - first_row, last_col - first_col
+
+    def crowded_window(self, lattice: Lattice) -> Window:
+        """Return a window that holds nearly all points, where most of the area is empty.
+
+        Else, as where that is more than half of the area, all of it.
+
+        Parameters
+        ----------
+        lattice : Lattice
+            The database's.
+        """
+        if not self.number.any():
+            return self.window
+        low, high = _NEARLY_ALL
+        ends = []
+        for axis in (1, 0):
+            share = np.cumsum(self.number.sum(axis=axis)) / self.number.sum()
+            first, last = int(np.argmax(share > low)), int(np.argmax(share >= high))
+            ends.append((first, last))
+        found = self.window_about(ends[0], ends[1], lattice)
+        is_small = 2 * found[2] * found[3] < self.window[2] * self.window[3]
+        return found if is_small else self.window
 
 
 def thinned_lattice(lattice: Lattice) -> tuple[Lattice, int]:
@@ -98,8 +150,10 @@ def thinned_lattice(lattice: Lattice) -> tuple[Lattice, int]:
     return replace(lattice, resolution_m=side_m, rows=rows, cols=cols), step
 
 
-def best_servers(rasters: RxLevRasters, database: RadioRouteDatabase) -> BestServers:
-    """Return the best server, its level and its margin over the area of a database.
+def best_servers(
+    rasters: RxLevRasters, database: RadioRouteDatabase, area: Lattice | None = None
+) -> BestServers:
+    """Return the best server, its level and its margin over a database, or some of its area.
 
     Cells below the database's floor are not heard. Of large areas every second, third... pixel is
     taken, block by block.
@@ -109,7 +163,7 @@ def best_servers(rasters: RxLevRasters, database: RadioRouteDatabase) -> BestSer
     InputError
         Rasters and database are of different areas, or a raster is damaged.
     """
-    window = common_window(rasters.lattice, database)
+    window = common_window(rasters.lattice, area or database.lattice, str(database.path))
     lattice, step = thinned_lattice(rasters.lattice.window(*window))
     found = BestServers.nowhere(lattice)
     shape = lattice.rows, lattice.cols
@@ -152,6 +206,7 @@ def served_points(database: RadioRouteDatabase, window: Window | None = None) ->
     top, left, rows, cols = window or (0, 0, database.lattice.rows, database.lattice.cols)
     lattice, step = thinned_lattice(database.lattice.window(top, left, rows, cols))
     best = BestServers.nowhere(lattice)
+    number = np.zeros(best.server.shape, dtype=np.int64)
     on_square = np.zeros(best.server.shape, dtype=np.bool_)
     counts = np.zeros(len(database.cell_ids), dtype=np.int64)
     ids = pa.array(database.cell_ids, type=pa.string())
@@ -166,19 +221,27 @@ def served_points(database: RadioRouteDatabase, window: Window | None = None) ->
         best.server[at], best.level_dbm[at] = server, read["best_level_dbm"]
         best.margin_db[at] = np.where(np.isnan(margin_db), np.inf, margin_db)
         on_square[at] = read["on_square"]
+        np.add.at(number, at, 1)
         counts += np.bincount(server, minlength=len(counts))
-    return ServedPoints(best, on_square, counts)
+    return ServedPoints((top, left, rows, cols), best, number, on_square, counts)
 
 
-def common_window(lattice: Lattice, database: RadioRouteDatabase) -> Window:
-    """Return the pixels of the rasters that the database covers: row, col, rows, cols.
+def common_window(lattice: Lattice, part: Lattice, where: str) -> Window:
+    """Return the pixels of a lattice that lie on another: row, col, rows, cols.
+
+    Parameters
+    ----------
+    lattice, part : Lattice
+        Such as those of rasters and of a database.
+    where : str
+        What the second is of.
 
     Raises
     ------
     InputError
         There are none.
     """
-    west, south, east, north = database.lattice.bounds_m
+    west, south, east, north = part.bounds_m
     # A hair inside, so that an edge on a pixel's edge takes no pixel beyond it.
     hair_m = 1e-6 * lattice.resolution_m
     top, left = lattice.row_col(west + hair_m, north - hair_m)
@@ -186,7 +249,7 @@ def common_window(lattice: Lattice, database: RadioRouteDatabase) -> Window:
     top, left = max(int(top), 0), max(int(left), 0)
     rows = min(int(bottom), lattice.rows - 1) - top + 1
     cols = min(int(right), lattice.cols - 1) - left + 1
-    if not same_crs(lattice.crs, database.lattice.crs) or rows < 1 or cols < 1:
+    if not same_crs(lattice.crs, part.crs) or rows < 1 or cols < 1:
         expected = "rasters of the database's area and CRS"
-        raise fail(InputError, str(database.path), expected, "others", "built from other rasters")
+        raise fail(InputError, where, expected, "others", "built from other rasters")
     return top, left, rows, cols

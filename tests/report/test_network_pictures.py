@@ -214,6 +214,51 @@ def test_of_a_country_only_points_are_drawn(network, tmp_path, monkeypatch):
     assert len(drawn) == 6
 
 
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    """A town of 60 x 60 pixels at a corner of a large area, and one long drive out of it."""
+    folder = tmp_path_factory.mktemp("drive")
+    lattice = Lattice(CRS, 385_000.0, 6_672_000.0, 5.0, 400, 500)
+    plan = plan_of("S1A", "S1B")
+    level_dbm = np.broadcast_to(-60.0 - 0.05 * np.arange(500), (400, 500))
+    levels = {"S1A": level_dbm.astype(np.float32), "S1B": level_dbm[:, ::-1].astype(np.float32)}
+    write_rasters(folder / "rxlev.tif", lattice, levels.items(), plan.ids)
+    walkable = np.zeros((400, 500), dtype=bool)
+    walkable[20:80, 30:90] = True
+    walkable[80:110, 60] = walkable[390, 490] = True
+    rasters = open_rasters(folder / "rxlev.tif")
+    routes = route_lattice_from_landuse(walkable, lattice, None)
+    return rasters, build(rasters, plan, routes, folder / "database")
+
+
+@pytest.mark.parametrize("most_px", [1200, 50])
+def test_pictures_show_where_nearly_all_points_lie(drive, most_px, tmp_path, monkeypatch):
+    monkeypatch.setattr(served, "MOST_PX", most_px)
+    rasters, database = drive
+    whole = served_points(database)
+    assert whole.number.sum() == 3631
+    top, left, rows, cols = whole.crowded_window(database.lattice)
+    # Two hundredths of the points may lie outside; some room is about the others.
+    assert 0 <= top <= 20
+    assert 0 <= left <= 30
+    assert 80 <= top + rows < 300
+    assert 90 <= left + cols < 300
+    points = served_points(database, (top, left, rows, cols))
+    assert points.counts.sum() >= 0.96 * 3631
+    titles = []
+    monkeypatch.setattr(
+        network_pictures, "plot_level", lambda *_, title, **__: titles.append(title)
+    )
+    landuse = LandUse(np.zeros((400, 500), np.int16), ("town",), (True,))
+    assert len(draw_network(rasters, database, tmp_path, landuse=landuse)) == 6
+    assert titles == ["Level of the best server, where 99 % of the points lie"]
+
+
+def test_an_area_full_of_points_is_shown_whole(network):
+    points = served_points(network[1])
+    assert points.crowded_window(LATTICE) == (0, 0, 40, 50)
+
+
 def test_rasters_of_another_place_are_told(network, tmp_path):
     _, database = network
     far = Lattice(CRS, 500_000.0, 6_000_000.0, 5.0, 4, 4)

@@ -1,5 +1,7 @@
 """A build draws its database, unless nothing is to be drawn; a land-use raster, too."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import rasterio
@@ -86,3 +88,15 @@ def test_a_land_use_raster_is_drawn_in_its_own_colours(world, landuse, tmp_path)
     assert shares["street"] > shares["park"]
     walkable = np.mean(np.abs(image - to_rgb("#0072b2")).max(axis=2) < 0.01)
     assert walkable == pytest.approx(shares["street"] + shares["park"], rel=0.1)
+
+
+def test_an_area_smaller_than_the_rasters_is_drawn_alone(world, landuse, tmp_path):
+    given = settings(
+        roads__landuse=landuse / "landuse.tif", roads__landuse_table=landuse / "classes.csv",
+        area__bbox="24.9430,60.1667,24.9480,60.1690", output__pictures="first",
+    )  # fmt: skip
+    built = assert_done(build(world, tmp_path, *given)).json
+    assert [Path(picture).stem for picture in built["pictures"]] == EVERY
+    streets = imread(built["pictures"][0])[:, :, :3]
+    # Levels fill the map: there is nothing of the rasters beside the area.
+    assert np.ptp(streets.reshape(-1, 3), axis=1).astype(bool).mean() > 0.5
