@@ -52,7 +52,12 @@ def sweep(
 
 
 def reproduce(
-    paper: Annotated[str, typer.Argument(metavar="PAPER", help="khalaf-allah-2007.")],
+    paper: Annotated[
+        str,
+        typer.Argument(
+            metavar="PAPER", help="khalaf-allah-2007, fritsche-klein-2009 or zhang-2006."
+        ),
+    ],
     area_map: Annotated[
         str | None,
         typer.Option("--map", metavar="FILE", help="An .osm.pbf file; else a made city."),
@@ -60,7 +65,14 @@ def reproduce(
     bbox: Annotated[
         str | None, typer.Option("--bbox", metavar="W,S,E,N", help="Degrees; else the map's own.")
     ] = None,
-    trials: Annotated[int, typer.Option("--trials", min=1, help="Runs in each cell.")] = 100,
+    layout: Annotated[
+        Path | None,
+        typer.Option("--layout", metavar="FILE", help="Network and satellites (TOML)."),
+    ] = None,
+    trials: Annotated[
+        int | None,
+        typer.Option("--trials", min=1, help="Runs in each cell, or trials; else the paper's."),
+    ] = None,
     seed: SeedOption = None,
     out: OutOption = None,
     workers: WorkersOption = 1,
@@ -69,15 +81,28 @@ def reproduce(
 ) -> None:
     """Repeat a paper's experiments: figure, table, and every reading of what it leaves open."""
     from mapfilter.workflows.reproduce import run_reproduce
+    from mapfilter.workflows.reproduce_fusion import FUSION_PAPERS, run_reproduce_fusion
     from mapfilter.workflows.sweep_brief import brief
 
+    if paper in FUSION_PAPERS:
+        with rate_bar("reproduce", "parts") as progress:
+            fused = run_reproduce_fusion(
+                paper,
+                (out or Path("out") / paper).absolute(),
+                layout_file=layout,
+                trials=trials,
+                seed=seed or 0,
+                progress=progress,
+            )
+        print_result(fused, as_json)
+        return
     with rate_bar("reproduce", "runs") as progress:
         result = run_reproduce(
             paper,
             (out or Path("out") / paper).absolute(),
             map_name=area_map,
             bbox=numbers(bbox, 4, "--bbox"),
-            trials=trials,
+            trials=trials or 100,
             seed=seed or 0,
             workers=workers,
             cluster=cluster,
@@ -88,7 +113,9 @@ def reproduce(
 
 
 def bench(
-    stage: Annotated[str, typer.Argument(metavar="[NAME]", help="build or sweep.")] = "build",
+    stage: Annotated[
+        str, typer.Argument(metavar="[NAME]", help="build, fusion or sweep.")
+    ] = "build",
     runs: Annotated[int, typer.Option("--runs", min=1, help="Runs that medians are of.")] = 5,
     as_json: JsonOption = False,
 ) -> None:

@@ -25,10 +25,11 @@ from mapfilter.radio.rasters import RxLevRasters, open_rasters, write_rasters
 from mapfilter.roads.lattice import RouteLattice
 
 if TYPE_CHECKING:
+    from mapfilter.workflows.bench_fusion import FusionBench
     from mapfilter.workflows.bench_sweep import SweepBench
 
 CRS = "EPSG:32629"
-STAGES = ("build", "sweep")
+STAGES = ("build", "fusion", "sweep")
 _FLOOR_DBM = -104.0
 _BLOCK_PX = 256
 
@@ -75,7 +76,7 @@ class BuildBench:
 
 def run_bench(
     stage: str, *, rasters: int = 10, side_px: int = 3000, points: int = 100_000, runs: int = 5
-) -> BuildBench | SweepBench:
+) -> BuildBench | FusionBench | SweepBench:
     """Measure a stage on made inputs; a sweep on the embedded map.
 
     Raises
@@ -87,6 +88,10 @@ def run_bench(
     """
     if stage not in STAGES:
         raise fail(ConfigError, "bench", f"one of {', '.join(STAGES)}", repr(stage))
+    if stage == "fusion":
+        from mapfilter.workflows.bench_fusion import bench_fusion
+
+        return bench_fusion(runs=runs)
     if stage == "sweep":
         from mapfilter.workflows.bench_sweep import bench_sweep
 

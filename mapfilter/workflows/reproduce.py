@@ -23,6 +23,7 @@ from mapfilter.workflows.build import run_build
 from mapfilter.workflows.config import load_config
 from mapfilter.workflows.paper_pictures import draw_khalaf_allah_2007
 from mapfilter.workflows.predict import run_predict
+from mapfilter.workflows.reproduce_fusion import FUSION_PAPERS
 from mapfilter.workflows.sections import Config
 from mapfilter.workflows.sweep import sweep_executor
 from mapfilter.workflows.sweep_world import sweep_world
@@ -98,7 +99,8 @@ def run_reproduce(
     """
     began_s = time.perf_counter()
     if name not in PAPERS:
-        raise fail(ConfigError, "reproduce", f"one of {', '.join(PAPERS)}", repr(name))
+        known = (*PAPERS, *FUSION_PAPERS)
+        raise fail(ConfigError, "reproduce", f"one of {', '.join(known)}", repr(name))
     config = paper_config(out, map_name, bbox)
     plans = paper.plans(trials, seed)
     ensure_writable_folder(out)

@@ -209,7 +209,8 @@ def draw(given: Scene, trials: int, steps: int, rng: np.random.Generator) -> Tri
     """Draw trials: true states, readings, and first guesses.
 
     Guesses of position and velocity are normal about the truth with P(0|0), those of the clock's
-    bias and drift uniform with the variance of P(0|0).
+    bias and drift uniform with the variance of P(0|0). With more than a few trials the sample's
+    mean and covariance are made exactly those, which lessens the chance in averages.
     """
     n = given.layout.size
     start = np.array(START[:n])
@@ -222,4 +223,8 @@ def draw(given: Scene, trials: int, steps: int, rng: np.random.Generator) -> Tri
     deviation = np.sqrt(np.diagonal(given.first_covariance))
     unit = rng.standard_normal((trials, n))
     unit[:, 4:] = rng.uniform(-np.sqrt(3), np.sqrt(3), (trials, n - 4))
+    if trials > 4 * n:
+        # The sample's moments are made those of P(0|0), which early errors depend on.
+        unit = unit - unit.mean(axis=0)
+        unit = unit @ np.linalg.inv(np.linalg.cholesky(np.cov(unit.T, bias=True))).T
     return Trials(states, readings, start + unit * deviation)
