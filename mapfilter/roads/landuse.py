@@ -26,6 +26,7 @@ _LARGEST_WINDOW_PX = 1 << 24
 _MOST_DIGITS = 10
 _ALIGNED_PX = 1e-3
 _NEARLY_ALL = 0.95
+_MOST_TOLD = 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,24 +100,30 @@ def read_landuse(path: Path | str, table_path: Path | str, lattice: Lattice) -> 
     ------
     InputError
         A file is missing or damaged, the CRS differs, raster and table do not go together, values
-        or colours are not in the table (each with its number of points), or none is walkable.
+        or colours are not in the table (the most frequent ones with their number of points), or
+        none is walkable.
     """
     path = Path(path)
     keys, is_colour = _read_table(Path(table_path))
     codes, known, notes = _read_codes(path, lattice, colour=is_colour)
     found, counts = np.unique(codes[known], return_counts=True)
-    faults = Faults()
-    for code, count in zip(found.tolist(), counts.tolist(), strict=True):
-        if code not in keys:
-            shown = f"value {code}"
-            if is_colour:
-                shown = f"colour {code >> 16},{code >> 8 & 255},{code & 255}"
-            hint = "a class left out, or colours blended by compression or resampling"
-            faults.add(str(path), f"classes of {table_path}", f"{shown} at {count} points", hint)
+    pairs = zip(found.tolist(), counts.tolist(), strict=True)
+    unknown = [(code, count) for code, count in pairs if code not in keys]
+    unknown.sort(key=lambda pair: -pair[1])
+    faults, expected = Faults(), f"classes of {table_path}"
+    hint = "a class left out, or colours blended by compression or resampling"
+    for code, count in unknown[:_MOST_TOLD]:
+        shown = f"value {code}"
+        if is_colour:
+            shown = f"colour {code >> 16},{code >> 8 & 255},{code & 255}"
+        faults.add(str(path), expected, f"{shown} at {count} points", hint)
+    if rest := unknown[_MOST_TOLD:]:
+        points = sum(count for _, count in rest)
+        faults.add(str(path), expected, f"{len(rest)} others at {points} points", hint)
     faults.raise_if_any(InputError)
-    index = np.full(codes.shape, -1, dtype=np.int16)
+    index = np.full(codes.shape, -1, dtype=np.min_scalar_type(-len(keys)))
     rank = {code: number for number, code in enumerate(keys)}
-    places = np.array([rank[code] for code in found.tolist()], dtype=np.int16)
+    places = np.array([rank[code] for code in found.tolist()], dtype=index.dtype)
     for row in range(lattice.rows):
         here = known[row]
         index[row, here] = places[np.searchsorted(found, codes[row, here])]

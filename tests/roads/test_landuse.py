@@ -46,6 +46,26 @@ def test_colours(write):
     np.testing.assert_array_equal(mask, VALUES != 2)
 
 
+def test_tables_of_any_length(write):
+    codes = VALUES.astype(np.uint16) * 20_000
+    rows = "".join(f"class {code},{code},{int(code != 40_000)}\n" for code in range(60_001))
+    landuse = read_landuse(*write(codes, table=f"class,value,walkable\n{rows}"), LATTICE)
+    np.testing.assert_array_equal(landuse.walkable, VALUES != 2)
+    assert landuse.code.max() == 60_000
+    assert read_landuse(*write(VALUES), LATTICE).code.dtype == np.int8
+
+
+def test_of_many_unknown_classes_the_most_frequent_are_told(write):
+    codes = np.arange(24, dtype=np.uint8).reshape(4, 6)
+    codes[0, :3] = 23
+    with pytest.raises(InputError) as caught:
+        read_landuse(*write(codes), LATTICE)
+    told = [fault.got for fault in caught.value.faults]
+    assert told[0] == "value 23 at 4 points"
+    assert told[-1] == "10 others at 10 points"
+    assert len(told) == 11
+
+
 def test_finer_and_coarser_rasters_are_read_at_the_lattice_points(write):
     fine = Lattice(CRS, LATTICE.west_m, LATTICE.north_m, 1.0, 20, 30)
     files = write(np.kron(VALUES, np.ones((5, 5), np.uint8)), lattice=fine)
