@@ -46,6 +46,8 @@ class SurveyedLevels:
     Parameters
     ----------
     cell_id : str
+    lattice : Lattice
+        Where the pixels lie.
     level_dbm, deviation_db : (rows, cols) arrays
         Mean level, and how far off a reading may be; NaN where nobody measured.
     east_m, north_m, measured_dbm : arrays of equal length
@@ -53,6 +55,7 @@ class SurveyedLevels:
     """
 
     cell_id: str
+    lattice: Lattice
     level_dbm: NDArray[np.floating]
     deviation_db: NDArray[np.floating]
     east_m: Floats
@@ -60,9 +63,7 @@ class SurveyedLevels:
     measured_dbm: Floats
 
 
-def plot_surveyed_levels(
-    cells: Sequence[SurveyedLevels], lattice: Lattice, base: BaseMap, path: Path
-) -> None:
+def plot_surveyed_levels(cells: Sequence[SurveyedLevels], base: BaseMap, path: Path) -> None:
     """Draw up to four cells: the level with the measured points in its colours, the deviation.
 
     A point that vanishes in its surroundings is told well. The ends of both scales are those of
@@ -72,8 +73,6 @@ def plot_surveyed_levels(
     ----------
     cells : sequence of SurveyedLevels
         One to four, in the order of the rows.
-    lattice : Lattice
-        Where the pixels lie.
     base : BaseMap
         The map below.
     path : Path
@@ -82,7 +81,7 @@ def plot_surveyed_levels(
     Raises
     ------
     InputError
-        There is no cell, or more than four, or a raster does not fit the lattice.
+        There is no cell, or more than four, or a raster does not fit its lattice.
     OutputError
         The picture cannot be written.
     """
@@ -91,20 +90,20 @@ def plot_surveyed_levels(
         raise fail(InputError, "cells to draw", f"1 to {MAX_CELLS}", count)
     for cell in cells:
         for raster in (cell.level_dbm, cell.deviation_db):
-            shape_faults(raster, lattice).raise_if_any(InputError)
+            shape_faults(raster, cell.lattice).raise_if_any(InputError)
     levels_dbm = _range([v for c in cells for v in (c.level_dbm, c.measured_dbm)], (-120, -60))
     deviations_db = _range([c.deviation_db for c in cells], (0, 10))
     height_in = count * (_PANEL_IN * _ASPECT + 0.95) + 0.15
     with picture(path, 2 * (_PANEL_IN + _BAR_IN) + 0.4, height_in) as figure:
         panels = figure.subplots(count, 2, squeeze=False)
         for cell, (left, right) in zip(cells, panels, strict=True):
-            shown = base.zoomed(_surroundings(cell, lattice))
+            shown = base.zoomed(_surroundings(cell))
             points = grouped(len(cell.measured_dbm))
             left.set_title(f"{cell.cell_id}: level, {points} measurements", fontsize=10)
             right.set_title(f"{cell.cell_id}: deviation", fontsize=10)
-            frame = _draw_raster(figure, left, cell.level_dbm, lattice, shown, _LEVELS,
+            frame = _draw_raster(figure, left, cell.level_dbm, cell.lattice, shown, _LEVELS,
                                  levels_dbm, "level / dBm", scale_bar=True)  # fmt: skip
-            _draw_raster(figure, right, cell.deviation_db, lattice, shown, "magma_r",
+            _draw_raster(figure, right, cell.deviation_db, cell.lattice, shown, "magma_r",
                          deviations_db, "deviation / dB", scale_bar=False)  # fmt: skip
             x, y = frame(cell.east_m, cell.north_m)
             left.scatter(
@@ -220,9 +219,10 @@ def _draw_raster(
     return frame
 
 
-def _surroundings(cell: SurveyedLevels, lattice: Lattice) -> Bounds:
+def _surroundings(cell: SurveyedLevels) -> Bounds:
     """Return the extent of where a cell was measured, brought to the shape of the panels."""
     row, col = np.nonzero(np.isfinite(cell.deviation_db))
+    lattice = cell.lattice
     if not row.size:
         row, col = np.array([0, lattice.rows - 1]), np.array([0, lattice.cols - 1])
     east, north = lattice.east_north(

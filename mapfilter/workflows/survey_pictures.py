@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
 
 import numpy as np
 
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Lattice
 from mapfilter.radio.measurements import Measurements
 from mapfilter.radio.rasters import RxLevRasters
 from mapfilter.radio.survey_validation import LeftOut
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
+from mapfilter.workflows.cover import outside_m
+from mapfilter.workflows.served import thinned_lattice
 
 SURVEY_PICTURES = ("survey-levels.png", "survey-left-out.png")
 
@@ -80,12 +81,11 @@ def _named(left_out: LeftOut) -> str:
     return f"{sessions} sessions{groups}, each told by the others"
 
 
-def _surveyed(survey: SurveyEvidence) -> tuple[list[SurveyedLevels], Lattice, BaseMap]:
-    """Return the cells with the most measurements, the lattice about these, and its map."""
+def _surveyed(survey: SurveyEvidence) -> tuple[list[SurveyedLevels], BaseMap]:
+    """Return the cells with the most measurements in reach of the lattice, and its map."""
     rows, whole = survey.measurements, survey.levels.lattice
-    row, col = whole.row_col(rows.east_m, rows.north_m)
-    on = np.asarray(whole.contains(row, col))
-    counts = np.bincount(rows.cell[on], minlength=len(rows.cell_ids))
+    near = outside_m(rows.east_m, rows.north_m, whole) <= survey.reach_m
+    counts = np.bincount(rows.cell[near], minlength=len(rows.cell_ids))
     shown = [
         index
         for index in np.argsort(-counts, kind="stable").tolist()
@@ -94,19 +94,25 @@ def _surveyed(survey: SurveyEvidence) -> tuple[list[SurveyedLevels], Lattice, Ba
     if not shown:
         expected = "measurements of cells of the survey's rasters"
         raise fail(InputError, str(survey.levels.path), expected, "none", "rasters of another area")
-    there = on & np.isin(rows.cell, shown)
+    cells = [
+        _cell(survey, rows.where(near & (rows.cell == index)), rows.cell_ids[index])
+        for index in shown
+    ]
+    return cells, BaseMap(whole.bounds_m, attribution=survey.attribution)
+
+
+def _cell(survey: SurveyEvidence, own: Measurements, cell_id: str) -> SurveyedLevels:
+    """Return the map about a cell's own measurements, thinned to what a picture can show."""
+    whole = survey.levels.lattice
+    row, col = whole.row_col(own.east_m, own.north_m)
     around = ceil(survey.reach_m / whole.resolution_m)
-    top, left = max(row[there].min() - around, 0), max(col[there].min() - around, 0)
-    bottom = min(row[there].max() + around, whole.rows - 1)
-    right = min(col[there].max() + around, whole.cols - 1)
-    window = int(top), int(left), int(bottom - top) + 1, int(right - left) + 1
-    cells = []
-    for index in shown:
-        cell_id, own = rows.cell_ids[index], rows.where(there & (rows.cell == index))
-        level_dbm = survey.levels.read(window, (cell_id,))[0]
-        deviation_db = survey.deviations.read(window, (cell_id,))[0]
-        cells.append(
-            SurveyedLevels(cell_id, level_dbm, deviation_db, own.east_m, own.north_m, own.level_dbm)
-        )
-    area = whole.window(*window)
-    return cells, area, BaseMap(area.bounds_m, attribution=survey.attribution)
+    top, bottom = np.clip((row.min() - around, row.max() + around), 0, whole.rows - 1).tolist()
+    left, right = np.clip((col.min() - around, col.max() + around), 0, whole.cols - 1).tolist()
+    part = whole.window(top, left, bottom - top + 1, right - left + 1)
+    lattice, _ = thinned_lattice(part)
+    level_dbm, deviation_db = (
+        replace(rasters, lattice=lattice, resampling="nearest").read(cells=(cell_id,))[0]
+        for rasters in (survey.levels, survey.deviations)
+    )
+    places = own.east_m, own.north_m, own.level_dbm
+    return SurveyedLevels(cell_id, lattice, level_dbm, deviation_db, *places)

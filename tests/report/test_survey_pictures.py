@@ -12,6 +12,7 @@ from mapfilter.radio.survey_rasters import write_survey
 from mapfilter.radio.survey_validation import LeftOut, cross_validate, leave_out
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
+from mapfilter.workflows import served, survey_pictures
 from mapfilter.workflows.survey_pictures import SurveyEvidence, draw_survey
 
 CRS = "EPSG:32635"
@@ -19,14 +20,14 @@ LATTICE = Lattice(CRS, 385_000.0, 6_672_000.0, 5.0, 40, 50)
 BASE = BaseMap(LATTICE.bounds_m, attribution="© OpenStreetMap contributors")
 
 
-def surveyed(cell_id: str = "A") -> SurveyedLevels:
+def surveyed(cell_id: str = "A", lattice: Lattice = LATTICE) -> SurveyedLevels:
     row, col = np.mgrid[:40, :50]
     level_dbm = -70.0 - 0.5 * col
     deviation_db = np.where(row > 20, 4.0, np.nan)
     places = np.array([25, 30, 35])
     east_m, north_m = LATTICE.east_north(places, places)
     return SurveyedLevels(
-        cell_id, np.where(row > 20, level_dbm, np.nan), deviation_db, east_m, north_m,
+        cell_id, lattice, np.where(row > 20, level_dbm, np.nan), deviation_db, east_m, north_m,
         -70.0 - 0.5 * places,
     )  # fmt: skip
 
@@ -38,7 +39,7 @@ def test_same_data_give_same_bytes(tmp_path):
     for name in "ab":
         folder = tmp_path / name
         cells = [surveyed("A"), surveyed("B")]
-        plot_surveyed_levels(cells, LATTICE, BASE, folder / "levels.png")
+        plot_surveyed_levels(cells, BASE, folder / "levels.png")
         plot_left_out(
             measured_dbm, predicted_dbm, folder / "left-out.png", trend_dbm=measured_dbm + 6.0,
             attribution="somebody's",
@@ -54,10 +55,10 @@ def test_survey_pictures_are_checked(tmp_path):
     path = tmp_path / "s.png"
     for cells in ([], [surveyed()] * 5):
         with pytest.raises(InputError, match="1 to 4"):
-            plot_surveyed_levels(cells, LATTICE, BASE, path)
+            plot_surveyed_levels(cells, BASE, path)
     small = Lattice(CRS, 0.0, 0.0, 5.0, 4, 5)
     with pytest.raises(InputError, match="4 x 5 pixels"):
-        plot_surveyed_levels([surveyed()], small, BASE, path)
+        plot_surveyed_levels([surveyed("A", small)], BASE, path)
     with pytest.raises(InputError, match="3 of them"):
         plot_left_out(np.zeros(3), np.zeros(2), path)
     for bad in (np.empty(0), np.array([np.nan])):
@@ -104,6 +105,25 @@ def test_a_survey_gets_its_pictures(sessions, folds, tmp_path):
     for told_nothing in (None, nothing):
         evidence = SurveyEvidence(measured, options.reach_m, *rasters, told_nothing)
         assert len(draw_survey(evidence, tmp_path / "one")) == 1
+
+
+def test_readings_beside_the_lattice_are_drawn_and_large_areas_thinned(tmp_path, monkeypatch):
+    """All of one cell's readings lie beside the area that was asked for, in reach of it."""
+    measured, options = walks(1), SurveyOptions(method="knn", trend="mean")
+    survey = fit_survey(measured, options)
+    paths = tmp_path / "mean.tif", tmp_path / "deviation.tif"
+    north = LATTICE.window(0, 0, 15, 50)
+    write_survey(survey, north, *paths)
+    monkeypatch.setattr(served, "MOST_PX", 20)
+    drawn = []
+    monkeypatch.setattr(
+        survey_pictures, "plot_surveyed_levels", lambda cells, *_: drawn.extend(cells)
+    )
+    rasters = [open_rasters(path) for path in paths]
+    draw_survey(SurveyEvidence(measured, options.reach_m, *rasters), tmp_path / "out")
+    assert [cell.cell_id for cell in drawn] == ["A", "B"]
+    assert {cell.level_dbm.shape for cell in drawn} == {(5, 17)}
+    assert all(np.isfinite(cell.level_dbm).any() for cell in drawn)
 
 
 def test_a_survey_of_other_cells_is_told(tmp_path):
