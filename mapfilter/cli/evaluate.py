@@ -33,7 +33,7 @@ def evaluate(
         typer.Option("--case", metavar="NAME", help="A case; repeatable. Default: all."),
     ] = None,
     filter_name: Annotated[
-        str, typer.Option("--filter", metavar="NAME", help="bayes or candidate.")
+        str, typer.Option("--filter", metavar="NAME", help="bayes, grid or candidate.")
     ] = "bayes",
     runs: Annotated[int, typer.Option("--runs", min=1, help="Routes for each case.")] = 20,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of what is drawn.")] = 0,

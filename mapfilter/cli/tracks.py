@@ -60,7 +60,7 @@ def replay(
         Path | None, typer.Option("--log", metavar="LOG", help="A log, or a folder of logs.")
     ] = None,
     filter_name: Annotated[
-        str | None, typer.Option("--filter", metavar="NAME", help="candidate or bayes.")
+        str | None, typer.Option("--filter", metavar="NAME", help="candidate, bayes or grid.")
     ] = None,
     without: Annotated[
         str | None,

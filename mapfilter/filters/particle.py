@@ -21,6 +21,7 @@ from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, Upd
 from mapfilter.filters.hypotheses import Bins, Summary, nothing, summarise
 from mapfilter.filters.particle_options import ParticleOptions
 from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
+from mapfilter.filters.switch import switched
 
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
@@ -163,8 +164,15 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             belief.log_evidence + log_total,
         )
         weighed.__dict__["weight"] = weight
-        status, agreed_at_m = self._agreed(belief, weighed.summary)
-        wanted = self._wanted(weighed.summary, status)
+        said = weighed.summary
+        status, agreed_at_m = switched(
+            belief.status,
+            belief.travelled_m,
+            belief.agreed_at_m,
+            agrees=said.mass_50m >= self.options.switch_mass and self.model.credible(said),
+            hold_m=self.options.switch_hold_m,
+        )
+        wanted = self._wanted(said, status)
         state, now = weighed.state, weighed
         power = self.options.flatten if status is Status.SEARCHING else 1.0
         if power < 1:
@@ -180,7 +188,7 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             weighed, state=state, log_weight=log_weight, status=status, agreed_at_m=agreed_at_m
         )
         # The summary before resampling is the better one of the same belief.
-        now.__dict__["summary"] = weighed.summary
+        now.__dict__["summary"] = said
         return now, UpdateInfo(Reason.USED, status, int(now.log_weight.size))
 
     def locate(self, belief: ParticleBelief) -> Estimate:
@@ -202,19 +210,6 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         jitter = np.asarray(self.options.jitter, dtype=np.float32)
         copy_with_jitter(state, chosen, jitter, draw_key(rng), copies)
         return copies, chosen
-
-    def _agreed(self, belief: ParticleBelief, summary: Summary) -> tuple[Status, float]:
-        """Return the status after an update, and since when the switch rule holds."""
-        if belief.status is Status.CONVERGED:
-            return Status.TRACKING, belief.agreed_at_m
-        if belief.status is not Status.SEARCHING:
-            return belief.status, belief.agreed_at_m
-        if summary.mass_50m < self.options.switch_mass or not self.model.credible(summary):
-            return Status.SEARCHING, nan
-        since_m = belief.agreed_at_m if isfinite(belief.agreed_at_m) else belief.travelled_m
-        if belief.travelled_m - since_m >= self.options.switch_hold_m:
-            return Status.CONVERGED, since_m
-        return Status.SEARCHING, since_m
 
 
 def _left_over(log_weight: Floats, power: float) -> Floats:

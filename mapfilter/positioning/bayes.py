@@ -8,13 +8,16 @@ every one that comes in: equal epochs give equal bytes.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import isfinite, nan, sqrt
+from typing import Any
 
 import numpy as np
 
-from mapfilter.filters.contract import Reason, Status
+from mapfilter.filters.contract import Filter, Reason, Status
+from mapfilter.filters.grid import GridBelief, GridFilter
 from mapfilter.filters.hypotheses import Summary, nothing
-from mapfilter.filters.particle import ParticleBelief, ParticleFilter
+from mapfilter.filters.particle import ParticleFilter
 from mapfilter.filters.particle_options import ParticleOptions
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.area_map import AreaMap
@@ -23,12 +26,14 @@ from mapfilter.positioning.challenger import (
     Challenger,
     ChallengeRules,
     Doubt,
+    MapBelief,
     Verdict,
     judge,
 )
 from mapfilter.positioning.epochs import Epoch, headed
 from mapfilter.positioning.estimate import Fix, UnusedReading
 from mapfilter.positioning.evidence import Memory, RadioReading, reading_of
+from mapfilter.positioning.grid_model import StreetGrid
 from mapfilter.positioning.matched_way import matched_way
 
 _STREET_SHARE = 0.3
@@ -43,7 +48,7 @@ class BayesTrack:
     ----------
     memory : Memory
         Of dead reckoning and levels.
-    belief : ParticleBelief or None
+    belief : MapBelief or None
         None before the first report that can be placed.
     heading_rad : float
         Of the last step; without a compass counted from the first one.
@@ -58,7 +63,7 @@ class BayesTrack:
     """
 
     memory: Memory
-    belief: ParticleBelief | None = None
+    belief: MapBelief | None = None
     heading_rad: float = nan
     compass: bool = True
     status: Status = Status.SEARCHING
@@ -67,7 +72,7 @@ class BayesTrack:
     wins: int = 0
 
     @property
-    def leading(self) -> ParticleBelief | None:
+    def leading(self) -> MapBelief | None:
         """The belief to go by: the challenger's where the first one is lost."""
         lost = self.status is Status.LOST and self.challenger is not None
         return self.challenger.belief if lost and self.challenger else self.belief
@@ -99,11 +104,14 @@ class BayesPositioner:
     model : BayesModel
     options : ParticleOptions
     rules : ChallengeRules
+    grid : bool
+        The exact filter on a grid in place of particles.
     """
 
     model: BayesModel
     options: ParticleOptions = field(default_factory=ParticleOptions)
     rules: ChallengeRules = field(default_factory=ChallengeRules)
+    grid: bool = False
 
     @property
     def area(self) -> AreaMap:
@@ -111,9 +119,20 @@ class BayesPositioner:
         return self.model.area
 
     @property
-    def filter(self) -> ParticleFilter[Start, RadioReading]:
-        """The filter by itself."""
-        return ParticleFilter(self.model, self.options)
+    def name(self) -> str:
+        """The filter's name."""
+        return "grid" if self.grid else "bayes"
+
+    def filter_for(self, compass: bool) -> Filter[Start, MapBelief, RadioReading]:
+        """Return the filter by itself, for headings with or without a compass."""
+        return self._filters[compass]
+
+    @cached_property
+    def _filters(self) -> dict[bool, Filter[Start, Any, RadioReading]]:
+        if not self.grid:
+            return dict.fromkeys((True, False), ParticleFilter(self.model, self.options))
+        grids = {compass: StreetGrid(self.model, compass) for compass in (True, False)}
+        return {compass: GridFilter(grid, self.options) for compass, grid in grids.items()}
 
     def begin(self) -> BayesTrack:
         """Return what is known before the first epoch: nothing."""
@@ -123,7 +142,7 @@ class BayesPositioner:
         self, east_m: float, north_m: float, sd_m: float, rng: np.random.Generator
     ) -> BayesTrack:
         """Return what is known at a known start, in the CRS of the database."""
-        belief = self.filter.init(Start(None, True, east_m, north_m, sd_m), rng)
+        belief = self.filter_for(True).init(Start(None, True, east_m, north_m, sd_m), rng)
         belief = replace(belief, status=Status.TRACKING)
         return replace(self.begin(), belief=belief, status=Status.TRACKING)
 
@@ -143,7 +162,7 @@ class BayesPositioner:
         if belief is None:
             if reading is not None:
                 start = Start(reading, track.compass)
-                track = replace(track, belief=self.filter.init(start, rng))
+                track = replace(track, belief=self.filter_for(track.compass).init(start, rng))
         elif reading is not None:
             track, why = self._weigh(track, belief, reading, epoch, rng)
             reason = reason if why is Reason.USED else why
@@ -160,13 +179,13 @@ class BayesPositioner:
     def _weigh(
         self,
         track: BayesTrack,
-        before: ParticleBelief,
+        before: MapBelief,
         reading: RadioReading,
         epoch: Epoch,
         rng: np.random.Generator,
     ) -> tuple[BayesTrack, Reason]:
         """Weigh the belief, and its challenger, which may start, win or give up."""
-        belief, info = self.filter.update(before, reading, rng)
+        belief, info = self.filter_for(track.compass).update(before, reading, rng)
         status = Status.LOST if track.status is Status.LOST else belief.status
         if info.reason is not Reason.USED:
             return replace(track, belief=belief, status=status), info.reason
@@ -175,7 +194,7 @@ class BayesPositioner:
         challenger, wins = track.challenger, track.wins
         travelled_m = track.memory.travelled_m
         if challenger is not None:
-            other, _ = self.filter.update(challenger.belief, reading, rng)
+            other, _ = self.filter_for(track.compass).update(challenger.belief, reading, rng)
             challenger = replace(challenger, belief=other)
             verdict = judge(self.rules, belief, challenger, travelled_m)
             if verdict is Verdict.WON:
@@ -196,14 +215,14 @@ class BayesPositioner:
         return self.rules.doubt if told else self.rules.doubt_of_cells
 
     def _challenger(
-        self, track: BayesTrack, main: ParticleBelief, epoch: Epoch, rng: np.random.Generator
+        self, track: BayesTrack, main: MapBelief, epoch: Epoch, rng: np.random.Generator
     ) -> Challenger | None:
         """Start from scratch: from the report alone, as if it were the first."""
         empty = Memory.empty(len(self.area.cell_ids))
         _, reading, _, _ = reading_of(self.area, self.model.evidence, empty, epoch)
         if reading is None:
             return None
-        belief = self.filter.init(Start(reading, track.compass), rng)
+        belief = self.filter_for(track.compass).init(Start(reading, track.compass), rng)
         return Challenger(belief, track.memory.travelled_m, main.log_evidence)
 
     def _move(
@@ -222,10 +241,10 @@ class BayesPositioner:
                 # Nothing has moved yet: headings can still become those of no compass.
                 compass = False
                 belief = self._without_compass(belief, rng)
-            belief, why = self.filter.predict(belief, step, rng)
+            belief, why = self.filter_for(track.compass).predict(belief, step, rng)
             memory = memory.moved(step)
             if challenger is not None:
-                other, _ = self.filter.predict(challenger.belief, step, rng)
+                other, _ = self.filter_for(track.compass).predict(challenger.belief, step, rng)
                 challenger = replace(challenger, belief=other)
             if why is not Reason.USED:
                 unused.append(UnusedReading(epoch.time_s, "motion", "", why))
@@ -239,7 +258,15 @@ class BayesPositioner:
         )
         return moved, unused
 
-    def _without_compass(self, belief: ParticleBelief, rng: np.random.Generator) -> ParticleBelief:
+    def _without_compass(self, belief: MapBelief, rng: np.random.Generator) -> MapBelief:
+        if isinstance(belief, GridBelief):
+            grid = StreetGrid(self.model, compass=False)
+            count = grid.bias_rad.size
+            on, off = (
+                np.repeat(mass.sum(axis=0, keepdims=True) / count, count, axis=0)
+                for mass in (belief.on, belief.off)
+            )
+            return replace(belief, on=on, off=off, model=grid)
         state = self.model.any_heading(belief.state, rng)
         times = state.shape[1] // max(belief.log_weight.size, 1)
         log_weight = np.tile(belief.log_weight, times) - np.log(max(times, 1))

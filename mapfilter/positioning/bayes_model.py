@@ -38,7 +38,7 @@ Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 
 _F = np.float32
-_OFF_AT_START = 0.05
+OFF_AT_START = 0.05
 _TIMES_WITHOUT_COMPASS = 4
 _FIX_SD_M = 10.0
 _FIX_CLIP = 5.0
@@ -123,7 +123,7 @@ class BayesModel:
         bias = rng.standard_normal(most) * self.motion.bias_sd_rad
         state[BIAS] = bias if prior.compass else pi * (2 * rng.random(most) - 1)
         state[LOG_SCALE] = self.motion.scale_sd * rng.standard_normal(most)
-        state[OFF] = _OFF_AT_START
+        state[OFF] = OFF_AT_START
         log_weight = np.full(most, -np.log(most))
         if isfinite(prior.east_m) and prior.reading is not None:
             self.weigh(state, log_weight, prior.reading)

@@ -37,6 +37,8 @@ class BayesOptions:
         When a belief in doubt is challenged, and when it is replaced.
     smooth : bool
         Whether positions are those in hindsight, by the whole log.
+    grid : bool
+        The exact filter on the lattice in place of particles: slow, and without the step scale.
     """
 
     motion: MotionErrors = field(default_factory=MotionErrors)
@@ -45,11 +47,12 @@ class BayesOptions:
     particles: ParticleOptions = field(default_factory=ParticleOptions)
     challenge: ChallengeRules = field(default_factory=ChallengeRules)
     smooth: bool = False
+    grid: bool = False
 
     def over(self, area: AreaMap) -> BayesPositioner:
         """Return the filter over an area."""
         model = BayesModel(area, self.motion, self.map, self.evidence)
-        return BayesPositioner(model, self._particles, self.challenge)
+        return BayesPositioner(model, self._particles, self.challenge, self.grid)
 
     @property
     def _particles(self) -> ParticleOptions:

@@ -71,7 +71,7 @@ def position_by_bayes(
             history.add(before, track)
         if pictures and _worth_a_picture(track, snapshots):
             snapshots.append(_snapshot(track, news, positioner.area))
-    estimate = estimate_of(crs, "bayes", told, log.start_utc_s)
+    estimate = estimate_of(crs, positioner.name, told, log.start_utc_s)
     if smooth:
         history.close(track)
         model = positioner.model
@@ -128,6 +128,8 @@ def _snapshot(track: BayesTrack, news: News, area: AreaMap) -> Snapshot:
 
 def _warm_up(positioner: BayesPositioner) -> None:
     """Load what is compiled, and prepare the area, before the clock starts."""
+    if positioner.grid:
+        return
     model, rng = positioner.model, np.random.default_rng(0)
     west, south = model.area.origin_m
     small = replace(positioner, options=replace(positioner.options, most=64, least=32))
@@ -135,7 +137,7 @@ def _warm_up(positioner: BayesPositioner) -> None:
     epoch = Epoch(0.0, (MotionStep(1.0, 0.0),))
     track, _ = small.advance(track, epoch, rng)
     if track.belief is not None and model.area.cell_ids:
-        small.filter.update(track.belief, _every_kind(), rng)
+        small.filter_for(True).update(track.belief, _every_kind(), rng)
 
 
 def _every_kind() -> RadioReading:

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from mapfilter._kernels import draw_key
 from mapfilter.filters.contract import Status
 from mapfilter.filters.hypotheses import Bins, summarise
-from mapfilter.filters.particle import ParticleBelief
 from mapfilter.filters.resampling import systematic
 from mapfilter.models.street_motion import MotionErrors
 from mapfilter.models.street_smoothing import draw_ancestors
 from mapfilter.positioning.area_map import AreaMap
 from mapfilter.positioning.bayes import BayesTrack
+from mapfilter.positioning.challenger import MapBelief
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.matched_way import matched_way
 
@@ -101,7 +101,7 @@ def _due(kept: list[Kept], travelled_m: float, every_m: float) -> bool:
     return not kept or travelled_m - kept[-1].travelled_m >= every_m
 
 
-def _keep(belief: ParticleBelief, epoch: int, moved: tuple[float, float, float]) -> Kept:
+def _keep(belief: MapBelief, epoch: int, moved: tuple[float, float, float]) -> Kept:
     weight = belief.log_weight.astype(np.float32)
     return Kept(epoch, belief.state, weight, moved[:2], moved[2])
 

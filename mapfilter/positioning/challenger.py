@@ -15,8 +15,11 @@ from enum import Enum
 from math import exp, hypot
 
 from mapfilter.filters.contract import Status
+from mapfilter.filters.grid import GridBelief
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
+
+MapBelief = ParticleBelief | GridBelief
 
 _USUAL, _LEAST_USUAL, _MOST_USUAL = 0.8, 0.5, 2.0
 _SLACK = 1.5
@@ -56,18 +59,18 @@ class Challenger:
 
     Parameters
     ----------
-    belief : ParticleBelief
+    belief : MapBelief
     began_at_m : float
         Distance travelled when it started.
     against : float
         Log evidence of the first belief then.
     """
 
-    belief: ParticleBelief
+    belief: MapBelief
     began_at_m: float
     against: float
 
-    def ahead(self, main: ParticleBelief) -> float:
+    def ahead(self, main: MapBelief) -> float:
         """Return the logarithm of the Bayes factor in its favour."""
         return self.belief.log_evidence - (main.log_evidence - self.against)
 
@@ -83,7 +86,7 @@ class Verdict(Enum):
 
 
 def judge(
-    rules: ChallengeRules, main: ParticleBelief, challenger: Challenger, travelled_m: float
+    rules: ChallengeRules, main: MapBelief, challenger: Challenger, travelled_m: float
 ) -> Verdict:
     """Compare a belief and its challenger after both have seen the same readings."""
     ahead, other = challenger.ahead(main), challenger.belief.summary

@@ -43,8 +43,8 @@ class FilterChoice:
         match self.options:
             case CandidateOptions():
                 return "candidate"
-            case BayesOptions():
-                return "bayes"
+            case BayesOptions() as options:
+                return "grid" if options.grid else "bayes"
 
 
 def open_locator(
@@ -77,8 +77,6 @@ def open_locator(
             positioner = bayes.over(open_area(database))
 
             def locate_by_bayes(log: TrackLog, rng: np.random.Generator) -> PositionedTrack:
-                return position_by_bayes(
-                    positioner, log, rng, smooth=bayes.smooth, pictures=ways
-                )
+                return position_by_bayes(positioner, log, rng, smooth=bayes.smooth, pictures=ways)
 
             return locate_by_bayes

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from mapfilter.errors import ConfigError, fail
 from mapfilter.filters.candidate_options import CandidateOptions
 from mapfilter.positioning.locators import FilterChoice
 from mapfilter.workflows.sections import FilterSection
@@ -23,5 +26,7 @@ def filter_choice(section: FilterSection, resolution_m: float) -> FilterChoice:
                 when_empty=section.when_empty,
             )
             return FilterChoice(options, section.margin_db)
-        case "bayes":
-            return FilterChoice(section.bayes.options)
+        case "bayes" | "grid":
+            return FilterChoice(replace(section.bayes.options, grid=section.name == "grid"))
+        case name:
+            raise fail(ConfigError, "filter.name", "a filter that takes a database", repr(name))

@@ -1,0 +1,305 @@
+"""The exact filter on a grid: position on a lattice times bins of the lasting heading error.
+
+It sums over all positions where particles sample some, so it is the oracle that the particle filter
+is tested against, and a choice for small areas. Mass moves by a Gaussian, integrated over each
+pixel: what is less than a pixel wide is smeared over it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import isfinite, nan
+from typing import Any, Generic, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
+from mapfilter.filters.hypotheses import Bins, Summary, nothing, summarise
+from mapfilter.filters.particle_options import ParticleOptions
+from mapfilter.filters.switch import switched
+
+Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
+
+PriorT = TypeVar("PriorT", contravariant=True)
+ReadingT = TypeVar("ReadingT", contravariant=True)
+
+_LEAST_MASS = 1e-9
+_REACH_SD = 4.0
+_LEAST_SD_PX = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Transport:
+    """What one stretch of dead reckoning does to mass.
+
+    Parameters
+    ----------
+    right_px, down_px : ndarray, shape (B,)
+        Mean displacement of each bin of the heading error, in pixels.
+    sd_right_px, sd_down_px : ndarray, shape (B,)
+    turned_bins : float
+        Standard deviation of the heading error's change, in bins.
+    on, off : ndarray of float32, shape (rows, cols), and float
+        Likelihood of the map at each pixel, and off it.
+    leave, come_back : float
+        Probabilities of leaving the map and of coming back.
+    """
+
+    right_px: Floats
+    down_px: Floats
+    sd_right_px: Floats
+    sd_down_px: Floats
+    turned_bins: float
+    on: Floats32
+    off: float
+    leave: float
+    come_back: float
+
+
+class GridModel(Protocol[PriorT, ReadingT]):
+    """What a grid filter needs to know of the world."""
+
+    @property
+    def bins(self) -> Bins:
+        """The area, in bins."""
+
+    @property
+    def bias_rad(self) -> Floats:
+        """Middle of each bin of the lasting heading error, shape (B,)."""
+
+    @property
+    def circular(self) -> bool:
+        """Whether the bins go around the whole circle."""
+
+    def start(self, prior: PriorT) -> tuple[Floats32, Floats32]:
+        """Return the first mass on and off the map, shape (B, rows, cols) each."""
+
+    def states(self, row: NDArray[np.intp], col: NDArray[np.intp], bias_rad: Floats32) -> Floats32:
+        """Return pixels as states of the particle model, shape (R, N)."""
+
+    def transport(self, east_m: float, north_m: float, length_m: float) -> Transport:
+        """Return what a displacement by dead reckoning, of some length, does."""
+
+    def weigh(self, state: Floats32, log_weight: Floats, reading: ReadingT) -> Reason:
+        """Add a reading's log-likelihood to the log weights, in place; say why if it has none."""
+
+    def credible(self, summary: Summary) -> bool:
+        """Tell whether a belief may count as having converged, if it agrees on a place."""
+
+
+@dataclass(frozen=True, eq=False)
+class GridBelief:
+    """Mass on the grid, and how the filter stands.
+
+    Parameters
+    ----------
+    on, off : ndarray of float32, shape (B, rows, cols)
+        Mass of those on and off the map; together they sum to one after an update.
+    states : callable
+        The model's.
+    bias_rad : ndarray, shape (B,)
+    bins : Bins
+    waiting_m : (float, float, float)
+        Displacement east and north, and its length, that mass has not been moved by yet.
+    travelled_m, log_evidence, status, agreed_at_m
+        As of :class:`mapfilter.filters.particle.ParticleBelief`.
+    """
+
+    on: Floats32
+    off: Floats32
+    model: GridModel[Any, Any]
+    waiting_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    travelled_m: float = 0.0
+    log_evidence: float = 0.0
+    status: Status = Status.SEARCHING
+    agreed_at_m: float = nan
+
+    @property
+    def bins(self) -> Bins:
+        """The area, in bins."""
+        return self.model.bins
+
+    @cached_property
+    def moved(self) -> GridBelief:
+        """The belief with nothing waiting."""
+        return _moved(self)
+
+    @cached_property
+    def _cloud(self) -> tuple[Floats32, Floats32]:
+        """Pixels that hold mass, as states, and their weights."""
+        now = self.moved
+        both = now.on + now.off
+        bias, row, col = np.nonzero(both > _LEAST_MASS)
+        mass = both[bias, row, col]
+        state = self.model.states(row, col, self.model.bias_rad[bias].astype(np.float32))
+        state[-1] = now.off[bias, row, col] / mass
+        return state, (mass / mass.sum()).astype(np.float32)
+
+    @property
+    def state(self) -> Floats32:
+        """Pixels that hold mass, shape (R, N)."""
+        return self._cloud[0]
+
+    @property
+    def weight(self) -> Floats32:
+        """Their weights, shape (N,)."""
+        return self._cloud[1]
+
+    @property
+    def log_weight(self) -> Floats:
+        """Logarithms of the weights."""
+        return np.log(self.weight.astype(np.float64))
+
+    @cached_property
+    def summary(self) -> Summary:
+        """What the belief says."""
+        if not self.weight.size:
+            return nothing(self.state.shape[0])
+        return summarise(self.state, self.weight, self.bins)
+
+    def __getstate__(self) -> dict[str, object]:
+        return {name: self.__dict__[name] for name in self.__dataclass_fields__}
+
+
+@dataclass(frozen=True, slots=True)
+class GridFilter(Generic[PriorT, ReadingT]):
+    """The exact filter; its switch rule is the particle filter's.
+
+    Parameters
+    ----------
+    model : GridModel
+    options : ParticleOptions
+    """
+
+    model: GridModel[PriorT, ReadingT]
+    options: ParticleOptions = field(default_factory=ParticleOptions)
+
+    def init(self, prior: PriorT, rng: np.random.Generator) -> GridBelief:  # noqa: ARG002
+        """Return the first belief; nothing is drawn."""
+        on, off = self.model.start(prior)
+        return GridBelief(on, off, self.model)
+
+    def predict(
+        self,
+        belief: GridBelief,
+        motion: MotionStep,
+        rng: np.random.Generator,  # noqa: ARG002
+    ) -> tuple[GridBelief, Reason]:
+        """Add a step to the displacement that waits for the next reading."""
+        if not isfinite(motion.step_m):
+            return belief, Reason.NO_STEP
+        if not isfinite(motion.heading_rad):
+            return belief, Reason.NO_HEADING
+        if motion.step_m == 0:
+            return belief, Reason.USED
+        east_m, north_m, length_m = belief.waiting_m
+        waiting_m = (
+            east_m + motion.step_m * np.cos(motion.heading_rad),
+            north_m + motion.step_m * np.sin(motion.heading_rad),
+            length_m + abs(motion.step_m),
+        )
+        travelled_m = belief.travelled_m + abs(motion.step_m)
+        return replace(belief, waiting_m=waiting_m, travelled_m=travelled_m), Reason.USED
+
+    def update(
+        self,
+        belief: GridBelief,
+        reading: ReadingT,
+        rng: np.random.Generator,  # noqa: ARG002
+    ) -> tuple[GridBelief, UpdateInfo]:
+        """Move the mass by what waits, weigh it, and look whether it agrees."""
+        before = belief.moved
+        both = before.on + before.off
+        bias, row, col = np.nonzero(both > _LEAST_MASS * float(both.max(initial=0.0)))
+        state = self.model.states(row, col, self.model.bias_rad[bias].astype(np.float32))
+        log_weight = np.zeros(bias.size)
+        reason = self.model.weigh(state, log_weight, reading)
+        if reason is not Reason.USED:
+            return belief, UpdateInfo(reason, belief.status, int(bias.size))
+        highest = float(log_weight.max(initial=-np.inf))
+        likelihood = np.exp(log_weight - highest).astype(np.float32)
+        on, off = np.zeros_like(before.on), np.zeros_like(before.off)
+        on[bias, row, col] = before.on[bias, row, col] * likelihood
+        off[bias, row, col] = before.off[bias, row, col] * likelihood
+        total = float(on.sum(dtype=np.float64) + off.sum(dtype=np.float64))
+        if not total > 0:
+            return belief, UpdateInfo(Reason.NO_CANDIDATES_LEFT, belief.status, int(bias.size))
+        weighed = replace(
+            before,
+            on=on / np.float32(total),
+            off=off / np.float32(total),
+            log_evidence=before.log_evidence + highest + float(np.log(total)),
+        )
+        status, agreed_at_m = switched(
+            belief.status,
+            belief.travelled_m,
+            belief.agreed_at_m,
+            agrees=weighed.summary.mass_50m >= self.options.switch_mass
+            and self.model.credible(weighed.summary),
+            hold_m=self.options.switch_hold_m,
+        )
+        now = replace(weighed, status=status, agreed_at_m=agreed_at_m)
+        return now, UpdateInfo(Reason.USED, status, int(bias.size))
+
+    def locate(self, belief: GridBelief) -> Estimate:
+        """Return the leading hypothesis."""
+        said = belief.summary
+        return Estimate(float(said.mean[0]), float(said.mean[1]), said.covariance_m2, said.radii_m)
+
+
+def _moved(belief: GridBelief) -> GridBelief:
+    """Move all mass by the displacement that waits, and weigh it by the map."""
+    if belief.waiting_m[2] == 0:
+        return belief
+    model = belief.model
+    step = model.transport(*belief.waiting_m)
+    on, off = np.empty_like(belief.on), np.empty_like(belief.off)
+    for b in range(on.shape[0]):
+        right = _taps(step.right_px[b], step.sd_right_px[b])
+        down = _taps(step.down_px[b], step.sd_down_px[b])
+        for source, target in ((belief.on, on), (belief.off, off)):
+            target[b] = _shifted(_shifted(source[b], *right, axis=1), *down, axis=0)
+    if step.turned_bins > 0 and on.shape[0] > 1:
+        taps = _taps(0.0, step.turned_bins)
+        on, off = (_turned(mass, *taps, circular=model.circular) for mass in (on, off))
+    leave, come_back = np.float32(step.leave), np.float32(step.come_back)
+    stayed = on * (1 - leave) + off * come_back
+    away = on * leave + off * (1 - come_back)
+    waiting = (0.0, 0.0, 0.0)
+    return replace(belief, on=stayed * step.on, off=away * np.float32(step.off), waiting_m=waiting)
+
+
+def _taps(shift_px: float, sd_px: float) -> tuple[int, Floats32]:
+    """Return how far the first tap shifts, and a Gaussian's share of each pixel."""
+    sd_px = max(sd_px, _LEAST_SD_PX)
+    first = int(np.floor(shift_px - _REACH_SD * sd_px))
+    last = int(np.ceil(shift_px + _REACH_SD * sd_px))
+    edges = np.arange(first, last + 2) - 0.5
+    return first, np.diff(ndtr((edges - shift_px) / sd_px)).astype(np.float32)
+
+
+def _shifted(mass: Floats32, first: int, taps: Floats32, *, axis: int) -> Floats32:
+    """Spread mass along an axis; what leaves the lattice is lost."""
+    spread = np.zeros_like(mass)
+    size = mass.shape[axis]
+    for k, tap in enumerate(taps, start=first):
+        if abs(k) >= size or tap < 1e-7:
+            continue
+        target, source = [slice(None)] * mass.ndim, [slice(None)] * mass.ndim
+        target[axis] = slice(max(k, 0), size + min(k, 0))
+        source[axis] = slice(max(-k, 0), size - max(k, 0))
+        spread[tuple(target)] += tap * mass[tuple(source)]
+    return spread
+
+
+def _turned(mass: Floats32, first: int, taps: Floats32, *, circular: bool) -> Floats32:
+    if not circular:
+        return _shifted(mass, first, taps, axis=0)
+    return np.asarray(
+        sum(tap * np.roll(mass, k, axis=0) for k, tap in enumerate(taps, start=first)),
+        dtype=np.float32,
+    )

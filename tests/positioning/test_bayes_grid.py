@@ -1,0 +1,98 @@
+"""The particle filter against the exact one on a grid: the same model, two ways to sum."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from cross_world import CRS, WALK, make_database, make_plan, truth
+
+from mapfilter.filters.particle_options import ParticleOptions
+from mapfilter.models.fingerprint import LevelErrors
+from mapfilter.models.street_motion import MapWeights, MotionErrors
+from mapfilter.positioning.bayes import BayesPositioner
+from mapfilter.positioning.bayes_model import BayesModel
+from mapfilter.positioning.bayes_options import open_area
+from mapfilter.positioning.epochs import epochs
+from mapfilter.positioning.evidence import EvidenceOptions
+from mapfilter.tracks.log import make_log
+
+# Wide enough that a pixel of 5 m resolves what one step adds.
+ERRORS = MotionErrors(
+    step_sd_m=4.0, typical_step_m=5.0, heading_sd_rad=0.7, bias_sd_rad=0.08,
+    bias_drift_rad_per_sqrt_m=0.004, scale_sd=0.0,
+)  # fmt: skip
+BLOCK_M = 25.0
+
+
+@pytest.fixture(scope="module")
+def area(tmp_path_factory):
+    return open_area(make_database(tmp_path_factory.mktemp("cross")))
+
+
+@pytest.fixture(scope="module")
+def log():
+    """Every fourth second of the walk: 5 m steps, with the levels of both cells."""
+    time_s, east, north, _ = (column[::4] for column in (*truth(WALK)[:3], truth(WALK)[0]))
+    step = np.hypot(np.diff(east), np.diff(north))
+    heading = np.arctan2(np.diff(north), np.diff(east))
+    cells = make_plan().cells[:2]
+    level = np.array([[-50 - 0.1 * np.hypot(e - c.east_m, n - c.north_m) for c in cells]
+                      for e, n in zip(east, north, strict=True)])  # fmt: skip
+    best = level.argmax(axis=1)
+    rows = [
+        {"time_s": t, "role": "serving" if k == b else "neighbour", "cell": cells[k].id,
+         "level_dbm": float(row[k])}
+        for t, row, b in zip(time_s, level, best, strict=True) for k in (b, 1 - b)
+    ]  # fmt: skip
+    motion = pd.DataFrame({"time_s": time_s[1:], "step_m": step, "heading_rad": heading})
+    return make_log(CRS, motion=motion, radio=pd.DataFrame(rows))
+
+
+def positioner(area, *, grid, count=100_000):
+    # What a report counts must not depend on the number of particles.
+    levels = LevelErrors(measurement_db=6.0, roughness_db=0.0)
+    evidence = EvidenceOptions(levels=levels, spacing_m=4.0)
+    model = BayesModel(area, ERRORS, MapWeights(), evidence)
+    options = ParticleOptions(
+        most=count, searching=count, least=count, flatten=1.0, jitter=(0.0,) * 5
+    )
+    return BayesPositioner(model, options, grid=grid)
+
+
+def blocks(belief):
+    """Mass by squares of 25 m."""
+    edges = np.arange(-25, 450, BLOCK_M)
+    place = belief.state[0], belief.state[1]
+    return np.histogram2d(*place, bins=(edges, edges), weights=belief.weight)[0]
+
+
+def beliefs(positioner, log, seed=0, count=30):
+    """Squares of mass after every tenth epoch."""
+    rng, track, found = np.random.default_rng(seed), positioner.begin(), []
+    for index, epoch in enumerate(epochs(log)[:count]):
+        track, _ = positioner.advance(track, epoch, rng)
+        if index % 10 == 9:
+            found.append(blocks(track.belief))
+    return found
+
+
+def variation(a, b):
+    """Total variation distance."""
+    return 0.5 * np.abs(a - b).sum()
+
+
+def test_particles_agree_with_the_grid(area, log):
+    exact = beliefs(positioner(area, grid=True), log)
+    for sampled, summed in zip(beliefs(positioner(area, grid=False), log), exact, strict=True):
+        assert summed.sum() == pytest.approx(1.0, abs=1e-3)
+        assert variation(sampled, summed) <= 0.02
+
+
+def test_the_error_falls_with_the_root_of_the_number(area, log):
+    reference = beliefs(positioner(area, grid=False, count=400_000), log, count=30)[-1]
+
+    def error(count):
+        some = positioner(area, grid=False, count=count)
+        found = [beliefs(some, log, seed, count=30)[-1] for seed in range(30)]
+        return np.mean([variation(one, reference) for one in found])
+
+    assert error(1000) / error(4000) == pytest.approx(2.0, rel=0.1)
