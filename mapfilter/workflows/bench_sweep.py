@@ -70,7 +70,7 @@ class SweepBench:
     dask_ratio: float | None
 
 
-def bench_sweep(*, runs: int = 3, trials: int = 40) -> SweepBench:
+def bench_sweep(*, runs: int = 3, trials: int = 160) -> SweepBench:
     """Measure a sweep on the embedded map.
 
     Parameters

@@ -1,5 +1,6 @@
 """The table of a sweep: null where undefined, parts that are cut off, memory that stays flat."""
 
+from dataclasses import replace
 from math import nan
 
 import pyarrow.parquet as pq
@@ -7,7 +8,7 @@ import pytest
 
 from mapfilter.errors import StoreError
 from mapfilter.evaluation.accuracy import Accuracy
-from mapfilter.experiments.sweep.plan import Reading, SweepPlan
+from mapfilter.experiments.sweep.plan import LONGEST_BATCH, Noise, Reading, SweepPlan
 from mapfilter.experiments.sweep.table import (
     SCHEMA,
     is_part,
@@ -67,3 +68,17 @@ def test_another_table_is_refused(tmp_path):
     pq.write_table(rows(0, 5).drop_columns(["draw", "route"]), other)
     with pytest.raises(StoreError, match="columns of a sweep"):
         read_runs(other)
+
+
+@pytest.mark.parametrize(
+    ("routes", "draws", "sigmas"), [(3, 2, 40), (3, 1, 1), (100, 1, 3), (7, 5, 7), (1, 90, 9)]
+)
+def test_batches_hold_all_runs_once_and_whole_journeys_or_shares_of_one(routes, draws, sigmas):
+    noises = tuple(Noise(sigma_trans_m=0.01 * n) for n in range(sigmas))
+    plan = replace(PLAN, routes=routes, draws=draws, noises=noises)
+    batches = list(plan.batches())
+    assert [n for first, end in batches for n in range(first, end)] == list(range(plan.runs))
+    own = plan.runs // (routes * len(plan.radios) * len(plan.report_periods_s))
+    for first, end in batches:
+        assert end - first <= LONGEST_BATCH
+        assert first // own == (end - 1) // own or first % own == end % own == 0

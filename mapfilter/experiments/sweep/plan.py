@@ -8,7 +8,7 @@ import itertools
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields
-from math import isfinite, prod, radians
+from math import ceil, isfinite, prod, radians
 from typing import Literal
 
 from mapfilter.errors import ConfigError, Faults
@@ -22,8 +22,10 @@ AS_PREDICTED = "as_predicted"
 """The radio world in which each place is served by the cell predicted best there."""
 
 LONGEST_BATCH = 100
-SHORTEST_BATCH = 10
+SHORTEST_BATCH = 24
 _BATCHES = 64
+# Of the plan's shape, the first ones: radio, report period, route.
+_JOURNEY_AXES = 3
 _MOST_RUNS = 100_000_000
 
 
@@ -217,10 +219,22 @@ class SweepPlan:
         return JourneyPlan(length_m=self.length_m, profile=self.profile, speed_mps=self.speed_mps)
 
     def batches(self) -> Iterator[tuple[int, int]]:
-        """Yield first run and end of each batch: together all runs, in order."""
-        size = min(max(self.runs // _BATCHES, SHORTEST_BATCH), LONGEST_BATCH)
-        for first in range(0, self.runs, size):
-            yield first, min(first + size, self.runs)
+        """Yield first run and end of each batch: together all runs, in order.
+
+        A batch holds whole journeys, or an equal share of one journey's runs: what is heard on a
+        journey is made anew in each of its batches.
+        """
+        wanted = min(max(self.runs // _BATCHES, SHORTEST_BATCH), LONGEST_BATCH)
+        own = prod(self.shape[_JOURNEY_AXES:])
+        if own <= wanted:
+            size = wanted // own * own
+            for first in range(0, self.runs, size):
+                yield first, min(first + size, self.runs)
+            return
+        shares = ceil(own / wanted)
+        for journey in range(0, self.runs, own):
+            for share in range(shares):
+                yield journey + own * share // shares, journey + own * (share + 1) // shares
 
     def select(self, first: int, end: int) -> Iterator[Run]:
         """Yield the runs of a batch. Those of one route lie together, however long their grid."""
