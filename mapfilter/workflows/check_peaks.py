@@ -15,6 +15,7 @@ from mapfilter.radio.sitefit import best_place, in_squares, place_fit
 from mapfilter.workflows.findings import Findings, listed
 
 _FAR_PX, _FAR_M = 10.0, 150.0
+_SITES = 16
 _CLEARLY_BETTER = 0.1
 _BETTER = 0.05
 _MILDLY_BETTER = 0.02
@@ -26,6 +27,7 @@ class _Fit:
     """How well sites and the best place explain one raster."""
 
     own: float
+    # Of the cell's own site and of those about the best place.
     by_site: Mapping[str, float]
     best: float
     away_m: float
@@ -37,7 +39,7 @@ class _Fit:
         return self.far and self.best > _FITS
 
     def gain(self, site: str) -> float:
-        return self.by_site[site] - self.own
+        return self.by_site.get(site, 0.0) - self.own
 
 
 def check_peaks(
@@ -82,19 +84,22 @@ def check_peaks(
 
 
 def _fits(seen: Sequence[RasterSample], plan: CellPlan) -> dict[str, _Fit]:
-    places = {cell.site: (cell.east_m, cell.north_m) for cell in reversed(plan.cells)}
+    site_at = {cell.site: (cell.east_m, cell.north_m) for cell in reversed(plan.cells)}
+    names, places_m = list(site_at), np.array(list(site_at.values()))
     found = {}
     for sample in seen:
         squares = in_squares(sample)
         if squares is None:
             continue
         cell = plan[sample.cell_id]
-        by_site = {site: place_fit(squares, *place) for site, place in places.items()}
         best, (east_m, north_m) = best_place(squares, sample)
+        off_m = np.hypot(*(places_m - (east_m, north_m)).T)
+        about = [names[index] for index in np.argsort(off_m, kind="stable")[:_SITES]]
         away_m = float(np.hypot(east_m - cell.east_m, north_m - cell.north_m))
+        own = place_fit(squares, cell.east_m, cell.north_m)
         found[cell.id] = _Fit(
-            place_fit(squares, cell.east_m, cell.north_m),
-            by_site,
+            own,
+            {site: place_fit(squares, *site_at[site]) for site in about} | {cell.site: own},
             best,
             away_m,
             away_m >= max(_FAR_M, _FAR_PX * sample.lattice.resolution_m),

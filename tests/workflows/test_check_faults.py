@@ -8,6 +8,8 @@ from command_line import mapfilter
 from rasterio.transform import Affine
 
 from mapfilter.geodesy import Lattice
+from mapfilter.radio.sitefit import place_fit
+from mapfilter.workflows import check_peaks
 
 
 @pytest.fixture(scope="module")
@@ -182,6 +184,17 @@ def test_planted_doubts(code, plant, world):
     plant(world)
     found = check(world)
     assert {(f["code"], f["severity"]) for f in found} == {(code, "warning")}, found
+
+
+def test_of_many_sites_only_those_about_the_best_place_are_tried(world, monkeypatch):
+    tried = []
+    monkeypatch.setattr(check_peaks, "_SITES", 1)
+    monkeypatch.setattr(
+        check_peaks, "place_fit", lambda *given: tried.append(given) or place_fit(*given)
+    )
+    exchange_sites(world)
+    assert [f["code"] for f in check(world)] == ["site-labels-swapped"]
+    assert len(tried) == 2 * len(world.rows)
 
 
 def test_nothing_is_found_in_a_clean_world(world):
