@@ -60,7 +60,12 @@ def replay(
         Path | None, typer.Option("--log", metavar="LOG", help="A log, or a folder of logs.")
     ] = None,
     filter_name: Annotated[
-        str | None, typer.Option("--filter", metavar="NAME", help="candidate, bayes or grid.")
+        str | None,
+        typer.Option(
+            "--filter",
+            metavar="NAME",
+            help="candidate, bayes, grid; without a map ekf, iekf, rbukf, ukf, ckf.",
+        ),
     ] = None,
     without: Annotated[
         str | None,

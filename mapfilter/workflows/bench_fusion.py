@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from statistics import median
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from mapfilter.errors import ConfigError, fail
@@ -137,44 +138,51 @@ def _table_3() -> None:
             _ours(given, drawn, method, drawn.first_means, given.first_covariance)
 
 
-class _PlainModel:
-    """The hybrid measurement as one would write it for filterpy: NumPy, one state at a time."""
+@njit(cache=True)
+def _mean(x: Floats, sats: Floats, sites: Floats, boresight: Floats) -> Floats:  # pragma: no cover
+    """Return the hybrid measurement, written for filterpy and compiled: it costs the peer nothing."""
+    found = np.empty(10)
+    for i in range(2):
+        up = np.sqrt((x[0] - sats[i, 0]) ** 2 + (x[2] - sats[i, 1]) ** 2 + sats[i, 2] ** 2)
+        found[i] = up + x[4]
+    for i in range(7):
+        east, north = x[0] - sites[i, 0], x[2] - sites[i, 1]
+        distance = np.sqrt(east**2 + north**2)
+        if i == 0:
+            found[2] = distance
+        angle = (np.arctan2(north, east) - boresight[i] + np.pi) % (2 * np.pi) - np.pi
+        gain = -min(12 * (angle / (np.pi / 3)) ** 2, 20.0)
+        found[3 + i] = 50.0 - (132.8 + 38.0 * np.log10(distance / 1000.0)) + gain
+    return found
 
-    def __init__(self, layout: Layout) -> None:
-        self.satellites = layout.satellites_m(2)
-        self.sites = np.array(layout.sites_m)
-        self.boresight = np.radians(layout.boresights_deg)
-        self.serving = layout.serving
 
-    def mean(self, x: Floats) -> Floats:
-        place = np.array([x[0], x[2]])
-        up = np.append(place, 0.0) - self.satellites
-        away = place - self.sites
-        distance = np.sqrt(np.sum(away**2, axis=1))
-        angle = np.arctan2(away[:, 1], away[:, 0]) - self.boresight
-        angle = (angle + np.pi) % (2 * np.pi) - np.pi
-        gain = -np.minimum(12 * (angle / (np.pi / 3)) ** 2, 20.0)
-        level = 50.0 - (132.8 + 38.0 * np.log10(distance / 1000.0)) + gain
-        ranges = np.sqrt(np.sum(up**2, axis=1)) + x[4]
-        return np.concatenate([ranges, distance[self.serving : self.serving + 1], level])
-
-    def jacobian(self, x: Floats) -> Floats:
-        place = np.array([x[0], x[2]])
-        up = np.append(place, 0.0) - self.satellites
-        away = place - self.sites
-        squared = np.sum(away**2, axis=1)
-        angle = np.arctan2(away[:, 1], away[:, 0]) - self.boresight
-        angle = (angle + np.pi) % (2 * np.pi) - np.pi
+@njit(cache=True)
+def _jacobian(
+    x: Floats, sats: Floats, sites: Floats, boresight: Floats
+) -> Floats:  # pragma: no cover
+    slope = np.zeros((10, 6))
+    for i in range(2):
+        east, north = x[0] - sats[i, 0], x[2] - sats[i, 1]
+        up = np.sqrt(east**2 + north**2 + sats[i, 2] ** 2)
+        slope[i, 0], slope[i, 2], slope[i, 4] = east / up, north / up, 1.0
+    for i in range(7):
+        east, north = x[0] - sites[i, 0], x[2] - sites[i, 1]
+        squared = east**2 + north**2
+        if i == 0:
+            slope[2, 0], slope[2, 2] = east / np.sqrt(squared), north / np.sqrt(squared)
+        angle = (np.arctan2(north, east) - boresight[i] + np.pi) % (2 * np.pi) - np.pi
         ratio = angle / (np.pi / 3)
-        turn = np.where(12 * ratio**2 < 20.0, -24 * ratio / (np.pi / 3), 0.0)
-        slope = np.zeros((10, 6))
-        slope[:2, [0, 2]] = up[:, :2] / np.sqrt(np.sum(up**2, axis=1))[:, None]
-        slope[:2, 4] = 1.0
-        slope[2, [0, 2]] = away[self.serving] / np.sqrt(squared[self.serving])
-        fall = -38.0 / np.log(10.0) / squared
-        slope[3:, 0] = fall * away[:, 0] - turn * away[:, 1] / squared
-        slope[3:, 2] = fall * away[:, 1] + turn * away[:, 0] / squared
-        return slope
+        turn = -24 * ratio / (np.pi / 3) if 12 * ratio**2 < 20.0 else 0.0
+        fall = -38.0 / np.log(10.0)
+        slope[3 + i, 0] = (fall * east - turn * north) / squared
+        slope[3 + i, 2] = (fall * north + turn * east) / squared
+    return slope
+
+
+def _peer_arguments() -> tuple[Floats, Floats, Floats]:
+    layout = Layout()
+    sites, boresights = np.array(layout.sites_m), np.radians(layout.boresights_deg)
+    return layout.satellites_m(2), sites, boresights
 
 
 def _peer_ekf(given: Scene, readings: Floats, mean: Floats, first: Floats) -> Floats:
@@ -182,14 +190,14 @@ def _peer_ekf(given: Scene, readings: Floats, mean: Floats, first: Floats) -> Fl
         from filterpy.kalman import ExtendedKalmanFilter
     except ImportError as error:
         raise fail(ConfigError, "bench fusion", "the package filterpy", "none") from error
-    model, peer = _PlainModel(Layout()), ExtendedKalmanFilter(dim_x=6, dim_z=10)
+    model, peer = _peer_arguments(), ExtendedKalmanFilter(dim_x=6, dim_z=10)
     peer.x, peer.P = mean.copy(), first.copy()
     peer.F, peer.Q = given.assumed.transition, given.assumed.noise
     peer.R = given.measurement.covariance()
     found = np.empty((len(readings), 6))
     for k, reading in enumerate(readings):
         peer.predict()
-        peer.update(reading, model.jacobian, model.mean)
+        peer.update(reading, _jacobian, _mean, args=model, hx_args=model)
         found[k] = peer.x
     return found
 
@@ -197,10 +205,12 @@ def _peer_ekf(given: Scene, readings: Floats, mean: Floats, first: Floats) -> Fl
 def _peer_ukf(given: Scene, readings: Floats, mean: Floats, first: Floats) -> None:
     from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 
-    model, phi = _PlainModel(Layout()), given.assumed.transition
+    model, phi = _peer_arguments(), given.assumed.transition
     # With α = 1e-3 its covariances lose positive definiteness; the work is the same.
     points = MerweScaledSigmaPoints(6, 1.0, 2.0, 0.0)
-    peer = UnscentedKalmanFilter(6, 10, 0.48, model.mean, lambda x, _: phi @ x, points)
+    peer = UnscentedKalmanFilter(
+        6, 10, 0.48, lambda x: _mean(x, *model), lambda x, _: phi @ x, points
+    )
     peer.x, peer.P, peer.Q = mean.copy(), first.copy(), given.assumed.noise
     peer.R = given.measurement.covariance()
     for reading in readings:

@@ -21,6 +21,7 @@ from mapfilter.workflows.facts import facts
 from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.log_checks import check_logs, lacking
 from mapfilter.workflows.pictures import draw_track
+from mapfilter.workflows.replay_fusion import FUSION_FILTERS, run_replay_fusion
 from mapfilter.workflows.replayed import ReplayedLog, ReplayResult, summary_figures
 from mapfilter.workflows.results import ESTIMATES, FIGURES, SUMMARY, clear_results
 from mapfilter.workflows.sections import Config
@@ -49,6 +50,8 @@ def run_replay(
     MapfilterError
         The database or a log is missing or damaged, or the output cannot be written.
     """
+    if config.filter.name in FUSION_FILTERS:
+        return run_replay_fusion(config, out, progress=progress)
     database = open_database(config.database_path, verify="full")
     folders = list_logs(config.track_path)
     check_logs(folders, database.lattice)

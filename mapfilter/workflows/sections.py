@@ -204,7 +204,7 @@ class Track(Section):
 class FilterSection(Section):
     """``[filter]``: which filter, and its reading of the paper (see the candidate filter)."""
 
-    name: Literal["candidate", "bayes", "grid"] = "candidate"
+    name: Literal["candidate", "bayes", "grid", "ekf", "iekf", "rbukf", "ukf", "ckf"] = "candidate"
     margin_db: NotNegative | None = None
     update_length_m: NotNegative = 22.0
     tracking_length_m: NotNegative | None = None
