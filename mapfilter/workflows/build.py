@@ -17,6 +17,7 @@ from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rasters import RxLevRasters
+from mapfilter.workflows.area import pixels_on
 from mapfilter.workflows.cover import check_cells_near, map_cover, raster_cover
 from mapfilter.workflows.network_pictures import NETWORK_PICTURES, draw_network
 from mapfilter.workflows.results import clear_pictures
@@ -181,19 +182,13 @@ def _raster_world(config: Config) -> tuple[RxLevRasters, CellPlan, World]:
 
 def _cut(lattice: Lattice, area: Area, name: str) -> Lattice:
     wanted = area_lattice(area.model_copy(update={"crs": lattice.crs}))
-    west, south, east, north = wanted.bounds_m
-    # A hair inside, so that an edge on a pixel's edge takes no pixel beyond it.
-    hair_m = 1e-6 * lattice.resolution_m
-    top, left = lattice.row_col(west + hair_m, north - hair_m)
-    bottom, right = lattice.row_col(east - hair_m, south + hair_m)
-    top, left = max(top, 0), max(left, 0)
-    rows, cols = min(bottom, lattice.rows - 1) - top + 1, min(right, lattice.cols - 1) - left + 1
-    if rows < 1 or cols < 1:
+    found = pixels_on(lattice, wanted.bounds_m)
+    if found is None:
         covered = ", ".join(f"{value:.0f}" for value in lattice.bounds_m)
         asked = ", ".join(f"{value:.0f}" for value in wanted.bounds_m)
         expected = f"an area that overlaps the rasters {name} ({covered})"
         raise fail(InputError, "area", expected, asked, "rasters and roads of different places")
-    return lattice.window(top, left, rows, cols)
+    return lattice.window(*found)
 
 
 def _draw(

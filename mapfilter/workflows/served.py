@@ -16,6 +16,7 @@ from mapfilter.database.windows import WindowReader
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Floats, Lattice, same_crs
 from mapfilter.radio.rasters import RxLevRasters
+from mapfilter.workflows.area import pixels_on
 
 MOST_PX = 1200
 """Pixels along the longer side of a thinned area; a map in a picture is some 1 000 wide."""
@@ -241,15 +242,8 @@ def common_window(lattice: Lattice, part: Lattice, where: str) -> Window:
     InputError
         There are none.
     """
-    west, south, east, north = part.bounds_m
-    # A hair inside, so that an edge on a pixel's edge takes no pixel beyond it.
-    hair_m = 1e-6 * lattice.resolution_m
-    top, left = lattice.row_col(west + hair_m, north - hair_m)
-    bottom, right = lattice.row_col(east - hair_m, south + hair_m)
-    top, left = max(int(top), 0), max(int(left), 0)
-    rows = min(int(bottom), lattice.rows - 1) - top + 1
-    cols = min(int(right), lattice.cols - 1) - left + 1
-    if not same_crs(lattice.crs, part.crs) or rows < 1 or cols < 1:
+    found = pixels_on(lattice, part.bounds_m) if same_crs(lattice.crs, part.crs) else None
+    if found is None:
         expected = "rasters of the database's area and CRS"
         raise fail(InputError, where, expected, "others", "built from other rasters")
-    return top, left, rows, cols
+    return found
