@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pyarrow.parquet as pq
+import pytest
 from small_world import FLOOR_DBM, IDS, LATTICE, make_plan, make_routes, make_world
 
 from mapfilter.database.build import build
@@ -84,3 +85,23 @@ def test_reaching_is_told_by_the_files_own_extent(tmp_path):
     assert rasters.reaching((0, 0, 20, 10)).cell_ids == ("S1.A",)
     assert [rasters.reaching((0, col, 20, 1)).cell_ids for col in range(30, 90)] == [()] * 60
     assert rasters.reaching((0, 0, 20, rasters.lattice.cols)) is rasters
+
+
+@pytest.mark.parametrize("resampling", ["nearest", "bilinear"])
+def test_windows_of_mixed_resolutions_say_what_the_whole_says(resampling, tmp_path):
+    rng = np.random.default_rng(3)
+    for number, (cell_id, side_m) in enumerate(zip(IDS, (5.0, 7.3, 20.0), strict=True)):
+        west_m, north_m = LATTICE.west_m + 61.0 * number, LATTICE.north_m - 42.5 * number
+        part = Lattice(LATTICE.crs, west_m, north_m, side_m, 9, 11)
+        values = rng.uniform(-100, -60, (9, 11)).astype(np.float32)
+        values[rng.random(values.shape) < 0.1] = np.nan
+        write_rasters(tmp_path / f"{number}.tif", part, [(cell_id, values)], (cell_id,))
+    rasters = open_rasters(tmp_path, resampling=resampling)
+    whole = rasters.read()
+    for row, col, rows, cols in rasters.lattice.tiles(7):
+        expected = np.full((len(IDS), rows, cols), np.nan, np.float32)
+        some = rasters.reaching((row, col, rows, cols))
+        for cell_id in some.cell_ids:
+            read = some.read((row, col, rows, cols), (cell_id,))
+            expected[rasters.cell_ids.index(cell_id)] = read[0]
+        np.testing.assert_array_equal(whole[:, row : row + rows, col : col + cols], expected)
