@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, Future
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Thread
 
 import numpy as np
 
@@ -107,9 +108,9 @@ def build(
     out = Path(out)
     check_replaceable(out, MANIFEST, FORMAT)
     parameters = {"margin_db": float(margin_db), "floor_dbm": float(floor_dbm), "tile_px": tile_px}
-    with ThreadPoolExecutor(1) as aside, ExitStack() as stack:
+    with ExitStack() as stack:
         # The rasters are hashed while the first tiles are made.
-        digest = aside.submit(rasters.sha256)
+        digest = _aside(rasters.sha256)
 
         def key() -> str:
             laid = job.routes.digest()
@@ -227,6 +228,20 @@ class BuildJob:
     def _holds(self, window: Window) -> bool:
         inside = overlap(self.rasters.lattice, self.routes.lattice, window)
         return inside is not None and self.routes.holds(self.rasters.lattice.window(*inside))
+
+
+def _aside(function: Callable[[], str]) -> Future[str]:
+    """Run a function in a thread of its own; who stops before it has ended does not wait for it."""
+    future: Future[str] = Future()
+
+    def run() -> None:
+        try:
+            future.set_result(function())
+        except BaseException as error:
+            future.set_exception(error)
+
+    Thread(target=run, daemon=True).start()
+    return future
 
 
 def check_parameters(margin_db: float, floor_dbm: float, tile_px: int) -> None:

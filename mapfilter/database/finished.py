@@ -76,7 +76,9 @@ class FinishedTiles:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None or issubclass(kind, InputError | OutputError):
+        # Where nobody asked for the folder there is none, and its name may take long to be known.
+        asked = "folder" in vars(self)
+        if asked and (kind is None or issubclass(kind, InputError | OutputError)):
             shutil.rmtree(self.folder, ignore_errors=True)
 
     def missing(self, total: int) -> list[int]:

@@ -5,6 +5,7 @@ import os
 import signal
 import time
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from mapfilter.database.estimate import dry_run
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.database.store import info, open_database
 from mapfilter.errors import InputError, MapfilterError
-from mapfilter.radio.rasters import open_rasters
+from mapfilter.radio.rasters import RxLevRasters, open_rasters
 from mapfilter.roads.routable import RouteSource, route_lattice
 from mapfilter.roads.ways import Buildings, Squares, Ways
 
@@ -101,6 +102,25 @@ def test_tiles_of_other_inputs_or_damaged_ones_are_made_again(world, whole, tmp_
 def test_wrong_inputs_leave_no_tiles(world, tmp_path):
     with pytest.raises(InputError, match="floor too high"):
         build(world.rasters, world.plan, world.routes, tmp_path / "db", floor_dbm=0)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_who_stops_does_not_wait_for_the_checksum_of_the_rasters(world, tmp_path, monkeypatch):
+    released, done = Event(), []
+
+    def slow(_):
+        done.append(released.wait(20))
+        return "0" * 64
+
+    def damaged(*_):
+        raise InputError(())
+
+    monkeypatch.setattr(RxLevRasters, "sha256", slow)
+    monkeypatch.setattr(RxLevRasters, "read", damaged)
+    with pytest.raises(InputError):
+        again(world, tmp_path / "db")
+    assert done == []
+    released.set()
     assert list(tmp_path.iterdir()) == []
 
 
