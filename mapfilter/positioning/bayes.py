@@ -37,6 +37,7 @@ from mapfilter.positioning.grid_model import StreetGrid
 from mapfilter.positioning.matched_way import matched_way
 
 _STREET_SHARE = 0.3
+_MOST_TIMES, _SEARCHING_TIMES = 12, 8
 _FIRST_GRAIN_M, _LEAST_GRAIN_M = 5.0, 1.5
 
 
@@ -130,7 +131,15 @@ class BayesPositioner:
     @cached_property
     def _filters(self) -> dict[bool, Filter[Start, Any, RadioReading]]:
         if not self.grid:
-            return dict.fromkeys((True, False), ParticleFilter(self.model, self.options))
+            known = self.options
+            # Every place times every heading: most of them are gone after a few steps.
+            unknown = replace(
+                known, most=_MOST_TIMES * known.most, searching=_SEARCHING_TIMES * known.searching
+            )
+            return {
+                True: ParticleFilter(self.model, known),
+                False: ParticleFilter(self.model, unknown),
+            }
         grids = {compass: StreetGrid(self.model, compass) for compass in (True, False)}
         return {compass: GridFilter(grid, self.options) for compass, grid in grids.items()}
 
@@ -267,9 +276,8 @@ class BayesPositioner:
                 for mass in (belief.on, belief.off)
             )
             return replace(belief, on=on, off=off, model=grid)
-        state = self.model.any_heading(belief.state, rng)
-        times = state.shape[1] // max(belief.log_weight.size, 1)
-        log_weight = np.tile(belief.log_weight, times) - np.log(max(times, 1))
+        state = self.model.any_heading(belief.state, _MOST_TIMES, rng)
+        log_weight = np.tile(belief.log_weight, _MOST_TIMES) - np.log(_MOST_TIMES)
         return replace(belief, state=state, log_weight=log_weight)
 
     def _news(

@@ -39,7 +39,6 @@ Floats32 = NDArray[np.float32]
 
 _F = np.float32
 OFF_AT_START = 0.05
-_TIMES_WITHOUT_COMPASS = 4
 _FIX_SD_M = 10.0
 _FIX_CLIP = 5.0
 
@@ -107,8 +106,6 @@ class BayesModel:
         pixel.
         """
         resolution_m = _F(self.area.lattice.resolution_m)
-        if not prior.compass:
-            most *= _TIMES_WITHOUT_COMPASS
         if isfinite(prior.east_m):
             west, south = self.area.origin_m
             place = np.array([[prior.east_m - west], [prior.north_m - south]])
@@ -142,9 +139,15 @@ class BayesModel:
         systematic((weight / weight.sum()).astype(np.float32), rng.random(), chosen)
         return chosen
 
-    def any_heading(self, state: Floats32, rng: np.random.Generator) -> Floats32:
-        """Return four times as many hypotheses that know nothing of their heading error."""
-        turned = np.tile(state, _TIMES_WITHOUT_COMPASS)
+    def any_heading(self, state: Floats32, times: int, rng: np.random.Generator) -> Floats32:
+        """Return so many times as many hypotheses, which know nothing of their heading error.
+
+        Each is moved within its pixel, too.
+        """
+        turned = np.tile(state, times)
+        resolution_m = _F(self.area.lattice.resolution_m)
+        spread = rng.random((2, turned.shape[1]), dtype=np.float32) - _F(0.5)
+        turned[: NORTH + 1] += resolution_m * spread
         turned[BIAS] = pi * (2 * rng.random(turned.shape[1]) - 1)
         return turned
 

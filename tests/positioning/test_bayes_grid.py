@@ -20,7 +20,7 @@ ERRORS = MotionErrors(
     step_sd_m=4.0, typical_step_m=5.0, heading_sd_rad=0.7, bias_sd_rad=0.08,
     bias_drift_rad_per_sqrt_m=0.004, scale_sd=0.0,
 )  # fmt: skip
-BLOCK_M = 25.0
+COARSE_M, FINE_M = 50.0, 25.0
 
 
 @pytest.fixture(scope="module")
@@ -58,20 +58,20 @@ def positioner(area, *, grid, count=100_000):
     return BayesPositioner(model, options, grid=grid)
 
 
-def blocks(belief):
-    """Mass by squares of 25 m."""
-    edges = np.arange(-25, 450, BLOCK_M)
+def blocks(belief, side_m):
+    """Mass by squares."""
+    edges = np.arange(-25, 475, side_m)
     place = belief.state[0], belief.state[1]
     return np.histogram2d(*place, bins=(edges, edges), weights=belief.weight)[0]
 
 
-def beliefs(positioner, log, seed=0, count=30):
+def beliefs(positioner, log, side_m, seed=0, count=30):
     """Squares of mass after every tenth epoch."""
     rng, track, found = np.random.default_rng(seed), positioner.begin(), []
     for index, epoch in enumerate(epochs(log)[:count]):
         track, _ = positioner.advance(track, epoch, rng)
         if index % 10 == 9:
-            found.append(blocks(track.belief))
+            found.append(blocks(track.belief, side_m))
     return found
 
 
@@ -81,18 +81,20 @@ def variation(a, b):
 
 
 def test_particles_agree_with_the_grid(area, log):
-    exact = beliefs(positioner(area, grid=True), log)
-    for sampled, summed in zip(beliefs(positioner(area, grid=False), log), exact, strict=True):
+    exact = beliefs(positioner(area, grid=True), log, COARSE_M)
+    for sampled, summed in zip(
+        beliefs(positioner(area, grid=False), log, COARSE_M), exact, strict=True
+    ):
         assert summed.sum() == pytest.approx(1.0, abs=1e-3)
         assert variation(sampled, summed) <= 0.02
 
 
 def test_the_error_falls_with_the_root_of_the_number(area, log):
-    reference = beliefs(positioner(area, grid=False, count=400_000), log, count=30)[-1]
+    reference = beliefs(positioner(area, grid=False, count=400_000), log, FINE_M)[-1]
 
     def error(count):
         some = positioner(area, grid=False, count=count)
-        found = [beliefs(some, log, seed, count=30)[-1] for seed in range(30)]
+        found = [beliefs(some, log, FINE_M, seed)[-1] for seed in range(30)]
         return np.mean([variation(one, reference) for one in found])
 
     assert error(1000) / error(4000) == pytest.approx(2.0, rel=0.1)
