@@ -39,7 +39,7 @@ Floats = NDArray[np.float64]
 Curves = dict[str, Floats]
 
 QUANTITIES = ("location_m", "velocity_mps", "bias_m", "drift_mps")
-SUM_PARTS = MappingProxyType({0: 7, 2: 7, 1: 5, 3: 5})
+SUM_PARTS = MappingProxyType({0: 9, 2: 9, 1: 5, 3: 5})
 """Into how many the hard start is cut along east, north and their rates."""
 
 FAR_M = 500.0
