@@ -140,7 +140,7 @@ def _table_3() -> None:
 
 @njit(cache=True)
 def _mean(x: Floats, sats: Floats, sites: Floats, boresight: Floats) -> Floats:  # pragma: no cover
-    """Return the hybrid measurement, written for filterpy and compiled: it costs the peer nothing."""
+    """Return the hybrid measurement, compiled for filterpy, too: it costs the peer nothing."""
     found = np.empty(10)
     for i in range(2):
         up = np.sqrt((x[0] - sats[i, 0]) ** 2 + (x[2] - sats[i, 1]) ** 2 + sats[i, 2] ** 2)
