@@ -15,7 +15,7 @@ for each hypothesis and summed out exactly, so that no hypotheses are spent on i
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import exp
+from math import exp, radians
 
 import numpy as np
 from numba import njit
@@ -53,12 +53,12 @@ class MotionErrors:
     scale_drift_per_sqrt_m : float
     """
 
-    step_sd_m: float = 0.2
+    step_sd_m: float = 0.3
     typical_step_m: float = 1.4
-    heading_sd_rad: float = 0.1
-    bias_sd_rad: float = 0.02
-    bias_drift_rad_per_sqrt_m: float = 0.0005
-    scale_sd: float = 0.01
+    heading_sd_rad: float = radians(6.0)
+    bias_sd_rad: float = radians(3.0)
+    bias_drift_rad_per_sqrt_m: float = radians(0.05)
+    scale_sd: float = 0.02
     scale_drift_per_sqrt_m: float = 0.0
 
 

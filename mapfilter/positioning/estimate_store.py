@@ -18,7 +18,7 @@ from mapfilter._io import atomic_file
 from mapfilter.errors import Faults, InputError, StoreError, fail
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import unproject
-from mapfilter.positioning.estimate import TrackEstimate, UnusedReading
+from mapfilter.positioning.estimate import TrackEstimate, TrackEvidence, UnusedReading
 
 VERSION = 1
 _META = b"mapfilter"
@@ -28,6 +28,8 @@ _COLUMNS = (
     "radius_50_m", "radius_67_m", "radius_95_m", "status", "hypotheses", "mass_50m", "way_id",
     "way_probability", "reason",
 )  # fmt: skip
+
+_EVIDENCE = tuple(TrackEvidence.__dataclass_fields__)
 
 
 def write_estimate(estimate: TrackEstimate, path: str | Path) -> None:
@@ -56,9 +58,10 @@ def write_estimate(estimate: TrackEstimate, path: str | Path) -> None:
         estimate.way_probability,
         [str(r) for r in estimate.reason],
     )
-    frame = geopandas.GeoDataFrame(
-        dict(zip(_COLUMNS, values, strict=True)), geometry=points, crs=estimate.crs
-    )
+    columns: dict[str, Any] = dict(zip(_COLUMNS, values, strict=True))
+    if estimate.evidence is not None:
+        columns |= {name: getattr(estimate.evidence, name) for name in _EVIDENCE}
+    frame = geopandas.GeoDataFrame(columns, geometry=points, crs=estimate.crs)
     meta = {
         "version": VERSION,
         "crs": estimate.crs,
@@ -118,6 +121,9 @@ def _estimate(table: Any, meta: dict[str, Any], path: Path) -> TrackEstimate:
         axis=-2,
     )
     start = meta["start_utc_s"]
+    evidence = None
+    if set(_EVIDENCE) <= set(table.column_names):
+        evidence = TrackEvidence(*(table[name].to_numpy() for name in _EVIDENCE))
     return TrackEstimate(
         meta["crs"],
         meta["filter"],
@@ -134,6 +140,7 @@ def _estimate(table: Any, meta: dict[str, Any], path: Path) -> TrackEstimate:
         column["way_probability"],
         tuple(Reason(r) for r in column["reason"]),
         tuple(UnusedReading(t, kind, what, Reason(r)) for t, kind, what, r in meta["unused"]),
+        evidence,
     )
 
 
