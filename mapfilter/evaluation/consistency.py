@@ -133,7 +133,8 @@ def uniformity(ranks: ArrayLike) -> float:
 def nees(error_east_m: ArrayLike, error_north_m: ArrayLike, covariance_m2: ArrayLike) -> Floats:
     """Return normalised estimation errors squared, shape (N,).
 
-    They are 2 on average where beliefs are normal and calibrated. NaN where a covariance is unknown or has no inverse.
+    They are 2 on average where beliefs are normal and calibrated, and NaN where a covariance is
+    unknown or has no inverse.
 
     Examples
     --------
@@ -145,8 +146,10 @@ def nees(error_east_m: ArrayLike, error_north_m: ArrayLike, covariance_m2: Array
     )
     covariance = np.asarray(covariance_m2, dtype=np.float64)
     found = np.full(len(error), np.nan)
-    known = np.isfinite(covariance).all(axis=(1, 2)) & np.isfinite(error).all(axis=1)
-    known = np.asarray(known & (np.linalg.det(np.where(known[:, None, None], covariance, 0)) > 0))
+    whole = np.concatenate([covariance.reshape(len(error), 4), error], axis=1)
+    finite = np.isfinite(whole).all(axis=1, keepdims=True)
+    determinant = np.linalg.det(np.where(finite[..., np.newaxis], covariance, 0.0))
+    known = np.flatnonzero(determinant > 0)
     solved = np.linalg.solve(covariance[known], error[known][..., None])[..., 0]
     found[known] = np.sum(error[known] * solved, axis=1)
     return found

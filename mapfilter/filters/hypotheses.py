@@ -172,14 +172,7 @@ def _summarise(
         cy = south_m + (best // cols + 0.5) * size_m
         if hypothesis == 0:
             for _ in range(2):
-                total = sx = sy = 0.0
-                for i in range(weight.size):
-                    if (east[i] - cx) ** 2 + (north[i] - cy) ** 2 <= NEAR_M**2:
-                        total += weight[i]
-                        sx += weight[i] * east[i]
-                        sy += weight[i] * north[i]
-                if total > 0:
-                    cx, cy = sx / total, sy / total
+                cx, cy = _mean_near(east, north, weight, cx, cy)
             x, y = cx, cy
         else:
             found[place], found[place + 1], found[place + 2] = cx, cy, most
@@ -193,29 +186,57 @@ def _summarise(
     found[size + 13] = entropy / log(2.0)
 
 
-@njit(error_model="numpy", cache=True)
+@njit(error_model="numpy", fastmath={"contract", "reassoc", "nsz"}, cache=True)
+def _mean_near(
+    east: Floats32, north: Floats32, weight: Floats32, x: float, y: float
+) -> tuple[float, float]:
+    """Return the mean of what lies near a place, or the place where nothing does."""
+    cx, cy, reach = np.float32(x), np.float32(y), np.float32(NEAR_M**2)
+    total, sx, sy = np.float32(0.0), np.float32(0.0), np.float32(0.0)
+    for i in range(weight.size):
+        dx, dy = east[i] - cx, north[i] - cy
+        w = weight[i] if dx * dx + dy * dy <= reach else np.float32(0.0)
+        total += w
+        sx += w * dx
+        sy += w * dy
+    if total <= 0:
+        return x, y
+    return x + sx / total, y + sy / total
+
+
+@njit(error_model="numpy", fastmath={"contract", "reassoc", "nsz"}, cache=True)
 def _moments(state: Floats32, weight: Floats32, x: float, y: float, found: Floats) -> None:
     """Fill mean, covariance, radii and the mass near a place."""
-    size = state.shape[0]
+    size, count = state.shape[0], weight.size
     east, north = state[0], state[1]
-    near = 0.0
-    by_radius = np.zeros(_RADIUS_BINS + 1)
+    cx, cy, reach = np.float32(x), np.float32(y), np.float32(NEAR_M**2)
+    zero, rings = np.float32(0.0), np.float32(_RINGS_PER_SQRT_M)
+    near = np.empty(count, dtype=np.float32)
+    ring_of = np.empty(count, dtype=np.int32)
+    mass = xx = yy = xy = 0.0
     # Ever wider rings, of a decimetre at 2 m and of a metre at 200 m; the last ends at 18 km.
-    for i in range(weight.size):
-        dx, dy = east[i] - x, north[i] - y
-        square, w = dx * dx + dy * dy, float(weight[i])
-        if square <= NEAR_M**2:
-            near += w
-            for r in range(size):
-                found[r] += w * state[r, i]
-            found[size] += w * dx * dx
-            found[size + 1] += w * dy * dy
-            found[size + 2] += w * dx * dy
-        ring = int(_RINGS_PER_SQRT_M * square**0.25)
-        by_radius[min(ring, _RADIUS_BINS)] += w
-    if near > 0:
+    for i in range(count):
+        dx, dy = east[i] - cx, north[i] - cy
+        square = dx * dx + dy * dy
+        w = weight[i] if square <= reach else zero
+        near[i] = w
+        mass += w
+        xx += w * dx * dx
+        yy += w * dy * dy
+        xy += w * dx * dy
+        ring_of[i] = np.int32(rings * np.sqrt(np.sqrt(square)))
+    for r in range(size):
+        row, total = state[r], 0.0
+        for i in range(count):
+            total += near[i] * row[i]
+        found[r] = total
+    found[size], found[size + 1], found[size + 2] = xx, yy, xy
+    by_radius = np.zeros(_RADIUS_BINS + 1)
+    for i in range(count):
+        by_radius[min(ring_of[i], _RADIUS_BINS)] += weight[i]
+    if mass > 0:
         for r in range(size + 3):
-            found[r] /= near
+            found[r] /= mass
     passed, ring = 0.0, 0
     for k in range(3):
         while ring <= _RADIUS_BINS and passed + by_radius[ring] < SHARES[k]:
@@ -223,4 +244,4 @@ def _moments(state: Floats32, weight: Floats32, x: float, y: float, found: Float
             ring += 1
         inside = (SHARES[k] - passed) / by_radius[ring] if ring <= _RADIUS_BINS else 1.0
         found[size + 3 + k] = ((ring + inside) / _RINGS_PER_SQRT_M) ** 2
-    found[size + 6] = near
+    found[size + 6] = mass
