@@ -201,7 +201,7 @@ def _mean_near(
         sy += w * dy
     if total <= 0:
         return x, y
-    return x + sx / total, y + sy / total
+    return x + float(sx / total), y + float(sy / total)
 
 
 @njit(error_model="numpy", fastmath={"contract", "reassoc", "nsz"}, cache=True)
@@ -228,7 +228,7 @@ def _moments(state: Floats32, weight: Floats32, x: float, y: float, found: Float
     for r in range(size):
         row, total = state[r], 0.0
         for i in range(count):
-            total += near[i] * row[i]
+            total += float(near[i] * row[i])
         found[r] = total
     found[size], found[size + 1], found[size + 2] = xx, yy, xy
     by_radius = np.zeros(_RADIUS_BINS + 1)
