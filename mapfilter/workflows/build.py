@@ -162,7 +162,8 @@ def run_dry_build(config: Config) -> BuildEstimate:
 def _raster_world(config: Config) -> tuple[RxLevRasters, CellPlan, World]:
     """Return rasters, plan, and the world on the rasters' lattice, cut to the area if one is given.
 
-    A plan by rule is laid out over the whole rasters, as when they were predicted.
+    The rasters are then read as if they held no more than that: a database is of the area that it
+    was built for, and merged it has no word beyond it. A plan by rule is laid out over the whole rasters, as when they were predicted.
     """
     rasters = planned_rasters(config)
     lattice, area = rasters.lattice, config.area
@@ -176,8 +177,9 @@ def _raster_world(config: Config) -> tuple[RxLevRasters, CellPlan, World]:
     if area.bbox is None and area.southwest is None:
         return rasters, whole.plan, whole
     cut = _cut(lattice, area, str(rasters.path))
-    world = whole if cut == lattice else World(config, cut)
-    return rasters, whole.plan, world
+    if cut == lattice:
+        return rasters, whole.plan, whole
+    return replace(rasters, lattice=cut), whole.plan, World(config, cut)
 
 
 def _cut(lattice: Lattice, area: Area, name: str) -> Lattice:
