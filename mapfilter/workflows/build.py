@@ -163,7 +163,8 @@ def _raster_world(config: Config) -> tuple[RxLevRasters, CellPlan, World]:
     """Return rasters, plan, and the world on the rasters' lattice, cut to the area if one is given.
 
     The rasters are then read as if they held no more than that: a database is of the area that it
-    was built for, and merged it has no word beyond it. A plan by rule is laid out over the whole rasters, as when they were predicted.
+    was built for, and merged it has no word beyond it. A plan by rule is laid out over the whole
+    rasters, as when they were predicted.
     """
     rasters = planned_rasters(config)
     lattice, area = rasters.lattice, config.area
