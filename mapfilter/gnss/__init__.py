@@ -1,0 +1,1 @@
+"""Satellites: almanacs, where they stand, and which of them are seen."""
