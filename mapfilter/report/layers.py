@@ -32,7 +32,11 @@ _MOST_NAMES = 60
 def map_picture(path: Path, base: BaseMap, beside_in: float) -> Iterator[tuple[Figure, Axes]]:
     """Give a figure with one map and so much room beside it; write it as :func:`picture` does."""
     with picture(path, MAP_IN + beside_in, map_height_in(base, MAP_IN) + 0.85) as figure:
-        yield figure, figure.subplots()
+        axes = figure.subplots()
+        # Kept at the left: the layout reckons the room for its labels before the map's shape is
+        # fitted, and a map moved off its labels' room would have them cut off.
+        axes.set_anchor("W")
+        yield figure, axes
 
 
 def shape_faults(raster: NDArray[np.generic], lattice: Lattice) -> Faults:

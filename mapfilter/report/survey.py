@@ -182,7 +182,8 @@ def plot_left_out(
         told = f"RMSE {rmse_db:.1f} dB"
         if trend_dbm is not None:
             told += f" (trend alone {_rms(measured_dbm - trend_dbm):.1f} dB)"
-        bias = f"{float(error_db.mean()):+.1f}".replace("-", "\N{MINUS SIGN}")
+        mean_db = round(float(error_db.mean()), 1)
+        bias = f"{mean_db:+.1f}".replace("-", "\N{MINUS SIGN}") if mean_db else "0.0"
         told += f"\nbias {bias} dB\n{grouped(error_db.size)} measurements"
         axes.text(
             0.025, 0.975, told, transform=axes.transAxes, ha="left", va="top", linespacing=1.5,
