@@ -213,12 +213,12 @@ def _moments(state: Floats32, weight: Floats32, x: float, y: float, found: Float
     zero, rings = np.float32(0.0), np.float32(_RINGS_PER_SQRT_M)
     near = np.empty(count, dtype=np.float32)
     ring_of = np.empty(count, dtype=np.int32)
-    mass = xx = yy = xy = 0.0
+    mass, xx, yy, xy = 0.0, 0.0, 0.0, 0.0
     # Ever wider rings, of a decimetre at 2 m and of a metre at 200 m; the last ends at 18 km.
     for i in range(count):
         dx, dy = east[i] - cx, north[i] - cy
         square = dx * dx + dy * dy
-        w = weight[i] if square <= reach else zero
+        w = float(weight[i] if square <= reach else zero)
         near[i] = w
         mass += w
         xx += w * dx * dx

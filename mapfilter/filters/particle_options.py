@@ -42,8 +42,8 @@ class ParticleOptions:
     per_bin: float = 60.0
     resample_below: float = 0.5
     flatten: float = 0.5
-    jitter: tuple[float, ...] = (1.0, 1.0, 0.005, 0.003, 0.0)
-    switch_mass: float = 0.98
+    jitter: tuple[float, ...] = (0.5, 0.5, 0.005, 0.003, 0.0)
+    switch_mass: float = 0.99
     switch_hold_m: float = 14.0
 
     def __post_init__(self) -> None:

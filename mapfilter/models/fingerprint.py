@@ -52,7 +52,7 @@ class LevelErrors:
         Exponent of the likelihood; below 1 where the model is not trusted to be exact.
     """
 
-    sd_db: float = 8.0
+    sd_db: float = 10.0
     correlation_m: float = 50.0
     measurement_db: float = 1.5
     roughness_db: float = 6.0
