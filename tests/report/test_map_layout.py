@@ -33,7 +33,7 @@ def test_no_bias_has_no_sign(tmp_path, monkeypatch):
     told = []
     monkeypatch.setattr("matplotlib.axes.Axes.text", lambda *args, **_: told.append(args[3]))
     measured = np.array([-80.0, -70.0, -60.0, -50.0])
-    predicted = measured + [0.01, 0.0, -0.0, 0.01]
+    predicted = measured + 0.005
     plot_left_out(measured, predicted, tmp_path / "left-out.png")
     assert "bias 0.0 dB" in told[0]
     plot_left_out(measured, predicted + 1.0, tmp_path / "left-out.png")
