@@ -87,6 +87,23 @@ def picture(path: Path, width_in: float, height_in: float) -> Iterator[Figure]:
             figure.savefig(temporary, format="png", dpi=DPI, metadata={"Software": None})
 
 
+def bottom_legend(figure: Figure, most_columns: int) -> None:
+    """Put a legend of all that is labelled under the axes, in as many columns as there is room for.
+
+    Parameters
+    ----------
+    figure : Figure
+        One of :func:`picture`.
+    most_columns : int
+    """
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    for columns in range(most_columns, 0, -1):
+        legend = figure.legend(loc="outside lower center", ncols=columns, frameon=False)
+        if columns == 1 or legend.get_window_extent(renderer).width <= figure.bbox.width:
+            return
+        legend.remove()
+
+
 def distinct_colours(count: int) -> list[str]:
     """Return colours that tell ``count`` groups apart, also for the colour-blind.
 

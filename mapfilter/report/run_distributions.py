@@ -10,7 +10,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
-from mapfilter.report.canvas import GREY, VERMILLION, distinct_colours, picture
+from mapfilter.report.canvas import GREY, VERMILLION, bottom_legend, distinct_colours, picture
 
 _SIZE_IN = (11.0, 4.6)
 _FARTHEST_M = 200.0
@@ -66,7 +66,7 @@ def plot_run_distributions(
             axes.spines[["top", "right"]].set_visible(False)
         figure.suptitle(title, fontsize=11)
         if groups:
-            figure.legend(loc="outside lower center", ncols=4, frameon=False)
+            bottom_legend(figure, 4)
 
 
 def _draw(axes: Axes, values: pd.Series, total: int, colour: str, name: str) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from mapfilter.evaluation.success_cells import SuccessCell
-from mapfilter.report.canvas import BLACK, distinct_colours, picture
+from mapfilter.report.canvas import BLACK, bottom_legend, distinct_colours, picture
 
 _SIZE_IN = (8.4, 5.2)
 
@@ -76,7 +76,7 @@ def plot_success_curves(
         axes.set_axisbelow(True)
         axes.spines[["top", "right"]].set_visible(False)
         if curves or claims:
-            figure.legend(loc="outside lower center", ncols=3, frameon=False)
+            bottom_legend(figure, 3)
 
 
 def _draw_claims(axes: Axes, claims: Sequence[Claim], claimant: str) -> None:

@@ -50,6 +50,13 @@ def test_curves(tmp_path, curves, claims):
     assert inked(path) > 0.005
 
 
+def test_a_legend_of_long_names_stays_within_the_picture(tmp_path):
+    path = tmp_path / "curves.png"
+    names = [f"set, 1 Hz, projected along the last heading, {n}" for n in range(11)]
+    plot_success_curves([(name, grid(6, 1)) for name in names], path, title="a town", claims=CLAIMS)
+    assert (matplotlib.image.imread(path)[:, [0, 1, -2, -1], :3] == 1.0).all()
+
+
 def test_equal_curves_give_equal_bytes(tmp_path):
     for name in ("a", "b"):
         plot_success_curves([("set", grid())], tmp_path / name, title="a town", claims=CLAIMS)
