@@ -96,10 +96,9 @@ def bottom_legend(figure: Figure, most_columns: int) -> None:
         One of :func:`picture`.
     most_columns : int
     """
-    renderer = FigureCanvasAgg(figure).get_renderer()
     for columns in range(most_columns, 0, -1):
         legend = figure.legend(loc="outside lower center", ncols=columns, frameon=False)
-        if columns == 1 or legend.get_window_extent(renderer).width <= figure.bbox.width:
+        if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
             return
         legend.remove()
 
