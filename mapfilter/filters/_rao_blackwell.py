@@ -1,0 +1,238 @@
+"""The loops over particles of :mod:`mapfilter.filters.rao_blackwell`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import float64, int64, njit, types
+from numpy.typing import NDArray
+
+from mapfilter._kernels import hashed, normals
+from mapfilter.filters._updates import MEASURE_SIGNATURE
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_LANES = 256
+"""Particles that are weighed at once: what they need stays in the nearest cache."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+def move(
+    state: Floats, row: Ints, column: Ints, entry: Floats, gain: Floats, key: np.uint64,
+    moved: Floats,
+) -> None:  # pragma: no cover  # fmt: skip
+    """Write ``x + A x + G ε`` for each particle.
+
+    Parameters
+    ----------
+    state : (n, N) array
+    row, column, entry : (e,) arrays
+        A by its entries.
+    gain : (n, d) array
+        G.
+    key : numpy.uint64
+        ε is counted from it.
+    moved : (n, N) array
+        Written.
+    """
+    n, count = state.shape
+    sources = gain.shape[1]
+    half = (sources * _LANES + 1) // 2
+    drawn = np.empty(2 * half, dtype=np.float32)
+    for begin in range(0, count, _LANES):
+        lanes = min(_LANES, count - begin)
+        first = np.uint64(begin) << np.uint64(16)
+        for k in range(half):
+            a, b = normals(hashed(key, first + np.uint64(k)))
+            drawn[k] = a
+            drawn[half + k] = b
+        for i in range(n):
+            to, source = moved[i, begin : begin + lanes], state[i, begin : begin + lanes]
+            for k in range(lanes):
+                to[k] = source[k]
+            for j in range(sources):
+                share = gain[i, j]
+                if share != 0.0:
+                    noise = drawn[j * _LANES : j * _LANES + lanes]
+                    for k in range(lanes):
+                        to[k] += share * noise[k]
+        for e in range(entry.size):
+            to = moved[row[e], begin : begin + lanes]
+            source, value = state[column[e], begin : begin + lanes], entry[e]
+            for k in range(lanes):
+                to[k] += value * source[k]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def gains(
+    slope: Floats, covariance: Floats, noise: Floats
+) -> tuple[Floats, Floats, Floats, float]:  # pragma: no cover
+    """Return what a linear reading makes of a covariance.
+
+    Parameters
+    ----------
+    slope : (m, n) array
+        C.
+    covariance : (n, n) array
+        P.
+    noise : (m, m) array
+        R.
+
+    Returns
+    -------
+    inverse : (m, m) array
+        L⁻¹ with ``L Lᵀ = C P Cᵀ + R``.
+    gain : (n, m) array
+        ``P Cᵀ L⁻ᵀ``, the gain for residuals whitened by L⁻¹.
+    updated : (n, n) array
+        ``P - P Cᵀ (L Lᵀ)⁻¹ C P``.
+    log_root : float
+        Logarithm of the determinant of L; NaN where there is none.
+    """
+    m, n = slope.shape
+    factor, inverse = np.zeros((m, m)), np.zeros((m, m))
+    crossed = np.zeros((n, m))
+    for a in range(n):
+        for b in range(n):
+            if covariance[a, b] != 0.0:
+                for i in range(m):
+                    crossed[a, i] += covariance[a, b] * slope[i, b]
+    log_root = 0.0
+    for i in range(m):
+        for j in range(i + 1):
+            value = noise[i, j]
+            for a in range(n):
+                value += slope[i, a] * crossed[a, j]
+            for k in range(j):
+                value -= factor[i, k] * factor[j, k]
+            factor[i, j] = np.sqrt(value) if i == j else value / factor[j, j]
+        log_root += np.log(factor[i, i])
+        inverse[i, i] = 1.0 / factor[i, i]
+        for j in range(i):
+            value = 0.0
+            for k in range(j, i):
+                value -= factor[i, k] * inverse[k, j]
+            inverse[i, j] = value / factor[i, i]
+    gain, updated = np.zeros((n, m)), covariance.copy()
+    for a in range(n):
+        for i in range(m):
+            for j in range(i + 1):
+                gain[a, i] += inverse[i, j] * crossed[a, j]
+    for a in range(n):
+        for b in range(n):
+            for i in range(m):
+                updated[a, b] -= gain[a, i] * gain[b, i]
+    return inverse, gain, updated, log_root
+
+
+@njit(
+    [
+        float64(
+            types.FunctionType(MEASURE_SIGNATURE), int64[::1], int64[::1], float64[:, ::1],
+            float64[::1], float64[::1], float64[:, ::1], int64[::1], float64[:, ::1], int64[::1],
+            int64[::1], float64[::1], float64[:, ::1], float64[::1],
+        )
+    ],
+    cache=True, nogil=True, error_model="numpy", fastmath={"contract"},
+)  # fmt: skip
+def weigh(
+    measure: Any, slots: Ints, uses: Ints, rows: Floats, patterns: Floats, reading: Floats,
+    inverse: Floats, used: Ints, gain: Floats, row: Ints, column: Ints, entry: Floats,
+    state: Floats, log_weight: Floats,
+) -> float:  # pragma: no cover  # fmt: skip
+    """Add the log density of a reading to each weight, and correct the means; both in place.
+
+    Parameters
+    ----------
+    measure, slots, uses, rows, patterns
+        As of :class:`mapfilter.filters.trials.CompiledMeasurement`.
+    reading : (m,) array
+    inverse : (m, m) array
+        Inverse of the lower Cholesky factor of the reading's covariance.
+    used : (u,) integer array
+        Components that are corrected.
+    gain : (u, m) array
+        Their gains for whitened residuals.
+    row, column, entry : (e,) arrays
+        What else of the state adds to the reading.
+    state : (n, N) array
+    log_weight : (N,) array
+
+    Returns
+    -------
+    float
+        Smallest normalised square of a residual.
+    """
+    m = reading.size
+    count = state.shape[1]
+    slope = np.zeros((1, 1, 1))
+    least = np.inf
+    for begin in range(0, count, _LANES):
+        lanes = min(_LANES, count - begin)
+        points, mean = np.empty((uses.size, lanes)), np.empty((m, lanes))
+        white, square = np.empty(lanes), np.zeros(lanes)
+        for a in range(uses.size):
+            points[a] = state[uses[a], begin : begin + lanes]
+        measure(points, slots, rows, patterns, mean, slope, False)
+        for e in range(entry.size):
+            to, source, value = mean[row[e]], state[column[e]], entry[e]
+            for k in range(lanes):
+                to[k] += value * source[begin + k]
+        for i in range(m):
+            own, given = mean[i], reading[i]
+            for k in range(lanes):
+                own[k] = given - own[k]
+        for i in range(m):
+            white[:] = 0.0
+            for j in range(i + 1):
+                share = inverse[i, j]
+                if share != 0.0:
+                    own = mean[j]
+                    for k in range(lanes):
+                        white[k] += share * own[k]
+            for k in range(lanes):
+                square[k] += white[k] * white[k]
+            for c in range(used.size):
+                step = gain[c, i]
+                if step != 0.0:
+                    own = state[used[c]]
+                    for k in range(lanes):
+                        own[begin + k] += step * white[k]
+        for k in range(lanes):
+            log_weight[begin + k] -= 0.5 * square[k]
+            least = min(least, square[k])
+    return least
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def copies(state: Floats, chosen: NDArray[np.int32], out: Floats) -> None:  # pragma: no cover
+    """Write the chosen particles of ``state`` (n, N) to ``out`` (n, M)."""
+    for i in range(state.shape[0]):
+        source, to = state[i], out[i]
+        for k in range(chosen.size):
+            to[k] = source[np.uint32(chosen[k])]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def sums(state: Floats, weight: NDArray[np.float32]) -> tuple[Floats, Floats]:  # pragma: no cover
+    """Return the weighted mean and covariance of particles (n, N)."""
+    n, count = state.shape
+    mean, spread = np.zeros(n), np.zeros((n, n))
+    total = 0.0
+    for k in range(count):
+        total += weight[k]
+    for i in range(n):
+        centre, one = 0.0, state[i]
+        origin = one[0]
+        for k in range(count):
+            centre += weight[k] * (one[k] - origin)
+        mean[i] = origin + centre / total
+    for i in range(n):
+        for j in range(i + 1):
+            product, one, two = 0.0, state[i], state[j]
+            for k in range(count):
+                product += weight[k] * (one[k] - mean[i]) * (two[k] - mean[j])
+            spread[i, j] = spread[j, i] = product / total
+    return mean, spread
