@@ -14,9 +14,9 @@ from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
+from mapfilter.filters.grid_transport import shifted, taps, turned
 from mapfilter.filters.hypotheses import Bins, Summary, nothing, summarise
 from mapfilter.filters.particle_options import ParticleOptions
 from mapfilter.filters.switch import switched
@@ -28,8 +28,6 @@ PriorT = TypeVar("PriorT", contravariant=True)
 ReadingT = TypeVar("ReadingT", contravariant=True)
 
 _LEAST_MASS = 1e-9
-_REACH_SD = 4.0
-_LEAST_SD_PX = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -259,47 +257,15 @@ def _moved(belief: GridBelief) -> GridBelief:
     step = model.transport(*belief.waiting_m)
     on, off = np.empty_like(belief.on), np.empty_like(belief.off)
     for b in range(on.shape[0]):
-        right = _taps(step.right_px[b], step.sd_right_px[b])
-        down = _taps(step.down_px[b], step.sd_down_px[b])
+        right = taps(step.right_px[b], step.sd_right_px[b])
+        down = taps(step.down_px[b], step.sd_down_px[b])
         for source, target in ((belief.on, on), (belief.off, off)):
-            target[b] = _shifted(_shifted(source[b], *right, axis=1), *down, axis=0)
+            target[b] = shifted(shifted(source[b], *right, axis=1), *down, axis=0)
     if step.turned_bins > 0 and on.shape[0] > 1:
-        taps = _taps(0.0, step.turned_bins)
-        on, off = (_turned(mass, *taps, circular=model.circular) for mass in (on, off))
+        spread = taps(0.0, step.turned_bins)
+        on, off = (turned(mass, *spread, circular=model.circular) for mass in (on, off))
     leave, come_back = np.float32(step.leave), np.float32(step.come_back)
     stayed = on * (1 - leave) + off * come_back
     away = on * leave + off * (1 - come_back)
     waiting = (0.0, 0.0, 0.0)
     return replace(belief, on=stayed * step.on, off=away * np.float32(step.off), waiting_m=waiting)
-
-
-def _taps(shift_px: float, sd_px: float) -> tuple[int, Floats32]:
-    """Return how far the first tap shifts, and a Gaussian's share of each pixel."""
-    sd_px = max(sd_px, _LEAST_SD_PX)
-    first = int(np.floor(shift_px - _REACH_SD * sd_px))
-    last = int(np.ceil(shift_px + _REACH_SD * sd_px))
-    edges = np.arange(first, last + 2) - 0.5
-    return first, np.diff(ndtr((edges - shift_px) / sd_px)).astype(np.float32)
-
-
-def _shifted(mass: Floats32, first: int, taps: Floats32, *, axis: int) -> Floats32:
-    """Spread mass along an axis; what leaves the lattice is lost."""
-    spread = np.zeros_like(mass)
-    size = mass.shape[axis]
-    for k, tap in enumerate(taps, start=first):
-        if abs(k) >= size or tap < 1e-7:
-            continue
-        target, source = [slice(None)] * mass.ndim, [slice(None)] * mass.ndim
-        target[axis] = slice(max(k, 0), size + min(k, 0))
-        source[axis] = slice(max(-k, 0), size - max(k, 0))
-        spread[tuple(target)] += tap * mass[tuple(source)]
-    return spread
-
-
-def _turned(mass: Floats32, first: int, taps: Floats32, *, circular: bool) -> Floats32:
-    if not circular:
-        return _shifted(mass, first, taps, axis=0)
-    return np.asarray(
-        sum(tap * np.roll(mass, k, axis=0) for k, tap in enumerate(taps, start=first)),
-        dtype=np.float32,
-    )

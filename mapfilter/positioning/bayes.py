@@ -22,10 +22,11 @@ from mapfilter.filters.particle_options import ParticleOptions
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.area_map import AreaMap
 from mapfilter.positioning.bayes_model import BayesModel, Start
+from mapfilter.positioning.bayes_track import BayesTrack as BayesTrack
+from mapfilter.positioning.bayes_track import News as News
 from mapfilter.positioning.challenger import (
     Challenger,
     ChallengeRules,
-    Doubt,
     MapBelief,
     Verdict,
     judge,
@@ -39,61 +40,6 @@ from mapfilter.positioning.matched_way import matched_way
 _STREET_SHARE = 0.3
 _MOST_TIMES, _SEARCHING_TIMES = 12, 8
 _FIRST_GRAIN_M, _LEAST_GRAIN_M = 5.0, 1.5
-
-
-@dataclass(frozen=True, eq=False)
-class BayesTrack:
-    """What is known after an epoch.
-
-    Parameters
-    ----------
-    memory : Memory
-        Of dead reckoning and levels.
-    belief : MapBelief or None
-        None before the first report that can be placed.
-    heading_rad : float
-        Of the last step; without a compass counted from the first one.
-    compass : bool
-        Whether headings are a compass's.
-    status : Status
-    doubt : Doubt
-    challenger : Challenger or None
-        Beside a belief in doubt.
-    wins : int
-        How many challengers have taken over.
-    """
-
-    memory: Memory
-    belief: MapBelief | None = None
-    heading_rad: float = nan
-    compass: bool = True
-    status: Status = Status.SEARCHING
-    doubt: Doubt = field(default_factory=Doubt)
-    challenger: Challenger | None = None
-    wins: int = 0
-
-    @property
-    def leading(self) -> MapBelief | None:
-        """The belief to go by: the challenger's where the first one is lost."""
-        lost = self.status is Status.LOST and self.challenger is not None
-        return self.challenger.belief if lost and self.challenger else self.belief
-
-
-@dataclass(frozen=True, slots=True)
-class News:
-    """What one epoch brought.
-
-    Parameters
-    ----------
-    fix : Fix
-    evidence : tuple of float
-        Runner-up's east, north and mass, entropy in bits, log evidence.
-    unused : tuple of UnusedReading
-    """
-
-    fix: Fix
-    evidence: tuple[float, float, float, float, float]
-    unused: tuple[UnusedReading, ...]
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,17 @@ cells count by the metre, and levels by what is new in them (see :mod:`mapfilter
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import cos, exp, inf, isfinite, nan, sin, sqrt
+from math import exp, isfinite, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mapfilter.filters.contract import MotionStep, Reason
+from mapfilter.filters.contract import Reason
 from mapfilter.models.cell_id import ServingWeights
 from mapfilter.models.fingerprint import BoundReading, LevelErrors, LevelReading
 from mapfilter.positioning.area_map import AreaMap
 from mapfilter.positioning.epochs import Epoch, GnssFix, Heard
+from mapfilter.positioning.memory import Memory as Memory
 from mapfilter.tracks.schema import SERVING
 
 Floats = NDArray[np.float64]
@@ -68,6 +69,9 @@ class RadioReading:
         Log probability on average where the belief is right.
     length_m : float
         Travelled since the last report that was used.
+    timing_advance : float
+        Of the serving cell, in steps; NaN where it was not told. Only models that know what is
+        usual there take it.
     """
 
     serving: int = -1
@@ -77,52 +81,7 @@ class RadioReading:
     fix: GnssFix | None = None
     expected: float = 0.0
     length_m: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class Memory:
-    """What is kept from one report to the next.
-
-    Parameters
-    ----------
-    travelled_m, east_m, north_m : float
-        By dead reckoning since the start; east and north in the frame of its headings.
-    used_at_m : float
-        Distance at the last report that was used; minus infinity before the first.
-    back_east_m, back_north_m : float
-        Displacement since then.
-    level_dbm, heard_at_m : ndarray, shape (C,)
-        Level of each cell when it was last heard inside the scale, and the distance then.
-    """
-
-    level_dbm: Floats
-    heard_at_m: Floats
-    travelled_m: float = 0.0
-    east_m: float = 0.0
-    north_m: float = 0.0
-    used_at_m: float = -inf
-    back_east_m: float = 0.0
-    back_north_m: float = 0.0
-
-    @classmethod
-    def empty(cls, cells: int) -> Memory:
-        """Return the memory of one who has heard nothing."""
-        return cls(np.full(cells, nan), np.full(cells, -inf))
-
-    def moved(self, step: MotionStep) -> Memory:
-        """Return the memory after a step."""
-        if not isfinite(step.step_m):
-            return self
-        heading = step.heading_rad if isfinite(step.heading_rad) else 0.0
-        east_m, north_m = step.step_m * cos(heading), step.step_m * sin(heading)
-        return replace(
-            self,
-            travelled_m=self.travelled_m + abs(step.step_m),
-            east_m=self.east_m + east_m,
-            north_m=self.north_m + north_m,
-            back_east_m=self.back_east_m + east_m,
-            back_north_m=self.back_north_m + north_m,
-        )
+    timing_advance: float = nan
 
 
 Unplaced = tuple[Heard, Reason]
@@ -195,6 +154,7 @@ def reading_of(
         epoch.fix,
         -surprise - by_levels,
         0.0 if first else since_m,
+        _timing_advance(epoch) if serving >= 0 else nan,
     )
     memory = replace(
         memory,
@@ -218,6 +178,10 @@ def _serving(area: AreaMap, epoch: Epoch) -> tuple[int, Reason, list[Unplaced]]:
         return area.band_of[cell], Reason.USED, more
     known = cell in area.known_ids
     return -1, Reason.NO_POINTS_IN_CELL if known else Reason.UNKNOWN_CELL, more
+
+
+def _timing_advance(epoch: Epoch) -> float:
+    return next((row.timing_advance for row in epoch.heard if row.role == SERVING), nan)
 
 
 def _placed(
