@@ -27,6 +27,8 @@ class Heard:
         NaN where it was not reported.
     censored : int
         -1: below; 1: above what is told; 0: this.
+    timing_advance : float
+        Steps; NaN where it was not reported.
     """
 
     role: str
@@ -35,6 +37,7 @@ class Heard:
     bsic: int | None
     level_dbm: float
     censored: int
+    timing_advance: float = nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,10 +84,11 @@ def epochs(log: TrackLog) -> list[Epoch]:
     for time_s, *step in _rows(log.motion, ("time_s", "step_m", "heading_rad", "turn_rad")):
         motion.setdefault(time_s, []).append(MotionStep(*step))
     heard: dict[float, list[Heard]] = {}
-    names = ("time_s", "role", "cell", "arfcn", "bsic", "level_dbm", "censored")
-    for time_s, role, cell, arfcn, bsic, level_dbm, censored in _rows(log.radio, names):
+    names = ("time_s", "role", "cell", "arfcn", "bsic", "level_dbm", "censored", "timing_advance")
+    for time_s, role, cell, arfcn, bsic, level_dbm, censored, steps in _rows(log.radio, names):
         level = float(level_dbm) if level_dbm is not None else nan
-        row = Heard(role, cell, arfcn, bsic, level, censored or 0)
+        advance = float(steps) if steps is not None else nan
+        row = Heard(role, cell, arfcn, bsic, level, censored or 0, advance)
         heard.setdefault(time_s, []).append(row)
     fixes = {
         time_s: GnssFix(*place)
