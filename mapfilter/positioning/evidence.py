@@ -8,7 +8,7 @@ cells count by the metre, and levels by what is new in them (see :mod:`mapfilter
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import exp, isfinite, sqrt
+from math import exp, isfinite, nan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
