@@ -133,7 +133,7 @@ def test_a_setting_inside_a_value_of_the_file(write):
         ("24.9420,160.1660,24.9495,160.1697", "(likely: longitude and latitude swapped)"),
         ("385795,6671660,386230,6672090", "(likely: metres given for degrees)"),
         ("24.9495,60.1697,24.9420,60.1660", "(likely: corners swapped)"),
-        ("8.6,49.3,8.7,49.4", "(likely: the area lies outside the map; name another, or none where"),
+        ("8.6,49.3,8.7,49.4", "(likely: the area lies outside the map; name another, or none"),
     ],
 )
 @pytest.mark.parametrize("command", ["predict", "build", "simulate"])

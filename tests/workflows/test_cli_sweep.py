@@ -34,7 +34,8 @@ def parts(world):
     """Plan, world and databases of one sweep."""
     config = load_config(world.toml, GIVEN)
     plan, databases = sweep_plan(config)
-    return plan, sweep_world(config, plan.radios), {name: one.path for name, one in databases.items()}
+    folders = {name: one.path for name, one in databases.items()}
+    return plan, sweep_world(config, plan.radios), folders
 
 
 @pytest.fixture(scope="module")
@@ -160,7 +161,7 @@ def test_another_sweep_is_not_resumed(parts, world, tmp_path):
         sweep(*parts, tmp_path, executor=StopsAfter(1), in_flight=1)
     config = load_config(world.toml, [*GIVEN, "sweep.seed=5"])
     plan, _ = sweep_plan(config)
-    with pytest.raises(ConfigError, match="another the plan"):
+    with pytest.raises(ConfigError, match="found another plan "):
         sweep(plan, *parts[1:], tmp_path, resume=True)
     # Without --resume it starts anew.
     assert len(read_runs(sweep(plan, *parts[1:], tmp_path))) == RUNS
