@@ -104,6 +104,9 @@ def _area(config: Config, rasters: RxLevRasters | None, findings: Findings) -> L
                 return None
     if about is not None and not _says_where(config):
         return about
+    if findings.found and not config.area.has_extent and config.rasters_path.exists():
+        # What keeps the rasters, which would tell the area, from being read is told already.
+        return None
     try:
         return area_lattice(config.area)
     except MapfilterError as error:
@@ -167,7 +170,7 @@ def _plan(inputs: _Inputs, findings: Findings) -> CellPlan | None:
 def _check_rasters(
     rasters: RxLevRasters, plan: CellPlan | None, config: Config, findings: Findings
 ) -> None:
-    check_pixels(rasters, config, findings)
+    check_pixels(rasters, findings)
     before = len(findings.found)
     samples = sampled(rasters, plan, findings)
     as_declared = len(findings.found) == before
@@ -228,6 +231,8 @@ def _check_roads(inputs: _Inputs, area: Lattice, findings: Findings) -> None:
             files = (config.roads.layer, *config.roads.tracks.files)
             source = next((str(path) for path in files if path is not None), config.area.map)
             check_ways(ways, rasters, f"{source} and {rasters.path}", findings)
+        if gaps := world.streets.gaps:
+            findings.add("ways-with-gaps", "roads.half_width_m", f"{_sentence(gaps)}.", "warning")
         return
     try:
         _ = world.landuse
@@ -245,6 +250,10 @@ def _check_landuse_pixels(path: Path, rasters: RxLevRasters, findings: Findings)
     except RasterioError:
         return
     check_same_pixels(str(path), (transform.c, transform.a, transform.f), rasters, findings)
+
+
+def _sentence(note: str) -> str:
+    return note[:1].upper() + note[1:]
 
 
 def _plan_name(config: Config) -> str:

@@ -26,6 +26,7 @@ Move = Callable[[Floats, Floats], tuple[Floats, Floats]]
 _HALF_TOLERANCE_PX = 0.02
 _SAME_SIDE = 1e-6
 _OUTSIDE_SHARE = 0.05
+_AT_EDGE_M = 1.0
 _MOST_ZONES = 2
 _NEARLY_ALL = 0.9
 
@@ -96,8 +97,11 @@ def check_sites(plan: CellPlan, lattice: Lattice, where: str, findings: Findings
     return frozenset(ids)
 
 
-def check_pixels(rasters: RxLevRasters, config: Config, findings: Findings) -> None:
-    """See whether rasters are half a pixel off the area's lattice, or off one another."""
+def check_pixels(rasters: RxLevRasters, findings: Findings) -> None:
+    """See whether rasters are half a pixel off one another, or off multiples of their own pixels.
+
+    The lattice of an area lies on multiples of its pixels, and so do those of nearly all exports.
+    """
     lattice = rasters.lattice
     names: list[str] = []
     steps: list[tuple[float, float]] = []
@@ -111,13 +115,12 @@ def check_pixels(rasters: RxLevRasters, config: Config, findings: Findings) -> N
         where = f"{rasters.path}, {listed(names)}"
         findings.add("half-pixel-shift", where, evidence, "warning")
         return
-    side_m = config.area.resolution_m
-    if not math.isclose(side_m, lattice.resolution_m, rel_tol=_SAME_SIDE):
-        return
     step = _half_step(lattice, 0.0, 0.0)
     if step is not None:
         corner = f"{lattice.west_m:.10g}, {lattice.north_m:.10g}"
-        evidence = f"{_step(step)} off multiples of {side_m:g} m: their corner is {corner}."
+        evidence = (
+            f"{_step(step)} off multiples of {lattice.resolution_m:g} m: their corner is {corner}."
+        )
         findings.add("half-pixel-shift", str(rasters.path), evidence, "warning")
 
 
@@ -171,7 +174,7 @@ def _overlap(a: BoxDeg, b: BoxDeg) -> bool:
 
 
 def _inside(east: Floats, north: Floats, lattice: Lattice) -> NDArray[np.bool_]:
-    west, south, right, top = lattice.bounds_m
+    west, south, right, top = np.array(lattice.bounds_m) + _AT_EDGE_M * np.array([-1, -1, 1, 1])
     return np.asarray((east >= west) & (east <= right) & (north >= south) & (north <= top))
 
 

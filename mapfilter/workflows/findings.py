@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
+from operator import attrgetter
 from typing import Literal
 
 from mapfilter.errors import Fault, MapfilterError
 
 Severity = Literal["error", "warning"]
+
+_MOST_ALIKE = 3
 
 REMEDIES = {
     "antenna-frequency": "Name the pattern measured for the cell's band.",
@@ -67,6 +71,8 @@ REMEDIES = {
     "site-off-peak": "Correct the site's position, or take the raster that belongs to the cell.",
     "site-outside-area": "Correct the position, or take the cell out if it is not of this area.",
     "values-implausible": "Check rasters.factor and rasters.quantity.",
+    "ways-with-gaps": "Raise half widths to half a pixel, or read the rasters on finer pixels "
+    "(rasters.resolution_m; of rasters that mapfilter predicts, area.resolution_m).",
 }
 """What helps, by code."""
 
@@ -183,11 +189,19 @@ class Findings:
 
 
 def paragraphs(result: CheckResult) -> Iterable[str]:
-    """Yield one paragraph for each finding, or one that says that there is none."""
+    """Yield one paragraph for each finding, or one that says that there is none.
+
+    Of many alike, such as the same mistake in each row of a table, only the first few are told.
+    """
     if not result.findings:
         yield "Nothing found that looks wrong."
-    for finding in result.findings:
-        yield str(finding)
+    kind = attrgetter("severity", "code", "remedy")
+    for _, alike in groupby(result.findings, kind):
+        found = list(alike)
+        yield from map(str, found[:_MOST_ALIKE])
+        if more := found[_MOST_ALIKE:]:
+            last = f", the last of them {more[-1].where}" if len(more) > 1 else f": {more[0].where}"
+            yield f"{more[0].severity} {more[0].code}: {len(more)} more{last}."
 
 
 def listed(ids: Sequence[str], most: int = 8) -> str:

@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+import shapely
 
 from mapfilter.database.manifest import InputRole
 from mapfilter.errors import ConfigError, fail
@@ -108,11 +109,36 @@ class Streets:
             return self.landuse.notes
         roads, told = self.config.roads, list(self._roads[2])
         told += _unused(roads.half_width_by_class_m, self._roads[0].class_names)
+        if self.gaps:
+            told.append(self.gaps)
         if roads.cut_buildings and len(self.buildings):
             told.append(f"{len(self.buildings)} buildings cut out")
         if self._water is not None:
             told.append(f"{len(self._water)} waters cut out, save under bridges")
         return tuple(told)
+
+    @property
+    def gaps(self) -> str:
+        """Which ways are narrower than a pixel, so that their points have gaps; or nothing.
+
+        A corridor as wide as a pixel holds a pixel's centre in each row or column that it crosses.
+        """
+        roads, side_m = self.config.roads, self.lattice.resolution_m
+        if self.landuse is not None:
+            return ""
+        ways = self.ways
+        default_m, by_class_m = roads.half_width_m, roads.half_width_by_class_m
+        width_m = 2 * np.array([by_class_m.get(name, default_m) for name in ways.class_names])
+        narrow = (width_m > 0) & (width_m < side_m)
+        length_m = shapely.length(ways.geometry)
+        gappy_m = float(length_m[narrow[ways.way_class]].sum())
+        if gappy_m == 0:
+            return ""
+        least_m = width_m[narrow][np.isin(np.flatnonzero(narrow), ways.way_class)].min()
+        return (
+            f"{gappy_m / length_m.sum():.0%} of the ways, down to {least_m:g} m wide, are narrower "
+            f"than the pixels of {side_m:g} m: their points have gaps"
+        )
 
     @property
     def files(self) -> tuple[tuple[InputRole, Path], ...]:

@@ -32,7 +32,7 @@ def test_the_demo_where_reality_differs_from_the_prediction(predicted):
 
 
 def test_a_plan_by_rule_before_anything_runs(tmp_path):
-    assert_nothing_found(f"--set=output.dir={tmp_path}", "--set=area.resolution_m=20")
+    assert_nothing_found(f"--set=output.dir={tmp_path}", "--set=area.resolution_m=10")
 
 
 def test_porto(shared_data, tmp_path):
