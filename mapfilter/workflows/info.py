@@ -5,6 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import rasterio
+from rasterio.errors import RasterioError
+
+from mapfilter.database.cog import BANDS, CELLS_TAG
 from mapfilter.database.manifest import MANIFEST
 from mapfilter.database.store import info, open_database
 from mapfilter.errors import InputError, fail
@@ -51,11 +55,23 @@ def _no_raster(path: Path) -> str:
         return "a map; use it as area.map"
     if path.stem in TABLES or is_log(path.parent):
         return "a part of a log; name the folder that it lies in"
+    if path.suffix.lower() == ".gpkg":
+        return "an exported database, or a layer of roads; QGIS and geopandas open it"
+    if path.suffix.lower() in (".tif", ".tiff") and _is_export(path):
+        return "best servers that mapfilter export wrote; QGIS and rasterio open it"
     if path.suffix == ".toml":
         return "a configuration; give it to a command with -c"
     if path.suffix == ".csv" and _INDEX_COLUMN not in _first_line(path):
         return "a cell plan; use it as cells.plan"
     return ""
+
+
+def _is_export(path: Path) -> bool:
+    try:
+        with rasterio.open(path) as source:
+            return CELLS_TAG in source.tags() and source.descriptions == tuple(dict(BANDS))
+    except RasterioError:
+        return False
 
 
 def _first_line(path: Path) -> bytes:

@@ -66,12 +66,13 @@ def groups_of(runs: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
 
 
 def _title(at: Mapping[str, object], several: list[str]) -> str:
-    told = [f"{at['filter']}: {at['reading']}"]
-    for name in several:
-        if name in _UNITS:
-            told.append(_UNITS[name].format(at[name]))
-        elif name in ("database", "radio"):
-            told.append(str(at[name]))
+    name, reading = at["filter"], at["reading"]
+    told = [f"{name} filter" if reading == name else f"{name} filter: {reading}"]
+    for axis in several:
+        if axis in _UNITS:
+            told.append(_UNITS[axis].format(at[axis]))
+        elif axis in ("database", "radio"):
+            told.append(str(at[axis]))
     return ", ".join(told)
 
 

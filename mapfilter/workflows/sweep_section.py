@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from mapfilter.workflows.fields import NotNegative, Positive, Section, Seed
 from mapfilter.workflows.survey_section import Files
@@ -15,7 +15,13 @@ def _listed(value: Any) -> Any:
     return [value] if isinstance(value, int | float) else value
 
 
-_AXIS = (BeforeValidator(_listed), Field(strict=False, min_length=1))
+def _each_once(values: tuple[float, ...]) -> tuple[float, ...]:
+    if len(set(values)) < len(values):
+        raise ValueError("every value once")
+    return values
+
+
+_AXIS = (BeforeValidator(_listed), Field(strict=False, min_length=1), AfterValidator(_each_once))
 _Below1 = Annotated[float, Field(ge=0, lt=1)]
 _Degrees = Annotated[float, Field(ge=0, le=360)]
 

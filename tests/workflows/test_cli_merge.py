@@ -37,6 +37,12 @@ def test_best_server_as_geotiff(world, tmp_path):
     with rasterio.open(file) as source:
         assert json.loads(source.tags()["CELLS"]) == ["A", "B", "C"]
         assert source.count == 3
+    assert_refused(mapfilter("info", file), "best servers that mapfilter export wrote")
+
+
+def test_info_knows_a_geopackage(world, tmp_path):
+    assert_done(mapfilter("export", world.database, "--to", tmp_path / "points.gpkg"))
+    assert_refused(mapfilter("info", tmp_path / "points.gpkg"), "an exported database")
 
 
 def test_resume_of_nothing_is_a_build(own_world):

@@ -277,3 +277,8 @@ def test_sweeps_and_simulate_hear_alike(world, parts, tmp_path):
     )
     best = swept.levels_dbm["as_predicted"][:, row, col].argmax(axis=0)
     assert [swept.plan.ids[i] for i in best] == serving["cell"].tolist()
+
+
+def test_a_value_given_twice_is_told_by_its_key(world):
+    twice = mapfilter("sweep", "-c", world.toml, "--set=sweep.sigma_orient_deg=3,3")
+    assert_refused(twice, "sweep.sigma_orient_deg: expected every value once")

@@ -167,16 +167,16 @@ def _known(out: Path, head: Mapping[str, object]) -> bool:
         return False
     found = read_json(out / HEAD)
     names = {
-        "plan_sha256": "the plan",
-        "world_sha256": "streets, cells or levels",
-        "databases_sha256": "a database",
-        "version": "the version of mapfilter",
+        "plan_sha256": "another plan",
+        "world_sha256": "other streets, cells or levels",
+        "databases_sha256": "another database",
+        "version": "another version of mapfilter",
     }
     changed = [told for name, told in names.items() if found.get(name) != head[name]]
     if changed:
         expected = "a sweep of the same plan over the same world to resume"
         hint = "settings changed since; sweep without --resume, or into another folder"
-        raise fail(ConfigError, str(out), expected, f"another {', another '.join(changed)}", hint)
+        raise fail(ConfigError, str(out), expected, ", ".join(changed), hint)
     return True
 
 
