@@ -25,7 +25,7 @@ _PLACES = 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Squares:
+class MeanLevels:
     """Mean levels of a raster in coarse squares.
 
     Parameters
@@ -41,7 +41,7 @@ class Squares:
     side_m: float
 
 
-def in_squares(sample: RasterSample) -> Squares | None:
+def in_squares(sample: RasterSample) -> MeanLevels | None:
     """Average a raster in at most 40 x 40 squares; None where there is too little to judge by."""
     values = sample.values.astype(np.float64)
     step = max(1, -(-max(values.shape) // _SIDE))
@@ -57,10 +57,10 @@ def in_squares(sample: RasterSample) -> Squares | None:
     middle = np.arange(max(rows, cols)) * step + (step - 1) / 2
     row, col = np.nonzero(known)
     east_m, north_m = sample.lattice.east_north(middle[row], middle[col])
-    return Squares(east_m, north_m, level_db, step * sample.lattice.resolution_m)
+    return MeanLevels(east_m, north_m, level_db, step * sample.lattice.resolution_m)
 
 
-def place_fit(squares: Squares, east_m: float, north_m: float) -> float:
+def place_fit(squares: MeanLevels, east_m: float, north_m: float) -> float:
     """Return how well a place explains levels: the multiple correlation, 0..1.
 
     Levels that become stronger with the distance count as not depending on it.
@@ -85,7 +85,7 @@ def place_fit(squares: Squares, east_m: float, north_m: float) -> float:
 
 
 def best_place(
-    squares: Squares, sample: RasterSample, others: Iterable[tuple[float, float]] = ()
+    squares: MeanLevels, sample: RasterSample, others: Iterable[tuple[float, float]] = ()
 ) -> tuple[float, tuple[float, float]]:
     """Return the best fit and its place, among a grid over the raster, its peak, and others."""
     west, south, east, north = sample.lattice.bounds_m
