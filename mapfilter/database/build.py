@@ -124,7 +124,10 @@ def build(
         if written.heard == 0:
             expected = f"a level of at least {floor_dbm:g} dBm at a point"
             hint = "floor too high, or rasters hold no data along the roads"
-            got = "none" if written.points else "no point of the roads on the rasters"
+            got = "none"
+            if not written.points:
+                hint = "roads beside the rasters, or narrower than their pixels"
+                got = "no point of the roads on the rasters"
             raise fail(InputError, str(rasters.path), expected, got, hint)
         counts = {
             "points": written.heard,

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
 import rasterio
-from rasterio.errors import RasterioError
+from rasterio.errors import NotGeoreferencedWarning, RasterioError
 
 from mapfilter.database.cog import BANDS, CELLS_TAG
 from mapfilter.database.manifest import MANIFEST
@@ -68,7 +69,11 @@ def _no_raster(path: Path) -> str:
 
 def _is_export(path: Path) -> bool:
     try:
-        with rasterio.open(path) as source:
+        with warnings.catch_warnings():
+            # A file that is cut off may have lost its place; its own reader tells so.
+            warnings.simplefilter("ignore", NotGeoreferencedWarning)
+            source = rasterio.open(path)
+        with source:
             return CELLS_TAG in source.tags() and source.descriptions == tuple(dict(BANDS))
     except RasterioError:
         return False

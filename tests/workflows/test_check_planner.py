@@ -4,7 +4,7 @@ import re
 
 import pytest
 from check_world import base_levels, make_world, shifted
-from command_line import assert_done, mapfilter, settings
+from command_line import assert_done, assert_refused, mapfilter, settings
 
 from mapfilter.workflows.findings import Findings, paragraphs
 
@@ -43,6 +43,13 @@ def test_ways_narrower_than_a_pixel_are_told(world):
     notes = assert_done(mapfilter("build", "-c", world.toml, *given, "--json")).json["notes"]
     told = "100% of the ways, down to 8 m wide, are narrower than the pixels of 10 m"
     assert any(told in note for note in notes)
+
+
+def test_a_build_without_a_point_says_why(world):
+    world.write()
+    given = settings(roads__half_width_m=4.0, output__dir=world.folder)
+    built = mapfilter("build", "-c", world.toml, *given)
+    assert_refused(built, "no point of the roads", "narrower than their pixels")
 
 
 def test_of_rasters_that_cannot_be_read_nothing_else_is_told(world):
