@@ -20,7 +20,7 @@ from mapfilter.workflows.terminal import print_result, rate_bar
 
 
 def evaluate(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="global-positioning.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="global-positioning or ottawa.")],
     map_file: Annotated[
         Path | None,
         typer.Option("--map", metavar="FILE", help="An OpenStreetMap file.", callback=given_path),
@@ -35,7 +35,23 @@ def evaluate(
     filter_name: Annotated[
         str, typer.Option("--filter", metavar="NAME", help="bayes, grid or candidate.")
     ] = "bayes",
-    runs: Annotated[int, typer.Option("--runs", min=1, help="Routes for each case.")] = 20,
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            "--data",
+            metavar="DIR",
+            help="Folder of the data sets, for ottawa.",
+            callback=given_path,
+        ),
+    ] = None,
+    runs: Annotated[
+        int | None,
+        typer.Option(
+            "--runs",
+            min=1,
+            help="Routes for each case (20); draws of the noise for each session (3).",
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of what is drawn.")] = 0,
     workers: Annotated[int, typer.Option("--workers", min=1, help="Local processes.")] = 2,
     resume: ResumeOption = False,
@@ -44,11 +60,14 @@ def evaluate(
     out: OutOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Tell how well a filter finds itself, in many cases, on any map."""
+    """Tell how well a filter finds itself: in many cases, on any map, or on real sessions."""
     from mapfilter.workflows.config import load_config
-    from mapfilter.workflows.evaluate import check_benchmark, run_global_positioning
+    from mapfilter.workflows.evaluate import RUNS, check_benchmark, run_global_positioning
 
-    check_benchmark(name)
+    check_benchmark(name, data)
+    if name == "ottawa" and data is not None:
+        _ottawa(data, out, runs, seed, as_json)
+        return
     given = list(settings or ())
     if map_file is not None:
         given.append(f"area.map={toml(str(map_file))}")
@@ -61,11 +80,20 @@ def evaluate(
         result = run_global_positioning(
             loaded,
             folder,
-            runs=runs,
+            runs=runs or RUNS,
             seed=seed,
             cases=cases or (),
             workers=workers,
             resume=resume,
             progress=progress,
         )
+    print_result(result, as_json)
+
+
+def _ottawa(data: Path, out: Path | None, runs: int | None, seed: int, as_json: bool) -> None:
+    from mapfilter.workflows.evaluate_ottawa import RUNS, run_ottawa
+
+    folder = (out or Path("out") / "ottawa").absolute()
+    with rate_bar("evaluate", "sessions") as progress:
+        result = run_ottawa(data, folder, runs=runs or RUNS, seed=seed, progress=progress)
     print_result(result, as_json)

@@ -29,7 +29,8 @@ from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.sections import Config
 from mapfilter.workflows.world import World
 
-NAMES = ("global-positioning",)
+NAMES = ("global-positioning", "ottawa")
+RUNS = 20
 TABLE = "table.json"
 _MISSING = 0.1
 
@@ -59,8 +60,8 @@ class EvaluateResult:
     out: Path
 
 
-def check_benchmark(name: str) -> None:
-    """See that there is such a benchmark.
+def check_benchmark(name: str, data: Path | None = None) -> None:
+    """See that there is such a benchmark, and data where it needs them.
 
     Raises
     ------
@@ -69,6 +70,8 @@ def check_benchmark(name: str) -> None:
     """
     if name not in NAMES:
         raise fail(ConfigError, "evaluate", ", ".join(NAMES), name)
+    if name == "ottawa" and data is None:
+        raise fail(ConfigError, "--data", "the folder of the data sets", "none")
 
 
 def check_cases(names: Sequence[str]) -> tuple[str, ...]:

@@ -1,0 +1,225 @@
+"""Real phones in Ottawa: each session is found on the map that the other sessions made.
+
+A phone tells its serving cell, RSRP and timing advance; speed and bearing by GNSS, with noise and
+bias added, are its dead reckoning. Positions by GNSS are the truth where they are good enough.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from math import radians
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
+from mapfilter.experiments.benchmarks.ottawa_sessions import (
+    ReckoningErrors,
+    Session,
+    centroids,
+    session_log,
+)
+from mapfilter.filters.contract import Status
+from mapfilter.models.cell_id import ServingWeights
+from mapfilter.models.fingerprint import LevelErrors
+from mapfilter.models.heard_maps import HeardMaps, HeardOptions, HeardRows
+from mapfilter.models.street_motion import MapWeights, MotionErrors
+from mapfilter.positioning.bayes import BayesPositioner
+from mapfilter.positioning.bayes_options import BayesOptions, open_area
+from mapfilter.positioning.bayes_replay import position_by_bayes
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.evidence import EvidenceOptions
+from mapfilter.positioning.heard_model import HeardModel
+from mapfilter.radio.shadowing import named_rng
+from mapfilter.tracks.log import TrackLog
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+PARTS = ("lacolyoc", "uottawa", "carling")
+FOLDER = "cell-ottawa-lte"
+LEFT_OUT = ("OpenCellID_20200830",)
+"""Beginnings of files that are no session of their part: another drive, of 27 km."""
+GOOD_M = 20.0
+"""Fixes of this reported accuracy, or better, are scored."""
+MAP_M = 50.0
+"""Fixes of this accuracy make maps."""
+METHODS = ("bayes", "smoothed")
+_ON_MAP_M = 50.0
+
+
+@dataclass(frozen=True)
+class OttawaOptions:
+    """How the filter is set; chosen on the part ``carling`` alone.
+
+    GNSS smooths its speed, so that steps are 5 to 25 % too short, at every corner by another share:
+    the scale is wide and drifts.
+    """
+
+    filter: BayesOptions = field(
+        default_factory=lambda: BayesOptions(
+            motion=MotionErrors(
+                step_sd_m=1.0,
+                typical_step_m=14.0,
+                heading_sd_rad=radians(10.0),
+                bias_sd_rad=radians(6.0),
+                bias_drift_rad_per_sqrt_m=radians(0.4),
+                scale_sd=0.15,
+                scale_drift_per_sqrt_m=0.01,
+            ),
+            map=MapWeights(sd_m=12.0),
+            evidence=EvidenceOptions(
+                serving=ServingWeights(weight_per_m=1 / 25),
+                levels=LevelErrors(sd_db=5.0, correlation_m=60.0, measurement_db=3.0),
+            ),
+        )
+    )
+    heard: HeardOptions = field(default_factory=HeardOptions)
+    errors: ReckoningErrors = field(default_factory=ReckoningErrors)
+
+
+@dataclass(frozen=True, eq=False)
+class FoundSession:
+    """One session found once by one method; N fixes are scored.
+
+    Parameters
+    ----------
+    part, session, method : str
+    on_map : float
+        Share of all good fixes that lie within 50 m of the map.
+    converged, success : bool
+        At most 50 m off at the first good fix from CONVERGED on.
+    switch_m : float
+        Metres by dead reckoning until CONVERGED.
+    error_at_switch_m : float
+    lost : int
+        Epochs that were LOST.
+    error_m : ndarray, shape (N,)
+        Of the good fixes from CONVERGED on; of all good fixes for ``smoothed``.
+    covered : ndarray of bool, shape (N,)
+        Whether the 95 % radius held the fix.
+    """
+
+    part: str
+    session: str
+    method: str
+    on_map: float
+    converged: bool
+    success: bool
+    switch_m: float
+    error_at_switch_m: float
+    lost: int
+    error_m: Floats
+    covered: Bools
+
+
+def surveyed_positioner(
+    database: RadioRouteDatabase,
+    others: Sequence[Session],
+    options: OttawaOptions,
+    level_sd_db: float | None = None,
+) -> BayesPositioner:
+    """Return the filter over a map that sessions made.
+
+    Parameters
+    ----------
+    database : RadioRouteDatabase
+        Of the other sessions.
+    others : sequence of Session
+    options : OttawaOptions
+    level_sd_db : float, optional
+        Deviation of a new reading from the map of levels, as the survey tells it.
+    """
+    area, chosen = open_area(database), options.filter
+    if level_sd_db is not None:
+        levels = chosen.evidence.levels
+        lasting_db2 = level_sd_db**2 - levels.measurement_db**2
+        levels = replace(levels, sd_db=max(lasting_db2, 1.0) ** 0.5)
+        chosen = replace(chosen, evidence=replace(chosen.evidence, levels=levels))
+    crs = database.lattice.crs
+    places = np.concatenate([other.places(crs) for other in others])
+    good = np.concatenate([other.accuracy_m for other in others]) <= MAP_M
+    cell = np.array([area.band_of.get(name, -1) for other in others for name in other.cell])
+    steps = np.concatenate([other.timing_advance for other in others])
+    rows = HeardRows(cell[good], places[good, 0], places[good, 1], steps[good])
+    heard = HeardMaps.of_rows(rows, area.lattice, len(area.cell_ids), options.heard)
+    model = HeardModel(area, chosen.motion, chosen.map, chosen.evidence, heard)
+    return replace(chosen.over(area), model=model)
+
+
+def find_session(
+    part: str,
+    session: Session,
+    positioner: BayesPositioner,
+    options: OttawaOptions,
+    seed: int,
+    draw: int,
+) -> list[FoundSession]:
+    """Find a session from an unknown start, with one draw of the noise, by both methods."""
+    crs = positioner.area.lattice.crs
+    rng = named_rng(seed, "noise", session.name, str(draw))
+    log = session_log(session, crs, options.errors, rng)
+    found = []
+    for method in METHODS:
+        # The same stream of numbers: the filter below the smoother is the filter itself.
+        own = named_rng(seed, "filter", session.name, str(draw))
+        located = position_by_bayes(positioner, log, own, smooth=method == "smoothed")
+        found.append(_scored(part, session, method, log, located.estimate, positioner))
+    return found
+
+
+def centroid_errors_m(session: Session, others: Sequence[Session], crs: str) -> Floats:
+    """Return how far good fixes are from the mean place of their serving cell in other sessions."""
+    middle, places = centroids(others, crs, np.inf), session.places(crs)
+    return np.array(
+        [
+            np.hypot(*(places[i] - middle[cell]))
+            for i, cell in enumerate(session.cell)
+            if session.accuracy_m[i] <= GOOD_M and cell in middle
+        ]
+    )
+
+
+def _scored(
+    part: str,
+    session: Session,
+    method: str,
+    log: TrackLog,
+    estimate: TrackEstimate,
+    positioner: BayesPositioner,
+) -> FoundSession:
+    truth = log.truth[["east_m", "north_m"]].to_numpy()
+    at = np.searchsorted(estimate.time_s, log.truth["time_s"].to_numpy())
+    error_m = np.hypot(estimate.east_m[at] - truth[:, 0], estimate.north_m[at] - truth[:, 1])
+    good = (session.accuracy_m <= GOOD_M) & np.isfinite(error_m)
+    switch = estimate.converged_at
+    after = good & (at >= switch) if switch is not None else np.zeros_like(good)
+    first_m = float(error_m[after][0]) if after.any() else float("nan")
+    scored = good if method == "smoothed" else after
+    gone_m = float("nan")
+    if switch is not None:
+        before = log.motion["time_s"] <= estimate.time_s[switch]
+        gone_m = float(log.motion["step_m"][before].abs().sum())
+    return FoundSession(
+        part,
+        session.name,
+        method,
+        _on_map(positioner, truth[session.accuracy_m <= GOOD_M]),
+        switch is not None,
+        first_m <= SUCCESS_RADIUS_M,
+        gone_m,
+        first_m,
+        sum(status is Status.LOST for status in estimate.status),
+        error_m[scored],
+        (error_m <= estimate.radii_m[at, 2])[scored],
+    )
+
+
+def _on_map(positioner: BayesPositioner, places: Floats) -> float:
+    area = positioner.area
+    points = area.points.T + np.array(area.origin_m)
+    away_m, _ = cKDTree(points).query(places)
+    return float(np.mean(away_m <= _ON_MAP_M)) if len(places) else float("nan")

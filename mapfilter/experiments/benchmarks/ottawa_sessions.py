@@ -1,0 +1,189 @@
+"""Sessions of a phone that logged its serving cell: what is measured, and what is only truth.
+
+Speed and bearing by GNSS stand in for steps and headings, after stated errors have been added;
+positions are truth alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import radians
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mapfilter.errors import InputError, fail
+from mapfilter.geodesy import grid_convergence_rad, heading_from_azimuth_rad, project
+from mapfilter.tracks.log import TrackLog, make_log
+from mapfilter.tracks.schema import SERVING
+
+Floats = NDArray[np.float64]
+
+LONGEST_GAP_S = 30.0
+"""Nothing is known of the way over a longer silence."""
+_MOST_STEPS = 1282
+_COLUMNS = (
+    "mcc", "mnc", "lac", "cellid", "lat", "lon", "signal", "measured_at", "rating", "speed",
+    "direction", "ta",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class ReckoningErrors:
+    """What is added to speed and bearing.
+
+    Parameters
+    ----------
+    step_share : float
+        White noise of a step, as a share of it.
+    heading_sd_rad : float
+        White noise of a heading.
+    bias_rad : float
+        Of all headings of a session, to one side or the other.
+    """
+
+    step_share: float = 0.10
+    heading_sd_rad: float = radians(6.0)
+    bias_rad: float = radians(5.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """One session, in the order of time; N rows.
+
+    Parameters
+    ----------
+    name : str
+    path : Path
+    time_s : ndarray of float64, shape (N,)
+        Unix seconds.
+    lon_deg, lat_deg, accuracy_m : ndarray
+        By GNSS.
+    speed_mps, azimuth_deg : ndarray
+        By GNSS; clockwise from north.
+    cell : tuple of str
+        Serving.
+    level_dbm : ndarray
+        RSRP.
+    timing_advance : ndarray
+        Steps; NaN where it was not told.
+    """
+
+    name: str
+    path: Path
+    time_s: Floats
+    lon_deg: Floats
+    lat_deg: Floats
+    accuracy_m: Floats
+    speed_mps: Floats
+    azimuth_deg: Floats
+    cell: tuple[str, ...]
+    level_dbm: Floats
+    timing_advance: Floats
+
+    def __len__(self) -> int:
+        return self.time_s.size
+
+    def places(self, crs: str) -> Floats:
+        """Return east and north by GNSS, shape (N, 2)."""
+        return np.column_stack(project(crs, self.lon_deg, self.lat_deg))
+
+
+def read_session(path: Path) -> Session:
+    """Read a session from a file in OpenCellID's columns; of rows of one time the first counts.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, a column is missing, or there are not two rows.
+    """
+    try:
+        table = pd.read_csv(path, usecols=list(_COLUMNS))
+    except (OSError, ValueError) as error:
+        expected = f"CSV with the columns {', '.join(_COLUMNS)}"
+        raise fail(InputError, str(path), expected, error) from error
+    numbers = table.apply(pd.to_numeric, errors="coerce")
+    numbers = numbers.dropna(subset=["lat", "lon", "measured_at", "lac", "cellid", "signal"])
+    numbers = numbers.drop_duplicates("measured_at").sort_values("measured_at", kind="stable")
+    if len(numbers) < 2:
+        raise fail(InputError, str(path), "two rows or more", len(numbers))
+    steps = _column(numbers, "ta")
+    told = (steps >= 0) & (steps <= _MOST_STEPS)
+    identity = numbers[["mcc", "mnc", "lac", "cellid"]].astype(np.int64)
+    return Session(
+        path.stem,
+        path,
+        _column(numbers, "measured_at") / 1000,
+        _column(numbers, "lon"),
+        _column(numbers, "lat"),
+        _column(numbers, "rating"),
+        _column(numbers, "speed"),
+        _column(numbers, "direction"),
+        tuple("-".join(map(str, row)) for row in identity.itertuples(index=False)),
+        _column(numbers, "signal"),
+        np.where(told, steps, np.nan),
+    )
+
+
+def session_log(
+    session: Session, crs: str, errors: ReckoningErrors, rng: np.random.Generator
+) -> TrackLog:
+    """Return what a phone without GNSS would have logged, with the truth beside it.
+
+    Between two rows one goes half of the time by the first one's speed and bearing and half by the
+    second one's. Over a silence of more than 30 s no step is known.
+
+    Parameters
+    ----------
+    session : Session
+    crs : str
+        Of the log.
+    errors : ReckoningErrors
+    rng : numpy.random.Generator
+    """
+    time_s = session.time_s - session.time_s[0]
+    lon_deg, lat_deg = float(np.median(session.lon_deg)), float(np.median(session.lat_deg))
+    heading = heading_from_azimuth_rad(
+        session.azimuth_deg, grid_convergence_rad(crs, lon_deg, lat_deg)
+    )
+    half_s = np.diff(time_s) / 2
+    ends = np.column_stack([time_s[:-1] + half_s, time_s[1:]]).ravel()
+    # Rows 0, 1, 1, 2, 2, ...: each interval's halves belong to its two ends.
+    of = np.column_stack([np.arange(half_s.size), np.arange(1, half_s.size + 1)]).ravel()
+    length_s = np.repeat(half_s, 2)
+    step_m = np.where(2 * length_s <= LONGEST_GAP_S, session.speed_mps[of] * length_s, np.nan)
+    bias = errors.bias_rad * rng.choice([-1.0, 1.0])
+    step_m = step_m * (1 + errors.step_share * rng.standard_normal(of.size))
+    told = heading[of] + bias + errors.heading_sd_rad * rng.standard_normal(of.size)
+    motion = pd.DataFrame({"time_s": ends, "step_m": step_m, "heading_rad": _wrapped(told)})
+    radio = pd.DataFrame(
+        {
+            "time_s": time_s,
+            "role": SERVING,
+            "cell": session.cell,
+            "level_dbm": session.level_dbm,
+            "timing_advance": session.timing_advance,
+        }
+    )
+    east_m, north_m = session.places(crs).T
+    truth = pd.DataFrame({"time_s": time_s, "east_m": east_m, "north_m": north_m})
+    return make_log(crs, motion=motion, radio=radio, truth=truth, start_utc_s=session.time_s[0])
+
+
+def centroids(others: Sequence[Session], crs: str, accuracy_m: float) -> dict[str, Floats]:
+    """Return the mean place of each cell's rows in sessions, of fixes that are good enough."""
+    places = np.concatenate([other.places(crs) for other in others])
+    good = np.concatenate([other.accuracy_m for other in others]) <= accuracy_m
+    cell = np.array([name for other in others for name in other.cell])
+    return {str(name): places[good & (cell == name)].mean(axis=0) for name in np.unique(cell[good])}
+
+
+def _column(table: pd.DataFrame, name: str) -> Floats:
+    return np.asarray(table[name], dtype=np.float64)
+
+
+def _wrapped(angle_rad: Floats) -> Floats:
+    return np.asarray(np.angle(np.exp(1j * angle_rad)), dtype=np.float64)

@@ -1,0 +1,200 @@
+"""The table of sessions found: a row for each part and method, and one for each session."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapfilter.evaluation.success import wilson_interval, wilson_interval_of_routes
+from mapfilter.experiments.benchmarks.ottawa import METHODS, FoundSession
+
+Floats = NDArray[np.float64]
+
+_MAPPED_SHARE = 0.5
+
+
+@dataclass(frozen=True)
+class PartRow:
+    """What one method makes of one part.
+
+    Parameters
+    ----------
+    part : str
+    method : str
+        ``bayes``: from CONVERGED on; ``smoothed``: whole tracks in hindsight; both also as
+        ``-mapped``, of the sessions of which at least half lies within 50 m of where others were;
+        ``centroid``: the mean place of the serving cell's rows.
+    unit_count : int
+        Sessions, each left out once.
+    n : int
+        Fixes that were scored, over all draws of the noise.
+    median_m, mean_m, p95_m : float
+        Of their errors.
+    success, success_low, success_high : float
+        Share of the runs that converged at most 50 m off, with the 95 % Wilson interval over
+        sessions.
+    coverage_95 : float
+        Share of the scored fixes within the 95 % radius.
+    baseline_m : float
+        Median error of the centroids of the same sessions.
+    """
+
+    part: str
+    method: str
+    unit_count: int
+    n: int
+    median_m: float
+    mean_m: float
+    p95_m: float
+    success: float
+    success_low: float
+    success_high: float
+    coverage_95: float
+    baseline_m: float
+
+
+@dataclass(frozen=True)
+class SessionRow:
+    """What came of one session, over all draws of the noise.
+
+    Parameters
+    ----------
+    part, session : str
+    on_map : float
+        Share of its good fixes within 50 m of where others were.
+    runs, converged, successes : int
+    switch_m, error_at_switch_m : float
+        Medians over the runs that converged.
+    n : int
+        Fixes scored from CONVERGED on.
+    median_m, coverage_95 : float
+    smoothed_m : float
+        Median error of the whole track in hindsight.
+    centroid_m : float
+    lost : int
+        Epochs that were LOST.
+    """
+
+    part: str
+    session: str
+    on_map: float
+    runs: int
+    converged: int
+    successes: int
+    switch_m: float
+    error_at_switch_m: float
+    n: int
+    median_m: float
+    coverage_95: float
+    smoothed_m: float
+    centroid_m: float
+    lost: int
+
+
+def part_rows(
+    part: str, found: Sequence[FoundSession], centroid_m: dict[str, Floats]
+) -> list[PartRow]:
+    """Put the sessions of a part together.
+
+    Parameters
+    ----------
+    part : str
+    found : sequence of FoundSession
+        Of this part, by all methods.
+    centroid_m : dict of str to ndarray
+        Errors of the centroids, by session.
+    """
+    mapped = {one.session for one in found if one.on_map >= _MAPPED_SHARE}
+    rows = []
+    for method in METHODS:
+        own = [one for one in found if one.method == method]
+        rows.append(_row(part, method, own, centroid_m))
+        if mapped and len(mapped) < len(centroid_m):
+            some = [one for one in own if one.session in mapped]
+            rows.append(_row(part, f"{method}-mapped", some, centroid_m))
+    every = np.concatenate([np.empty(0), *centroid_m.values()])
+    told = _errors(every)
+    nan = float("nan")
+    rows.append(
+        PartRow(part, "centroid", len(centroid_m), every.size, *told, nan, nan, nan, nan, told[0])
+    )
+    return rows
+
+
+def session_rows(found: Sequence[FoundSession], centroid_m: dict[str, Floats]) -> list[SessionRow]:
+    """Tell what came of each session, in the order of their names."""
+    rows = []
+    for name in sorted({one.session for one in found}):
+        own = [one for one in found if one.session == name and one.method == "bayes"]
+        behind = [one for one in found if one.session == name and one.method == "smoothed"]
+        converged = [one for one in own if one.converged]
+        errors = np.concatenate([one.error_m for one in own])
+        rows.append(
+            SessionRow(
+                own[0].part,
+                name,
+                own[0].on_map,
+                len(own),
+                len(converged),
+                sum(one.success for one in own),
+                _median([one.switch_m for one in converged]),
+                _median([one.error_at_switch_m for one in converged]),
+                errors.size,
+                _median(errors),
+                _share([one.covered for one in own]),
+                _median(np.concatenate([np.empty(0), *(one.error_m for one in behind)])),
+                _median(centroid_m[name]),
+                sum(one.lost for one in own),
+            )
+        )
+    return rows
+
+
+def _row(
+    part: str, method: str, found: Sequence[FoundSession], centroid_m: dict[str, Floats]
+) -> PartRow:
+    names = sorted({one.session for one in found})
+    runs = [sum(one.session == name for one in found) for name in names]
+    good = [sum(one.success for one in found if one.session == name) for name in names]
+    if len(found) == len(names):
+        low, high = wilson_interval(sum(good), len(found))
+    else:
+        low, high = wilson_interval_of_routes(good, runs)
+    errors = np.concatenate([np.empty(0), *(one.error_m for one in found)])
+    baseline = np.concatenate([np.empty(0), *(centroid_m[name] for name in names)])
+    return PartRow(
+        part,
+        method,
+        len(names),
+        errors.size,
+        *_errors(errors),
+        sum(good) / len(found) if found else float("nan"),
+        low,
+        high,
+        _share([one.covered for one in found]),
+        _median(baseline),
+    )
+
+
+def _errors(errors_m: Floats) -> tuple[float, float, float]:
+    if not errors_m.size:
+        return float("nan"), float("nan"), float("nan")
+    return (
+        float(np.median(errors_m)),
+        float(np.mean(errors_m)),
+        float(np.quantile(errors_m, 0.95)),
+    )
+
+
+def _median(values: Sequence[float] | Floats) -> float:
+    known = np.asarray(values, dtype=np.float64)
+    known = known[np.isfinite(known)]
+    return float(np.median(known)) if known.size else float("nan")
+
+
+def _share(covered: Sequence[NDArray[np.bool_]]) -> float:
+    every = np.concatenate([np.empty(0, dtype=np.bool_), *covered])
+    return float(np.mean(every)) if every.size else float("nan")

@@ -1,0 +1,132 @@
+"""What earlier sessions say of a cell: how often it served at a place, at which timing advance.
+
+Where phones tell nothing but their serving cell, nobody knows how the others were heard, and a
+margin over the best other cell is made of extrapolations. What was served can be counted. Rows of
+sessions are spread by a Gaussian kernel (Nadaraya 1964; Watson 1964): with n rows of any cell about
+a place and n_c of one, that one serves with the probability ``(n_c + a p_c) / (n + a)``, with p_c
+its share of all rows and a the weight of not knowing. Timing advances get mean and deviation in
+the same way: buildings bend the way of the signal, so that rings about the site, whose place is
+not known either, say less than what was told nearby.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from mapfilter.geodesy import Lattice
+
+Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
+
+_CLIP_SD = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class HeardOptions:
+    """How rows are spread.
+
+    Parameters
+    ----------
+    reach_m : float
+        Standard deviation of the kernel.
+    prior_rows : float
+        Weight of not knowing: so many rows at a place say as much as all rows together.
+    rounding_steps : float
+        Standard deviation of a timing advance where all rows agree.
+    """
+
+    reach_m: float = 30.0
+    prior_rows: float = 1.0
+    rounding_steps: float = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class HeardRows:
+    """Rows of earlier sessions, shape (N,) each.
+
+    Parameters
+    ----------
+    cell : ndarray of int
+        Band of the serving cell; -1 for one that is not of the map.
+    east_m, north_m : ndarray
+    timing_advance : ndarray
+        Steps; NaN where it was not told.
+    """
+
+    cell: NDArray[np.int64]
+    east_m: Floats
+    north_m: Floats
+    timing_advance: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class HeardMaps:
+    """Maps on a lattice of P pixels, of C cells.
+
+    Parameters
+    ----------
+    log_share : ndarray of float32, shape (C, P)
+        Log probability that a cell serves.
+    advance_steps, deviation_steps : ndarray of float32, shape (C, P)
+        Timing advance; NaN for a cell of which none was told.
+    """
+
+    log_share: Floats32
+    advance_steps: Floats32
+    deviation_steps: Floats32
+
+    @classmethod
+    def of_rows(
+        cls, rows: HeardRows, lattice: Lattice, cells: int, options: HeardOptions
+    ) -> HeardMaps:
+        """Count rows on a lattice.
+
+        Rows outside it do not count.
+        """
+        row, col = lattice.row_col(rows.east_m, rows.north_m)
+        inside = np.asarray(lattice.contains(row, col))
+        pixel = (np.asarray(row) * lattice.cols + np.asarray(col))[inside]
+        cell, told = rows.cell[inside], rows.timing_advance[inside]
+        sigma = options.reach_m / lattice.resolution_m
+        # Scaled so that a row counts as one at its own place.
+        scale = 2 * np.pi * max(sigma, 1 / np.sqrt(2 * np.pi)) ** 2
+        shape = (lattice.rows, lattice.cols)
+
+        def spread(which: NDArray[np.bool_], value: Floats) -> Floats:
+            count = np.bincount(pixel[which], value[which], minlength=shape[0] * shape[1])
+            smooth = gaussian_filter(count.reshape(shape), sigma, mode="constant", truncate=3.0)
+            return np.asarray(scale * smooth, dtype=np.float64).ravel()
+
+        ones = np.ones(cell.size)
+        total = spread(ones > 0, ones) + options.prior_rows
+        maps = np.full((3, cells, shape[0] * shape[1]), np.nan, dtype=np.float32)
+        for band in range(cells):
+            own = cell == band
+            share = (np.sum(own) + 0.5) / (cell.size + 0.5 * cells)
+            maps[0, band] = np.log((spread(own, ones) + options.prior_rows * share) / total)
+            known = own & np.isfinite(told)
+            if not known.any():
+                continue
+            mean, variance = float(told[known].mean()), float(told[known].var())
+            prior = options.prior_rows
+            count = spread(known, ones) + prior
+            first = (spread(known, told) + prior * mean) / count
+            second = (spread(known, told**2) + prior * (variance + mean**2)) / count
+            maps[1, band] = first
+            maps[2, band] = np.sqrt(np.maximum(second - first**2, 0.0) + options.rounding_steps**2)
+        return cls(*maps)
+
+    def log_serving(self, band: int, pixel: NDArray[np.int32]) -> Floats32:
+        """Return the log-likelihood of a serving cell at pixels."""
+        return np.asarray(self.log_share[band][pixel])
+
+    def log_advance(self, band: int, pixel: NDArray[np.int32], steps: float) -> Floats32:
+        """Return the log-likelihood of a timing advance at pixels; 0 where nothing is known."""
+        deviation = self.deviation_steps[band][pixel]
+        beside = np.abs(steps - self.advance_steps[band][pixel]) / deviation
+        found = -0.5 * np.minimum(beside, _CLIP_SD) ** 2 - np.log(deviation)
+        return np.asarray(np.nan_to_num(found, nan=0.0), dtype=np.float32)

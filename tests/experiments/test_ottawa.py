@@ -1,0 +1,166 @@
+"""Sessions found on the map that other sessions made: a made block, and real walks."""
+
+import json
+import shutil
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mapfilter.errors import InputError
+from mapfilter.experiments.benchmarks.ottawa import FOLDER, centroid_errors_m
+from mapfilter.experiments.benchmarks.ottawa_sessions import (
+    ReckoningErrors,
+    read_session,
+    session_log,
+)
+from mapfilter.geodesy import unproject
+from mapfilter.workflows.evaluate_ottawa import run_ottawa
+
+CRS = "EPSG:32618"
+WEST, SOUTH = 445_000.0, 5_030_000.0
+ANTENNAS = {1: (-60.0, 40.0), 2: (300.0, 460.0), 3: (520.0, -40.0)}
+STEP_M, SPEED_MPS = 8.0, 4.0
+
+
+def write_ride(path, seed, start_s):
+    """A ride once and a half around a block of 400 m; the strongest cell serves."""
+    rng = np.random.default_rng(seed)
+    along_m = np.arange(0.0, 2400.0, STEP_M)
+    corners = np.array([[0, 0], [400, 0], [400, 300], [0, 300]] * 2 + [[0, 0]], dtype=float)
+    sides = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
+    place_m = np.column_stack([np.interp(along_m, sides, axis) for axis in corners.T])
+    ahead_m = np.column_stack([np.interp(along_m + 1, sides, axis) for axis in corners.T])
+    seen_m = place_m + rng.normal(0, 2, place_m.shape)
+    lon, lat = unproject(CRS, WEST + seen_m[:, 0], SOUTH + seen_m[:, 1])
+    distance_m = np.array([np.hypot(*(place_m - site).T) for site in ANTENNAS.values()])
+    level_dbm = -30 - 33 * np.log10(distance_m + 20) + 4 * np.sin(along_m / 60)
+    heard_dbm = level_dbm + rng.normal(0, 2, level_dbm.shape)
+    serving = np.argmax(heard_dbm, axis=0)
+    every = np.arange(along_m.size)
+    pd.DataFrame(
+        {
+            "mcc": 1, "mnc": 1, "lac": 7, "cellid": serving + 1, "lat": lat, "lon": lon,
+            "signal": heard_dbm[serving, every].round(),
+            "measured_at": (1000 * (start_s + along_m / SPEED_MPS)).round().astype(np.int64),
+            "rating": np.where(every % 10 == 9, 40.0, 6.0),
+            "speed": SPEED_MPS,
+            "direction": np.degrees(np.arctan2(*(ahead_m - place_m).T)) % 360,
+            "act": "LTE", "ta": distance_m[serving, every] // 78,
+        }
+    ).to_csv(path, index=False)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    data = tmp_path_factory.mktemp("made")
+    folder = data / FOLDER / "carling"
+    folder.mkdir(parents=True)
+    for number in range(3):
+        name = f"OpenCellID_2021010{number + 1}.csv"
+        write_ride(folder / name, number, 1_600_000_000 + 86_400 * number)
+    return data
+
+
+@pytest.fixture(scope="module")
+def found(made, tmp_path_factory):
+    return run_ottawa(made, tmp_path_factory.mktemp("found"), runs=1, parts=("carling",))
+
+
+def test_made_sessions_are_found_on_the_map_of_the_others(found):
+    rows = {row.method: row for row in found.rows}
+    assert list(rows) == ["bayes", "smoothed", "centroid"]
+    bayes, centroid = rows["bayes"], rows["centroid"]
+    assert bayes.unit_count == 3
+    assert bayes.success == 1.0
+    assert bayes.success_low == pytest.approx(3 / (3 + 1.96**2), abs=1e-3)
+    assert bayes.median_m < 20 < 60 < centroid.median_m
+    assert rows["smoothed"].n > bayes.n
+    assert bayes.baseline_m == centroid.median_m
+    assert [one.on_map for one in found.sessions] == [1.0, 1.0, 1.0]
+
+
+def test_the_table_is_written_and_equal_seeds_find_the_same(found, made, tmp_path):
+    table = json.loads((found.out / "table.json").read_text())
+    assert table["rows"][0]["part"] == "carling"
+    again = run_ottawa(made, tmp_path, runs=1, parts=("carling",))
+    assert again.rows == found.rows or repr(again.rows) == repr(found.rows)
+
+
+def test_dead_reckoning_without_errors_follows_the_truth(made):
+    session = read_session(made / FOLDER / "carling" / "OpenCellID_20210101.csv")
+    log = session_log(session, CRS, ReckoningErrors(0.0, 0.0, 0.0), np.random.default_rng(0))
+    step_m, heading = log.motion["step_m"].to_numpy(), log.motion["heading_rad"].to_numpy()
+    place_m = np.cumsum(step_m[:, None] * np.column_stack([np.cos(heading), np.sin(heading)]), 0)
+    truth_m = log.truth[["east_m", "north_m"]].to_numpy()
+    assert np.abs(truth_m[1:] - truth_m[0] - place_m[1::2]).max() < 25
+    assert log.radio["timing_advance"].max() <= 6
+    assert log.gnss.empty
+
+
+def test_the_bias_is_of_all_headings_of_a_session(made):
+    session = read_session(made / FOLDER / "carling" / "OpenCellID_20210101.csv")
+    plain, turned = (
+        session_log(session, CRS, ReckoningErrors(0.0, 0.0, bias), np.random.default_rng(1))
+        for bias in (0.0, 0.1)
+    )
+    beside = turned.motion["heading_rad"] - plain.motion["heading_rad"]
+    assert np.ptp(np.angle(np.exp(1j * beside))) < 1e-9
+    assert np.abs(np.angle(np.exp(1j * beside))).max() == pytest.approx(0.1)
+
+
+def test_nothing_is_known_of_the_way_over_a_silence(made, tmp_path):
+    table = pd.read_csv(made / FOLDER / "carling" / "OpenCellID_20210101.csv")
+    table.loc[100:, "measured_at"] += 60_000
+    table.to_csv(tmp_path / "silent.csv", index=False)
+    log = session_log(
+        read_session(tmp_path / "silent.csv"), CRS, ReckoningErrors(), np.random.default_rng(0)
+    )
+    assert np.flatnonzero(log.motion["step_m"].isna()).tolist() == [198, 199]
+
+
+def test_rows_of_one_time_count_once_and_strange_timing_advances_not(made, tmp_path):
+    table = pd.read_csv(made / FOLDER / "carling" / "OpenCellID_20210101.csv")
+    table.loc[5, "ta"] = 2**31 - 1
+    pd.concat([table, table.iloc[:7]]).to_csv(tmp_path / "twice.csv", index=False)
+    session = read_session(tmp_path / "twice.csv")
+    assert len(session) == len(table)
+    assert np.flatnonzero(np.isnan(session.timing_advance)).tolist() == [5]
+
+
+@pytest.mark.parametrize("text", ["", "a,b\n1,2\n", "mcc,mnc\n"])
+def test_a_file_of_another_kind_is_refused(tmp_path, text):
+    (tmp_path / "other.csv").write_text(text)
+    with pytest.raises(InputError, match=r"other\.csv"):
+        read_session(tmp_path / "other.csv")
+
+
+def test_a_data_set_that_is_not_there_is_told(tmp_path):
+    with pytest.raises(InputError, match=FOLDER):
+        run_ottawa(tmp_path, tmp_path / "out")
+
+
+def test_centroids_of_real_rides_are_far_off(shared_data):
+    folder = shared_data / FOLDER / "lacolyoc"
+    names = [path for path in sorted(folder.glob("*.csv")) if "20200830" not in path.name]
+    sessions = [read_session(path) for path in names]
+    errors_m = np.concatenate(
+        [
+            centroid_errors_m(one, [other for other in sessions if other is not one], CRS)
+            for one in sessions
+        ]
+    )
+    assert errors_m.size > 600
+    assert np.median(errors_m) == pytest.approx(126, abs=4)
+
+
+def test_a_real_walk_is_found(shared_data, tmp_path):
+    folder = tmp_path / FOLDER / "carling"
+    folder.mkdir(parents=True)
+    for day in ("20210404", "20210506", "20210523"):
+        (path,) = (shared_data / FOLDER / "carling").glob(f"OpenCellID_{day}*.csv")
+        shutil.copy(path, folder)
+    found = run_ottawa(tmp_path, tmp_path / "out", runs=1, parts=("carling",))
+    assert found.rows[0].success >= 2 / 3
+    assert found.rows[0].median_m < 60
+    assert found.rows[0].baseline_m > 100
