@@ -72,7 +72,7 @@ def replay(
         typer.Option("--without", metavar="KINDS", help="What to leave out: gnss,ta,neighbours."),
     ] = None,
     smooth: Annotated[
-        bool, typer.Option("--smooth", help="Positions in hindsight, by the whole log (bayes).")
+        bool, typer.Option("--smooth", help="Positions in hindsight, by the whole log.")
     ] = False,
     config: ConfigOption = None,
     settings: SetOption = None,
@@ -94,10 +94,10 @@ def replay(
     if without is not None:
         given.append(f"track.without={toml([kind.strip() for kind in without.split(',')])}")
     if smooth:
-        given.append("filter.bayes.smooth=true")
+        given += ["filter.bayes.smooth=true", "filter.smooth=true"]
     loaded = load_config(config, given)
-    if smooth and loaded.filter.name != "bayes":
-        raise fail(ConfigError, "--smooth", "the filter bayes", loaded.filter.name)
+    if smooth and loaded.filter.name in ("candidate", "grid"):
+        raise fail(ConfigError, "--smooth", "bayes, ekf, iekf, rbukf, ukf, ckf", loaded.filter.name)
     folder = (out or loaded.output.dir / "replay").absolute()
     with progress_bar("replay") as progress:
         result = run_replay(loaded, folder, progress=progress)

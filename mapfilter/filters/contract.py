@@ -48,6 +48,8 @@ class Reason(StrEnum):
     NO_READING = "no_reading"
     NOT_STARTED = "not_started"
     NOT_USED_BY_FILTER = "not_used_by_filter"
+    AMBIGUOUS_CELL = "ambiguous_cell"
+    UPDATE_FAILED = "update_failed"
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from mapfilter.models._terms import LEVEL
 from mapfilter.models.gaussian import GaussianTerms, checked, deviations, places, terms
 from mapfilter.models.protocols import Floats
 from mapfilter.models.state import StateLayout
-from mapfilter.radio.antenna import MeasuredAntenna
+from mapfilter.radio.antenna import MeasuredAntenna, leaning
 
 SHORTEST_DISTANCE_M = 1.0
 """Nearer, a level is as at this distance, and its slope is 0."""
@@ -113,6 +113,7 @@ def sampled_pattern(
     depression_rad: float = 0.0,
     downtilt_deg: float | None = None,
     samples: int = 360,
+    mechanical_downtilt_rad: float = 0.0,
 ) -> Floats:
     """Return a measured antenna's gains around it, for ``pattern_db`` of :func:`levels`.
 
@@ -125,6 +126,8 @@ def sampled_pattern(
         Electrical downtilt wanted.
     samples : int
         How many angles; with 360, cuts given by the degree are kept as they are.
+    mechanical_downtilt_rad : float
+        How far the whole antenna leans forward.
 
     Returns
     -------
@@ -132,7 +135,8 @@ def sampled_pattern(
         dB relative to the strongest direction, counter-clockwise from boresight.
     """
     offsets = np.arange(samples) * (2 * np.pi / samples)
-    return antenna.gain_db(offsets, np.full(samples, depression_rad), downtilt_deg)
+    own = leaning(offsets, np.full(samples, depression_rad), mechanical_downtilt_rad)
+    return antenna.gain_db(*own, downtilt_deg)
 
 
 def _numbers(name: str, given: ArrayLike, size: int, faults: Faults) -> Floats:

@@ -2,7 +2,7 @@
 
 No map is needed, only the sites. With dead reckoning the state is the position, moved by each step;
 without, it is position and velocity, and motion is that of constant velocity with white
-acceleration.
+acceleration. A start without a fix is a Gaussian sum: one Gaussian over a kilometre goes astray.
 """
 
 from __future__ import annotations
@@ -10,33 +10,40 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from math import cos, isfinite, nan, sin
+from math import cos, inf, isfinite, nan, pi, sin
+from typing import Any
 
 import numpy as np
 
 from mapfilter.errors import InputError, fail
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.gaussian import Gaussian, Method
-from mapfilter.filters.kalman import predict, update
 from mapfilter.geodesy import same_crs
 from mapfilter.models.gaussian import GaussianTerms
 from mapfilter.models.motion import constant_velocity
 from mapfilter.models.position_fix import position_fix
+from mapfilter.models.protocols import Floats
 from mapfilter.models.state import MOVING, POSITION
 from mapfilter.positioning.epochs import Epoch, GnssFix, epochs
 from mapfilter.positioning.estimate import Fix, TrackEstimate, UnusedReading
 from mapfilter.positioning.fusion import compiled
+from mapfilter.positioning.fusion_belief import SumBelief
 from mapfilter.positioning.fusion_models import SiteModels
-from mapfilter.positioning.gaussian_radii import gaussian_radii_m
+from mapfilter.positioning.fusion_readings import SiteReadings, site_readings, timing_advances_of
+from mapfilter.positioning.fusion_smoothing import FusionHistory
+from mapfilter.positioning.gaussian_radii import gaussian_radii_m, share_within
 from mapfilter.positioning.track import PositionedTrack
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.schema import NEIGHBOUR, SERVING
 
 _SURPRISE, _WINDOW = 5.0, 10
+_WITHIN_M = 50.0
+_MOST_PARTS = 64
+_LEAST_MOVED_M = 0.1
+_WALK_MPS = 1.5
 
 
 def position_by_fusion(
-    sites: SiteModels, crs: str, log: TrackLog, method: Method
+    sites: SiteModels, crs: str, log: TrackLog, method: Method, *, smooth: bool = False
 ) -> PositionedTrack:
     """Locate a log with a Kalman-type filter.
 
@@ -50,6 +57,8 @@ def position_by_fusion(
     log : TrackLog
         In the same CRS.
     method : Method
+    smooth : bool
+        Positions in hindsight, by the whole log; statuses stay those of the moment.
 
     Raises
     ------
@@ -59,60 +68,82 @@ def position_by_fusion(
     if not same_crs(log.crs, crs):
         raise fail(InputError, "log, crs", crs, log.crs, "log of another area or zone")
     began_s = time.process_time()
-    walked = _Walk(sites, method, bool(len(log.motion)))
-    timed = _timing_advances(log)
+    history = FusionHistory() if smooth else None
+    walked = _Walk(sites, method, reckoned=bool(len(log.motion)), history=history)
+    timed = timing_advances_of(log)
     fixes = [walked.take(epoch, timed.get(epoch.time_s, {})) for epoch in epochs(log)]
+    if history is not None:
+        fixes = _in_hindsight(fixes, history, walked.where)
     estimate = TrackEstimate.of_fixes(
         crs, method.name, fixes, start_utc_s=log.start_utc_s, unused=walked.unused
     )
     return PositionedTrack(estimate, (), time.process_time() - began_s)
 
 
-def _timing_advances(log: TrackLog) -> dict[float, dict[str, int]]:
-    """Return the steps of timing advance by time and cell."""
-    table = log.radio[log.radio["timing_advance"].notna() & log.radio["cell"].notna()]
-    found: dict[float, dict[str, int]] = {}
-    columns = (table["time_s"], table["cell"], table["timing_advance"])
-    for time_s, cell, steps in zip(*(column.tolist() for column in columns), strict=True):
-        found.setdefault(float(time_s), {})[str(cell)] = int(steps)
-    return found
+def _in_hindsight(fixes: list[Fix], history: FusionHistory, where: list[int]) -> list[Fix]:
+    """Replace the positions since the start by smoothed ones."""
+    later = history.smoothed()
+    first = len(fixes) - len(later)
+    return fixes[:first] + [
+        replace(fix, **_place(belief, where))
+        for fix, belief in zip(fixes[first:], later, strict=True)
+    ]
 
 
 class _Walk:
     """One log on its way; the belief is replaced at each epoch."""
 
-    def __init__(self, sites: SiteModels, method: Method, reckoned: bool) -> None:
+    def __init__(
+        self, sites: SiteModels, method: Method, *, reckoned: bool, history: FusionHistory | None
+    ) -> None:
         self.sites, self.method, self.options = sites, method, sites.options
         self.layout = POSITION if reckoned else MOVING
-        self.belief: Gaussian | None = None
-        self.time_s, self.heard_s, self.status = nan, nan, Status.SEARCHING
+        self.where = [self.layout.east, self.layout.north]
+        self.belief: SumBelief | None = None
+        self.history = history
+        self.time_s, self.moved_m, self.status = nan, inf, Status.SEARCHING
         self.surprise: list[float] = []
         self.unused: list[UnusedReading] = []
 
     def take(self, epoch: Epoch, timed: dict[str, int]) -> Fix:
         """Move, then measure; return the epoch's fix."""
-        self._move(epoch)
-        reason = self._measure(epoch, timed)
+        moved = self._move(epoch)
+        reason = self._measure(epoch, site_readings(self.sites, epoch, timed))
         self.time_s = epoch.time_s
+        if self.history is not None and self.belief is not None:
+            self.history.add(self.belief, *moved)
         return self._fix(epoch.time_s, reason)
 
-    def _move(self, epoch: Epoch) -> None:
+    def _move(self, epoch: Epoch) -> tuple[Floats, Floats, Floats]:
+        """Predict; return the transition, the noise and the shift."""
+        size = self.layout.size
         elapsed_s = max(epoch.time_s - self.time_s, 0.0) if isfinite(self.time_s) else 0.0
+        transition, noise, shift = np.eye(size), np.zeros((size, size)), np.zeros(size)
         if self.belief is None:
             self._label(epoch, epoch.motion, Reason.NOT_STARTED)
-            return
+            return transition, noise, shift
         if self.layout is MOVING:
             if elapsed_s > 0:
                 motion = constant_velocity(elapsed_s, self.options.acceleration, noise="continuous")
-                self.belief = predict(self.belief, motion.transition, motion.noise)
-            return
-        shift, noise = np.zeros(2), self.options.drift_m**2 * elapsed_s * np.eye(2)
-        for step in epoch.motion:
-            moved, spread = self._step(epoch, step)
-            shift, noise = shift + moved, noise + spread
-        self.belief = predict(self.belief, np.eye(2), noise, shift)
+                transition, noise = motion.transition, motion.noise
+                self.moved_m += self._speed_mps() * elapsed_s
+        else:
+            noise = self.options.drift_m**2 * elapsed_s * np.eye(2)
+            for step in epoch.motion:
+                moved, spread = self._step(epoch, step)
+                shift, noise = shift + moved, noise + spread
+                self.moved_m += step.step_m if isfinite(step.step_m) else 0.0
+        self.belief = self.belief.predict(transition, noise, shift)
+        return transition, noise, shift
 
-    def _step(self, epoch: Epoch, step: MotionStep) -> tuple[np.ndarray, np.ndarray]:
+    def _speed_mps(self) -> float:
+        """Return how fast one is believed to go, at least at a walk."""
+        if self.belief is None:
+            raise AssertionError("asked once started")
+        mean = self.belief.moments.mean
+        return max(float(np.hypot(*mean[list(self.layout.velocity)])), _WALK_MPS)
+
+    def _step(self, epoch: Epoch, step: MotionStep) -> tuple[Floats, Floats]:
         """Return where a step leads and how sure that is; without direction it is all spread."""
         if not isfinite(step.step_m):
             self._label(epoch, (step,), Reason.NO_STEP)
@@ -126,61 +157,60 @@ class _Walk:
         noise = self.options.step_sigma_m**2 * np.outer(along, along)
         return step.step_m * along, noise + cross_m**2 * np.outer(across, across)
 
-    def _measure(self, epoch: Epoch, timed: dict[str, int]) -> Reason:
-        heard: list[tuple[str, float]] = []
-        for row in epoch.heard:
-            kind = SERVING if row.role == SERVING else NEIGHBOUR
-            if row.cell is None or row.cell not in self.sites.cells:
-                reason = Reason.NOT_USED_BY_FILTER if row.cell is None else Reason.UNKNOWN_CELL
-                self.unused.append(UnusedReading(epoch.time_s, kind, row.cell or "", reason))
-            elif isfinite(row.level_dbm) and row.censored == 0:
-                heard.append((row.cell, row.level_dbm))
-            elif row.cell not in timed:
-                self.unused.append(
-                    UnusedReading(epoch.time_s, kind, row.cell, Reason.NOT_USED_BY_FILTER)
-                )
-        timing = {cell: steps for cell, steps in timed.items() if cell in self.sites.cells}
-        if epoch.fix is None and not heard and not timing:
+    def _measure(self, epoch: Epoch, given: SiteReadings) -> Reason:
+        self.unused += given.unused
+        fix = epoch.fix
+        if fix is not None and not (isfinite(fix.east_m) and isfinite(fix.north_m)):
+            self.unused.append(UnusedReading(epoch.time_s, "gnss", "", Reason.NO_READING))
+            fix = None
+        if fix is None and not given.cells and not given.timed:
             return Reason.UNKNOWN_CELL if epoch.heard else Reason.NO_READING
         if self.belief is None:
-            self._start(epoch.fix, [*timing, *(cell for cell, _ in heard)])
-        if epoch.fix is not None:
-            self._update_fix(epoch.fix)
-        if heard or timing:
-            first = next(iter(timing), None)
-            model = self.sites.of(self.layout, tuple(cell for cell, _ in heard), first)
-            reading = [level for _, level in heard]
-            if first is not None:
-                reading.append((timing[first] + 0.5) * self.options.timing_step_m)
-            kept_s = [self.options.level_memory_s] * len(heard)
-            kept_s += [self.options.timing_memory_s] * (first is not None)
-            self._update(self._aged(model, kept_s, epoch.time_s), reading)
-            self.heard_s = epoch.time_s
-        return Reason.USED
+            self.belief = self._start(fix, given)
+        taken = fix is not None and self._update_fix(fix)
+        if given.cells or given.timed:
+            model = self.sites.of(self.layout, given.cells, given.timed)
+            step_m = self.options.timing_step_m
+            reading = [*given.levels_dbm, *((steps + 0.5) * step_m for steps in given.steps)]
+            kept_m = [self.options.level_memory_m] * len(given.cells)
+            kept_m += [self.options.timing_memory_m] * len(given.timed)
+            if self._update(self._aged(model, kept_m), reading):
+                self.moved_m, taken = 0.0, True
+        return Reason.USED if taken else Reason.UPDATE_FAILED
 
-    def _aged(self, model: GaussianTerms, kept_s: Sequence[float], time_s: float) -> GaussianTerms:
+    def _aged(self, model: GaussianTerms, kept_m: Sequence[float]) -> GaussianTerms:
         """Return a model with noise for errors that last: reports in a row tell it only once."""
-        elapsed_s = time_s - self.heard_s if isfinite(self.heard_s) else np.inf
-        growth = np.sqrt(np.maximum(1.0, np.array(kept_s) / max(elapsed_s, 1e-3)))
+        growth = np.sqrt(np.maximum(1.0, np.array(kept_m) / max(self.moved_m, _LEAST_MOVED_M)))
         return replace(model, noise=model.noise * np.outer(growth, growth))
 
-    def _start(self, fix: GnssFix | None, cells: Sequence[str]) -> None:
-        if fix is not None:
-            place = (fix.east_m, fix.north_m)
-        else:
-            cell = self.sites.cells[cells[0]]
-            place = (cell.east_m, cell.north_m)
+    def _start(self, fix: GnssFix | None, given: SiteReadings) -> SumBelief:
+        """Return the first belief: at a fix, on a timing advance's circle, or about a site."""
+        options, east, north = self.options, *self.where
         mean, deviation = np.zeros(self.layout.size), np.zeros(self.layout.size)
-        where = [self.layout.east, self.layout.north]
-        mean[where], deviation[where] = place, self.options.start_sigma_m
-        if self.layout is MOVING:
-            deviation[list(self.layout.velocity)] = self.options.speed_sigma_mps
-        if fix is None:
-            # On the very site a distance has no direction to start with.
-            mean[self.layout.east] += 1.0
-        self.belief = Gaussian(mean, np.diag(deviation**2))
+        deviation[list(self.layout.velocity if self.layout is MOVING else ())] = (
+            options.speed_sigma_mps
+        )
+        if fix is not None:
+            mean[self.where] = fix.east_m, fix.north_m
+            deviation[self.where] = options.start_sigma_m
+            return SumBelief.start(mean, np.diag(deviation**2))
+        cell = self.sites.cells[(given.timed or given.cells)[0]]
+        mean[self.where] = cell.east_m, cell.north_m
+        if not given.timed:
+            deviation[self.where] = options.start_sigma_m
+            parts = {east: options.start_parts, north: options.start_parts}
+            return SumBelief.start(mean, np.diag(deviation**2), parts)
+        radius_m = (given.steps[0] + 0.5) * options.timing_step_m
+        count = min(max(round(2 * pi * radius_m / options.start_spacing_m), 8), _MOST_PARTS)
+        deviation[self.where] = max(options.start_spacing_m, 0.7 * 2 * pi * radius_m / count)
+        angle = 2 * pi * np.arange(count) / count
+        return SumBelief.around(
+            mean, np.diag(deviation**2),
+            {east: cell.east_m + radius_m * np.cos(angle),
+             north: cell.north_m + radius_m * np.sin(angle)},
+        )  # fmt: skip
 
-    def _update_fix(self, fix: GnssFix) -> None:
+    def _update_fix(self, fix: GnssFix) -> bool:
         noise = np.array(
             [
                 [fix.var_east_m2, fix.cov_east_north_m2],
@@ -192,14 +222,16 @@ class _Walk:
         sure = np.isfinite(noise).all() and noise[0, 0] > 0 and np.linalg.det(noise) > 0
         if not sure:
             noise = np.eye(2) * self.options.fix_sigma_m**2
-        self._update(position_fix(self.layout, noise), [fix.east_m, fix.north_m])
+        return self._update(position_fix(self.layout, noise), [fix.east_m, fix.north_m])
 
-    def _update(self, model: GaussianTerms, reading: Sequence[float]) -> None:
+    def _update(self, model: GaussianTerms, reading: Sequence[float]) -> bool:
+        """Take a reading in; tell whether that could be done."""
         if self.belief is None:
             raise AssertionError("started before it measures")
-        self.belief, news = update(self.belief, compiled(model), reading, self.method)
+        self.belief, news = self.belief.update(compiled(model), reading, self.method)
         if news.used:
             self.surprise = [*self.surprise, news.nis / len(reading)][-_WINDOW:]
+        return news.used
 
     def _label(self, epoch: Epoch, steps: Sequence[MotionStep], reason: Reason) -> None:
         self.unused += [UnusedReading(epoch.time_s, "motion", "", reason) for _ in steps]
@@ -210,12 +242,16 @@ class _Walk:
             return Fix(
                 time_s, nan, nan, empty, np.full(3, nan), self.status, 0, nan, 0, nan, reason
             )
-        where = [self.layout.east, self.layout.north]
-        covariance = self.belief.covariance[np.ix_(where, where)]
-        radii, mass = gaussian_radii_m(covariance, 50.0)
-        self._tell(float(radii[2]))
-        east_m, north_m = (float(value) for value in self.belief.mean[where])
-        return Fix(time_s, east_m, north_m, covariance, radii, self.status, 1, mass, 0, nan, reason)
+        place = _place(self.belief.moments, self.where)
+        self._tell(float(place["radii_m"][2]))
+        count = self.belief.weights.size
+        if count > 1:
+            lead = self.belief.leading.covariance[np.ix_(self.where, self.where)]
+            place["mass_50m"] = share_within(lead, _WITHIN_M) * float(self.belief.weights.max())
+        return Fix(
+            time_s, **place, status=self.status, hypotheses=count, way_id=0, way_probability=nan,
+            reason=reason,
+        )  # fmt: skip
 
     def _tell(self, radius_m: float) -> None:
         """Bring the status up to date: settled or not, surprised for long or not."""
@@ -225,3 +261,14 @@ class _Walk:
                 self.status = Status.CONVERGED
         else:
             self.status = Status.LOST if lost else Status.TRACKING
+
+
+def _place(belief: Gaussian, where: list[int]) -> dict[str, Any]:
+    """Return what a belief says about the position, as fields of a fix."""
+    covariance = belief.covariance[np.ix_(where, where)]
+    radii, mass = gaussian_radii_m(covariance, _WITHIN_M)
+    east_m, north_m = (float(value) for value in belief.mean[where])
+    return {
+        "east_m": east_m, "north_m": north_m, "covariance_m2": covariance, "radii_m": radii,
+        "mass_50m": mass,
+    }  # fmt: skip

@@ -29,18 +29,33 @@ def gaussian_radii_m(covariance_m2: Floats, within_m: float) -> tuple[Floats, fl
     >>> radii.round(2).tolist(), round(share, 4)
     ([11.77, 14.89, 24.48], 0.8647)
     """
-    values = np.maximum(np.linalg.eigvalsh(covariance_m2), 1e-6)
-    # Ratios beyond this are a line as far as any radius can tell.
-    high, low = values[1], max(values[0], 1e-4 * values[1])
-    q = np.cos(_ANGLES) ** 2 / high + np.sin(_ANGLES) ** 2 / low
-
-    def outside(radius_m: Floats) -> Floats:
-        inner = np.exp(-0.5 * radius_m[:, None] ** 2 * q) / q
-        return np.asarray(inner.mean(axis=1) / np.sqrt(high * low))
-
+    high, low = _spread(covariance_m2)
     near, far = np.zeros(3), np.full(3, 6.0 * np.sqrt(high))
     for _ in range(40):
         middle = 0.5 * (near + far)
-        beyond = outside(middle) > 1 - _SHARES
+        beyond = _outside(middle, high, low) > 1 - _SHARES
         near, far = np.where(beyond, middle, near), np.where(beyond, far, middle)
-    return 0.5 * (near + far), float(1 - outside(np.array([within_m]))[0])
+    return 0.5 * (near + far), share_within(covariance_m2, within_m)
+
+
+def share_within(covariance_m2: Floats, within_m: float) -> float:
+    """Return the share of a normal belief within a distance of its mean.
+
+    Examples
+    --------
+    >>> round(share_within(np.diag([100.0, 100.0]), 20.0), 4)
+    0.8647
+    """
+    return float(1 - _outside(np.array([within_m]), *_spread(covariance_m2))[0])
+
+
+def _spread(covariance_m2: Floats) -> tuple[float, float]:
+    values = np.maximum(np.linalg.eigvalsh(covariance_m2), 1e-6)
+    # Ratios beyond this are a line as far as any radius can tell.
+    return float(values[1]), float(max(values[0], 1e-4 * values[1]))
+
+
+def _outside(radius_m: Floats, high: float, low: float) -> Floats:
+    q = np.cos(_ANGLES) ** 2 / high + np.sin(_ANGLES) ** 2 / low
+    inner = np.exp(-0.5 * radius_m[:, None] ** 2 * q) / q
+    return np.asarray(inner.mean(axis=1) / np.sqrt(high * low))

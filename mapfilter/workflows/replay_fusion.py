@@ -14,6 +14,9 @@ from mapfilter.filters.gaussian import METHODS
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.fusion_models import FusionOptions, SiteModels
 from mapfilter.positioning.fusion_replay import position_by_fusion
+from mapfilter.radio.antenna import MeasuredAntenna
+from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.msi import read_antennas
 from mapfilter.report.error_curve import plot_error_over_distance
 from mapfilter.tracks.leave_out import leave_out
 from mapfilter.tracks.store import list_logs, read_log
@@ -43,7 +46,8 @@ def run_replay_fusion(
     Raises
     ------
     MapfilterError
-        There is no cell plan, it or a log is missing or damaged, or the output cannot be written.
+        There is no cell plan, it, an antenna or a log is missing or damaged, or the output cannot
+        be written.
     """
     if config.cells.plan is None:
         hint = "filters without a map take the sites from there"
@@ -56,7 +60,8 @@ def run_replay_fusion(
     for index, folder in enumerate(folders):
         log = leave_out(read_log(folder), config.track.without)
         plan = planned_cells(config, log.crs)
-        track = position_by_fusion(SiteModels(plan, FusionOptions()), plan.crs, log, method)
+        sites = SiteModels(plan, FusionOptions(), _antennas(config, plan))
+        track = position_by_fusion(sites, plan.crs, log, method, smooth=config.filter.smooth)
         into = out if len(folders) == 1 else out / folder.name
         files = tuple(into / file for file in ESTIMATES)
         write_estimate(track.estimate, files[0])
@@ -84,3 +89,8 @@ def run_replay_fusion(
     if len(folders) > 1:
         write_json(out / SUMMARY, facts(summary_figures(result)))
     return result
+
+
+def _antennas(config: Config, plan: CellPlan) -> dict[str, MeasuredAntenna]:
+    folder = config.cells.antennas
+    return {} if folder is None else read_antennas(folder, (cell.antenna for cell in plan.cells))

@@ -214,6 +214,7 @@ class FilterSection(Section):
     at_threshold: Literal["switch", "stall"] = "switch"
     switch_check: Literal["next_call", "same_call"] = "same_call"
     when_empty: Literal["fail", "reinitialise"] = "fail"
+    smooth: bool = False
     bayes: BayesSection = BayesSection()
 
 
