@@ -24,6 +24,8 @@ FUSION_PAPERS = ("fritsche-klein-2009", "zhang-2006")
 
 Figures = dict[str, float | None]
 
+MOST_TRIALS = 20_000
+
 _AT = (10, 100, 400)
 _OVER_AT = (50, 100, 200, 400)
 
@@ -133,10 +135,14 @@ def run_reproduce_fusion(
     Raises
     ------
     MapfilterError
-        There is no such paper, the layout is wrong, or the output cannot be written.
+        There is no such paper, there are too many trials, the layout is wrong, or the output
+        cannot be written.
     """
     if name not in FUSION_PAPERS:
         raise fail(ConfigError, "reproduce", f"one of {', '.join(FUSION_PAPERS)}", repr(name))
+    if trials is not None and not 1 <= trials <= MOST_TRIALS:
+        hint = "all trials are in memory at once"
+        raise fail(ConfigError, "--trials", f"a number in 1..{MOST_TRIALS}", trials, hint)
     if name == "zhang-2006":
         if layout_file is not None:
             raise fail(ConfigError, "--layout", "fritsche-klein-2009", name)
@@ -170,10 +176,6 @@ def read_layout(path: Path) -> Layout:
         for name in ("boresights_deg", "satellite_azimuths_deg"):
             if name in given:
                 given[name] = tuple(float(value) for value in given[name])
-        numbers = [given.get("satellite_elevation_deg", 1.0), *given.get("boresights_deg", ())]
-        numbers += [value for site in given.get("sites_m", ()) for value in site]
-        if not np.isfinite(np.array(numbers, dtype=np.float64)).all():
-            raise fail(InputError, str(path), "finite numbers", "NaN or infinity")
         return Layout(**given)
     except (TypeError, ValueError) as error:
         raise fail(

@@ -129,7 +129,7 @@ def test_all_filters_are_the_kalman_filter_on_a_linear_problem(method):
         # α = 1e-3 sends points 1e-3 deviations out: 1e-16 · 1e6 is left.
         close = 1e-8 if method is RBUKF else 1e-9
         np.testing.assert_allclose(run.means[trial], means, rtol=0, atol=close)
-        np.testing.assert_allclose(run.covariances[trial], covariances, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(run.covariances[trial], covariances, rtol=0, atol=close)
 
 
 def test_the_extended_filter_is_filterpys():
@@ -166,3 +166,6 @@ def test_the_unscented_filter_is_filterpys():
         peer.update(reading)
         deviation = np.sqrt(np.diagonal(peer.P))
         assert np.abs((run.means[0, k] - peer.x) / deviation).max() < 1e-7
+        assert np.abs((run.covariances[0, k] - peer.P) / np.outer(deviation, deviation)).max() < (
+            1e-7
+        )

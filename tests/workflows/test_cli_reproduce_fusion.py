@@ -64,6 +64,14 @@ BAD = {
     "too few directions": ("boresights_deg = [1.0]\n", "one direction"),
     "text for numbers": ('sites_m = [["a", 1.0]]\n', "numbers"),
     "a site of one number": ("sites_m = [[1.0]]\n", "numbers"),
+    "half a step": ("steps = 2.5\n", "whole number"),
+    "a step that is none": ("steps = true\n", "whole number"),
+    "steps without end": ("steps = 1000000000\n", "whole number"),
+    "half a site": ("serving = 0.5\n", "a site in"),
+    "a satellite nowhere": ("satellite_azimuths_deg = [nan, 1.0]\n", "finite"),
+    "a satellite out of reach": ("satellite_distance_m = inf\n", "above 0"),
+    "below the horizon": ("satellite_elevation_deg = -3\n", "0..90"),
+    "one satellite": ("satellite_azimuths_deg = [1.0]\n", "two or more"),
     "infinity": ("boresights_deg = [inf, 0, 0, 0, 0, 0, 0]\n", "finite"),
 }
 
@@ -76,6 +84,15 @@ def test_a_layout_that_is_none_is_said_so(text, said, tmp_path):
 
     with pytest.raises(InputError, match=said):
         CliRunner().invoke(app, [*words, "--out", str(tmp_path / "o")], catch_exceptions=False)
+
+
+@pytest.mark.parametrize("paper", ["fritsche-klein-2009", "zhang-2006"])
+def test_more_trials_than_memory_holds_are_refused(paper, tmp_path):
+    from mapfilter.errors import ConfigError
+
+    words = ["reproduce", paper, "--trials", "1000000000", "--out", str(tmp_path / "o")]
+    with pytest.raises(ConfigError, match="20000"):
+        CliRunner().invoke(app, words, catch_exceptions=False)
 
 
 def test_bench_compares_with_filterpy(monkeypatch):

@@ -48,6 +48,9 @@ MOTION_FACTOR, CLOCK_FACTOR = 100.0, 5.0
 """How much more noise than there is the filters assume."""
 
 
+MOST_STEPS = 10_000
+
+
 @dataclass(frozen=True)
 class Layout:
     """What stands where.
@@ -83,18 +86,21 @@ class Layout:
         count = len(self.sites_m)
         if count != len(self.boresights_deg) or not count:
             faults.add("layout", "one direction for each site", f"{len(self.boresights_deg)}")
-        if not 0 <= self.serving < count:
+        if not (_whole(self.serving) and 0 <= self.serving < count):
             faults.add("layout, serving", f"a site in 0..{count - 1}", self.serving)
+        numbers = [*np.ravel(self.sites_m), *self.boresights_deg, *self.satellite_azimuths_deg]
+        if not np.isfinite(np.array(numbers, dtype=np.float64)).all():
+            faults.add("layout", "finite numbers", "NaN or infinity")
         if len(self.satellite_azimuths_deg) < 2:
             got = len(self.satellite_azimuths_deg)
             faults.add("layout, satellite_azimuths_deg", "two or more", got)
         if not 0 < self.satellite_elevation_deg <= 90:
             got_deg = self.satellite_elevation_deg
             faults.add("layout, satellite_elevation_deg", "degrees in 0..90", got_deg)
-        if not self.satellite_distance_m > 0:
+        if not 0 < self.satellite_distance_m < np.inf:
             faults.add("layout, satellite_distance_m", "metres above 0", self.satellite_distance_m)
-        if self.steps < 1:
-            faults.add("layout, steps", "1 or more", self.steps)
+        if not (_whole(self.steps) and 1 <= self.steps <= MOST_STEPS):
+            faults.add("layout, steps", f"a whole number in 1..{MOST_STEPS}", self.steps)
         faults.raise_if_any(InputError)
 
     def satellites_m(self, count: int) -> Floats:
@@ -104,6 +110,10 @@ class Layout:
         flat = np.cos(elevation) * np.stack([np.sin(azimuth), np.cos(azimuth)], axis=-1)
         up = np.full((len(azimuth), 1), np.sin(elevation))
         return self.satellite_distance_m * np.hstack([flat, up])
+
+
+def _whole(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
 
 
 def hard_layout(distance_m: float = 1000.0) -> Layout:
