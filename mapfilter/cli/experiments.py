@@ -55,7 +55,7 @@ def reproduce(
     paper: Annotated[
         str,
         typer.Argument(
-            metavar="PAPER", help="khalaf-allah-2007, fritsche-klein-2009 or zhang-2006."
+            metavar="PAPER", help="khalaf-allah-2007, fritsche-klein-2009, zhang-2006 or tesa."
         ),
     ],
     area_map: Annotated[
@@ -82,6 +82,7 @@ def reproduce(
     """Repeat a paper's experiments: figure, table, and every reading of what it leaves open."""
     from mapfilter.workflows.reproduce import run_reproduce
     from mapfilter.workflows.reproduce_fusion import FUSION_PAPERS, run_reproduce_fusion
+    from mapfilter.workflows.reproduce_tesa import TESA, run_reproduce_tesa
     from mapfilter.workflows.sweep_brief import brief
 
     if paper in FUSION_PAPERS:
@@ -95,6 +96,20 @@ def reproduce(
                 progress=progress,
             )
         print_result(fused, as_json)
+        return
+    if paper == TESA:
+        with rate_bar("reproduce", "trials") as progress:
+            drives = run_reproduce_tesa(
+                (out or Path("out") / paper).absolute(),
+                trials=trials,
+                seed=seed or 0,
+                workers=workers,
+                cluster=cluster,
+                progress=progress,
+            )
+        # The table holds the rows, too.
+        shown = {key: own for key, own in asdict(drives).items() if as_json or key != "rows"}
+        print_result(shown, as_json)
         return
     with rate_bar("reproduce", "runs") as progress:
         result = run_reproduce(

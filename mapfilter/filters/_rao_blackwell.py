@@ -66,6 +66,51 @@ def move(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def propagate(
+    covariance: Floats, transition: Floats, process: Floats, sampled: Ints
+) -> tuple[Floats, Floats]:  # pragma: no cover
+    """Return the gain G of what is drawn, (n, d), and the covariance that is left, (n, n)."""
+    n, d = transition.shape[0], sampled.size
+    half, joint = np.zeros((n, n)), process.copy()
+    for i in range(n):
+        for k in range(n):
+            if transition[i, k] != 0.0:
+                for j in range(n):
+                    half[i, j] += transition[i, k] * covariance[k, j]
+    for j in range(n):
+        for k in range(n):
+            if transition[j, k] != 0.0:
+                for i in range(n):
+                    joint[i, j] += half[i, k] * transition[j, k]
+    gain = np.zeros((n, d))
+    for j in range(d):
+        # Cholesky's steps; what was drawn already leaves nothing where the noise is singular.
+        pivot = joint[sampled[j], sampled[j]]
+        for k in range(j):
+            pivot -= gain[sampled[j], k] ** 2
+        if pivot <= 1e-14 * joint[sampled[j], sampled[j]]:
+            continue
+        root = np.sqrt(pivot)
+        for i in range(n):
+            value = joint[i, sampled[j]]
+            for k in range(j):
+                value -= gain[i, k] * gain[sampled[j], k]
+            gain[i, j] = value / root
+    left = np.zeros((n, n))
+    for i in range(n):
+        for j in range(n):
+            left[i, j] = joint[i, j]
+            for k in range(d):
+                left[i, j] -= gain[i, k] * gain[j, k]
+    for j in range(d):
+        left[sampled[j], :] = 0.0
+        left[:, sampled[j]] = 0.0
+        for i in range(j):
+            gain[sampled[i], j] = 0.0
+    return gain, 0.5 * (left + left.T)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def gains(
     slope: Floats, covariance: Floats, noise: Floats
 ) -> tuple[Floats, Floats, Floats, float]:  # pragma: no cover
@@ -216,19 +261,27 @@ def copies(state: Floats, chosen: NDArray[np.int32], out: Floats) -> None:  # pr
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def means(state: Floats, weight: NDArray[np.float32]) -> Floats:  # pragma: no cover
+    """Return the weighted mean of particles (n, N), counted from the first one of them."""
+    mean, total = np.empty(state.shape[0]), 0.0
+    for k in range(weight.size):
+        total += weight[k]
+    for i in range(mean.size):
+        off, one = 0.0, state[i]
+        origin = one[0]
+        for k in range(weight.size):
+            off += weight[k] * (one[k] - origin)
+        mean[i] = origin + off / total
+    return mean
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc"})
 def sums(state: Floats, weight: NDArray[np.float32]) -> tuple[Floats, Floats]:  # pragma: no cover
     """Return the weighted mean and covariance of particles (n, N)."""
     n, count = state.shape
-    mean, spread = np.zeros(n), np.zeros((n, n))
-    total = 0.0
+    mean, spread, total = means(state, weight), np.zeros((n, n)), 0.0
     for k in range(count):
         total += weight[k]
-    for i in range(n):
-        centre, one = 0.0, state[i]
-        origin = one[0]
-        for k in range(count):
-            centre += weight[k] * (one[k] - origin)
-        mean[i] = origin + centre / total
     for i in range(n):
         for j in range(i + 1):
             product, one, two = 0.0, state[i], state[j]

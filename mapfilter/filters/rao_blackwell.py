@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mapfilter._kernels import draw_key
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.filters._rao_blackwell import copies, gains, move, sums, weigh
+from mapfilter.filters._rao_blackwell import copies, gains, means, move, propagate, sums, weigh
 from mapfilter.filters.gaussian import Gaussian, factor_of
 from mapfilter.filters.kalman import Taken
 from mapfilter.filters.resampling import normalise, systematic
@@ -64,9 +64,7 @@ class MixedBelief:
 
     def mean(self) -> Floats:
         """Return the mean of the whole state, shape (n,)."""
-        # Counted from one particle, so that nothing is lost far from the origin.
-        origin = self.state[:, :1]
-        return np.asarray(origin[:, 0] + (self.state - origin) @ self.weights())
+        return np.asarray(means(self.state, self.weights()))
 
     def moments(self) -> Gaussian:
         """Return mean and covariance of the whole state."""
@@ -136,19 +134,14 @@ def predict(
     if transition.shape != (n, n) or process.shape != (n, n):
         expected, got = f"two matrices {n} x {n}", f"{transition.shape}, {process.shape}"
         raise fail(InputError, "motion", expected, got)
-    s = belief.sampled
-    joint = transition @ belief.covariance @ transition.T + process
-    gain = joint[:, s] @ _inverse_factor(joint[np.ix_(s, s)])
-    covariance = joint - gain @ gain.T
-    covariance[s, :] = covariance[:, s] = 0.0
+    gain, covariance = propagate(
+        belief.covariance, np.ascontiguousarray(transition), process, belief.sampled
+    )
     change = transition - np.eye(n)
-    row, column = np.nonzero(change)
+    row, column = (np.ascontiguousarray(index) for index in np.nonzero(change))
     moved = np.empty_like(belief.state)
-    move(
-        belief.state, row, column, change[row, column], np.ascontiguousarray(gain), draw_key(rng),
-        moved,
-    )  # fmt: skip
-    return MixedBelief(moved, belief.log_weight, 0.5 * (covariance + covariance.T), s)
+    move(belief.state, row, column, change[row, column], gain, draw_key(rng), moved)
+    return MixedBelief(moved, belief.log_weight, covariance, belief.sampled)
 
 
 def update(
@@ -201,7 +194,7 @@ def update(
     if not isfinite(log_root):
         raise fail(InputError, "measurement, noise", "a positive definite covariance", noise)
     own = loading if loading is not None else np.zeros((0, 0))
-    row, column = np.nonzero(own)
+    row, column = (np.ascontiguousarray(index) for index in np.nonzero(own))
     used = np.flatnonzero(gain.any(axis=1))
     log_weight, state = belief.log_weight.copy(), belief.state.copy()
     least = weigh(
@@ -238,13 +231,6 @@ def _drawn_anew(
         move(state, none, none, np.zeros(0), gain, draw_key(rng), moved)
         state = moved
     return MixedBelief(state, np.full(count, -np.log(count)), belief.covariance, sampled)
-
-
-def _inverse_factor(matrix: Floats) -> Floats:
-    """Return W with ``S W`` a factor of a covariance S, which may be singular: ``S W Wᵀ S = S``."""
-    values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
-    kept = values > 1e-14 * max(values[-1], 0.0)
-    return np.asarray(vectors * np.where(kept, 1 / np.sqrt(np.where(kept, values, 1.0)), 0.0))
 
 
 def _slopes(

@@ -48,8 +48,8 @@ class Panel:
         Label of the upright axis.
     curves : sequence of Curve
     logarithmic : bool
-    top : float or None
-        Upper end of the upright axis.
+    top, bottom : float or None
+        Ends of the upright axis.
     """
 
     title: str
@@ -57,10 +57,18 @@ class Panel:
     curves: Sequence[Curve]
     logarithmic: bool = False
     top: float | None = None
+    bottom: float | None = 0.0
 
 
-def plot_error_panels(panels: Sequence[Panel], path: Path, *, title: str, columns: int = 2) -> None:
-    """Draw errors over the time index in panels side by side.
+def plot_error_panels(
+    panels: Sequence[Panel],
+    path: Path,
+    *,
+    title: str,
+    columns: int = 2,
+    across: str = "time index k",
+) -> None:
+    """Draw errors over the time index in panels side by side; ``across`` says what it counts.
 
     Raises
     ------
@@ -72,7 +80,7 @@ def plot_error_panels(panels: Sequence[Panel], path: Path, *, title: str, column
     with picture(path, 5.6 * columns, 3.7 * rows + 0.7) as figure:
         axes = figure.subplots(rows, columns, squeeze=False).ravel()
         for one, panel in zip(axes, panels, strict=False):
-            _draw_panel(one, panel)
+            _draw_panel(one, panel, across)
         for spare in axes[len(panels) :]:
             spare.remove()
         figure.suptitle(title, fontsize=12)
@@ -86,7 +94,7 @@ def plot_error_panels(panels: Sequence[Panel], path: Path, *, title: str, column
         )  # fmt: skip
 
 
-def _draw_panel(axes: Axes, panel: Panel) -> None:
+def _draw_panel(axes: Axes, panel: Panel, across: str) -> None:
     for curve in panel.curves:
         k = np.arange(1, curve.values.size + 1)
         axes.plot(
@@ -100,9 +108,9 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.yaxis.set_minor_formatter(FuncFormatter(_minor_label))
     else:
-        axes.set_ylim(0.0, panel.top)
+        axes.set_ylim(panel.bottom, panel.top)
     axes.set_title(panel.title)
-    axes.set_xlabel("time index k")
+    axes.set_xlabel(across)
     axes.set_ylabel(panel.label)
     axes.grid(color="#e6e6e6", linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)

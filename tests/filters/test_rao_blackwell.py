@@ -140,12 +140,12 @@ def test_more_that_adds_to_a_reading_is_estimated():
     """A level with an unknown offset: as a Kalman filter with the offset in its state."""
     layout, rng = StateLayout(4, 0, 1, clock=3), np.random.default_rng(6)
     fix = position_fix(layout, np.diag([4.0, 9.0]))
-    loading = np.array([[0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 0.0]])
+    loading = np.array([[0.0, 0.0, 1.0, 0.0], [0.0, 0.0, -2.0, 1.0]])
     covariance = np.diag([25.0, 25.0, 16.0, 1.0])
     belief = rb.init(np.zeros(4), covariance, [0, 1], 300_000, rng)
     reading = np.array([7.0, -2.0])
     after, _ = rb.update(belief, compiled(fix), reading, rng, SirOptions(0.0), loading)
-    slope = np.array([[1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
+    slope = np.eye(2, 4) + loading
     spread = slope @ covariance @ slope.T + fix.covariance()
     gain = covariance @ slope.T @ np.linalg.inv(spread)
     agree(after.moments(), Gaussian(gain @ reading, covariance - gain @ slope @ covariance), 0.03)

@@ -1,0 +1,106 @@
+"""Drives along straight roads, and what changes on the way: shadowing and the receiver's clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapfilter.errors import Faults, InputError
+from mapfilter.gnss.noise import correlated_along
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """Where a vehicle truly is at each epoch.
+
+    Parameters
+    ----------
+    time_s : (K,) array
+    place_m : (K, 3) array
+        East, north, up.
+    travelled_m : (K,) array
+    """
+
+    time_s: Floats
+    place_m: Floats
+    travelled_m: Floats
+
+
+def ahead_and_left(bearing_deg: float) -> tuple[Floats, Floats]:
+    """Return the unit vectors (east, north) ahead of a bearing, clockwise from north, and left.
+
+    Examples
+    --------
+    >>> [axis.round(9).tolist() for axis in ahead_and_left(90.0)]
+    [[1.0, 0.0], [-0.0, 1.0]]
+    """
+    bearing = np.radians(bearing_deg)
+    ahead = np.array([np.sin(bearing), np.cos(bearing)])
+    return ahead, np.array([-ahead[1], ahead[0]])
+
+
+def straight_drive(
+    length_m: float, bearing_deg: float, duration_s: float, interval_s: float = 1.0
+) -> Drive:
+    """Return a drive from the origin at constant speed, on the plane through it.
+
+    Epochs are at one interval, two intervals and so on to the end.
+
+    Raises
+    ------
+    InputError
+        A number is not above 0, or the bearing not finite.
+
+    Examples
+    --------
+    >>> drive = straight_drive(300.0, 90.0, 30.0, 10.0)
+    >>> drive.time_s.tolist(), drive.place_m[:, 0].round(9).tolist()
+    ([10.0, 20.0, 30.0], [100.0, 200.0, 300.0])
+    """
+    faults = Faults()
+    given = {"length_m": length_m, "duration_s": duration_s, "interval_s": interval_s}
+    for name, value in given.items():
+        if not (np.isfinite(value) and value > 0):
+            faults.add(f"drive, {name}", "a number above 0", value)
+    if not np.isfinite(bearing_deg):
+        faults.add("drive, bearing_deg", "finite degrees", bearing_deg)
+    faults.raise_if_any(InputError)
+    steps = int(np.floor(duration_s / interval_s + 1e-9))
+    time = np.asarray(interval_s * np.arange(1, steps + 1), dtype=np.float64)
+    travelled = np.asarray(length_m / duration_s * time, dtype=np.float64)
+    place = np.zeros((steps, 3))
+    place[:, :2] = np.outer(travelled, ahead_and_left(bearing_deg)[0])
+    return Drive(time, place, travelled)
+
+
+def shadowing_db(
+    drive: Drive, stations: int, sigma_db: float, correlation_m: float, rng: np.random.Generator
+) -> Floats:
+    """Draw log-normal shadowing of each station, correlated by ``exp(-d / L)`` along the way.
+
+    Parameters
+    ----------
+    drive : Drive
+    stations : int
+        Independent of each other.
+    sigma_db : float
+        Standard deviation; 0 for none.
+    correlation_m : float
+        L.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    (K, stations) array
+    """
+    return sigma_db * correlated_along(drive.travelled_m, stations, correlation_m, rng)
+
+
+def clock_walk_m(epochs: int, sigma_m: float, first_m: float, rng: np.random.Generator) -> Floats:
+    """Draw a clock's bias, c₀·δt: uniform within ± ``first_m``, then a random walk, shape (K,)."""
+    steps = rng.normal(0.0, sigma_m, epochs)
+    return np.asarray(rng.uniform(-first_m, first_m) + np.cumsum(steps))

@@ -1,0 +1,83 @@
+"""The pictures of TESA's scenarios."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from mapfilter.experiments.papers import tesa
+from mapfilter.experiments.papers import tesa_scene as scene
+from mapfilter.report.canvas import BLACK, BLUE, GREY, ORANGE, PURPLE, SKY, VERMILLION
+from mapfilter.report.fusion import Curve, Panel, plot_error_panels
+from mapfilter.simulation.drives import Drive, shadowing_db, straight_drive
+
+_ACROSS = "time / s"
+_COLOURS = {0.0: SKY, 1.0: BLUE, 4.0: PURPLE}
+_FIGURE_4_S = 300.0
+_SEED = 4
+
+
+def draw_tesa(run: tesa.PaperRun, out: Path) -> tuple[Path, ...]:
+    """Draw Figs. 4, 6, 7 and 8, and the outage by β and by model of motion."""
+    paths = tuple(out / f"{name}.png" for name in (
+        "figure-4", "figure-6", "figure-7", "figure-8", "outage",
+    ))  # fmt: skip
+    drive = straight_drive(scene.LENGTH_M * _FIGURE_4_S / scene.DURATION_S, 90.0, _FIGURE_4_S)
+    plot_error_panels(
+        [Panel("", "received power / dBm", _profiles(drive), bottom=None)],
+        paths[0], title="Fig. 4: power of a base station behind, 50 km/h", across=_ACROSS,
+    )  # fmt: skip
+    beta = scene.BETA_DB
+    first = {"GNSS": tesa.Run(1, "identity"), "GNSS + GSM": tesa.Run(1, "identity", beta)}
+    trials = len(run.errors_m[first["GNSS"]])
+    top = 1.15 * max(float(run.errors_m[key][0].max()) for key in first.values())
+    for path, figure, name in zip(paths[1:3], ("6", "7"), first, strict=True):
+        plot_error_panels(
+            [Panel("", "error / m", _of(run, first[name], name, BLUE), top=top)], path,
+            title=f"Fig. {figure}: scenario 1, {name}, {trials} trials", across=_ACROSS,
+        )  # fmt: skip
+    told = f"scenario 2, β = {beta:g} dB, {trials} trials"
+    panels = [
+        Panel("GNSS alone", "error / m", _of(run, tesa.Run(2, "identity"), "GNSS", VERMILLION)),
+        Panel("GNSS + GSM, identity model", "error / m",
+              _of(run, tesa.Run(2, "identity", beta), "identity", BLUE)),
+        Panel("GNSS + GSM, velocity model", "error / m",
+              _of(run, tesa.Run(2, "velocity", beta), "velocity", ORANGE)),
+    ]  # fmt: skip
+    plot_error_panels(panels, paths[3], title=f"Fig. 8: {told}", columns=3, across=_ACROSS)
+    panels = [
+        Panel(
+            f"{motion} model", "mean error / m",
+            [
+                Curve(f"β = {beta:g} dB", run.errors_m[tesa.Run(2, motion, beta)].mean(axis=0),
+                      _COLOURS[beta])
+                for beta in scene.BETAS_DB
+            ],
+            logarithmic=True,
+        )
+        for motion in (scene.IDENTITY, scene.VELOCITY_MODEL)
+    ]  # fmt: skip
+    plot_error_panels(
+        panels, paths[4], title=f"Scenario 2 by shadowing, {trials} trials", across=_ACROSS
+    )
+    return paths
+
+
+def _of(run: tesa.PaperRun, key: tesa.Run, name: str, colour: str) -> list[Curve]:
+    errors = run.errors_m[key]
+    return [
+        Curve(f"{name}, one trial", errors[0], GREY),
+        Curve(f"{name}, mean", errors.mean(axis=0), colour),
+    ]
+
+
+def _profiles(drive: Drive) -> list[Curve]:
+    free = scene.EIRP_DBM - scene.loss_at_km_db() - 20 * np.log10(drive.travelled_m / 1000.0)
+    shadow = shadowing_db(drive, 1, 1.0, scene.CORRELATION_M, np.random.default_rng(_SEED))[:, 0]
+    shadowed = [
+        Curve(f"β = {beta:g} dB", free + beta * shadow, _COLOURS[beta])
+        for beta in reversed(scene.BETAS_DB)
+        if beta > 0
+    ]
+    return [*shadowed, Curve("free space", free, BLACK, "--")]
