@@ -11,6 +11,10 @@ from numpy.typing import ArrayLike
 from mapfilter.errors import Faults, InputError
 from mapfilter.models.protocols import Floats, GaussianMeasurement
 
+TOO_FEW = "not enough measurements"
+BAD_GEOMETRY = "bad geometry"
+UNSETTLED = "steps that do not settle"
+
 _ITERATIONS = 50
 _SETTLED_M = 1e-9
 _LOWEST_RATIO = 1e-7
@@ -29,12 +33,16 @@ class StaticFix:
     ok : bool
         Whether the reading determines the state and the steps settled.
     iterations : int
+    problem : str
+        Why there is no fix: one of :data:`TOO_FEW`, :data:`BAD_GEOMETRY` and :data:`UNSETTLED`;
+        empty where there is one.
     """
 
     state: Floats
     covariance: Floats
     ok: bool
     iterations: int
+    problem: str = ""
 
 
 def static_fix(
@@ -42,6 +50,7 @@ def static_fix(
     reading: ArrayLike,
     start: ArrayLike,
     unknowns: Sequence[int] | None = None,
+    largest_deviation: float | None = None,
 ) -> StaticFix:
     """Solve for the state that explains a reading best.
 
@@ -57,6 +66,9 @@ def static_fix(
         Where to begin; components that are not solved for stay as they are.
     unknowns : sequence of int, optional
         Components to solve for; all without.
+    largest_deviation : float, optional
+        Largest standard deviation in any direction of the unknowns that is still a fix; a worse one
+        is bad geometry. Without it only what determines nothing is.
 
     Raises
     ------
@@ -72,9 +84,13 @@ def static_fix(
     faults.raise_if_any(InputError)
     free = list(range(state.size)) if unknowns is None else list(unknowns)
     present = np.isfinite(given)
-    nothing = StaticFix(np.full(state.size, np.nan), np.full((len(free),) * 2, np.nan), False, 0)
+
+    def nothing(problem: str, iterations: int = 0) -> StaticFix:
+        unknown = np.full((len(free), len(free)), np.nan)
+        return StaticFix(np.full(state.size, np.nan), unknown, False, iterations, problem)
+
     if present.sum() < len(free):
-        return nothing
+        return nothing(TOO_FEW)
     factor = np.linalg.cholesky(measurement.covariance()[np.ix_(present, present)])
 
     def whitened(at: Floats) -> Floats:
@@ -85,7 +101,7 @@ def static_fix(
         slope = np.linalg.solve(factor, measurement.jacobian(state)[present][:, free])
         left, values, right = np.linalg.svd(slope, full_matrices=False)
         if values[-1] <= _LOWEST_RATIO * values[0]:
-            return nothing
+            return nothing(BAD_GEOMETRY, iteration)
         move = right.T @ (left.T @ residual / values)
         length = 1.0
         while length > 1e-6:
@@ -98,6 +114,8 @@ def static_fix(
             length /= 2
         state, residual = tried, better
         if np.abs(length * move).max() <= _SETTLED_M * (1 + np.abs(state[free]).max()):
+            if largest_deviation is not None and values[-1] * largest_deviation < 1:
+                return nothing(BAD_GEOMETRY, iteration)
             covariance = (right.T / values**2) @ right
             return StaticFix(state, covariance, True, iteration)
-    return nothing
+    return nothing(UNSETTLED, _ITERATIONS)

@@ -10,7 +10,7 @@ from mapfilter.models.pseudorange import pseudoranges
 from mapfilter.models.state import POSITION, POSITION_CLOCK_3D
 from mapfilter.models.tdoa import range_differences
 from mapfilter.models.timing_advance import timing_advances
-from mapfilter.positioning.least_squares import static_fix
+from mapfilter.positioning.least_squares import BAD_GEOMETRY, TOO_FEW, static_fix
 
 CASE = CASES["gauss_newton"]
 GNSS = pseudoranges(POSITION_CLOCK_3D, CASE["sats"], CASE["s_pr"])
@@ -46,12 +46,32 @@ def test_two_satellites_and_two_stations_determine_nothing():
     fix = static_fix(few, np.append(Y[:2], Y[5]), START)
     assert fix.ok is CASES["dlr_two_sats_two_bs_underdetermined_ok"]
     assert np.isnan(fix.state).all()
+    assert fix.problem == TOO_FEW
+
+
+def test_satellites_close_together_are_bad_geometry_where_that_is_asked_for():
+    """Four satellites within a degree: solvable, with a deviation of kilometres."""
+    near = np.radians([[60.0, 0.0], [60.6, 0.5], [59.5, 0.9], [60.1, -0.7]])
+    away = 2.2e7 * np.column_stack([
+        np.cos(near[:, 0]) * np.sin(near[:, 1]), np.cos(near[:, 0]) * np.cos(near[:, 1]),
+        np.sin(near[:, 0]),
+    ])  # fmt: skip
+    model = pseudoranges(POSITION_CLOCK_3D, away, 3.0)
+    reading = model.mean([10.0, 20.0, 1.0, 85.0])
+    fix = static_fix(model, reading, np.zeros(4))
+    deviation = np.sqrt(np.linalg.eigvalsh(fix.covariance)[-1])
+    assert fix.ok
+    assert fix.problem == ""
+    assert deviation > 1000
+    told = static_fix(model, reading, np.zeros(4), largest_deviation=100.0)
+    assert (told.ok, told.problem) == (False, BAD_GEOMETRY)
+    assert static_fix(model, reading, np.zeros(4), largest_deviation=1.01 * deviation).ok
 
 
 def test_stations_in_a_line_do_not_tell_the_sides_apart():
     model = timing_advances(POSITION, [[0.0, 0.0], [1000.0, 0.0], [2000.0, 0.0]], 10.0)
     reading = model.mean(np.array([500.0, 400.0]))
-    assert not static_fix(model, reading, [500.0, 0.0]).ok
+    assert static_fix(model, reading, [500.0, 0.0]).problem == BAD_GEOMETRY
     fix = static_fix(model, reading, [500.0, 10.0])
     np.testing.assert_allclose(fix.state, [500.0, 400.0], atol=1e-6)
 
