@@ -187,11 +187,11 @@ def test_a_log_with_a_header_and_no_rows(log, replay):
 def test_a_logs_randomness_depends_on_its_name_not_on_its_neighbours(world, tmp_path, monkeypatch):
     drawn = {}
 
-    def position(database, points_of, log, options, rng):
+    def position(database, points_of, log, options, rng, *, ways):
         drawn.setdefault(log.truth_length_m, []).append(rng.integers(2**62))
-        return position_by_candidates(database, points_of, log, options, rng)
+        return position_by_candidates(database, points_of, log, options, rng, ways=ways)
 
-    monkeypatch.setattr("mapfilter.workflows.replay.position_by_candidates", position)
+    monkeypatch.setattr("mapfilter.positioning.locators.position_by_candidates", position)
     settings = ["output.pictures=none", f"database.path={world.database}"]
     for path in (world.journeys, world.journeys / "journey-0001-draw-000"):
         config = load_config(world.toml, [*settings, f"track.path={path}"])
