@@ -6,12 +6,13 @@ outlives a call. Equal data give equal bytes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import matplotlib
+from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -87,17 +88,22 @@ def picture(path: Path, width_in: float, height_in: float) -> Iterator[Figure]:
             figure.savefig(temporary, format="png", dpi=DPI, metadata={"Software": None})
 
 
-def bottom_legend(figure: Figure, most_columns: int) -> None:
-    """Put a legend of all that is labelled under the axes, in as many columns as there is room for.
+def bottom_legend(
+    figure: Figure, most_columns: int, handles: Sequence[Artist] | None = None
+) -> None:
+    """Put a legend under the axes, in as many columns as there is room for.
 
     Parameters
     ----------
     figure : Figure
         One of :func:`picture`.
     most_columns : int
+    handles : sequence of Artist, optional
+        What is in it; without, all that is labelled.
     """
+    given: dict[str, Any] = {} if handles is None else {"handles": handles, "handletextpad": 0.4}
     for columns in range(most_columns, 0, -1):
-        legend = figure.legend(loc="outside lower center", ncols=columns, frameon=False)
+        legend = figure.legend(loc="outside lower center", ncols=columns, frameon=False, **given)
         if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
             return
         legend.remove()

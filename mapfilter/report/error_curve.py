@@ -22,6 +22,7 @@ from mapfilter.report.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION
 _SIZE_IN = (9.0, 4.8)
 _SEARCHING = "#eeeeee"
 _LOST = "#f7d9c9"
+_WIDE, _LEAST_M = 12.0, 0.3
 
 
 def plot_error_over_distance(
@@ -29,8 +30,9 @@ def plot_error_over_distance(
 ) -> None:
     """Draw the position error over the metres really travelled.
 
-    Marks the switch from searching to tracking, the 50 m that count as success there, the mean and
-    the 67 and 95 % errors after it, and where the filter was searching or lost.
+    The error's axis is logarithmic where hundreds of metres become few; the filter's own radii are
+    a band. Marks the switch from searching to tracking, the 50 m that count as success there, the
+    mean and the 67 and 95 % errors after it, and where the filter was searching or lost.
 
     Parameters
     ----------
@@ -52,24 +54,33 @@ def plot_error_over_distance(
     errors_m = position_errors_m(estimate, truth)
     length_m = max(float(truth.distance_at(truth.time_s[-1])), 1.0)
     known_m = errors_m[np.isfinite(errors_m)]
-    top_m = 1.15 * max(float(known_m.max(initial=0.0)), 1.1 * SUCCESS_RADIUS_M)
+    score = accuracy(estimate, truth)
+    most_m = max(float(known_m.max(initial=0.0)), 1.1 * SUCCESS_RADIUS_M)
+    # Hundreds of metres while searching would press what follows flat.
+    wide = score.switched and most_m > _WIDE * score.error_95_m
     with picture(path, *_SIZE_IN) as figure:
         axes = figure.subplots()
         axes.set_xlim(0.0, length_m)
-        axes.set_ylim(0.0, top_m)
-        _shade(axes, estimate, distance_m, Status.SEARCHING, _SEARCHING, "searching")
-        _shade(axes, estimate, distance_m, Status.LOST, _LOST, "lost")
+        if wide:
+            axes.set_yscale("log")
+            axes.set_ylim(_LEAST_M, 2 * most_m)
+            axes.yaxis.set_major_formatter("{x:g}")
+        else:
+            axes.set_ylim(0.0, 1.15 * most_m)
+        shade_searching_and_lost(axes, estimate, distance_m)
         axes.axhline(
             SUCCESS_RADIUS_M, color=VERMILLION, linewidth=1.2, linestyle=(0, (5, 3)),
             label=f"{SUCCESS_RADIUS_M:.0f} m",
         )  # fmt: skip
-        told_m = estimate.radii_m[:, 2]
-        if np.isfinite(told_m).any():
+        told_m = estimate.radii_m.T
+        if np.isfinite(told_m[2]).any():
+            for radius_m in told_m:
+                axes.fill_between(distance_m, radius_m, color=ORANGE, alpha=0.16, linewidth=0)
             axes.plot(
-                distance_m, told_m, color=ORANGE, linewidth=1.1, label="95 % radius by the filter"
-            )
+                distance_m, told_m[2], color=ORANGE, linewidth=1.1,
+                label="50, 67, 95 % radius by the filter",
+            )  # fmt: skip
         axes.plot(distance_m, errors_m, color=BLUE, linewidth=1.5, label="error")
-        score = accuracy(estimate, truth)
         if score.switched:
             _draw_score(axes, score, length_m)
         else:
@@ -82,6 +93,25 @@ def plot_error_over_distance(
         axes.set_title(title or f"Filter: {estimate.filter}")
         axes.spines[["top", "right"]].set_visible(False)
         figure.legend(loc="outside lower center", ncols=4, frameon=False)
+
+
+def shade_searching_and_lost(
+    axes: Axes, estimate: TrackEstimate, along: Floats, *, named: bool = True
+) -> None:
+    """Shade the stretches of a track during which the filter was searching or lost.
+
+    Parameters
+    ----------
+    axes : Axes
+    estimate : TrackEstimate
+    along : (N,) array
+        Where each epoch is on the level axis.
+    named : bool
+        Whether the legend names them.
+    """
+    for status, colour in ((Status.SEARCHING, _SEARCHING), (Status.LOST, _LOST)):
+        name = status.lower() if named else None
+        _shade(axes, estimate, along, status, colour, name)
 
 
 def _draw_score(axes: Axes, score: Accuracy, length_m: float) -> None:
@@ -106,14 +136,19 @@ def _draw_score(axes: Axes, score: Accuracy, length_m: float) -> None:
 
 
 def _shade(
-    axes: Axes, estimate: TrackEstimate, distance_m: Floats, status: Status, colour: str, name: str
+    axes: Axes,
+    estimate: TrackEstimate,
+    along: Floats,
+    status: Status,
+    colour: str,
+    name: str | None,
 ) -> None:
     """Shade the stretches during which the filter had a status."""
     has = np.array([s is status for s in estimate.status], dtype=bool)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], has, [False]]).astype(np.int8)))
     for index, (first, end) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
-        last = min(int(end), distance_m.size - 1)
+        last = min(int(end), along.size - 1)
         axes.axvspan(
-            float(distance_m[first]), float(distance_m[last]), color=colour, linewidth=0,
+            float(along[first]), float(along[last]), color=colour, linewidth=0,
             zorder=0, label=name if index == 0 else None,
         )  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.resources import as_file, files
 from pathlib import Path
 
@@ -15,14 +15,38 @@ from mapfilter.workflows.build import run_build
 from mapfilter.workflows.config import load_config
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.replay import run_replay
+from mapfilter.workflows.replayed import ReplayedLog
 from mapfilter.workflows.simulate import run_simulate
 
 _STAGES = ("predict", "build", "simulate", "replay")
+_OLD_FILTER = "candidate"
+
+
+@dataclass(frozen=True)
+class FilterFigures:
+    """How a filter found the walk.
+
+    Parameters
+    ----------
+    switched : bool
+        Whether the filter went over to tracking.
+    switch_distance_m, error_at_switch_m : float
+        After how many metres, and how far off; NaN if it never switched.
+    error_mean_m, error_67_m, error_95_m : float
+        Over the track from the switch on.
+    """
+
+    switched: bool
+    switch_distance_m: float
+    error_at_switch_m: float
+    error_mean_m: float
+    error_67_m: float
+    error_95_m: float
 
 
 @dataclass(frozen=True)
 class DemoResult:
-    """What the demo found.
+    """What the demo found: the figures are the Bayes map filter's.
 
     Parameters
     ----------
@@ -36,6 +60,8 @@ class DemoResult:
         After how many metres, and how far off; NaN if it never switched.
     error_mean_m, error_67_m, error_95_m : float
         Over the track from the switch on.
+    candidate : FilterFigures
+        The same walk by the filter of Khalaf-Allah (2007), which takes no levels.
     seconds : dict
         Wall time of each stage.
     outputs : tuple of Path
@@ -51,6 +77,7 @@ class DemoResult:
     error_mean_m: float
     error_67_m: float
     error_95_m: float
+    candidate: FilterFigures
     seconds: dict[str, float]
     outputs: tuple[Path, ...]
 
@@ -62,7 +89,7 @@ def run_demo(
     seed: int | None = None,
     progress: Progress | None = None,
 ) -> DemoResult:
-    """Predict, build, simulate a walk and replay it, with the pictures of each.
+    """Predict, build, simulate a walk and replay it by two filters, with the pictures of each.
 
     Parameters
     ----------
@@ -101,26 +128,37 @@ def run_demo(
     with stage("simulate"):
         simulated = run_simulate(config)
     with stage("replay"):
-        replayed = run_replay(config, out / "replay")
-    walk = replayed.logs[0]
-    if walk.accuracy is None:
-        raise AssertionError("a simulated walk has its truth")
+        walk = run_replay(config, out / "replay").logs[0]
+        old_filter = config.filter.model_copy(update={"name": _OLD_FILTER})
+        old_config = config.model_copy(update={"filter": old_filter})
+        old = run_replay(old_config, out / _OLD_FILTER).logs[0]
     files_written = [predicted.rasters, predicted.reality, predicted.plan, built.database]
     return DemoResult(
-        built.points,
-        built.cells,
-        simulated.track_m,
-        walk.accuracy.switched,
-        walk.accuracy.switch_distance_m,
-        walk.accuracy.error_at_switch_m,
-        walk.accuracy.error_mean_m,
-        walk.accuracy.error_67_m,
-        walk.accuracy.error_95_m,
-        seconds,
-        (
+        points=built.points,
+        cells=built.cells,
+        track_m=simulated.track_m,
+        **asdict(_figures(walk)),
+        candidate=_figures(old),
+        seconds=seconds,
+        outputs=(
             *(f for f in files_written if f is not None),
             simulated.path,
             *built.pictures,
             *walk.outputs,
+            *old.outputs,
         ),
+    )
+
+
+def _figures(walk: ReplayedLog) -> FilterFigures:
+    score = walk.accuracy
+    if score is None:
+        raise AssertionError("a simulated walk has its truth")
+    return FilterFigures(
+        score.switched,
+        score.switch_distance_m,
+        score.error_at_switch_m,
+        score.error_mean_m,
+        score.error_67_m,
+        score.error_95_m,
     )

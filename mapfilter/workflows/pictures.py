@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,40 +10,57 @@ import numpy as np
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.positioning.global_positioning import PositionedTrack
 from mapfilter.positioning.snapshot import Snapshot
-from mapfilter.report.candidates import MAX_PANELS, plot_candidates
+from mapfilter.report.belief import plot_belief
+from mapfilter.report.candidates import plot_candidates
 from mapfilter.report.error_curve import plot_error_over_distance
+from mapfilter.report.evidence import plot_evidence
+from mapfilter.report.panels import MAX_PANELS
 from mapfilter.report.track import plot_track
 from mapfilter.tracks.log import TrackLog
 from mapfilter.workflows.network_pictures import street_map
 from mapfilter.workflows.served import served_points
 from mapfilter.workflows.truth import truth_of
 
+_SQUARE_M = 5.0
+
 
 def draw_track(
     database: RadioRouteDatabase, log: TrackLog, track: PositionedTrack, folder: Path
 ) -> tuple[Path, ...]:
-    """Draw one located log: candidates thinning out (Fig. 1), the track, error over distance."""
+    """Draw one located log: its belief at a few moments, the track, error and evidence.
+
+    Of the candidate filter these are candidates thinning out (Fig. 1 of the paper).
+    """
     base, truth = street_map(database, served_points(database)), truth_of(log)
     drawn = []
+    evidence = track.estimate.evidence
     if track.snapshots:
-        drawn.append(folder / "candidates.png")
-        plot_candidates(choose_snapshots(track.snapshots), truth, base, drawn[-1])
+        drawn.append(folder / ("candidates.png" if evidence is None else "belief.png"))
+        plot = plot_candidates if evidence is None else plot_belief
+        spread = _candidates if evidence is None else _places
+        plot(choose_snapshots(track.snapshots, spread), truth, base, drawn[-1])
     drawn.append(folder / "track.png")
     plot_track(track.estimate, truth, base, drawn[-1])
     if truth is not None:
         drawn.append(folder / "error.png")
         plot_error_over_distance(track.estimate, truth, drawn[-1])
+    if evidence is not None and len(track.estimate):
+        drawn.append(folder / "evidence.png")
+        plot_evidence(track.estimate, truth, drawn[-1])
     return tuple(drawn)
 
 
-def choose_snapshots(snapshots: Sequence[Snapshot]) -> list[Snapshot]:
+def choose_snapshots(
+    snapshots: Sequence[Snapshot], spread: Callable[[Snapshot], float]
+) -> list[Snapshot]:
     """Choose at most six: the first, the last, and between them even steps of the thinning out.
 
-    Steps are even in the logarithm of the number of hypotheses, because that is how it falls.
+    Steps are even in the logarithm of ``spread``, the number of places that a belief is spread
+    over, because that is how it falls.
     """
     if len(snapshots) <= MAX_PANELS:
         return list(snapshots)
-    counts = np.array([max(s.hypothesis_east_m.size, 1) for s in snapshots])
+    counts = np.array([max(spread(s), 1.0) for s in snapshots])
     last = len(snapshots) - 1
     depth = np.log(counts[0] / counts) + 1e-9 * np.arange(len(snapshots))
     chosen = {0, last}
@@ -51,3 +68,18 @@ def choose_snapshots(snapshots: Sequence[Snapshot]) -> list[Snapshot]:
         free = [i for i in range(1, last) if i not in chosen]
         chosen.add(free[int(np.argmin(np.abs(depth[free] - goal)))])
     return [snapshots[i] for i in sorted(chosen)]
+
+
+def _candidates(snapshot: Snapshot) -> float:
+    return float(snapshot.hypothesis_east_m.size)
+
+
+def _places(snapshot: Snapshot) -> float:
+    """Return the effective number of squares that a belief of probabilities is spread over."""
+    if not snapshot.weight.size:
+        return 0.0
+    at_m = np.array([snapshot.hypothesis_east_m, snapshot.hypothesis_north_m])
+    _, square = np.unique(np.round(at_m / _SQUARE_M), axis=1, return_inverse=True)
+    mass = np.bincount(square.ravel(), snapshot.weight)
+    mass = mass[mass > 0]
+    return float(np.exp(-np.sum(mass * np.log(mass))))

@@ -12,7 +12,9 @@ ESTIMATES = ("estimate.parquet", "estimate.gpx", "estimate.geojson")
 FIGURES = "figures.json"
 SUMMARY = "summary.json"
 
-_OF_ONE_LOG = {*ESTIMATES, FIGURES, "candidates.png", "track.png", "error.png"}
+PICTURES = ("candidates.png", "belief.png", "track.png", "error.png", "evidence.png")
+
+_OF_ONE_LOG = {*ESTIMATES, FIGURES, *PICTURES}
 
 
 def clear_results(out: Path) -> None:

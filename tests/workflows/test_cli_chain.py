@@ -16,7 +16,7 @@ from mapfilter.tracks.store import read_log
 
 DEMO_KEYS = [
     "points", "cells", "track_m", "switched", "switch_distance_m", "error_at_switch_m",
-    "error_mean_m", "error_67_m", "error_95_m", "seconds", "outputs",
+    "error_mean_m", "error_67_m", "error_95_m", "candidate", "seconds", "outputs",
 ]  # fmt: skip
 JOURNEYS = ["journey-0000-draw-000", "journey-0001-draw-000"]
 
@@ -189,6 +189,7 @@ def test_demo_prints_the_documented_keys_on_the_last_line(tmp_path):
     found = assert_done(mapfilter("demo", "--out", tmp_path, *small, "--json"))
     assert len(found.out.splitlines()) == 1
     assert list(found.json) == DEMO_KEYS
+    assert list(found.json["candidate"]) == DEMO_KEYS[3:9]
     assert list(found.json["seconds"]) == ["predict", "build", "simulate", "replay"]
     assert found.json["cells"] == 13
     assert all(Path(path).exists() for path in found.json["outputs"])

@@ -1,0 +1,100 @@
+"""Pictures of beliefs with probabilities: the same each time, showing the data."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.image import imread
+
+from mapfilter.errors import InputError
+from mapfilter.evaluation.accuracy import Truth
+from mapfilter.filters.contract import Reason, Status
+from mapfilter.positioning.estimate import Fix, TrackEstimate, TrackEvidence
+from mapfilter.positioning.snapshot import Snapshot
+from mapfilter.report.basemap import BaseMap
+from mapfilter.report.belief import plot_belief
+from mapfilter.report.canvas import BLUE
+from mapfilter.report.error_curve import plot_error_over_distance
+from mapfilter.report.evidence import plot_evidence
+from mapfilter.workflows.pictures import choose_snapshots
+
+STREET = np.array([[0.0, 100.0], [400.0, 100.0]])
+BASE = BaseMap((0.0, 0.0, 400.0, 300.0), (STREET,))
+COUNT = 200
+TRUTH = Truth(np.arange(float(COUNT)), np.arange(float(COUNT)), np.full(COUNT, 100.0))
+
+
+def snapshot(width_m: float, time_s: float = 0.0, status: Status = Status.SEARCHING) -> Snapshot:
+    """Return 2000 equal hypotheses along the street, so far to both sides of its middle."""
+    east_m = 200.0 + np.linspace(-width_m, width_m, 2000)
+    weight = np.full(2000, 1 / 2000)
+    return Snapshot(time_s, time_s, east_m, np.full(2000, 100.0), weight, 200.0, 100.0, status)
+
+
+def blue_pixels(path) -> int:
+    return int((np.abs(imread(path)[..., :3] - to_rgb(BLUE)).max(axis=2) < 0.01).sum())
+
+
+def estimate() -> TrackEstimate:
+    status = [Status.SEARCHING] * 50 + [Status.CONVERGED] + [Status.TRACKING] * 149
+    off_m = np.r_[np.full(50, 150.0), np.full(150, 2.0)]
+    fixes = [
+        Fix(
+            t, t + off_m[t], 100.0, np.eye(2), off_m[t] * np.array([0.5, 0.8, 1.5]), status[t],
+            9, 0.5, 0, np.nan, Reason.USED,
+        )
+        for t in range(COUNT)
+    ]  # fmt: skip
+    half = np.linspace(0.0, 0.5, COUNT)
+    nowhere = np.full(COUNT, np.nan)
+    settled = np.zeros(COUNT, dtype=np.bool_)
+    evidence = TrackEvidence(nowhere, nowhere, half, 9 - 18 * half, -half, settled)
+    return TrackEstimate.of_fixes("EPSG:32635", "bayes", fixes, evidence=evidence)
+
+
+def test_a_belief_fades_as_it_narrows(tmp_path):
+    blue = []
+    for width_m in (150.0, 60.0, 20.0):
+        plot_belief([snapshot(width_m)], TRUTH, BASE, tmp_path / "belief.png")
+        blue.append(blue_pixels(tmp_path / "belief.png"))
+    assert blue[0] > 1.5 * blue[1] > 2 * blue[2] > 0
+
+
+def test_the_same_belief_gives_the_same_bytes(tmp_path):
+    shown = [snapshot(150.0), snapshot(10.0, 60.0, Status.CONVERGED)]
+    for name in ("a.png", "b.png"):
+        plot_belief(shown, None, BASE, tmp_path / name)
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+@pytest.mark.parametrize("count", [0, 7])
+def test_one_to_six_moments(tmp_path, count):
+    with pytest.raises(InputError, match="1 to 6"):
+        plot_belief([snapshot(10.0)] * count, TRUTH, BASE, tmp_path / "belief.png")
+
+
+@pytest.mark.parametrize("truth", [TRUTH, None])
+def test_evidence_with_and_without_truth(tmp_path, truth):
+    plot_evidence(estimate(), truth, tmp_path / "evidence.png")
+    assert blue_pixels(tmp_path / "evidence.png") > 300
+
+
+def test_no_evidence_no_picture(tmp_path):
+    with pytest.raises(InputError, match="probabilities"):
+        plot_evidence(replace(estimate(), evidence=None), TRUTH, tmp_path / "evidence.png")
+
+
+def test_small_errors_after_large_ones_are_seen(tmp_path):
+    plot_error_over_distance(estimate(), TRUTH, tmp_path / "error.png")
+    rows, _ = np.nonzero(
+        np.abs(imread(tmp_path / "error.png")[:-250, ..., :3] - to_rgb(BLUE)).max(axis=2) < 0.01
+    )
+    # Two metres are well above the lower end of an axis that also shows 150 m.
+    assert 0.15 * 720 < rows.max() < 0.6 * 720
+
+
+def test_chosen_moments_follow_the_spread():
+    seen = [snapshot(width_m, time_s) for time_s, width_m in enumerate(np.geomspace(150, 3, 30))]
+    chosen = choose_snapshots(seen, lambda s: float(np.ptp(s.hypothesis_east_m)))
+    assert [s.time_s for s in chosen] == pytest.approx([0, 5.8, 11.6, 17.4, 23.2, 29], abs=1)
