@@ -4,13 +4,17 @@ Where phones tell nothing but their serving cell, nobody knows how the others we
 margin over the best other cell is made of extrapolations. What was served can be counted. Rows of
 sessions are spread by a Gaussian kernel (Nadaraya 1964; Watson 1964): with n rows of any cell about
 a place and n_c of one, that one serves with the probability ``(n_c + a p_c) / (n + a)``, with p_c
-its share of all rows and a the weight of not knowing. Timing advances get mean and deviation in
-the same way: buildings bend the way of the signal, so that rings about the site, whose place is
-not known either, say less than what was told nearby.
+its share of all rows and a the weight of not knowing. On another day another cell of the same site
+may serve, of another carrier: a part of the probability goes by how often the site served.
+
+Timing advances get mean and deviation in the same way, a cell's drawn to those of its site:
+buildings bend the way of the signal, so that rings about the site, whose place is not known either,
+say less than what was told nearby.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,12 +39,15 @@ class HeardOptions:
         Standard deviation of the kernel.
     prior_rows : float
         Weight of not knowing: so many rows at a place say as much as all rows together.
+    site_part : float
+        Part of the probability that goes by the site.
     rounding_steps : float
         Standard deviation of a timing advance where all rows agree.
     """
 
     reach_m: float = 30.0
     prior_rows: float = 1.0
+    site_part: float = 0.1
     rounding_steps: float = 0.5
 
 
@@ -81,11 +88,18 @@ class HeardMaps:
 
     @classmethod
     def of_rows(
-        cls, rows: HeardRows, lattice: Lattice, cells: int, options: HeardOptions
+        cls, rows: HeardRows, lattice: Lattice, site: NDArray[np.int64], options: HeardOptions
     ) -> HeardMaps:
         """Count rows on a lattice.
 
-        Rows outside it do not count.
+        Parameters
+        ----------
+        rows : HeardRows
+            Those outside the lattice do not count.
+        lattice : Lattice
+        site : ndarray of int, shape (C,)
+            Which site each cell is of, as numbers from 0.
+        options : HeardOptions
         """
         row, col = lattice.row_col(rows.east_m, rows.north_m)
         inside = np.asarray(lattice.contains(row, col))
@@ -101,23 +115,27 @@ class HeardMaps:
             smooth = gaussian_filter(count.reshape(shape), sigma, mode="constant", truncate=3.0)
             return np.asarray(scale * smooth, dtype=np.float64).ravel()
 
-        ones = np.ones(cell.size)
-        total = spread(ones > 0, ones) + options.prior_rows
-        maps = np.full((3, cells, shape[0] * shape[1]), np.nan, dtype=np.float32)
-        for band in range(cells):
-            own = cell == band
-            share = (np.sum(own) + 0.5) / (cell.size + 0.5 * cells)
-            maps[0, band] = np.log((spread(own, ones) + options.prior_rows * share) / total)
+        ones, prior = np.ones(cell.size), options.prior_rows
+        total = spread(ones > 0, ones) + prior
+        place = np.where(cell >= 0, site[cell], -1)
+        often = np.bincount(cell[cell >= 0], minlength=site.size) + 0.5
+        often /= often.sum()
+        maps = np.empty((3, site.size, shape[0] * shape[1]), dtype=np.float32)
+        for one in np.unique(site):
+            own, bands = place == one, np.flatnonzero(site == one)
+            usual = often[bands].sum()
+            by_site = (spread(own, ones) + prior * usual) / total
             known = own & np.isfinite(told)
-            if not known.any():
-                continue
-            mean, variance = float(told[known].mean()), float(told[known].var())
-            prior = options.prior_rows
-            count = spread(known, ones) + prior
-            first = (spread(known, told) + prior * mean) / count
-            second = (spread(known, told**2) + prior * (variance + mean**2)) / count
-            maps[1, band] = first
-            maps[2, band] = np.sqrt(np.maximum(second - first**2, 0.0) + options.rounding_steps**2)
+            usual_steps = _moments_of(told[known])
+            by_place = _moments(spread, known, told, usual_steps, prior)
+            for band in bands:
+                by_cell = (spread(cell == band, ones) + prior * often[band]) / total
+                part = options.site_part
+                share = (1 - part) * by_cell + part * by_site * often[band] / usual
+                maps[0, band] = np.log(share)
+                first, second = _moments(spread, known & (cell == band), told, by_place, prior)
+                variance = np.maximum(second - first**2, 0.0) + options.rounding_steps**2
+                maps[1, band], maps[2, band] = first, np.sqrt(variance)
         return cls(*maps)
 
     def log_serving(self, band: int, pixel: NDArray[np.int32]) -> Floats32:
@@ -130,3 +148,24 @@ class HeardMaps:
         beside = np.abs(steps - self.advance_steps[band][pixel]) / deviation
         found = -0.5 * np.minimum(beside, _CLIP_SD) ** 2 - np.log(deviation)
         return np.asarray(np.nan_to_num(found, nan=0.0), dtype=np.float32)
+
+
+def _moments_of(values: Floats) -> tuple[Floats, Floats]:
+    """Return mean and mean square, NaN without any."""
+    if not values.size:
+        return np.full(1, np.nan), np.full(1, np.nan)
+    return np.array([values.mean()]), np.array([np.mean(values**2)])
+
+
+def _moments(
+    spread: Callable[[NDArray[np.bool_], Floats], Floats],
+    known: NDArray[np.bool_],
+    told: Floats,
+    otherwise: tuple[Floats, Floats],
+    prior: float,
+) -> tuple[Floats, Floats]:
+    """Return maps of mean and mean square, drawn to what is known otherwise."""
+    count = spread(known, np.ones(told.size)) + prior
+    first = (spread(known, told) + prior * otherwise[0]) / count
+    second = (spread(known, told**2) + prior * otherwise[1]) / count
+    return first, second

@@ -21,6 +21,7 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
     Session,
     centroids,
     session_log,
+    site_of,
 )
 from mapfilter.filters.contract import Status
 from mapfilter.models.cell_id import ServingWeights
@@ -145,7 +146,8 @@ def surveyed_positioner(
     cell = np.array([area.band_of.get(name, -1) for other in others for name in other.cell])
     steps = np.concatenate([other.timing_advance for other in others])
     rows = HeardRows(cell[good], places[good, 0], places[good, 1], steps[good])
-    heard = HeardMaps.of_rows(rows, area.lattice, len(area.cell_ids), options.heard)
+    sites = np.unique([site_of(name) for name in area.cell_ids], return_inverse=True)[1]
+    heard = HeardMaps.of_rows(rows, area.lattice, sites, options.heard)
     model = HeardModel(area, chosen.motion, chosen.map, chosen.evidence, heard)
     return replace(chosen.over(area), model=model)
 
