@@ -129,7 +129,7 @@ def reproduce(
 
 def bench(
     stage: Annotated[
-        str, typer.Argument(metavar="[NAME]", help="build, fusion or sweep.")
+        str, typer.Argument(metavar="[NAME]", help="build, filter, fusion or sweep.")
     ] = "build",
     runs: Annotated[int, typer.Option("--runs", min=1, help="Runs that medians are of.")] = 5,
     as_json: JsonOption = False,

@@ -25,11 +25,12 @@ from mapfilter.radio.rasters import RxLevRasters, open_rasters, write_rasters
 from mapfilter.roads.lattice import RouteLattice
 
 if TYPE_CHECKING:
+    from mapfilter.workflows.bench_filter import FilterBench
     from mapfilter.workflows.bench_fusion import FusionBench
     from mapfilter.workflows.bench_sweep import SweepBench
 
 CRS = "EPSG:32629"
-STAGES = ("build", "fusion", "sweep")
+STAGES = ("build", "filter", "fusion", "sweep")
 _FLOOR_DBM = -104.0
 _BLOCK_PX = 256
 
@@ -76,8 +77,8 @@ class BuildBench:
 
 def run_bench(
     stage: str, *, rasters: int = 10, side_px: int = 3000, points: int = 100_000, runs: int = 5
-) -> BuildBench | FusionBench | SweepBench:
-    """Measure a stage on made inputs; a sweep on the embedded map.
+) -> BuildBench | FilterBench | FusionBench | SweepBench:
+    """Measure a stage on made inputs; a filter and a sweep on the embedded map.
 
     Raises
     ------
@@ -88,6 +89,10 @@ def run_bench(
     """
     if stage not in STAGES:
         raise fail(ConfigError, "bench", f"one of {', '.join(STAGES)}", repr(stage))
+    if stage == "filter":
+        from mapfilter.workflows.bench_filter import bench_filter
+
+        return bench_filter(runs=runs)
     if stage == "fusion":
         from mapfilter.workflows.bench_fusion import bench_fusion
 
