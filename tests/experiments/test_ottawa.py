@@ -2,25 +2,40 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from mapfilter.database.store import open_database
 from mapfilter.errors import InputError
-from mapfilter.experiments.benchmarks.ottawa import FOLDER, centroid_errors_m
+from mapfilter.experiments.benchmarks.ottawa import (
+    FOLDER,
+    OttawaOptions,
+    centroid_errors_m,
+    find_session,
+    surveyed_positioner,
+)
 from mapfilter.experiments.benchmarks.ottawa_sessions import (
     ReckoningErrors,
     read_session,
     session_log,
 )
-from mapfilter.geodesy import unproject
+from mapfilter.filters.particle_options import ParticleOptions
+from mapfilter.geodesy import Lattice, unproject
+from mapfilter.models.heard_maps import HeardMaps, HeardOptions, HeardRows
 from mapfilter.workflows.evaluate_ottawa import run_ottawa
 
 CRS = "EPSG:32618"
 WEST, SOUTH = 445_000.0, 5_030_000.0
 ANTENNAS = {1: (-60.0, 40.0), 2: (300.0, 460.0), 3: (520.0, -40.0)}
-STEP_M, SPEED_MPS = 8.0, 4.0
+STEP_M, SPEED_MPS = 20.0, 4.0
+CHOSEN = OttawaOptions()
+QUICK = replace(
+    CHOSEN, filter=replace(CHOSEN.filter, particles=ParticleOptions(most=6000, searching=4000))
+)
+"""A fifth of the particles."""
 
 
 def write_ride(path, seed, start_s):
@@ -64,7 +79,8 @@ def made(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def found(made, tmp_path_factory):
-    return run_ottawa(made, tmp_path_factory.mktemp("found"), runs=1, parts=("carling",))
+    folder = tmp_path_factory.mktemp("found")
+    return run_ottawa(made, folder, runs=1, parts=("carling",), options=QUICK)
 
 
 def test_made_sessions_are_found_on_the_map_of_the_others(found):
@@ -80,11 +96,21 @@ def test_made_sessions_are_found_on_the_map_of_the_others(found):
     assert [one.on_map for one in found.sessions] == [1.0, 1.0, 1.0]
 
 
-def test_the_table_is_written_and_equal_seeds_find_the_same(found, made, tmp_path):
+def test_the_table_is_written(found):
     table = json.loads((found.out / "table.json").read_text())
-    assert table["rows"][0]["part"] == "carling"
-    again = run_ottawa(made, tmp_path, runs=1, parts=("carling",))
-    assert again.rows == found.rows or repr(again.rows) == repr(found.rows)
+    assert [row["method"] for row in table["rows"]] == ["bayes", "smoothed", "centroid"]
+    assert table["sessions"][0]["successes"] == 1
+
+
+def test_equal_seeds_find_the_same(found, made):
+    one, *others = [read_session(path) for path in sorted((made / FOLDER / "carling").iterdir())]
+    database = open_database(found.out / "carling" / one.name / "database")
+    positioner = surveyed_positioner(database, others, QUICK, 3.0)
+    first, again, other = (
+        find_session("carling", one, positioner, QUICK, seed, 0)[0] for seed in (7, 7, 8)
+    )
+    assert first.error_m.tobytes() == again.error_m.tobytes()
+    assert first.error_m.tobytes() != other.error_m.tobytes()
 
 
 def test_dead_reckoning_without_errors_follows_the_truth(made):
@@ -93,7 +119,7 @@ def test_dead_reckoning_without_errors_follows_the_truth(made):
     step_m, heading = log.motion["step_m"].to_numpy(), log.motion["heading_rad"].to_numpy()
     place_m = np.cumsum(step_m[:, None] * np.column_stack([np.cos(heading), np.sin(heading)]), 0)
     truth_m = log.truth[["east_m", "north_m"]].to_numpy()
-    assert np.abs(truth_m[1:] - truth_m[0] - place_m[1::2]).max() < 25
+    assert np.abs(truth_m[1:] - truth_m[0] - place_m[1::2]).max() < 40
     assert log.radio["timing_advance"].max() <= 6
     assert log.gnss.empty
 
@@ -111,12 +137,12 @@ def test_the_bias_is_of_all_headings_of_a_session(made):
 
 def test_nothing_is_known_of_the_way_over_a_silence(made, tmp_path):
     table = pd.read_csv(made / FOLDER / "carling" / "OpenCellID_20210101.csv")
-    table.loc[100:, "measured_at"] += 60_000
+    table.loc[50:, "measured_at"] += 60_000
     table.to_csv(tmp_path / "silent.csv", index=False)
     log = session_log(
         read_session(tmp_path / "silent.csv"), CRS, ReckoningErrors(), np.random.default_rng(0)
     )
-    assert np.flatnonzero(log.motion["step_m"].isna()).tolist() == [198, 199]
+    assert np.flatnonzero(log.motion["step_m"].isna()).tolist() == [98, 99]
 
 
 def test_rows_of_one_time_count_once_and_strange_timing_advances_not(made, tmp_path):
@@ -160,7 +186,29 @@ def test_a_real_walk_is_found(shared_data, tmp_path):
     for day in ("20210404", "20210506", "20210523"):
         (path,) = (shared_data / FOLDER / "carling").glob(f"OpenCellID_{day}*.csv")
         shutil.copy(path, folder)
-    found = run_ottawa(tmp_path, tmp_path / "out", runs=1, parts=("carling",))
+    found = run_ottawa(tmp_path, tmp_path / "out", runs=1, parts=("carling",), options=QUICK)
     assert found.rows[0].success >= 2 / 3
     assert found.rows[0].median_m < 60
     assert found.rows[0].baseline_m > 100
+
+
+def test_another_cell_of_the_site_may_serve():
+    lattice = Lattice(CRS, WEST, SOUTH + 200.0, 10.0, 20, 20)
+    rows = HeardRows(
+        np.array([0] * 9 + [2]),
+        WEST + np.array([55.0] * 9 + [155.0]),
+        np.full(10, SOUTH + 55.0),
+        np.array([2.0] * 9 + [7.0]),
+    )
+    options = HeardOptions(reach_m=20.0, prior_rows=1.0, site_part=0.2)
+    maps = HeardMaps.of_rows(rows, lattice, np.array([0, 0, 1]), options)
+    row, col = lattice.row_col([WEST + 55.0, WEST + 155.0], [SOUTH + 55.0] * 2)
+    at = np.asarray(row) * lattice.cols + np.asarray(col)
+    share = np.exp(maps.log_share[:, at])
+    assert share.sum(axis=0) == pytest.approx([1.0, 1.0], abs=1e-5)
+    assert share[0, 0] > 0.8 > share[2, 1] > share[0, 1]
+    alone = HeardMaps.of_rows(rows, lattice, np.arange(3), options)
+    assert share[1, 0] > 1.5 * np.exp(alone.log_share[1, at[0]])
+    assert maps.advance_steps[1, at] == pytest.approx([2.0, 2.0])
+    told = maps.log_advance(0, at.astype(np.int32), 2.0)
+    assert told == pytest.approx([-np.log(0.5)] * 2, abs=1e-5)
