@@ -60,7 +60,7 @@ def test_quickstart_commands_run(tmp_path, monkeypatch):
     (tmp_path / "helsinki.toml").write_text(textwrap.dedent(toml[1]), encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     commands = re.findall(r"^   \$ mapfilter (.+)$", text, flags=re.MULTILINE)
-    assert len(commands) == 12
+    assert len(commands) == 13
     for command in commands:
         if command.startswith("demo"):
             continue
@@ -71,6 +71,8 @@ def test_quickstart_commands_run(tmp_path, monkeypatch):
     found = {path.name for path in (tmp_path / "located").rglob("*")}
     named_there = {f"estimate.{kind}" for kind in ("parquet", "gpx", "geojson")}
     assert named_there | {"figures.json", "candidates.png", "track.png", "error.png"} <= found
+    drawn = {path.name for path in (tmp_path / "located-bayes").rglob("*.png")}
+    assert drawn == {"belief.png", "track.png", "error.png", "evidence.png"}
 
 
 def test_conventions_name_every_status_and_reason():
@@ -144,4 +146,4 @@ def test_quickstart_shows_only_commands_that_exist():
     commands = set(typer.main.get_command(app).commands)
     shown = set(re.findall(r"^   \$ mapfilter (\w+)", page("quickstart.rst"), flags=re.MULTILINE))
     assert shown <= commands
-    assert commands - shown <= {"merge", "bench", "evaluate", "sweep", "reproduce"}
+    assert commands - shown <= {"merge", "bench", "bound", "evaluate", "sweep", "reproduce"}
