@@ -182,7 +182,7 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         else:
             flat = weight
         if effective < self.options.resample_below * weight.size or 2 * wanted < weight.size:
-            state, chosen = self._resampled(state, flat, wanted, rng)
+            state, chosen = self._resampled(state, flat, wanted, status, rng)
             log_weight = _left_over(log_weight[chosen], power)
         now = replace(
             weighed, state=state, log_weight=log_weight, status=status, agreed_at_m=agreed_at_m
@@ -202,13 +202,19 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         return int(min(max(options.per_bin * summary.effective_bins, least), options.most))
 
     def _resampled(
-        self, state: Floats32, weight: Floats32, wanted: int, rng: np.random.Generator
+        self,
+        state: Floats32,
+        weight: Floats32,
+        wanted: int,
+        status: Status,
+        rng: np.random.Generator,
     ) -> tuple[Floats32, NDArray[np.int32]]:
         chosen = np.empty(wanted, dtype=np.int32)
         systematic(weight, rng.random(), chosen)
         copies = np.empty((state.shape[0], wanted), dtype=np.float32)
-        jitter = np.asarray(self.options.jitter, dtype=np.float32)
-        copy_with_jitter(state, chosen, jitter, draw_key(rng), copies)
+        times = self.options.searching_jitter if status is Status.SEARCHING else 1.0
+        jitter = times * np.asarray(self.options.jitter, dtype=np.float32)
+        copy_with_jitter(state, chosen, jitter.astype(np.float32), draw_key(rng), copies)
         return copies, chosen
 
 

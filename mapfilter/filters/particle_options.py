@@ -29,6 +29,9 @@ class ParticleOptions:
         resampling.
     jitter : tuple of float
         Standard deviation of the noise that parts copies, for each row of the state.
+    searching_jitter : float
+        Times as much of it until the filter has converged: few copies stand for each place then,
+        and must cover all headings and step lengths that are possible there.
     switch_mass : float
         The filter has converged when so much of the belief lies within 50 m of the leading
         hypothesis,
@@ -43,6 +46,7 @@ class ParticleOptions:
     resample_below: float = 0.5
     flatten: float = 0.5
     jitter: tuple[float, ...] = (0.5, 0.5, 0.005, 0.003, 0.0)
+    searching_jitter: float = 3.0
     switch_mass: float = 0.99
     switch_hold_m: float = 14.0
 
@@ -64,4 +68,6 @@ class ParticleOptions:
             faults.add("particles, switch_hold_m", "metres >= 0", self.switch_hold_m)
         if not all(isfinite(sd) and sd >= 0 for sd in self.jitter):
             faults.add("particles, jitter", "finite numbers >= 0", self.jitter)
+        if not (isfinite(self.searching_jitter) and self.searching_jitter >= 0):
+            faults.add("particles, searching_jitter", "times >= 0", self.searching_jitter)
         faults.raise_if_any(ConfigError)

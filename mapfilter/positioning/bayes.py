@@ -146,19 +146,32 @@ class BayesPositioner:
             return replace(track, belief=belief, status=status), info.reason
         gained = belief.log_evidence - before.log_evidence
         doubt = track.doubt.after(reading.expected, gained, reading.length_m)
+        most = self._doubt_at(reading)
+        if belief.status is Status.CONVERGED and doubt.sum > self.rules.converge_below:
+            # All agree, and what is heard does not: the truth may have died out.
+            belief = replace(belief, status=Status.SEARCHING)
+            status = belief.status
         challenger, wins = track.challenger, track.wins
         travelled_m = track.memory.travelled_m
         if challenger is not None:
             other, _ = self.filter_for(track.compass).update(challenger.belief, reading, rng)
             challenger = replace(challenger, belief=other)
             verdict = judge(self.rules, belief, challenger, travelled_m)
-            if verdict is Verdict.WON:
-                belief, wins = replace(other, status=Status.TRACKING), wins + 1
-            if verdict not in (Verdict.OPEN, Verdict.AHEAD):
-                doubt, challenger = replace(doubt, sum=0.0), None
+            found = verdict is Verdict.WON
             lost = verdict is Verdict.AHEAD
-            status = Status.LOST if lost else Status.TRACKING
-        elif status is Status.TRACKING and doubt.sum >= self._doubt_at(reading):
+            if belief.status is Status.TRACKING:
+                after = Status.TRACKING
+                status = Status.LOST if lost else after
+            else:
+                # Nothing found yet can be lost: whoever is ahead goes on with the search at once.
+                after = Status.CONVERGED if found else Status.SEARCHING
+                found = found or lost
+                status = after if found else belief.status
+            if found:
+                belief, wins = replace(other, status=after), wins + 1
+            if found or verdict not in (Verdict.OPEN, Verdict.AHEAD):
+                doubt, challenger = doubt.none(), None
+        elif status is not Status.CONVERGED and doubt.sum >= most:
             challenger = self._challenger(track, belief, epoch, rng)
         now = replace(
             track, belief=belief, status=status, doubt=doubt, challenger=challenger, wins=wins

@@ -6,11 +6,13 @@ When it is large a *challenger* starts from scratch beside the belief. Both then
 readings, and the difference of their log evidence is the logarithm of the Bayes factor between
 "one is where I thought" and "one is anywhere". The belief is LOST when the challenger is ahead, and
 is replaced only once the challenger has converged; it is confirmed when both are at one place.
+A belief that still searches is in doubt when the true place has died out of it: it does not
+converge, and a challenger that is ahead goes on in its place.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from math import exp, hypot
 
@@ -43,6 +45,8 @@ class ChallengeRules:
         A challenger that is so far behind gives up,
     give_up_m : float
         or one that has neither won nor lost after so many metres.
+    converge_below : float
+        No belief converges while the doubt is larger.
     """
 
     doubt: float = 5.0
@@ -51,6 +55,7 @@ class ChallengeRules:
     confirmed_mass: float = 0.9
     give_up: float = -25.0
     give_up_m: float = 800.0
+    converge_below: float = 2.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,3 +141,7 @@ class Doubt:
         share = 0.0 if total > 0 else 1.0 - exp(-length_m / _LEARNT_OVER_M)
         ratio = min(max(gained / expected, _LEAST_USUAL), _MOST_USUAL)
         return Doubt(total, self.usual + share * (ratio - self.usual))
+
+    def none(self) -> Doubt:
+        """Return no doubt, with what was learnt."""
+        return replace(self, sum=0.0)
