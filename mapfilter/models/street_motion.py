@@ -90,8 +90,8 @@ def map_log_likelihood(distance_m: Floats32, sd_m: float) -> Floats32:
 
     Examples
     --------
-    >>> map_log_likelihood(np.float32([0, 5, 60]), 5.0).round(2).tolist()
-    [0.0, -0.49, -5.51]
+    >>> [f"{value:.2f}" for value in map_log_likelihood(np.float32([0, 5, 60]), 5.0)]
+    ['0.00', '-0.49', '-5.51']
     """
     d = np.asarray(distance_m, dtype=np.float64)
     near, far = 0.97 * np.exp(-0.5 * (d / sd_m) ** 2), 0.03 * np.exp(-d / 30.0)

@@ -56,6 +56,7 @@ def test_a_build_prints_nothing_but_its_json(command, own_world):
         "database",
         "seconds",
         "notes",
+        "pictures",
     ]
 
 
