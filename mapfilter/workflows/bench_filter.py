@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -16,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapfilter._kernels import draw_key
-from mapfilter.database.estimate import peak_memory_bytes
 from mapfilter.database.store import open_database
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.particle import ParticleBelief, ParticleFilter
@@ -26,11 +23,11 @@ from mapfilter.models.fingerprint import LevelReading
 from mapfilter.positioning.bayes import BayesPositioner
 from mapfilter.positioning.bayes_model import BayesModel, Start
 from mapfilter.positioning.bayes_options import BayesOptions, open_area
-from mapfilter.positioning.bayes_replay import position_by_bayes
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.evidence import RadioReading
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.store import list_logs, read_log
+from mapfilter.workflows.bench_filter_memory import locating_memory_bytes
 from mapfilter.workflows.bench_filter_peers import (
     NumpyModel,
     numpy_step,
@@ -80,7 +77,7 @@ class StepBench:
 
 @dataclass(frozen=True)
 class FilterBench:
-    """One process, on the embedded map.
+    """One process, on the embedded map; times are processor times.
 
     Parameters
     ----------
@@ -96,8 +93,8 @@ class FilterBench:
         Walks with 300 m that nobody measured in their middle, and a challenger because of it.
     challenged_track_s : float or None
         These walks; None where no challenger came.
-    peak_memory_bytes, smoothing_peak_memory_bytes : int
-        Of a process that opens the database and locates a walk.
+    loaded_memory_bytes, peak_memory_bytes, smoothing_peak_memory_bytes : int
+        Of a process that opens the database and locates a walk: its libraries alone, and in all.
     """
 
     runs: int
@@ -109,6 +106,7 @@ class FilterBench:
     track_s: float
     challenged: int
     challenged_track_s: float | None
+    loaded_memory_bytes: int
     peak_memory_bytes: int
     smoothing_peak_memory_bytes: int
 
@@ -150,6 +148,8 @@ def bench_filter(
         timed = [_track(positioner, log) for _ in range(runs + 1) for log in logs][len(logs) :]
         cut = [_track(positioner, _without_middle(log)) for _ in range(runs) for log in logs]
         challenged = [took_s for took_s, challenges in cut if challenges]
+        loaded, peak = locating_memory_bytes(database, folders[0], smooth=False)
+        _, smoothing_peak = locating_memory_bytes(database, folders[0], smooth=True)
         east_m, north_m = area.size_m
         return FilterBench(
             runs=runs,
@@ -161,8 +161,9 @@ def bench_filter(
             track_s=median(took_s for took_s, _ in timed),
             challenged=len(challenged) // runs,
             challenged_track_s=median(challenged) if challenged else None,
-            peak_memory_bytes=_peak(database, folders[0], smooth=False),
-            smoothing_peak_memory_bytes=_peak(database, folders[0], smooth=True),
+            loaded_memory_bytes=loaded,
+            peak_memory_bytes=peak,
+            smoothing_peak_memory_bytes=smoothing_peak,
         )
 
 
@@ -223,12 +224,12 @@ def _step(model: BayesModel, log: TrackLog, count: int, runs: int) -> StepBench:
     took: dict[str, list[float]] = {name: [] for name in tasks}
     for run in range(runs + 1):
         for name, (task, times) in tasks.items():
-            began_s = time.perf_counter()
+            began_s = time.process_time()
             for _ in range(times):
                 task()
             if run > 0:
                 steps = _PEER_STEPS if name == "particles" else times
-                took[name].append(1e9 * (time.perf_counter() - began_s) / (steps * count))
+                took[name].append(1e9 * (time.process_time() - began_s) / (steps * count))
     ns = {name: median(times) for name, times in took.items()}
     peers = {name: ns.get(name) for name in ("particles", "stonesoup")}
     ratios = {name: None if t is None else t / ns["own"] for name, t in peers.items()}
@@ -258,12 +259,12 @@ def _track(positioner: BayesPositioner, log: TrackLog) -> tuple[float, int]:
     """Return the seconds that a walk takes, and how many challengers it had."""
     rng, merged = np.random.default_rng(2), epochs(log)
     track, challenges = positioner.begin(), 0
-    began_s = time.perf_counter()
+    began_s = time.process_time()
     for epoch in merged:
         before = track.challenger
         track, _ = positioner.advance(track, epoch, rng)
         challenges += before is None and track.challenger is not None
-    return time.perf_counter() - began_s, challenges
+    return time.process_time() - began_s, challenges
 
 
 def _without_middle(log: TrackLog) -> TrackLog:
@@ -278,22 +279,3 @@ def _without_middle(log: TrackLog) -> TrackLog:
         motion=log.motion[~off].reset_index(drop=True),
         radio=log.radio[~heard].reset_index(drop=True),
     )
-
-
-def locate_once(database: Path, log: Path, *, smooth: bool) -> int:
-    """Open, locate, and return the most memory (bytes) that this process has taken."""
-    positioner = BayesOptions(smooth=smooth).over(open_area(open_database(database)))
-    position_by_bayes(positioner, read_log(log), np.random.default_rng(0), smooth=smooth)
-    return peak_memory_bytes()
-
-
-def _peak(database: Path, log: Path, *, smooth: bool) -> int:
-    code = (
-        "import sys; from pathlib import Path;"
-        "from mapfilter.workflows.bench_filter import locate_once;"
-        "print(locate_once(Path(sys.argv[1]), Path(sys.argv[2]), smooth=sys.argv[3] == 'smooth'))"
-    )
-    how = "smooth" if smooth else "forward"
-    given = [sys.executable, "-c", code, str(database), str(log), how]
-    done = subprocess.run(given, check=True, capture_output=True, text=True)
-    return int(done.stdout)

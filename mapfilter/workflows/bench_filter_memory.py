@@ -1,0 +1,36 @@
+"""What locating a walk takes of memory, in a process of its own that does nothing else."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from mapfilter.database.estimate import peak_memory_bytes
+from mapfilter.database.store import open_database
+from mapfilter.positioning.bayes_options import BayesOptions, open_area
+from mapfilter.positioning.bayes_replay import position_by_bayes
+from mapfilter.tracks.store import read_log
+
+
+def locating_memory_bytes(database: Path, log: Path, *, smooth: bool) -> tuple[int, int]:
+    """Return the most memory that a process has taken with its libraries loaded, and at its end."""
+    code = (
+        "import sys; from pathlib import Path;"
+        "from mapfilter.workflows.bench_filter_memory import locate_once;"
+        "print(*locate_once(Path(sys.argv[1]), Path(sys.argv[2]), smooth=sys.argv[3] == 'smooth'))"
+    )
+    given = [sys.executable, "-c", code, str(database), str(log), "smooth" if smooth else "forward"]
+    done = subprocess.run(given, check=True, capture_output=True, text=True)
+    loaded, at_the_end = map(int, done.stdout.split())
+    return loaded, at_the_end
+
+
+def locate_once(database: Path, log: Path, *, smooth: bool) -> tuple[int, int]:
+    """Open, locate, and return this process's peak memory (bytes) before and after."""
+    loaded = peak_memory_bytes()
+    positioner = BayesOptions(smooth=smooth).over(open_area(open_database(database)))
+    position_by_bayes(positioner, read_log(log), np.random.default_rng(0), smooth=smooth)
+    return loaded, peak_memory_bytes()
