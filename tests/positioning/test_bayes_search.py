@@ -1,0 +1,63 @@
+"""A search that has lost the true place notices it, and goes on from scratch."""
+
+from dataclasses import replace
+from math import nan
+
+import numpy as np
+import pytest
+from cross_world import make_database, walk_log
+
+from mapfilter.errors import ConfigError
+from mapfilter.filters.contract import Status
+from mapfilter.filters.particle_options import ParticleOptions
+from mapfilter.positioning.bayes_options import BayesOptions, open_area
+from mapfilter.positioning.bayes_replay import position_by_bayes
+from mapfilter.positioning.challenger import ChallengeRules
+from mapfilter.positioning.epochs import epochs
+
+FEW = ParticleOptions(most=4000, searching=2000, least=500)
+
+
+@pytest.fixture(scope="module")
+def area(tmp_path_factory):
+    return open_area(make_database(tmp_path_factory.mktemp("search")))
+
+
+def off_m(log, fix):
+    truth = log.truth
+    east_m = np.interp(fix.time_s, truth["time_s"], truth["east_m"])
+    north_m = np.interp(fix.time_s, truth["time_s"], truth["north_m"])
+    return float(np.hypot(fix.east_m - east_m, fix.north_m - north_m))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_search_without_the_true_place_is_taken_over(area, seed):
+    positioner = BayesOptions(particles=FEW).over(area)
+    log, rng = walk_log(), np.random.default_rng(seed)
+    track, switches = positioner.begin(), []
+    for number, epoch in enumerate(epochs(log)):
+        if number == 30:
+            state = track.belief.state.copy()
+            state[:2] = state[:2, :1] + np.array([[200.0], [0.0]], dtype=np.float32)
+            astray = replace(track.belief, state=state, status=Status.SEARCHING, agreed_at_m=nan)
+            track = replace(track, belief=astray, status=Status.SEARCHING)
+        track, news = positioner.advance(track, epoch, rng)
+        if news.fix.status is Status.CONVERGED:
+            switches.append(off_m(log, news.fix))
+        assert news.fix.status is not Status.LOST
+    assert track.wins >= 1
+    assert len(switches) == 1
+    assert switches[0] < 20
+
+
+def test_a_belief_in_doubt_does_not_converge(area):
+    never = ChallengeRules(doubt=1e9, doubt_of_cells=1e9, converge_below=-1.0)
+    positioner = replace(BayesOptions(particles=FEW).over(area), rules=never)
+    estimate = position_by_bayes(positioner, walk_log(), np.random.default_rng(0)).estimate
+    assert set(estimate.status) == {Status.SEARCHING}
+    assert estimate.mass_50m[-1] > 0.99
+
+
+def test_copies_part_by_no_less_than_nothing():
+    with pytest.raises(ConfigError, match="searching_jitter"):
+        ParticleOptions(searching_jitter=-1.0)
