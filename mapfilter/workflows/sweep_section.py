@@ -47,6 +47,12 @@ class ReadingSection(Section):
     when_empty: Literal["fail", "reinitialise"] | None = None
 
 
+def _names_once(readings: tuple[ReadingSection, ...]) -> tuple[ReadingSection, ...]:
+    if len({(reading.name, reading.update_length_m) for reading in readings}) < len(readings):
+        raise ValueError("readings of different names")
+    return readings
+
+
 class SweepSection(Section):
     """``[sweep]``: axes of the grid, how many runs, and the filters that are compared."""
 
@@ -60,7 +66,9 @@ class SweepSection(Section):
     imu_period_s: Positives | None = None
     update_length_m: NotNegatives | None = None
     databases: Files = ()
-    readings: Annotated[tuple[ReadingSection, ...], Field(strict=False)] = ()
+    readings: Annotated[
+        tuple[ReadingSection, ...], Field(strict=False), AfterValidator(_names_once)
+    ] = ()
     routes: Annotated[int, Field(ge=1, le=1_000_000)] = 40
     draws: Annotated[int, Field(ge=1, le=1_000_000)] = 10
     seed: Seed = 0

@@ -243,7 +243,7 @@ threshold = 0
     assert not (own_world.out / "sweep").exists()
 
 
-def test_faults_that_only_the_whole_plan_shows(own_world):
+def test_values_and_names_given_twice_are_told_with_what_is_missing(own_world):
     twice = """[[sweep.readings]]
 name = "same"
 [[sweep.readings]]
@@ -255,8 +255,8 @@ name = "same"
             load_sweep(own_world.toml, ["sweep.sigma_trans_m=1,1", 'sweep.databases=["gone"]'])
         )
     text = str(caught.value)
-    assert "sweep, readings" in text
-    assert "sweep, noise" in text
+    assert "sweep.readings: expected readings of different names" in text
+    assert "sweep.sigma_trans_m: expected every value once" in text
     assert "gone" in text
 
 
