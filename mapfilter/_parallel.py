@@ -140,6 +140,9 @@ def ordered_results(
     if progress is not None and not isinstance(tasks, Sized):
         tasks = list(tasks)
     total = len(tasks) if isinstance(tasks, Sized) else 0
+    if isinstance(executor, SerialExecutor):
+        # A task is done as it is handed in: none ahead of its turn.
+        in_flight = 1
     todo = iter(tasks)
     waiting: deque[Future[T]] = deque()
     done = 0

@@ -1,7 +1,7 @@
 """The executor seam: the number of workers changes nothing but the time."""
 
 import os
-from concurrent.futures import Future
+from concurrent.futures import Executor, Future
 
 import pytest
 
@@ -55,7 +55,7 @@ def test_a_worker_that_dies_is_told(tasks):
         list(ordered_results(executor, dies, range(tasks), in_flight=4))
 
 
-class Counting(SerialExecutor):
+class Counting(Executor):
     """Finishes tasks at once and counts those handed in."""
 
     def __init__(self):
@@ -63,7 +63,7 @@ class Counting(SerialExecutor):
 
     def submit(self, fn, /, *args, **kwargs):
         self.submitted += 1
-        return super().submit(fn, *args, **kwargs)
+        return SerialExecutor().submit(fn, *args, **kwargs)
 
 
 @pytest.mark.parametrize("in_flight", [1, 3, 8, 100])
@@ -72,6 +72,14 @@ def test_no_more_than_in_flight_wait(in_flight):
     for taken, _ in enumerate(ordered_results(executor, picky, [0] * 20, in_flight=in_flight)):
         assert executor.submitted == min(taken + in_flight, 20)
     assert executor.submitted == 20
+
+
+def test_in_one_process_each_result_comes_before_the_next_task_is_begun():
+    begun = []
+    for result in ordered_results(SerialExecutor(), begun.append, range(5), in_flight=8):
+        assert result is None
+        begun.append("taken")
+    assert begun == [0, "taken", 1, "taken", 2, "taken", 3, "taken", 4, "taken"]
 
 
 def test_results_keep_their_order_whichever_finishes_first():

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mapfilter._parallel import Progress
+from mapfilter._parallel import Progress, ordered_results
 from mapfilter.experiments.papers.tesa_scene import (
     BETA_DB,
     BETAS_DB,
@@ -163,13 +163,9 @@ def run_paper(
     progress : callable, optional
         Called with trials done and trials in all.
     """
-    futures = [executor.submit(trial_errors_m, trial, seed) for trial in range(trials)]
-    found = []
-    for done, future in enumerate(futures, start=1):
-        found.append(future.result())
-        if progress is not None:
-            progress(done, trials)
-    errors = np.stack(found, axis=1)
+    one = partial(trial_errors_m, seed=seed)
+    found = ordered_results(executor, one, range(trials), progress=progress)
+    errors = np.stack(list(found), axis=1)
     return PaperRun(_scene(), dict(zip(RUNS, errors, strict=True)))
 
 
