@@ -13,6 +13,7 @@ from mapfilter.cli.options import (
     OutOption,
     ResumeOption,
     SetOption,
+    find_own_filter,
     given_path,
     toml,
 )
@@ -33,7 +34,10 @@ def evaluate(
         typer.Option("--case", metavar="NAME", help="A case; repeatable. Default: all."),
     ] = None,
     filter_name: Annotated[
-        str, typer.Option("--filter", metavar="NAME", help="bayes, grid or candidate.")
+        str,
+        typer.Option(
+            "--filter", metavar="NAME", help="bayes, grid, candidate or package.module:Name."
+        ),
     ] = "bayes",
     data: Annotated[
         Path | None,
@@ -75,6 +79,7 @@ def evaluate(
         given.append(f"area.bbox={bbox}")
     given.append(f"filter.name={toml(filter_name)}")
     loaded = load_config(config, given)
+    find_own_filter(loaded)
     folder = (out or loaded.output.dir / name).absolute()
     with rate_bar("evaluate", "batches") as progress:
         result = run_global_positioning(

@@ -18,6 +18,7 @@ from mapfilter.cli.options import (
     SeedOption,
     SetOption,
     WorkersOption,
+    find_own_filter,
     numbers,
     seeded,
 )
@@ -39,6 +40,7 @@ def sweep(
     from mapfilter.workflows.sweep_brief import brief
 
     loaded = load_sweep(config, seeded(settings, seed, "sweep.seed"), out=out)
+    find_own_filter(loaded)
     try:
         with rate_bar("sweep", "runs") as progress:
             result = run_sweep(

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mapfilter.errors import ConfigError, fail
+
+if TYPE_CHECKING:
+    from mapfilter.workflows.sections import Config
 
 DONE, WRONG, PARTIAL = 0, 2, 3
 """Exit codes."""
@@ -68,3 +72,11 @@ def numbers(text: str | None, count: int, where: str) -> list[float] | None:
     if len(found) != count:
         raise fail(ConfigError, where, f"{count} numbers with commas between them", repr(text))
     return found
+
+
+def find_own_filter(config: Config) -> None:
+    """Have modules in the working folder found, after all others, where a filter is one's own."""
+    names = [config.filter.name, *(reading.filter or "" for reading in config.sweep.readings)]
+    folder = str(Path.cwd())
+    if any(":" in name for name in names) and folder not in sys.path:
+        sys.path.append(folder)

@@ -14,6 +14,7 @@ from mapfilter.cli.options import (
     OutOption,
     SeedOption,
     SetOption,
+    find_own_filter,
     seeded,
     toml,
 )
@@ -64,12 +65,17 @@ def replay(
         typer.Option(
             "--filter",
             metavar="NAME",
-            help="candidate, bayes, grid; without a map ekf, iekf, rbukf, ukf, ckf.",
+            help="candidate, bayes, grid or your own, package.module:Name; "
+            "without a map ekf, iekf, rbukf, ukf, ckf.",
         ),
     ] = None,
     without: Annotated[
         str | None,
-        typer.Option("--without", metavar="KINDS", help="What to leave out: gnss,ta,neighbours."),
+        typer.Option(
+            "--without",
+            metavar="KINDS",
+            help="What to leave out: gnss (fixes, pseudoranges), ta, tdoa, neighbours, radio.",
+        ),
     ] = None,
     smooth: Annotated[
         bool, typer.Option("--smooth", help="Positions in hindsight, by the whole log.")
@@ -96,8 +102,10 @@ def replay(
     if smooth:
         given += ["filter.bayes.smooth=true", "filter.smooth=true"]
     loaded = load_config(config, given)
-    if smooth and loaded.filter.name in ("candidate", "grid"):
-        raise fail(ConfigError, "--smooth", "bayes, ekf, iekf, rbukf, ukf, ckf", loaded.filter.name)
+    find_own_filter(loaded)
+    name = loaded.filter.name
+    if smooth and (name in ("candidate", "grid") or ":" in name):
+        raise fail(ConfigError, "--smooth", "bayes, ekf, iekf, rbukf, ukf, ckf", name)
     folder = (out or loaded.output.dir / "replay").absolute()
     with progress_bar("replay") as progress:
         result = run_replay(loaded, folder, progress=progress)

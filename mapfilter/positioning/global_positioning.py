@@ -20,6 +20,7 @@ from mapfilter.filters.run import Event, run
 from mapfilter.geodesy import same_crs
 from mapfilter.positioning.estimate import Fix, TrackEstimate, UnusedReading
 from mapfilter.positioning.events import serving_events
+from mapfilter.positioning.matched_way import nearest_ways
 from mapfilter.positioning.snapshot import Snapshot
 from mapfilter.positioning.track import PositionedTrack as PositionedTrack
 from mapfilter.tracks.log import TrackLog
@@ -111,7 +112,7 @@ def position_by_candidates(
     estimate = TrackEstimate.of_fixes(
         database.lattice.crs,
         "candidate",
-        _with_ways(database, fixes) if ways else fixes,
+        nearest_ways(database, fixes) if ways else fixes,
         start_utc_s=log.start_utc_s,
         unused=sorted(unused, key=lambda reading: reading.time_s),
     )
@@ -231,14 +232,3 @@ def _first_known(events: Sequence[Event[str]], points_of: PointsOf) -> int:
             if points is not None and len(points):
                 return index
     return len(events)
-
-
-def _with_ways(database: RadioRouteDatabase, fixes: Sequence[Fix]) -> list[Fix]:
-    """Match each position to the way of the database point nearest to it."""
-    points = database.points()
-    index = CellPointIndex.of_points(database.lattice, points.row, points.col)
-    nearest, _ = index.nearest([f.east_m for f in fixes], [f.north_m for f in fixes])
-    return [
-        replace(fix, way_id=int(points.way_id[point])) if point >= 0 else fix
-        for fix, point in zip(fixes, nearest.tolist(), strict=True)
-    ]

@@ -16,6 +16,8 @@ from mapfilter.positioning.global_positioning import (
     cell_points,
     position_by_candidates,
 )
+from mapfilter.positioning.own_filter import OwnFilter, make_filter
+from mapfilter.positioning.own_replay import position_by_own
 from mapfilter.tracks.log import TrackLog
 
 Locator = Callable[[TrackLog, np.random.Generator], PositionedTrack]
@@ -28,13 +30,13 @@ class FilterChoice:
 
     Parameters
     ----------
-    options : CandidateOptions or BayesOptions
+    options : CandidateOptions, BayesOptions or OwnFilter
     margin_db : float, optional
         A point belongs to every cell within this margin of its best server; None takes the
         margin that the database was built with.
     """
 
-    options: CandidateOptions | BayesOptions = field(default_factory=CandidateOptions)
+    options: CandidateOptions | BayesOptions | OwnFilter = field(default_factory=CandidateOptions)
     margin_db: float | None = None
 
     @property
@@ -45,6 +47,8 @@ class FilterChoice:
                 return "candidate"
             case BayesOptions() as options:
                 return "grid" if options.grid else "bayes"
+            case OwnFilter() as own:
+                return own.name
 
 
 def open_locator(
@@ -80,3 +84,10 @@ def open_locator(
                 return position_by_bayes(positioner, log, rng, smooth=bayes.smooth, pictures=ways)
 
             return locate_by_bayes
+        case OwnFilter() as own:
+            made = make_filter(own, database)
+
+            def locate_by_own(log: TrackLog, rng: np.random.Generator) -> PositionedTrack:
+                return position_by_own(database, made, log, rng, name=own.name, ways=ways)
+
+            return locate_by_own

@@ -129,9 +129,9 @@ def run_global_positioning(
     """
     began_s = time.perf_counter()
     wanted = check_cases(cases)
+    choice = filter_choice(config.filter, config.area.resolution_m)
     ensure_writable_folder(out)
     world, points = _world(World.of(config), out / "world", seed)
-    choice = filter_choice(config.filter, config.area.resolution_m)
     with local_executor(workers) as executor:
         found = benchmark(
             world,

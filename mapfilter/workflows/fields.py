@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationInfo,
+)
 
 from mapfilter.workflows.paths import path_fault
 
@@ -15,6 +23,10 @@ SYNTHETIC_MAP = "synthetic"
 MANHATTAN_MAP = "manhattan"
 MADE_MAPS = (SYNTHETIC_MAP, MANHATTAN_MAP)
 MAP_NAMES = (EMBEDDED_MAP, NO_MAP, *MADE_MAPS)
+MAP_FILTERS = ("candidate", "bayes", "grid")
+FUSION_FILTERS = ("ekf", "iekf", "rbukf", "ukf", "ckf")
+_NAME = r"[^\W\d]\w*(\.[^\W\d]\w*)*"
+_OWN_FILTER = re.compile(f"{_NAME}:{_NAME}")
 
 
 def resolve_path(value: Any, info: ValidationInfo) -> Any:
@@ -37,6 +49,15 @@ def resolve_map(value: Any, info: ValidationInfo) -> Any:
     return str(found) if isinstance(found, Path) else value
 
 
+def check_filter_name(value: str) -> str:
+    """See that a filter is one of ours, or has the form ``package.module:Name``."""
+    known = (*MAP_FILTERS, *FUSION_FILTERS)
+    if value not in known and not _OWN_FILTER.fullmatch(value):
+        names = ", ".join(map(repr, known))
+        raise ValueError(f"{names}, or your own as package.module:Name")
+    return value
+
+
 FilePath = Annotated[Path, BeforeValidator(resolve_path)]
 MapName = Annotated[str, BeforeValidator(resolve_map)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -47,6 +68,7 @@ Pair = Annotated[tuple[Finite, Finite], Field(strict=False)]
 Size = Annotated[tuple[Positive, Positive], Field(strict=False)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Seed = Annotated[int, Field(ge=0, lt=2**63)]
+FilterName = Annotated[str, AfterValidator(check_filter_name)]
 Count = Annotated[int, Field(ge=0, le=1_000_000)]
 
 

@@ -7,11 +7,18 @@ from dataclasses import replace
 from mapfilter.errors import ConfigError, fail
 from mapfilter.filters.candidate_options import CandidateOptions
 from mapfilter.positioning.locators import FilterChoice
+from mapfilter.positioning.own_filter import own_filter
 from mapfilter.workflows.sections import FilterSection
 
 
 def filter_choice(section: FilterSection, resolution_m: float) -> FilterChoice:
-    """Return filter and options of a configuration, for a database of a resolution."""
+    """Return filter and options of a configuration, for a database of a resolution.
+
+    Raises
+    ------
+    ConfigError
+        The filter takes no database, or it is one's own and is not there.
+    """
     match section.name:
         case "candidate":
             options = CandidateOptions(
@@ -28,5 +35,7 @@ def filter_choice(section: FilterSection, resolution_m: float) -> FilterChoice:
             return FilterChoice(options, section.margin_db)
         case "bayes" | "grid":
             return FilterChoice(replace(section.bayes.options, grid=section.name == "grid"))
+        case name if ":" in name:
+            return FilterChoice(own_filter(name))
         case name:
             raise fail(ConfigError, "filter.name", "a filter that takes a database", repr(name))

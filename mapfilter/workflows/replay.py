@@ -55,10 +55,10 @@ def run_replay(
     database = open_database(config.database_path, verify="full")
     folders = list_logs(config.track_path)
     check_logs(folders, database.lattice)
-    ensure_writable_folder(out)
-    clear_results(out)
     choice = filter_choice(config.filter, database.lattice.resolution_m)
     locate = open_locator(database, choice)
+    ensure_writable_folder(out)
+    clear_results(out)
     logs: list[ReplayedLog] = []
     for index, folder in enumerate(folders):
         log = leave_out(read_log(folder), config.track.without)

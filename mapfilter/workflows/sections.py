@@ -18,6 +18,7 @@ from mapfilter.workflows.fields import (
     NO_MAP,
     Box,
     FilePath,
+    FilterName,
     Finite,
     MapName,
     NotNegative,
@@ -204,7 +205,7 @@ class Track(Section):
 class FilterSection(Section):
     """``[filter]``: which filter, and its reading of the paper (see the candidate filter)."""
 
-    name: Literal["candidate", "bayes", "grid", "ekf", "iekf", "rbukf", "ukf", "ckf"] = "candidate"
+    name: FilterName = "candidate"
     margin_db: NotNegative | None = None
     update_length_m: NotNegative = 22.0
     tracking_length_m: NotNegative | None = None

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from mapfilter.workflows.fields import NotNegative, Positive, Section, Seed
+from mapfilter.workflows.fields import FilterName, NotNegative, Positive, Section, Seed
 from mapfilter.workflows.survey_section import Files
 
 
@@ -35,7 +35,7 @@ class ReadingSection(Section):
     """``[[sweep.readings]]``: a filter by a name, and what it has otherwise than ``[filter]``."""
 
     name: Annotated[str, Field(min_length=1)]
-    filter: Literal["candidate", "bayes"] | None = None
+    filter: FilterName | None = None
     margin_db: NotNegative | None = None
     update_length_m: NotNegative | None = None
     tracking_length_m: NotNegative | None = None
