@@ -33,8 +33,8 @@ _SLOTS_DEG = (
 """Arguments of latitude in planes A to F."""
 
 
-def nominal_gps() -> Almanac:
-    """Return the 24 slots of GPS, G01 to G24, plane by plane; their epoch is second 0 of week 0.
+def nominal_gps(week: int = 0) -> Almanac:
+    """Return the 24 slots of GPS, G01 to G24, plane by plane; their epoch is second 0 of a week.
 
     Examples
     --------
@@ -43,10 +43,10 @@ def nominal_gps() -> Almanac:
     """
     latitude = np.array(_SLOTS_DEG)
     node = np.repeat(_NODE_OF_A_DEG - _GREENWICH_DEG + 60.0 * np.arange(6), 4)
-    return _circular("G", _GPS_AXIS_M, _GPS_TILT_DEG, node, latitude.ravel())
+    return _circular("G", _GPS_AXIS_M, _GPS_TILT_DEG, node, latitude.ravel(), week)
 
 
-def nominal_galileo() -> Almanac:
+def nominal_galileo(week: int = 0) -> Almanac:
     """Return 27 satellites of Galileo, E01 to E27, plane by plane; epoch as for GPS.
 
     Examples
@@ -59,17 +59,23 @@ def nominal_galileo() -> Almanac:
     phase = 360.0 / (_GALILEO_PER_PLANE * _GALILEO_PLANES)
     latitude = 360.0 / _GALILEO_PER_PLANE * slot + phase * plane
     node = 360.0 / _GALILEO_PLANES * plane
-    return _circular("E", _GALILEO_AXIS_M, _GALILEO_TILT_DEG, node, latitude)
+    return _circular("E", _GALILEO_AXIS_M, _GALILEO_TILT_DEG, node, latitude, week)
 
 
 def _circular(
-    system: str, axis_m: float, tilt_deg: float, node_deg: np.ndarray, latitude_deg: np.ndarray
+    system: str,
+    axis_m: float,
+    tilt_deg: float,
+    node_deg: np.ndarray,
+    latitude_deg: np.ndarray,
+    week: int,
 ) -> Almanac:
     count = latitude_deg.size
     zero = np.zeros(count)
     wrapped = np.radians(np.mod(node_deg + 180.0, 360.0) - 180.0)
     return Almanac(
         tuple(f"{system}{index:02d}" for index in range(1, count + 1)),
-        zero, zero, np.full(count, np.sqrt(axis_m)), zero, np.full(count, np.radians(tilt_deg)),
-        wrapped, zero, zero, np.radians(latitude_deg), np.ones(count, dtype=np.bool_),
+        zero + week, zero, np.full(count, np.sqrt(axis_m)), zero,
+        np.full(count, np.radians(tilt_deg)), wrapped, zero, zero, np.radians(latitude_deg),
+        np.ones(count, dtype=np.bool_),
     )  # fmt: skip

@@ -12,6 +12,7 @@ from mapfilter.errors import Faults, InputError, StoreError
 from mapfilter.tracks.schema import TABLES
 
 HEAD = "log.json"
+ALMANAC = "almanac.txt"
 
 _SUFFIXES = (".parquet", ".csv")
 
@@ -67,7 +68,7 @@ def parts_by_name(folder: Path) -> dict[str, Path]:
     for path in _others(folder, paths.values()):
         near = get_close_matches(path.stem.lower(), absent, 1, 0.6)
         if near and not faults.found:
-            expected = "tables called motion, radio, gnss or truth (.csv or .parquet)"
+            expected = f"tables called {', '.join(TABLES)} (.csv or .parquet)"
             faults.add(str(path), expected, path.name, f"{near[0]}.csv")
     faults.raise_if_any(InputError)
     return paths
@@ -85,7 +86,7 @@ def ignored_files(folder: Path, used: Collection[Path]) -> tuple[str, ...]:
 
 
 def _others(folder: Path, used: Collection[Path]) -> list[Path]:
-    known = {HEAD, *(path.name for path in used)}
+    known = {HEAD, ALMANAC, *(path.name for path in used)}
     return [
         path
         for path in sorted(folder.iterdir())

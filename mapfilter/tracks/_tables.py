@@ -47,7 +47,8 @@ def read_table(table: str, path: Path) -> ReadTable:
 
     Parameters
     ----------
-    table : {"motion", "radio", "gnss", "truth"}
+    table : str
+        Out of :data:`mapfilter.tracks.schema.TABLES`.
     path : Path
 
     Raises

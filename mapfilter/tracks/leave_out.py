@@ -11,7 +11,7 @@ import pandas as pd
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.schema import NEIGHBOUR
 
-Kind = Literal["gnss", "ta", "neighbours"]
+Kind = Literal["gnss", "fixes", "pseudoranges", "ta", "tdoa", "neighbours", "radio"]
 
 
 def leave_out(log: TrackLog, kinds: Collection[Kind]) -> TrackLog:
@@ -21,8 +21,8 @@ def leave_out(log: TrackLog, kinds: Collection[Kind]) -> TrackLog:
     ----------
     log : TrackLog
     kinds : collection of str
-        ``gnss`` (all fixes), ``ta`` (timing advances; their reports stay) and ``neighbours`` (all
-        cells but the serving one).
+        ``gnss`` (``fixes`` and ``pseudoranges``), ``ta`` (timing advances; their reports stay),
+        ``tdoa``, ``neighbours`` (all cells but the serving one) and ``radio`` (all reports).
 
     Examples
     --------
@@ -35,17 +35,26 @@ def leave_out(log: TrackLog, kinds: Collection[Kind]) -> TrackLog:
     >>> print(*alone.notes, sep="; ")
     ta: 1 left out; neighbours: 1 left out
     """
-    radio, gnss = log.radio, log.gnss
+    radio, gnss, ranges, tdoa = log.radio, log.gnss, log.pseudoranges, log.tdoa
     left: dict[str, int] = {}
-    if "gnss" in kinds:
-        left["gnss"] = len(gnss)
+    if "gnss" in kinds or "fixes" in kinds:
+        left["gnss" if "gnss" in kinds else "fixes"] = len(gnss)
         gnss = gnss.iloc[:0]
+    if "pseudoranges" in kinds or ("gnss" in kinds and len(ranges)):
+        left["pseudoranges"] = len(ranges)
+        ranges = ranges.iloc[:0]
     if "ta" in kinds:
         left["ta"] = int(radio["timing_advance"].notna().sum())
         radio = radio.assign(timing_advance=pd.array([pd.NA] * len(radio), dtype="Int64"))
-    if "neighbours" in kinds:
+    if "tdoa" in kinds:
+        left["tdoa"] = len(tdoa)
+        tdoa = tdoa.iloc[:0]
+    if "radio" in kinds:
+        left["radio"] = len(radio)
+        radio = radio.iloc[:0]
+    elif "neighbours" in kinds:
         neighbour = radio["role"] == NEIGHBOUR
         left["neighbours"] = int(neighbour.sum())
         radio = radio[~neighbour].reset_index(drop=True)
     notes = (*log.notes, *(f"{kind}: {count} left out" for kind, count in left.items()))
-    return replace(log, radio=radio, gnss=gnss, notes=notes)
+    return replace(log, radio=radio, gnss=gnss, pseudoranges=ranges, tdoa=tdoa, notes=notes)

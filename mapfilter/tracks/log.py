@@ -1,8 +1,8 @@
-"""The track log: what one journey recorded, as four tables of events.
+"""The track log: what one journey recorded, as tables of events.
 
 Missing values stay missing: nothing is dropped because one of its fields is unknown. Rows out of
 order are sorted and exact duplicates dropped, and the log's notes tell of both. Rows of equal time
-are processed in the order motion, gnss, radio: first move, then measure.
+are processed in the order motion, gnss and pseudoranges, radio and tdoa: first move, then measure.
 """
 
 from __future__ import annotations
@@ -17,7 +17,9 @@ from numpy.typing import ArrayLike
 
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import projected_crs
+from mapfilter.gnss.almanac import Almanac
 from mapfilter.tracks.clocks import check_clocks, check_start, early_ends
+from mapfilter.tracks.satellites import place_satellites
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.steps import check_steps
 from mapfilter.tracks.tidy import tidy_table
@@ -43,6 +45,13 @@ class TrackLog:
         (nullable): one row for each cell heard.
     gnss : pandas.DataFrame
         time_s, east_m, north_m, var_east_m2, var_north_m2, cov_east_north_m2.
+    pseudoranges : pandas.DataFrame
+        time_s, satellite ("G07": its constellation's letter and number), pseudorange_m, sigma_m,
+        and where the satellite was, earth-centred: x_m, y_m, z_m. One row for each satellite
+        received. NaN: not measured, not told, or not known.
+    tdoa : pandas.DataFrame
+        time_s, cell, reference, difference_m (how much farther the cell is than the reference),
+        sigma_m and reference_sigma_m: of each one's time of arrival, as distances.
     truth : pandas.DataFrame
         time_s, east_m, north_m, way_id (nullable integer).
     notes : tuple of str
@@ -54,6 +63,8 @@ class TrackLog:
     motion: pd.DataFrame
     radio: pd.DataFrame
     gnss: pd.DataFrame
+    pseudoranges: pd.DataFrame
+    tdoa: pd.DataFrame
     truth: pd.DataFrame
     notes: tuple[str, ...] = ()
 
@@ -77,20 +88,26 @@ def make_log(
     radio: pd.DataFrame | None = None,
     gnss: pd.DataFrame | None = None,
     truth: pd.DataFrame | None = None,
+    pseudoranges: pd.DataFrame | None = None,
+    tdoa: pd.DataFrame | None = None,
+    almanac: Almanac | None = None,
     start_utc_s: float = float("nan"),
     notes: Sequence[str] = (),
     names: Mapping[str, str] | None = None,
     row_numbers: Mapping[str, ArrayLike] | None = None,
 ) -> TrackLog:
-    """Check four tables and make them a log.
+    """Check tables and make them a log.
 
     Parameters
     ----------
     crs : str
         Projected CRS in metres, in any form that pyproj knows.
-    motion, radio, gnss, truth : pandas.DataFrame, optional
+    motion, radio, gnss, truth, pseudoranges, tdoa : pandas.DataFrame, optional
         With the columns of :class:`TrackLog`; only ``time_s``, ``role`` (radio), ``east_m`` and
-        ``north_m`` (gnss, truth) must be there. An absent table is an empty one.
+        ``north_m`` (gnss, truth), ``satellite`` (pseudoranges), ``cell`` and ``reference`` (tdoa)
+        must be there. An absent table is an empty one.
+    almanac : Almanac, optional
+        Tells where satellites were whose rows do not; the start must then be known.
     start_utc_s : float
         UTC seconds (Unix time) at which ``time_s`` is zero; NaN, the default, where unknown.
     notes : sequence of str
@@ -106,7 +123,8 @@ def make_log(
         With every fault: NaN or infinity in times or coordinates, text for numbers, values out of
         their range, columns missing or misspelt, milliseconds for seconds, degrees for metres or
         for radians, steps that are none, raw RXLEV for dBm, a CRS that is not projected, tables
-        that do not overlap in time, a start outside the years 1 to 9999.
+        that do not overlap in time, a start outside the years 1 to 9999, an almanac of another
+        time, or one without a start.
 
     Examples
     --------
@@ -123,7 +141,10 @@ def make_log(
         crs = projected_crs(crs, f"{whole}, crs")
     except InputError as error:
         faults.found.extend(error.faults)
-    given = {"motion": motion, "radio": radio, "gnss": gnss, "truth": truth}
+    given = {
+        "motion": motion, "radio": radio, "gnss": gnss, "pseudoranges": pseudoranges,
+        "tdoa": tdoa, "truth": truth,
+    }  # fmt: skip
     tables: dict[str, pd.DataFrame] = {}
     told = tuple(notes)
     for table in TABLES:
@@ -137,4 +158,9 @@ def make_log(
         told += check_steps(tables, called.get("motion", "motion"), faults)
         told += early_ends(tables)
     faults.raise_if_any(InputError)
+    if almanac is not None:
+        where = called.get("pseudoranges", "pseudoranges")
+        placed, news = place_satellites(tables["pseudoranges"], almanac, start_utc_s, where)
+        tables["pseudoranges"] = placed
+        told += news
     return TrackLog(str(crs), float(start_utc_s), **tables, notes=tuple(dict.fromkeys(told)))

@@ -1,4 +1,4 @@
-"""The columns of a track log's four tables: types, units, ranges and likely mistakes.
+"""The columns of a track log's tables: types, units, ranges and likely mistakes.
 
 Every table has ``time_s``, seconds after the log's start. Headings are radians counter-clockwise
 from grid east; positions are metres in the log's projected CRS.
@@ -11,8 +11,14 @@ from typing import Literal
 
 import numpy as np
 
-TABLES = ("motion", "radio", "gnss", "truth")
+TABLES = ("motion", "radio", "gnss", "pseudoranges", "tdoa", "truth")
 """The tables of a log, in the order in which they are stored."""
+
+OPTIONAL = ("pseudoranges", "tdoa")
+"""Tables that are stored only where they hold something."""
+
+SATELLITE = r"[GRECJIS]\d{2}"
+"""A satellite's name as in RINEX: the letter of its constellation and two digits."""
 
 SERVING = "serving"
 NEIGHBOUR = "neighbour"
@@ -100,6 +106,36 @@ SCHEMA: dict[str, tuple[Column, ...]] = {
         Column("var_east_m2", low=0, expected="square metres >= 0"),
         Column("var_north_m2", low=0, expected="square metres >= 0"),
         Column("cov_east_north_m2", expected="square metres"),
+    ),
+    "pseudoranges": (
+        _TIME,
+        Column("satellite", kind="text", required=True, expected="a name such as G07 or E19"),
+        Column(
+            "pseudorange_m",
+            low=1.5e7,
+            high=6e7,
+            expected="metres in 1.5e7..6e7",
+            hint="kilometres or seconds for metres, or a leap second or week in the times",
+        ),
+        Column("sigma_m", low=1e-3, high=1e5, expected="metres in 0.001..100000"),
+        *(
+            Column(name, low=-6e7, high=6e7, expected="metres from the earth's centre")
+            for name in ("x_m", "y_m", "z_m")
+        ),
+    ),
+    "tdoa": (
+        _TIME,
+        Column("cell", kind="text", required=True, expected="a cell id"),
+        Column("reference", kind="text", required=True, expected="a cell id"),
+        Column(
+            "difference_m",
+            low=-2e5,
+            high=2e5,
+            expected="metres in -200000..200000",
+            hint="nanoseconds given for metres",
+        ),
+        Column("sigma_m", low=1e-3, high=1e5, expected="metres in 0.001..100000"),
+        Column("reference_sigma_m", low=1e-3, high=1e5, expected="metres in 0.001..100000"),
     ),
     "truth": (
         _TIME,

@@ -1,7 +1,8 @@
-"""Track logs on disk: a folder with ``log.json`` and up to four tables, Parquet or CSV.
+"""Track logs on disk: a folder with ``log.json`` and up to six tables, Parquet or CSV.
 
 ``log.json`` holds the format, its version, the CRS, the start and the checksums of the tables. A
-folder made by hand needs only ``{"crs": "EPSG:…"}`` in it; a table that is absent is empty.
+folder made by hand needs only ``{"crs": "EPSG:…"}`` in it; a table that is absent is empty. An
+almanac beside it (``almanac.txt``, YUMA) tells where satellites were whose rows do not.
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ from mapfilter._io import (
     write_json,
 )
 from mapfilter.errors import Faults, InputError, MapfilterError, StoreError, fail
+from mapfilter.gnss.almanac import read_yuma
 from mapfilter.tracks._folder import (
+    ALMANAC,
     HEAD,
     checked_parts,
     ignored_files,
@@ -32,7 +35,7 @@ from mapfilter.tracks._folder import (
 )
 from mapfilter.tracks._tables import read_table
 from mapfilter.tracks.log import TrackLog, make_log
-from mapfilter.tracks.schema import SCHEMA, TABLES
+from mapfilter.tracks.schema import OPTIONAL, SCHEMA, TABLES
 
 FORMAT = "mapfilter track log"
 VERSION = 1
@@ -67,6 +70,8 @@ def write_log(
         parts = []
         for table in TABLES:
             rows = getattr(log, table)
+            if table in OPTIONAL and rows.empty:
+                continue
             path = new / f"{table}.{format}"
             if format == "csv":
                 rows.to_csv(path, index=False, lineterminator="\n")
@@ -110,9 +115,11 @@ def read_log(folder: str | Path) -> TrackLog:
     paths = checked_parts(folder, head) if "parts" in head else parts_by_name(folder)
     tables = {table: read_table(table, path) for table, path in paths.items()}
     notes = [note for read in tables.values() for note in read.notes]
+    beside = folder / ALMANAC
     return make_log(
         head.get("crs"),
         **{table: read.rows for table, read in tables.items()},
+        almanac=read_yuma(beside) if beside.is_file() else None,
         start_utc_s=_start_utc_s(head),
         notes=(*head.get("notes", ()), *ignored_files(folder, paths.values()), *notes),
         names={"log": where} | {table: str(path) for table, path in paths.items()},

@@ -12,12 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from mapfilter.errors import Faults
 from mapfilter.geodesy import wrap_rad
+from mapfilter.tracks.satellites import check_satellites
 from mapfilter.tracks.schema import MISSING_SIGNS, NEIGHBOUR, SCHEMA, SERVING, Column
 
 _SHOWN_ROWS = 3
 _SELDOM_S = 10.0
 _SOMEWHERE_M = 25.0
 _SLOW_MPS = 0.04
+_MOVING = ("motion", "gnss", "truth")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -27,6 +29,10 @@ class _Door:
     where: str
     row_numbers: NDArray[np.int64]
     faults: Faults
+
+    def numbered(self, row: int) -> str:
+        """Return what messages call a row."""
+        return f"{self.where} row {self.row_numbers[row]}"
 
     def add(self, field: str, expected: str, got: object, hint: str = "") -> None:
         self.faults.add(f"{self.where}{field}", expected, got, hint)
@@ -43,8 +49,8 @@ def tidy_table(
 
     Parameters
     ----------
-    table : {"motion", "radio", "gnss", "truth"}
-        Which table it is.
+    table : str
+        Which table it is, out of :data:`mapfilter.tracks.schema.TABLES`.
     given : pandas.DataFrame or None
         As read or made; None is an empty table. Values may be text, as from CSV.
     where : str
@@ -72,6 +78,8 @@ def tidy_table(
         tidy["censored"] = tidy["censored"].fillna(0)
     if table == "gnss":
         _check_covariance(tidy, door)
+    if table == "pseudoranges":
+        check_satellites(tidy, door.numbered, faults)
     if table == "motion":
         tidy["heading_rad"] = wrap_rad(tidy["heading_rad"])
     else:
@@ -205,7 +213,7 @@ def _check_degrees(table: pd.DataFrame, door: _Door) -> None:
 def _check_milliseconds(table: str, rows: pd.DataFrame, door: _Door) -> None:
     """Find times in milliseconds: rows seldom come, and what gets somewhere goes very slowly."""
     time = np.unique(rows["time_s"].to_numpy())
-    if len(time) < 3 or table == "radio" or not np.isfinite(time).all():
+    if len(time) < 3 or table not in _MOVING or not np.isfinite(time).all():
         return
     between_s = float(np.median(np.diff(time)))
     if table == "motion":

@@ -77,7 +77,9 @@ def test_a_row_that_is_cut_off_is_told(folder):
 def test_a_name_near_that_of_a_missing_table_is_refused(name, folder):
     (folder / name).write_text("time_s,role\n1,serving\n")
     told = refusal_of(read_log, folder)
-    assert told.startswith(f"{folder / name}: expected tables called motion, radio, gnss or truth")
+    assert told.startswith(
+        f"{folder / name}: expected tables called motion, radio, gnss, pseudoranges, tdoa, truth"
+    )
     assert told.endswith(f"found {name} (likely: radio.csv)")
 
 

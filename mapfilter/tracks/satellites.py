@@ -1,0 +1,149 @@
+"""Satellites of a log: whether their rows make sense, and where an almanac says that they were.
+
+Positions are earth-centred (ECEF, WGS 84): where a satellite was when it sent, in the frame of the
+moment of reception, since the earth turns on while a signal is under way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.gnss.almanac import Almanac
+from mapfilter.gnss.orbits import EARTH_RATE_RAD_S, gps_time, satellite_positions_m
+from mapfilter.tracks.schema import SATELLITE
+
+Floats = NDArray[np.float64]
+
+PLACE = ("x_m", "y_m", "z_m")
+_LIGHT_MPS = 299_792_458.0
+_LOWEST_M, _HIGHEST_M = 2.0e7, 5.5e7
+_SHOWN = 3
+_USUAL_M = 2.25e7
+
+
+def check_satellites(rows: pd.DataFrame, called: Callable[[int], str], faults: Faults) -> None:
+    """See that satellites are called as in RINEX, and are as high as satellites are.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        Of the table of pseudoranges.
+    called : callable
+        From a row's number to what messages call it.
+    faults : Faults
+    """
+    name = rows["satellite"]
+    wrong = name.notna().to_numpy() & ~name.astype(str).str.fullmatch(SATELLITE).to_numpy(bool)
+    for row in np.flatnonzero(wrong)[:_SHOWN]:
+        hint = "its constellation's letter (G, R, E, C, J, I, S) and two digits"
+        faults.add(f"{called(row)}, satellite", "a name such as G07", repr(name.iloc[row]), hint)
+    place = rows[list(PLACE)].to_numpy(dtype=np.float64)
+    told = np.isfinite(place)
+    away_m = np.sqrt(np.sum(place**2, axis=1))
+    for row in np.flatnonzero(told.any(axis=1) & ~told.all(axis=1))[:_SHOWN]:
+        faults.add(f"{called(row)}, x_m, y_m, z_m", "all three, or none", "some of them")
+    bad = told.all(axis=1) & ~((away_m >= _LOWEST_M) & (away_m <= _HIGHEST_M))
+    for row in np.flatnonzero(bad)[:_SHOWN]:
+        hint = "kilometres for metres, or a receiver's place"
+        expected = "20 000 to 55 000 km from the earth's centre"
+        got = f"{away_m[row] / 1000:.0f} km"
+        faults.add(f"{called(row)}, x_m, y_m, z_m", expected, got, hint)
+
+
+def place_satellites(
+    rows: pd.DataFrame, almanac: Almanac, start_utc_s: float, where: str = "pseudoranges"
+) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """Give satellites the places that an almanac tells, where their rows tell none.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        Of the table of pseudoranges, checked.
+    almanac : Almanac
+        Weeks may be counted modulo 1024. Satellites that are not healthy get no place.
+    start_utc_s : float
+        UTC seconds at ``time_s`` = 0.
+    where : str
+        What messages call the table.
+
+    Returns
+    -------
+    rows : pandas.DataFrame
+    notes : tuple of str
+        Satellites that the almanac does not know, or that are not healthy.
+
+    Raises
+    ------
+    InputError
+        The start is not known, or the almanac is of another time.
+
+    Examples
+    --------
+    >>> from mapfilter.gnss.constellations import nominal_gps
+    >>> start_utc_s = 1_700_000_000.0
+    >>> week, _ = gps_time(start_utc_s)
+    >>> rows = pd.DataFrame({"time_s": [0.0], "satellite": ["G01"], "pseudorange_m": [2.2e7],
+    ...     "x_m": [np.nan], "y_m": [np.nan], "z_m": [np.nan]})
+    >>> placed, _ = place_satellites(rows, nominal_gps(week), start_utc_s)
+    >>> bool(np.isfinite(placed["x_m"]).all())
+    True
+    """
+    unplaced = ~np.isfinite(rows["x_m"].to_numpy(dtype=np.float64))
+    if not unplaced.any():
+        return rows, ()
+    if not np.isfinite(start_utc_s):
+        hint = "without it an almanac does not tell where satellites were"
+        raise fail(InputError, f"{where}, start_utc_s", "UTC seconds of the start", "none", hint)
+    time_s = rows["time_s"].to_numpy(dtype=np.float64)
+    week, second = gps_time(start_utc_s + float(time_s[unplaced][0]))
+    known = almanac.in_era(week)
+    places, notes = rows[list(PLACE)].to_numpy(dtype=np.float64).copy(), []
+    names, range_m = rows["satellite"].to_numpy(), rows["pseudorange_m"].to_numpy(np.float64)
+    index = {name: i for i, name in enumerate(known.names)}
+    for name in sorted({str(value) for value in names[unplaced]}):
+        of = np.flatnonzero(unplaced & (names == name))
+        if name not in index or not known.healthy[index[name]]:
+            why = "not healthy" if name in index else "not in the almanac"
+            notes.append(f"{where}: {name} is {why}, {len(of)} rows without a place")
+            continue
+        since_s = time_s[of] - time_s[unplaced][0]
+        one = known.only(np.array([index[name]]))
+        places[of] = sent_from_m(one, week, second + since_s, range_m[of])
+    return rows.assign(**dict(zip(PLACE, places.T, strict=True))), tuple(notes)
+
+
+def sent_from_m(almanac: Almanac, week: int, second: Floats, range_m: Floats) -> Floats:
+    """Return where one satellite was when it sent, in the frame of the moment of reception.
+
+    Parameters
+    ----------
+    almanac : Almanac
+        Of that satellite alone, its weeks counted on.
+    week : int
+    second : (K,) array
+        Of the week, at reception; may run over its end.
+    range_m : (K,) array
+        Tell how long the signal was under way; a usual time where NaN.
+
+    Returns
+    -------
+    (K, 3) array
+    """
+    way_s = np.where(np.isfinite(range_m), range_m, _USUAL_M) / _LIGHT_MPS
+    sent = second - way_s
+    places = np.empty((len(sent), 3))
+    weeks = np.floor(sent / 604_800.0).astype(np.int64)
+    for turn in np.unique(weeks).tolist():
+        of = weeks == turn
+        tow_s = sent[of] - 604_800.0 * turn
+        places[of] = satellite_positions_m(almanac, tow_s, week + turn)[:, 0]
+    angle = EARTH_RATE_RAD_S * way_s
+    x, y = places[:, 0].copy(), places[:, 1].copy()
+    places[:, 0] = x * np.cos(angle) + y * np.sin(angle)
+    places[:, 1] = y * np.cos(angle) - x * np.sin(angle)
+    return places
