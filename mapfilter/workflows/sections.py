@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from mapfilter.tracks.leave_out import Kind
 from mapfilter.workflows.bayes_section import BayesSection
 from mapfilter.workflows.cells_section import Cells
 from mapfilter.workflows.fields import (
@@ -199,7 +200,7 @@ class Track(Section):
     """
 
     path: FilePath | None = None
-    without: Annotated[tuple[Literal["gnss", "ta", "neighbours"], ...], Field(strict=False)] = ()
+    without: Annotated[tuple[Kind, ...], Field(strict=False)] = ()
 
 
 class FilterSection(Section):
