@@ -50,6 +50,11 @@ class Reason(StrEnum):
     NOT_USED_BY_FILTER = "not_used_by_filter"
     AMBIGUOUS_CELL = "ambiguous_cell"
     UPDATE_FAILED = "update_failed"
+    UNKNOWN_SATELLITE = "unknown_satellite"
+    BELOW_HORIZON = "below_horizon"
+    SECOND_READING = "second_reading"
+    REJECTED_BY_EVIDENCE = "rejected_by_evidence"
+    ON_PROBATION = "on_probation"
 
 
 @dataclass(frozen=True, slots=True)

@@ -101,14 +101,15 @@ def copy_with_jitter(
     state : ndarray of float32, shape (R, N)
     chosen : ndarray of int32, shape (M,)
     jitter : ndarray of float32, shape (R,)
-        Standard deviation for each row; rows of 0 are copied as they are.
+        Standard deviation for each row; rows of 0, and rows beyond, are copied as they are.
     key : numpy.uint64
     copies : ndarray of float32, shape (R, M)
         Filled.
     """
     rows = state.shape[0]
     for r in range(rows):
-        source, target, sd = state[r], copies[r], jitter[r]
+        source, target = state[r], copies[r]
+        sd = jitter[r] if r < jitter.size else np.float32(0.0)
         for j in range(chosen.size):
             target[j] = source[np.uint32(chosen[j])]
         if sd > 0:

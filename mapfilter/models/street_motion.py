@@ -109,7 +109,8 @@ def move(
 
     Parameters
     ----------
-    state : ndarray of float32, shape (5, N)
+    state : ndarray of float32, shape (5 or more, N)
+        Further rows stay.
     step_m, heading_rad : float
         As measured; the lasting error is added to the heading.
     errors : MotionErrors
@@ -156,7 +157,7 @@ def _move(
         to_scale[i] = stretched
         to_east[i] = east[i] + (along * cosine - across * sine)
         to_north[i] = north[i] + (along * sine + across * cosine)
-    moved[4] = state[4]
+    moved[4:] = state[4:]
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)

@@ -59,6 +59,47 @@ class GnssFix:
 
 
 @dataclass(frozen=True, slots=True)
+class Pseudorange:
+    """One satellite received.
+
+    Parameters
+    ----------
+    satellite : str
+    range_m : float
+        With the receiver's clock in it; NaN where it was not measured.
+    sigma_m : float
+        NaN where unknown.
+    place_m : tuple of float
+        Of the satellite, earth-centred; NaN where unknown.
+    """
+
+    satellite: str
+    range_m: float
+    sigma_m: float
+    place_m: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """How much farther away a cell is than another, by times of arrival.
+
+    Parameters
+    ----------
+    cell, reference : str
+    difference_m : float
+        NaN where it was not measured.
+    sigma_m, reference_sigma_m : float
+        Of the two times, as distances; NaN where unknown.
+    """
+
+    cell: str
+    reference: str
+    difference_m: float
+    sigma_m: float = nan
+    reference_sigma_m: float = nan
+
+
+@dataclass(frozen=True, slots=True)
 class Epoch:
     """What is known at one moment; first one moves, then one measures.
 
@@ -70,12 +111,16 @@ class Epoch:
     heard : tuple of Heard
         The report, of all its rows.
     fix : GnssFix or None
+    ranges : tuple of Pseudorange
+    differences : tuple of Difference
     """
 
     time_s: float
     motion: tuple[MotionStep, ...] = ()
     heard: tuple[Heard, ...] = ()
     fix: GnssFix | None = None
+    ranges: tuple[Pseudorange, ...] = ()
+    differences: tuple[Difference, ...] = ()
 
 
 def epochs(log: TrackLog) -> list[Epoch]:
@@ -97,11 +142,26 @@ def epochs(log: TrackLog) -> list[Epoch]:
             ("time_s", "east_m", "north_m", "var_east_m2", "var_north_m2", "cov_east_north_m2"),
         )
     }
+    ranges: dict[float, list[Pseudorange]] = {}
+    names = ("time_s", "satellite", "pseudorange_m", "sigma_m", "x_m", "y_m", "z_m")
+    for time_s, name, range_m, sigma_m, *place_m in _rows(log.pseudoranges, names):
+        row_m = Pseudorange(name, range_m, sigma_m, (place_m[0], place_m[1], place_m[2]))
+        ranges.setdefault(time_s, []).append(row_m)
+    differences: dict[float, list[Difference]] = {}
+    names = ("time_s", "cell", "reference", "difference_m", "sigma_m", "reference_sigma_m")
+    for time_s, *compared in _rows(log.tdoa, names):
+        differences.setdefault(time_s, []).append(Difference(*compared))
+    times = motion.keys() | heard.keys() | fixes.keys() | ranges.keys() | differences.keys()
     return [
         Epoch(
-            time_s, tuple(motion.get(time_s, ())), tuple(heard.get(time_s, ())), fixes.get(time_s)
+            time_s,
+            tuple(motion.get(time_s, ())),
+            tuple(heard.get(time_s, ())),
+            fixes.get(time_s),
+            tuple(ranges.get(time_s, ())),
+            tuple(differences.get(time_s, ())),
         )
-        for time_s in sorted(motion.keys() | heard.keys() | fixes.keys())
+        for time_s in sorted(times)
     ]
 
 

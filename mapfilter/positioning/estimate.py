@@ -62,9 +62,9 @@ class UnusedReading:
     time_s : float
         When it was taken.
     kind : str
-        ``motion``, ``serving``, ``neighbour`` or ``gnss``.
+        ``motion``, ``serving``, ``neighbour``, ``gnss``, ``pseudorange``, ``ta`` or ``tdoa``.
     what : str
-        The cell, or an empty string.
+        The cell or satellite, or an empty string.
     reason : Reason
         Why.
     """

@@ -33,8 +33,8 @@ class ServingEvents:
 def serving_events(log: TrackLog) -> ServingEvents:
     """Merge motion and serving cells of a log.
 
-    A report that names no serving cell makes no event. Neighbours and GNSS fixes are told as not
-    used.
+    A report that names no serving cell makes no event. Neighbours and all that GNSS and times of
+    arrival tell is told as not used.
     """
     serving, unused = _serving_cells(log)
     moves: dict[float, list[MotionStep]] = {}
@@ -74,6 +74,11 @@ def _left_out(log: TrackLog) -> list[UnusedReading]:
         UnusedReading(
             float(rows["time_s"].iloc[0]), kind, f"{len(rows)} rows", Reason.NOT_USED_BY_FILTER
         )
-        for kind, rows in (("neighbour", neighbours), ("gnss", log.gnss))
+        for kind, rows in (
+            ("neighbour", neighbours),
+            ("gnss", log.gnss),
+            ("pseudorange", log.pseudoranges),
+            ("tdoa", log.tdoa),
+        )
         if len(rows)
     ]
