@@ -106,6 +106,42 @@ def summarise(state: Floats32, weight: Floats32, bins: Bins) -> Summary:
     )
 
 
+def flattened(state: Floats32, weight: Floats32, bins: Bins, power: float) -> Floats32:
+    """Return weights, summing to one, that spread over a belief's places more evenly.
+
+    Each bin gets its mass to a power; its particles share it by their weights.
+    """
+    flat = np.empty_like(weight)
+    mass = np.zeros(bins.rows * bins.cols, dtype=np.float32)
+    _flatten(state, weight, bins.west_m, bins.south_m, bins.size_m, bins.cols, power, mass, flat)
+    return flat
+
+
+@njit(error_model="numpy", cache=True)
+def _flatten(
+    state: Floats32, weight: Floats32, west_m: float, south_m: float, size_m: float, cols: int,
+    power: float, mass: Floats32, flat: Floats32,
+) -> None:  # fmt: skip
+    per_m, w, s = np.float32(1 / size_m), np.float32(west_m), np.float32(south_m)
+    rows = mass.size // cols
+    east, north = state[0], state[1]
+    of_bin = np.empty(weight.size, dtype=np.int32)
+    for i in range(weight.size):
+        col = min(max(np.int32((east[i] - w) * per_m), 0), cols - 1)
+        row = min(max(np.int32((north[i] - s) * per_m), 0), rows - 1)
+        of_bin[i] = row * cols + col
+        mass[of_bin[i]] += weight[i]
+    total = 0.0
+    for at in range(mass.size):
+        if mass[at] > 0:
+            share = float(mass[at]) ** power
+            mass[at] = share / mass[at]
+            total += share
+    per_share = np.float32(1.0 / total)
+    for i in range(weight.size):
+        flat[i] = weight[i] * mass[of_bin[i]] * per_share
+
+
 def nothing(rows: int) -> Summary:
     """Return the summary of a belief that holds nothing."""
     unknown = np.full((2, 2), nan)

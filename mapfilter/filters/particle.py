@@ -8,7 +8,7 @@ and tells when it has found itself.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import isfinite, nan
 from typing import Generic, Protocol, TypeVar
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from mapfilter._kernels import draw_key
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
-from mapfilter.filters.hypotheses import Bins, Summary, nothing, summarise
+from mapfilter.filters.hypotheses import Bins, Summary, flattened, nothing, summarise
 from mapfilter.filters.particle_options import ParticleOptions
 from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
 from mapfilter.filters.switch import switched
@@ -134,11 +134,14 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             return belief, reason
         key = draw_key(rng)
         state, log_weight = self.model.move(belief.state, belief.log_weight, motion, key)
-        moved = replace(
-            belief,
-            state=state,
-            log_weight=log_weight,
-            travelled_m=belief.travelled_m + abs(motion.step_m),
+        moved = ParticleBelief(
+            state,
+            log_weight,
+            belief.bins,
+            belief.travelled_m + abs(motion.step_m),
+            belief.log_evidence,
+            belief.status,
+            belief.agreed_at_m,
         )
         return moved, reason
 
@@ -173,19 +176,23 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             hold_m=self.options.switch_hold_m,
         )
         wanted = self._wanted(said, status)
-        state, now = weighed.state, weighed
-        power = self.options.flatten if status is Status.SEARCHING else 1.0
-        if power < 1:
-            flat = weight ** np.float32(power)
-            flat /= flat.sum()
+        state = weighed.state
+        searching = status is Status.SEARCHING
+        flat = weight
+        if searching and self.options.flatten < 1:
+            flat = flattened(state, weight, belief.bins, self.options.flatten)
             effective = 1.0 / float(np.dot(flat, flat))
-        else:
-            flat = weight
         if effective < self.options.resample_below * weight.size or 2 * wanted < weight.size:
             state, chosen = self._resampled(state, flat, wanted, status, rng)
-            log_weight = _left_over(log_weight[chosen], power)
-        now = replace(
-            weighed, state=state, log_weight=log_weight, status=status, agreed_at_m=agreed_at_m
+            log_weight = _left_over(log_weight[chosen], flat[chosen])
+        now = ParticleBelief(
+            state,
+            log_weight,
+            belief.bins,
+            belief.travelled_m,
+            weighed.log_evidence,
+            status,
+            agreed_at_m,
         )
         # The summary before resampling is the better one of the same belief.
         now.__dict__["summary"] = said
@@ -218,10 +225,9 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         return copies, chosen
 
 
-def _left_over(log_weight: Floats, power: float) -> Floats:
-    """Return the log weights of copies that were chosen by their weights to a power."""
-    if power == 1:
-        return np.full(log_weight.size, -np.log(log_weight.size))
-    left = (1.0 - power) * log_weight
+def _left_over(log_weight: Floats, chosen_by: Floats32) -> Floats:
+    """Return the log weights of copies that were chosen by other weights than their own."""
+    # Rounding may choose the last one though its weight is none.
+    left = log_weight - np.log(np.maximum(chosen_by, np.finfo(np.float32).tiny))
     normalise(left, np.empty(left.size, dtype=np.float32))
     return left

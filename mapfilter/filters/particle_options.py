@@ -24,8 +24,8 @@ class ParticleOptions:
     resample_below : float
         Share of the particles that the effective sample size must not fall below.
     flatten : float
-        Until the filter has converged, particles are resampled by their weights to this power and
-        keep the rest of them as weights: improbable places stay well covered. 1 for plain
+        Until the filter has converged, each bin of 25 m gets particles by its mass to this power,
+        which keep the rest of it as weights: improbable places stay well covered. 1 for plain
         resampling.
     jitter : tuple of float
         Standard deviation of the noise that parts copies, for each row of the state.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import cos, inf, isfinite, nan, sin
 
 import numpy as np
@@ -49,11 +49,13 @@ class Memory:
             return self
         heading = step.heading_rad if isfinite(step.heading_rad) else 0.0
         east_m, north_m = step.step_m * cos(heading), step.step_m * sin(heading)
-        return replace(
-            self,
-            travelled_m=self.travelled_m + abs(step.step_m),
-            east_m=self.east_m + east_m,
-            north_m=self.north_m + north_m,
-            back_east_m=self.back_east_m + east_m,
-            back_north_m=self.back_north_m + north_m,
+        return Memory(
+            self.level_dbm,
+            self.heard_at_m,
+            self.travelled_m + abs(step.step_m),
+            self.east_m + east_m,
+            self.north_m + north_m,
+            self.used_at_m,
+            self.back_east_m + east_m,
+            self.back_north_m + north_m,
         )
