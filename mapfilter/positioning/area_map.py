@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -43,6 +43,8 @@ class AreaMap:
         Bands of the cells on each (ARFCN, BSIC); with BSIC -1 of all on the carrier.
     floor_dbm : float
         Weaker levels are not in the database.
+    sites : mapping of str to tuple of float
+        East, north and height of all cells of the database.
     """
 
     lattice: Lattice
@@ -54,6 +56,7 @@ class AreaMap:
     on_way: NDArray[np.bool_]
     carriers: dict[tuple[int, int], tuple[int, ...]]
     floor_dbm: float
+    sites: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
 
     @classmethod
     def of_field(cls, field: RadioField, plan: CellPlan, floor_dbm: float) -> AreaMap:
@@ -85,6 +88,7 @@ class AreaMap:
             field.on_way,
             _carriers(plan, field.cell_ids),
             floor_dbm,
+            {cell.id: (cell.east_m, cell.north_m, cell.height_m) for cell in plan.cells},
         )
 
     @property

@@ -9,19 +9,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import isfinite, nan, sqrt
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from mapfilter.filters.contract import Filter, Reason, Status
 from mapfilter.filters.grid import GridBelief, GridFilter
-from mapfilter.filters.hypotheses import Summary, nothing
 from mapfilter.filters.particle import ParticleFilter
 from mapfilter.filters.particle_options import ParticleOptions
-from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.area_map import AreaMap
 from mapfilter.positioning.bayes_model import BayesModel, Start
+from mapfilter.positioning.bayes_news import grain_of, name_of, news_of
 from mapfilter.positioning.bayes_track import BayesTrack as BayesTrack
 from mapfilter.positioning.bayes_track import News as News
 from mapfilter.positioning.challenger import (
@@ -32,14 +31,16 @@ from mapfilter.positioning.challenger import (
     judge,
 )
 from mapfilter.positioning.epochs import Epoch, headed
-from mapfilter.positioning.estimate import Fix, UnusedReading
+from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.evidence import Memory, RadioReading, reading_of
 from mapfilter.positioning.grid_model import StreetGrid
-from mapfilter.positioning.matched_way import matched_way
+from mapfilter.positioning.listening import Listener
+from mapfilter.positioning.satellites import Satellites, SkyNews
+from mapfilter.positioning.sky_memory import SkyMemory
+from mapfilter.positioning.sky_options import SkyOptions, TimingOptions
+from mapfilter.positioning.timing import NEVER, is_timed, with_timing
 
-_STREET_SHARE = 0.3
 _MOST_TIMES, _SEARCHING_TIMES = 12, 8
-_FIRST_GRAIN_M, _LEAST_GRAIN_M = 5.0, 1.5
 
 
 @dataclass(frozen=True)
@@ -53,12 +54,16 @@ class BayesPositioner:
     rules : ChallengeRules
     grid : bool
         The exact filter on a grid in place of particles.
+    satellites : SkyOptions
+    timing : TimingOptions
     """
 
     model: BayesModel
     options: ParticleOptions = field(default_factory=ParticleOptions)
     rules: ChallengeRules = field(default_factory=ChallengeRules)
     grid: bool = False
+    satellites: SkyOptions = field(default_factory=SkyOptions)
+    timing: TimingOptions = field(default_factory=TimingOptions)
 
     @property
     def area(self) -> AreaMap:
@@ -89,6 +94,12 @@ class BayesPositioner:
         grids = {compass: StreetGrid(self.model, compass) for compass in (True, False)}
         return {compass: GridFilter(grid, self.options) for compass, grid in grids.items()}
 
+    @cached_property
+    def _sky(self) -> Satellites:
+        area, (width_m, height_m) = self.area, self.area.size_m
+        listener = Listener(self.satellites, area.lattice.crs, area.origin_m)
+        return Satellites(listener, (width_m / 2, height_m / 2), not self.grid)
+
     def begin(self) -> BayesTrack:
         """Return what is known before the first epoch: nothing."""
         return BayesTrack(Memory.empty(len(self.area.cell_ids)))
@@ -105,21 +116,28 @@ class BayesPositioner:
         self, track: BayesTrack, epoch: Epoch, rng: np.random.Generator
     ) -> tuple[BayesTrack, News]:
         """Take one epoch in."""
+        grain_m = grain_of(track)
         track, unused = self._move(track, epoch, rng)
+        track, sky = self._sky.hear(track, epoch, grain_m)
+        known = track.belief is not None and epoch.fix is not None
+        report = replace(epoch, fix=None) if known else epoch
         memory, reading, reason, unplaced = reading_of(
-            self.area, self.model.evidence, track.memory, epoch, _grain_m(track)
+            self.area, self.model.evidence, track.memory, report, grain_m
         )
+        track, reading, untimed = self._timed(track, epoch, reading)
+        unused += [*sky.unused, *untimed]
         unused += [
-            UnusedReading(epoch.time_s, row.role, _name(row.cell, row.arfcn, row.bsic), why)
+            UnusedReading(epoch.time_s, row.role, name_of(row), why)
             for row, why in unplaced
         ]
         belief = track.belief
         if belief is None:
+            reading = self._sky.first(reading, epoch)
             if reading is not None:
-                start = Start(reading, track.compass)
-                track = replace(track, belief=self.filter_for(track.compass).init(start, rng))
-        elif reading is not None:
-            track, why = self._weigh(track, belief, reading, epoch, rng)
+                belief, heard = self._start(track, reading, epoch, rng)
+                track = replace(track, belief=belief, sky=heard)
+        elif reading is not None or sky.says:
+            track, why = self._weigh(track, belief, reading or RadioReading(), sky, epoch, rng)
             reason = reason if why is Reason.USED else why
         elif track.status is Status.CONVERGED:
             # CONVERGED is one epoch, also where nothing is heard in the next.
@@ -129,18 +147,20 @@ class BayesPositioner:
             cell = next((str(row.cell) for row in epoch.heard if row.cell is not None), "")
             unused.append(UnusedReading(epoch.time_s, "serving", cell, reason))
         after = replace(track, memory=memory)
-        return after, self._news(after, epoch.time_s, reason, tuple(unused))
+        return after, news_of(self.area, after, epoch.time_s, reason, tuple(unused))
 
     def _weigh(
         self,
         track: BayesTrack,
         before: MapBelief,
         reading: RadioReading,
+        sky: SkyNews,
         epoch: Epoch,
         rng: np.random.Generator,
     ) -> tuple[BayesTrack, Reason]:
         """Weigh the belief, and its challenger, which may start, win or give up."""
-        belief, info = self.filter_for(track.compass).update(before, reading, rng)
+        told = sky.for_main(reading)
+        belief, info = self.filter_for(track.compass).update(before, told, rng)
         status = Status.LOST if track.status is Status.LOST else belief.status
         if info.reason is not Reason.USED:
             return replace(track, belief=belief, status=status), info.reason
@@ -151,10 +171,11 @@ class BayesPositioner:
             # All agree, and what is heard does not: the truth may have died out.
             belief = replace(belief, status=Status.SEARCHING)
             status = belief.status
-        challenger, wins = track.challenger, track.wins
+        challenger, wins, heard = track.challenger, track.wins, track.sky
         travelled_m = track.memory.travelled_m
         if challenger is not None:
-            other, _ = self.filter_for(track.compass).update(challenger.belief, reading, rng)
+            told = sky.for_other(reading)
+            other, _ = self.filter_for(track.compass).update(challenger.belief, told, rng)
             challenger = replace(challenger, belief=other)
             verdict = judge(self.rules, belief, challenger, travelled_m)
             found = verdict is Verdict.WON
@@ -169,13 +190,15 @@ class BayesPositioner:
                 status = after if found else belief.status
             if found:
                 belief, wins = replace(other, status=after), wins + 1
+                heard = challenger.sky
             if found or verdict not in (Verdict.OPEN, Verdict.AHEAD):
                 doubt, challenger = doubt.none(), None
-        elif status is not Status.CONVERGED and doubt.sum >= most:
+        elif status is not Status.CONVERGED and (doubt.sum >= most or sky.disputed):
             challenger = self._challenger(track, belief, epoch, rng)
         now = replace(
-            track, belief=belief, status=status, doubt=doubt, challenger=challenger, wins=wins
-        )
+            track, belief=belief, status=status, doubt=doubt, challenger=challenger, wins=wins,
+            sky=heard,
+        )  # fmt: skip
         return now, Reason.USED
 
     def _doubt_at(self, reading: RadioReading) -> float:
@@ -188,10 +211,31 @@ class BayesPositioner:
         """Start from scratch: from the report alone, as if it were the first."""
         empty = Memory.empty(len(self.area.cell_ids))
         _, reading, _, _ = reading_of(self.area, self.model.evidence, empty, epoch)
+        _, reading, _ = self._timed(replace(track, timed_at_m=NEVER), epoch, reading)
+        reading = self._sky.first(reading, epoch)
         if reading is None:
             return None
+        belief, heard = self._start(track, reading, epoch, rng)
+        travelled_m = track.memory.travelled_m
+        return Challenger(belief, travelled_m, main.log_evidence, epoch.time_s, heard)
+
+    def _start(
+        self, track: BayesTrack, reading: RadioReading, epoch: Epoch, rng: np.random.Generator
+    ) -> tuple[MapBelief, SkyMemory]:
         belief = self.filter_for(track.compass).init(Start(reading, track.compass), rng)
-        return Challenger(belief, track.memory.travelled_m, main.log_evidence)
+        return self._sky.begin(belief, epoch, track.memory.travelled_m)
+
+    def _timed(
+        self, track: BayesTrack, epoch: Epoch, reading: RadioReading | None
+    ) -> tuple[BayesTrack, RadioReading | None, list[UnusedReading]]:
+        """Add what times of arrival tell to a report."""
+        if not is_timed(epoch):
+            return track, reading, []
+        reading, timed_at_m, unused = with_timing(
+            self.area, self.timing, epoch, reading, track.timed_at_m, track.memory.travelled_m,
+            advances=self.model.timed_by_sites,
+        )  # fmt: skip
+        return replace(track, timed_at_m=timed_at_m), reading, unused
 
     def _move(
         self, track: BayesTrack, epoch: Epoch, rng: np.random.Generator
@@ -239,51 +283,3 @@ class BayesPositioner:
         log_weight = np.tile(belief.log_weight, _MOST_TIMES) - np.log(_MOST_TIMES)
         return replace(belief, state=state, log_weight=log_weight)
 
-    def _news(
-        self, track: BayesTrack, time_s: float, reason: Reason, unused: tuple[UnusedReading, ...]
-    ) -> News:
-        belief, (west, south) = track.leading, self.area.origin_m
-        if belief is None:
-            said, count, way = nothing(STATES), 0, (0, nan)
-        else:
-            said, count = belief.summary, belief.log_weight.size
-            way = matched_way(self.area, belief.state[0], belief.state[1], belief.weight)
-        fix = Fix(
-            time_s,
-            float(said.mean[0]) + west,
-            float(said.mean[1]) + south,
-            said.covariance_m2,
-            said.radii_m,
-            track.status,
-            count,
-            said.mass_50m if count else nan,
-            *way,
-            reason,
-        )
-        evidence = _evidence(said, west, south, belief.log_evidence if belief else nan)
-        return News(fix, evidence, unused)
-
-
-def _grain_m(track: BayesTrack) -> float:
-    """Return how far hypotheses lie apart where the belief is, and no less than they are good."""
-    belief = track.belief
-    if belief is None or not belief.log_weight.size:
-        return _FIRST_GRAIN_M
-    area_m2 = _STREET_SHARE * belief.bins.size_m**2 * belief.summary.effective_bins
-    return max(sqrt(area_m2 / belief.log_weight.size), _LEAST_GRAIN_M)
-
-
-def _evidence(
-    said: Summary, west: float, south: float, log_evidence: float
-) -> tuple[float, float, float, float, float]:
-    east_m = north_m = nan
-    mass = 0.0 if isfinite(said.entropy_bits) else nan
-    if len(said.runners_up):
-        east_m, north_m, mass = said.runners_up[0].tolist()
-    return east_m + west, north_m + south, mass, said.entropy_bits, log_evidence
-
-
-def _name(cell: str | None, arfcn: int | None, bsic: int | None) -> str:
-    if cell is not None:
-        return cell
-    return "" if arfcn is None else f"ARFCN {arfcn}, BSIC {'unknown' if bsic is None else bsic}"

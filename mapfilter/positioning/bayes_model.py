@@ -31,16 +31,14 @@ from mapfilter.models.street_motion import (
     weigh_by_map,
 )
 from mapfilter.positioning.area_map import AreaMap
-from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.evidence import EvidenceOptions, RadioReading
+from mapfilter.positioning.fix_evidence import FixEvidence
 
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 
 _F = np.float32
 OFF_AT_START = 0.05
-_FIX_SD_M = 10.0
-_FIX_CLIP = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +78,11 @@ class BayesModel:
     motion: MotionErrors = field(default_factory=MotionErrors)
     weights: MapWeights = field(default_factory=MapWeights)
     evidence: EvidenceOptions = field(default_factory=EvidenceOptions)
+
+    @property
+    def timed_by_sites(self) -> bool:
+        """Whether timing advances are compared with the distances of sites."""
+        return True
 
     @cached_property
     def bins(self) -> Bins:
@@ -206,7 +209,10 @@ class BayesModel:
                     bound.weight, self._bound_table, log_weight,
                 )  # fmt: skip
         if reading.fix is not None:
-            self._weigh_by_fix(state, log_weight, reading.fix)
+            log_weight += FixEvidence(reading.fix, self.area.origin_m).log_likelihood(state)
+            used = True
+        for evidence in reading.also:
+            log_weight += evidence.log_likelihood(state)
             used = True
         return Reason.USED if used else Reason.NO_READING
 
@@ -225,17 +231,3 @@ class BayesModel:
             lattice.cols, pixel,
         )  # fmt: skip
         return pixel
-
-    def _weigh_by_fix(self, state: Floats32, log_weight: Floats, fix: GnssFix) -> None:
-        west, south = self.area.origin_m
-        dx = state[EAST] - _F(fix.east_m - west)
-        dy = state[NORTH] - _F(fix.north_m - south)
-        known = isfinite(fix.var_east_m2) and isfinite(fix.var_north_m2)
-        var_x = max(fix.var_east_m2, 1.0) if known else _FIX_SD_M**2
-        var_y = max(fix.var_north_m2, 1.0) if known else _FIX_SD_M**2
-        cross = fix.cov_east_north_m2 if known and isfinite(fix.cov_east_north_m2) else 0.0
-        cross = float(np.clip(cross, -0.99 * sqrt(var_x * var_y), 0.99 * sqrt(var_x * var_y)))
-        det = var_x * var_y - cross**2
-        square = (var_y * dx**2 - 2 * cross * dx * dy + var_x * dy**2) / det
-        # A fix far off is an outlier: it counts no more than one at five deviations.
-        log_weight -= 0.5 * np.minimum(square, _FIX_CLIP**2)

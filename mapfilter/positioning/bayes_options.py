@@ -13,6 +13,7 @@ from mapfilter.positioning.bayes import BayesPositioner
 from mapfilter.positioning.bayes_model import BayesModel
 from mapfilter.positioning.challenger import ChallengeRules
 from mapfilter.positioning.evidence import EvidenceOptions
+from mapfilter.positioning.sky_options import SkyOptions, TimingOptions
 
 _NARROW_BIAS_RAD, _NARROW_SCALE = radians(1.5), 0.015
 _MOST_TIMES = 5.0
@@ -35,6 +36,10 @@ class BayesOptions:
         length that are nearly right; wide errors get up to five times as many.
     challenge : ChallengeRules
         When a belief in doubt is challenged, and when it is replaced.
+    satellites : SkyOptions
+        How far pseudoranges and fixes are trusted.
+    timing : TimingOptions
+        How far timing advances and time differences are trusted.
     smooth : bool
         Whether positions are those in hindsight, by the whole log.
     grid : bool
@@ -46,13 +51,17 @@ class BayesOptions:
     evidence: EvidenceOptions = field(default_factory=EvidenceOptions)
     particles: ParticleOptions = field(default_factory=ParticleOptions)
     challenge: ChallengeRules = field(default_factory=ChallengeRules)
+    satellites: SkyOptions = field(default_factory=SkyOptions)
+    timing: TimingOptions = field(default_factory=TimingOptions)
     smooth: bool = False
     grid: bool = False
 
     def over(self, area: AreaMap) -> BayesPositioner:
         """Return the filter over an area."""
         model = BayesModel(area, self.motion, self.map, self.evidence)
-        return BayesPositioner(model, self._particles, self.challenge, self.grid)
+        return BayesPositioner(
+            model, self._particles, self.challenge, self.grid, self.satellites, self.timing
+        )
 
     @property
     def _particles(self) -> ParticleOptions:

@@ -18,7 +18,7 @@ from mapfilter._kernels import draw_key
 from mapfilter.filters.contract import Status
 from mapfilter.filters.hypotheses import Bins, summarise
 from mapfilter.filters.resampling import systematic
-from mapfilter.models.street_motion import MotionErrors
+from mapfilter.models.street_motion import STATES, MotionErrors
 from mapfilter.models.street_smoothing import draw_ancestors
 from mapfilter.positioning.area_map import AreaMap
 from mapfilter.positioning.bayes import BayesTrack
@@ -103,7 +103,7 @@ def _due(kept: list[Kept], travelled_m: float, every_m: float) -> bool:
 
 def _keep(belief: MapBelief, epoch: int, moved: tuple[float, float, float]) -> Kept:
     weight = belief.log_weight.astype(np.float32)
-    return Kept(epoch, belief.state, weight, moved[:2], moved[2])
+    return Kept(epoch, belief.state[:STATES], weight, moved[:2], moved[2])
 
 
 def smoothed(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import nan
+from math import inf, nan
 
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.challenger import Challenger, Doubt, MapBelief
 from mapfilter.positioning.estimate import Fix, UnusedReading
 from mapfilter.positioning.memory import Memory
+from mapfilter.positioning.sky_memory import NO_SKY, SkyMemory
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +32,10 @@ class BayesTrack:
         Beside a belief in doubt.
     wins : int
         How many challengers have taken over.
+    sky : SkyMemory
+        Of the belief.
+    timed_at_m : (float, float)
+        Distance travelled when timing advances and time differences were last used.
     """
 
     memory: Memory
@@ -41,6 +46,8 @@ class BayesTrack:
     doubt: Doubt = field(default_factory=Doubt)
     challenger: Challenger | None = None
     wins: int = 0
+    sky: SkyMemory = NO_SKY
+    timed_at_m: tuple[float, float] = (-inf, -inf)
 
     @property
     def leading(self) -> MapBelief | None:

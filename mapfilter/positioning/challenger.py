@@ -14,12 +14,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from math import exp, hypot
+from math import exp, hypot, nan
 
 from mapfilter.filters.contract import Status
 from mapfilter.filters.grid import GridBelief
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
+from mapfilter.positioning.sky_memory import NO_SKY, SkyMemory
 
 MapBelief = ParticleBelief | GridBelief
 
@@ -69,15 +70,25 @@ class Challenger:
         Distance travelled when it started.
     against : float
         Log evidence of the first belief then.
+    began_s : float
+        Time when it started.
+    sky : SkyMemory
+    by_satellites : float
+        What satellites add to the logarithm of the Bayes factor; bounded, as all of them may be
+        faulty.
     """
 
     belief: MapBelief
     began_at_m: float
     against: float
+    began_s: float = nan
+    sky: SkyMemory = NO_SKY
+    by_satellites: float = 0.0
 
     def ahead(self, main: MapBelief) -> float:
         """Return the logarithm of the Bayes factor in its favour."""
-        return self.belief.log_evidence - (main.log_evidence - self.against)
+        by_radio = self.belief.log_evidence - (main.log_evidence - self.against)
+        return by_radio + self.by_satellites
 
 
 class Verdict(Enum):

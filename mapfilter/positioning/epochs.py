@@ -143,14 +143,14 @@ def epochs(log: TrackLog) -> list[Epoch]:
         )
     }
     ranges: dict[float, list[Pseudorange]] = {}
-    names = ("time_s", "satellite", "pseudorange_m", "sigma_m", "x_m", "y_m", "z_m")
-    for time_s, name, range_m, sigma_m, *place_m in _rows(log.pseudoranges, names):
+    received = ("time_s", "satellite", "pseudorange_m", "sigma_m", "x_m", "y_m", "z_m")
+    for time_s, name, range_m, sigma_m, *place_m in _rows(log.pseudoranges, received):
         row_m = Pseudorange(name, range_m, sigma_m, (place_m[0], place_m[1], place_m[2]))
         ranges.setdefault(time_s, []).append(row_m)
     differences: dict[float, list[Difference]] = {}
-    names = ("time_s", "cell", "reference", "difference_m", "sigma_m", "reference_sigma_m")
-    for time_s, *compared in _rows(log.tdoa, names):
-        differences.setdefault(time_s, []).append(Difference(*compared))
+    compared = ("time_s", "cell", "reference", "difference_m", "sigma_m", "reference_sigma_m")
+    for time_s, *told in _rows(log.tdoa, compared):
+        differences.setdefault(time_s, []).append(Difference(*told))
     times = motion.keys() | heard.keys() | fixes.keys() | ranges.keys() | differences.keys()
     return [
         Epoch(

@@ -19,6 +19,7 @@ from mapfilter.models.fingerprint import BoundReading, LevelErrors, LevelReading
 from mapfilter.positioning.area_map import AreaMap
 from mapfilter.positioning.epochs import Epoch, GnssFix, Heard
 from mapfilter.positioning.memory import Memory as Memory
+from mapfilter.positioning.place_evidence import PlaceEvidence
 from mapfilter.tracks.schema import SERVING
 
 Floats = NDArray[np.float64]
@@ -72,6 +73,8 @@ class RadioReading:
     timing_advance : float
         Of the serving cell, in steps; NaN where it was not told. Only models that know what is
         usual there take it.
+    also : tuple of PlaceEvidence
+        What else tells of places: satellites, times of arrival.
     """
 
     serving: int = -1
@@ -82,6 +85,7 @@ class RadioReading:
     expected: float = 0.0
     length_m: float = 0.0
     timing_advance: float = nan
+    also: tuple[PlaceEvidence, ...] = ()
 
 
 Unplaced = tuple[Heard, Reason]

@@ -32,6 +32,11 @@ class HeardModel(BayesModel):
 
     heard: HeardMaps | None = None
 
+    @property
+    def timed_by_sites(self) -> bool:
+        """Whether timing advances are compared with the distances of sites: with maps if any."""
+        return self.heard is None
+
     def weigh(self, state: Floats32, log_weight: Floats, reading: RadioReading) -> Reason:
         """Add the log-likelihood of a report and of a fix, in place."""
         heard = self.heard

@@ -1,0 +1,85 @@
+"""What the map filter says after an epoch."""
+
+from __future__ import annotations
+
+from math import isfinite, nan, sqrt
+
+from mapfilter.filters.contract import Reason
+from mapfilter.filters.hypotheses import Summary, nothing
+from mapfilter.models.street_motion import STATES
+from mapfilter.positioning.area_map import AreaMap
+from mapfilter.positioning.bayes_track import BayesTrack, News
+from mapfilter.positioning.epochs import Heard
+from mapfilter.positioning.estimate import Fix, UnusedReading
+from mapfilter.positioning.matched_way import matched_way
+
+_STREET_SHARE = 0.3
+_FIRST_GRAIN_M, _LEAST_GRAIN_M = 5.0, 1.5
+
+
+def news_of(
+    area: AreaMap,
+    track: BayesTrack,
+    time_s: float,
+    reason: Reason,
+    unused: tuple[UnusedReading, ...],
+) -> News:
+    """Return what a track says after an epoch.
+
+    Parameters
+    ----------
+    area : AreaMap
+    track : BayesTrack
+        After the epoch.
+    time_s : float
+    reason : Reason
+        Whether the epoch's report was used.
+    unused : tuple of UnusedReading
+    """
+    belief, (west, south) = track.leading, area.origin_m
+    if belief is None:
+        said, count, way = nothing(STATES), 0, (0, nan)
+    else:
+        said, count = belief.summary, belief.log_weight.size
+        way = matched_way(area, belief.state[0], belief.state[1], belief.weight)
+    fix = Fix(
+        time_s,
+        float(said.mean[0]) + west,
+        float(said.mean[1]) + south,
+        said.covariance_m2,
+        said.radii_m,
+        track.status,
+        count,
+        said.mass_50m if count else nan,
+        *way,
+        reason,
+    )
+    evidence = _evidence(said, west, south, belief.log_evidence if belief else nan)
+    return News(fix, evidence, unused)
+
+
+def grain_of(track: BayesTrack) -> float:
+    """Return how far hypotheses lie apart where the belief is, and no less than they are good."""
+    belief = track.belief
+    if belief is None or not belief.log_weight.size:
+        return _FIRST_GRAIN_M
+    area_m2 = _STREET_SHARE * belief.bins.size_m**2 * belief.summary.effective_bins
+    return max(sqrt(area_m2 / belief.log_weight.size), _LEAST_GRAIN_M)
+
+
+def name_of(row: Heard) -> str:
+    """Return what messages call the cell of a report's row."""
+    if row.cell is not None:
+        return row.cell
+    bsic = "unknown" if row.bsic is None else row.bsic
+    return "" if row.arfcn is None else f"ARFCN {row.arfcn}, BSIC {bsic}"
+
+
+def _evidence(
+    said: Summary, west: float, south: float, log_evidence: float
+) -> tuple[float, float, float, float, float]:
+    east_m = north_m = nan
+    mass = 0.0 if isfinite(said.entropy_bits) else nan
+    if len(said.runners_up):
+        east_m, north_m, mass = said.runners_up[0].tolist()
+    return east_m + west, north_m + south, mass, said.entropy_bits, log_evidence
