@@ -230,7 +230,7 @@ def _levels(
     cell = np.fromiter(inside, np.int32, count)
     level = np.fromiter(inside.values(), np.float64, count)
     away_m = memory.travelled_m - memory.heard_at_m[cell]
-    together = memory.heard_at_m[cell] == memory.used_at_m
+    together = (memory.heard_at_m[cell] == memory.used_at_m) & isfinite(memory.used_at_m)
     correlation = np.exp(-away_m / errors.correlation_m)
     rho = np.where(together, correlation, 0.0)
     before = np.where(together, memory.level_dbm[cell], 0.0)
