@@ -127,8 +127,8 @@ def _flatten(
     east, north = state[0], state[1]
     of_bin = np.empty(weight.size, dtype=np.int32)
     for i in range(weight.size):
-        col = min(max(np.int32((east[i] - w) * per_m), 0), cols - 1)
-        row = min(max(np.int32((north[i] - s) * per_m), 0), rows - 1)
+        col = min(max(int((east[i] - w) * per_m), 0), cols - 1)
+        row = min(max(int((north[i] - s) * per_m), 0), rows - 1)
         of_bin[i] = row * cols + col
         mass[of_bin[i]] += weight[i]
     total = 0.0

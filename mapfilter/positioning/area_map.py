@@ -91,13 +91,13 @@ class AreaMap:
             {cell.id: (cell.east_m, cell.north_m, cell.height_m) for cell in plan.cells},
         )
 
-    @property
+    @cached_property
     def origin_m(self) -> tuple[float, float]:
         """East and north of the local frame's origin."""
         west, south, _, _ = self.lattice.bounds_m
         return west, south
 
-    @property
+    @cached_property
     def size_m(self) -> tuple[float, float]:
         """East and north extent."""
         west, south, east, north = self.lattice.bounds_m

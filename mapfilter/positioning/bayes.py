@@ -146,7 +146,7 @@ class BayesPositioner:
         if reason not in (Reason.USED, Reason.NOT_MOVED_ENOUGH, Reason.NO_READING):
             cell = next((str(row.cell) for row in epoch.heard if row.cell is not None), "")
             unused.append(UnusedReading(epoch.time_s, "serving", cell, reason))
-        after = replace(track, memory=memory)
+        after = track if memory is track.memory else replace(track, memory=memory)
         return after, news_of(self.area, after, epoch.time_s, reason, tuple(unused))
 
     def _weigh(
@@ -195,9 +195,9 @@ class BayesPositioner:
                 doubt, challenger = doubt.none(), None
         elif status is not Status.CONVERGED and (doubt.sum >= most or sky.disputed):
             challenger = self._challenger(track, belief, epoch, rng)
-        now = replace(
-            track, belief=belief, status=status, doubt=doubt, challenger=challenger, wins=wins,
-            sky=heard,
+        now = BayesTrack(
+            track.memory, belief, track.heading_rad, track.compass, status, doubt, challenger,
+            wins, heard, track.timed_at_m,
         )  # fmt: skip
         return now, Reason.USED
 
@@ -260,13 +260,17 @@ class BayesPositioner:
                 challenger = replace(challenger, belief=other)
             if why is not Reason.USED:
                 unused.append(UnusedReading(epoch.time_s, "motion", "", why))
-        moved = replace(
-            track,
-            belief=belief,
-            memory=memory,
-            heading_rad=heading_rad,
-            compass=compass,
-            challenger=challenger,
+        moved = BayesTrack(
+            memory,
+            belief,
+            heading_rad,
+            compass,
+            track.status,
+            track.doubt,
+            challenger,
+            track.wins,
+            track.sky,
+            track.timed_at_m,
         )
         return moved, unused
 

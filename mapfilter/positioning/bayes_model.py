@@ -39,6 +39,7 @@ Floats32 = NDArray[np.float32]
 
 _F = np.float32
 OFF_AT_START = 0.05
+_OFF_SHARE, _TRIES = 0.2, 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,39 +109,59 @@ class BayesModel:
         They are spread by their probability over all points where one can be, each anywhere in its
         pixel.
         """
-        resolution_m = _F(self.area.lattice.resolution_m)
+        state = np.zeros((STATES, most), dtype=np.float32)
+        log_weight = np.full(most, -np.log(most))
         if isfinite(prior.east_m):
             west, south = self.area.origin_m
             place = np.array([[prior.east_m - west], [prior.north_m - south]])
-            position = place + prior.sd_m * rng.standard_normal((2, most))
+            state[EAST : NORTH + 1] = place + prior.sd_m * rng.standard_normal((2, most))
+            state[OFF] = OFF_AT_START
         else:
-            points = self.area.points
-            chosen = self._likely_points(points, prior.reading, most, rng)
-            spread = rng.random((2, most), dtype=np.float32) - _F(0.5)
-            position = points[:, chosen] + resolution_m * spread
-        state = np.empty((STATES, most), dtype=np.float32)
-        state[EAST : NORTH + 1] = position
+            self._spread(state, log_weight, prior.reading, rng)
         bias = rng.standard_normal(most) * self.motion.bias_sd_rad
         state[BIAS] = bias if prior.compass else pi * (2 * rng.random(most) - 1)
         state[LOG_SCALE] = self.motion.scale_sd * rng.standard_normal(most)
-        state[OFF] = OFF_AT_START
-        log_weight = np.full(most, -np.log(most))
         if isfinite(prior.east_m) and prior.reading is not None:
             self.weigh(state, log_weight, prior.reading)
         return state, log_weight
 
-    def _likely_points(
+    def _spread(
+        self, state: Floats32, log_weight: Floats, reading: RadioReading | None,
+        rng: np.random.Generator,
+    ) -> None:  # fmt: skip
+        """Fill places on the map and off it, by the first report; more off it than are due."""
+        resolution_m, size_m = self.area.lattice.resolution_m, np.array(self.area.size_m)
+        count = state.shape[1]
+        middle = count - int(_OFF_SHARE * count)
+        anywhere = (size_m * rng.random((_TRIES * (count - middle), 2))).T.astype(np.float32)
+        for part, points, spread_m, off in (
+            (slice(0, middle), self.area.points, resolution_m, 0.0),
+            (slice(middle, count), anywhere, 0.0, 1.0),
+        ):
+            if not points.shape[1] or part.start == part.stop:
+                log_weight[part] = -np.inf
+                continue
+            chosen, log_mean = self._likely(points, reading, part.stop - part.start, rng)
+            beside = rng.random((2, chosen.size), dtype=np.float32) - _F(0.5)
+            state[EAST : NORTH + 1, part] = points[:, chosen] + _F(spread_m) * beside
+            state[OFF, part] = off
+            share = OFF_AT_START if off else 1 - OFF_AT_START
+            log_weight[part] = log_mean + np.log(share / chosen.size)
+
+    def _likely(
         self, points: Floats32, reading: RadioReading | None, count: int, rng: np.random.Generator
-    ) -> NDArray[np.int32]:
+    ) -> tuple[NDArray[np.int32], float]:
+        """Draw points by their likelihood; return them and the logarithm of its mean."""
         state = np.zeros((STATES, points.shape[1]), dtype=np.float32)
         state[EAST : NORTH + 1] = points
         log_weight = np.zeros(points.shape[1])
         if reading is not None:
             self.weigh(state, log_weight, reading)
-        weight = np.exp(log_weight - log_weight.max())
+        most = log_weight.max()
+        weight = np.exp(log_weight - most)
         chosen = np.empty(count, dtype=np.int32)
         systematic((weight / weight.sum()).astype(np.float32), rng.random(), chosen)
-        return chosen
+        return chosen, float(most + np.log(weight.mean()))
 
     def any_heading(self, state: Floats32, times: int, rng: np.random.Generator) -> Floats32:
         """Return so many times as many hypotheses, which know nothing of their heading error.

@@ -62,29 +62,27 @@ class StreetGrid:
         return np.asarray(self.bin_rad * np.arange(-side, side + 1), dtype=np.float64)
 
     def start(self, prior: Start) -> tuple[Floats32, Floats32]:
-        """Return mass on all points where one can be, by the first report, or about a place."""
+        """Return mass on the ways and off them by the first report, or about a place."""
         area = self.model.area
-        lattice = area.lattice
-        place: Floats = np.zeros((lattice.rows, lattice.cols))
-        row, col = np.nonzero(np.ones_like(area.on_way) if isfinite(prior.east_m) else area.on_way)
+        row, col = np.indices(area.on_way.shape).reshape(2, -1)
         state = self.states(row, col, np.zeros(row.size, dtype=np.float32))
         log_weight = np.zeros(row.size)
+        on_map = area.on_way / max(area.on_way.sum(), 1)
         if isfinite(prior.east_m):
             west, south = area.origin_m
             dx, dy = state[EAST] - (prior.east_m - west), state[NORTH] - (prior.north_m - south)
             log_weight -= (dx**2 + dy**2) / (2 * prior.sd_m**2)
+            on_map = np.full(on_map.shape, 1 / row.size)
         if prior.reading is not None:
             self.model.weigh(state, log_weight, prior.reading)
-        place[row, col] = np.exp(log_weight - log_weight.max(initial=0.0))
+        likely = np.exp(log_weight - log_weight.max()).reshape(on_map.shape)
         bias = np.ones(self.bias_rad.size)
         if self.compass and self.model.motion.bias_sd_rad > 0:
             bias = np.exp(-0.5 * (self.bias_rad / self.model.motion.bias_sd_rad) ** 2)
-        mass = bias[:, None, None] * place
-        mass /= mass.sum()
-        return (
-            ((1 - OFF_AT_START) * mass).astype(np.float32),
-            (OFF_AT_START * mass).astype(np.float32),
-        )
+        on = (1 - OFF_AT_START) * bias[:, None, None] * on_map * likely
+        off = OFF_AT_START * bias[:, None, None] * likely / row.size
+        total = on.sum() + off.sum()
+        return (on / total).astype(np.float32), (off / total).astype(np.float32)
 
     def states(self, row: NDArray[np.intp], col: NDArray[np.intp], bias_rad: Floats32) -> Floats32:
         """Return pixels as states of the particle model."""
