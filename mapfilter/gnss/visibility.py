@@ -16,6 +16,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+_MOST_PAIRS = 2_000_000
+
 
 class Skyline:
     """Buildings as prisms with flat roofs, in east and north metres.
@@ -52,6 +54,7 @@ class Skyline:
         self._shapes, self._heights = shapes, heights
         self._tree = shapely.STRtree(shapes)
         self._walls, self._first = _walls(shapes)
+        self._boxes = shapely.bounds(shapes).reshape(-1, 4)
 
     def seen(self, places_m: ArrayLike, toward: Directions) -> Bools:
         """Tell which directions are open to the sky.
@@ -76,21 +79,33 @@ class Skyline:
         if not self._shapes.size or not open_sky.any():
             return open_sky
         lowest = np.where(open_sky, elevation, np.pi / 2).min(axis=1)
-        most_m = self._heights.max() - places[:, 2]
-        reach_m = np.maximum(most_m, 0.0) / np.tan(lowest) + 1e-6
-        points = shapely.points(places[:, 0], places[:, 1])
-        place, near = self._tree.query(points, predicate="dwithin", distance=reach_m)
-        order = np.argsort(place, kind="stable")
-        place, near = place[order], near[order]
+        place, near, away_m = self._near(places, np.tan(lowest))
         begin = np.searchsorted(place, np.arange(len(places) + 1))
         _block(
-            places, elevation, azimuth, begin.astype(np.int64), near.astype(np.int64),
+            places, elevation, azimuth, begin.astype(np.int64), near.astype(np.int64), away_m,
             self._walls, self._first, self._heights, open_sky,
         )  # fmt: skip
+        points = shapely.points(places[:, 0], places[:, 1])
         inside, own = self._tree.query(points, predicate="within")
         under = inside[self._heights[own] > places[inside, 2]]
         open_sky[under] = False
         return open_sky
+
+    def _near(self, places: Floats, rise: Floats) -> tuple[Ints, Ints, Floats]:
+        """Return pairs of places and buildings that may hide something, and how far they are."""
+        west, south, east, north = self._boxes.T
+        found = []
+        some = max(_MOST_PAIRS // len(west), 1)
+        for first in range(0, len(places), some):
+            x, y, up = (places[first : first + some, axis, None] for axis in range(3))
+            aside = np.maximum(np.maximum(west - x, x - east), 0.0)
+            along = np.maximum(np.maximum(south - y, y - north), 0.0)
+            away_m = np.hypot(aside, along)
+            matters = away_m * rise[first : first + some, None] < self._heights - up
+            place, near = np.nonzero(matters)
+            found.append((place + first, near, away_m[place, near]))
+        place, near, far = (np.concatenate(column) for column in zip(*found, strict=True))
+        return place, near, far
 
 
 def _walls(shapes: NDArray[np.object_]) -> tuple[Floats, Ints]:
@@ -110,8 +125,8 @@ def _walls(shapes: NDArray[np.object_]) -> tuple[Floats, Ints]:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _block(
-    places: Floats, elevation: Floats, azimuth: Floats, begin: Ints, near: Ints, walls: Floats,
-    first: Ints, heights: Floats, open_sky: Bools,
+    places: Floats, elevation: Floats, azimuth: Floats, begin: Ints, near: Ints, away_m: Floats,
+    walls: Floats, first: Ints, heights: Floats, open_sky: Bools,
 ) -> None:  # pragma: no cover  # fmt: skip
     """Close directions whose ray meets a wall lower than the building's roof."""
     for k in range(places.shape[0]):
@@ -125,7 +140,7 @@ def _block(
             for i in range(begin[k], begin[k + 1]):
                 building = near[i]
                 over = heights[building] - up
-                if over <= 0:
+                if away_m[i] * rise >= over:
                     continue
                 for w in range(first[building], first[building + 1]):
                     a_e, a_n = walls[w, 0] - east, walls[w, 1] - north

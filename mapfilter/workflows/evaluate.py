@@ -14,11 +14,19 @@ from mapfilter._parallel import Progress, local_executor
 from mapfilter.database.build import build
 from mapfilter.database.sources import LaidRoutes
 from mapfilter.errors import ConfigError, Faults, fail
-from mapfilter.experiments.benchmarks.cases import CASES
+from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.global_positioning import benchmark
 from mapfilter.experiments.benchmarks.missing_ways import without_ways
 from mapfilter.experiments.benchmarks.scores import CaseResult
-from mapfilter.experiments.benchmarks.world import FULL, HEIGHTS, STREETS, THINNED, BenchmarkWorld
+from mapfilter.experiments.benchmarks.world import (
+    BUILDINGS,
+    FULL,
+    HEIGHTS,
+    STREETS,
+    THINNED,
+    BenchmarkWorld,
+    write_buildings,
+)
 from mapfilter.experiments.sweep.world import SweepWorld, write_world
 from mapfilter.radio.predict import PredictionModel, predict
 from mapfilter.radio.rasters import open_rasters, write_rasters
@@ -75,7 +83,7 @@ def check_benchmark(name: str, data: Path | None = None) -> None:
 
 
 def check_cases(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the cases that are asked for, or all of them.
+    """Return the cases that are asked for, or all but those with satellites.
 
     Raises
     ------
@@ -87,7 +95,7 @@ def check_cases(names: Sequence[str]) -> tuple[str, ...]:
         if name not in CASES:
             faults.add("--case", ", ".join(CASES), name)
     faults.raise_if_any(ConfigError)
-    return tuple(dict.fromkeys(names)) or tuple(CASES)
+    return tuple(dict.fromkeys(names)) or USUAL
 
 
 def run_global_positioning(
@@ -114,7 +122,7 @@ def run_global_positioning(
     seed : int
         Of routes, reality and noise.
     cases : sequence of str
-        All without one.
+        All without satellites if there is none.
     workers : int
         Local processes.
     resume : bool
@@ -174,6 +182,7 @@ def _world(world: World, folder: Path, seed: int) -> tuple[BenchmarkWorld, int]:
         )
         count = count or int(database.manifest["counts"]["points"])
     np.save(folder / HEIGHTS, world.heights_m)
+    write_buildings(world.buildings, folder / BUILDINGS)
     network = street_network(world.ways, world.routes)
     write_world(SweepWorld(network, world.plan, world.lattice, {}), folder / STREETS)
     return BenchmarkWorld(folder, model), count

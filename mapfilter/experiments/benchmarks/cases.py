@@ -37,6 +37,10 @@ class Case:
     recovery_within_m : float
         For journeys with an unmeasured displacement: within how many metres it must be found
         again; 0 for those without.
+    satellites : int or None
+        How many of the satellites that are seen the phone receives; None without a receiver.
+    spoofed : bool
+        Whether a spoofer puts it elsewhere for a while.
     """
 
     name: str
@@ -47,6 +51,8 @@ class Case:
     level_error_db: float = 7.0
     smooth: bool = False
     recovery_within_m: float = 0.0
+    satellites: int | None = None
+    spoofed: bool = False
 
     @property
     def told(self) -> MotionErrors:
@@ -85,6 +91,11 @@ CASES = {
         Case("smooth-bias10", _BIAS_10, smooth=True),
         Case("recovery-levels", _PLAIN, recovery_within_m=300.0),
         Case("recovery-cell", _PLAIN, levels=False, recovery_within_m=700.0),
+        *(Case(f"satellites-{count}", _BIAS_10, satellites=count) for count in range(5)),
+        Case("spoofed", _BIAS_10, satellites=4, spoofed=True),
     )
 }
 """All cases by name, in the order of the table."""
+
+USUAL = tuple(name for name, case in CASES.items() if case.satellites is None)
+"""Those that are run unless others are asked for."""

@@ -17,7 +17,14 @@ from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter.errors import ConfigError, fail
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.journeys import displaced_walk, log_of, walk
-from mapfilter.experiments.benchmarks.scores import CaseResult, Row, score, summarise
+from mapfilter.experiments.benchmarks.satellites import TOLD, spoofer_of, with_satellites
+from mapfilter.experiments.benchmarks.scores import (
+    CaseResult,
+    Row,
+    score,
+    score_window,
+    summarise,
+)
 from mapfilter.experiments.benchmarks.world import BenchmarkWorld
 from mapfilter.positioning.bayes_options import BayesOptions
 from mapfilter.positioning.locators import FilterChoice
@@ -65,12 +72,18 @@ def run_batch(batch: Batch) -> list[Row]:
                 make = displaced_walk if case.recovery_within_m > 0 else walk
                 walked = make(world.network, batch.seed, route)
                 log = log_of(case, walked, levels, world.plan, world.lattice.crs, batch.seed, route)
+                log = with_satellites(
+                    case, log, walked, batch.world.skyline(case), batch.seed, route
+                )
                 locate = batch.world.locator(
                     told(batch.choice, name), thinned=case.missing_ways > 0
                 )
                 found = locate(log, named_rng(batch.seed, "filter", name, str(route)))
                 scored_at = named_rng(batch.seed, "score", name, str(route))
-                rows.append({**score(case, walked, found, scored_at), "route": route})
+                row = {**score(case, walked, found, scored_at), "route": route}
+                if case.satellites is not None:
+                    row |= score_window(walked, found, spoofer_of(walked, batch.seed, route).from_s)
+                rows.append(row)
     return rows
 
 
@@ -79,6 +92,8 @@ def told(choice: FilterChoice, case: str) -> FilterChoice:
     match choice.options:
         case BayesOptions() as options:
             known = replace(options, motion=CASES[case].told, smooth=CASES[case].smooth)
+            if CASES[case].satellites is not None:
+                known = replace(known, satellites=TOLD)
             return replace(choice, options=known)
     return choice
 

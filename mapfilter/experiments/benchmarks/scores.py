@@ -22,6 +22,7 @@ from mapfilter.filters.contract import Status
 from mapfilter.positioning.global_positioning import PositionedTrack
 
 _STAY_S = 10.0
+_WINDOW_S = 120.0
 Row = dict[str, Any]
 
 
@@ -50,6 +51,9 @@ class CaseResult:
         Processor time of the filter, median.
     lost_per_km : float
         How often LOST was said where nothing had happened.
+    window_median_m : float
+        In the cases with satellites, mean over the runs of the median error in the two minutes
+        from when a spoofer begins, or would.
     """
 
     name: str
@@ -67,6 +71,7 @@ class CaseResult:
     coverage_95: float
     seconds_per_track: float
     lost_per_km: float
+    window_median_m: float = float("nan")
 
 
 def score(case: Case, walked: Walk, found: PositionedTrack, rng: np.random.Generator) -> Row:
@@ -122,7 +127,19 @@ def summarise(case: Case, filter_name: str, rows: Sequence[Mapping[str, Any]]) -
         coverage_95=_mean([row["covered"] for row in rows]),
         seconds_per_track=float(np.median([row["seconds"] for row in rows])) if runs else 0.0,
         lost_per_km=sum(row["lost"] for row in rows) / km if km else float("nan"),
+        window_median_m=_mean([row.get("window_median_m") for row in rows]),
     )
+
+
+def score_window(walked: Walk, found: PositionedTrack, from_s: float) -> Row:
+    """Score the two minutes from a time on, where the filter says that it knows its place."""
+    estimate = found.estimate
+    errors_m = position_errors_m(estimate, _truth(walked))
+    known = np.array([status is not Status.SEARCHING for status in estimate.status], dtype=bool)
+    at = (estimate.time_s >= from_s) & (estimate.time_s < from_s + _WINDOW_S) & known
+    inside = errors_m[at]
+    inside = inside[np.isfinite(inside)]
+    return {"window_median_m": _told(float(np.median(inside))) if inside.size else None}
 
 
 def _truth(walked: Walk) -> Truth:

@@ -7,15 +7,23 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import shapely
 from numpy.typing import NDArray
 
+from mapfilter._io import atomic_file
 from mapfilter.database.store import open_database
+from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.sweep.world import SweepWorld, open_world
+from mapfilter.gnss.visibility import Skyline
 from mapfilter.positioning.locators import FilterChoice, Locator, open_locator
 from mapfilter.radio.predict import PredictionModel, RealityErrors, realise
+from mapfilter.roads.ways import Buildings
 from mapfilter.simulation.reports import Levels, array_sampler
 
 STREETS, HEIGHTS, FULL, THINNED = "streets", "heights.npy", "database", "database-thinned"
+BUILDINGS = "buildings.parquet"
 
 
 @dataclass(frozen=True)
@@ -25,8 +33,8 @@ class BenchmarkWorld:
     Parameters
     ----------
     folder : Path
-        Holds streets and cells, building heights, and a database with all ways, and one that
-        lacks some.
+        Holds streets and cells, buildings and their heights, and a database with all ways, and
+        one that lacks some.
     model : PredictionModel
         That the databases were predicted with.
     """
@@ -43,9 +51,27 @@ class BenchmarkWorld:
         """Return a function that locates logs, with the databases read once by each process."""
         return _locator(self.folder / (THINNED if thinned else FULL), choice)
 
+    def skyline(self, case: Case) -> Skyline | None:
+        """Return the buildings that hide satellites, where a case has any satellites."""
+        return None if case.satellites is None else _skyline(self.folder / BUILDINGS)
+
     def reality(self, seed: int, level_error_db: float) -> Levels:
         """Draw how the cells are really heard."""
         return _reality(self.folder, self.model, seed, level_error_db)
+
+
+def write_buildings(buildings: Buildings, path: Path) -> None:
+    """Keep footprints and heights."""
+    columns = {"footprint": shapely.to_wkb(buildings.footprints), "height_m": buildings.height_m}
+    with atomic_file(path) as file:
+        pq.write_table(pa.table(columns), file)
+
+
+@lru_cache(maxsize=1)
+def _skyline(path: Path) -> Skyline | None:
+    table = pq.read_table(path)
+    footprints = shapely.from_wkb(table["footprint"].to_numpy())
+    return Skyline(footprints, table["height_m"].to_numpy()) if len(footprints) else None
 
 
 @lru_cache(maxsize=1)

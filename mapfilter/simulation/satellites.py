@@ -1,0 +1,265 @@
+"""What a receiver of satellites hears on a journey: who is seen, how far, by which clock.
+
+Satellites are seen past the buildings by geometry. A pseudorange is the distance, the receiver's
+clock, noise that grows towards the horizon, and echoes, which only make it longer and last for
+metres. A spoofer may put a receiver elsewhere.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mapfilter.errors import ConfigError, Faults, InputError, fail
+from mapfilter.geodesy import unproject
+from mapfilter.gnss.almanac import Almanac
+from mapfilter.gnss.grid_frame import GridFrame
+from mapfilter.gnss.noise import correlated_along, multipath_bias_m
+from mapfilter.gnss.orbits import gps_time, satellite_positions_m
+from mapfilter.gnss.sky import Directions, directions, ecef_from_lonlat
+from mapfilter.gnss.visibility import Skyline
+from mapfilter.models.clock import clock_noise
+from mapfilter.tracks.satellites import sent_from_m
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class ReceptionModel:
+    """How a receiver hears satellites.
+
+    Parameters
+    ----------
+    period_s : float
+        Between two epochs of pseudoranges.
+    most : int or None
+        Channels: satellites that are received at a time; None for all that are seen.
+    choice : {"random", "highest"}
+        Which of those that are seen; with "random" the order is drawn anew every ``hold_s``.
+    hold_s : float
+    mask_deg : float
+        Lower satellites are not received.
+    zenith_m : float
+        White noise overhead; it grows as one over the sine of the elevation.
+    echo_m : float
+        Mean of the echoes where half of the satellites over the mask are hidden, or more; in the
+        open there are none.
+    echo_memory_m : float
+    clock_m, drift_mps : float
+        First error of the clock, uniform to both sides; deviation of its first rate.
+    antenna_m : float
+        Above ground.
+    height_m, height_sd_m : float
+        Of the ground over the ellipsoid, and by how much it differs from that as a whole.
+    relief_m, relief_memory_m : float
+        By how much, and over how many metres, the ground rises and falls.
+    """
+
+    period_s: float = 1.0
+    most: int | None = None
+    choice: Literal["random", "highest"] = "random"
+    hold_s: float = 20.0
+    mask_deg: float = 10.0
+    zenith_m: float = 2.0
+    echo_m: float = 3.0
+    echo_memory_m: float = 10.0
+    clock_m: float = 1e5
+    drift_mps: float = 30.0
+    antenna_m: float = 1.5
+    height_m: float = 100.0
+    height_sd_m: float = 10.0
+    relief_m: float = 5.0
+    relief_memory_m: float = 300.0
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        for name in (
+            "period_s", "hold_s", "zenith_m", "echo_memory_m", "relief_memory_m",
+        ):  # fmt: skip
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                faults.add(f"reception, {name}", "a finite number > 0", getattr(self, name))
+        for name in ("echo_m", "clock_m", "drift_mps", "antenna_m", "height_sd_m", "relief_m"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
+                faults.add(f"reception, {name}", "a finite number >= 0", getattr(self, name))
+        if self.most is not None and self.most < 0:
+            faults.add("reception, most", "a number of satellites >= 0", self.most)
+        if self.choice not in ("random", "highest"):
+            faults.add("reception, choice", "random or highest", repr(self.choice))
+        if not 0 < self.mask_deg < 90:
+            faults.add("reception, mask_deg", "degrees between 0 and 90", self.mask_deg)
+        faults.raise_if_any(ConfigError)
+
+
+@dataclass(frozen=True, slots=True)
+class Spoofer:
+    """Signals as if the receiver were elsewhere.
+
+    Parameters
+    ----------
+    from_s, lasts_s : float
+    east_m, north_m : float
+        How far off it seems to be.
+    clock_m : float
+        How much later all of its signals are.
+    """
+
+    from_s: float
+    lasts_s: float
+    east_m: float
+    north_m: float
+    clock_m: float = 0.0
+
+
+def receive(
+    truth: pd.DataFrame,
+    crs: str,
+    skyline: Skyline | None,
+    almanac: Almanac,
+    start_utc_s: float,
+    model: ReceptionModel,
+    rng: np.random.Generator,
+    spoofer: Spoofer | None = None,
+) -> pd.DataFrame:
+    """Return the table of pseudoranges of one journey.
+
+    Noise, clock and the order of choice do not depend on how many are received, nor on a spoofer:
+    journeys of one seed differ in these alone.
+
+    Parameters
+    ----------
+    truth : pandas.DataFrame
+        time_s, east_m, north_m.
+    crs : str
+        Of the truth.
+    skyline : Skyline or None
+        Buildings in the same CRS; None for an open sky.
+    almanac : Almanac
+        Its weeks as those of the start.
+    start_utc_s : float
+        UTC seconds at ``time_s`` = 0.
+    model : ReceptionModel
+    rng : numpy.random.Generator
+    spoofer : Spoofer, optional
+
+    Raises
+    ------
+    InputError
+        There is no truth, or the almanac is of another time.
+    """
+    if truth.empty:
+        raise fail(InputError, "truth", "at least one row", "none")
+    time, east, north = (truth[name].to_numpy() for name in ("time_s", "east_m", "north_m"))
+    count = int(np.floor((time[-1] - time[0]) / model.period_s + 1e-9)) + 1
+    tick_s = time[0] + np.arange(count) * model.period_s
+    place = np.stack([np.interp(tick_s, time, axis) for axis in (east, north)], axis=1)
+    gone_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(place, axis=0).T))])
+    relief = correlated_along(gone_m, 1, model.relief_memory_m, rng)[:, 0]
+    ground_m = model.height_m + model.height_sd_m * rng.standard_normal() + model.relief_m * relief
+    up_m = ground_m + model.antenna_m
+    week, second = gps_time(start_utc_s + float(tick_s[0]))
+    tow_s = second + (tick_s - tick_s[0])
+    east_m, north_m = place[count // 2].tolist()
+    frame = GridFrame(crs, east_m, north_m, float(model.height_m))
+    usable = _over_horizon(almanac.usable(), week, float(tow_s[count // 2]), frame, model)
+    clock_m = _clock_m(count, model, rng)
+    white = rng.standard_normal((count, len(usable.names)))
+    echo = multipath_bias_m(
+        gone_m, len(usable.names), rng, mean_m=1.0, correlation_m=model.echo_memory_m
+    )
+    slots = int(tick_s[-1] // model.hold_s) - int(tick_s[0] // model.hold_s) + 1
+    order = rng.random((slots, len(usable.names)))
+    there = _ecef(crs, place, up_m)
+    satellites = np.stack(
+        [_places(usable, index, week, tow_s, there) for index in range(len(usable.names))], axis=1
+    )
+    seen = directions(frame.satellites_m(satellites), frame.satellites_m(there)[:, None])
+    open_sky, echo_m = _sky(seen, place, skyline, frame, model)
+    range_m = np.linalg.norm(satellites - there[:, None], axis=2)
+    sigma_m = model.zenith_m / np.sin(np.maximum(seen.elevation_rad, 0.05))
+    heard_m = range_m + clock_m[:, None] + sigma_m * white + echo_m[:, None] * echo
+    if spoofer is not None:
+        shift = np.array([spoofer.east_m, spoofer.north_m])
+        elsewhere = _ecef(crs, place + shift, up_m)
+        false_m = np.linalg.norm(satellites - elsewhere[:, None], axis=2)
+        on = (tick_s >= spoofer.from_s) & (tick_s < spoofer.from_s + spoofer.lasts_s)
+        false_m = false_m + (clock_m + spoofer.clock_m)[:, None] + sigma_m * white
+        heard_m = np.where(on[:, None], false_m, heard_m)
+    if model.choice == "highest":
+        prefer = seen.elevation_rad
+    else:
+        prefer = order[(tick_s // model.hold_s - tick_s[0] // model.hold_s).astype(int)]
+    received = _received(open_sky, prefer, model.most)
+    row, column = np.nonzero(received)
+    return pd.DataFrame(
+        {
+            "time_s": tick_s[row],
+            "satellite": np.array(usable.names, dtype=object)[column],
+            "pseudorange_m": heard_m[row, column],
+            "x_m": satellites[row, column, 0],
+            "y_m": satellites[row, column, 1],
+            "z_m": satellites[row, column, 2],
+        }
+    )
+
+
+def _over_horizon(
+    almanac: Almanac, week: int, tow_s: float, frame: GridFrame, model: ReceptionModel
+) -> Almanac:
+    """Return the satellites that may rise above the mask within some hours of a journey."""
+    turns = int(tow_s // 604_800.0)
+    there = satellite_positions_m(almanac, tow_s - 604_800.0 * turns, week + turns)
+    above = directions(frame.satellites_m(there)).elevation_rad
+    return almanac.only(np.flatnonzero(above > np.radians(model.mask_deg) - 0.35))
+
+
+def _places(almanac: Almanac, index: int, week: int, tow_s: Floats, there: Floats) -> Floats:
+    """Return where one satellite was when it sent what is received, (K, 3)."""
+    one = almanac.only(np.array([index]))
+    first = sent_from_m(one, week, tow_s, np.full(tow_s.size, np.nan))
+    return sent_from_m(one, week, tow_s, np.linalg.norm(first - there, axis=1))
+
+
+def _ecef(crs: str, place: Floats, up_m: Floats) -> Floats:
+    return ecef_from_lonlat(*unproject(crs, place[:, 0], place[:, 1]), up_m)
+
+
+def _clock_m(count: int, model: ReceptionModel, rng: np.random.Generator) -> Floats:
+    """Draw the clock's error at each epoch: its rate wanders, too."""
+    noise = np.linalg.cholesky(clock_noise(model.period_s, cross_term="textbook"))
+    steps = noise @ rng.standard_normal((2, count))
+    rate = model.drift_mps * rng.standard_normal() + np.cumsum(steps[1])
+    first = rng.uniform(-model.clock_m, model.clock_m)
+    before = np.concatenate([[0.0], rate[:-1]])
+    return np.asarray(first + np.cumsum(model.period_s * before + steps[0]))
+
+
+def _sky(
+    seen: Directions, place: Floats, skyline: Skyline | None, frame: GridFrame,
+    model: ReceptionModel,
+) -> tuple[Bools, Floats]:  # fmt: skip
+    """Return who is seen at each epoch, (K, S), and how large echoes are, (K,)."""
+    above = seen.above(model.mask_deg)
+    if skyline is None:
+        return above, np.zeros(len(place))
+    # Buildings stand on the map's grid, whose north is not the true one.
+    true = np.stack([np.sin(seen.azimuth_rad), np.cos(seen.azimuth_rad)])
+    east, north = np.einsum("ij,jks->iks", np.linalg.inv(frame.true_from_grid), true)
+    up = np.where(above, seen.elevation_rad, -0.1)
+    grid = Directions(up, np.mod(np.arctan2(east, north), 2 * np.pi))
+    heights = np.full((len(place), 1), model.antenna_m)
+    free = above & skyline.seen(np.hstack([place, heights]), grid)
+    hidden = 1.0 - free.sum(axis=1) / np.maximum(above.sum(axis=1), 1)
+    return free, model.echo_m * np.minimum(2.0 * hidden, 1.0)
+
+
+def _received(open_sky: Bools, prefer: Floats, most: int | None) -> Bools:
+    if most is None:
+        return open_sky
+    wanted = np.where(open_sky, prefer, -np.inf)
+    rank = np.argsort(np.argsort(-wanted, axis=1, kind="stable"), axis=1, kind="stable")
+    return open_sky & (rank < most)
