@@ -1,0 +1,44 @@
+"""A sky over the made cross of streets: six satellites, seen from everywhere on it."""
+
+import numpy as np
+import pandas as pd
+from cross_world import CRS, walk_log
+
+from mapfilter.gnss.almanac import joined
+from mapfilter.gnss.constellations import nominal_galileo, nominal_gps
+from mapfilter.gnss.orbits import gps_time
+from mapfilter.positioning.sky_options import SkyOptions
+from mapfilter.simulation.satellites import ReceptionModel, receive
+from mapfilter.tracks.log import make_log
+
+START_UTC_S = 1_700_000_000.0
+HEIGHTS = SkyOptions(height_m=100.0, height_sd_m=20.0)
+
+
+def sky_table(truth, seed=0, spoofer=None, **model):
+    week, _ = gps_time(START_UTC_S)
+    almanac = joined(nominal_gps(week), nominal_galileo(week))
+    reception = ReceptionModel(**model)
+    rng = np.random.default_rng(seed)
+    return receive(truth, CRS, None, almanac, START_UTC_S, reception, rng, spoofer)
+
+
+def sky_log(seed=0, spoofer=None, legs=None, radio=True, **model):
+    """A walk on the cross with pseudoranges."""
+    log = walk_log(legs) if legs else walk_log()
+    tables = {"motion": log.motion, "truth": log.truth}
+    if radio:
+        tables["radio"] = log.radio
+    ranges = sky_table(log.truth, seed, spoofer, **model)
+    return make_log(CRS, pseudoranges=ranges, start_utc_s=START_UTC_S, **tables)
+
+
+def off_m(log, estimate):
+    """How far off each epoch of an estimate is."""
+    east = np.interp(estimate.time_s, log.truth["time_s"], log.truth["east_m"])
+    north = np.interp(estimate.time_s, log.truth["time_s"], log.truth["north_m"])
+    return np.hypot(estimate.east_m - east, estimate.north_m - north)
+
+
+def no_rows(log, table):
+    return pd.DataFrame(getattr(log, table)).iloc[:0]
