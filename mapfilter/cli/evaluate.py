@@ -70,7 +70,7 @@ def evaluate(
 
     check_benchmark(name, data)
     if name == "ottawa" and data is not None:
-        _ottawa(data, out, runs, seed, as_json)
+        _ottawa(data, out, runs, seed, workers, resume, as_json)
         return
     given = list(settings or ())
     if map_file is not None:
@@ -95,10 +95,26 @@ def evaluate(
     print_result(result, as_json)
 
 
-def _ottawa(data: Path, out: Path | None, runs: int | None, seed: int, as_json: bool) -> None:
+def _ottawa(
+    data: Path,
+    out: Path | None,
+    runs: int | None,
+    seed: int,
+    workers: int,
+    resume: bool,
+    as_json: bool,
+) -> None:
     from mapfilter.workflows.evaluate_ottawa import RUNS, run_ottawa
 
     folder = (out or Path("out") / "ottawa").absolute()
     with rate_bar("evaluate", "sessions") as progress:
-        result = run_ottawa(data, folder, runs=runs or RUNS, seed=seed, progress=progress)
+        result = run_ottawa(
+            data,
+            folder,
+            runs=runs or RUNS,
+            seed=seed,
+            workers=workers,
+            resume=resume,
+            progress=progress,
+        )
     print_result(result, as_json)

@@ -4,26 +4,24 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-
-from mapfilter._io import ensure_writable_folder, write_json
-from mapfilter._parallel import Progress
+from mapfilter._io import ensure_writable_folder, read_json, write_json
+from mapfilter._parallel import Progress, local_executor, ordered_results
 from mapfilter.database.store import open_database
-from mapfilter.errors import InputError, fail
+from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.experiments.benchmarks.ottawa import (
     FOLDER,
     LEFT_OUT,
     PARTS,
-    FoundSession,
     OttawaOptions,
     centroid_errors_m,
     find_session,
     surveyed_positioner,
 )
 from mapfilter.experiments.benchmarks.ottawa_sessions import Session, read_session
+from mapfilter.experiments.benchmarks.ottawa_store import LeftOut, read_left_out, write_left_out
 from mapfilter.experiments.benchmarks.ottawa_table import (
     PartRow,
     SessionRow,
@@ -31,14 +29,16 @@ from mapfilter.experiments.benchmarks.ottawa_table import (
     session_rows,
 )
 from mapfilter.radio.rasters import open_rasters
+from mapfilter.report.error_curves import plot_error_curves
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.facts import facts
 from mapfilter.workflows.sections import Config
 from mapfilter.workflows.survey import run_survey
 
-TABLE = "table.json"
+HEAD, TABLE, FOUND, PICTURE = "benchmark.json", "table.json", "found.json", "errors.png"
 RUNS = 3
-_FLOOR_DBM = -130.0
+_VERSION = 1
+_FLOOR_DBM = -140.0
 _HALF_WIDTH_M = 15.0
 
 
@@ -65,6 +65,37 @@ class OttawaResult:
     out: Path
 
 
+@dataclass(frozen=True)
+class Task:
+    """One session to be left out and found.
+
+    Parameters
+    ----------
+    part : str
+    session : Path
+        Its file.
+    others : tuple of Path
+        Of those that make the map.
+    folder : Path
+        Gets survey, database and what came out.
+    options : OttawaOptions
+    runs, seed : int
+    """
+
+    part: str
+    session: Path
+    others: tuple[Path, ...]
+    folder: Path
+    options: OttawaOptions = field(default_factory=OttawaOptions)
+    runs: int = RUNS
+    seed: int = 0
+
+    @property
+    def result(self) -> Path:
+        """File of what came out."""
+        return self.folder / FOUND
+
+
 def run_ottawa(
     data: Path,
     out: Path,
@@ -73,6 +104,8 @@ def run_ottawa(
     seed: int = 0,
     parts: Sequence[str] = PARTS,
     options: OttawaOptions | None = None,
+    workers: int = 1,
+    resume: bool = False,
     progress: Progress | None = None,
 ) -> OttawaResult:
     """Leave each session out, build map and ways from the others, and find it.
@@ -82,12 +115,17 @@ def run_ottawa(
     data : Path
         Holds the folder ``cell-ottawa-lte`` with a folder for each part.
     out : Path
-        Gets a folder for each part and session with its survey and database, and ``table.json``.
+        Gets a folder for each part and session with its survey and database, ``table.json`` and
+        ``errors.png``.
     runs : int
         Draws of the noise for each session.
     seed : int
     parts : sequence of str
     options : OttawaOptions, optional
+    workers : int
+        Local processes.
+    resume : bool
+        Keep the sessions that the same benchmark has finished.
     progress : callable, optional
         Called with sessions done and sessions in all.
 
@@ -95,62 +133,102 @@ def run_ottawa(
     ------
     InputError
         The data set is not there, or a file of it is no session.
+    ConfigError
+        There is something else to resume.
     OutputError
         The output cannot be written.
     """
     began_s = time.perf_counter()
     chosen = options or OttawaOptions()
+    files = {part: _session_files(data, part) for part in parts}
+    tasks = [
+        Task(
+            part, file, tuple(other for other in every if other != file),
+            out / part / file.stem, chosen, runs, seed,
+        )
+        for part, every in files.items()
+        for file in every
+    ]  # fmt: skip
     ensure_writable_folder(out)
-    sessions = {part: _sessions(data, part) for part in parts}
-    total, done = sum(map(len, sessions.values())), 0
+    _begin(out, {"version": _VERSION, "seed": seed, "runs": runs, "options": repr(chosen)}, resume)
+    todo = [task for task in tasks if not (resume and task.result.is_file())]
+    before = len(tasks) - len(todo)
+
+    def tell(done: int, _: int) -> None:
+        if progress is not None:
+            progress(before + done, len(tasks))
+
+    tell(0, 0)
+    with local_executor(workers) as executor:
+        for _ in ordered_results(
+            executor, find_left_out, todo, in_flight=2 * workers, progress=tell
+        ):
+            pass
     rows: list[PartRow] = []
     told: list[SessionRow] = []
-    for part, every in sessions.items():
-        found: list[FoundSession] = []
-        centroid_m = {}
-        for session in every:
-            others = [other for other in every if other is not session]
-            made = _map_of(others, out / part / session.name)
-            positioner = surveyed_positioner(
-                open_database(made.database), others, chosen, made.level_sd_db
-            )
-            for draw in range(runs):
-                found += find_session(part, session, positioner, chosen, seed, draw)
-            crs = positioner.area.lattice.crs
-            centroid_m[session.name] = centroid_errors_m(session, others, crs)
-            done += 1
-            if progress is not None:
-                progress(done, total)
+    for part in parts:
+        every = [read_left_out(task.result) for task in tasks if task.part == part]
+        found = [one for left_out in every for one in left_out.found]
+        centroid_m = {left_out.session: left_out.centroid_m for left_out in every}
         rows += part_rows(part, found, centroid_m)
         told += session_rows(found, centroid_m)
+        plot_error_curves(_curves(every), out / part / PICTURE, title=f"Ottawa, {part}")
     seconds = time.perf_counter() - began_s
     result = OttawaResult(seed, runs, tuple(rows), tuple(told), seconds, out)
     write_json(out / TABLE, facts(result))
     return result
 
 
-@dataclass(frozen=True)
-class _Made:
-    """A map: its database, and by how much a new reading differs from its levels."""
+def find_left_out(task: Task) -> None:
+    """Make the map of the other sessions, find the one that was left out, and keep what came out.
 
-    database: Path
-    level_sd_db: float
+    Raises
+    ------
+    MapfilterError
+        A file is no session, or the output cannot be written.
+    """
+    session, others = read_session(task.session), [read_session(file) for file in task.others]
+    surveyed, database = _map_of(others, task.folder)
+    positioner = surveyed_positioner(
+        open_database(database), others, task.options, open_rasters(surveyed)
+    )
+    found = [
+        one
+        for draw in range(task.runs)
+        for one in find_session(task.part, session, positioner, task.options, task.seed, draw)
+    ]
+    errors_m = centroid_errors_m(session, others, positioner.area.lattice.crs)
+    write_left_out(LeftOut(session.name, errors_m, tuple(found)), task.result)
 
 
-def _sessions(data: Path, part: str) -> list[Session]:
+def _begin(out: Path, head: dict[str, object], resume: bool) -> None:
+    if resume and (out / HEAD).is_file() and read_json(out / HEAD) != head:
+        expected = "the same runs, seed and options to resume"
+        hint = "begin without --resume, or in another folder"
+        raise fail(ConfigError, str(out), expected, "others", hint)
+    write_json(out / HEAD, head)
+
+
+def _session_files(data: Path, part: str) -> list[Path]:
     folder = data / FOLDER / part
     files = [path for path in sorted(folder.glob("*.csv")) if not path.name.startswith(LEFT_OUT)]
     if len(files) < 2:
         expected = "CSV files of two sessions or more"
         hint = f"--data is the folder that holds {FOLDER}"
         raise fail(InputError, str(folder), expected, len(files), hint)
-    return [read_session(path) for path in files]
+    return [file.absolute() for file in files]
 
 
-def _map_of(others: Sequence[Session], folder: Path) -> _Made:
-    """Make levels, ways and database of sessions, as drive tests without a street map are."""
-    files = [str(other.path.absolute()) for other in others]
-    survey = {"files": files, "cross_validate": False}
+def _map_of(others: Sequence[Session], folder: Path) -> tuple[Path, Path]:
+    """Make levels, ways and database of sessions, as drive tests without a street map are.
+
+    Returns
+    -------
+    deviation, database : Path
+    """
+    files = [str(other.path) for other in others]
+    # The trend stays where nobody measured: not measured there is not the same as not heard.
+    survey = {"files": files, "cross_validate": False, "fill": True}
     config = Config.model_validate(
         {
             "area": {"map": "none"},
@@ -162,6 +240,14 @@ def _map_of(others: Sequence[Session], folder: Path) -> _Made:
         context={"folder": Path.cwd()},
     )
     surveyed = run_survey(config)
-    built = run_build(config)
-    deviation_db = open_rasters(surveyed.deviation).read()
-    return _Made(built.database, float(np.sqrt(np.nanmedian(deviation_db**2))))
+    return surveyed.deviation, run_build(config).database
+
+
+def _curves(every: Sequence[LeftOut]) -> dict[str, list[float]]:
+    """Return all errors by method, for the picture."""
+    curves: dict[str, list[float]] = {}
+    for left_out in every:
+        for one in left_out.found:
+            curves.setdefault(one.method, []).extend(one.error_m.tolist())
+    curves["centroid"] = [error for left_out in every for error in left_out.centroid_m.tolist()]
+    return curves

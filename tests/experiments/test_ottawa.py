@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from mapfilter.database.store import open_database
-from mapfilter.errors import InputError
+from mapfilter.errors import ConfigError, InputError, StoreError
 from mapfilter.experiments.benchmarks.ottawa import (
     FOLDER,
     OttawaOptions,
@@ -22,10 +22,15 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
     read_session,
     session_log,
 )
+from mapfilter.experiments.benchmarks.ottawa_store import read_left_out
 from mapfilter.filters.particle_options import ParticleOptions
 from mapfilter.geodesy import Lattice, unproject
+from mapfilter.models.fingerprint import LevelReading
 from mapfilter.models.heard_maps import HeardMaps, HeardOptions, HeardRows
-from mapfilter.workflows.evaluate_ottawa import run_ottawa
+from mapfilter.positioning.bayes_model import BayesModel
+from mapfilter.positioning.evidence import RadioReading
+from mapfilter.radio.rasters import open_rasters
+from mapfilter.workflows.evaluate_ottawa import Task, find_left_out, run_ottawa
 
 CRS = "EPSG:32618"
 WEST, SOUTH = 445_000.0, 5_030_000.0
@@ -33,9 +38,9 @@ ANTENNAS = {1: (-60.0, 40.0), 2: (300.0, 460.0), 3: (520.0, -40.0)}
 STEP_M, SPEED_MPS = 20.0, 4.0
 CHOSEN = OttawaOptions()
 QUICK = replace(
-    CHOSEN, filter=replace(CHOSEN.filter, particles=ParticleOptions(most=6000, searching=4000))
+    CHOSEN, filter=replace(CHOSEN.filter, particles=ParticleOptions(most=2000, searching=1500))
 )
-"""A fifth of the particles."""
+"""A fifteenth of the particles."""
 
 
 def write_ride(path, seed, start_s):
@@ -102,10 +107,62 @@ def test_the_table_is_written(found):
     assert table["sessions"][0]["successes"] == 1
 
 
+def test_what_is_finished_is_kept_and_another_benchmark_not_resumed(found, made, tmp_path):
+    shutil.copytree(found.out, tmp_path / "out")
+    options = {"runs": 1, "parts": ("carling",), "options": QUICK, "resume": True}
+    written = tmp_path / "out" / "carling" / "OpenCellID_20210102" / "found.json"
+    told = json.loads(written.read_text())
+    told["found"][0]["error_m"] = [7.0, 7.0]
+    told["found"][0]["covered"] = [True, False]
+    written.write_text(json.dumps(told))
+    seen = []
+    again = run_ottawa(made, tmp_path / "out", progress=lambda *at: seen.append(at), **options)
+    assert seen == [(3, 3)]
+    assert again.sessions[1].median_m == 7.0
+    assert again.sessions[1].coverage_95 == 0.5
+    assert again.sessions[::2] == found.sessions[::2]
+    assert (tmp_path / "out" / "carling" / "errors.png").stat().st_size > 10_000
+    with pytest.raises(ConfigError, match="the same runs, seed and options"):
+        run_ottawa(made, tmp_path / "out", seed=5, **options)
+    written.write_text('{"found": 3}')
+    with pytest.raises(StoreError, match=r"found\.json"):
+        run_ottawa(made, tmp_path / "out", **options)
+
+
+def test_a_place_where_a_cell_was_not_measured_says_less_of_its_level(found, made):
+    one, *others = [read_session(path) for path in sorted((made / FOLDER / "carling").iterdir())]
+    folder = found.out / "carling" / one.name
+    deviation = open_rasters(folder / "rxlev-deviation.tif")
+    database = open_database(folder / "database")
+    model = surveyed_positioner(database, others, QUICK, deviation).model
+    told = deviation.read(cells=model.area.cell_ids).reshape(model.level_sd_db.shape)
+    assert np.isnan(told).any()
+    np.testing.assert_array_equal(model.level_sd_db[np.isnan(told)], QUICK.unmeasured_db)
+    np.testing.assert_array_equal(model.level_sd_db[~np.isnan(told)], told[~np.isnan(told)])
+    assert np.isfinite(database.field().level_dbm).all()
+    level = LevelReading(
+        np.array([0], np.int32), *np.float32([[-100.0], [0.0], [0.1]]), 0.0, 1.0, 3.0, 0.0, 0.0
+    )
+    state = np.zeros((5, model.area.points.shape[1]), dtype=np.float32)
+    state[:2] = model.area.points
+    plain, own = np.zeros((2, state.shape[1]))
+    same = np.full_like(model.level_sd_db, np.hypot(*_sds(model)))
+    BayesModel.weigh(model, state, plain, RadioReading(levels=level))
+    replace(model, level_sd_db=same).weigh(state, own, RadioReading(0, 0.0, level))
+    np.testing.assert_allclose(own, plain, atol=1e-5)
+    wide = np.zeros_like(own)
+    replace(model, level_sd_db=2 * same).weigh(state, wide, RadioReading(0, 0.0, level))
+    assert np.ptp(wide) < np.ptp(own)
+
+
+def _sds(model):
+    return model.evidence.levels.sd_db, model.evidence.levels.measurement_db
+
+
 def test_equal_seeds_find_the_same(found, made):
     one, *others = [read_session(path) for path in sorted((made / FOLDER / "carling").iterdir())]
     database = open_database(found.out / "carling" / one.name / "database")
-    positioner = surveyed_positioner(database, others, QUICK, 3.0)
+    positioner = surveyed_positioner(database, others, QUICK)
     first, again, other = (
         find_session("carling", one, positioner, QUICK, seed, 0)[0] for seed in (7, 7, 8)
     )
@@ -186,10 +243,14 @@ def test_a_real_walk_is_found(shared_data, tmp_path):
     for day in ("20210404", "20210506", "20210523"):
         (path,) = (shared_data / FOLDER / "carling").glob(f"OpenCellID_{day}*.csv")
         shutil.copy(path, folder)
-    found = run_ottawa(tmp_path, tmp_path / "out", runs=1, parts=("carling",), options=QUICK)
-    assert found.rows[0].success >= 2 / 3
-    assert found.rows[0].median_m < 60
-    assert found.rows[0].baseline_m > 100
+    first, *others = sorted(folder.iterdir())
+    task = Task("carling", first, tuple(others), tmp_path / "out", QUICK, runs=1)
+    find_left_out(task)
+    bayes, smoothed = read_left_out(task.result).found
+    assert (bayes.method, smoothed.method) == ("bayes", "smoothed")
+    assert bayes.success
+    assert np.median(bayes.error_m) < 60
+    assert np.median(smoothed.error_m) < 60
 
 
 def test_another_cell_of_the_site_may_serve():

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
 from mapfilter.experiments.benchmarks.ottawa_sessions import (
     ReckoningErrors,
@@ -28,16 +29,19 @@ from mapfilter.models.cell_id import ServingWeights
 from mapfilter.models.fingerprint import LevelErrors
 from mapfilter.models.heard_maps import HeardMaps, HeardOptions, HeardRows
 from mapfilter.models.street_motion import MapWeights, MotionErrors
+from mapfilter.positioning.area_map import AreaMap
 from mapfilter.positioning.bayes import BayesPositioner
 from mapfilter.positioning.bayes_options import BayesOptions, open_area
 from mapfilter.positioning.bayes_replay import position_by_bayes
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.evidence import EvidenceOptions
 from mapfilter.positioning.heard_model import HeardModel
+from mapfilter.radio.rasters import RxLevRasters
 from mapfilter.radio.shadowing import named_rng
 from mapfilter.tracks.log import TrackLog
 
 Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
 Bools = NDArray[np.bool_]
 
 PARTS = ("lacolyoc", "uottawa", "carling")
@@ -58,6 +62,14 @@ class OttawaOptions:
 
     GNSS smooths its speed, so that steps are 5 to 25 % too short, at every corner by another share:
     the scale is wide and drifts.
+
+    Parameters
+    ----------
+    filter : BayesOptions
+    unmeasured_db : float
+        Deviation of a level where its cell was not measured, and only its trend is known.
+    heard : HeardOptions
+    errors : ReckoningErrors
     """
 
     filter: BayesOptions = field(
@@ -67,17 +79,18 @@ class OttawaOptions:
                 typical_step_m=14.0,
                 heading_sd_rad=radians(10.0),
                 bias_sd_rad=radians(6.0),
-                bias_drift_rad_per_sqrt_m=radians(0.4),
+                bias_drift_rad_per_sqrt_m=radians(0.2),
                 scale_sd=0.15,
-                scale_drift_per_sqrt_m=0.01,
+                scale_drift_per_sqrt_m=0.005,
             ),
             map=MapWeights(sd_m=12.0),
             evidence=EvidenceOptions(
-                serving=ServingWeights(weight_per_m=1 / 25),
+                serving=ServingWeights(weight_per_m=1 / 100),
                 levels=LevelErrors(sd_db=5.0, correlation_m=60.0, measurement_db=3.0),
             ),
         )
     )
+    unmeasured_db: float = 8.0
     heard: HeardOptions = field(default_factory=HeardOptions)
     errors: ReckoningErrors = field(default_factory=ReckoningErrors)
 
@@ -121,7 +134,7 @@ def surveyed_positioner(
     database: RadioRouteDatabase,
     others: Sequence[Session],
     options: OttawaOptions,
-    level_sd_db: float | None = None,
+    deviation: RxLevRasters | None = None,
 ) -> BayesPositioner:
     """Return the filter over a map that sessions made.
 
@@ -131,13 +144,16 @@ def surveyed_positioner(
         Of the other sessions.
     others : sequence of Session
     options : OttawaOptions
-    level_sd_db : float, optional
-        Deviation of a new reading from the map of levels, as the survey tells it.
+    deviation : RxLevRasters, optional
+        By how much a new reading differs from the map of levels, as the survey tells it; no value
+        where a cell was not measured.
     """
-    area, chosen = open_area(database), options.filter
-    if level_sd_db is not None:
+    area, chosen, level_sd_db = open_area(database), options.filter, None
+    if deviation is not None:
+        level_sd_db = _level_sd_db(deviation, area, options.unmeasured_db)
         levels = chosen.evidence.levels
-        lasting_db2 = level_sd_db**2 - levels.measurement_db**2
+        usual_db = float(np.nanmedian(deviation.read()))
+        lasting_db2 = usual_db**2 - levels.measurement_db**2
         levels = replace(levels, sd_db=max(lasting_db2, 1.0) ** 0.5)
         chosen = replace(chosen, evidence=replace(chosen.evidence, levels=levels))
     crs = database.lattice.crs
@@ -148,8 +164,21 @@ def surveyed_positioner(
     rows = HeardRows(cell[good], places[good, 0], places[good, 1], steps[good])
     sites = np.unique([site_of(name) for name in area.cell_ids], return_inverse=True)[1]
     heard = HeardMaps.of_rows(rows, area.lattice, sites, options.heard)
-    model = HeardModel(area, chosen.motion, chosen.map, chosen.evidence, heard)
+    model = HeardModel(
+        area, chosen.motion, chosen.map, chosen.evidence, heard=heard, level_sd_db=level_sd_db
+    )
     return replace(chosen.over(area), model=model)
+
+
+def _level_sd_db(deviation: RxLevRasters, area: AreaMap, unmeasured_db: float) -> Floats32:
+    """Return the deviation at each pixel of the area, shape (C, P)."""
+    found = deviation.read(cells=area.cell_ids)
+    lattice = area.lattice
+    if deviation.lattice != lattice:
+        expected = "the lattice of the database"
+        raise fail(InputError, str(deviation.path), expected, "another", "of another survey")
+    flat = found.reshape(len(area.cell_ids), -1)
+    return np.where(np.isfinite(flat), flat, np.float32(unmeasured_db)).astype(np.float32)
 
 
 def find_session(
