@@ -219,9 +219,11 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         chosen = np.empty(wanted, dtype=np.int32)
         systematic(weight, rng.random(), chosen)
         copies = np.empty((state.shape[0], wanted), dtype=np.float32)
-        times = self.options.searching_jitter if status is Status.SEARCHING else 1.0
-        jitter = times * np.asarray(self.options.jitter, dtype=np.float32)
-        copy_with_jitter(state, chosen, jitter.astype(np.float32), draw_key(rng), copies)
+        options, searching = self.options, status is Status.SEARCHING
+        jitter = np.asarray(
+            options.searching_jitter if searching else options.jitter, dtype=np.float32
+        )
+        copy_with_jitter(state, chosen, jitter, draw_key(rng), copies)
         return copies, chosen
 
 

@@ -29,9 +29,9 @@ class ParticleOptions:
         resampling.
     jitter : tuple of float
         Standard deviation of the noise that parts copies, for each row of the state.
-    searching_jitter : float
-        Times as much of it until the filter has converged: few copies stand for each place then,
-        and must cover all headings and step lengths that are possible there.
+    searching_jitter : tuple of float
+        The same until the filter has converged: few copies stand for each place then, and must
+        cover all headings and step lengths that are possible there.
     switch_mass : float
         The filter has converged when so much of the belief lies within 50 m of the leading
         hypothesis,
@@ -39,15 +39,15 @@ class ParticleOptions:
         and has done so for so many metres travelled.
     """
 
-    most: int = 30_000
-    searching: int = 20_000
+    most: int = 20_000
+    searching: int = 12_000
     least: int = 1000
     per_bin: float = 60.0
     resample_below: float = 0.5
     flatten: float = 0.5
-    jitter: tuple[float, ...] = (0.5, 0.5, 0.005, 0.003, 0.0)
-    searching_jitter: float = 3.0
-    switch_mass: float = 0.99
+    jitter: tuple[float, ...] = (0.2, 0.2, 0.0025, 0.0015, 0.0)
+    searching_jitter: tuple[float, ...] = (1.5, 1.5, 0.015, 0.009, 0.0)
+    switch_mass: float = 0.985
     switch_hold_m: float = 14.0
 
     def __post_init__(self) -> None:
@@ -66,8 +66,7 @@ class ParticleOptions:
                 faults.add(f"particles, {name}", "a share between 0 and 1", getattr(self, name))
         if not (isfinite(self.switch_hold_m) and self.switch_hold_m >= 0):
             faults.add("particles, switch_hold_m", "metres >= 0", self.switch_hold_m)
-        if not all(isfinite(sd) and sd >= 0 for sd in self.jitter):
-            faults.add("particles, jitter", "finite numbers >= 0", self.jitter)
-        if not (isfinite(self.searching_jitter) and self.searching_jitter >= 0):
-            faults.add("particles, searching_jitter", "times >= 0", self.searching_jitter)
+        for name in ("jitter", "searching_jitter"):
+            if not all(isfinite(sd) and sd >= 0 for sd in getattr(self, name)):
+                faults.add(f"particles, {name}", "finite numbers >= 0", getattr(self, name))
         faults.raise_if_any(ConfigError)

@@ -38,7 +38,7 @@ class ServingWeights:
 
     hysteresis_db: float = 2.0
     sd_db: float = 9.0
-    weight_per_m: float = 1 / 40
+    weight_per_m: float = 1 / 22
 
 
 def log_serving(margin_db: ArrayLike, weights: ServingWeights) -> Floats:

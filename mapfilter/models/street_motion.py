@@ -78,8 +78,8 @@ class MapWeights:
         Rates of leaving the map and of coming back.
     """
 
-    sd_m: float = 5.0
-    weight_per_m: float = 1 / 12
+    sd_m: float = 4.0
+    weight_per_m: float = 1 / 18
     off_cost_per_m: float = 0.1
     leave_per_m: float = 1e-3
     return_per_m: float = 1e-2

@@ -27,18 +27,18 @@ class BayesSection(Section):
     bias_deg: NotNegative = 3.0
     drift_deg_per_sqrt_m: NotNegative = 0.05
     scale: Annotated[float, Field(ge=0, lt=1)] = 0.02
-    map_sd_m: Positive = 5.0
-    map_weight_per_m: NotNegative = 1 / 12
+    map_sd_m: Positive = 4.0
+    map_weight_per_m: NotNegative = 1 / 18
     off_cost_per_m: NotNegative = 0.1
     levels: bool = True
     level_error_db: Positive = 10.0
     level_correlation_m: Positive = 50.0
     level_weight: Annotated[float, Field(gt=0, le=1)] = 0.7
     report_spacing_m: NotNegative = 5.0
-    most_particles: Annotated[int, Field(ge=100, le=10_000_000)] = 30_000
-    searching_particles: Annotated[int, Field(ge=10, le=10_000_000)] = 20_000
+    most_particles: Annotated[int, Field(ge=100, le=10_000_000)] = 20_000
+    searching_particles: Annotated[int, Field(ge=10, le=10_000_000)] = 12_000
     least_particles: Annotated[int, Field(ge=10, le=10_000_000)] = 1000
-    switch_mass: Annotated[float, Field(gt=0, lt=1)] = 0.99
+    switch_mass: Annotated[float, Field(gt=0, lt=1)] = 0.985
     switch_hold_m: NotNegative = 14.0
     smooth: bool = False
 

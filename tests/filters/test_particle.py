@@ -13,8 +13,9 @@ from mapfilter.filters.particle_options import ParticleOptions
 
 PRIOR_SD, STEP_SD, FIX_SD = 20.0, 3.0, 8.0
 PLAIN = ParticleOptions(
-    most=60_000, searching=60_000, least=60_000, flatten=1.0, jitter=(0.0, 0.0), switch_hold_m=5.0
-)
+    most=60_000, searching=60_000, least=60_000, flatten=1.0, jitter=(0.0, 0.0),
+    searching_jitter=(0.0, 0.0), switch_hold_m=5.0,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

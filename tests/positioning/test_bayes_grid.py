@@ -53,7 +53,12 @@ def positioner(area, *, grid, count=100_000):
     evidence = EvidenceOptions(levels=levels, spacing_m=4.0)
     model = BayesModel(area, ERRORS, MapWeights(), evidence)
     options = ParticleOptions(
-        most=count, searching=count, least=count, flatten=1.0, jitter=(0.0,) * 5
+        most=count,
+        searching=count,
+        least=count,
+        flatten=1.0,
+        jitter=(0.0,) * 5,
+        searching_jitter=(0.0,) * 5,
     )
     return BayesPositioner(model, options, grid=grid)
 
@@ -90,11 +95,11 @@ def test_particles_agree_with_the_grid(area, log):
 
 
 def test_the_error_falls_with_the_root_of_the_number(area, log):
-    reference = beliefs(positioner(area, grid=False, count=400_000), log, FINE_M)[-1]
+    reference = beliefs(positioner(area, grid=False, count=1_000_000), log, FINE_M)[-1]
 
     def error(count):
         some = positioner(area, grid=False, count=count)
-        found = [beliefs(some, log, FINE_M, seed)[-1] for seed in range(30)]
+        found = [beliefs(some, log, FINE_M, seed)[-1] for seed in range(120)]
         return np.mean([variation(one, reference) for one in found])
 
     assert error(1000) / error(4000) == pytest.approx(2.0, rel=0.1)

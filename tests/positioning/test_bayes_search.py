@@ -60,4 +60,4 @@ def test_a_belief_in_doubt_does_not_converge(area):
 
 def test_copies_part_by_no_less_than_nothing():
     with pytest.raises(ConfigError, match="searching_jitter"):
-        ParticleOptions(searching_jitter=-1.0)
+        ParticleOptions(searching_jitter=(-1.0,))

@@ -60,7 +60,7 @@ class Case:
         imu = self.imu
         drift = imu.heading_drift_rad_per_sqrt_s / _WALKING_MPS**0.5
         return MotionErrors(
-            step_sd_m=max(1.5 * imu.sigma_trans_m, 0.1),
+            step_sd_m=max(imu.sigma_trans_m, 0.1),
             heading_sd_rad=max(imu.sigma_orient_rad, radians(_LEAST_HEADING_SD_DEG)),
             bias_sd_rad=max(imu.heading_bias_sd_rad, radians(_LEAST_BIAS_DEG)),
             bias_drift_rad_per_sqrt_m=max(drift, radians(_LEAST_DRIFT_DEG)),
