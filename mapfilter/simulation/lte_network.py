@@ -1,0 +1,170 @@
+"""A hexagonal LTE network as it is heard: sites of three sectors, levels, and SINR.
+
+All sectors send at once and in the same band, so that each is heard against all others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import log10
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.radio.antenna import sector_gain_db
+from mapfilter.radio.tr38901 import hidden_loss_db, seen_loss_db
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+SECTORS = 3
+_LEAST_DISTANCE_M = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class LteRadio:
+    """What all sectors have in common.
+
+    Parameters
+    ----------
+    power_dbm : float
+        Of a sector.
+    gain_dbi : float
+        Of its antenna, at boresight.
+    beamwidth_deg, front_to_back_db : float
+        Of its horizontal pattern.
+    frequency_mhz, bandwidth_mhz : float
+    noise_figure_db : float
+        Of receivers.
+    height_m, mobile_height_m : float
+    """
+
+    power_dbm: float = 43.0
+    gain_dbi: float = 14.0
+    beamwidth_deg: float = 70.0
+    front_to_back_db: float = 20.0
+    frequency_mhz: float = 2000.0
+    bandwidth_mhz: float = 20.0
+    noise_figure_db: float = 7.0
+    height_m: float = 30.0
+    mobile_height_m: float = 1.5
+
+    @property
+    def noise_dbm(self) -> float:
+        """Thermal noise over the whole band."""
+        return -174.0 + 10 * log10(self.bandwidth_mhz * 1e6) + self.noise_figure_db
+
+
+def hexagonal_sites(spacing_m: float, rings: int) -> Floats:
+    """Return a site and rings of sites around it, each as far from its neighbours, (S, 2).
+
+    The neighbours of the first one lie at 0°, 60° ... anticlockwise from east; three sites meet at
+    30°, 90° ... from each, at ``spacing / √3``.
+
+    Raises
+    ------
+    InputError
+        The distance is not above 0, or the rings are fewer than none.
+
+    Examples
+    --------
+    >>> hexagonal_sites(1500.0, 1).round(0).tolist()[:3]
+    [[0.0, 0.0], [-750.0, -1299.0], [750.0, -1299.0]]
+    >>> len(hexagonal_sites(1500.0, 2))
+    19
+    """
+    if not (np.isfinite(spacing_m) and spacing_m > 0 and rings >= 0):
+        got = f"{spacing_m} m, {rings} rings"
+        raise fail(InputError, "hexagonal sites", "metres above 0 and rings >= 0", got)
+    steps = np.arange(-rings, rings + 1)
+    a, b = (axis.ravel() for axis in np.meshgrid(steps, steps))
+    within = np.maximum(np.maximum(np.abs(a), np.abs(b)), np.abs(a + b)) <= rings
+    a, b = a[within], b[within]
+    places = spacing_m * np.column_stack([a + b / 2, b * np.sqrt(3) / 2])
+    order = np.argsort(np.hypot(*places.T).round(3), kind="stable")
+    return np.asarray(places[order])
+
+
+def turned(places_m: Floats, angle_deg: float) -> Floats:
+    """Return places (..., 2) turned anticlockwise about the origin.
+
+    Examples
+    --------
+    >>> turned(np.array([[1.0, 0.0]]), 90.0).round(9).tolist()
+    [[0.0, 1.0]]
+    """
+    angle = np.radians(angle_deg)
+    axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    return np.asarray(places_m @ axes)
+
+
+def sector_levels_dbm(
+    radio: LteRadio,
+    sites_m: Floats,
+    boresights_deg: ArrayLike,
+    places_m: Floats,
+    seen: Bools,
+    shadowing_db: ArrayLike = 0.0,
+) -> Floats:
+    """Return the level of each sector at each place.
+
+    Path loss is that of 3GPP TR 38.901 for urban macro cells, with or without line of sight.
+
+    Parameters
+    ----------
+    radio : LteRadio
+    sites_m : (S, 2) array
+    boresights_deg : (3,) array_like
+        Of the sectors of each site, anticlockwise from east.
+    places_m : (K, 2) array
+    seen : (K, S) array of bool
+        Whether a site is in line of sight.
+    shadowing_db : (K, S) array_like
+        Added to all sectors of a site.
+
+    Returns
+    -------
+    (K, S, 3) array
+    """
+    away = places_m[:, None] - sites_m
+    distance = np.maximum(np.hypot(away[..., 0], away[..., 1]), _LEAST_DISTANCE_M)
+    given = (radio.frequency_mhz, radio.height_m, radio.mobile_height_m)
+    free, blocked = seen_loss_db("uma", distance, *given), hidden_loss_db("uma", distance, *given)
+    loss = np.where(seen, free, blocked)
+    bearing = np.arctan2(away[..., 1], away[..., 0])[..., None]
+    gain = sector_gain_db(
+        bearing - np.radians(np.asarray(boresights_deg, dtype=np.float64)),
+        np.radians(radio.beamwidth_deg), radio.front_to_back_db,
+    )  # fmt: skip
+    level = radio.power_dbm + radio.gain_dbi - loss + np.asarray(shadowing_db)
+    return np.asarray(level[..., None] + gain)
+
+
+def site_sinr_db(levels_dbm: Floats, noise_dbm: float) -> Floats:
+    """Return the SINR of each site's best sector against all other sectors and noise, (..., S).
+
+    Parameters
+    ----------
+    levels_dbm : (..., S, 3) array
+    noise_dbm : float
+
+    Raises
+    ------
+    InputError
+        A level is not a number.
+
+    Examples
+    --------
+    >>> levels = np.array([[[-80.0, -110.0, -110.0], [-80.0, -110.0, -110.0]]])
+    >>> site_sinr_db(levels, -120.0).round(2).tolist()
+    [[-0.02, -0.02]]
+    """
+    faults = Faults()
+    if np.isnan(levels_dbm).any():
+        faults.add("levels_dbm", "numbers", "NaN")
+    faults.raise_if_any(InputError)
+    power = 10 ** (levels_dbm / 10)
+    best = power.max(axis=-1)
+    others = power.sum(axis=(-2, -1))[..., None] - best + 10 ** (noise_dbm / 10)
+    return np.asarray(10 * np.log10(best / others))
