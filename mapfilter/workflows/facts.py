@@ -8,6 +8,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+_WIDEST = 200
+
 
 def facts(value: Any) -> Any:
     """Turn a result into what JSON knows: paths become text; NaN and infinity become None.
@@ -33,6 +35,8 @@ def facts(value: Any) -> Any:
 def text_lines(found: Mapping[str, Any], indent: str = "") -> Iterator[str]:
     r"""Yield one line for each figure, nested ones indented; none for what is empty.
 
+    Rows of the same figures are a table, where it is not too wide.
+
     Examples
     --------
     >>> found = {"bounds_m": [385412.52], "lon_deg": 24.9412341, "seconds": {"build": 1.23456}}
@@ -42,6 +46,12 @@ def text_lines(found: Mapping[str, Any], indent: str = "") -> Iterator[str]:
     lon_deg: 24.941234
     seconds:
       build: 1.235
+    >>> rows = [{"name": "levels-6", "runs": 20}, {"name": "cell-20", "runs": 5}]
+    >>> print(*text_lines({"cases": rows}), sep="\n")
+    cases:
+      name      runs
+      levels-6    20
+      cell-20      5
     """
     for key, value in found.items():
         if isinstance(value, Mapping | list) and not value:
@@ -49,6 +59,9 @@ def text_lines(found: Mapping[str, Any], indent: str = "") -> Iterator[str]:
         if isinstance(value, Mapping):
             yield f"{indent}{key}:"
             yield from text_lines(value, indent + "  ")
+        elif isinstance(value, list) and (table := _table(value)):
+            yield f"{indent}{key}:"
+            yield from (f"{indent}  {line}" for line in table)
         elif isinstance(value, list):
             yield f"{indent}{key}:"
             for item in value:
@@ -60,6 +73,27 @@ def text_lines(found: Mapping[str, Any], indent: str = "") -> Iterator[str]:
                 yield f"{indent}  {shown}"
         else:
             yield f"{indent}{key}: {_short(value, key)}"
+
+
+def _table(rows: list[Any]) -> list[str]:
+    """Return the lines of a table, numbers to the right; none where it is not one."""
+    if len(rows) < 2 or not all(
+        isinstance(row, Mapping) and row.keys() == rows[0].keys() for row in rows
+    ):
+        return []
+    names = [name for name in rows[0] if any(row[name] not in (None, "") for row in rows)]
+    lines = [names, *([_short(row[name], name) for name in names] for row in rows)]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    if sum(widths) + 2 * len(widths) > _WIDEST:
+        return []
+    texts = [any(isinstance(row[name], str) for row in rows) for name in names]
+    return [
+        "  ".join(
+            cell.ljust(width) if text else cell.rjust(width)
+            for cell, width, text in zip(line, widths, texts, strict=True)
+        ).rstrip()
+        for line in lines
+    ]
 
 
 def _short(value: Any, name: str) -> str:
