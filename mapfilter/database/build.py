@@ -22,10 +22,10 @@ from mapfilter.database.store import open_database
 from mapfilter.database.tiles import (
     TileRows,
     TileTask,
-    Window,
     read_tiles,
     tile_windows,
 )
+from mapfilter.database.windows import Window
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan

@@ -22,12 +22,11 @@ from mapfilter.database.store import open_database
 from mapfilter.database.tiles import (
     TileLevels,
     TileRows,
-    Window,
     heard_levels,
     tile_windows,
     z_order,
 )
-from mapfilter.database.windows import WindowReader
+from mapfilter.database.windows import Window, WindowReader
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.radio.cells import Cell, CellPlan

@@ -10,6 +10,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from mapfilter.database.sources import RoutePart
+from mapfilter.database.windows import Window
 from mapfilter.geodesy import Floats, Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rasters import RxLevRasters
@@ -17,7 +18,6 @@ from mapfilter.roads.geoparquet import dictionary, point_geometry
 from mapfilter.roads.lattice import RouteLattice
 
 Floats32 = NDArray[np.float32]
-Window = tuple[int, int, int, int]
 
 _CELLS_AT_A_TIME = 128
 

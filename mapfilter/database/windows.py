@@ -11,9 +11,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from mapfilter.database.columns import DAMAGE, damaged
-from mapfilter.database.tiles import Window
 from mapfilter.errors import StoreError, fail
 from mapfilter.geodesy import Lattice
+
+Window = tuple[int, int, int, int]
+"""Row, column, rows and columns on a lattice."""
 
 _EVERYWHERE = (-(2**62), 2**62)
 

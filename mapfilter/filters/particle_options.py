@@ -45,7 +45,7 @@ class ParticleOptions:
     per_bin: float = 60.0
     resample_below: float = 0.5
     flatten: float = 0.5
-    jitter: tuple[float, ...] = (0.2, 0.2, 0.0025, 0.0015, 0.0)
+    jitter: tuple[float, ...] = (0.2, 0.2, 0.005, 0.003, 0.0)
     searching_jitter: tuple[float, ...] = (1.5, 1.5, 0.015, 0.009, 0.0)
     switch_mass: float = 0.985
     switch_hold_m: float = 14.0
