@@ -57,7 +57,8 @@ def reproduce(
     paper: Annotated[
         str,
         typer.Argument(
-            metavar="PAPER", help="khalaf-allah-2007, fritsche-klein-2009, zhang-2006 or tesa."
+            metavar="PAPER",
+            help="khalaf-allah-2007, fritsche-klein-2009, zhang-2006, tesa or dlr.",
         ),
     ],
     area_map: Annotated[
@@ -83,6 +84,7 @@ def reproduce(
 ) -> None:
     """Repeat a paper's experiments: figure, table, and every reading of what it leaves open."""
     from mapfilter.workflows.reproduce import run_reproduce
+    from mapfilter.workflows.reproduce_dlr import DLR, run_reproduce_dlr
     from mapfilter.workflows.reproduce_fusion import FUSION_PAPERS, run_reproduce_fusion
     from mapfilter.workflows.reproduce_tesa import TESA, run_reproduce_tesa
     from mapfilter.workflows.sweep_brief import brief
@@ -99,9 +101,10 @@ def reproduce(
             )
         print_result(fused, as_json)
         return
-    if paper == TESA:
+    if paper in (TESA, DLR):
+        run = run_reproduce_tesa if paper == TESA else run_reproduce_dlr
         with rate_bar("reproduce", "trials") as progress:
-            drives = run_reproduce_tesa(
+            tried = run(
                 (out or Path("out") / paper).absolute(),
                 trials=trials,
                 seed=seed or 0,
@@ -110,7 +113,7 @@ def reproduce(
                 progress=progress,
             )
         # The table holds the rows, too.
-        shown = {key: own for key, own in asdict(drives).items() if as_json or key != "rows"}
+        shown = {key: own for key, own in asdict(tried).items() if as_json or key != "rows"}
         print_result(shown, as_json)
         return
     with rate_bar("reproduce", "runs") as progress:

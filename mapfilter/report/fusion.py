@@ -67,8 +67,11 @@ def plot_error_panels(
     title: str,
     columns: int = 2,
     across: str = "time index k",
+    shaded: tuple[str, NDArray[np.bool_]] | None = None,
 ) -> None:
     """Draw errors over the time index in panels side by side; ``across`` says what it counts.
+
+    Some indices may be ``shaded``, under a name.
 
     Raises
     ------
@@ -81,6 +84,8 @@ def plot_error_panels(
         axes = figure.subplots(rows, columns, squeeze=False).ravel()
         for one, panel in zip(axes, panels, strict=False):
             _draw_panel(one, panel, across)
+            if shaded is not None:
+                _shade(one, *shaded)
         for spare in axes[len(panels) :]:
             spare.remove()
         figure.suptitle(title, fontsize=12)
@@ -114,6 +119,12 @@ def _draw_panel(axes: Axes, panel: Panel, across: str) -> None:
     axes.set_ylabel(panel.label)
     axes.grid(color="#e6e6e6", linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)
+
+
+def _shade(axes: Axes, name: str, where: NDArray[np.bool_]) -> None:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], where, [0]]).astype(np.int8)))
+    for first, end in zip(edges[::2], edges[1::2], strict=True):
+        axes.axvspan(first + 0.5, end + 0.5, color="#f3ddd0", linewidth=0, zorder=0, label=name)
 
 
 def _minor_label(value: float, _: object) -> str:

@@ -23,6 +23,7 @@ from mapfilter.workflows.build import run_build
 from mapfilter.workflows.config import load_config
 from mapfilter.workflows.paper_pictures import draw_khalaf_allah_2007
 from mapfilter.workflows.predict import run_predict
+from mapfilter.workflows.reproduce_dlr import DLR
 from mapfilter.workflows.reproduce_fusion import FUSION_PAPERS
 from mapfilter.workflows.reproduce_tesa import TESA
 from mapfilter.workflows.sections import Config
@@ -100,7 +101,7 @@ def run_reproduce(
     """
     began_s = time.perf_counter()
     if name not in PAPERS:
-        known = (*PAPERS, *FUSION_PAPERS, TESA)
+        known = (*PAPERS, *FUSION_PAPERS, TESA, DLR)
         raise fail(ConfigError, "reproduce", f"one of {', '.join(known)}", repr(name))
     config = paper_config(out, map_name, bbox)
     plans = paper.plans(trials, seed)
