@@ -1,8 +1,8 @@
 """The exact filter on a grid: position on a lattice times bins of the lasting heading error.
 
 It sums over all positions where particles sample some, so it is the oracle that the particle filter
-is tested against, and a choice for small areas. Mass moves by a Gaussian, integrated over each
-pixel: what is less than a pixel wide is smeared over it.
+is tested against, and a choice for small areas. Mass moves with the mean and the variance of each
+displacement; where that falls between pixels, it is smeared over them.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Moving mass on a lattice by a Gaussian that is integrated over each pixel."""
+"""Moving mass on a lattice: mean and variance of the displacement are kept, also within a pixel."""
 
 from __future__ import annotations
 
@@ -9,16 +9,34 @@ from scipy.special import ndtr
 Floats32 = NDArray[np.float32]
 
 _REACH_SD = 4.0
-_LEAST_SD_PX = 0.05
+_READ_INTO_PIXELS = 1 / 6
 
 
 def taps(shift_px: float, sd_px: float) -> tuple[int, Floats32]:
-    """Return how far the first tap shifts, and a Gaussian's share of each pixel."""
-    sd_px = max(sd_px, _LEAST_SD_PX)
-    first = int(np.floor(shift_px - _REACH_SD * sd_px))
-    last = int(np.ceil(shift_px + _REACH_SD * sd_px))
-    edges = np.arange(first, last + 2) - 0.5
-    return first, np.diff(ndtr((edges - shift_px) / sd_px)).astype(np.float32)
+    """Return how far the first tap shifts, and the share of each tap.
+
+    Their mean is the shift and their variance that of the displacement. Only where a shift falls
+    between pixels, f from the nearest, no less than f (1 - f) is possible.
+
+    Examples
+    --------
+    >>> taps(0.75, 0.0)
+    (0, array([0.25, 0.75, 0.  ], dtype=float32))
+    """
+    nearest = round(shift_px)
+    beside = shift_px - nearest
+    variance = max(sd_px**2, abs(beside) * (1 - abs(beside)))
+    if variance + beside**2 <= 1:
+        square = variance + beside**2
+        share = [(square - beside) / 2, 1 - square, (square + beside) / 2]
+        return nearest - 1, np.array(share, dtype=np.float32)
+    # A Gaussian over mass that is spread evenly in its pixel, read into pixels again.
+    narrower_px = float(np.sqrt(variance - _READ_INTO_PIXELS))
+    first = int(np.floor(shift_px - _REACH_SD * narrower_px)) - 1
+    last = int(np.ceil(shift_px + _REACH_SD * narrower_px)) + 1
+    beyond = (np.arange(first - 1, last + 2) - shift_px) / narrower_px
+    ramp = narrower_px * (beyond * ndtr(beyond) + np.exp(-0.5 * beyond**2) / np.sqrt(2 * np.pi))
+    return first, np.diff(ramp, 2).astype(np.float32)
 
 
 def shifted(mass: Floats32, first: int, taps: Floats32, *, axis: int) -> Floats32:

@@ -20,7 +20,6 @@ from mapfilter.positioning.evidence import RadioReading
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 
-_PIXEL_VARIANCE = 1 / 12
 _CIRCLE_BINS = 72
 
 
@@ -112,9 +111,8 @@ class StreetGrid:
         return Transport(
             right,
             -up,
-            # The pixel that mass is read into widens it once more.
-            np.sqrt(np.maximum(east_var / pixel_m**2 - _PIXEL_VARIANCE, 0.0)),
-            np.sqrt(np.maximum(north_var / pixel_m**2 - _PIXEL_VARIANCE, 0.0)),
+            np.sqrt(east_var) / pixel_m,
+            np.sqrt(north_var) / pixel_m,
             motion.bias_drift_rad_per_sqrt_m * length_m**0.5 / width_rad,
             np.exp(weights.weight_per_m * length_m * self.model.log_map),
             exp(-weights.off_cost_per_m * length_m),
