@@ -1,0 +1,41 @@
+"""The exact filter on a grid on the full chain."""
+
+from command_line import assert_done, assert_refused, mapfilter, settings
+
+from mapfilter.positioning.estimate_store import read_estimate
+
+
+def test_a_replay_by_the_grid(world, tmp_path):
+    out = tmp_path / "out"
+    given = ["--db", world.database, "--log", world.journeys / "journey-0000-draw-000"]
+    found = assert_done(
+        mapfilter("replay", *given, "--filter", "grid", "--out", out, "--json")
+    ).json
+    assert found["filter"] == "grid"
+    assert found["success"] is True
+    assert found["error_mean_m"] < 10
+    names = {path.name for path in out.iterdir()}
+    assert {"belief.png", "track.png", "error.png", "evidence.png"} <= names
+    estimate = read_estimate(out / "estimate.parquet")
+    assert estimate.filter == "grid"
+    assert estimate.way_probability[-1] > 0.2
+
+
+def test_a_benchmark_of_the_grid(world, tmp_path):
+    given = [*settings(area__resolution_m=10), "--filter", "grid", "--runs", 1, "--workers", 1]
+    cases = ["--case", "levels-6", "--case", "smooth-6"]
+    told = mapfilter(
+        "evaluate", "global-positioning", "-c", world.toml, *given, *cases, "--out", tmp_path,
+        "--json",
+    )  # fmt: skip
+    plain, smoothed = told.json["cases"]
+    assert plain["filter"] == smoothed["filter"] == "grid"
+    assert plain["success"] == 1.0
+    assert plain["error_mean_m"] < 10
+
+
+def test_the_grid_has_no_hindsight(world, tmp_path):
+    told = mapfilter(
+        "replay", "-c", world.toml, "--filter", "grid", "--smooth", "--out", tmp_path / "out"
+    )
+    assert_refused(told, "--smooth", "grid")
