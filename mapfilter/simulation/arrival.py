@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import comb, log_ndtr
 
 from mapfilter.errors import Faults, InputError
-from mapfilter.gnss.noise import correlated_along
 from mapfilter.models.clock import SPEED_OF_LIGHT_MPS
+from mapfilter.simulation.lte_network import sites_along
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -115,9 +115,8 @@ def detour_m(
     -------
     (K, S) array
     """
-    drawn = correlated_along(travelled_m, hidden.shape[1] + 1, correlation_m, rng)
-    mixed = np.sqrt(1 - shared) * drawn[:, 1:] + np.sqrt(shared) * drawn[:, :1]
-    return np.asarray(np.where(hidden, -mean_m * log_ndtr(-mixed), 0.0))
+    drawn = sites_along(travelled_m, hidden.shape[1], correlation_m, shared, rng)
+    return np.asarray(np.where(hidden, -mean_m * log_ndtr(-drawn), 0.0))
 
 
 def arrival_errors_m(model: ArrivalModel, sinr_db: Floats, rng: np.random.Generator) -> Floats:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mapfilter.errors import Faults, InputError, fail
+from mapfilter.gnss.noise import correlated_along
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.tr38901 import hidden_loss_db, seen_loss_db
 
@@ -97,6 +98,37 @@ def turned(places_m: Floats, angle_deg: float) -> Floats:
     angle = np.radians(angle_deg)
     axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     return np.asarray(places_m @ axes)
+
+
+def sites_along(
+    travelled_m: ArrayLike, sites: int, correlation_m: float, shared: float,
+    rng: np.random.Generator,
+) -> Floats:  # fmt: skip
+    """Draw standard normal numbers for sites, part of which is common: what is near the receiver.
+
+    Parameters
+    ----------
+    travelled_m : (K,) array_like
+    sites : int
+    correlation_m : float
+        The correlation along the way is ``exp(-d / correlation_m)``.
+    shared : float
+        Correlation of any two sites.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    (K, sites) array
+
+    Raises
+    ------
+    InputError
+        The correlation of sites is not within 0..1.
+    """
+    if not 0 <= shared <= 1:
+        raise fail(InputError, "shared", "a correlation in 0..1", shared)
+    drawn = correlated_along(travelled_m, sites + 1, correlation_m, rng)
+    return np.asarray(np.sqrt(1 - shared) * drawn[:, 1:] + np.sqrt(shared) * drawn[:, :1])
 
 
 def sector_levels_dbm(

@@ -10,6 +10,7 @@ from mapfilter.simulation.lte_network import (
     hexagonal_sites,
     sector_levels_dbm,
     site_sinr_db,
+    sites_along,
     turned,
 )
 
@@ -69,9 +70,21 @@ def test_near_a_station_others_are_hardly_heard():
     assert radio.noise_dbm == pytest.approx(-94.0, abs=0.1)
 
 
+def test_sites_share_what_is_near_the_receiver():
+    along = np.arange(0.0, 60_000.0, 5.0)
+    drawn = sites_along(along, 3, 20.0, 0.5, np.random.default_rng(14))
+    found = np.corrcoef(drawn.T)
+    np.testing.assert_allclose(found, np.where(np.eye(3), 1.0, 0.5), atol=0.06)
+    np.testing.assert_allclose(drawn.std(axis=0), 1.0, atol=0.06)
+    lag = np.mean(drawn[4:] * drawn[:-4])
+    assert lag == pytest.approx(np.exp(-1.0), abs=0.05)
+
+
 def test_what_is_no_network():
     for bad in ((0.0, 1), (np.nan, 1), (100.0, -1)):
         with pytest.raises(InputError, match="hexagonal"):
             hexagonal_sites(*bad)
+    with pytest.raises(InputError, match="shared"):
+        sites_along([0.0, 1.0], 2, 10.0, 1.5, np.random.default_rng(0))
     with pytest.raises(InputError, match="NaN"):
         site_sinr_db(np.full((1, 1, 3), np.nan), -90.0)

@@ -14,7 +14,8 @@ ASSUMPTIONS = (
     "drift is estimated",
     "network: sites 1500 m apart, 19 of them, 30 m high, three sectors of 70° and 43 dBm + 14 dBi, "
     "2 GHz, all sending; turned by 17° against the streets; losses of 3GPP TR 38.901 UMa with or "
-    "without line of sight past the canyon's houses, shadowing of 6 dB over 50 m per site",
+    "without line of sight past the canyon's houses, shadowing of 6 dB over 50 m, correlated by "
+    "half between sites",
     "edge: the canyon's middle is where three cells meet, 866 m from their sites; near: 200 m from "
     "a site",
     "times of arrival: of each site's best sector; Cramér-Rao bound of 62 carriers of 15 kHz over "

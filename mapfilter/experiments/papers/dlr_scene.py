@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from mapfilter.geodesy import Lattice
 from mapfilter.gnss.almanac import joined
 from mapfilter.gnss.constellations import nominal_galileo, nominal_gps
-from mapfilter.gnss.noise import correlated_along, elevation_sigma_m, multipath_bias_m
+from mapfilter.gnss.noise import elevation_sigma_m, multipath_bias_m
 from mapfilter.gnss.orbits import satellite_positions_m
 from mapfilter.gnss.sky import LocalFrame, directions
 from mapfilter.gnss.visibility import Skyline
@@ -28,6 +28,7 @@ from mapfilter.simulation.lte_network import (
     hexagonal_sites,
     sector_levels_dbm,
     site_sinr_db,
+    sites_along,
     turned,
 )
 from mapfilter.simulation.pedestrians import GasGround, gas_walk
@@ -60,6 +61,8 @@ NEAR_M = 200.0
 BORESIGHTS_DEG = (30.0, 150.0, 270.0)
 SHADOW_DB, SHADOW_M = 6.0, 50.0
 DETOUR_M, ALONG_M = 15.0, 5.0
+SHARED = 0.5
+"""Correlation of shadowing, and of detours, between any two sites."""
 RADIO = LteRadio()
 ARRIVAL = ArrivalModel()
 
@@ -174,7 +177,7 @@ def draw_track(scene: Scene, rng: np.random.Generator, steps: int = STEPS) -> Tr
         # Stations stand above all roofs: what a ray meets behind them is lower.
         own = directions(stations, place[:, None])
         stations_seen[where] = scene.skyline.seen(place, own)
-        shadow = SHADOW_DB * correlated_along(travelled, len(stations), SHADOW_M, rng)
+        shadow = SHADOW_DB * sites_along(travelled, len(stations), SHADOW_M, SHARED, rng)
         levels = sector_levels_dbm(
             RADIO, stations[:, :2], np.array(BORESIGHTS_DEG) + TURN_DEG, flat,
             stations_seen[where], shadow,
@@ -209,7 +212,7 @@ def draw_readings(scene: Scene, track: Track, rng: np.random.Generator) -> Readi
         distance = np.linalg.norm(stations - track.place_m[:, None], axis=2)
         hidden = ~track.stations_seen[where]
         detour = detour_m(
-            track.travelled_m, hidden, rng, mean_m=DETOUR_M, correlation_m=ALONG_M
+            track.travelled_m, hidden, rng, mean_m=DETOUR_M, correlation_m=ALONG_M, shared=SHARED
         )  # fmt: skip
         times[where] = distance + detour + arrival_errors_m(ARRIVAL, track.sinr_db[where], rng)
     return Readings(np.where(track.seen, free + echo, np.nan), free, times)
