@@ -118,6 +118,30 @@ def cluster_executor(address: str) -> Iterator[tuple[Executor, int]]:
             raise _died() from error
 
 
+@contextlib.contextmanager
+def executor_of(workers: int, cluster: str | None = None) -> Iterator[tuple[Executor, int]]:
+    """Give an executor of local processes, or of a cluster, and how many tasks it does at once.
+
+    Parameters
+    ----------
+    workers : int
+        Local processes, where there is no cluster.
+    cluster : str, optional
+        As for :func:`cluster_executor`.
+
+    Raises
+    ------
+    MapfilterError
+        As :func:`cluster_executor`.
+    """
+    if cluster is not None:
+        with cluster_executor(cluster) as (executor, threads):
+            yield executor, threads
+        return
+    with local_executor(workers) as executor:
+        yield executor, workers
+
+
 def ordered_results(
     executor: Executor,
     function: Callable[[Any], T],

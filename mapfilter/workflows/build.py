@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mapfilter._io import ensure_writable_folder
-from mapfilter._parallel import Progress, cluster_executor, local_executor
+from mapfilter._parallel import Progress, executor_of
 from mapfilter.database.build import build
 from mapfilter.database.estimate import BuildEstimate, dry_run
 from mapfilter.database.manifest import InputFile
@@ -91,14 +90,11 @@ def run_build(
     rasters, plan, world = _raster_world(config)
     check_cells_near(plan, world.lattice, str(config.cells.plan or "cells"))
     ensure_writable_folder(target.parent)
-    with contextlib.ExitStack() as stack:
-        tiles_a_task = 1
-        if cluster is None:
-            executor = stack.enter_context(local_executor(workers))
-        else:
-            executor, workers = stack.enter_context(cluster_executor(cluster))
-            pixels = config.database.tile_px**2 * len(plan.ids)
-            tiles_a_task = min(max(PIXELS_A_TASK // pixels, 1), MOST_TILES_A_TASK)
+    tiles_a_task = 1
+    if cluster is not None:
+        pixels = config.database.tile_px**2 * len(plan.ids)
+        tiles_a_task = min(max(PIXELS_A_TASK // pixels, 1), MOST_TILES_A_TASK)
+    with executor_of(workers, cluster) as (executor, at_once):
         database = build(
             rasters,
             plan,
@@ -110,9 +106,9 @@ def run_build(
             inputs=_inputs(world),
             attribution=world.streets.attribution,
             executor=executor,
-            in_flight=_TASKS_A_WORKER * workers,
+            in_flight=_TASKS_A_WORKER * at_once,
             tiles_a_task=tiles_a_task,
-            writers=workers,
+            writers=at_once,
             resume=resume,
             progress=progress,
         )

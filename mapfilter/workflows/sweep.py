@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mapfilter._io import ensure_writable_folder
-from mapfilter._parallel import Progress, cluster_executor, local_executor
+from mapfilter._parallel import Progress, executor_of
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.evaluation.success_cells import SuccessCell, success_cells
 from mapfilter.experiments.sweep.run import sweep
@@ -128,9 +128,5 @@ def run_sweep(
 @contextlib.contextmanager
 def sweep_executor(workers: int, cluster: str | None) -> Iterator[tuple[Executor, int]]:
     """Give an executor, and how many batches keep all of its workers busy."""
-    if cluster is None:
-        with local_executor(workers) as executor:
-            yield executor, 2 * workers
-        return
-    with cluster_executor(cluster) as (executor, threads):
-        yield executor, 3 * threads
+    with executor_of(workers, cluster) as (executor, at_once):
+        yield executor, (2 if cluster is None else 3) * at_once

@@ -1,8 +1,6 @@
 """Builds that are cut short, go on, run on a cluster, and lay their points in the workers."""
 
 import multiprocessing
-import os
-import signal
 import time
 from pathlib import Path
 from threading import Event
@@ -10,6 +8,7 @@ from threading import Event
 import numpy as np
 import pytest
 import shapely
+from killed_worker import KillsOneWorker
 from small_world import CRS, FLOOR_DBM, LATTICE, make_plan, make_routes, make_world
 
 from mapfilter._parallel import SerialExecutor, cluster_executor, local_executor
@@ -122,26 +121,6 @@ def test_who_stops_does_not_wait_for_the_checksum_of_the_rasters(world, tmp_path
     assert done == []
     released.set()
     assert list(tmp_path.iterdir()) == []
-
-
-def dies_once(path):
-    """Kill the worker that runs this, the first time."""
-    if not path.exists():
-        path.touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-
-
-class KillsOneWorker:
-    """Passes tasks on, and a deadly one among them."""
-
-    def __init__(self, executor, mark):
-        self.executor, self.mark, self.tasks, self.deaths = executor, mark, 0, []
-
-    def submit(self, fn, /, *args, **kwargs):
-        self.tasks += 1
-        if self.tasks == 3:
-            self.deaths.append(self.executor.submit(dies_once, self.mark))
-        return self.executor.submit(fn, *args, **kwargs)
 
 
 @pytest.mark.filterwarnings("default")

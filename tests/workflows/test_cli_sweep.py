@@ -1,11 +1,10 @@
 """Sweeps by the command: the same table however it is done, cut short, gone on with, refused."""
 
-import os
 import shutil
-import signal
 
 import pytest
 from command_line import assert_done, assert_refused, mapfilter, settings
+from killed_worker import KillsOneWorker
 
 from mapfilter._parallel import SerialExecutor, cluster_executor, local_executor
 from mapfilter.errors import ConfigError, MapfilterError
@@ -79,25 +78,6 @@ def test_logs_of_a_sweep_are_as_sound_as_checked_ones(parts):
 def test_two_processes_give_the_same_bytes(parts, whole, tmp_path):
     with local_executor(2) as executor:
         assert sweep(*parts, tmp_path, executor=executor).read_bytes() == whole
-
-
-class KillsOneWorker:
-    """Passes tasks on, and a deadly one among them."""
-
-    def __init__(self, executor, mark):
-        self.executor, self.mark, self.tasks, self.deaths = executor, mark, 0, []
-
-    def submit(self, fn, /, *args, **kwargs):
-        self.tasks += 1
-        if self.tasks == 3:
-            self.deaths.append(self.executor.submit(dies_once, self.mark))
-        return self.executor.submit(fn, *args, **kwargs)
-
-
-def dies_once(path):
-    if not path.exists():
-        path.touch()
-        os.kill(os.getpid(), signal.SIGKILL)
 
 
 @pytest.mark.filterwarnings("default")
