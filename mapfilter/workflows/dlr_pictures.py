@@ -9,7 +9,7 @@ import numpy as np
 from mapfilter.evaluation.track_percentiles import percentile_of_tracks
 from mapfilter.experiments.papers import dlr, dlr_scene, dlr_table
 from mapfilter.gnss.sky import directions
-from mapfilter.report.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION
+from mapfilter.report.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILLION
 from mapfilter.report.cumulative import (
     Distribution,
     OverThreshold,
@@ -79,7 +79,7 @@ def _free_space(run: dlr.PaperRun, path: Path, told: str) -> None:
         )
     ]  # fmt: skip
     plot_cumulative(
-        curves, path, title=f"Fig. 6: canyon and free space, {told}; curves end where no fix is",
+        curves, path, title=f"Fig. 6: canyon and free space, {told}; epochs without a fix fail",
         most_m=60.0,
     )  # fmt: skip
 
@@ -109,7 +109,7 @@ def _differences(run: dlr.PaperRun, path: Path, told: str) -> None:
             ("edge, static", dlr.TDOA_STATIC, VERMILLION, "-", None),
             ("edge, PKF", dlr.TDOA_PKF, ORANGE, "-", None),
             ("edge, EKF", dlr.TDOA_EKF, BLUE, "-", None),
-            ("edge, PF", dlr.TDOA_PF, BLACK, "-", published["pf_edge"]),
+            ("edge, PF", dlr.TDOA_PF, BLACK, ":", published["pf_edge"]),
             ("near a station, EKF", dlr.TDOA_EKF_NEAR, SKY, "--", None),
             ("near a station, PF", dlr.TDOA_PF_NEAR, GREY, "--", None),
         )
@@ -192,10 +192,15 @@ def _over_time(run: dlr.PaperRun, seen_path: Path, error_path: Path) -> None:
         shaded=shaded,
     )  # fmt: skip
     rmse = np.sqrt(np.mean(run.over_time_m**2, axis=0))
-    names = ((_BOTH, BLACK), ("with TDOA, near", PURPLE), ("with TDOA, edge", BLUE))
-    panel = Panel("", "root mean square error / m", [
-        Curve(name, one, colour) for (name, colour), one in zip(names, rmse, strict=True)
-    ])  # fmt: skip
+    # Near a station there are often no differences: that curve lies on the first.
+    looks = (
+        (_BOTH, BLACK, "-"), ("with TDOA, near", ORANGE, "--"), ("with TDOA, edge", BLUE, "-"),
+    )  # fmt: skip
+    curves = [
+        Curve(name, one, colour, style)
+        for (name, colour, style), one in zip(looks, rmse, strict=True)
+    ]
+    panel = Panel("", "root mean square error / m", curves)
     plot_error_panels(
         [panel], error_path, across="time / s", shaded=shaded,
         title=f"Fig. 12: track {shown}, EKF, {len(run.over_time_m)} draws",

@@ -21,7 +21,7 @@ ASSUMPTIONS = (
     "times of arrival: of each site's best sector; Cramér-Rao bound of 62 carriers of 15 kHz over "
     "40 symbols (the synchronisation channels of 100 ms) at the SINR, with 3 m at the least; a "
     "wrong peak anywhere within 3 km as probable as noise makes it at the SINR, which is often "
-    "below -23 dB",
+    "below -25 dB",
     "detours without line of sight: 15 m on the average, exponential, correlated over 5 m of the "
     "way and by half between stations",
     "filters know the SINR and the deviations, not the means: 3 m for echoes, 15 m for detours; "
