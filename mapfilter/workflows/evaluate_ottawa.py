@@ -20,7 +20,11 @@ from mapfilter.experiments.benchmarks.ottawa import (
     find_session,
     surveyed_positioner,
 )
-from mapfilter.experiments.benchmarks.ottawa_sessions import Session, read_session
+from mapfilter.experiments.benchmarks.ottawa_sessions import (
+    Session,
+    read_session,
+    step_factor_of,
+)
 from mapfilter.experiments.benchmarks.ottawa_store import LeftOut, read_left_out, write_left_out
 from mapfilter.experiments.benchmarks.ottawa_table import (
     PartRow,
@@ -192,12 +196,16 @@ def find_left_out(task: Task) -> None:
     positioner = surveyed_positioner(
         open_database(database), others, task.options, open_rasters(surveyed)
     )
+    crs = positioner.area.lattice.crs
+    factor = step_factor_of(others, crs)
     found = [
         one
         for draw in range(task.runs)
-        for one in find_session(task.part, session, positioner, task.options, task.seed, draw)
+        for one in find_session(
+            task.part, session, positioner, task.options, task.seed, draw, factor
+        )
     ]
-    errors_m = centroid_errors_m(session, others, positioner.area.lattice.crs)
+    errors_m = centroid_errors_m(session, others, crs)
     write_left_out(LeftOut(session.name, errors_m, tuple(found)), task.result)
 
 

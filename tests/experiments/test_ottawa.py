@@ -21,6 +21,7 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
     ReckoningErrors,
     read_session,
     session_log,
+    step_factor_of,
 )
 from mapfilter.experiments.benchmarks.ottawa_store import read_left_out
 from mapfilter.filters.particle_options import ParticleOptions
@@ -179,6 +180,21 @@ def test_dead_reckoning_without_errors_follows_the_truth(made):
     assert np.abs(truth_m[1:] - truth_m[0] - place_m[1::2]).max() < 40
     assert log.radio["timing_advance"].max() <= 6
     assert log.gnss.empty
+
+
+def test_the_step_factor_is_learnt_of_sessions_whose_speed_is_too_low(made):
+    sessions = [read_session(path) for path in sorted((made / FOLDER / "carling").iterdir())]
+    assert step_factor_of(sessions, CRS) == pytest.approx(1.0, abs=0.03)
+    slow = [replace(one, speed_mps=0.8 * one.speed_mps) for one in sessions]
+    factor = step_factor_of(slow, CRS)
+    assert factor == pytest.approx(1.25, abs=0.04)
+    told, right = (
+        session_log(one, CRS, ReckoningErrors(0, 0, 0), np.random.default_rng(0), step_factor=by)
+        for one, by in ((slow[0], 1.25), (sessions[0], 1.0))
+    )
+    np.testing.assert_allclose(told.motion["step_m"], right.motion["step_m"])
+    still = [replace(one, speed_mps=0 * one.speed_mps) for one in sessions]
+    assert step_factor_of(still, CRS) == 1.0
 
 
 def test_the_bias_is_of_all_headings_of_a_session(made):

@@ -25,6 +25,7 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
     site_of,
 )
 from mapfilter.filters.contract import Status
+from mapfilter.filters.particle_options import ParticleOptions
 from mapfilter.models.cell_id import ServingWeights
 from mapfilter.models.fingerprint import LevelErrors
 from mapfilter.models.heard_maps import HeardMaps, HeardOptions, HeardRows
@@ -60,8 +61,9 @@ _ON_MAP_M = 50.0
 class OttawaOptions:
     """How the filter is set; chosen on the part ``carling`` alone.
 
-    GNSS smooths its speed, so that steps are 5 to 25 % too short, at every corner by another share:
-    the scale is wide and drifts.
+    GNSS smooths its speed, so that steps are too short, at every corner by another share: the scale
+    is wide and drifts. Serving cells and levels of another day err together over long stretches, so
+    that both count little by the metre.
 
     Parameters
     ----------
@@ -83,10 +85,11 @@ class OttawaOptions:
                 scale_sd=0.15,
                 scale_drift_per_sqrt_m=0.005,
             ),
-            map=MapWeights(sd_m=12.0),
+            map=MapWeights(sd_m=16.0),
+            particles=ParticleOptions(most=10_000, searching=7_000),
             evidence=EvidenceOptions(
-                serving=ServingWeights(weight_per_m=1 / 100),
-                levels=LevelErrors(sd_db=5.0, correlation_m=60.0, measurement_db=3.0),
+                serving=ServingWeights(weight_per_m=1 / 150),
+                levels=LevelErrors(sd_db=5.0, correlation_m=100.0, measurement_db=3.0),
             ),
         )
     )
@@ -188,11 +191,12 @@ def find_session(
     options: OttawaOptions,
     seed: int,
     draw: int,
+    step_factor: float = 1.0,
 ) -> list[FoundSession]:
     """Find a session from an unknown start, with one draw of the noise, by both methods."""
     crs = positioner.area.lattice.crs
     rng = named_rng(seed, "noise", session.name, str(draw))
-    log = session_log(session, crs, options.errors, rng)
+    log = session_log(session, crs, options.errors, rng, step_factor=step_factor)
     found = []
     for method in METHODS:
         # The same stream of numbers: the filter below the smoother is the filter itself.

@@ -25,6 +25,7 @@ Floats = NDArray[np.float64]
 LONGEST_GAP_S = 30.0
 """Nothing is known of the way over a longer silence."""
 _MOST_STEPS = 1282
+_GOOD_M, _MOVED_M = 20.0, 4.0
 _COLUMNS = (
     "mcc", "mnc", "lac", "cellid", "lat", "lon", "signal", "measured_at", "rating", "speed",
     "direction", "ta",
@@ -129,7 +130,12 @@ def read_session(path: Path) -> Session:
 
 
 def session_log(
-    session: Session, crs: str, errors: ReckoningErrors, rng: np.random.Generator
+    session: Session,
+    crs: str,
+    errors: ReckoningErrors,
+    rng: np.random.Generator,
+    *,
+    step_factor: float = 1.0,
 ) -> TrackLog:
     """Return what a phone without GNSS would have logged, with the truth beside it.
 
@@ -143,21 +149,16 @@ def session_log(
         Of the log.
     errors : ReckoningErrors
     rng : numpy.random.Generator
+    step_factor : float
+        That all steps are multiplied by, as :func:`step_factor_of` learns it of other sessions.
     """
     time_s = session.time_s - session.time_s[0]
-    lon_deg, lat_deg = float(np.median(session.lon_deg)), float(np.median(session.lat_deg))
-    heading = heading_from_azimuth_rad(
-        session.azimuth_deg, grid_convergence_rad(crs, lon_deg, lat_deg)
-    )
     half_s = np.diff(time_s) / 2
     ends = np.column_stack([time_s[:-1] + half_s, time_s[1:]]).ravel()
-    # Rows 0, 1, 1, 2, 2, ...: each interval's halves belong to its two ends.
-    of = np.column_stack([np.arange(half_s.size), np.arange(1, half_s.size + 1)]).ravel()
-    length_s = np.repeat(half_s, 2)
-    step_m = np.where(2 * length_s <= LONGEST_GAP_S, session.speed_mps[of] * length_s, np.nan)
+    step_m, heading = _reckoned(session, crs)
     bias = errors.bias_rad * rng.choice([-1.0, 1.0])
-    step_m = step_m * (1 + errors.step_share * rng.standard_normal(of.size))
-    told = heading[of] + bias + errors.heading_sd_rad * rng.standard_normal(of.size)
+    step_m = step_factor * step_m * (1 + errors.step_share * rng.standard_normal(ends.size))
+    told = heading + bias + errors.heading_sd_rad * rng.standard_normal(ends.size)
     motion = pd.DataFrame({"time_s": ends, "step_m": step_m, "heading_rad": _wrapped(told)})
     radio = pd.DataFrame(
         {
@@ -171,6 +172,45 @@ def session_log(
     east_m, north_m = session.places(crs).T
     truth = pd.DataFrame({"time_s": time_s, "east_m": east_m, "north_m": north_m})
     return make_log(crs, motion=motion, radio=radio, truth=truth, start_utc_s=session.time_s[0])
+
+
+def step_factor_of(others: Sequence[Session], crs: str) -> float:
+    """Return how many times longer true ways are than speed times time, which GNSS smooths.
+
+    The median over all intervals of sessions between fixes that are good enough, on which one
+    moved.
+
+    Parameters
+    ----------
+    others : sequence of Session
+        Of the same receiver, but not the one that is to be found.
+    crs : str
+    """
+    ratios = []
+    for other in others:
+        step_m, heading = _reckoned(other, crs)
+        halves_m = step_m[:, np.newaxis] * np.column_stack([np.cos(heading), np.sin(heading)])
+        said_m = np.hypot(*(halves_m[0::2] + halves_m[1::2]).T)
+        true_m = np.hypot(*np.diff(other.places(crs), axis=0).T)
+        good = np.maximum(other.accuracy_m[:-1], other.accuracy_m[1:]) <= _GOOD_M
+        moved = good & (said_m > _MOVED_M)
+        ratios.append(true_m[moved] / said_m[moved])
+    every = np.concatenate([np.empty(0), *ratios])
+    return float(np.median(every)) if every.size else 1.0
+
+
+def _reckoned(session: Session, crs: str) -> tuple[Floats, Floats]:
+    """Return steps in metres and headings in radians of the two halves of each interval."""
+    lon_deg, lat_deg = float(np.median(session.lon_deg)), float(np.median(session.lat_deg))
+    heading = heading_from_azimuth_rad(
+        session.azimuth_deg, grid_convergence_rad(crs, lon_deg, lat_deg)
+    )
+    half_s = np.diff(session.time_s) / 2
+    # Rows 0, 1, 1, 2, 2, ...: each interval's halves belong to its two ends.
+    of = np.column_stack([np.arange(half_s.size), np.arange(1, half_s.size + 1)]).ravel()
+    length_s = np.repeat(half_s, 2)
+    step_m = np.where(2 * length_s <= LONGEST_GAP_S, session.speed_mps[of] * length_s, np.nan)
+    return step_m, heading[of]
 
 
 def site_of(cell: str) -> str:
