@@ -27,8 +27,7 @@ from mapfilter.positioning.challenger import (
     Challenger,
     ChallengeRules,
     MapBelief,
-    Verdict,
-    judge,
+    settle,
 )
 from mapfilter.positioning.epochs import Epoch, headed
 from mapfilter.positioning.estimate import UnusedReading
@@ -118,7 +117,7 @@ class BayesPositioner:
         """Take one epoch in."""
         grain_m = grain_of(track)
         track, unused = self._move(track, epoch, rng)
-        track, sky = self._sky.hear(track, epoch, grain_m)
+        track, sky = self._sky.hear(track, epoch, grain_m, self.model.evidence.spacing_m)
         known = track.belief is not None and epoch.fix is not None
         report = replace(epoch, fix=None) if known else epoch
         memory, reading, reason, unplaced = reading_of(
@@ -127,8 +126,7 @@ class BayesPositioner:
         track, reading, untimed = self._timed(track, epoch, reading)
         unused += [*sky.unused, *untimed]
         unused += [
-            UnusedReading(epoch.time_s, row.role, name_of(row), why)
-            for row, why in unplaced
+            UnusedReading(epoch.time_s, row.role, name_of(row), why) for row, why in unplaced
         ]
         belief = track.belief
         if belief is None:
@@ -161,49 +159,37 @@ class BayesPositioner:
         """Weigh the belief, and its challenger, which may start, win or give up."""
         told = sky.for_main(reading)
         belief, info = self.filter_for(track.compass).update(before, told, rng)
-        status = Status.LOST if track.status is Status.LOST else belief.status
         if info.reason is not Reason.USED:
-            return replace(track, belief=belief, status=status), info.reason
+            return replace(track, belief=belief), info.reason
         gained = belief.log_evidence - before.log_evidence
         doubt = track.doubt.after(reading.expected, gained, reading.length_m)
-        most = self._doubt_at(reading)
-        if belief.status is Status.CONVERGED and doubt.sum > self.rules.converge_below:
-            # All agree, and what is heard does not: the truth may have died out.
-            belief = replace(belief, status=Status.SEARCHING)
-            status = belief.status
+        cells_only = reading.levels is None and not reading.bounds
         challenger, wins, heard = track.challenger, track.wins, track.sky
-        travelled_m = track.memory.travelled_m
         if challenger is not None:
             told = sky.for_other(reading)
             other, _ = self.filter_for(track.compass).update(challenger.belief, told, rng)
-            challenger = replace(challenger, belief=other)
-            verdict = judge(self.rules, belief, challenger, travelled_m)
-            found = verdict is Verdict.WON
-            lost = verdict is Verdict.AHEAD
-            if belief.status is Status.TRACKING:
-                after = Status.TRACKING
-                status = Status.LOST if lost else after
-            else:
-                # Nothing found yet can be lost: whoever is ahead goes on with the search at once.
-                after = Status.CONVERGED if found else Status.SEARCHING
-                found = found or lost
-                status = after if found else belief.status
-            if found:
-                belief, wins = replace(other, status=after), wins + 1
-                heard = challenger.sky
-            if found or verdict not in (Verdict.OPEN, Verdict.AHEAD):
-                doubt, challenger = doubt.none(), None
-        elif status is not Status.CONVERGED and (doubt.sum >= most or sky.disputed):
-            challenger = self._challenger(track, belief, epoch, rng)
-        now = BayesTrack(
-            track.memory, belief, track.heading_rad, track.compass, status, doubt, challenger,
-            wins, heard, track.timed_at_m,
+            gained = other.log_evidence - challenger.belief.log_evidence
+            own = challenger.doubt.after(reading.expected, gained, reading.length_m)
+            challenger = replace(challenger, belief=other, doubt=own)
+        now = settle(
+            self.rules, track.status, belief, doubt, challenger, track.memory.travelled_m,
+            cells_only=cells_only,
         )  # fmt: skip
-        return now, Reason.USED
-
-    def _doubt_at(self, reading: RadioReading) -> float:
-        told = reading.levels is not None or reading.bounds
-        return self.rules.doubt if told else self.rules.doubt_of_cells
+        if now.taken_over and challenger is not None:
+            wins, heard = wins + 1, challenger.sky
+        most = self.rules.doubt_of_cells if cells_only else self.rules.doubt
+        challenger = now.challenger
+        if (
+            track.challenger is None
+            and now.status is not Status.CONVERGED
+            and (now.doubt.sum >= most or sky.disputed)
+        ):
+            challenger = self._challenger(track, now.belief, epoch, rng)
+        after = BayesTrack(
+            track.memory, now.belief, track.heading_rad, track.compass, now.status, now.doubt,
+            challenger, wins, heard, track.timed_at_m,
+        )  # fmt: skip
+        return after, Reason.USED
 
     def _challenger(
         self, track: BayesTrack, main: MapBelief, epoch: Epoch, rng: np.random.Generator
@@ -217,7 +203,9 @@ class BayesPositioner:
             return None
         belief, heard = self._start(track, reading, epoch, rng)
         travelled_m = track.memory.travelled_m
-        return Challenger(belief, travelled_m, main.log_evidence, epoch.time_s, heard)
+        return Challenger(
+            belief, travelled_m, main.log_evidence, epoch.time_s, heard, doubt=track.doubt.none()
+        )
 
     def _start(
         self, track: BayesTrack, reading: RadioReading, epoch: Epoch, rng: np.random.Generator
@@ -286,4 +274,3 @@ class BayesPositioner:
         state = self.model.any_heading(belief.state, _MOST_TIMES, rng)
         log_weight = np.tile(belief.log_weight, _MOST_TIMES) - np.log(_MOST_TIMES)
         return replace(belief, state=state, log_weight=log_weight)
-
