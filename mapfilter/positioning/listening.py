@@ -26,6 +26,7 @@ from mapfilter.positioning.receiver import (
     Receiver,
     Sky,
     Weighed,
+    agreement,
     begun,
     carried,
     centred,
@@ -40,6 +41,7 @@ from mapfilter.positioning.sky_readings import LEAST_MOVED_M, Told, range_sigma_
 
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
+Bools = NDArray[np.bool_]
 
 _RESET_GATE = 0.5
 
@@ -99,6 +101,7 @@ class Listener:
         grain_m : float
             How far the hypotheses nearest to the truth may lie beside it.
         """
+        memory = replace(memory, heard_at_s=epoch.time_s, heard_at_m=travelled_m)
         found = Listened(belief, memory)
         if epoch.fix is not None:
             found = self._hear_fix(found, epoch, epoch.fix, travelled_m)
@@ -172,25 +175,33 @@ class Listener:
     ) -> tuple[Sky, Weighed] | None:  # fmt: skip
         """Return the satellites that agree with a belief, and what they make of it."""
         gate, place, log_weight = self._gate(belief), belief.state[:2], belief.log_weight
-        whole = weighed(sky, sigma, receiver, place, log_weight, rows, free=int(fresh))
-        if whole.score >= -gate:
+        searching = belief.status is Status.SEARCHING
+        # Echoes that last make readings count less, but not be farther off.
+        once = sigma if searching else range_sigma_m(self.options, sky, np.inf, 0.0)
+
+        def weigh(chosen: Bools, clock: Receiver, free: int, gate: float) -> Weighed | None:
+            some = sky.only(chosen)
+            if not searching:
+                fits = agreement(some, once[chosen], clock, place, belief.weight, rows, free)
+                if fits < -gate:
+                    return None
+            found = weighed(some, sigma[chosen], clock, place, log_weight, rows, free)
+            return found if found.score >= -gate else None
+
+        every = np.ones(len(sky.names), dtype=np.bool_)
+        whole = weigh(every, receiver, int(fresh), gate)
+        if whole is None:
+            jumped = clock_reset(self.options, receiver)
+            whole = weigh(every, jumped, 1, _RESET_GATE * gate)
+        if whole is not None:
             return sky, whole
-        jumped = clock_reset(self.options, receiver)
-        again = weighed(sky, sigma, jumped, place, log_weight, rows, free=1)
-        if again.score >= -_RESET_GATE * gate:
-            return sky, again
         if len(sky.names) < 3:
             return None
-        alone = [
-            weighed(sky.only(one), sigma[one], receiver, place, log_weight, rows).score >= -gate
-            for one in np.eye(len(sky.names), dtype=np.bool_)
-        ]
-        good = np.array(alone)
+        good = np.array([weigh(one, receiver, 0, gate) is not None for one in np.diag(every)])
         if 2 * good.sum() <= good.size:
             return None
-        rest = sky.only(good)
-        most = weighed(rest, sigma[good], receiver, place, log_weight, rows)
-        return (rest, most) if most.score >= -gate else None
+        rest = weigh(good, receiver, 0, gate)
+        return (sky.only(good), rest) if rest is not None else None
 
     def mixed(self, gain: Floats) -> Floats:
         """Return log-likelihoods of readings of which a share tells nothing."""

@@ -132,8 +132,11 @@ def moved(
     run = np.eye(LINEAR)
     run[0, 1] = elapsed_s
     noise = np.zeros((LINEAR, LINEAR))
-    if elapsed_s > 0:
-        noise[:2, :2] = clock_noise(elapsed_s, cross_term="textbook")
+    # So much in a second, and in proportion: noise must not depend on how often one looks.
+    bias, rate = np.diag(clock_noise(1.0)).tolist()
+    noise[0, 0] = bias * elapsed_s + rate * elapsed_s**3 / 3
+    noise[0, 1] = noise[1, 0] = rate * elapsed_s**2 / 2
+    noise[1, 1] = rate * elapsed_s
     noise[2, 2] = options.slope**2 * gone_m
     rows = rows.copy()
     rows[0] += elapsed_s * rows[1]
@@ -223,3 +226,33 @@ def weighed(
     best = -0.5 * news.nis if news.used else -np.inf
     score = best - float(gain.max()) + 0.5 * max(len(sky.names) - free, 0)
     return Weighed(gain, score, after.state[2:], after.covariance[2:, 2:])
+
+
+def agreement(
+    sky: Sky, sigma_m: Floats, receiver: Receiver, place: Floats32, weight: Floats32,
+    rows: Floats, free: int = 0,
+) -> float:  # fmt: skip
+    """Return how well pseudoranges agree with a belief as a whole, taken for one Gaussian.
+
+    Arguments are those of :func:`weighed`, but weights that sum to one.
+
+    Returns
+    -------
+    float
+        Half of the degrees of freedom less the normalised square of the innovation: about 0 where
+        all is well, far below where not.
+    """
+    origin = np.array(sky.origin_m)[:, None]
+    flat = sky.true_from_grid @ (place.astype(np.float64) - origin)
+    away = sky.satellites_m[:, :2, None] - flat
+    up = sky.satellites_m[:, 2, None]
+    expected = np.sqrt(away[:, 0] ** 2 + away[:, 1] ** 2 + up**2)
+    slope = np.zeros((len(sky.names), LINEAR))
+    slope[:, 0] = 1.0
+    slope[:, 2] = -np.sin(sky.elevation_rad)
+    off = sky.range_m[:, None] - expected - slope @ (rows + receiver.mean[:, None])
+    mean = off @ weight
+    apart = off - mean[:, None]
+    spread = (apart * weight) @ apart.T + slope @ receiver.covariance @ slope.T
+    square = float(mean @ np.linalg.solve(spread + np.diag(sigma_m**2), mean))
+    return 0.5 * (max(len(sky.names) - free, 0) - square)

@@ -104,11 +104,21 @@ class Satellites:
     middle_m: tuple[float, float]
     ranges: bool = True
 
-    def hear(self, track: BayesTrack, epoch: Epoch, grain_m: float) -> tuple[BayesTrack, SkyNews]:
-        """Compare an epoch's satellites with a track's beliefs, which then carry their clocks."""
+    def hear(
+        self, track: BayesTrack, epoch: Epoch, grain_m: float, spacing_m: float
+    ) -> tuple[BayesTrack, SkyNews]:
+        """Compare an epoch's satellites with a track's beliefs, which then carry their clocks.
+
+        They are listened to when a report counts, ``spacing_m`` after the last one, or by
+        themselves where no report comes.
+        """
         if track.belief is None or (epoch.fix is None and not epoch.ranges):
             return track, NO_NEWS
-        travelled_m, listen = track.memory.travelled_m, self.listener.listen
+        travelled_m, memory = track.memory.travelled_m, track.memory
+        reported = bool(epoch.heard) and travelled_m - memory.used_at_m >= spacing_m
+        if not reported and not track.sky.due(self.options, epoch.time_s, travelled_m):
+            return track, NO_NEWS
+        listen = self.listener.listen
         main = listen(track.belief, track.sky, epoch, travelled_m, grain_m)
         track = replace(track, belief=main.belief, sky=main.memory)
         other, challenger = None, track.challenger

@@ -25,6 +25,9 @@ class SkyOptions:
         Over how many metres they do; pseudoranges in a row count as one in so many.
     fix_memory_m : float
         The same of fixes.
+    spacing_m, pause_s : float
+        Satellites are listened to with each report that counts; without one after so many metres,
+        or so many seconds where one stands.
     mask_deg : float
         Lower satellites are left out.
     height_m, height_sd_m : float
@@ -52,6 +55,8 @@ class SkyOptions:
     echo_m: float = 4.0
     echo_memory_m: float = 15.0
     fix_memory_m: float = 20.0
+    spacing_m: float = 10.0
+    pause_s: float = 10.0
     mask_deg: float = 5.0
     height_m: float = 100.0
     height_sd_m: float = 200.0

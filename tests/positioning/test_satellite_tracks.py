@@ -93,7 +93,8 @@ def test_a_spoofer_is_rejected_and_honest_satellites_come_back(positioner, most)
     if most > 1:
         assert reasons >= {Reason.REJECTED_BY_EVIDENCE, Reason.ON_PROBATION}
         rejected = {u.time_s for u in told}
-        assert sum(200 <= time_s < 260 for time_s in rejected) >= 55
+        # They are listened to every 5 m, which is every 4 s.
+        assert sum(200 <= time_s < 260 for time_s in rejected) >= 13
     # They are used again soon after it.
     assert not [u for u in told if u.time_s > 275]
     assert Status.LOST not in estimates[1].status[estimates[1].converged_at :]
@@ -109,8 +110,8 @@ def test_a_spoofed_fix_is_rejected_too(positioner):
     estimate = found(positioner, told)
     assert off_m(told, estimate)[120:].max() < 30
     times = {u.time_s for u in estimate.unused if u.kind == "gnss"}
-    assert {200.0, 259.0} <= times
-    assert max(times) < 266
+    assert 200 <= min(times) <= 204
+    assert 255 <= max(times) < 268
 
 
 def test_honest_satellites_find_a_filter_that_is_lost(positioner):
@@ -185,7 +186,7 @@ def test_a_start_eighteen_seconds_off_is_rejected_epoch_by_epoch(positioner):
     assert off_m(log, estimate)[estimate.converged_at :].mean() < 15
     after = estimate.time_s[estimate.converged_at]
     told = {u.time_s for u in estimate.unused if u.kind == "pseudorange" and u.time_s > after}
-    assert len(told) > 0.9 * np.sum(estimate.time_s > after)
+    assert len(told) > 0.2 * np.sum(estimate.time_s > after)
 
 
 def test_the_exact_filter_tells_that_it_takes_no_pseudoranges(area):
