@@ -45,6 +45,17 @@ def progress_bar(label: str) -> Iterator[Progress | None]:
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
+def rate_text(per_s: float, unit: str) -> str:
+    """Return a rate by the second, or by the minute where that is clearer.
+
+    Examples
+    --------
+    >>> rate_text(13.83, "runs"), rate_text(0.045, "sessions")
+    ('13.8 runs/s', '2.7 sessions/min')
+    """
+    return f"{per_s:.1f} {unit}/s" if per_s >= 1 else f"{60 * per_s:.1f} {unit}/min"
+
+
 @contextlib.contextmanager
 def rate_bar(label: str, unit: str, every_s: float = 30.0) -> Iterator[Progress]:
     """Give a progress on stderr with rate and time left; a line now and then where nobody watches.
@@ -69,7 +80,7 @@ def rate_bar(label: str, unit: str, every_s: float = 30.0) -> Iterator[Progress]
         if time.monotonic() - told_s >= every_s and done > first:
             told_s = time.monotonic()
             left_s = (total - done) / rate(done)
-            many = f"{done} of {total} {unit}, {rate(done):.1f} {unit}/s, {left_s:.0f} s left"
+            many = f"{done} of {total} {unit}, {rate_text(rate(done), unit)}, {left_s:.0f} s left"
             say(f"{label}: {many}")
 
     if not sys.stderr.isatty():
@@ -87,7 +98,7 @@ def rate_bar(label: str, unit: str, every_s: float = 30.0) -> Iterator[Progress]
             nonlocal began_s, first
             if first < 0:
                 began_s, first = time.monotonic(), done
-            told = f"{rate(done):.1f} {unit}/s"
+            told = rate_text(rate(done), unit)
             bar.update(task, completed=done, total=total, rate=told)
 
         yield show
