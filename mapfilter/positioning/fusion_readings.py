@@ -66,6 +66,18 @@ def site_readings(sites: SiteModels, epoch: Epoch, timed: dict[str, int]) -> Sit
     )  # fmt: skip
 
 
+def not_taken(log: TrackLog) -> list[UnusedReading]:
+    """Return what a log holds that these filters make no use of, each kind once."""
+    kinds = (("pseudorange", log.pseudoranges), ("tdoa", log.tdoa))
+    return [
+        UnusedReading(
+            float(rows["time_s"].iloc[0]), kind, f"{len(rows)} rows", Reason.NOT_USED_BY_FILTER
+        )
+        for kind, rows in kinds
+        if len(rows)
+    ]
+
+
 def timing_advances_of(log: TrackLog) -> dict[float, dict[str, int]]:
     """Return the steps of timing advance by time and cell."""
     table = log.radio[log.radio["timing_advance"].notna() & log.radio["cell"].notna()]

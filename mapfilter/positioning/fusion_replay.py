@@ -29,7 +29,12 @@ from mapfilter.positioning.estimate import Fix, TrackEstimate, UnusedReading
 from mapfilter.positioning.fusion import compiled
 from mapfilter.positioning.fusion_belief import SumBelief
 from mapfilter.positioning.fusion_models import SiteModels
-from mapfilter.positioning.fusion_readings import SiteReadings, site_readings, timing_advances_of
+from mapfilter.positioning.fusion_readings import (
+    SiteReadings,
+    not_taken,
+    site_readings,
+    timing_advances_of,
+)
 from mapfilter.positioning.fusion_smoothing import FusionHistory
 from mapfilter.positioning.gaussian_radii import gaussian_radii_m, share_within
 from mapfilter.positioning.track import PositionedTrack
@@ -71,6 +76,8 @@ def position_by_fusion(
     history = FusionHistory() if smooth else None
     walked = _Walk(sites, method, reckoned=bool(len(log.motion)), history=history)
     timed = timing_advances_of(log)
+    walked.unused += not_taken(log)
+    log = replace(log, pseudoranges=log.pseudoranges.iloc[:0], tdoa=log.tdoa.iloc[:0])
     fixes = [walked.take(epoch, timed.get(epoch.time_s, {})) for epoch in epochs(log)]
     if history is not None:
         fixes = _in_hindsight(fixes, history, walked.where)

@@ -12,7 +12,8 @@ from mapfilter.models.fingerprint import LevelErrors
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.positioning.bayes_options import BayesOptions
 from mapfilter.positioning.evidence import EvidenceOptions
-from mapfilter.workflows.fields import NotNegative, Positive, Section
+from mapfilter.positioning.sky_options import SkyOptions, TimingOptions
+from mapfilter.workflows.fields import Finite, NotNegative, Positive, Section
 
 
 class BayesSection(Section):
@@ -41,6 +42,11 @@ class BayesSection(Section):
     switch_mass: Annotated[float, Field(gt=0, lt=1)] = 0.985
     switch_hold_m: NotNegative = 14.0
     smooth: bool = False
+    satellite_sd_m: Positive = 2.0
+    antenna_height_m: Finite = 100.0
+    antenna_height_sd_m: NotNegative = 200.0
+    timing_step_m: Positive = 553.5
+    timing_sd_m: Positive = 200.0
 
     @property
     def options(self) -> BayesOptions:
@@ -70,5 +76,11 @@ class BayesSection(Section):
                 switch_mass=self.switch_mass,
                 switch_hold_m=self.switch_hold_m,
             ),
+            satellites=SkyOptions(
+                zenith_m=self.satellite_sd_m,
+                height_m=self.antenna_height_m,
+                height_sd_m=self.antenna_height_sd_m,
+            ),
+            timing=TimingOptions(step_m=self.timing_step_m, advance_sd_m=self.timing_sd_m),
             smooth=self.smooth,
         )

@@ -52,7 +52,7 @@ def lacking(log: TrackLog, estimate: TrackEstimate) -> str:
     serving = (log.radio["role"] == SERVING) & log.radio["cell"].notna()
     moved = log.motion["step_m"].notna()
     lacks = []
-    if not serving.any():
+    if not serving.any() and not (estimate.hypotheses > 0).any():
         lacks.append("no serving cell")
     elif not (estimate.hypotheses > 0).any():
         lacks.append("no serving cell of which the database has points")

@@ -1,0 +1,117 @@
+"""Timing advances and time differences as evidence of places, by hand-worked numbers."""
+
+from dataclasses import replace
+from math import inf, nan
+
+import numpy as np
+import pandas as pd
+import pytest
+from cross_world import CRS, LATTICE, make_database, walk_log
+
+from mapfilter.filters.contract import Reason
+from mapfilter.filters.particle_options import ParticleOptions
+from mapfilter.positioning.bayes_options import BayesOptions, open_area
+from mapfilter.positioning.bayes_replay import position_by_bayes
+from mapfilter.positioning.epochs import Difference, Epoch, Heard
+from mapfilter.positioning.sky_options import TimingOptions
+from mapfilter.positioning.timing import NEVER, is_timed, with_timing
+from mapfilter.tracks.log import make_log
+
+LTE = TimingOptions(step_m=78.1, advance_sd_m=30.0, advance_memory_m=50.0)
+WEST, SOUTH, *_ = LATTICE.bounds_m
+
+
+@pytest.fixture(scope="module")
+def area(tmp_path_factory):
+    return open_area(make_database(tmp_path_factory.mktemp("timing")))
+
+
+def state(*places):
+    found = np.zeros((5, len(places)), dtype=np.float32)
+    found[:2] = np.array(places).T
+    return found
+
+
+def told(area, epoch, timed=NEVER, travelled_m=0.0, options=LTE):
+    return with_timing(area, options, epoch, None, timed, travelled_m)
+
+
+def test_a_timing_advance_is_a_ring(area):
+    epoch = Epoch(0.0, heard=(Heard("serving", "W", None, None, nan, 0, 1.0),))
+    reading, timed, unused = told(area, epoch)
+    assert (timed, unused) == ((0.0, -inf), [])
+    # Cell W stands at (0, 150) and 28.5 m above the phone: 1.5 steps are 117.15 m.
+    places = state((100.0, 150.0), (0.0, 263.6), (300.0, 150.0))
+    gain = reading.also[0].log_likelihood(places)
+    sigma = np.hypot(30.0, 78.1 / 12**0.5)
+    away = np.hypot([100.0, 113.6, 300.0], 28.5)
+    expected = -0.5 * np.minimum(((117.15 - away) / sigma) ** 2, 9.0)
+    np.testing.assert_allclose(gain, expected, atol=1e-6)
+    assert reading.expected == pytest.approx(-0.5)
+
+
+def test_errors_that_last_count_once(area):
+    epoch = Epoch(0.0, heard=(Heard("serving", "W", None, None, nan, 0, 1.0),))
+    soon, _, _ = told(area, epoch, (0.0, -inf), 5.0)
+    place = state((300.0, 150.0))
+    whole = told(area, epoch)[0].also[0].log_likelihood(place)
+    share = 1 - np.exp(-2 * 5.0 / 50.0)
+    np.testing.assert_allclose(soon.also[0].log_likelihood(place), share * whole)
+    still, timed, _ = told(area, epoch, (0.0, -inf), 0.0)
+    assert still is None
+    assert timed == (0.0, -inf)
+
+
+def test_differences_share_the_error_of_their_reference(area):
+    rows = (Difference("E", "W", 120.0, 5.0, 8.0), Difference("NW", "W", -40.0, 12.0, 8.0))
+    reading, timed, unused = told(area, Epoch(0.0, differences=rows))
+    assert (timed, unused) == ((-inf, 0.0), [])
+    place = state((150.0, 150.0))
+    sites = np.array([[400.0, 150.0], [0.0, 300.0]])
+    away = np.sqrt(np.sum((sites - 150.0) ** 2, axis=1) + 28.5**2)
+    off = np.array([120.0, -40.0]) - (away - np.hypot(150.0, 28.5))
+    noise = np.diag([25.0, 144.0]) + 64.0
+    square = min(float(off @ np.linalg.solve(noise, off)), 2 * 9.0)
+    np.testing.assert_allclose(reading.also[0].log_likelihood(place), -0.5 * square, rtol=1e-5)
+
+
+def test_what_nobody_can_place_is_told(area):
+    rows = (
+        Difference("E", "??", 10.0), Difference("E", "W", nan), Difference("E", "W", 3.0),
+        Difference("E", "W", 4.0), Difference("W", "W", 0.0),
+    )  # fmt: skip
+    heard = (Heard("serving", "??", None, None, nan, 0, 2.0),)
+    reading, _, unused = told(area, Epoch(0.0, heard=heard, differences=rows))
+    assert len(reading.also) == 1
+    assert [(u.kind, u.what, u.reason) for u in unused] == [
+        ("ta", "??", Reason.UNKNOWN_CELL),
+        ("tdoa", "??", Reason.UNKNOWN_CELL),
+        ("tdoa", "E", Reason.SECOND_READING),
+    ]
+    assert not is_timed(Epoch(0.0, heard=(Heard("serving", "W", None, None, nan, 0),)))
+
+
+def test_times_of_arrival_shorten_the_search(area):
+    log = walk_log()
+    sites = {"W": (WEST, SOUTH + 150), "E": (LATTICE.bounds_m[2], SOUTH + 150),
+             "NW": (WEST, LATTICE.bounds_m[3])}  # fmt: skip
+    away = {
+        cell: np.sqrt((log.truth["east_m"] - x) ** 2 + (log.truth["north_m"] - y) ** 2 + 28.5**2)
+        for cell, (x, y) in sites.items()
+    }
+    rng = np.random.default_rng(0)
+    rows = [
+        pd.DataFrame({"time_s": log.truth["time_s"], "cell": cell, "reference": "W",
+                      "difference_m": away[cell] - away["W"] + rng.normal(0, 8, len(log.truth)),
+                      "sigma_m": 6.0, "reference_sigma_m": 6.0})
+        for cell in ("E", "NW")
+    ]  # fmt: skip
+    with_them = replace(log, tdoa=make_log(CRS, tdoa=pd.concat(rows)).tdoa)
+    few = ParticleOptions(most=2000, searching=1000, least=300)
+    positioner = BayesOptions(particles=few).over(area)
+    switch = [
+        position_by_bayes(positioner, one, np.random.default_rng(1)).estimate.converged_at
+        for one in (log, with_them)
+    ]
+    assert switch[1] is not None
+    assert switch[1] < 0.7 * (switch[0] or len(log.truth))
