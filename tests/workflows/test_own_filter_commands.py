@@ -108,3 +108,11 @@ def test_it_has_no_hindsight(world, here):
 
 def test_filters_without_a_map_are_those_that_replay_has():
     assert set(FUSION_FILTERS) == set(REPLAYED)
+
+
+@pytest.mark.parametrize("command", ["sweep", "evaluate"])
+def test_a_filter_without_a_map_is_refused_where_there_is_one(command, own_world, tmp_path):
+    ekf = settings(filter__name="ekf") if command == "sweep" else ["--filter", "ekf"]
+    name = ["global-positioning"] if command == "evaluate" else []
+    told = mapfilter(command, *name, "-c", own_world.toml, *ekf, "--out", tmp_path / "out")
+    assert_refused(told, "a filter that takes a database", "ekf")
