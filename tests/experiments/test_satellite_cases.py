@@ -1,0 +1,49 @@
+"""The benchmark's cases with satellites: asked for by name only, over the same walks."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mapfilter.errors import ConfigError
+from mapfilter.experiments.benchmarks.cases import CASES, USUAL
+from mapfilter.experiments.benchmarks.journeys import Walk
+from mapfilter.experiments.benchmarks.satellites import SPOOFED_S, spoofer_of, with_satellites
+from mapfilter.tracks.log import make_log
+from mapfilter.workflows.evaluate import check_cases
+
+CRS = "EPSG:32629"
+NAMES = [*(f"satellites-{count}" for count in range(5)), "spoofed"]
+TRUTH = pd.DataFrame(
+    {"time_s": np.arange(401.0), "east_m": 531_000.0 + 1.4 * np.arange(401.0), "north_m": 4.556e6}
+)
+WALKED = Walk(TRUTH)
+
+
+def log_of(name):
+    return with_satellites(CASES[name], make_log(CRS, truth=TRUTH), WALKED, None, 1, 2)
+
+
+def test_they_are_run_only_when_asked_for():
+    assert set(NAMES).isdisjoint(USUAL)
+    assert check_cases(()) == USUAL
+    assert check_cases(NAMES) == tuple(NAMES)
+    with pytest.raises(ConfigError, match="satellites-4"):
+        check_cases(["satellites-9"])
+
+
+def test_cases_of_a_walk_see_the_same_sky():
+    few, many, none = (log_of(f"satellites-{n}").pseudoranges for n in (2, 4, 0))
+    assert none.empty
+    keys = ["time_s", "satellite", "pseudorange_m"]
+    assert len(few.merge(many, on=keys)) == len(few)
+    spoofer, spoofed = spoofer_of(WALKED, 1, 2), log_of("spoofed").pseudoranges
+    changed = many["pseudorange_m"].to_numpy() != spoofed["pseudorange_m"].to_numpy()
+    times = many["time_s"][changed]
+    assert times.min() >= spoofer.from_s
+    assert times.max() <= spoofer.from_s + SPOOFED_S
+    assert np.hypot(spoofer.east_m, spoofer.north_m) == pytest.approx(500.0)
+
+
+def test_a_case_without_a_receiver_hears_nothing():
+    log = make_log(CRS, truth=TRUTH)
+    assert with_satellites(CASES["levels-6"], log, WALKED, None, 1, 2) is log
