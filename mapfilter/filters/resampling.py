@@ -107,13 +107,19 @@ def copy_with_jitter(
         Filled.
     """
     rows = state.shape[0]
-    for r in range(rows):
-        source, target = state[r], copies[r]
-        sd = jitter[r] if r < jitter.size else np.float32(0.0)
+    for r in range(0, rows, 2):
+        # Normal numbers come in pairs: one for each of two rows.
+        one, other = state[r], state[min(r + 1, rows - 1)]
+        to_one, to_other = copies[r], copies[min(r + 1, rows - 1)]
+        sd, other_sd = jitter[r], jitter[min(r + 1, rows - 1)]
         for j in range(chosen.size):
-            target[j] = source[np.uint32(chosen[j])]
-        if sd > 0:
-            first = np.uint64(r) << np.uint64(40)
+            to_one[j] = one[np.uint32(chosen[j])]
+            to_other[j] = other[np.uint32(chosen[j])]
+        first = np.uint64(r) << np.uint64(40)
+        if r + 1 == rows:
+            other_sd = np.float32(0.0)
+        if sd > 0 or other_sd > 0:
             for j in range(chosen.size):
-                a, _ = normals(hashed(key, first + np.uint64(j)))
-                target[j] += sd * a
+                a, b = normals(hashed(key, first + np.uint64(j)))
+                to_one[j] += sd * a
+                to_other[j] += other_sd * b
