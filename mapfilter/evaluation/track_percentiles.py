@@ -28,9 +28,9 @@ class Percentile:
     Parameters
     ----------
     value : float
-        NaN where nothing counts.
+        NaN where nothing counts, or so much fails that there is none.
     low, high : float
-        95 % interval over tracks.
+        95 % interval over tracks; NaN likewise.
     epochs : int
         How many count.
     """
@@ -62,9 +62,7 @@ def percentile_of_tracks(errors_m: Floats, counted: Bools, share: float) -> Perc
     >>> percentile_of_tracks(errors, errors > 0, 0.9)
     Percentile(value=9.0, low=5.0, high=10.0, epochs=10)
     """
-    drawn = _drawn(errors_m, counted, share)
-    low, high = _interval(drawn[1:])
-    return Percentile(float(drawn[0]), low, high, int(counted.sum()))
+    return _found(_drawn(errors_m, counted, share), counted)
 
 
 def ratio_of_tracks(one_m: Floats, other_m: Floats, counted: Bools, share: float) -> Percentile:
@@ -75,13 +73,13 @@ def ratio_of_tracks(one_m: Floats, other_m: Floats, counted: Bools, share: float
     InputError
         As for :func:`percentile_of_tracks`.
     """
-    ratio = _drawn(one_m, counted, share) / _drawn(other_m, counted, share)
-    low, high = _interval(ratio[1:])
-    return Percentile(float(ratio[0]), low, high, int(counted.sum()))
+    with np.errstate(invalid="ignore"):
+        ratio = _drawn(one_m, counted, share) / _drawn(other_m, counted, share)
+    return _found(ratio, counted)
 
 
 def _drawn(errors_m: Floats, counted: Bools, share: float) -> Floats:
-    """Return the percentile of all tracks, then those of tracks drawn anew."""
+    """Return the percentile of all tracks, then those of tracks drawn anew; failures infinite."""
     if errors_m.ndim != 2 or errors_m.shape != counted.shape:
         got = f"{errors_m.shape} and {counted.shape}"
         raise fail(InputError, "errors_m", "tracks by epochs, as counted is", got)
@@ -101,12 +99,14 @@ def _drawn(errors_m: Floats, counted: Bools, share: float) -> Floats:
         if below.size and below[-1] > 0:
             at = int(np.searchsorted(below, share * below[-1] - 1e-9))
             found[index] = errors[at]
-    return np.where(np.isinf(found), np.nan, found)
+    return found
 
 
-def _interval(values: Floats) -> tuple[float, float]:
-    known = np.sort(values[np.isfinite(values)])
-    if not known.size:
-        return float("nan"), float("nan")
-    low, high = np.quantile(known, [0.025, 0.975], method="inverted_cdf")
-    return float(low), float(high)
+def _found(drawn: Floats, counted: Bools) -> Percentile:
+    """Return the first one with the interval of the others."""
+    known = drawn[1:][~np.isnan(drawn[1:])]
+    ends = np.quantile(known, [0.025, 0.975], method="inverted_cdf") if known.size else [np.nan] * 2
+    value, low, high = (
+        float(one) if np.isfinite(one) else float("nan") for one in (drawn[0], *ends)
+    )
+    return Percentile(value, low, high, int(counted.sum()))

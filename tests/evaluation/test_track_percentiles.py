@@ -18,6 +18,15 @@ def test_by_hand_and_failures_are_worst():
     assert percentile_of_tracks(errors, known, 0.9).epochs == 5
 
 
+def test_intervals_end_where_too_much_fails():
+    """Ten tracks of which one fails: with two of them among those drawn, 90 % is a failure."""
+    errors = np.tile(np.arange(1.0, 11.0), (10, 1))
+    errors[0] = np.nan
+    found = percentile_of_tracks(errors, np.ones(errors.shape, dtype=bool), 0.9)
+    assert (found.value, found.low) == (10.0, 9.0)
+    assert np.isnan(found.high)
+
+
 def test_nothing_counted():
     found = percentile_of_tracks(np.ones((2, 3)), np.zeros((2, 3), dtype=bool), 0.9)
     assert np.isnan([found.value, found.low, found.high]).all()
