@@ -10,6 +10,7 @@ from mapfilter._parallel import SerialExecutor
 from mapfilter.experiments.papers import dlr, dlr_table
 from mapfilter.experiments.papers import dlr_filters as filters
 from mapfilter.experiments.papers import dlr_scene as scene
+from mapfilter.experiments.papers.dlr_assumptions import ASSUMPTIONS
 from mapfilter.models.state import POSITION_CLOCK_3D
 from mapfilter.positioning.least_squares import TOO_FEW
 
@@ -26,6 +27,12 @@ def place():
 @pytest.fixture(scope="module")
 def track(place):
     return scene.draw_track(place, np.random.default_rng(21))
+
+
+def test_the_page_tells_all_assumptions():
+    page = Path(__file__).parents[2] / "docs" / "explanation" / "canyon.rst"
+    told = " ".join(page.read_text(encoding="utf-8").split())
+    assert [one for one in ASSUMPTIONS if one not in told] == []
 
 
 def test_the_canyon_and_its_network(place, track):
