@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from mapfilter._io import ensure_writable_folder, read_json, write_json
 from mapfilter._parallel import Progress, local_executor, ordered_results
 from mapfilter.database.store import open_database
@@ -33,7 +35,8 @@ from mapfilter.experiments.benchmarks.ottawa_table import (
     session_rows,
 )
 from mapfilter.radio.rasters import open_rasters
-from mapfilter.report.error_curves import plot_error_curves
+from mapfilter.report.canvas import BLUE, GREEN, GREY
+from mapfilter.report.cumulative import Distribution, plot_cumulative
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.facts import facts
 from mapfilter.workflows.sections import Config
@@ -44,6 +47,8 @@ RUNS = 3
 _VERSION = 1
 _FLOOR_DBM = -140.0
 _HALF_WIDTH_M = 15.0
+_MOST_M = 300.0
+_COLOURS = {"bayes": BLUE, "smoothed": GREEN, "centroid": GREY}
 
 
 @dataclass(frozen=True)
@@ -176,7 +181,9 @@ def run_ottawa(
         centroid_m = {left_out.session: left_out.centroid_m for left_out in every}
         rows += part_rows(part, found, centroid_m)
         told += session_rows(found, centroid_m)
-        plot_error_curves(_curves(every), out / part / PICTURE, title=f"Ottawa, {part}")
+        title = f"Ottawa, {part}: real phones, each session on the map of the others"
+        picture = out / part / PICTURE
+        plot_cumulative(_curves(every), picture, title=title, most_m=_MOST_M, share=0.95)
     seconds = time.perf_counter() - began_s
     result = OttawaResult(seed, runs, tuple(rows), tuple(told), seconds, out)
     write_json(out / TABLE, facts(result))
@@ -251,11 +258,15 @@ def _map_of(others: Sequence[Session], folder: Path) -> tuple[Path, Path]:
     return surveyed.deviation, run_build(config).database
 
 
-def _curves(every: Sequence[LeftOut]) -> dict[str, list[float]]:
+def _curves(every: Sequence[LeftOut]) -> list[Distribution]:
     """Return all errors by method, for the picture."""
-    curves: dict[str, list[float]] = {}
+    errors_m = {"centroid": [left_out.centroid_m for left_out in every]}
     for left_out in every:
         for one in left_out.found:
-            curves.setdefault(one.method, []).extend(one.error_m.tolist())
-    curves["centroid"] = [error for left_out in every for error in left_out.centroid_m.tolist()]
-    return curves
+            errors_m.setdefault(one.method, []).append(one.error_m)
+    told = {name: np.concatenate([np.empty(0), *errors_m[name]]) for name in _COLOURS}
+    return [
+        Distribution(f"{name}, median {np.median(told[name]):.0f} m", told[name], colour)
+        for name, colour in _COLOURS.items()
+        if told[name].size
+    ]
