@@ -47,7 +47,7 @@ class ParticleOptions:
     flatten: float = 0.5
     jitter: tuple[float, ...] = (0.2, 0.2, 0.005, 0.003, 0.0)
     searching_jitter: tuple[float, ...] = (1.5, 1.5, 0.015, 0.009, 0.0)
-    switch_mass: float = 0.985
+    switch_mass: float = 0.99
     switch_hold_m: float = 14.0
 
     def __post_init__(self) -> None:

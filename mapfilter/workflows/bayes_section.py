@@ -39,7 +39,7 @@ class BayesSection(Section):
     most_particles: Annotated[int, Field(ge=100, le=10_000_000)] = 20_000
     searching_particles: Annotated[int, Field(ge=10, le=10_000_000)] = 12_000
     least_particles: Annotated[int, Field(ge=10, le=10_000_000)] = 1000
-    switch_mass: Annotated[float, Field(gt=0, lt=1)] = 0.985
+    switch_mass: Annotated[float, Field(gt=0, lt=1)] = 0.99
     switch_hold_m: NotNegative = 14.0
     smooth: bool = False
     satellite_sd_m: Positive = 2.0
