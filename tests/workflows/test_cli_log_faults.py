@@ -123,8 +123,14 @@ def test_one_bad_log_of_many_stops_all_before_anything_is_written(own_world, rep
     ("more", "told"),
     [
         (["--filter", "kalman"], "setting filter.name: expected 'candidate', 'bayes', 'grid',"),
-        (["--without", "gps"], "setting track.without.0: expected 'gnss', 'ta' or 'neighbours'"),
-        (["--without", "gnss,"], "setting track.without.1: expected 'gnss', 'ta' or 'neighbours'"),
+        (
+            ["--without", "gps"],
+            "setting track.without.0: expected 'gnss', 'fixes', 'pseudoranges', 'ta', 'tdoa'",
+        ),
+        (
+            ["--without", "gnss,"],
+            "setting track.without.1: expected 'gnss', 'fixes', 'pseudoranges', 'ta', 'tdoa'",
+        ),
         (["--without", ""], "setting track.without.0: expected"),
         (["--set", "filter.threshold=0"], "setting filter.threshold: expected greater than"),
     ],
