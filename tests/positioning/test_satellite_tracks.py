@@ -204,3 +204,24 @@ def test_rows_of_one_time_count_alike_in_any_order(positioner):
     one, other = found(positioner, log), found(positioner, told)
     assert one.converged_at == other.converged_at
     np.testing.assert_allclose(one.east_m[-50:], other.east_m[-50:], atol=1.0)
+
+
+def test_hindsight_and_turns_alone_take_satellites_too(positioner):
+    log = sky_log(most=4, legs=((EAST, 90.0), (NORTH, 60.0)))
+    heading = log.motion["heading_rad"].to_numpy()
+    turn = np.diff(heading, prepend=np.nan)
+    motion = log.motion.assign(heading_rad=np.nan, turn_rad=(turn + np.pi) % (2 * np.pi) - np.pi)
+    for one, smooth in ((log, True), (replace(log, motion=motion), False)):
+        rng = np.random.default_rng(1)
+        estimate = position_by_bayes(positioner, one, rng, smooth=smooth).estimate
+        assert off_m(log, estimate)[-30:].mean() < 12
+
+
+def test_the_exact_filter_takes_fixes_and_rejects_lies(area):
+    grid = BayesOptions(grid=True, particles=FEW).over(area)
+    log = walk_log(((EAST, 90.0),))
+    fixes = log.truth[["time_s", "east_m", "north_m"]].assign(var_east_m2=9.0, var_north_m2=9.0)
+    fixes.loc[fixes["time_s"] > 40, "north_m"] += 400.0
+    estimate = found(grid, replace(log, gnss=make_log(CRS, gnss=fixes).gnss))
+    assert off_m(log, estimate)[10:].max() < 15
+    assert {u.reason for u in estimate.unused if u.kind == "gnss"} >= {Reason.REJECTED_BY_EVIDENCE}
