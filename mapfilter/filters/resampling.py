@@ -111,13 +111,12 @@ def copy_with_jitter(
         # Normal numbers come in pairs: one for each of two rows.
         one, other = state[r], state[min(r + 1, rows - 1)]
         to_one, to_other = copies[r], copies[min(r + 1, rows - 1)]
-        sd, other_sd = jitter[r], jitter[min(r + 1, rows - 1)]
+        sd = jitter[r] if r < jitter.size else np.float32(0.0)
+        other_sd = jitter[r + 1] if r + 1 < min(rows, jitter.size) else np.float32(0.0)
         for j in range(chosen.size):
             to_one[j] = one[np.uint32(chosen[j])]
             to_other[j] = other[np.uint32(chosen[j])]
         first = np.uint64(r) << np.uint64(40)
-        if r + 1 == rows:
-            other_sd = np.float32(0.0)
         if sd > 0 or other_sd > 0:
             for j in range(chosen.size):
                 a, b = normals(hashed(key, first + np.uint64(j)))

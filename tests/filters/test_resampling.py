@@ -60,3 +60,14 @@ def test_copies_part_by_the_jitter():
     np.testing.assert_allclose(copies.std(axis=1), [2.0, 0.5, 0.0, 1.0, 3.0], rtol=0.02)
     noise = np.corrcoef(copies[[0, 1, 3, 4]]) - np.eye(4)
     assert np.abs(noise).max() < 0.02
+
+
+def test_rows_beyond_the_jitter_are_copied_as_they_are():
+    state = np.arange(24.0, dtype=np.float32).reshape(8, 3)
+    chosen = np.array([2, 0, 0, 1], dtype=np.int32)
+    copies = np.empty((8, chosen.size), dtype=np.float32)
+    # What lies behind it in memory is no jitter.
+    jitter = np.full(8, 100.0, dtype=np.float32)[:5]
+    copy_with_jitter(state, chosen, jitter, draw_key(np.random.default_rng(0)), copies)
+    np.testing.assert_array_equal(copies[5:], state[5:, chosen])
+    assert not np.any(copies[:5] == state[:5, chosen])
