@@ -191,7 +191,7 @@ class Listener:
         every = np.ones(len(sky.names), dtype=np.bool_)
         whole = weigh(every, receiver, int(fresh), gate)
         if whole is None:
-            jumped = clock_reset(self.options, receiver)
+            jumped = near_clock(sky, clock_reset(self.options, receiver))
             whole = weigh(every, jumped, 1, _RESET_GATE * gate)
         if whole is not None:
             return sky, whole
