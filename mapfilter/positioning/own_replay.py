@@ -39,7 +39,8 @@ def position_by_own(
 
     It starts at the first epoch with a fix or with a serving cell of which the database has points:
     ``init`` is given that epoch, and ``update`` the same one and all later ones in which something
-    was heard. What is before is labelled and passed over.
+    was heard: reports, fixes, pseudoranges or time differences. What is before is labelled and
+    passed over.
 
     Parameters
     ----------
@@ -130,7 +131,8 @@ def _follow(
 
 def _events(epoch: Epoch) -> tuple[Event[Epoch], ...]:
     *earlier, last = epoch.motion or (None,)
-    heard = epoch if epoch.heard or epoch.fix is not None else None
+    told = epoch.heard or epoch.ranges or epoch.differences or epoch.fix is not None
+    heard = epoch if told else None
     return (
         *(Event[Epoch](epoch.time_s, motion) for motion in earlier),
         Event(epoch.time_s, last, heard),

@@ -8,6 +8,7 @@ from math import isnan, nan
 import numpy as np
 import pytest
 from cross_world import CROSSING, make_database, walk_log
+from sky_world import sky_log
 
 from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
@@ -179,3 +180,21 @@ def test_steps_reach_it_as_they_were_logged(tmp_path):
     position_by_own(database, Watching(database), log, np.random.default_rng(0), name="a:b")
     assert len(seen) == len(log.motion)
     assert all(isinstance(step, MotionStep) and isnan(step.heading_rad) for step in seen)
+
+
+def test_satellites_alone_reach_it(tmp_path):
+    seen = []
+
+    class Watching(Counting):
+        def update(self, belief, epoch, rng):
+            seen.append((len(epoch.heard), len(epoch.ranges)))
+            return super().update(belief, epoch, rng)
+
+    log = sky_log(legs=((0.0, 30.0),), most=2)
+    first = log.radio[log.radio["time_s"] == 0]
+    log = make_log(log.crs, motion=log.motion, radio=first, pseudoranges=log.pseudoranges)
+    database = make_database(tmp_path)
+    position_by_own(database, Watching(database), log, np.random.default_rng(0), name="a:b")
+    assert len(seen) > 10
+    assert seen[0] == (1, 2)
+    assert set(seen[1:]) == {(0, 2)}
