@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mapfilter._io import ensure_writable_folder, read_json, write_json
+from mapfilter._io import ensure_writable_folder, write_json
 from mapfilter._parallel import Progress, local_executor, ordered_results
 from mapfilter.database.store import open_database
-from mapfilter.errors import ConfigError, InputError, fail
+from mapfilter.errors import InputError, fail
 from mapfilter.experiments.benchmarks.ottawa import (
     FOLDER,
     LEFT_OUT,
@@ -34,6 +34,7 @@ from mapfilter.experiments.benchmarks.ottawa_table import (
     part_rows,
     session_rows,
 )
+from mapfilter.experiments.benchmarks.resuming import begin
 from mapfilter.radio.rasters import open_rasters
 from mapfilter.report.canvas import BLUE, GREEN, GREY
 from mapfilter.report.cumulative import Distribution, plot_cumulative
@@ -159,7 +160,8 @@ def run_ottawa(
         for file in every
     ]  # fmt: skip
     ensure_writable_folder(out)
-    _begin(out, {"version": _VERSION, "seed": seed, "runs": runs, "options": repr(chosen)}, resume)
+    head = {"version": _VERSION, "seed": seed, "runs": runs, "options": repr(chosen)}
+    begin(out / HEAD, head, [task.result for task in tasks], resume=resume)
     todo = [task for task in tasks if not (resume and task.result.is_file())]
     before = len(tasks) - len(todo)
 
@@ -214,14 +216,6 @@ def find_left_out(task: Task) -> None:
     ]
     errors_m = centroid_errors_m(session, others, crs)
     write_left_out(LeftOut(session.name, errors_m, tuple(found)), task.result)
-
-
-def _begin(out: Path, head: dict[str, object], resume: bool) -> None:
-    if resume and (out / HEAD).is_file() and read_json(out / HEAD) != head:
-        expected = "the same runs, seed and options to resume"
-        hint = "begin without --resume, or in another folder"
-        raise fail(ConfigError, str(out), expected, "others", hint)
-    write_json(out / HEAD, head)
 
 
 def _session_files(data: Path, part: str) -> list[Path]:

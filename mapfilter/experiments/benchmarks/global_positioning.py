@@ -14,9 +14,9 @@ from typing import Any
 
 from mapfilter._io import read_json, write_json
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
-from mapfilter.errors import ConfigError, fail
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.journeys import displaced_walk, log_of, walk
+from mapfilter.experiments.benchmarks.resuming import begin
 from mapfilter.experiments.benchmarks.satellites import TOLD, spoofer_of, with_satellites
 from mapfilter.experiments.benchmarks.scores import (
     CaseResult,
@@ -141,13 +141,10 @@ def benchmark(
         "filter": repr(choice),
         "cases": list(cases),
         "seed": seed,
+        "world": world.sha256,
     }
-    if resume and (out / HEAD).is_file() and read_json(out / HEAD) != head:
-        expected = "the same cases, seed and filter to resume"
-        hint = "begin without --resume, or in another folder"
-        raise fail(ConfigError, str(out), expected, "others", hint)
-    write_json(out / HEAD, head)
     (out / BATCHES).mkdir(parents=True, exist_ok=True)
+    begin(out / HEAD, head, (out / BATCHES).glob("*.json"), resume=resume)
     tasks, kept = [], dict[int, list[Row]]()
     for first in range(0, runs, ROUTES_PER_REALITY):
         end = min(first + ROUTES_PER_REALITY, runs)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -12,7 +13,7 @@ import pyarrow.parquet as pq
 import shapely
 from numpy.typing import NDArray
 
-from mapfilter._io import atomic_file
+from mapfilter._io import atomic_file, sha256_file
 from mapfilter.database.store import open_database
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.sweep.world import SweepWorld, open_world
@@ -41,6 +42,13 @@ class BenchmarkWorld:
 
     folder: Path
     model: PredictionModel
+
+    @property
+    def sha256(self) -> str:
+        """Of streets, cells, levels and buildings."""
+        parts = (*(f"{name}/manifest.json" for name in (FULL, THINNED)), BUILDINGS)
+        told = (sha256_file(self.folder / part) for part in (f"{STREETS}/world.json", *parts))
+        return hashlib.sha256("".join(told).encode()).hexdigest()
 
     @property
     def streets(self) -> SweepWorld:

@@ -1,0 +1,29 @@
+"""A benchmark goes on with its own results, and with those of no other one."""
+
+import json
+
+from command_line import assert_done, assert_refused, mapfilter, settings
+
+GIVEN = ["--filter", "candidate", "--case", "cell-6", "--runs", 1, "--workers", 1, "--json"]
+
+
+def test_a_benchmark_is_resumed_on_its_own_map_only(world, tmp_path):
+    out = tmp_path / "out"
+
+    def evaluate(*more):
+        given = ["-c", world.toml, *GIVEN, "--out", out, *more]
+        return mapfilter("evaluate", "global-positioning", *given)
+
+    assert_done(evaluate())
+    (batch,) = (out / "batches").glob("*.json")
+    told = json.loads(batch.read_text())
+    told["rows"][0] |= {"success": True, "error_mean_m": 77.0}
+    batch.write_text(json.dumps(told))
+    assert assert_done(evaluate("--resume")).json["cases"][0]["error_mean_m"] == 77.0
+    narrower = settings(area__bbox="24.9420,60.1660,24.9490,60.1697")
+    assert_refused(evaluate("--resume", *narrower), "benchmark.json", "another world")
+    assert_refused(evaluate("--resume", "--seed", 4), "another seed")
+    # Begun anew, nothing of an older one is left to be taken for its own.
+    (out / "batches" / "000005.json").write_text(batch.read_text())
+    assert assert_done(evaluate()).json["cases"][0]["error_mean_m"] != 77.0
+    assert list((out / "batches").iterdir()) == [batch]
