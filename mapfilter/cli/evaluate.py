@@ -15,6 +15,7 @@ from mapfilter.cli.options import (
     SetOption,
     find_own_filter,
     given_path,
+    refuse,
     toml,
 )
 from mapfilter.workflows.terminal import print_result, rate_bar
@@ -70,6 +71,9 @@ def evaluate(
 
     check_benchmark(name, data)
     if name == "ottawa" and data is not None:
+        other = None if filter_name == "bayes" else filter_name
+        unheeded = {"--map": map_file, "--bbox": bbox, "--case": cases, "--filter": other}
+        refuse(unheeded | {"--config": config, "--set": settings}, name)
         _ottawa(data, out, runs, seed, workers, resume, as_json)
         return
     given = list(settings or ())

@@ -20,6 +20,7 @@ from mapfilter.cli.options import (
     WorkersOption,
     find_own_filter,
     numbers,
+    refuse,
     seeded,
 )
 from mapfilter.workflows.terminal import print_result, rate_bar, say
@@ -102,6 +103,7 @@ def reproduce(
         print_result(fused, as_json)
         return
     if paper in (TESA, DLR):
+        refuse({"--map": area_map, "--bbox": bbox, "--layout": layout}, paper)
         run = run_reproduce_tesa if paper == TESA else run_reproduce_dlr
         with rate_bar("reproduce", "trials") as progress:
             tried = run(

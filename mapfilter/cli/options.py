@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mapfilter.errors import ConfigError, fail
+from mapfilter.errors import ConfigError, Faults, fail
 
 if TYPE_CHECKING:
     from mapfilter.workflows.sections import Config
@@ -80,3 +81,12 @@ def find_own_filter(config: Config) -> None:
     folder = str(Path.cwd())
     if any(":" in name for name in names) and folder not in sys.path:
         sys.path.append(folder)
+
+
+def refuse(given: Mapping[str, object], whom: str) -> None:
+    """See that no option is given that would be left unheeded."""
+    faults = Faults()
+    for option, value in given.items():
+        if value is not None and value != []:
+            faults.add(option, f"nothing, as {whom} takes none", value)
+    faults.raise_if_any(ConfigError)

@@ -27,3 +27,9 @@ def test_a_benchmark_is_resumed_on_its_own_map_only(world, tmp_path):
     (out / "batches" / "000005.json").write_text(batch.read_text())
     assert assert_done(evaluate()).json["cases"][0]["error_mean_m"] != 77.0
     assert list((out / "batches").iterdir()) == [batch]
+
+
+def test_what_real_sessions_take_no_heed_of_is_refused(tmp_path):
+    more = ["--case", "cell-6", "--filter", "grid", *settings(filter__bayes__scale=0.1)]
+    told = mapfilter("evaluate", "ottawa", "--data", tmp_path, *more, "--out", tmp_path / "out")
+    assert_refused(told, "--case", "--filter", "--set", "ottawa takes none")

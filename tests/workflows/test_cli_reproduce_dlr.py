@@ -4,6 +4,7 @@ import csv
 import json
 
 import numpy as np
+from command_line import assert_refused, mapfilter
 from typer.testing import CliRunner
 
 from mapfilter.cli import app
@@ -61,5 +62,9 @@ def test_dlr(tmp_path, monkeypatch):
 
 def test_one_track_has_no_interval(tmp_path):
     words = ["reproduce", "dlr", "--trials", "1", "--out", str(tmp_path)]
-    result = CliRunner().invoke(app, words)
-    assert result.exit_code != 0
+    assert_refused(mapfilter(*words), "--trials", "at least 2")
+
+
+def test_what_it_takes_no_heed_of_is_refused(tmp_path):
+    words = ["reproduce", "dlr", "--map", "helsinki", "--out", str(tmp_path / "out")]
+    assert_refused(mapfilter(*words), "--map", "dlr takes none")
