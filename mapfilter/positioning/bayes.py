@@ -164,6 +164,9 @@ class BayesPositioner:
         gained = belief.log_evidence - before.log_evidence
         doubt = track.doubt.after(reading.expected, gained, reading.length_m)
         cells_only = reading.levels is None and not reading.bounds
+        if reading.serving < 0 and np.isfinite(track.memory.heard_at_m).any():
+            # Satellites or times of arrival between two reports: levels are told all the same.
+            cells_only = False
         challenger, wins, heard = track.challenger, track.wins, track.sky
         if challenger is not None:
             told = sky.for_other(reading)

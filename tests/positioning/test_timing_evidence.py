@@ -10,6 +10,7 @@ from cross_world import CRS, LATTICE, make_database, walk_log
 
 from mapfilter.filters.contract import Reason
 from mapfilter.filters.particle_options import ParticleOptions
+from mapfilter.positioning import bayes
 from mapfilter.positioning.bayes_options import BayesOptions, open_area
 from mapfilter.positioning.bayes_replay import position_by_bayes
 from mapfilter.positioning.epochs import Difference, Epoch, Heard
@@ -115,3 +116,23 @@ def test_times_of_arrival_shorten_the_search(area):
     ]
     assert switch[1] is not None
     assert switch[1] < 0.7 * (switch[0] or len(log.truth))
+
+
+@pytest.mark.parametrize("level_dbm", [-70.0, nan])
+def test_differences_between_reports_of_levels_do_not_make_it_a_log_of_cells(
+    area, level_dbm, monkeypatch
+):
+    seen, settle = set(), bayes.settle
+
+    def watched(*given, cells_only):
+        seen.add(cells_only)
+        return settle(*given, cells_only=cells_only)
+
+    monkeypatch.setattr(bayes, "settle", watched)
+    log = walk_log(((0.0, 40.0),))
+    rows = pd.DataFrame({"time_s": log.truth["time_s"], "cell": "E", "reference": "W"})
+    radio = log.radio.assign(level_dbm=level_dbm)
+    told = make_log(CRS, motion=log.motion, radio=radio, tdoa=rows.assign(difference_m=0.0))
+    few = ParticleOptions(most=500, searching=300, least=100)
+    position_by_bayes(BayesOptions(particles=few).over(area), told, np.random.default_rng(1))
+    assert seen == {np.isnan(level_dbm)}
