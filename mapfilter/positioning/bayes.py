@@ -115,6 +115,9 @@ class BayesPositioner:
         self, track: BayesTrack, epoch: Epoch, rng: np.random.Generator
     ) -> tuple[BayesTrack, News]:
         """Take one epoch in."""
+        fix = epoch.fix
+        if fix is not None and not (isfinite(fix.east_m) and isfinite(fix.north_m)):
+            epoch = replace(epoch, fix=None)
         grain_m = grain_of(track)
         track, unused = self._move(track, epoch, rng)
         track, sky = self._sky.hear(track, epoch, grain_m, self.model.evidence.spacing_m)

@@ -13,7 +13,7 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.particle_options import ParticleOptions
 from mapfilter.positioning.bayes_options import BayesOptions, open_area
 from mapfilter.positioning.bayes_replay import estimate_of, position_by_bayes
-from mapfilter.positioning.epochs import epochs
+from mapfilter.positioning.epochs import Epoch, GnssFix, Heard, epochs
 from mapfilter.simulation.satellites import Spoofer
 from mapfilter.tracks.log import make_log
 
@@ -226,3 +226,17 @@ def test_the_exact_filter_takes_fixes_and_rejects_lies(area):
     estimate = found(grid, replace(log, gnss=make_log(CRS, gnss=fixes).gnss))
     assert off_m(log, estimate)[10:].max() < 15
     assert {u.reason for u in estimate.unused if u.kind == "gnss"} >= {Reason.REJECTED_BY_EVIDENCE}
+
+
+@pytest.mark.parametrize("grid", [False, True])
+def test_a_fix_of_no_place_is_no_fix_before_a_start_neither(area, grid):
+    positioner = BayesOptions(particles=FEW, satellites=HEIGHTS, grid=grid).over(area)
+    row = Heard("serving", "W", None, None, np.nan, 0)
+    blank, report = Epoch(0.0, fix=GnssFix(np.nan, 1.0)), Epoch(1.0, heard=(row,))
+    rng, other = np.random.default_rng(0), np.random.default_rng(0)
+    nothing, news = positioner.advance(positioner.begin(), blank, rng)
+    assert (nothing.belief, news.fix.hypotheses) == (None, 0)
+    _, told = positioner.advance(nothing, replace(report, fix=blank.fix), rng)
+    _, plain = positioner.advance(positioner.begin(), report, other)
+    assert told.fix.east_m == plain.fix.east_m
+    np.testing.assert_array_equal(told.fix.radii_m, plain.fix.radii_m)
