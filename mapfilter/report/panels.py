@@ -68,7 +68,7 @@ def plot_panels(
         raise fail(InputError, "snapshots", f"1 to {MAX_PANELS}", count)
     columns = count if count <= 3 else ceil(count / 2)
     rows = ceil(count / columns)
-    height_in = rows * (map_height_in(base, _PANEL_IN) + 0.3) + 0.9
+    height_in = rows * (map_height_in(base, _PANEL_IN) + 0.45) + 0.9
     with picture(path, columns * (_PANEL_IN + 0.1) + 0.6, height_in) as figure:
         panels = figure.subplots(rows, columns, squeeze=False)
         for index, axes in enumerate(panels.flat):
