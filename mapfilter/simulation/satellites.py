@@ -165,7 +165,9 @@ def receive(
     tow_s = second + (tick_s - tick_s[0])
     east_m, north_m = place[count // 2].tolist()
     frame = GridFrame(crs, east_m, north_m, float(model.height_m))
-    usable = _over_horizon(almanac.usable(), week, float(tow_s[count // 2]), frame, model)
+    # An hour apart, from the middle on to both sides: a short journey has one moment.
+    hour = max(int(3600 / model.period_s), 1)
+    usable = _over_horizon(almanac.usable(), week, tow_s[count // 2 % hour :: hour], frame, model)
     clock_m = _clock_m(count, model, rng)
     white = rng.standard_normal((count, len(usable.names)))
     echo = multipath_bias_m(
@@ -208,12 +210,14 @@ def receive(
 
 
 def _over_horizon(
-    almanac: Almanac, week: int, tow_s: float, frame: GridFrame, model: ReceptionModel
+    almanac: Almanac, week: int, tow_s: Floats, frame: GridFrame, model: ReceptionModel
 ) -> Almanac:
-    """Return the satellites that may rise above the mask within some hours of a journey."""
-    turns = int(tow_s // 604_800.0)
-    there = satellite_positions_m(almanac, tow_s - 604_800.0 * turns, week + turns)
-    above = directions(frame.satellites_m(there)).elevation_rad
+    """Return the satellites that may rise above the mask within half an hour of some moments."""
+    above = np.full(len(almanac.names), -np.inf)
+    for moment_s in tow_s.tolist():
+        turns = int(moment_s // 604_800.0)
+        there = satellite_positions_m(almanac, moment_s - 604_800.0 * turns, week + turns)
+        above = np.maximum(above, directions(frame.satellites_m(there)).elevation_rad)
     return almanac.only(np.flatnonzero(above > np.radians(model.mask_deg) - 0.35))
 
 

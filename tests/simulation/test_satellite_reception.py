@@ -8,8 +8,9 @@ import shapely
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import unproject
 from mapfilter.gnss.constellations import nominal_gps
-from mapfilter.gnss.orbits import gps_time
-from mapfilter.gnss.sky import ecef_from_lonlat
+from mapfilter.gnss.grid_frame import GridFrame
+from mapfilter.gnss.orbits import gps_time, satellite_positions_m
+from mapfilter.gnss.sky import directions, ecef_from_lonlat
 from mapfilter.gnss.visibility import Skyline
 from mapfilter.simulation.satellites import ReceptionModel, Spoofer, receive
 from mapfilter.tracks.log import make_log
@@ -97,3 +98,17 @@ def test_models_that_make_no_sense():
         ReceptionModel(mask_deg=0.0)
     with pytest.raises(InputError, match="truth"):
         heard(truth=TRUTH.iloc[:0])
+
+
+def test_a_long_journey_hears_those_that_rise_on_the_way():
+    truth = pd.DataFrame(
+        {"time_s": [0.0, 6 * 3600.0], "east_m": [531_000.0, 540_000.0], "north_m": 4_556_000.0}
+    )
+    rows = heard(truth=truth, period_s=600.0)
+    frame = GridFrame(CRS, 531_000.0, 4_556_000.0, 100.0)
+    week, second = gps_time(START)
+    for time_s in (0.0, 6 * 3600.0):
+        places = satellite_positions_m(ALMANAC, second + time_s, week)
+        high = directions(frame.satellites_m(places)).elevation_rad > np.radians(12.0)
+        told = set(rows.loc[rows["time_s"] == time_s, "satellite"])
+        assert set(np.array(ALMANAC.names)[high]) <= told
