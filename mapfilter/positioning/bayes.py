@@ -118,7 +118,7 @@ class BayesPositioner:
         fix = epoch.fix
         if fix is not None and not (isfinite(fix.east_m) and isfinite(fix.north_m)):
             epoch = replace(epoch, fix=None)
-        grain_m = grain_of(track)
+        grain_m, converged = grain_of(track), track.status is Status.CONVERGED
         track, unused = self._move(track, epoch, rng)
         track, sky = self._sky.hear(track, epoch, grain_m, self.model.evidence.spacing_m)
         known = track.belief is not None and epoch.fix is not None
@@ -140,9 +140,9 @@ class BayesPositioner:
         elif reading is not None or sky.says:
             track, why = self._weigh(track, belief, reading or RadioReading(), sky, epoch, rng)
             reason = reason if why is Reason.USED else why
-        elif track.status is Status.CONVERGED:
-            # CONVERGED is one epoch, also where nothing is heard in the next.
-            following = replace(belief, status=Status.TRACKING)
+        if converged and track.status is Status.CONVERGED and track.belief is not None:
+            # CONVERGED is one epoch, also where nothing that counts is heard in the next.
+            following = replace(track.belief, status=Status.TRACKING)
             track = replace(track, belief=following, status=Status.TRACKING)
         if reason not in (Reason.USED, Reason.NOT_MOVED_ENOUGH, Reason.NO_READING):
             cell = next((str(row.cell) for row in epoch.heard if row.cell is not None), "")
