@@ -32,7 +32,9 @@ def evaluate(
     ] = None,
     cases: Annotated[
         list[str] | None,
-        typer.Option("--case", metavar="NAME", help="A case; repeatable. Default: all."),
+        typer.Option(
+            "--case", metavar="NAME", help="A case; repeatable. Default: all without satellites."
+        ),
     ] = None,
     filter_name: Annotated[
         str,

@@ -19,7 +19,7 @@ from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import projected_crs
 from mapfilter.gnss.almanac import Almanac
 from mapfilter.tracks.clocks import check_clocks, check_start, early_ends
-from mapfilter.tracks.satellites import place_satellites
+from mapfilter.tracks.satellites import PLACE, place_satellites
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.steps import check_steps
 from mapfilter.tracks.tidy import tidy_table
@@ -158,6 +158,12 @@ def make_log(
         told += check_steps(tables, called.get("motion", "motion"), faults)
         told += early_ends(tables)
     faults.raise_if_any(InputError)
+    placeless = int(tables["pseudoranges"][list(PLACE)].isna().any(axis=1).sum())
+    if almanac is None and placeless:
+        told += (
+            f"pseudoranges: {placeless} rows without the place of their satellite, of no use "
+            "without an almanac beside the log",
+        )
     if almanac is not None:
         where = called.get("pseudoranges", "pseudoranges")
         placed, news = place_satellites(tables["pseudoranges"], almanac, start_utc_s, where)

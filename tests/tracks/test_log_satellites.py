@@ -136,6 +136,15 @@ def test_an_almanac_of_another_time_is_refused():
         make_log(CRS, pseudoranges=bare, almanac=nominal_gps(week))
 
 
+def test_satellites_without_any_place_are_noted():
+    log = make_log(CRS, pseudoranges=ranges(**dict.fromkeys(PLACE, np.nan)))
+    (note,) = log.notes
+    assert note.startswith("pseudoranges: 3 rows without the place")
+    assert "almanac" in note
+    placed = ranges(x_m=2.0e7, y_m=1.0e7, z_m=1.3e7)
+    assert not make_log(CRS, pseudoranges=placed).notes
+
+
 def test_unknown_and_unhealthy_satellites_are_noted():
     week, _ = gps_time(START)
     almanac = nominal_gps(week)
@@ -195,4 +204,7 @@ def test_kinds_are_left_out_one_by_one():
         "gnss": [0, 0, 2, 1], "fixes": [0, 3, 2, 1], "pseudoranges": [1, 0, 2, 1],
         "tdoa": [1, 3, 0, 1], "radio": [1, 3, 2, 0], "ta": [1, 3, 2, 1],
     }  # fmt: skip
-    assert leave_out(log, ["gnss"]).notes == ("gnss: 1 left out", "pseudoranges: 3 left out")
+    assert leave_out(log, ["gnss"]).notes[-2:] == (
+        "gnss: 1 left out",
+        "pseudoranges: 3 left out",
+    )
