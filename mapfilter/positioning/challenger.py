@@ -154,7 +154,7 @@ class Verdict(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class Settlement:
     """What became of a belief and its challenger by one reading.
 
     Parameters
@@ -184,7 +184,7 @@ def settle(
     travelled_m: float,
     *,
     cells_only: bool,
-) -> Outcome:
+) -> Settlement:
     """Decide after a belief and its challenger have seen the same reading.
 
     Parameters
@@ -203,14 +203,16 @@ def settle(
         # All agree, and what is heard does not: the truth may have died out.
         main = replace(main, status=Status.SEARCHING)
     if challenger is None:
-        return _told(before, Outcome(main, main.status, doubt))
+        return _told(before, Settlement(main, main.status, doubt))
     verdict = judge(rules, main, challenger, travelled_m, cells_only=cells_only)
     if verdict in (Verdict.CONFIRMED, Verdict.GAVE_UP):
-        return _told(before, Outcome(main, main.status, doubt.none()))
+        return _told(before, Settlement(main, main.status, doubt.none()))
     searching, other = main.status is Status.SEARCHING, challenger.belief
     if verdict is Verdict.WON:
         found = Status.CONVERGED if searching else Status.TRACKING
-        return _told(before, Outcome(replace(other, status=found), found, doubt.none(), None, True))
+        return _told(
+            before, Settlement(replace(other, status=found), found, doubt.none(), None, True)
+        )
     doubted = challenger.doubt.sum >= (rules.doubt_of_cells if cells_only else rules.doubt)
     if verdict is Verdict.AHEAD and (searching or doubted):
         # Nothing found yet can be lost: whoever is ahead goes on with the search at once. So it
@@ -218,12 +220,12 @@ def settle(
         status = Status.SEARCHING if searching else Status.LOST
         left = challenger.doubt if doubted else doubt.none()
         other = replace(other, status=Status.SEARCHING, agreed_at_m=nan)
-        return _told(before, Outcome(other, status, left, None, True))
+        return _told(before, Settlement(other, status, left, None, True))
     lost = verdict is Verdict.AHEAD and not searching
-    return _told(before, Outcome(main, Status.LOST if lost else main.status, doubt, challenger))
+    return _told(before, Settlement(main, Status.LOST if lost else main.status, doubt, challenger))
 
 
-def _told(before: Status, now: Outcome) -> Outcome:
+def _told(before: Status, now: Settlement) -> Settlement:
     """Return what the user is told: once lost, one is LOST until found, and then TRACKING."""
     if before is not Status.LOST or now.status in (Status.LOST, Status.TRACKING):
         return now
