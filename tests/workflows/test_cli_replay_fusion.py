@@ -217,7 +217,7 @@ def test_replay_takes_antennas_from_their_files(tmp_path):
 
 def test_a_filter_that_is_none_is_refused_with_those_that_are(tmp_path):
     words = ["replay", "--filter", "kalman", "--log", str(tmp_path), "--out", str(tmp_path / "o")]
-    with pytest.raises(ConfigError, match=r"filter\.name.*'ekf', 'iekf', 'rbukf', 'ukf' or 'ckf'"):
+    with pytest.raises(ConfigError, match=r"filter\.name.*'ekf', 'iekf', 'rbukf', 'ukf', 'ckf'"):
         CliRunner().invoke(app, words, catch_exceptions=False)
     words[2] = "candidate"
     with pytest.raises(ConfigError, match="--smooth"):
