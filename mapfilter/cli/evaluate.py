@@ -37,11 +37,21 @@ def evaluate(
         ),
     ] = None,
     filter_name: Annotated[
-        str,
+        str | None,
         typer.Option(
-            "--filter", metavar="NAME", help="bayes, grid, candidate or package.module:Name."
+            "--filter",
+            metavar="NAME",
+            help="bayes (default), grid, candidate or package.module:Name.",
         ),
-    ] = "bayes",
+    ] = None,
+    world: Annotated[
+        str | None,
+        typer.Option(
+            "--world",
+            metavar="NAME",
+            help="The simulated world: plain (default), or easy, which flatters.",
+        ),
+    ] = None,
     data: Annotated[
         Path | None,
         typer.Option(
@@ -68,13 +78,14 @@ def evaluate(
     as_json: JsonOption = False,
 ) -> None:
     """Tell how well a filter finds itself: in many cases, on any map, or on real sessions."""
-    from mapfilter.workflows.config import load_config
     from mapfilter.workflows.evaluate import RUNS, check_benchmark, run_global_positioning
+    from mapfilter.workflows.evaluate_settings import load_benchmark
 
     check_benchmark(name, data)
     if name == "ottawa" and data is not None:
         other = None if filter_name == "bayes" else filter_name
         unheeded = {"--map": map_file, "--bbox": bbox, "--case": cases, "--filter": other}
+        unheeded |= {"--world": world}
         refuse(unheeded | {"--config": config, "--set": settings}, name)
         _ottawa(data, out, runs, seed, workers, resume, as_json)
         return
@@ -83,8 +94,9 @@ def evaluate(
         given.append(f"area.map={toml(str(map_file))}")
     if bbox is not None:
         given.append(f"area.bbox={bbox}")
-    given.append(f"filter.name={toml(filter_name)}")
-    loaded = load_config(config, given)
+    if filter_name is not None:
+        given.append(f"filter.name={toml(filter_name)}")
+    loaded, fixed = load_benchmark(world or "plain", config, given)
     find_own_filter(loaded)
     folder = (out or loaded.output.dir / name).absolute()
     with rate_bar("evaluate", "batches") as progress:
@@ -97,6 +109,7 @@ def evaluate(
             workers=workers,
             resume=resume,
             progress=progress,
+            fixed=fixed,
         )
     print_result(result, as_json)
 

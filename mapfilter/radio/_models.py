@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -21,6 +21,7 @@ ModelName = Literal[
     "tr38901_umi",
 ]
 LineOfSight = Literal["buildings", "probability"]
+Clutter = Literal["own", "shared"]
 
 
 @dataclass(frozen=True)
@@ -49,8 +50,9 @@ class PredictionModel:
     metropolitan : bool
         Metropolitan centre, or medium-sized city and suburbs.
     shadowing_db, shadowing_correlation_m, site_share : float
-        The clutter detail that a planning tool's prediction has: deviation, correlation length, and
-        the share of its variance that is common to the sectors of a site.
+        Random clutter that stands for detail in the levels: deviation, correlation length, and the
+        share of its variance that is common to the sectors of a site. A prediction that is used for
+        positioning should have none: what is drawn at random is nowhere in the world.
     seed : int
 
     Raises
@@ -71,7 +73,7 @@ class PredictionModel:
     street_orientation_deg: float = 90.0
     default_roof_height_m: float = 12.0
     metropolitan: bool = False
-    shadowing_db: float = 6.0
+    shadowing_db: float = 0.0
     shadowing_correlation_m: float = 50.0
     site_share: float = 0.5
     seed: int = 0
@@ -102,7 +104,7 @@ class PredictionModel:
 
 @dataclass(frozen=True)
 class RealityErrors:
-    """How reality differs from its prediction.
+    """How the simulated ground truth differs from its prediction.
 
     Parameters
     ----------
@@ -114,6 +116,21 @@ class RealityErrors:
         Each cell's EIRP, azimuth and path-loss slope are off by uniform draws within ± these; the
         last is a fraction.
     seed : int
+    clutter : {"own", "shared"}
+        Whether the prediction's random clutter is drawn anew, with the same deviation, or is the
+        ground truth's too, as if the prediction had known it.
+    local_share, local_correlation_m : float
+        Share of the shadowing's variance that has another, shorter correlation length.
+    model : str or None
+        The ground truth's propagation model; None for the prediction's.
+    street_width_m, building_separation_m, default_roof_height_m : float or None
+        Likewise, of the ground truth.
+    roof_error : float
+        Heights of buildings are off by a factor, the same for neighbours, whose logarithm is
+        normal with this deviation.
+    offset_db : float
+        Added to all levels: the mean by which another propagation model differs, which drive tests
+        would have taken out of the prediction.
 
     Raises
     ------
@@ -128,15 +145,40 @@ class RealityErrors:
     azimuth_error_deg: float = 5.0
     slope_error: float = 0.05
     seed: int = 0
+    clutter: Clutter = "own"
+    local_share: float = 0.0
+    local_correlation_m: float = 20.0
+    model: ModelName | None = None
+    street_width_m: float | None = None
+    building_separation_m: float | None = None
+    default_roof_height_m: float | None = None
+    roof_error: float = 0.0
+    offset_db: float = 0.0
 
     def __post_init__(self) -> None:
         faults = Faults()
         _check(self, "reality", ["level_error_db", "eirp_error_db"], 0, 50, faults)
-        _check(self, "reality", ["correlation_m"], 0, 1e5, faults)
+        _check(self, "reality", ["correlation_m", "local_correlation_m"], 0, 1e5, faults)
         _check(self, "reality", ["azimuth_error_deg"], 0, 180, faults)
-        _check(self, "reality", ["site_share", "slope_error"], 0, 1, faults)
+        _check(self, "reality", ["site_share", "local_share", "slope_error"], 0, 1, faults)
+        _check(self, "reality", ["roof_error"], 0, 1, faults)
+        _check(self, "reality", ["offset_db"], -50, 50, faults)
         _check(self, "reality", ["seed"], 0, np.inf, faults)
+        if self.clutter not in get_args(Clutter):
+            faults.add("reality, clutter", "own or shared", repr(self.clutter))
         faults.raise_if_any(ConfigError)
+
+    def truth_of(self, prediction: PredictionModel) -> PredictionModel:
+        """Return the ground truth's propagation model, for that of a prediction.
+
+        Raises
+        ------
+        ConfigError
+            What differs from the prediction is out of range.
+        """
+        names = ("model", "street_width_m", "building_separation_m", "default_roof_height_m")
+        given = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        return replace(prediction, **given)
 
 
 def _check(

@@ -1,4 +1,4 @@
-"""Predicts how every cell is heard, and plays the reality that a prediction is tested against.
+"""Predicts how every cell is received, and simulates the ground truth that it is tested against.
 
 The prediction of a cell is EIRP + antenna gain - path loss + shadowing, at street height; where a
 raster of building heights is given it decides who sees the antenna and how high the roofs are.
@@ -22,7 +22,7 @@ from mapfilter.radio._surroundings import Surroundings, views_of
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.pathloss import outside_published_range, shortest_distance_m
-from mapfilter.radio.shadowing import named_rng, site_shadowing
+from mapfilter.radio.shadowing import correlated_field, named_rng, site_shadowing
 
 __all__ = [
     "PredictionModel",
@@ -40,6 +40,7 @@ Antennas = Mapping[str, MeasuredAntenna]
 _MOST_NAMED = 3
 _ROUND_DB = 3.0
 _NEAR_FREQUENCY = 0.2
+_BLOCK_M = 60.0
 
 
 def predict_cell(
@@ -143,12 +144,12 @@ def realise(
     *,
     antennas: Antennas | None = None,
 ) -> Iterator[tuple[str, Floats32]]:
-    """Play reality: the prediction of each cell, wrong in the ways that predictions are.
+    """Simulate the ground truth: how the cells of a prediction are really received.
 
-    It plays reality so that no filter is judged on its own prediction. EIRP, azimuth and path-loss
-    slope of each cell are off by uniformly drawn amounts, and a correlated shadowing field that is
-    independent of the prediction's is added. Every draw depends on the seed and on names only:
-    adding a cell changes no other.
+    No filter is to be judged on its own prediction. EIRP, azimuth and path-loss slope of each cell
+    are off by uniformly drawn amounts; shadowing that is independent of the prediction's is added;
+    propagation model, street widths and roofs may differ. Every draw depends on the seed and on
+    names only: adding a cell changes no other.
 
     Parameters
     ----------
@@ -165,24 +166,56 @@ def realise(
     ------
     InputError
         The heights do not fit the lattice, or an antenna is not there.
+    ConfigError
+        The ground truth's propagation model is not possible.
     """
     plan = plan.to_crs(lattice.crs)
     _check_antennas(plan, antennas)
-    surroundings = Surroundings.of(lattice, heights_m, model, antennas)
+    true_model = errors.truth_of(model)
+    true_heights_m = _true_heights_m(heights_m, lattice, errors)
+    surroundings = Surroundings.of(lattice, true_heights_m, true_model, antennas)
     views = views_of(plan, surroundings)
-    clutter = _clutter(plan, lattice, model)
-    wrong = site_shadowing(
-        plan, lattice, errors.level_error_db, errors.correlation_m, errors.site_share, errors.seed,
-        stream="reality",
-    )  # fmt: skip
-    for done, (cell, seen, (cell_id, clutter_db), (_, error_db)) in enumerate(
+    shared = errors.clutter == "shared"
+    stream = "prediction" if shared else "reality clutter"
+    clutter_of = model if shared else replace(model, seed=errors.seed)
+    clutter = _clutter(plan, lattice, clutter_of, stream)
+    wrong = _shadowing(plan, lattice, errors)
+    for done, (cell, seen, (cell_id, clutter_db), error_db) in enumerate(
         zip(plan.cells, views, clutter, wrong, strict=True), start=1
     ):
         real, slope_factor = _perturbed(cell, errors)
-        level_dbm = surroundings.median_level_dbm(real, seen, slope_factor)
+        level_dbm = surroundings.median_level_dbm(real, seen, slope_factor) + errors.offset_db
         if progress is not None:
             progress(done, len(plan))
         yield cell_id, np.asarray(level_dbm + clutter_db + error_db, dtype=np.float32)
+
+
+def _shadowing(plan: CellPlan, lattice: Lattice, errors: RealityErrors) -> Iterator[Floats32]:
+    """Draw the ground truth's shadowing of each cell: a part that lasts, and a local one."""
+    parts = (
+        (1.0 - errors.local_share, errors.correlation_m, "reality"),
+        (errors.local_share, errors.local_correlation_m, "reality local"),
+    )
+    fields = [
+        site_shadowing(
+            plan, lattice, errors.level_error_db * share**0.5, correlation_m, errors.site_share,
+            errors.seed, stream=stream,
+        )
+        for share, correlation_m, stream in parts
+        if share > 0
+    ]  # fmt: skip
+    for drawn in zip(*fields, strict=True):
+        yield np.sum([field_db for _, field_db in drawn], axis=0, dtype=np.float32)
+
+
+def _true_heights_m(
+    heights_m: Floats32 | None, lattice: Lattice, errors: RealityErrors
+) -> Floats32 | None:
+    if heights_m is None or errors.roof_error == 0:
+        return heights_m
+    rng = named_rng(errors.seed, "reality", "roofs")
+    factor = np.exp(correlated_field(lattice, errors.roof_error, _BLOCK_M, rng))
+    return np.asarray(heights_m * factor, dtype=np.float32)
 
 
 def outside_validity(plan: CellPlan, lattice: Lattice, model: PredictionModel) -> tuple[str, ...]:
@@ -266,9 +299,9 @@ def _perturbed(cell: Cell, errors: RealityErrors) -> tuple[Cell, float]:
 
 
 def _clutter(
-    plan: CellPlan, lattice: Lattice, model: PredictionModel
+    plan: CellPlan, lattice: Lattice, model: PredictionModel, stream: str = "prediction"
 ) -> Iterator[tuple[str, Floats32]]:
     return site_shadowing(
         plan, lattice, model.shadowing_db, model.shadowing_correlation_m, model.site_share,
-        model.seed, stream="prediction",
+        model.seed, stream=stream,
     )  # fmt: skip

@@ -9,10 +9,12 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.geodesy import Floats, wrap_rad
 from mapfilter.simulation.routes import Route, route
+from mapfilter.simulation.walking import Inside, WalkerModel, path_beside, with_stops
 
 __all__ = ["DRIVING_SPEED_MPS", "JourneyPlan", "Route", "journey", "route", "speed_profile"]
 
@@ -64,6 +66,8 @@ class JourneyPlan:
         Largest in a turn.
     driving_speed_mps : mapping
         Speed by class of way; classes that it lacks are driven at 8.3 m/s.
+    walker : WalkerModel
+        Where on the street one walks, and stops; of walking only.
 
     Raises
     ------
@@ -79,6 +83,7 @@ class JourneyPlan:
     acceleration_mps2: float = 2.0
     lateral_acceleration_mps2: float = 2.0
     driving_speed_mps: Mapping[str, float] = field(default_factory=lambda: DRIVING_SPEED_MPS)
+    walker: WalkerModel = field(default_factory=WalkerModel)
 
     def __post_init__(self) -> None:
         faults = Faults()
@@ -102,28 +107,64 @@ class JourneyPlan:
         faults.raise_if_any(ConfigError)
 
 
-def journey(along: Route, plan: JourneyPlan) -> pd.DataFrame:
+def journey(
+    along: Route,
+    plan: JourneyPlan,
+    rng: np.random.Generator | None = None,
+    inside: Inside | None = None,
+) -> pd.DataFrame:
     """Return the truth of one journey along a route.
 
     Parameters
     ----------
     along : Route
     plan : JourneyPlan
+    rng : numpy.random.Generator, optional
+        Draws on which side a walker goes, and the stops.
+    inside : callable, optional
+        Where buildings keep a walker off the pavement, see
+        :func:`mapfilter.simulation.walking.inside_buildings`.
 
     Returns
     -------
     truth : pandas.DataFrame
         time_s from 0 in steps of ``period_s``, east_m, north_m, way_id; it ends with the last tick
         that is still on the route.
+
+    Raises
+    ------
+    ValueError
+        The walker needs a generator.
     """
-    distance_m, time_s = speed_profile(along, plan)
+    walker = plan.walker
+    plain = walker.on_centre_line and walker.stop_every_m == 0
+    if plan.profile == "driving" or plain:
+        distance_m, time_s = speed_profile(along, plan)
+        tick_s = _ticks_s(time_s[-1], plan.period_s)
+        east, north, way_id = along.at(np.interp(tick_s, time_s, distance_m))
+        return _truth(tick_s, east, north, way_id)
+    if rng is None:
+        raise ValueError("a walker beside the centre line, or one that stops, needs rng")
+    path = path_beside(along, walker, rng, inside)
+    walked_m, time_s = with_stops(path.walked_m, path.walked_m / plan.speed_mps, walker, rng)
+    tick_s = _ticks_s(time_s[-1], plan.period_s)
+    at_m = np.interp(tick_s, time_s, walked_m)
+    _, _, way_id = along.at(np.interp(at_m, path.walked_m, path.distance_m))
+    east, north = (np.interp(at_m, path.walked_m, axis) for axis in (path.east_m, path.north_m))
+    return _truth(tick_s, east, north, way_id)
+
+
+def _ticks_s(end_s: float, period_s: float) -> Floats:
     # A route that takes a whole number of ticks must not lose the last one to rounding.
-    ticks = int(np.floor(time_s[-1] / plan.period_s + 1e-9))
-    tick_s = np.arange(ticks + 1) * plan.period_s
-    east, north, way_id = along.at(np.interp(tick_s, time_s, distance_m))
-    return pd.DataFrame(
-        {"time_s": tick_s, "east_m": east, "north_m": north, "way_id": pd.array(way_id, "Int64")}
-    )
+    ticks = int(np.floor(end_s / period_s + 1e-9))
+    return np.asarray(np.arange(ticks + 1) * period_s)
+
+
+def _truth(
+    tick_s: Floats, east_m: Floats, north_m: Floats, way_id: NDArray[np.int64]
+) -> pd.DataFrame:
+    ways = pd.array(way_id, "Int64")
+    return pd.DataFrame({"time_s": tick_s, "east_m": east_m, "north_m": north_m, "way_id": ways})
 
 
 def speed_profile(along: Route, plan: JourneyPlan) -> tuple[Floats, Floats]:

@@ -50,6 +50,9 @@ class ReportModel:
     radio : {"reality", "as_predicted"}
         With "as_predicted" the serving cell is the strongest at each place: no noise, no
         averaging, no hysteresis. The levels must then be the predicted ones.
+    phone_offset_sd_db : float
+        All levels of a journey are off by one number that is normal with this deviation: the
+        receiver's calibration, the hand, the pocket.
 
     Raises
     ------
@@ -65,12 +68,19 @@ class ReportModel:
     quantise: bool = True
     sensitivity_dbm: float = -104.0
     radio: Literal["reality", "as_predicted"] = "reality"
+    phone_offset_sd_db: float = 0.0
 
     def __post_init__(self) -> None:
         faults = Faults()
         if not (np.isfinite(self.period_s) and self.period_s > 0):
             faults.add("reports, period_s", "a finite number > 0", self.period_s)
-        for name in ("averaging_s", "hysteresis_db", "fading_db", "max_neighbours"):
+        for name in (
+            "averaging_s",
+            "hysteresis_db",
+            "fading_db",
+            "max_neighbours",
+            "phone_offset_sd_db",
+        ):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= 0):
                 faults.add(f"reports, {name}", "a finite number >= 0", value)
@@ -135,6 +145,7 @@ def reports(
         expected = f"an array of shape {(count, len(plan))}"
         raise fail(InputError, "levels", expected, level.shape, "another plan's cells")
     noise_db = model.fading_db * rng.standard_normal(level.shape)
+    noise_db += model.phone_offset_sd_db * rng.standard_normal()
     if model.radio == "reality":
         level = level + noise_db
     heard = np.where(level >= model.sensitivity_dbm, level, -np.inf)

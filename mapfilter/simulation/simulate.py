@@ -15,10 +15,11 @@ from mapfilter.roads.network import StreetNetwork
 from mapfilter.simulation.imu import ImuErrors, noisy_motion
 from mapfilter.simulation.journeys import JourneyPlan, journey
 from mapfilter.simulation.reports import Levels, ReportModel, reports
-from mapfilter.simulation.routes import Route, route
+from mapfilter.simulation.routes import route
+from mapfilter.simulation.walking import Inside
 from mapfilter.tracks.log import TrackLog, make_log
 
-_ROUTE, _IMU, _RADIO = range(3)
+_ROUTE, _IMU, _RADIO, _WALKER = range(4)
 _MOST_TICKS = 10_000_000
 
 
@@ -89,6 +90,7 @@ def simulate_journeys(
     plan: CellPlan,
     settings: SimulationSettings,
     seed: int,
+    inside: Inside | None = None,
 ) -> Iterator[tuple[str, TrackLog]]:
     """Make journeys one after another.
 
@@ -106,6 +108,8 @@ def simulate_journeys(
     settings : SimulationSettings
     seed : int
         Not negative.
+    inside : callable, optional
+        Where buildings keep walkers off the pavement.
 
     Yields
     ------
@@ -128,22 +132,23 @@ def simulate_journeys(
             leg_m=settings.journey.leg_m,
         )
         for d in range(settings.draws):
+            # All draws of a route are the same walk.
+            truth = journey(along, settings.journey, _rng(seed, _WALKER, j), inside)
             rngs = _rng(seed, _IMU, j, d), _rng(seed, _RADIO, j, d)
-            log = simulate_log(network.crs, along, levels, plan, settings, *rngs)
+            log = simulate_log(network.crs, truth, levels, plan, settings, *rngs)
             yield f"journey-{j:04d}-draw-{d:03d}", log
 
 
 def simulate_log(
     crs: str,
-    along: Route,
+    truth: pd.DataFrame,
     levels: Levels,
     plan: CellPlan,
     settings: SimulationSettings,
     imu_rng: np.random.Generator,
     radio_rng: np.random.Generator,
 ) -> TrackLog:
-    """Make one journey along a route; arguments as of :func:`simulate_journeys`."""
-    truth = journey(along, settings.journey)
+    """Make the log of one journey; arguments as of :func:`simulate_journeys`."""
     return make_log(
         crs,
         motion=noisy_motion(at_ticks(truth, settings.imu_period_s), settings.imu, imu_rng),

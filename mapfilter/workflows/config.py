@@ -36,7 +36,11 @@ _LISTS = {
 
 
 def load_config(
-    file: Path | None, settings: Sequence[str] = (), *, out: Path | None = None
+    file: Path | None,
+    settings: Sequence[str] = (),
+    *,
+    out: Path | None = None,
+    base: Path | None = None,
 ) -> Config:
     """Read and check a configuration.
 
@@ -49,6 +53,8 @@ def load_config(
         no brackets. Relative paths in them are relative to the working folder.
     out : Path or None
         Replaces ``output.dir``.
+    base : Path or None
+        TOML whose values stand in for the defaults.
 
     Raises
     ------
@@ -62,6 +68,8 @@ def load_config(
     (3, (24.94, 60.16, 24.95, 60.17))
     """
     values, folder = _given(file, settings, out)
+    if base is not None:
+        values = _merged(_read_toml(base), values)
     try:
         return Config.model_validate(values, context={"folder": folder})
     except ValidationError as error:
@@ -69,6 +77,17 @@ def load_config(
         raise ConfigError(
             tuple(_fault(file, changed, detail) for detail in error.errors())
         ) from None
+
+
+def given_keys(file: Path | None, settings: Sequence[str] = ()) -> tuple[str, ...]:
+    """Return the keys that a file and settings give, such as ``area.map``, sorted.
+
+    Raises
+    ------
+    ConfigError
+        As for :func:`load_config`, of the file and of the settings' form.
+    """
+    return tuple(sorted(_leaves(_values(file, settings))))
 
 
 def load_keys(
@@ -103,11 +122,7 @@ def _given(
     file: Path | None, settings: Sequence[str], out: Path | None
 ) -> tuple[dict[str, Any], Path]:
     """Return the values of file and settings, unchecked, and the folder that paths start from."""
-    values = _read_toml(file) if file is not None else {}
-    faults = Faults()
-    for setting in settings:
-        _apply(values, setting, faults)
-    faults.raise_if_any(ConfigError)
+    values = _values(file, settings)
     folder = file.absolute().parent if file is not None else Path.cwd()
     output = values.setdefault("output", {})
     if isinstance(output, dict):
@@ -115,6 +130,37 @@ def _given(
             output["dir"] = str(out.absolute())
         output.setdefault("dir", str(Path.cwd() / "out"))
     return values, folder
+
+
+def _values(file: Path | None, settings: Sequence[str]) -> dict[str, Any]:
+    """Return what file and settings give, and nothing else."""
+    values = _read_toml(file) if file is not None else {}
+    faults = Faults()
+    for setting in settings:
+        _apply(values, setting, faults)
+    faults.raise_if_any(ConfigError)
+    return values
+
+
+def _leaves(values: Mapping[str, Any]) -> list[str]:
+    """Return the keys of nested sections, with the names of their sections before them."""
+    found = []
+    for key, value in values.items():
+        inner = _leaves(value) if isinstance(value, Mapping) else []
+        found += [f"{key}.{name}" for name in inner] if inner else [key]
+    return found
+
+
+def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Return nested sections, with the values above in place of those below."""
+    merged = dict(below)
+    for key, value in above.items():
+        under = merged.get(key)
+        if isinstance(under, Mapping) and isinstance(value, Mapping):
+            merged[key] = _merged(under, value)
+        else:
+            merged[key] = value
+    return merged
 
 
 def _read_toml(file: Path) -> dict[str, Any]:

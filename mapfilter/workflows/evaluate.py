@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-
-import numpy as np
 
 from mapfilter._io import ensure_writable_folder, write_json
 from mapfilter._parallel import Progress, local_executor
@@ -21,20 +19,21 @@ from mapfilter.experiments.benchmarks.scores import CaseResult
 from mapfilter.experiments.benchmarks.world import (
     BUILDINGS,
     FULL,
-    HEIGHTS,
     STREETS,
     THINNED,
     BenchmarkWorld,
     write_buildings,
 )
 from mapfilter.experiments.sweep.world import SweepWorld, write_world
-from mapfilter.radio.predict import PredictionModel, predict
+from mapfilter.radio.predict import predict
 from mapfilter.radio.rasters import open_rasters, write_rasters
 from mapfilter.radio.shadowing import named_rng
 from mapfilter.roads.network import street_network
 from mapfilter.workflows.facts import facts
 from mapfilter.workflows.filters import filter_choice
+from mapfilter.workflows.predict import ground_truth_errors, prediction_model
 from mapfilter.workflows.sections import Config
+from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.world import World
 
 NAMES = ("global-positioning", "ottawa")
@@ -108,13 +107,14 @@ def run_global_positioning(
     workers: int = 2,
     resume: bool = False,
     progress: Progress | None = None,
+    fixed: frozenset[str] = frozenset(),
 ) -> EvaluateResult:
     """Predict, build, and run the cases of the benchmark on a map.
 
     Parameters
     ----------
-    config : Config
-        Its area, cells, roads, prediction, database and filter sections count.
+    config, fixed
+        From :func:`mapfilter.workflows.evaluate_settings.load_benchmark`.
     out : Path
         Gets the world, the finished batches and ``table.json``.
     runs : int
@@ -152,6 +152,7 @@ def run_global_positioning(
             in_flight=2 * workers,
             resume=resume,
             progress=progress,
+            fixed=fixed,
         )
     result = EvaluateResult(
         Path(config.area.map).name, seed, points, tuple(found), time.perf_counter() - began_s, out
@@ -163,9 +164,10 @@ def run_global_positioning(
 def _world(world: World, folder: Path, seed: int) -> tuple[BenchmarkWorld, int]:
     """Predict the cells, and build a database of all ways and one that lacks every tenth."""
     folder.mkdir(parents=True, exist_ok=True)
-    model, config = PredictionModel(), world.config
+    config = world.config
+    model, antennas = prediction_model(config.prediction), world.antennas
     rasters_path = folder / "rxlev.tif"
-    levels = predict(world.plan, world.lattice, world.heights_m, model)
+    levels = predict(world.plan, world.lattice, world.heights_m, model, antennas=antennas)
     write_rasters(rasters_path, world.lattice, levels, world.plan.ids)
     rasters = open_rasters(rasters_path)
     rng = named_rng(seed, "missing ways")
@@ -179,10 +181,13 @@ def _world(world: World, folder: Path, seed: int) -> tuple[BenchmarkWorld, int]:
             folder / name,
             margin_db=config.database.margin_db,
             floor_dbm=config.database.floor_dbm,
+            tile_px=config.database.tile_px,
         )
         count = count or int(database.manifest["counts"]["points"])
-    np.save(folder / HEIGHTS, world.heights_m)
     write_buildings(world.buildings, folder / BUILDINGS)
     network = street_network(world.ways, world.routes)
-    write_world(SweepWorld(network, world.plan, world.lattice, {}), folder / STREETS)
-    return BenchmarkWorld(folder, model), count
+    streets = SweepWorld(network, world.plan, world.lattice, {}, world.heights_m)
+    write_world(streets, folder / STREETS)
+    errors, settings = ground_truth_errors(config.prediction), simulation_settings(config)
+    settings = replace(settings, reports=replace(settings.reports, radio="reality"))
+    return BenchmarkWorld(folder, model, errors, settings, antennas), count

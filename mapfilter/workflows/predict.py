@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from mapfilter import __version__
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress
-from mapfilter.radio._models import ModelName
 from mapfilter.radio.cells import write_cell_plan
 from mapfilter.radio.predict import (
     PredictionModel,
@@ -75,7 +74,7 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     target, reality = config.rasters_path, config.reality_path
     for folder in (target.parent, reality.parent, config.output.dir):
         ensure_writable_folder(folder)
-    plan, lattice, model = world.plan, world.lattice, _model(name, config.prediction)
+    plan, lattice, model = world.plan, world.lattice, prediction_model(config.prediction)
     check_cells_near(plan, lattice, str(config.cells.plan or "cells"))
     antennas = world.antennas
     notes = (
@@ -85,7 +84,6 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
         *(note for antenna in antennas.values() for note in antenna.notes),
         *outside_validity(plan, lattice, model),
         *off_frequency(plan, antennas),
-        *_made_shadowing(config),
     )
     heights_m = world.heights_m
     wanted = 2 if config.prediction.reality.write else 1
@@ -93,7 +91,7 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     levels = predict(plan, lattice, heights_m, model, _part(progress, 0, wanted), antennas=antennas)
     write_rasters(target, lattice, levels, plan.ids, tags)
     if wanted == 2:
-        errors = _errors(config.prediction)
+        errors = ground_truth_errors(config.prediction)
         real = realise(
             plan, lattice, heights_m, model, errors, _part(progress, 1, wanted), antennas=antennas
         )
@@ -111,50 +109,14 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     )
 
 
-def _made_shadowing(config: Config) -> tuple[str, ...]:
-    """Return a note when levels of somebody's own cells get shadowing that nobody asked for."""
-    section = config.prediction
-    asked_for = "shadowing_db" in section.model_fields_set or section.shadowing_db == 0
-    if config.cells.plan is None or asked_for:
-        return ()
-    return (
-        f"{section.shadowing_db:g} dB of made shadowing are in the levels, as for a simulation; "
-        "set prediction.shadowing_db = 0 for the model's own levels",
-    )
+def prediction_model(section: Prediction) -> PredictionModel:
+    """Return the propagation model of a configuration that does not ask for a survey."""
+    return PredictionModel(**section.model_dump(exclude={"reality", "survey"}))
 
 
-def _model(name: ModelName, section: Prediction) -> PredictionModel:
-    return PredictionModel(
-        model=name,
-        line_of_sight=section.line_of_sight,
-        environment=section.environment,
-        path_loss_exponent=section.path_loss_exponent,
-        reference_distance_m=section.reference_distance_m,
-        reference_loss_db=section.reference_loss_db,
-        metropolitan=section.metropolitan,
-        mobile_height_m=section.mobile_height_m,
-        street_width_m=section.street_width_m,
-        building_separation_m=section.building_separation_m,
-        street_orientation_deg=section.street_orientation_deg,
-        default_roof_height_m=section.default_roof_height_m,
-        shadowing_db=section.shadowing_db,
-        shadowing_correlation_m=section.shadowing_correlation_m,
-        site_share=section.site_share,
-        seed=section.seed,
-    )
-
-
-def _errors(section: Prediction) -> RealityErrors:
-    reality = section.reality
-    return RealityErrors(
-        level_error_db=reality.level_error_db,
-        correlation_m=reality.correlation_m,
-        site_share=reality.site_share,
-        eirp_error_db=reality.eirp_error_db,
-        azimuth_error_deg=reality.azimuth_error_deg,
-        slope_error=reality.slope_error,
-        seed=reality.seed,
-    )
+def ground_truth_errors(section: Prediction) -> RealityErrors:
+    """Return how a configuration's ground truth differs from its prediction."""
+    return RealityErrors(**section.reality.model_dump(exclude={"write"}))
 
 
 def _part(progress: Progress | None, part: int, parts: int) -> Progress | None:

@@ -140,6 +140,8 @@ def paper_config(out: Path, map_name: str | None, bbox: Sequence[float] | None) 
     """Return the configuration of the paper's set-up: two sites of three sectors, four indoor."""
     settings = [f"area.resolution_m={paper.RESOLUTION_M}", "output.pictures=none"]
     settings += ["cells.sites=2", "cells.sectors=3", "cells.indoor=4", "database.margin_db=6.0"]
+    # Random clutter stands for the detail of the paper's measured map.
+    settings.append("prediction.shadowing_db=6.0")
     settings.append(f"area.map={CITY if map_name is None else map_name}")
     if bbox is not None:
         settings.append(f"area.bbox={','.join(map(str, bbox))}")

@@ -10,6 +10,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from mapfilter.radio._models import Clutter, ModelName
+from mapfilter.simulation.imu import Turns
 from mapfilter.tracks.leave_out import Kind
 from mapfilter.workflows.bayes_section import BayesSection
 from mapfilter.workflows.cells_section import Cells
@@ -84,7 +86,7 @@ class Area(Section):
 
 
 class Reality(Section):
-    """``[prediction.reality]``: how far the set that plays reality is from the prediction."""
+    """``[prediction.reality]``: how the simulated ground truth differs from the prediction."""
 
     write: bool = True
     level_error_db: NotNegative = 7.0
@@ -94,10 +96,19 @@ class Reality(Section):
     azimuth_error_deg: Annotated[float, Field(ge=0, le=180)] = 5.0
     slope_error: Annotated[float, Field(ge=0, lt=1)] = 0.05
     seed: Seed = 0
+    clutter: Clutter = "own"
+    local_share: Share = 0.0
+    local_correlation_m: Positive = 20.0
+    model: ModelName | None = None
+    street_width_m: Positive | None = None
+    building_separation_m: Positive | None = None
+    default_roof_height_m: Positive | None = None
+    roof_error: Share = 0.0
+    offset_db: Annotated[float, Field(ge=-50, le=50)] = 0.0
 
 
 class Prediction(Section):
-    """``[prediction]``: the propagation model and its terrain detail, or a survey."""
+    """``[prediction]``: the propagation model, or a survey."""
 
     model: Literal[
         "friis",
@@ -120,7 +131,7 @@ class Prediction(Section):
     building_separation_m: Positive = 40.0
     street_orientation_deg: Annotated[float, Field(ge=0, le=90)] = 90.0
     default_roof_height_m: Positive = 12.0
-    shadowing_db: NotNegative = 6.0
+    shadowing_db: NotNegative = 0.0
     shadowing_correlation_m: Positive = 50.0
     site_share: Share = 0.5
     seed: Seed = 0
@@ -178,11 +189,16 @@ class Journeys(Section):
     fading_db: NotNegative = 1.0
     max_neighbours: Annotated[int, Field(ge=0, le=32)] = 6
     sensitivity_dbm: Annotated[float, Field(ge=-150, le=0)] = -104.0
+    phone_offset_sd_db: NotNegative = 0.0
+    beside: Literal["centre", "pavement"] | Annotated[float, Field(ge=0, le=50)] = "centre"
+    change_side_m: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 150.0
+    stop_every_m: NotNegative = 0.0
+    stop_s: NotNegative = 20.0
     seed: Seed = 0
 
 
 class Imu(Section):
-    """``[imu]``: errors of dead reckoning, eqs. (5) to (8) of Khalaf-Allah (2007), and worse."""
+    """``[imu]``: simulated dead reckoning: eqs. (5)-(8) of Khalaf-Allah (2007), lasting errors."""
 
     period_s: Positive = 1.0
     sigma_trans_m: NotNegative = 0.2
@@ -191,6 +207,12 @@ class Imu(Section):
     drift_deg_per_sqrt_s: NotNegative = 0.0
     scale: Annotated[float, Field(ge=0, lt=1)] = 0.0
     translation_noise: Literal["zero_mean", "as_printed"] = "zero_mean"
+    heading_correlation_s: NotNegative = 0.0
+    step_scale_wander: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    step_scale_correlation_s: NotNegative = 15.0
+    turns: Turns = "headings"
+    gyro_noise_deg_per_sqrt_s: NotNegative = 0.0
+    gyro_bias_deg_per_s: NotNegative = 0.0
 
 
 class Track(Section):

@@ -17,6 +17,7 @@ from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel, level_sampler
 from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
+from mapfilter.simulation.walking import WalkerModel, inside_buildings
 from mapfilter.tracks.store import check_log_replaceable, is_log, write_log
 from mapfilter.workflows.cover import check_cells_near
 from mapfilter.workflows.reality import check_reality, check_reality_there
@@ -72,7 +73,8 @@ def run_simulate(config: Config, progress: Progress | None = None) -> SimulateRe
     total = settings.journeys * settings.draws
     with atomic_dir(config.track_path) as folder:
         track_m = 0.0
-        journeys = simulate_journeys(network, levels, world.plan, settings, section.seed)
+        inside = inside_buildings(world.heights_m, world.lattice)
+        journeys = simulate_journeys(network, levels, world.plan, settings, section.seed, inside)
         for done, (name, log) in enumerate(journeys, start=1):
             write_log(log, folder / name)
             track_m = log.truth_length_m
@@ -101,6 +103,12 @@ def simulation_settings(config: Config) -> SimulationSettings:
             length_m=section.length_m,
             profile=config.roads.profile,
             speed_mps=section.speed_mps,
+            walker=WalkerModel(
+                beside=section.beside,
+                change_side_m=section.change_side_m,
+                stop_every_m=section.stop_every_m,
+                stop_s=section.stop_s,
+            ),
         ),
         imu=ImuErrors(
             sigma_trans_m=imu.sigma_trans_m,
@@ -109,6 +117,12 @@ def simulation_settings(config: Config) -> SimulationSettings:
             heading_drift_rad_per_sqrt_s=float(np.radians(imu.drift_deg_per_sqrt_s)),
             step_scale_sd=imu.scale,
             translation_noise=imu.translation_noise,
+            heading_correlation_s=imu.heading_correlation_s,
+            step_scale_wander_sd=imu.step_scale_wander,
+            step_scale_correlation_s=imu.step_scale_correlation_s,
+            turns=imu.turns,
+            gyro_noise_rad_per_sqrt_s=float(np.radians(imu.gyro_noise_deg_per_sqrt_s)),
+            gyro_bias_sd_rad_per_s=float(np.radians(imu.gyro_bias_deg_per_s)),
         ),
         imu_period_s=imu.period_s,
         reports=ReportModel(
@@ -119,5 +133,6 @@ def simulation_settings(config: Config) -> SimulationSettings:
             max_neighbours=section.max_neighbours,
             sensitivity_dbm=section.sensitivity_dbm,
             radio=section.radio,
+            phone_offset_sd_db=section.phone_offset_sd_db,
         ),
     )

@@ -98,7 +98,8 @@ def _plan(config: Config, databases: tuple[str, ...], resolution_m: float) -> Sw
         profile=settings.journey.profile,
         speed_mps=settings.journey.speed_mps,
         reports=reports,
-        translation_noise=imu.translation_noise,
+        imu=settings.imu,
+        walker=settings.journey.walker,
         seed=section.seed,
     )
 

@@ -14,6 +14,7 @@ from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rasters import RxLevRasters, check_against_plan, open_rasters
 from mapfilter.radio.shadowing import site_shadowing
+from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.network import street_network
 from mapfilter.workflows.cover import check_cells_near
 from mapfilter.workflows.reality import check_reality, check_reality_there
@@ -60,7 +61,10 @@ def sweep_world(config: Config, radios: Sequence[Radio]) -> SweepWorld:
         )
         for radio in radios
     }
-    return SweepWorld(street_network(world.ways, world.routes), world.plan, lattices[0], heard)
+    on_pavement = config.journeys.beside != "centre"
+    heights_m = rasterise_heights(world.buildings, lattices[0]) if on_pavement else None
+    network = street_network(world.ways, world.routes)
+    return SweepWorld(network, world.plan, lattices[0], heard, heights_m)
 
 
 def _levels(rasters: RxLevRasters, plan: CellPlan) -> NDArray[np.float32]:

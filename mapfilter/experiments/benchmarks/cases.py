@@ -1,98 +1,140 @@
-"""The cases of the global-positioning benchmark: what is measured, and how badly."""
+"""The cases of the global-positioning benchmark: what is measured, how badly, and what is stated.
+
+How wrong the dead reckoning of a case is (``imu``) and what its data sheet states (``data_sheet``)
+are two things. A filter is given the second; where the sheet is silent, the filter's own defaults
+hold.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from math import radians
+from types import MappingProxyType
+from typing import Any
 
 from mapfilter.models.street_motion import MotionErrors
 from mapfilter.simulation.imu import ImuErrors
 
-_LEAST_HEADING_SD_DEG = 3.0
-_LEAST_BIAS_DEG = 1.5
-_LEAST_DRIFT_DEG = 0.05
-_LEAST_SCALE = 0.015
 _WALKING_MPS = 1.4
+_NOTHING: Mapping[str, float] = MappingProxyType({})
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Case:
     """One row of the table.
 
     Parameters
     ----------
     name : str
-    imu : ImuErrors
-        Of the dead reckoning.
+    imu : mapping of str to float
+        Errors of dead reckoning in which the case differs from the simulated world, by their names
+        in :class:`mapfilter.simulation.imu.ImuErrors`.
+    data_sheet : mapping of str to float
+        What is stated of the dead reckoning, by the names of
+        :class:`mapfilter.models.street_motion.MotionErrors`.
     levels : bool
-        Whether the phone tells levels and neighbours, or only its serving cell.
+        Whether the phone reports levels and neighbours, or only its serving cell.
     compass : bool
-        Whether it tells headings, or only turns.
+        Whether headings are measured, or only turns.
     missing_ways : float
         Share of the ways that the filter's map lacks.
-    level_error_db : float
-        Of the prediction, over 50 m.
+    level_error_db : float or None
+        Deviation of the ground truth's shadowing; None for that of the world.
     smooth : bool
         Whether the whole track is smoothed and scored from its start.
     recovery_within_m : float
-        For journeys with an unmeasured displacement: within how many metres it must be found
-        again; 0 for those without.
+        For journeys with an unmeasured displacement: within how many metres the position must be
+        found again; 0 for those without.
     satellites : int or None
-        How many of the satellites that are seen the phone receives; None without a receiver.
+        How many satellites the phone receives at most; None without a receiver.
     spoofed : bool
-        Whether a spoofer puts it elsewhere for a while.
+        Whether a spoofer shifts their position for a while.
     """
 
     name: str
-    imu: ImuErrors = field(default_factory=ImuErrors)
+    imu: Mapping[str, float] = field(default_factory=lambda: _NOTHING)
+    data_sheet: Mapping[str, float] = field(default_factory=lambda: _NOTHING)
     levels: bool = True
     compass: bool = True
     missing_ways: float = 0.0
-    level_error_db: float = 7.0
+    level_error_db: float | None = None
     smooth: bool = False
     recovery_within_m: float = 0.0
     satellites: int | None = None
     spoofed: bool = False
 
-    @property
-    def told(self) -> MotionErrors:
-        """What the filter is told of the dead reckoning: its data sheet, with a least noise."""
-        imu = self.imu
-        drift = imu.heading_drift_rad_per_sqrt_s / _WALKING_MPS**0.5
-        return MotionErrors(
-            step_sd_m=max(imu.sigma_trans_m, 0.1),
-            heading_sd_rad=max(imu.sigma_orient_rad, radians(_LEAST_HEADING_SD_DEG)),
-            bias_sd_rad=max(imu.heading_bias_sd_rad, radians(_LEAST_BIAS_DEG)),
-            bias_drift_rad_per_sqrt_m=max(drift, radians(_LEAST_DRIFT_DEG)),
-            scale_sd=max(imu.step_scale_sd, _LEAST_SCALE),
-        )
+    def errors_in(self, world: ImuErrors, fixed: frozenset[str] = frozenset()) -> ImuErrors:
+        """Return the errors of dead reckoning: the world's, with those of the case.
+
+        Parameters
+        ----------
+        world : ImuErrors
+        fixed : frozenset of str
+            Names that somebody set for all cases.
+        """
+        changes: dict[str, Any] = {k: v for k, v in self.imu.items() if k not in fixed}
+        return replace(world, **changes)
+
+    def stated_to(self, motion: MotionErrors, fixed: frozenset[str] = frozenset()) -> MotionErrors:
+        """Return the filter's options of dead reckoning with what the data sheet states.
+
+        Parameters
+        ----------
+        motion : MotionErrors
+            The filter's own.
+        fixed : frozenset of str
+            Names that somebody set for all cases.
+        """
+        return replace(motion, **{k: v for k, v in self.data_sheet.items() if k not in fixed})
 
 
-def _noise(
-    orient_deg: float, bias_deg: float = 0.0, drift_deg: float = 0.0, scale: float = 0.0
-) -> ImuErrors:
-    return ImuErrors(0.2, radians(orient_deg), radians(bias_deg), radians(drift_deg), scale)
+def _compass(sd_deg: float) -> tuple[Mapping[str, float], Mapping[str, float]]:
+    """Return errors and data sheet of a compass of some accuracy."""
+    return {"sigma_orient_rad": radians(sd_deg)}, {"heading_sd_rad": radians(sd_deg)}
 
 
-_PLAIN, _BIAS_10, _BIAS_20 = _noise(6.0), _noise(6.0, 10.0, 0.2, 0.05), _noise(6.0, 20.0, 0.4, 0.1)
+def _biased(
+    bias_deg: float, drift_deg_per_sqrt_s: float, scale: float
+) -> tuple[Mapping[str, float], Mapping[str, float]]:
+    """Return errors and data sheet of a unit with a lasting heading error and step scale."""
+    errors, sheet = _compass(6.0)
+    drift = radians(drift_deg_per_sqrt_s)
+    return (
+        {
+            **errors,
+            "heading_bias_sd_rad": radians(bias_deg),
+            "heading_drift_rad_per_sqrt_s": drift,
+            "step_scale_sd": scale,
+        },
+        {
+            **sheet,
+            "bias_sd_rad": radians(bias_deg),
+            "bias_drift_rad_per_sqrt_m": drift / _WALKING_MPS**0.5,
+            "scale_sd": scale,
+        },
+    )
+
+
+_USUAL, _BIAS_10, _BIAS_20 = _compass(6.0), _biased(10.0, 0.2, 0.05), _biased(20.0, 0.4, 0.1)
 
 CASES = {
     case.name: case
     for case in (
-        *(Case(f"levels-{deg}", _noise(deg)) for deg in (3, 6, 10, 20)),
-        *(Case(f"cell-{deg}", _noise(deg), levels=False) for deg in (3, 6, 10, 20)),
-        Case("levels-bias10", _BIAS_10),
-        Case("levels-bias20", _BIAS_20),
-        Case("levels-nocompass", _PLAIN, compass=False),
-        Case("cell-bias10", _BIAS_10, levels=False),
-        Case("levels-missing10", _PLAIN, missing_ways=0.1),
-        Case("levels-error10", _PLAIN, level_error_db=10.0),
-        Case("smooth-6", _PLAIN, smooth=True),
-        Case("smooth-bias10", _BIAS_10, smooth=True),
-        Case("recovery-levels", _PLAIN, recovery_within_m=300.0),
-        Case("recovery-cell", _PLAIN, levels=False, recovery_within_m=700.0),
-        *(Case(f"satellites-{count}", _BIAS_10, satellites=count) for count in range(5)),
-        Case("spoofed", _BIAS_10, satellites=4, spoofed=True),
+        *(Case(f"levels-{deg}", *_compass(deg)) for deg in (3, 6, 10, 20)),
+        *(Case(f"cell-{deg}", *_compass(deg), levels=False) for deg in (3, 6, 10, 20)),
+        Case("levels-bias10", *_BIAS_10),
+        Case("levels-bias20", *_BIAS_20),
+        Case("levels-nocompass", *_USUAL, compass=False),
+        Case("cell-bias10", *_BIAS_10, levels=False),
+        Case("levels-missing10", *_USUAL, missing_ways=0.1),
+        Case("levels-error10", *_USUAL, level_error_db=10.0),
+        Case("smooth-6", *_USUAL, smooth=True),
+        Case("smooth-bias10", *_BIAS_10, smooth=True),
+        Case("recovery-levels", *_USUAL, recovery_within_m=300.0),
+        Case("recovery-cell", *_USUAL, levels=False, recovery_within_m=700.0),
+        *(Case(f"satellites-{count}", *_BIAS_10, satellites=count) for count in range(5)),
+        Case("spoofed", *_BIAS_10, satellites=4, spoofed=True),
     )
 }
 """All cases by name, in the order of the table."""

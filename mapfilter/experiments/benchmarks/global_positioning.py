@@ -1,7 +1,7 @@
 """Global positioning from an unknown start, on any map: routes and radio are drawn anew.
 
-Runs go in batches: one reality of the radio, several routes, all cases over the same journeys.
-Finished batches lie on disk, so that what was stopped can go on.
+Runs go in batches of a few routes, each with a ground truth of its own; all cases run over the same
+journeys. Finished batches lie on disk, so that what was stopped can go on.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from typing import Any
 
 from mapfilter._io import read_json, write_json
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
-from mapfilter.experiments.benchmarks.cases import CASES
+from mapfilter.experiments.benchmarks.cases import CASES, Case
 from mapfilter.experiments.benchmarks.journeys import displaced_walk, log_of, walk
 from mapfilter.experiments.benchmarks.resuming import begin
-from mapfilter.experiments.benchmarks.satellites import TOLD, spoofer_of, with_satellites
+from mapfilter.experiments.benchmarks.satellites import TOWN_HEIGHT, spoofer_of, with_satellites
 from mapfilter.experiments.benchmarks.scores import (
     CaseResult,
     Row,
@@ -29,15 +29,16 @@ from mapfilter.experiments.benchmarks.world import BenchmarkWorld
 from mapfilter.positioning.bayes_options import BayesOptions
 from mapfilter.positioning.locators import FilterChoice
 from mapfilter.radio.shadowing import named_rng
+from mapfilter.simulation.reports import Levels
 
-ROUTES_PER_REALITY = 5
+ROUTES_PER_BATCH = 2
 HEAD, BATCHES = "benchmark.json", "batches"
-_VERSION = 1
+_VERSION = 2
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Runs of all cases over the routes of one reality.
+    """Runs of all cases over some routes.
 
     Parameters
     ----------
@@ -47,6 +48,8 @@ class Batch:
     seed : int
     first, end : int
         Numbers of the routes.
+    fixed : frozenset of str
+        Options of the filter and errors of dead reckoning that were set for all cases.
     """
 
     world: BenchmarkWorld
@@ -55,45 +58,57 @@ class Batch:
     seed: int
     first: int
     end: int
+    fixed: frozenset[str] = frozenset()
 
 
 def run_batch(batch: Batch) -> list[Row]:
     """Do the runs of a batch and return their rows."""
-    rows = []
-    world, number = batch.world.streets, batch.first // ROUTES_PER_REALITY
-    reality_seed = int(named_rng(batch.seed, "reality", str(number)).integers(2**62))
-    for error_db in sorted({CASES[name].level_error_db for name in batch.cases}):
-        levels = batch.world.reality(reality_seed, error_db)
-        for route in range(batch.first, batch.end):
-            for name in batch.cases:
-                case = CASES[name]
-                if case.level_error_db != error_db:
-                    continue
-                make = displaced_walk if case.recovery_within_m > 0 else walk
-                walked = make(world.network, batch.seed, route)
-                log = log_of(case, walked, levels, world.plan, world.lattice.crs, batch.seed, route)
-                log = with_satellites(
-                    case, log, walked, batch.world.skyline(case), batch.seed, route
-                )
-                locate = batch.world.locator(
-                    told(batch.choice, name), thinned=case.missing_ways > 0
-                )
-                found = locate(log, named_rng(batch.seed, "filter", name, str(route)))
-                scored_at = named_rng(batch.seed, "score", name, str(route))
-                row = {**score(case, walked, found, scored_at), "route": route}
-                if case.satellites is not None:
-                    row |= score_window(walked, found, spoofer_of(walked, batch.seed, route).from_s)
-                rows.append(row)
+    return [row for route in range(batch.first, batch.end) for row in _run_route(batch, route)]
+
+
+def _run_route(batch: Batch, route: int) -> list[Row]:
+    """Run all cases on one route and in one ground truth."""
+    world, streets, settings = batch.world, batch.world.streets, batch.world.settings
+    truth_seed = int(named_rng(batch.seed, "ground truth", str(route)).integers(2**62))
+    rows: list[Row] = []
+    truths: dict[float | None, Levels] = {}
+    for name in batch.cases:
+        case = CASES[name]
+        if case.level_error_db not in truths:
+            truths[case.level_error_db] = world.ground_truth(truth_seed, case.level_error_db)
+        levels = truths[case.level_error_db]
+        make = displaced_walk if case.recovery_within_m > 0 else walk
+        walked = make(streets, settings.journey, batch.seed, route)
+        log = log_of(case, walked, levels, streets, settings, batch.seed, route, batch.fixed)
+        log = with_satellites(case, log, walked, world.skyline(case), batch.seed, route)
+        choice = informed(batch.choice, case, batch.fixed)
+        locate = world.locator(choice, thinned=case.missing_ways > 0)
+        found = locate(log, named_rng(batch.seed, "filter", name, str(route)))
+        row = {**score(case, walked, found), "route": route}
+        if case.satellites is not None:
+            row |= score_window(walked, found, spoofer_of(walked, batch.seed, route).from_s)
+        rows.append(row)
     return rows
 
 
-def told(choice: FilterChoice, case: str) -> FilterChoice:
-    """Return a filter that knows the data sheet of a case's dead reckoning."""
+def informed(choice: FilterChoice, case: Case, fixed: frozenset[str] = frozenset()) -> FilterChoice:
+    """Return a filter with what the case's data sheet states; nothing else is known to it.
+
+    Parameters
+    ----------
+    choice : FilterChoice
+    case : Case
+    fixed : frozenset of str
+        Options that were set for all cases.
+    """
     match choice.options:
         case BayesOptions() as options:
-            known = replace(options, motion=CASES[case].told, smooth=CASES[case].smooth)
-            if CASES[case].satellites is not None:
-                known = replace(known, satellites=TOLD)
+            known = replace(
+                options, motion=case.stated_to(options.motion, fixed), smooth=case.smooth
+            )
+            if case.satellites is not None:
+                height = {k: v for k, v in TOWN_HEIGHT.items() if k not in fixed}
+                known = replace(known, satellites=replace(options.satellites, **height))
             return replace(choice, options=known)
     return choice
 
@@ -110,6 +125,7 @@ def benchmark(
     in_flight: int = 4,
     resume: bool = False,
     progress: Progress | None = None,
+    fixed: frozenset[str] = frozenset(),
 ) -> list[CaseResult]:
     """Run the cases and return one row of the table for each.
 
@@ -120,7 +136,7 @@ def benchmark(
     cases : sequence of str
         Names out of :data:`mapfilter.experiments.benchmarks.cases.CASES`.
     runs : int
-        Routes for each case; five share a reality of the radio.
+        Routes for each case, each with a ground truth of its own.
     seed : int
     out : Path
         Folder in which finished batches are kept.
@@ -129,7 +145,9 @@ def benchmark(
     resume : bool
         Keep what the same benchmark has finished.
     progress : callable, optional
-        Called with runs done and runs in all.
+        Called with batches done and batches in all.
+    fixed : frozenset of str
+        Options of the filter and errors of dead reckoning that hold in all cases.
 
     Raises
     ------
@@ -141,18 +159,19 @@ def benchmark(
         "filter": repr(choice),
         "cases": list(cases),
         "seed": seed,
+        "fixed": sorted(fixed),
         "world": world.sha256,
     }
     (out / BATCHES).mkdir(parents=True, exist_ok=True)
     begin(out / HEAD, head, (out / BATCHES).glob("*.json"), resume=resume)
     tasks, kept = [], dict[int, list[Row]]()
-    for first in range(0, runs, ROUTES_PER_REALITY):
-        end = min(first + ROUTES_PER_REALITY, runs)
+    for first in range(0, runs, ROUTES_PER_BATCH):
+        end = min(first + ROUTES_PER_BATCH, runs)
         done = _finished(out / BATCHES / f"{first:06d}.json", (end - first) * len(cases))
         if resume and done is not None:
             kept[first] = done
         else:
-            tasks.append(Batch(world, choice, tuple(cases), seed, first, end))
+            tasks.append(Batch(world, choice, tuple(cases), seed, first, end, fixed))
     results = ordered_results(
         executor or SerialExecutor(), run_batch, tasks, in_flight=in_flight, progress=progress
     )

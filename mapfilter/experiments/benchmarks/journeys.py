@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import count
 
 import numpy as np
 import pandas as pd
 
 from mapfilter.experiments.benchmarks.cases import Case
-from mapfilter.radio.cells import CellPlan
+from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.radio.shadowing import named_rng
-from mapfilter.roads.network import StreetNetwork
 from mapfilter.simulation.imu import noisy_motion
 from mapfilter.simulation.journeys import JourneyPlan, journey
-from mapfilter.simulation.reports import Levels, ReportModel, reports
+from mapfilter.simulation.reports import Levels, reports
 from mapfilter.simulation.routes import route
+from mapfilter.simulation.simulate import SimulationSettings, at_ticks
 from mapfilter.tracks.log import TrackLog, make_log
 
-LENGTH_M = 1940.0
 _BEFORE_M = 800.0
 _AFTER_M = 1000.0
 _NEAREST_M, _FARTHEST_M = 200.0, 1000.0
@@ -39,22 +39,24 @@ class Walk:
     displaced_at_s: float = float("inf")
 
 
-def walk(network: StreetNetwork, seed: int, number: int) -> Walk:
-    """Walk 1 940 m along a random route."""
-    rng = named_rng(seed, "route", str(number))
-    return Walk(journey(route(network, LENGTH_M, rng), JourneyPlan(LENGTH_M)))
+def walk(streets: SweepWorld, plan: JourneyPlan, seed: int, number: int) -> Walk:
+    """Walk along a random route, 1 940 m unless the plan says otherwise."""
+    along = route(streets.network, plan.length_m, named_rng(seed, "route", str(number)))
+    return Walk(journey(along, plan, named_rng(seed, "walker", str(number)), streets.inside))
 
 
-def displaced_walk(network: StreetNetwork, seed: int, number: int) -> Walk:
+def displaced_walk(streets: SweepWorld, plan: JourneyPlan, seed: int, number: int) -> Walk:
     """Walk 800 m, be carried 200 m to 1 km away without anything being measured, and walk 1 km.
 
     Both parts lie on one route: the first place behind the cut that is as far away as was drawn.
     """
     rng = named_rng(seed, "displacement", str(number))
-    while True:
-        # Short legs turn back soon; some routes never get as far away as is wanted.
-        length_m = _BEFORE_M + 4 * _FARTHEST_M
-        whole = journey(route(network, length_m, rng), JourneyPlan(length_m))
+    # Short legs turn back soon; some routes never get as far away as is wanted.
+    length_m = _BEFORE_M + 4 * _FARTHEST_M
+    for attempt in count():
+        along = route(streets.network, length_m, rng)
+        walker = named_rng(seed, "displaced walker", str(number), str(attempt))
+        whole = journey(along, replace(plan, length_m=length_m), walker, streets.inside)
         wanted_m = rng.uniform(_NEAREST_M, _FARTHEST_M)
         east, north = whole["east_m"].to_numpy(), whole["north_m"].to_numpy()
         walked_m = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(east), np.diff(north)))])
@@ -70,18 +72,41 @@ def displaced_walk(network: StreetNetwork, seed: int, number: int) -> Walk:
 
 
 def log_of(
-    case: Case, walked: Walk, levels: Levels, plan: CellPlan, crs: str, seed: int, number: int
+    case: Case,
+    walked: Walk,
+    levels: Levels,
+    streets: SweepWorld,
+    settings: SimulationSettings,
+    seed: int,
+    number: int,
+    fixed: frozenset[str] = frozenset(),
 ) -> TrackLog:
-    """Return what the phone and its unit tell of a walk.
+    """Return what the phone and its unit report of a walk.
 
-    Cases of one noise see the same noise, and all the same reports.
+    Cases of one noise have the same noise, and all the same reports.
+
+    Parameters
+    ----------
+    case : Case
+    walked : Walk
+    levels : callable
+        The ground truth's.
+    streets : SweepWorld
+    settings : SimulationSettings
+        Of the world: reports, and errors of dead reckoning.
+    seed, number : int
+        Of the benchmark and of the route.
+    fixed : frozenset of str
+        Errors of dead reckoning that the case does not change.
     """
-    truth = walked.truth
-    radio = reports(truth, levels, plan, ReportModel(), named_rng(seed, "radio", str(number)))
+    truth, plan = walked.truth, streets.plan
+    radio = reports(truth, levels, plan, settings.reports, named_rng(seed, "radio", str(number)))
     if not case.levels:
         serving = radio[radio["role"] == "serving"]
         radio = serving.assign(level_dbm=np.nan, censored=np.int8(0)).reset_index(drop=True)
-    motion = noisy_motion(truth, case.imu, named_rng(seed, "imu", str(number)))
+    errors = case.errors_in(settings.imu, fixed)
+    ticks = at_ticks(truth, settings.imu_period_s)
+    motion = noisy_motion(ticks, errors, named_rng(seed, "imu", str(number)))
     if np.isfinite(walked.displaced_at_s):
         # The interval of the displacement is as if one had stood still.
         carried = motion["time_s"].to_numpy().searchsorted(walked.displaced_at_s, side="right")
@@ -89,6 +114,6 @@ def log_of(
         motion.loc[carried, "turn_rad"] = 0.0
     if not case.compass:
         motion["heading_rad"] = np.nan
-    log = make_log(crs, motion=motion, radio=radio)
+    log = make_log(streets.network.crs, motion=motion, radio=radio)
     # The truth of a displacement is not a path that anybody walked.
     return replace(log, truth=truth)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
@@ -13,7 +15,6 @@ from mapfilter.gnss.almanac import joined
 from mapfilter.gnss.constellations import nominal_galileo, nominal_gps
 from mapfilter.gnss.orbits import gps_time
 from mapfilter.gnss.visibility import Skyline
-from mapfilter.positioning.sky_options import SkyOptions
 from mapfilter.radio.shadowing import named_rng
 from mapfilter.simulation.satellites import ReceptionModel, Spoofer, receive
 from mapfilter.tracks.log import TrackLog, make_log
@@ -24,10 +25,9 @@ SPOOFED_M, SPOOFED_S = 500.0, 60.0
 WINDOW_S = 120.0
 """Errors about a spoofer are looked at from its beginning on, for so long."""
 
-HEIGHT_M, HEIGHT_SD_M = 100.0, 20.0
-"""What the filter is told of the town's height over the ellipsoid."""
-
-TOLD = SkyOptions(height_m=HEIGHT_M, height_sd_m=HEIGHT_SD_M)
+HEIGHT_M = 100.0
+TOWN_HEIGHT: Mapping[str, float] = MappingProxyType({"height_m": HEIGHT_M, "height_sd_m": 20.0})
+"""What a map states of the town's height over the ellipsoid, as options of the filter."""
 
 
 def spoofer_of(walked: Walk, seed: int, number: int) -> Spoofer:

@@ -1,4 +1,4 @@
-"""What came of the benchmark's runs: one row for each, and one figure for each case."""
+"""Scores of the benchmark: one row for each run, and one figure with its interval for each case."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mapfilter.evaluation.accuracy import (
     SUCCESS_RADIUS_M,
@@ -15,7 +16,8 @@ from mapfilter.evaluation.accuracy import (
     percentile_m,
     position_errors_m,
 )
-from mapfilter.evaluation.success import wilson_interval
+from mapfilter.evaluation.claims import RADII, score_claims
+from mapfilter.evaluation.success import wilson_interval_of_routes
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.benchmarks.journeys import Walk
 from mapfilter.filters.contract import Status
@@ -24,20 +26,24 @@ from mapfilter.positioning.global_positioning import PositionedTrack
 _STAY_S = 10.0
 _WINDOW_S = 120.0
 Row = dict[str, Any]
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class CaseResult:
     """One row of the table.
 
+    All shares have 95 % intervals of the runs as clusters: each run has a route and a ground truth
+    of its own, and its epochs are alike.
+
     Parameters
     ----------
     name, filter : str
     runs : int
     success, success_low, success_high : float
-        Share and its 95 % Wilson interval: at most 50 m off when converged; in the cases of a
+        Share of the runs that were at most 50 m off when they converged; in the cases of a
         displacement, within 50 m again, and for 10 s, soon enough.
-    wrong : float
+    wrong, wrong_low, wrong_high : float
         Share of the runs that converged more than 50 m off; after a displacement, that still were
         so at the end.
     switch_mean_m, switch_p90_m : float
@@ -45,12 +51,24 @@ class CaseResult:
     error_mean_m, error_67_m, error_95_m : float
         Means over the successful runs of each run's figure, from then on; of the whole track where
         it is smoothed.
-    coverage_95 : float
-        Share of the runs whose 95 % radius held the truth at one random epoch after converging.
+    worst_100m_mean_m, worst_100m_95_m : float
+        Of each run that converged, the largest mean error over 100 m travelled after it: mean and
+        95 % over the runs.
+    claimed : float
+        Share of all epochs at which a position was claimed (CONVERGED or TRACKING).
+    within_50m, within_50m_low, within_50m_high : float
+        Share of the claimed epochs that were at most 50 m off.
+    coverage_50, coverage_67, coverage_95 : float
+        Share of the claimed epochs whose radius held the truth.
+    coverage_95_low, coverage_95_high : float
+    false_converged_per_journey, false_converged_per_km : float
+        How often a claim began more than 50 m off, also after LOST.
+    false_lost_per_journey, false_lost_per_km : float
+        How often LOST was reported right after a claimed position that was at most 50 m off.
+    lost_per_km : float
+        How often LOST was reported at all, before any displacement.
     seconds_per_track : float
         Processor time of the filter, median.
-    lost_per_km : float
-        How often LOST was said where nothing had happened.
     window_median_m : float
         In the cases with satellites, mean over the runs of the median error in the two minutes
         from when a spoofer begins, or would.
@@ -63,83 +81,126 @@ class CaseResult:
     success_low: float
     success_high: float
     wrong: float
+    wrong_low: float
+    wrong_high: float
     switch_mean_m: float
     switch_p90_m: float
     error_mean_m: float
     error_67_m: float
     error_95_m: float
+    worst_100m_mean_m: float
+    worst_100m_95_m: float
+    claimed: float
+    within_50m: float
+    within_50m_low: float
+    within_50m_high: float
+    coverage_50: float
+    coverage_67: float
     coverage_95: float
-    seconds_per_track: float
+    coverage_95_low: float
+    coverage_95_high: float
+    false_converged_per_journey: float
+    false_converged_per_km: float
+    false_lost_per_journey: float
+    false_lost_per_km: float
     lost_per_km: float
+    seconds_per_track: float
     window_median_m: float = float("nan")
 
 
-def score(case: Case, walked: Walk, found: PositionedTrack, rng: np.random.Generator) -> Row:
-    """Score one run; figures that are undefined are None."""
+def score(case: Case, walked: Walk, found: PositionedTrack) -> Row:
+    """Score one run; figures that are undefined are None.
+
+    After a displacement nothing is claimed fairly until it has been noticed: claims are scored up
+    to it.
+    """
     estimate, truth = found.estimate, _truth(walked)
     errors_m = position_errors_m(estimate, truth)
+    claims = score_claims(estimate, truth, until_s=walked.displaced_at_s)
     row: Row = {"case": case.name, "seconds": found.filter_s}
-    lost = np.array([status is Status.LOST for status in estimate.status], dtype=bool)
-    began_lost = lost & ~np.concatenate([[False], lost[:-1]])
-    before = estimate.time_s <= walked.displaced_at_s
-    row["lost"] = int(np.sum(began_lost & before))
-    row["km"] = float(truth.distance_at(min(walked.displaced_at_s, truth.time_s[-1])) / 1000)
+    row |= {
+        "km": claims.km,
+        "epochs": claims.epochs,
+        "claimed": claims.claimed,
+        "within_50m": claims.within_50m,
+        **{f"covered_{share}": held for share, held in zip(RADII, claims.covered, strict=True)},
+        "false_converged": claims.false_starts,
+        "false_lost": claims.false_lost,
+        "lost": claims.lost,
+        "worst_100m_m": _finite(claims.worst_100m_m),
+    }
     if case.recovery_within_m > 0:
         return row | _recovered(case, walked, truth, estimate.time_s, errors_m)
     scored = accuracy(estimate, truth)
     row |= {
         "success": scored.success,
         "wrong": bool(scored.error_at_switch_m > SUCCESS_RADIUS_M),
-        "switch_m": _told(scored.switch_distance_m),
-        "error_mean_m": _told(scored.error_mean_m),
-        "error_67_m": _told(scored.error_67_m),
-        "error_95_m": _told(scored.error_95_m),
-        "covered": None,
+        "switch_m": _finite(scored.switch_distance_m),
+        "error_mean_m": _finite(scored.error_mean_m),
+        "error_67_m": _finite(scored.error_67_m),
+        "error_95_m": _finite(scored.error_95_m),
     }
     if case.smooth:
         row |= _errors(errors_m[np.isfinite(errors_m)])
-    switch = estimate.converged_at
-    if switch is not None:
-        at = int(rng.integers(switch, len(estimate)))
-        row["covered"] = bool(errors_m[at] <= estimate.radii_m[at, 2])
     return row
 
 
 def summarise(case: Case, filter_name: str, rows: Sequence[Mapping[str, Any]]) -> CaseResult:
     """Put the runs of a case together."""
     runs, good = len(rows), [row for row in rows if row["success"]]
-    low, high = wilson_interval(len(good), runs)
     switch_m = [row["switch_m"] for row in rows if row["switch_m"] is not None]
-    km = sum(row["km"] for row in rows)
+    worst_m = [row["worst_100m_m"] for row in rows if row["worst_100m_m"] is not None]
+    km = _total(rows, "km")
+    success_low, success_high = _interval([int(row["success"]) for row in rows], [1] * runs)
+    wrong_low, wrong_high = _interval([int(row["wrong"]) for row in rows], [1] * runs)
+    claimed = [int(row["claimed"]) for row in rows]
+    near_low, near_high = _interval([int(row["within_50m"]) for row in rows], claimed)
+    held_low, held_high = _interval([int(row["covered_95"]) for row in rows], claimed)
     return CaseResult(
         name=case.name,
         filter=filter_name,
         runs=runs,
-        success=len(good) / runs if runs else float("nan"),
-        success_low=low,
-        success_high=high,
+        success=_ratio(len(good), runs),
+        success_low=success_low,
+        success_high=success_high,
         wrong=_mean([row["wrong"] for row in rows]),
+        wrong_low=wrong_low,
+        wrong_high=wrong_high,
         switch_mean_m=_mean(switch_m),
         switch_p90_m=percentile_m(np.array(switch_m, dtype=np.float64), 0.9),
         error_mean_m=_mean([row["error_mean_m"] for row in good]),
         error_67_m=_mean([row["error_67_m"] for row in good]),
         error_95_m=_mean([row["error_95_m"] for row in good]),
-        coverage_95=_mean([row["covered"] for row in rows]),
+        worst_100m_mean_m=_mean(worst_m),
+        worst_100m_95_m=percentile_m(np.array(worst_m, dtype=np.float64), 0.95),
+        claimed=_ratio(sum(claimed), _total(rows, "epochs")),
+        within_50m=_ratio(_total(rows, "within_50m"), sum(claimed)),
+        within_50m_low=near_low,
+        within_50m_high=near_high,
+        coverage_50=_ratio(_total(rows, "covered_50"), sum(claimed)),
+        coverage_67=_ratio(_total(rows, "covered_67"), sum(claimed)),
+        coverage_95=_ratio(_total(rows, "covered_95"), sum(claimed)),
+        coverage_95_low=held_low,
+        coverage_95_high=held_high,
+        false_converged_per_journey=_ratio(_total(rows, "false_converged"), runs),
+        false_converged_per_km=_ratio(_total(rows, "false_converged"), km),
+        false_lost_per_journey=_ratio(_total(rows, "false_lost"), runs),
+        false_lost_per_km=_ratio(_total(rows, "false_lost"), km),
+        lost_per_km=_ratio(_total(rows, "lost"), km),
         seconds_per_track=float(np.median([row["seconds"] for row in rows])) if runs else 0.0,
-        lost_per_km=sum(row["lost"] for row in rows) / km if km else float("nan"),
         window_median_m=_mean([row.get("window_median_m") for row in rows]),
     )
 
 
 def score_window(walked: Walk, found: PositionedTrack, from_s: float) -> Row:
-    """Score the two minutes from a time on, where the filter says that it knows its place."""
+    """Score the two minutes from a time on, where a position is known."""
     estimate = found.estimate
     errors_m = position_errors_m(estimate, _truth(walked))
     known = np.array([status is not Status.SEARCHING for status in estimate.status], dtype=bool)
     at = (estimate.time_s >= from_s) & (estimate.time_s < from_s + _WINDOW_S) & known
     inside = errors_m[at]
     inside = inside[np.isfinite(inside)]
-    return {"window_median_m": _told(float(np.median(inside))) if inside.size else None}
+    return {"window_median_m": _finite(float(np.median(inside))) if inside.size else None}
 
 
 def _truth(walked: Walk) -> Truth:
@@ -147,13 +208,7 @@ def _truth(walked: Walk) -> Truth:
     return Truth(*(np.asarray(walked.truth[name], dtype=np.float64) for name in names))
 
 
-def _recovered(
-    case: Case,
-    walked: Walk,
-    truth: Truth,
-    time_s: np.ndarray[Any, np.dtype[np.float64]],
-    errors_m: np.ndarray[Any, np.dtype[np.float64]],
-) -> Row:
+def _recovered(case: Case, walked: Walk, truth: Truth, time_s: Floats, errors_m: Floats) -> Row:
     """Score how soon a displaced track is found again: within 50 m, for 10 s."""
     after = np.flatnonzero(time_s > walked.displaced_at_s)
     near = errors_m[after] <= SUCCESS_RADIUS_M
@@ -161,7 +216,7 @@ def _recovered(
     carried_m = float(np.ptp(truth.distance_at(carried_s)))
     gone_m = truth.distance_at(time_s[after]) - truth.distance_at(walked.displaced_at_s)
     far = np.flatnonzero(~near)
-    row: Row = {"success": False, "wrong": bool(not near[-1]), "switch_m": None, "covered": None}
+    row: Row = {"success": False, "wrong": bool(not near[-1]), "switch_m": None}
     for begin in np.concatenate([[0], far + 1]).tolist():
         ends = far[far >= begin]
         end = int(ends[0]) if ends.size else len(near)
@@ -172,15 +227,31 @@ def _recovered(
     return row | {f"error_{name}_m": None for name in ("mean", "67", "95")}
 
 
-def _errors(errors_m: np.ndarray[Any, np.dtype[np.float64]]) -> Row:
+def _errors(errors_m: Floats) -> Row:
     return {
-        "error_mean_m": _told(float(np.mean(errors_m))) if errors_m.size else None,
-        "error_67_m": _told(percentile_m(errors_m, 0.67)),
-        "error_95_m": _told(percentile_m(errors_m, 0.95)),
+        "error_mean_m": _finite(float(np.mean(errors_m))) if errors_m.size else None,
+        "error_67_m": _finite(percentile_m(errors_m, 0.67)),
+        "error_95_m": _finite(percentile_m(errors_m, 0.95)),
     }
 
 
-def _told(value: float) -> float | None:
+def _interval(counts: Sequence[int], totals: Sequence[int]) -> tuple[float, float]:
+    """Return the interval of a share, each run being a cluster; runs without any are left out."""
+    known = np.asarray(totals) > 0
+    if not known.any():
+        return 0.0, 1.0
+    return wilson_interval_of_routes(np.asarray(counts)[known], np.asarray(totals)[known])
+
+
+def _total(rows: Sequence[Mapping[str, Any]], name: str) -> float:
+    return float(sum(row[name] for row in rows))
+
+
+def _ratio(part: float, whole: float) -> float:
+    return part / whole if whole else float("nan")
+
+
+def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 

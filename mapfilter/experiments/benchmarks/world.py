@@ -1,9 +1,10 @@
-"""The world of a benchmark on disk: streets, cells, heights and databases."""
+"""The world of a benchmark: streets, cells and databases on disk, and the ground truth."""
 
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -11,7 +12,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import shapely
-from numpy.typing import NDArray
 
 from mapfilter._io import atomic_file, sha256_file
 from mapfilter.database.store import open_database
@@ -19,40 +19,52 @@ from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.sweep.world import SweepWorld, open_world
 from mapfilter.gnss.visibility import Skyline
 from mapfilter.positioning.locators import FilterChoice, Locator, open_locator
+from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.predict import PredictionModel, RealityErrors, realise
 from mapfilter.roads.ways import Buildings
 from mapfilter.simulation.reports import Levels, array_sampler
+from mapfilter.simulation.simulate import SimulationSettings
 
-STREETS, HEIGHTS, FULL, THINNED = "streets", "heights.npy", "database", "database-thinned"
+STREETS, FULL, THINNED = "streets", "database", "database-thinned"
 BUILDINGS = "buildings.parquet"
 
 
 @dataclass(frozen=True)
 class BenchmarkWorld:
-    """Where a benchmark's world lies.
+    """Where a benchmark's world lies, and how it differs from its prediction.
 
     Parameters
     ----------
     folder : Path
-        Holds streets and cells, buildings and their heights, and a database with all ways, and
-        one that lacks some.
+        Holds streets, cells and building heights, buildings, and a database with all ways, and one
+        that lacks some.
     model : PredictionModel
         That the databases were predicted with.
+    errors : RealityErrors
+        How the ground truth differs; its seed is drawn anew for each ground truth.
+    settings : SimulationSettings
+        How one walks, what is reported, and the errors of dead reckoning.
+    antennas : mapping of str to MeasuredAntenna
+        That the cell plan names.
     """
 
     folder: Path
     model: PredictionModel
+    errors: RealityErrors = field(default_factory=RealityErrors)
+    settings: SimulationSettings = field(default_factory=SimulationSettings)
+    antennas: Mapping[str, MeasuredAntenna] = field(default_factory=dict)
 
     @property
     def sha256(self) -> str:
-        """Of streets, cells, levels and buildings."""
+        """Of streets, cells, levels and buildings, and of all that is simulated."""
         parts = (*(f"{name}/manifest.json" for name in (FULL, THINNED)), BUILDINGS)
-        told = (sha256_file(self.folder / part) for part in (f"{STREETS}/world.json", *parts))
-        return hashlib.sha256("".join(told).encode()).hexdigest()
+        drawn = [sha256_file(self.folder / part) for part in (f"{STREETS}/world.json", *parts)]
+        simulated = (repr(self.model), repr(self.errors), repr(self.settings))
+        return hashlib.sha256("".join((*drawn, *simulated)).encode()).hexdigest()
 
     @property
     def streets(self) -> SweepWorld:
-        """Streets and cells."""
+        """Streets, cells and building heights."""
         return _streets(self.folder / STREETS)
 
     def locator(self, choice: FilterChoice, *, thinned: bool) -> Locator:
@@ -63,9 +75,28 @@ class BenchmarkWorld:
         """Return the buildings that hide satellites, where a case has any satellites."""
         return None if case.satellites is None else _skyline(self.folder / BUILDINGS)
 
-    def reality(self, seed: int, level_error_db: float) -> Levels:
-        """Draw how the cells are really heard."""
-        return _reality(self.folder, self.model, seed, level_error_db)
+    def ground_truth(self, seed: int, level_error_db: float | None = None) -> Levels:
+        """Draw how the cells are really received.
+
+        Parameters
+        ----------
+        seed : int
+        level_error_db : float, optional
+            Deviation of the shadowing, in place of the world's.
+        """
+        errors = replace(self.errors, seed=seed)
+        if level_error_db is not None:
+            errors = replace(errors, level_error_db=level_error_db)
+        streets = self.streets
+        cells = realise(
+            streets.plan,
+            streets.lattice,
+            streets.heights_m,
+            self.model,
+            errors,
+            antennas=self.antennas,
+        )
+        return array_sampler(np.stack([level_dbm for _, level_dbm in cells]), streets.lattice)
 
 
 def write_buildings(buildings: Buildings, path: Path) -> None:
@@ -90,14 +121,3 @@ def _streets(folder: Path) -> SweepWorld:
 @lru_cache(maxsize=32)
 def _locator(database: Path, choice: FilterChoice) -> Locator:
     return open_locator(open_database(database), choice, ways=False)
-
-
-@lru_cache(maxsize=2)
-def _reality(folder: Path, model: PredictionModel, seed: int, level_error_db: float) -> Levels:
-    world = _streets(folder / STREETS)
-    heights_m: NDArray[np.float32] = np.load(folder / HEIGHTS, allow_pickle=False)
-    errors = RealityErrors(level_error_db=level_error_db, seed=seed)
-    levels = np.stack(
-        [level for _, level in realise(world.plan, world.lattice, heights_m, model, errors)]
-    )
-    return array_sampler(levels, world.lattice)

@@ -9,7 +9,7 @@ import pandas as pd
 
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.sweep.plan import AS_PREDICTED, Radio, Run, SweepPlan
-from mapfilter.experiments.sweep.seeds import imu_rng, radio_rng, route_rng
+from mapfilter.experiments.sweep.seeds import imu_rng, radio_rng, route_rng, walker_rng
 from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.simulation.imu import noisy_motion
 from mapfilter.simulation.journeys import journey
@@ -30,7 +30,7 @@ def true_path(world: SweepWorld, plan: SweepPlan, number: int) -> pd.DataFrame:
     settings = plan.journey
     rng = route_rng(plan.seed, number)
     along = route(world.network, settings.length_m, rng, leg_m=settings.leg_m)
-    return journey(along, settings)
+    return journey(along, settings, walker_rng(plan.seed, number), world.inside)
 
 
 def heard(
@@ -58,7 +58,7 @@ def sensed(plan: SweepPlan, log: TrackLog, run: Run) -> TrackLog:
 
     What was checked once is not checked again for each run.
     """
-    errors = run.noise.errors(plan.translation_noise)
+    errors = run.noise.errors(plan.imu)
     ticks = at_ticks(log.truth, run.imu_period_s)
     return replace(log, motion=noisy_motion(ticks, errors, imu_rng(plan.seed, run)))
 

@@ -7,7 +7,7 @@ import hashlib
 import itertools
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from math import ceil, isfinite, prod, radians
 from typing import Literal
 
@@ -16,7 +16,7 @@ from mapfilter.positioning.locators import FilterChoice
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
-from mapfilter.tracks.deadreckoning import TranslationNoise
+from mapfilter.simulation.walking import WalkerModel
 
 AS_PREDICTED = "as_predicted"
 """The radio world in which each place is served by the cell predicted best there."""
@@ -51,15 +51,15 @@ class Noise:
     drift_deg_per_sqrt_s: float = 0.0
     scale: float = 0.0
 
-    def errors(self, translation_noise: TranslationNoise) -> ImuErrors:
-        """Return the same in the units of the simulation."""
-        return ImuErrors(
+    def errors(self, others: ImuErrors) -> ImuErrors:
+        """Return the same in the units of the simulation, beside errors that are not swept."""
+        return replace(
+            others,
             sigma_trans_m=self.sigma_trans_m,
             sigma_orient_rad=radians(self.sigma_orient_deg),
             heading_bias_sd_rad=radians(self.bias_deg),
             heading_drift_rad_per_sqrt_s=radians(self.drift_deg_per_sqrt_s),
             step_scale_sd=self.scale,
-            translation_noise=translation_noise,
         )
 
 
@@ -131,7 +131,9 @@ class SweepPlan:
         Of the journeys; see :class:`mapfilter.simulation.journeys.JourneyPlan`.
     reports : ReportModel
         Its period and ``radio`` are replaced by the grid's.
-    translation_noise : {"zero_mean", "as_printed"}
+    imu : ImuErrors
+        Those of its errors that are not in ``noises``.
+    walker : WalkerModel
     seed : int
 
     Raises
@@ -153,7 +155,8 @@ class SweepPlan:
     profile: Literal["walking", "driving"] = "walking"
     speed_mps: float = 1.4
     reports: ReportModel = field(default_factory=ReportModel)
-    translation_noise: TranslationNoise = "zero_mean"
+    imu: ImuErrors = field(default_factory=ImuErrors)
+    walker: WalkerModel = field(default_factory=WalkerModel)
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -181,7 +184,7 @@ class SweepPlan:
                 faults.add("sweep, period", "seconds > 0", period_s)
         for noise in self.noises:
             try:
-                noise.errors(self.translation_noise)
+                noise.errors(self.imu)
             except ConfigError as error:
                 faults.found.extend(error.faults)
         try:
@@ -216,7 +219,12 @@ class SweepPlan:
     @property
     def journey(self) -> JourneyPlan:
         """How far and how fast each journey goes."""
-        return JourneyPlan(length_m=self.length_m, profile=self.profile, speed_mps=self.speed_mps)
+        return JourneyPlan(
+            length_m=self.length_m,
+            profile=self.profile,
+            speed_mps=self.speed_mps,
+            walker=self.walker,
+        )
 
     def batches(self) -> Iterator[tuple[int, int]]:
         """Yield first run and end of each batch: together all runs, in order.

@@ -18,6 +18,11 @@ def route_rng(seed: int, route: int) -> np.random.Generator:
     return named_rng(seed, "route", str(route))
 
 
+def walker_rng(seed: int, route: int) -> np.random.Generator:
+    """Return the generator of how a route is walked."""
+    return named_rng(seed, "walker", str(route))
+
+
 def radio_rng(seed: int, route: int, radio: Radio, report_period_s: float) -> np.random.Generator:
     """Return the generator of what a phone measures along a route: once, as one measures once."""
     return named_rng(seed, "radio", str(route), radio.name, _value(report_period_s))

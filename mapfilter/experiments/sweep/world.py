@@ -16,8 +16,10 @@ from mapfilter.errors import StoreError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.network import StreetNetwork
+from mapfilter.simulation.walking import Inside, inside_buildings
 
 _HEAD, _CELLS, _STREETS = "world.json", "cells.parquet", "streets.npz"
+_HEIGHTS = "heights.npy"
 _ARRAYS = (
     "east_m", "north_m", "node_a", "node_b", "length_m", "way_id", "way_class", "oneway",
 )  # fmt: skip
@@ -36,12 +38,22 @@ class SweepWorld:
         Of the levels.
     levels_dbm : mapping of str to ndarray, shape (cells, rows, cols)
         By the radio's name; NaN where a cell is not heard. Read from disk, they are mapped.
+    heights_m : ndarray, shape (rows, cols), or None
+        Of buildings on the lattice, where walkers keep out of them.
     """
 
     network: StreetNetwork
     plan: CellPlan
     lattice: Lattice
     levels_dbm: Mapping[str, NDArray[np.float32]]
+    heights_m: NDArray[np.float32] | None = None
+
+    @property
+    def inside(self) -> Inside | None:
+        """Tells where buildings stand; None where that is not known."""
+        if self.heights_m is None:
+            return None
+        return inside_buildings(self.heights_m, self.lattice)
 
 
 def write_world(world: SweepWorld, folder: Path) -> str:
@@ -61,7 +73,10 @@ def write_world(world: SweepWorld, folder: Path) -> str:
             levels = np.ascontiguousarray(world.levels_dbm[name], dtype=np.float32)
             np.save(into / _levels(number), levels)
         lattice = world.lattice
-        parts = (_CELLS, _STREETS, *(_levels(number) for number in range(len(names))))
+        parts = [_CELLS, _STREETS, *(_levels(number) for number in range(len(names)))]
+        if world.heights_m is not None:
+            np.save(into / _HEIGHTS, np.asarray(world.heights_m, dtype=np.float32))
+            parts.append(_HEIGHTS)
         head = {
             "crs": lattice.crs,
             "west_m": lattice.west_m,
@@ -102,9 +117,13 @@ def open_world(folder: Path) -> SweepWorld:
             str(name): np.load(folder / _levels(number), mmap_mode="r", allow_pickle=False)
             for number, name in enumerate(head["levels"])
         }
+        heights_m = None
+        if _HEIGHTS in head["sha256"]:
+            heights_m = np.load(folder / _HEIGHTS, mmap_mode="r", allow_pickle=False)
     except (OSError, KeyError, TypeError, ValueError) as error:
         raise fail(StoreError, str(folder), "the world of a sweep", error, "cut off") from error
-    return SweepWorld(network, read_cells(folder / _CELLS, lattice.crs), lattice, levels)
+    cells = read_cells(folder / _CELLS, lattice.crs)
+    return SweepWorld(network, cells, lattice, levels, heights_m)
 
 
 def _levels(number: int) -> str:
