@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -22,7 +23,9 @@ from mapfilter.workflows.terminal import print_result, rate_bar
 
 
 def evaluate(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="global-positioning or ottawa.")],
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="global-positioning, audit or ottawa.")
+    ],
     map_file: Annotated[
         Path | None,
         typer.Option("--map", metavar="FILE", help="An OpenStreetMap file.", callback=given_path),
@@ -96,6 +99,10 @@ def evaluate(
         given.append(f"area.bbox={bbox}")
     if filter_name is not None:
         given.append(f"filter.name={toml(filter_name)}")
+    if name == "audit":
+        refuse({"--world": world}, name)
+        _audit(config, given, out, runs or RUNS, seed, cases or (), workers, resume, as_json)
+        return
     loaded, fixed = load_benchmark(world or "plain", config, given)
     find_own_filter(loaded)
     folder = (out or loaded.output.dir / name).absolute()
@@ -110,6 +117,34 @@ def evaluate(
             resume=resume,
             progress=progress,
             fixed=fixed,
+        )
+    print_result(result, as_json)
+
+
+def _audit(
+    config: Path | None,
+    settings: list[str],
+    out: Path | None,
+    runs: int,
+    seed: int,
+    cases: Sequence[str],
+    workers: int,
+    resume: bool,
+    as_json: bool,
+) -> None:
+    from mapfilter.workflows.evaluate_audit import run_audit
+
+    with rate_bar("evaluate", "batches") as progress:
+        result = run_audit(
+            config,
+            settings,
+            (out or Path("out") / "audit").absolute(),
+            runs=runs,
+            seed=seed,
+            names=cases,
+            workers=workers,
+            resume=resume,
+            progress=progress,
         )
     print_result(result, as_json)
 

@@ -36,7 +36,7 @@ from mapfilter.workflows.sections import Config
 from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.world import World
 
-NAMES = ("global-positioning", "ottawa")
+NAMES = ("global-positioning", "audit", "ottawa")
 RUNS = 20
 TABLE = "table.json"
 _MISSING = 0.1
