@@ -165,19 +165,20 @@ def path_sum(prior, steps):
     return log(total)
 
 
-def joint_gaussian(mean, covariance, transition, process, readings, noise):
+def joint_gaussian(mean, covariance, transitions, processes, readings, noise):
     """Means and covariances of all states given all readings, solved as one Gaussian.
 
-    Readings are of the whole state; row 0 of them belongs to the prior's state.
+    Readings are of the whole state; row 0 of them belongs to the prior's state. Transition and
+    process k lead from state k to state k + 1.
     """
     n, count = len(mean), len(readings)
     precision, shift = np.zeros((n * count, n * count)), np.zeros(n * count)
     precision[:n, :n] += np.linalg.inv(covariance)
     shift[:n] += np.linalg.solve(covariance, mean)
-    both = np.hstack([-transition, np.eye(n)])
     for k in range(count - 1):
         at = slice(k * n, (k + 2) * n)
-        precision[at, at] += both.T @ np.linalg.inv(process) @ both
+        both = np.hstack([-transitions[k], np.eye(n)])
+        precision[at, at] += both.T @ np.linalg.inv(processes[k]) @ both
     for k, reading in enumerate(readings):
         at = slice(k * n, (k + 1) * n)
         precision[at, at] += np.linalg.inv(noise)
