@@ -136,6 +136,65 @@ def bound_log_likelihood(level_dbm, candidates_dbm, censored, sd_db):
     return log(sum(likelihoods) / len(likelihoods))
 
 
+def report_log_likelihood(table, now, then, report, options, counted_m, grain_m):
+    """Log-likelihood of a whole report for one hypothesis.
+
+    Parameters
+    ----------
+    table : (rows, cols, cells) array
+        Predicted levels.
+    now, then : (row, col)
+        Pixels of the hypothesis now and at the last report.
+    report : mapping
+        ``serving``, a band or None; ``levels``, rows of band, level, the level in the last report
+        or None, and metres since the cell was heard; ``bounds``, rows of bands, level and side.
+    options : EvidenceOptions
+    counted_m : float
+        Metres that the report counts for.
+    grain_m : float
+    """
+    errors, here, there = options.levels, table[now], table[then]
+    total = 0.0
+    if report["serving"] is not None:
+        weight = counted_m * options.serving.weight_per_m
+        total += weight * serving_log_likelihood(here, report["serving"], options.serving)
+    deviations = []
+    for band, level, before, away_m in report["levels"]:
+        correlation = exp(-away_m / errors.correlation_m)
+        # Heard in an earlier report only, a level is news as far as its error is a new one.
+        rho, news = (0.0, 1 - correlation**2) if before is None else (correlation, 1.0)
+        v = innovation_db(level, here[band], rho, before or 0.0, there[band])
+        deviations.append(v * sqrt(news / innovation_variance(errors, rho, grain_m)))
+    if deviations:
+        total += levels_log_likelihood(deviations, errors.common, errors.weight, errors.clip_sd)
+    for bands, level, side in report["bounds"]:
+        weight = errors.weight * (1 - exp(-counted_m / errors.correlation_m) ** 2)
+        sd_db = hypot(errors.sd_db, errors.measurement_db)
+        total += weight * bound_log_likelihood(level, [here[band] for band in bands], side, sd_db)
+    return total
+
+
+# Going back along a track
+
+
+def ancestor_probabilities(later, earlier, log_weight, moved_m, variances, log_jump):
+    """Probability of each earlier hypothesis: its weight times how well it reaches the later one.
+
+    ``variances`` are those of place, bias and scale; ``log_jump`` is the least that counts.
+    """
+    place_var, bias_var, scale_var = variances
+    length_m, heading_rad = hypot(*moved_m), atan2(moved_m[1], moved_m[0])
+    terms = []
+    for one, weight in zip(earlier.T, log_weight, strict=True):
+        east, north, bias, scale = (float(x) for x in one[:4])
+        reached = moved(east, north, bias, scale, length_m, heading_rad)
+        turned = atan2(sin(later[2] - bias), cos(later[2] - bias))
+        apart = (later[0] - reached[0]) ** 2 + (later[1] - reached[1]) ** 2
+        fit = apart / place_var + turned**2 / bias_var + (later[3] - scale) ** 2 / scale_var
+        terms.append(exp(max(-0.5 * fit, log_jump) + float(weight)))
+    return np.array(terms) / sum(terms)
+
+
 # Discrete and linear problems with exact answers
 
 

@@ -175,23 +175,6 @@ def test_being_off_the_map_is_a_hidden_mode_that_is_summed_out(length_m):
         assert after[i] == pytest.approx(expected, abs=2e-6)
 
 
-def chances(later, earlier, log_weight, moved_m, variances, log_jump):
-    """Probability of each ancestor: its weight times how well it reaches the later state."""
-    place_var, bias_var, scale_var = variances
-    length_m, heading_rad = np.hypot(*moved_m), np.arctan2(moved_m[1], moved_m[0])
-    terms = []
-    for one, weight in zip(earlier.T, log_weight, strict=True):
-        east, north, bias, scale = (float(x) for x in one[:4])
-        reached = oracle.moved(east, north, bias, scale, length_m, heading_rad)
-        turned = (later[2] - bias + pi) % (2 * pi) - pi
-        apart = (later[0] - reached[0]) ** 2 + (later[1] - reached[1]) ** 2
-        fit = -0.5 * (
-            apart / place_var + turned**2 / bias_var + (later[3] - scale) ** 2 / scale_var
-        )
-        terms.append(exp(max(fit, log_jump) + float(weight)))
-    return np.array(terms) / sum(terms)
-
-
 def test_ancestors_with_large_biases_are_reached_by_the_oracle():
     """Headings at half a turn, steps a third too long: signs and wrapping matter."""
     rng = np.random.default_rng(6)
@@ -208,7 +191,7 @@ def test_ancestors_with_large_biases_are_reached_by_the_oracle():
         np.repeat(later[:, None], draws, axis=1), earlier, log_weight, *moved_m, *variances,
         -12.0, KEY, chosen,
     )  # fmt: skip
-    expected = chances(later, earlier, log_weight, moved_m, variances, -12.0)
+    expected = oracle.ancestor_probabilities(later, earlier, log_weight, moved_m, variances, -12.0)
     counted = np.bincount(chosen, minlength=count) / draws
     # Five standard errors.
     assert np.all(np.abs(counted - expected) <= 5 * np.sqrt(expected * (1 - expected) / draws))
