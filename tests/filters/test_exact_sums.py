@@ -130,6 +130,8 @@ def test_motion_and_readings_of_nothing_leave_the_log_evidence():
     assert weighed.log_evidence == pytest.approx(np.log(PRIOR @ LIKELIHOOD["a"]), abs=1e-6)
     moved, _ = filter_.predict(weighed, STEP, rng)
     assert moved.log_evidence == weighed.log_evidence
+    back, _ = filter_.predict(moved, MotionStep(-4.0, 0.0), rng)
+    assert back.travelled_m == 14.0
     same, info = filter_.update(weighed, "nothing", rng)
     assert same is weighed
     assert info.reason is Reason.NO_READING
