@@ -133,12 +133,15 @@ def _audit(
     as_json: bool,
 ) -> None:
     from mapfilter.workflows.evaluate_audit import run_audit
+    from mapfilter.workflows.evaluate_settings import load_benchmark
 
+    loaded, _ = load_benchmark("easy", config, settings)
+    find_own_filter(loaded)
     with rate_bar("evaluate", "batches") as progress:
         result = run_audit(
             config,
             settings,
-            (out or Path("out") / "audit").absolute(),
+            (out or loaded.output.dir / "audit").absolute(),
             runs=runs,
             seed=seed,
             names=cases,

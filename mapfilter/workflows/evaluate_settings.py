@@ -19,6 +19,7 @@ _CASES = "is what the cases vary; use --case"
 _PREDICTS = "levels are predicted here, and the ground truth is drawn"
 _NO_JOURNEYS = "journeys are simulated here"
 _RUNS = "use --runs"
+_NO_TIMING = "no timing advances are simulated"
 _PICTURES = "no pictures are drawn here"
 REFUSED: Mapping[str, str] = {
     "prediction.reality.write": _PREDICTS,
@@ -33,10 +34,21 @@ REFUSED: Mapping[str, str] = {
     "track": _NO_JOURNEYS,
     "filter.smooth": _CASES,
     "filter.bayes.smooth": _CASES,
+    "filter.bayes.timing_step_m": _NO_TIMING,
+    "filter.bayes.timing_sd_m": _NO_TIMING,
     "sweep": "there is no grid here; use mapfilter sweep",
     "output.pictures": _PICTURES,
 }
 """Settings, or sections of them, that have no meaning here, and why."""
+
+_OF_WALKERS = frozenset(
+    f"journeys.{name}"
+    for name in ("speed_mps", "beside", "change_side_m", "stop_every_m", "stop_s")
+)
+
+_OF_PARTICLES = frozenset(
+    f"filter.bayes.{name}_particles" for name in ("most", "searching", "least")
+)
 
 _OF_THE_CASES: Mapping[str, str] = {
     "imu.sigma_orient_deg": "sigma_orient_rad",
@@ -102,11 +114,14 @@ def _refused(key: str, config: Config) -> str:
     for name, why in REFUSED.items():
         if key == name or key.startswith(f"{name}."):
             return why
+    if key in _OF_WALKERS and config.roads.profile == "driving":
+        return "is of walkers; roads.profile is driving"
     if not key.startswith("filter.") or key == "filter.name":
         return ""
     chosen = config.filter.name
     of_bayes = key.startswith("filter.bayes.")
-    if chosen in ("bayes", "grid") and of_bayes:
+    particles = chosen == "bayes" or key not in _OF_PARTICLES
+    if chosen in ("bayes", "grid") and of_bayes and particles:
         return ""
     if chosen == "candidate" and not of_bayes:
         return ""

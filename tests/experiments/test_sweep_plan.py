@@ -21,6 +21,8 @@ from mapfilter.experiments.sweep.plan import (
 from mapfilter.experiments.sweep.seeds import filter_rng, imu_rng, radio_rng, route_rng
 from mapfilter.filters.candidate_options import CandidateOptions
 from mapfilter.positioning.locators import FilterChoice
+from mapfilter.simulation.imu import ImuErrors
+from mapfilter.simulation.walking import WalkerModel
 
 SET = Reading("set", FilterChoice(CandidateOptions(), 0.0), 22.0)
 LIST = Reading("list", FilterChoice(CandidateOptions(duplicates="list", threshold=10)), 22.0)
@@ -158,7 +160,10 @@ def test_digest_changes_with_everything_that_changes_runs():
         {"length_m": 900.0},
         {"readings": (SET,)},
         {"readings": (replace(SET, choice=FilterChoice(CandidateOptions(threshold=2), 0.0)), LIST)},
-        {"translation_noise": "as_printed"},
+        {"imu": ImuErrors(translation_noise="as_printed")},
+        {"imu": ImuErrors(turns="gyro")},
+        {"walker": WalkerModel(beside="pavement")},
+        {"walker": WalkerModel(stop_every_m=300.0)},
         {"imu_periods_s": (1.0,)},
     )
     assert len({plan(**change).digest for change in changes}) == len(changes)

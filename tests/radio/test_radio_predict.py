@@ -192,11 +192,11 @@ def test_azimuth_is_off_by_up_to_what_is_stated() -> None:
 
 
 def test_shadowing_of_reality_has_its_deviation_and_is_not_the_predictions() -> None:
-    model, plan = PredictionModel(seed=1), CellPlan(CRS, (OMNI,))
+    model, plan = replace(PLAIN, shadowing_db=6.0, seed=1), CellPlan(CRS, (OMNI,))
     clutter = predict_cell(OMNI, LATTICE, None, model) - predict_cell(OMNI, LATTICE, None, PLAIN)
     squares, products = [], []
     for seed in range(40):
-        errors = replace(NO_ERRORS, level_error_db=7.0, seed=seed)
+        errors = replace(NO_ERRORS, level_error_db=7.0, seed=seed, clutter="shared")
         ((_, real),) = realise(plan, LATTICE, None, model, errors)
         error = (real - predict_cell(OMNI, LATTICE, None, model)).astype(np.float64)
         squares.append((error**2).mean())

@@ -22,7 +22,11 @@ PLAN = CellPlan(
 SEEDS = range(25)
 MODEL = PredictionModel(model="cost231_hata", shadowing_db=6.0, shadowing_correlation_m=50.0)
 ERRORS = RealityErrors(
-    level_error_db=7.0, eirp_error_db=0.0, azimuth_error_deg=0.0, slope_error=0.0
+    level_error_db=7.0,
+    eirp_error_db=0.0,
+    azimuth_error_deg=0.0,
+    slope_error=0.0,
+    clutter="shared",
 )
 
 Fields = NDArray[np.float64]

@@ -23,8 +23,8 @@ CONFIG = Config()
 
 def test_prediction():
     section = CONFIG.prediction
-    assert predict._model(section.model, section) == PredictionModel()
-    assert predict._errors(section) == RealityErrors()
+    assert predict.prediction_model(section) == PredictionModel()
+    assert predict.ground_truth_errors(section) == RealityErrors()
 
 
 def test_simulation():

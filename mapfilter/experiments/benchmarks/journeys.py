@@ -38,6 +38,13 @@ class Walk:
     truth: pd.DataFrame
     displaced_at_s: float = float("inf")
 
+    @property
+    def arrived_at_s(self) -> float:
+        """Time of the first row after the displacement; infinite without one."""
+        time_s = self.truth["time_s"].to_numpy()
+        later_s = time_s[time_s > self.displaced_at_s]
+        return float(later_s[0]) if later_s.size else float("inf")
+
 
 def walk(streets: SweepWorld, plan: JourneyPlan, seed: int, number: int) -> Walk:
     """Walk along a random route, 1 940 m unless the plan says otherwise."""
@@ -105,15 +112,29 @@ def log_of(
         serving = radio[radio["role"] == "serving"]
         radio = serving.assign(level_dbm=np.nan, censored=np.int8(0)).reset_index(drop=True)
     errors = case.errors_in(settings.imu, fixed)
-    ticks = at_ticks(truth, settings.imu_period_s)
+    ticks = at_ticks(_as_walked(walked), settings.imu_period_s)
     motion = noisy_motion(ticks, errors, named_rng(seed, "imu", str(number)))
-    if np.isfinite(walked.displaced_at_s):
-        # The interval of the displacement is as if one had stood still.
-        carried = motion["time_s"].to_numpy().searchsorted(walked.displaced_at_s, side="right")
-        motion.loc[carried, "step_m"] = 0.0
-        motion.loc[carried, "turn_rad"] = 0.0
+    # Whoever is carried makes no steps, not even noisy ones.
+    ends_s = ticks["time_s"].to_numpy()[1:]
+    begins_s = ticks["time_s"].to_numpy()[:-1]
+    carried = (begins_s >= walked.displaced_at_s) & (ends_s <= walked.arrived_at_s)
+    motion.loc[carried, "step_m"] = 0.0
     if not case.compass:
         motion["heading_rad"] = np.nan
     log = make_log(streets.network.crs, motion=motion, radio=radio)
     # The truth of a displacement is not a path that anybody walked.
     return replace(log, truth=truth)
+
+
+def _as_walked(walked: Walk) -> pd.DataFrame:
+    """Return the truth as if one had stood still while one was displaced."""
+    truth = walked.truth
+    after = truth["time_s"].to_numpy() > walked.displaced_at_s
+    if not after.any():
+        return truth
+    first = int(np.argmax(after))
+    moved = {
+        name: np.where(after, axis - (axis[first] - axis[first - 1]), axis)
+        for name, axis in ((name, truth[name].to_numpy()) for name in ("east_m", "north_m"))
+    }
+    return truth.assign(**moved)

@@ -212,16 +212,16 @@ def _recovered(case: Case, walked: Walk, truth: Truth, time_s: Floats, errors_m:
     """Score how soon a displaced track is found again: within 50 m, for 10 s."""
     after = np.flatnonzero(time_s > walked.displaced_at_s)
     near = errors_m[after] <= SUCCESS_RADIUS_M
-    carried_s = np.array([walked.displaced_at_s, time_s[after[0]]])
-    carried_m = float(np.ptp(truth.distance_at(carried_s)))
-    gone_m = truth.distance_at(time_s[after]) - truth.distance_at(walked.displaced_at_s)
+    # The displacement itself is not travelled; epochs may fall into it.
+    gone_m = truth.distance_at(time_s[after]) - truth.distance_at(walked.arrived_at_s)
+    gone_m = np.maximum(gone_m, 0.0)
     far = np.flatnonzero(~near)
-    row: Row = {"success": False, "wrong": bool(not near[-1]), "switch_m": None}
+    row: Row = {"success": False, "wrong": bool(errors_m[after[-1]] > SUCCESS_RADIUS_M), "switch_m": None}
     for begin in np.concatenate([[0], far + 1]).tolist():
         ends = far[far >= begin]
         end = int(ends[0]) if ends.size else len(near)
         if end > begin and time_s[after[end - 1]] - time_s[after[begin]] >= _STAY_S:
-            row["switch_m"] = float(gone_m[begin] - carried_m)
+            row["switch_m"] = float(gone_m[begin])
             row["success"] = row["switch_m"] <= case.recovery_within_m
             return row | _errors(errors_m[after[begin:]])
     return row | {f"error_{name}_m": None for name in ("mean", "67", "95")}

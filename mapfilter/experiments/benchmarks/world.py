@@ -65,15 +65,20 @@ class BenchmarkWorld:
     @property
     def streets(self) -> SweepWorld:
         """Streets, cells and building heights."""
-        return _streets(self.folder / STREETS)
+        folder = self.folder / STREETS
+        return _streets(folder, sha256_file(folder / "world.json"))
 
     def locator(self, choice: FilterChoice, *, thinned: bool) -> Locator:
         """Return a function that locates logs, with the databases read once by each process."""
-        return _locator(self.folder / (THINNED if thinned else FULL), choice)
+        folder = self.folder / (THINNED if thinned else FULL)
+        return _locator(folder, choice, sha256_file(folder / "manifest.json"))
 
     def skyline(self, case: Case) -> Skyline | None:
         """Return the buildings that hide satellites, where a case has any satellites."""
-        return None if case.satellites is None else _skyline(self.folder / BUILDINGS)
+        if case.satellites is None:
+            return None
+        file = self.folder / BUILDINGS
+        return _skyline(file, sha256_file(file))
 
     def ground_truth(self, seed: int, level_error_db: float | None = None) -> Levels:
         """Draw how the cells are really received.
@@ -106,18 +111,19 @@ def write_buildings(buildings: Buildings, path: Path) -> None:
         pq.write_table(pa.table(columns), file)
 
 
+# What is read is kept by its checksum: a folder may hold another world by now.
 @lru_cache(maxsize=1)
-def _skyline(path: Path) -> Skyline | None:
+def _skyline(path: Path, sha256: str) -> Skyline | None:  # noqa: ARG001
     table = pq.read_table(path)
     footprints = shapely.from_wkb(table["footprint"].to_numpy())
     return Skyline(footprints, table["height_m"].to_numpy()) if len(footprints) else None
 
 
 @lru_cache(maxsize=1)
-def _streets(folder: Path) -> SweepWorld:
+def _streets(folder: Path, sha256: str) -> SweepWorld:  # noqa: ARG001
     return open_world(folder)
 
 
 @lru_cache(maxsize=32)
-def _locator(database: Path, choice: FilterChoice) -> Locator:
+def _locator(database: Path, choice: FilterChoice, sha256: str) -> Locator:  # noqa: ARG001
     return open_locator(open_database(database), choice, ways=False)

@@ -1,0 +1,146 @@
+"""Claims of a filter, counted by hand on a straight walk of 10 m/s."""
+
+import numpy as np
+import pytest
+
+from mapfilter.evaluation.accuracy import Truth
+from mapfilter.evaluation.claims import score_claims
+from mapfilter.filters.contract import Reason, Status
+from mapfilter.positioning.estimate import Fix, TrackEstimate
+
+STATUS = {"S": Status.SEARCHING, "C": Status.CONVERGED, "T": Status.TRACKING, "L": Status.LOST}
+
+
+def truth(seconds):
+    time_s = np.arange(seconds + 1.0)
+    return Truth(time_s, 10.0 * time_s, np.zeros_like(time_s))
+
+
+def claims(statuses, errors_m, radii_m=(10.0, 20.0, 30.0), *, seconds=None, time_s=None, **more):
+    """Score epochs a second apart that are off to the north."""
+    count = len(statuses)
+    times = np.arange(float(count)) if time_s is None else np.asarray(time_s, dtype=float)
+    errors = np.broadcast_to(np.asarray(errors_m, dtype=float), (count,))
+    radii = np.broadcast_to(np.asarray(radii_m, dtype=float), (count, 3))
+    fixes = [
+        Fix(
+            times[i], 10.0 * times[i], errors[i], np.eye(2), radii[i], STATUS[statuses[i]],
+            1, 1.0, 0, 0.0, Reason.USED,
+        )
+        for i in range(count)
+    ]  # fmt: skip
+    estimate = TrackEstimate.of_fixes("EPSG:32629", "bayes", fixes)
+    return score_claims(estimate, truth(count - 1 if seconds is None else seconds), **more)
+
+
+def test_every_claimed_epoch_counts_and_no_other():
+    found = claims("SSCTTLLCT", [5, 5, 5, 60, 5, 5, 5, 49, 51])
+    assert (found.epochs, found.claimed, found.within_50m) == (9, 5, 3)
+    assert found.km == pytest.approx(0.08)
+
+
+@pytest.mark.parametrize(
+    ("error_m", "radii_m", "covered"),
+    [
+        (10.0, (10.0, 20.0, 30.0), (3, 3, 3)),
+        (10.01, (10.0, 20.0, 30.0), (0, 3, 3)),
+        (20.5, (10.0, 20.0, 30.0), (0, 0, 3)),
+        # Half as far again as the radius, and less than that, is outside.
+        (30.5, (10.0, 20.0, 30.0), (0, 0, 0)),
+        (38.9, (10.0, 20.0, 30.0), (0, 0, 0)),
+        (10.0, (8.0, 9.0, 9.5), (0, 0, 0)),
+        (0.0, (0.0, 0.0, 0.0), (3, 3, 3)),
+    ],
+)
+def test_coverage_is_counted_against_the_radius_itself(error_m, radii_m, covered):
+    assert claims("SCTT", error_m, radii_m).covered == covered
+
+
+def test_coverage_takes_each_epochs_own_radius():
+    radii = [(1, 1, 1), (1, 2, 3), (4, 5, 6), (7, 8, 9)]
+    assert claims("SCTT", [0, 2, 5.5, 6], radii).covered == (1, 2, 3)
+
+
+def test_the_limit_of_50_m_belongs_to_what_is_near():
+    assert claims("CT", [50.0, 50.001]).within_50m == 1
+
+
+def test_false_starts_are_claims_that_begin_far_off():
+    # Begins wrong; goes wrong later; begins wrong again after LOST.
+    assert claims("SCTTLCT", [0, 51, 0, 0, 0, 80, 80]).false_starts == 2
+    assert claims("SCTTT", [0, 10, 60, 60, 60]).false_starts == 0
+    assert claims("CTT", [51, 51, 51]).false_starts == 1
+    assert claims("SSS", 100).false_starts == 0
+
+
+def test_lost_begins_once_and_is_false_right_after_a_good_position():
+    found = claims("SCTLLTTLSL", [0, 0, 10, 0, 0, 90, 90, 0, 0, 0])
+    assert (found.lost, found.false_lost) == (3, 1)
+    # The position counts that was claimed last, not the one reported with LOST.
+    found = claims("CTLCTL", [0, 40, 200, 0, 200, 10])
+    assert (found.lost, found.false_lost) == (2, 1)
+
+
+def test_nothing_counts_after_a_given_time():
+    errors = [0, 0, 0, 0, 90, 90, 90]
+    whole = claims("SCTTLTT", errors)
+    assert (whole.claimed, whole.lost, whole.false_starts) == (5, 1, 1)
+    until = claims("SCTTLTT", errors, until_s=3.0)
+    assert (until.epochs, until.claimed, until.within_50m) == (4, 3, 3)
+    assert (until.lost, until.false_starts, until.covered) == (0, 0, (3, 3, 3))
+    assert until.km == pytest.approx(0.03)
+    assert until.worst_100m_m == 0.0
+
+
+def test_epochs_without_truth_do_not_count():
+    found = claims("CTTT", 5.0, seconds=2, time_s=[-1.0, 0.0, 2.0, 3.0])
+    assert (found.epochs, found.claimed, found.covered) == (2, 2, (2, 2, 2))
+    assert found.km == pytest.approx(0.02)
+
+
+def test_a_track_without_a_claim():
+    found = claims("SSLS", 5.0)
+    assert (found.claimed, found.within_50m, found.covered) == (0, 0, (0, 0, 0))
+    assert np.isnan(found.worst_100m_m)
+
+
+def test_the_worst_100_m_by_hand():
+    # 11 epochs reach back 100 m: of epochs 5 to 15 all are 33 m off, of others some.
+    errors = np.zeros(41)
+    errors[5:16] = 33.0
+    assert claims("C" + 40 * "T", errors).worst_100m_m == pytest.approx(33.0)
+    errors[10] = 0.0
+    assert claims("C" + 40 * "T", errors).worst_100m_m == pytest.approx(30.0)
+
+
+def test_the_worst_100_m_begins_with_the_first_claim_and_goes_on_while_lost():
+    errors = np.full(31, 500.0)
+    errors[11:] = 10.0
+    statuses = 11 * "S" + "C" + 19 * "T"
+    assert claims(statuses, errors).worst_100m_m == pytest.approx(10.0)
+    errors[20:] = 100.0
+    statuses = 11 * "S" + "C" + 8 * "T" + 11 * "L"
+    assert claims(statuses, errors).worst_100m_m == pytest.approx(100.0)
+
+
+def test_the_worst_100_m_of_less_than_100_m_is_the_mean():
+    assert claims("SSCTT", [900, 900, 10, 20, 60]).worst_100m_m == pytest.approx(30.0)
+
+
+def test_the_worst_100_m_on_an_uneven_walk():
+    """Against a double loop, with standing, jumps in time and positions that are not known."""
+    rng = np.random.default_rng(3)
+    time_s = np.cumsum(rng.uniform(0.1, 4.0, 120))
+    errors = rng.exponential(30.0, 120)
+    statuses = "".join(rng.choice(list("SCTL"), 120, p=[0.2, 0.1, 0.6, 0.1]))
+    found = claims(statuses, errors, seconds=400, time_s=time_s).worst_100m_m
+    first = min(statuses.index("C"), statuses.index("T"))
+    means = []
+    for end in range(first, 120):
+        if 10.0 * (time_s[end] - time_s[first]) < 100.0:
+            continue
+        inside = [
+            errors[i] for i in range(first, end + 1) if 10.0 * (time_s[end] - time_s[i]) <= 100.0
+        ]
+        means.append(sum(inside) / len(inside))
+    assert found == pytest.approx(max(means))

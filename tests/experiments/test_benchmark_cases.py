@@ -1,0 +1,149 @@
+"""Cases of the benchmark: errors of the unit, and what the filter is given of them."""
+
+from dataclasses import fields, replace
+from math import radians, sqrt
+
+import pytest
+
+from mapfilter.experiments.benchmarks.cases import CASES, USUAL
+from mapfilter.experiments.benchmarks.global_positioning import informed
+from mapfilter.filters.candidate_options import CandidateOptions
+from mapfilter.models.street_motion import MotionErrors
+from mapfilter.positioning.bayes_options import BayesOptions
+from mapfilter.positioning.locators import FilterChoice
+from mapfilter.simulation.imu import ImuErrors
+
+BIASED = [
+    "levels-bias10",
+    "cell-bias10",
+    "smooth-bias10",
+    "spoofed",
+    *(f"satellites-{n}" for n in range(5)),
+]
+COMPASS_DEG = {
+    **{f"{kind}-{deg}": deg for kind in ("levels", "cell") for deg in (3, 6, 10, 20)},
+    **dict.fromkeys(("levels-nocompass", "levels-missing10", "levels-error10", "smooth-6"), 6),
+    **dict.fromkeys(("recovery-levels", "recovery-cell"), 6),
+}
+DEFAULTS = MotionErrors()
+
+
+def known(name, options=None, fixed=frozenset()):
+    return informed(FilterChoice(options or BayesOptions()), CASES[name], fixed).options
+
+
+def test_all_cases_are_looked_at():
+    assert set(COMPASS_DEG) | {*BIASED, "levels-bias20"} == set(CASES)
+    assert len(USUAL) == len(CASES) - 6
+
+
+@pytest.mark.parametrize(("name", "deg"), COMPASS_DEG.items())
+def test_a_compass_has_its_stated_noise_and_the_filter_its_own_defaults(name, deg):
+    errors = CASES[name].errors_in(ImuErrors())
+    assert errors == replace(ImuErrors(), sigma_orient_rad=radians(deg))
+    assert known(name).motion == replace(DEFAULTS, heading_sd_rad=radians(deg))
+
+
+@pytest.mark.parametrize(
+    ("names", "bias_deg", "drift_deg", "scale"),
+    [(BIASED, 10.0, 0.2, 0.05), (["levels-bias20"], 20.0, 0.4, 0.1)],
+)
+def test_a_biased_unit_is_stated_to_be_one(names, bias_deg, drift_deg, scale):
+    for name in names:
+        errors = CASES[name].errors_in(ImuErrors())
+        assert errors == replace(
+            ImuErrors(),
+            sigma_orient_rad=radians(6),
+            heading_bias_sd_rad=radians(bias_deg),
+            heading_drift_rad_per_sqrt_s=radians(drift_deg),
+            step_scale_sd=scale,
+        )
+        motion = known(name).motion
+        # A drift by the second at 1.4 m/s, by the metre.
+        drift = radians(drift_deg) / sqrt(1.4)
+        assert motion.bias_drift_rad_per_sqrt_m == pytest.approx(drift, rel=1e-12)
+        assert motion == replace(
+            DEFAULTS,
+            heading_sd_rad=radians(6),
+            bias_sd_rad=radians(bias_deg),
+            bias_drift_rad_per_sqrt_m=motion.bias_drift_rad_per_sqrt_m,
+            scale_sd=scale,
+        )
+
+
+def test_what_cases_differ_in_beside_dead_reckoning():
+    assert {n for n, c in CASES.items() if not c.levels} == {
+        *(f"cell-{deg}" for deg in (3, 6, 10, 20)), "cell-bias10", "recovery-cell",
+    }  # fmt: skip
+    assert {n for n, c in CASES.items() if not c.compass} == {"levels-nocompass"}
+    assert {n: c.missing_ways for n, c in CASES.items() if c.missing_ways} == {
+        "levels-missing10": 0.1
+    }
+    assert {n: c.level_error_db for n, c in CASES.items() if c.level_error_db is not None} == {
+        "levels-error10": 10.0
+    }
+    assert {n for n, c in CASES.items() if c.smooth} == {"smooth-6", "smooth-bias10"}
+    assert {n: c.recovery_within_m for n, c in CASES.items() if c.recovery_within_m} == {
+        "recovery-levels": 300.0, "recovery-cell": 700.0,
+    }  # fmt: skip
+    assert {n: c.satellites for n, c in CASES.items() if c.satellites is not None} == {
+        **{f"satellites-{n}": n for n in range(5)}, "spoofed": 4,
+    }  # fmt: skip
+    assert [n for n, c in CASES.items() if c.spoofed] == ["spoofed"]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_nothing_but_the_sheet_reaches_the_filter(name):
+    """All other options are those that were chosen, whatever the ground truth is like."""
+    chosen = replace(
+        BayesOptions(),
+        motion=MotionErrors(step_sd_m=0.77, bias_sd_rad=0.5, scale_sd=0.3),
+        grid=True,
+    )
+    found, case = known(name, chosen), CASES[name]
+    for field in fields(BayesOptions):
+        if field.name not in ("motion", "smooth", "satellites"):
+            assert getattr(found, field.name) == getattr(chosen, field.name)
+    assert found.motion == replace(chosen.motion, **case.data_sheet)
+    assert found.motion.step_sd_m == 0.77
+    assert found.smooth is case.smooth
+    sheet = {} if case.satellites is None else {"height_m": 100.0, "height_sd_m": 20.0}
+    assert found.satellites == replace(chosen.satellites, **sheet)
+
+
+def test_what_was_set_is_not_changed_by_a_sheet():
+    own = BayesOptions(motion=MotionErrors(heading_sd_rad=0.5, bias_sd_rad=0.25))
+    found = known("levels-bias10", own, frozenset({"heading_sd_rad", "height_m"})).motion
+    assert (found.heading_sd_rad, found.bias_sd_rad) == (0.5, radians(10))
+    sky = known("satellites-2", fixed=frozenset({"height_m"})).satellites
+    assert sky == replace(BayesOptions().satellites, height_sd_m=20.0)
+    world = ImuErrors(sigma_orient_rad=0.4, step_scale_sd=0.01)
+    errors = CASES["levels-bias10"].errors_in(world, frozenset({"sigma_orient_rad"}))
+    assert (errors.sigma_orient_rad, errors.step_scale_sd) == (0.4, 0.05)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_worlds_other_errors_stay_in_every_case(name):
+    world = ImuErrors(
+        sigma_trans_m=0.3,
+        heading_correlation_s=20.0,
+        step_scale_wander_sd=0.1,
+        turns="gyro",
+        gyro_noise_rad_per_sqrt_s=0.01,
+        gyro_bias_sd_rad_per_s=0.001,
+    )
+    found, changed = CASES[name].errors_in(world), CASES[name].imu
+    for field in fields(ImuErrors):
+        expected = changed.get(field.name, getattr(world, field.name))
+        assert getattr(found, field.name) == expected
+
+
+def test_the_candidate_filter_takes_no_sheet():
+    choice = FilterChoice(CandidateOptions(), 3.0)
+    assert all(informed(choice, case) is choice for case in CASES.values())
+
+
+def test_sheets_and_errors_name_what_there_is():
+    for case in CASES.values():
+        assert set(case.imu) <= {f.name for f in fields(ImuErrors)}
+        assert set(case.data_sheet) <= {f.name for f in fields(MotionErrors)}
