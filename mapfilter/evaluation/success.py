@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from math import sqrt
 
@@ -35,7 +36,8 @@ def wilson_interval_of_routes(
     Runs on one route are alike, so many runs on few routes say less than their number. The variance
     of the share is taken from the scatter of the routes (the ratio estimator of cluster sampling),
     and the interval is Wilson's for as many independent runs as have that variance (Korn and
-    Graubard 1998). Where all routes succeed or all fail, each route counts as one run.
+    Graubard 1998). Where all routes succeed or all fail, each route counts as one run, and where
+    each route has one run, the interval is that of independent runs.
 
     Parameters
     ----------
@@ -58,6 +60,8 @@ def wilson_interval_of_routes(
     routes, total = good.size, float(of.sum())
     if routes < 2:
         return float("nan"), float("nan")
+    if np.all(of == 1):
+        return _wilson(float(good.mean()), routes, z)
     share = float(good.sum()) / total
     if share in (0.0, 1.0):
         return _wilson(share, routes, z)
@@ -85,7 +89,8 @@ class SuccessSummary:
     runs, switched, successes : int
         Counts.
     success, success_low, success_high : float
-        Share of successful runs and its 95 % Wilson interval.
+        Share of successful runs and its 95 % interval, with each route as a cluster; NaN for the
+        runs of a single route.
     wrong : float
         Share of all runs that switched more than 50 m off.
     switch_distance_m : float
@@ -107,16 +112,30 @@ class SuccessSummary:
     error_95_m: float
 
 
-def summarise(scores: Sequence[Accuracy]) -> SuccessSummary:
+def summarise(
+    scores: Sequence[Accuracy], routes: Sequence[Hashable] | None = None
+) -> SuccessSummary:
     """Put the scores of many runs together.
 
     As in the paper's Table 4, errors are those after *successful* global positioning.
+
+    Parameters
+    ----------
+    scores : sequence of Accuracy
+    routes : sequence, optional
+        The route of each run, as anything that is equal for runs on one route; without it each run
+        has its own.
     """
     runs = len(scores)
     switched = [score for score in scores if score.switched]
     right = [score for score in switched if score.success]
     wrong = [score for score in switched if score.error_at_switch_m > SUCCESS_RADIUS_M]
-    low, high = wilson_interval(len(right), runs)
+    if routes is None or len(set(routes)) == runs:
+        low, high = wilson_interval(len(right), runs)
+    else:
+        of = Counter(routes)
+        good = Counter(route for route, score in zip(routes, scores, strict=True) if score.success)
+        low, high = wilson_interval_of_routes([good[route] for route in of], list(of.values()))
     return SuccessSummary(
         runs,
         len(switched),

@@ -97,10 +97,7 @@ class GridBelief:
     ----------
     on, off : ndarray of float32, shape (B, rows, cols)
         Mass of those on and off the map; together they sum to one after an update.
-    states : callable
-        The model's.
-    bias_rad : ndarray, shape (B,)
-    bins : Bins
+    model : GridModel
     waiting_m : (float, float, float)
         Displacement east and north, and its length, that mass has not been moved by yet.
     travelled_m, log_evidence, status, agreed_at_m

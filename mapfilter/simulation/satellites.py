@@ -2,7 +2,7 @@
 
 Satellites are seen past the buildings by geometry. A pseudorange is the distance, the receiver's
 clock, noise that grows towards the horizon, and echoes, which only make it longer and last for
-metres. A spoofer may put a receiver elsewhere.
+metres. Hidden satellites may be received by reflections. A spoofer may put a receiver elsewhere.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from mapfilter.gnss.orbits import gps_time, satellite_positions_m
 from mapfilter.gnss.sky import Directions, directions, ecef_from_lonlat
 from mapfilter.gnss.visibility import Skyline
 from mapfilter.models.clock import clock_noise
+from mapfilter.simulation.reflections import NlosModel, draw_reflections
 from mapfilter.tracks.satellites import sent_from_m
 
 Floats = NDArray[np.float64]
@@ -38,9 +39,10 @@ class ReceptionModel:
     period_s : float
         Between two epochs of pseudoranges.
     most : int or None
-        Channels: satellites that are received at a time; None for all that are seen.
+        Channels: satellites that are received at a time; None for all that can be.
     choice : {"random", "highest"}
-        Which of those that are seen; with "random" the order is drawn anew every ``hold_s``.
+        Which of those that can be, reflections alike; with "random" the order is drawn anew every
+        ``hold_s``.
     hold_s : float
     mask_deg : float
         Lower satellites are not received.
@@ -58,6 +60,9 @@ class ReceptionModel:
         Of the ground over the ellipsoid, and by how much it differs from that as a whole.
     relief_m, relief_memory_m : float
         By how much, and over how many metres, the ground rises and falls.
+    nlos : NlosModel or None
+        How satellites behind buildings are received by reflections; None: they are not. Where
+        nothing is in line of sight, as under a roof, they are not either.
     """
 
     period_s: float = 1.0
@@ -75,6 +80,7 @@ class ReceptionModel:
     height_sd_m: float = 10.0
     relief_m: float = 5.0
     relief_memory_m: float = 300.0
+    nlos: NlosModel | None = None
 
     def __post_init__(self) -> None:
         faults = Faults()
@@ -127,8 +133,8 @@ def receive(
 ) -> pd.DataFrame:
     """Return the table of pseudoranges of one journey.
 
-    Noise, clock and the order of choice do not depend on how many are received, nor on a spoofer:
-    journeys of one seed differ in these alone.
+    Noise, clock and the order of choice do not depend on how many are received, nor on reflections
+    or a spoofer: journeys of one seed differ in these alone.
 
     Parameters
     ----------
@@ -184,6 +190,14 @@ def receive(
     range_m = np.linalg.norm(satellites - there[:, None], axis=2)
     sigma_m = model.zenith_m / np.sin(np.maximum(seen.elevation_rad, 0.05))
     heard_m = range_m + clock_m[:, None] + sigma_m * white + echo_m[:, None] * echo
+    audible = open_sky
+    if model.nlos is not None:
+        # Drawn last: nothing else changes.
+        mirrored = draw_reflections(model.nlos, gone_m, seen.elevation_rad, rng)
+        hidden = seen.above(model.mask_deg) & ~open_sky & open_sky.any(axis=1, keepdims=True)
+        late_m = model.nlos.noise_factor * sigma_m * white + mirrored.delay_m
+        heard_m = np.where(hidden, range_m + clock_m[:, None] + late_m, heard_m)
+        audible = open_sky | (hidden & mirrored.received)
     if spoofer is not None:
         shift = np.array([spoofer.east_m, spoofer.north_m])
         elsewhere = _ecef(crs, place + shift, up_m)
@@ -195,7 +209,7 @@ def receive(
         prefer = seen.elevation_rad
     else:
         prefer = order[(tick_s // model.hold_s - tick_s[0] // model.hold_s).astype(int)]
-    received = _received(open_sky, prefer, model.most)
+    received = _received(audible, prefer, model.most)
     row, column = np.nonzero(received)
     return pd.DataFrame(
         {
@@ -261,9 +275,9 @@ def _sky(
     return free, model.echo_m * np.minimum(2.0 * hidden, 1.0)
 
 
-def _received(open_sky: Bools, prefer: Floats, most: int | None) -> Bools:
+def _received(audible: Bools, prefer: Floats, most: int | None) -> Bools:
     if most is None:
-        return open_sky
-    wanted = np.where(open_sky, prefer, -np.inf)
+        return audible
+    wanted = np.where(audible, prefer, -np.inf)
     rank = np.argsort(np.argsort(-wanted, axis=1, kind="stable"), axis=1, kind="stable")
-    return open_sky & (rank < most)
+    return audible & (rank < most)

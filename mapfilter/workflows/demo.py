@@ -110,7 +110,12 @@ def run_demo(
     ensure_writable_folder(out)
     seeds = [] if seed is None else [f"journeys.seed={seed}"]
     with as_file(files("mapfilter.data")) as data:
-        config = load_config(data / "demo.toml", [*settings, *seeds], out=out)
+        config = load_config(
+            data / "demo.toml",
+            [*settings, *seeds],
+            out=out,
+            base=data / "world-plain.toml",
+        )
     seconds: dict[str, float] = {}
 
     @contextmanager

@@ -29,6 +29,8 @@ from mapfilter.radio.predict import predict
 from mapfilter.radio.rasters import open_rasters, write_rasters
 from mapfilter.radio.shadowing import named_rng
 from mapfilter.roads.network import street_network
+from mapfilter.simulation.reflections import NlosModel
+from mapfilter.simulation.satellites import ReceptionModel
 from mapfilter.workflows.facts import facts
 from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.predict import ground_truth_errors, prediction_model
@@ -190,4 +192,5 @@ def _world(world: World, folder: Path, seed: int) -> tuple[BenchmarkWorld, int]:
     write_world(streets, folder / STREETS)
     errors, settings = ground_truth_errors(config.prediction), simulation_settings(config)
     settings = replace(settings, reports=replace(settings.reports, radio="reality"))
-    return BenchmarkWorld(folder, model, errors, settings, antennas), count
+    reception = ReceptionModel(nlos=NlosModel() if config.journeys.nlos_satellites else None)
+    return BenchmarkWorld(folder, model, errors, settings, antennas, reception), count

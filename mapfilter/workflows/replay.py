@@ -9,7 +9,6 @@ from mapfilter._parallel import Progress
 from mapfilter.database.store import open_database
 from mapfilter.evaluation.accuracy import accuracy
 from mapfilter.evaluation.outcome import outcome
-from mapfilter.evaluation.success import summarise
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.global_positioning import PositionedTrack
 from mapfilter.positioning.locators import open_locator
@@ -22,7 +21,13 @@ from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.log_checks import check_logs, lacking
 from mapfilter.workflows.pictures import draw_track
 from mapfilter.workflows.replay_fusion import FUSION_FILTERS, run_replay_fusion
-from mapfilter.workflows.replayed import ReplayedLog, ReplayResult, summary_figures
+from mapfilter.workflows.replayed import (
+    ReplayedLog,
+    ReplayResult,
+    route_of,
+    summary_figures,
+    summary_of,
+)
 from mapfilter.workflows.results import ESTIMATES, FIGURES, SUMMARY, clear_results
 from mapfilter.workflows.sections import Config
 from mapfilter.workflows.truth import truth_of
@@ -72,8 +77,7 @@ def run_replay(
         logs.append(_write(folder.name, log, track, into, pictures))
         if progress is not None:
             progress(index + 1, len(folders))
-    scores = [log.accuracy for log in logs if log.accuracy is not None]
-    result = ReplayResult(choice.name, tuple(logs), summarise(scores) if scores else None, out)
+    result = ReplayResult(choice.name, tuple(logs), summary_of(logs), out)
     if len(folders) > 1:
         write_json(out / SUMMARY, facts(summary_figures(result)))
     return result
@@ -95,6 +99,7 @@ def _write(
         lacking(log, track.estimate),
         track.filter_s,
         (*files, out / FIGURES, *pictures),
+        route_of(log),
     )
     head = {"log": name, "filter": track.estimate.filter}
     write_json(out / FIGURES, {**head, **facts(replayed.figures)})

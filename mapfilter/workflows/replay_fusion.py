@@ -9,7 +9,6 @@ from mapfilter._parallel import Progress
 from mapfilter.errors import ConfigError, fail
 from mapfilter.evaluation.accuracy import accuracy
 from mapfilter.evaluation.outcome import outcome
-from mapfilter.evaluation.success import summarise
 from mapfilter.filters.gaussian import METHODS
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.fusion_models import FusionOptions, SiteModels
@@ -21,7 +20,13 @@ from mapfilter.report.error_curve import plot_error_over_distance
 from mapfilter.tracks.leave_out import leave_out
 from mapfilter.tracks.store import list_logs, read_log
 from mapfilter.workflows.facts import facts
-from mapfilter.workflows.replayed import ReplayedLog, ReplayResult, summary_figures
+from mapfilter.workflows.replayed import (
+    ReplayedLog,
+    ReplayResult,
+    route_of,
+    summary_figures,
+    summary_of,
+)
 from mapfilter.workflows.results import ESTIMATES, FIGURES, SUMMARY, clear_results
 from mapfilter.workflows.sections import Config
 from mapfilter.workflows.truth import truth_of
@@ -77,15 +82,14 @@ def run_replay_fusion(
         lack = "" if track.estimate.converged_at is not None else "too little was measured"
         replayed = ReplayedLog(
             folder.name, outcome(track.estimate), score, log.notes, lack, track.filter_s,
-            (*files, into / FIGURES, *pictures),
+            (*files, into / FIGURES, *pictures), route_of(log),
         )  # fmt: skip
         head = {"log": folder.name, "filter": method.name}
         write_json(into / FIGURES, {**head, **facts(replayed.figures)})
         logs.append(replayed)
         if progress is not None:
             progress(index + 1, len(folders))
-    scores = [one.accuracy for one in logs if one.accuracy is not None]
-    result = ReplayResult(method.name, tuple(logs), summarise(scores) if scores else None, out)
+    result = ReplayResult(method.name, tuple(logs), summary_of(logs), out)
     if len(folders) > 1:
         write_json(out / SUMMARY, facts(summary_figures(result)))
     return result

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from mapfilter.evaluation.accuracy import Accuracy
 from mapfilter.evaluation.outcome import Outcome
-from mapfilter.evaluation.success import SuccessSummary
+from mapfilter.evaluation.success import SuccessSummary, summarise
 from mapfilter.filters.contract import Reason
+from mapfilter.tracks.log import TrackLog
 
 _NAMED = 3
 
@@ -36,6 +40,8 @@ class ReplayedLog:
         Processor time of the filter.
     outputs : tuple of Path
         Files written.
+    route : str
+        Equal for logs with the same true path; empty without a truth.
     """
 
     name: str
@@ -45,6 +51,7 @@ class ReplayedLog:
     lack: str
     filter_s: float
     outputs: tuple[Path, ...]
+    route: str = ""
 
     @property
     def figures(self) -> dict[str, Any]:
@@ -95,6 +102,22 @@ class ReplayResult:
             names = [log.name for log in self.logs if log.lack == lack]
             told.append(f"nothing is located in {_named(names)}: {lack}")
         return tuple(told)
+
+
+def route_of(log: TrackLog) -> str:
+    """Return what is equal for logs with the same true path; an empty text without a truth."""
+    if log.truth.empty:
+        return ""
+    path = log.truth[["east_m", "north_m"]].to_numpy(dtype=np.float64)
+    return hashlib.sha256(np.ascontiguousarray(path).tobytes()).hexdigest()
+
+
+def summary_of(logs: Sequence[ReplayedLog]) -> SuccessSummary | None:
+    """Put the scores of the logs with truth together; None without any."""
+    scored = [(log.accuracy, log.route) for log in logs if log.accuracy is not None]
+    if not scored:
+        return None
+    return summarise([score for score, _ in scored], [route for _, route in scored])
 
 
 def summary_figures(result: ReplayResult) -> dict[str, Any]:

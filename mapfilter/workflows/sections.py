@@ -194,6 +194,7 @@ class Journeys(Section):
     change_side_m: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 150.0
     stop_every_m: NotNegative = 0.0
     stop_s: NotNegative = 20.0
+    nlos_satellites: bool = False
     seed: Seed = 0
 
 

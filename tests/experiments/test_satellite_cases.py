@@ -3,11 +3,15 @@
 import numpy as np
 import pandas as pd
 import pytest
+import shapely
 
 from mapfilter.errors import ConfigError
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.journeys import Walk
 from mapfilter.experiments.benchmarks.satellites import SPOOFED_S, spoofer_of, with_satellites
+from mapfilter.gnss.visibility import Skyline
+from mapfilter.simulation.reflections import NlosModel
+from mapfilter.simulation.satellites import ReceptionModel
 from mapfilter.tracks.log import make_log
 from mapfilter.workflows.evaluate import check_cases
 
@@ -47,3 +51,16 @@ def test_cases_of_a_walk_see_the_same_sky():
 def test_a_case_without_a_receiver_hears_nothing():
     log = make_log(CRS, truth=TRUTH)
     assert with_satellites(CASES["levels-6"], log, WALKED, None, 1, 2) is log
+
+
+def test_reflections_are_switched_on_by_a_model_and_change_nothing_else():
+    log = make_log(CRS, truth=TRUTH)
+    street = Skyline([shapely.box(530_000, 4_556_008, 532_000, 4_556_060)], [25.0])
+    case = CASES["satellites-4"]
+    models = (None, ReceptionModel(), ReceptionModel(nlos=NlosModel(share=1.0)))
+    plain, same, more = (
+        with_satellites(case, log, WALKED, street, 1, 2, model).pseudoranges for model in models
+    )
+    pd.testing.assert_frame_equal(plain, same, check_exact=True)
+    assert more.groupby("time_s").size().max() == 4
+    assert not more["pseudorange_m"].equals(plain["pseudorange_m"])

@@ -80,7 +80,8 @@ def _run_route(batch: Batch, route: int) -> list[Row]:
         make = displaced_walk if case.recovery_within_m > 0 else walk
         walked = make(streets, settings.journey, batch.seed, route)
         log = log_of(case, walked, levels, streets, settings, batch.seed, route, batch.fixed)
-        log = with_satellites(case, log, walked, world.skyline(case), batch.seed, route)
+        skyline = world.skyline(case)
+        log = with_satellites(case, log, walked, skyline, batch.seed, route, world.reception)
         choice = informed(batch.choice, case, batch.fixed)
         locate = world.locator(choice, thinned=case.missing_ways > 0)
         found = locate(log, named_rng(batch.seed, "filter", name, str(route)))

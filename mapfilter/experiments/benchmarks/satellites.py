@@ -46,26 +46,44 @@ def spoofer_of(walked: Walk, seed: int, number: int) -> Spoofer:
 
 
 def with_satellites(
-    case: Case, log: TrackLog, walked: Walk, skyline: Skyline | None, seed: int, number: int
+    case: Case,
+    log: TrackLog,
+    walked: Walk,
+    skyline: Skyline | None,
+    seed: int,
+    number: int,
+    model: ReceptionModel | None = None,
 ) -> TrackLog:
     """Return a walk's log with what its receiver hears of satellites.
 
     All cases of a walk see the same sky, clock and noise; those of more satellites hear others
     beside the same ones.
+
+    Parameters
+    ----------
+    case : Case
+        Its number of satellites replaces the model's.
+    log : TrackLog
+    walked : Walk
+    skyline : Skyline or None
+    seed, number : int
+        Of the benchmark, of the route.
+    model : ReceptionModel, optional
+        By default one without reflections; the height is always the benchmark's.
     """
     if case.satellites is None:
         return log
     rng = named_rng(seed, "satellites", str(number))
     start_utc_s = START_UTC_S + float(rng.uniform(0.0, DAY_S))
     week, _ = gps_time(start_utc_s)
-    model = ReceptionModel(most=case.satellites, height_m=HEIGHT_M)
+    received_as = replace(model or ReceptionModel(), most=case.satellites, height_m=HEIGHT_M)
     ranges: pd.DataFrame = receive(
         walked.truth,
         log.crs,
         skyline,
         joined(nominal_gps(week), nominal_galileo(week)),
         start_utc_s,
-        model,
+        received_as,
         rng,
         spoofer_of(walked, seed, number) if case.spoofed else None,
     )

@@ -216,7 +216,11 @@ def _recovered(case: Case, walked: Walk, truth: Truth, time_s: Floats, errors_m:
     gone_m = truth.distance_at(time_s[after]) - truth.distance_at(walked.arrived_at_s)
     gone_m = np.maximum(gone_m, 0.0)
     far = np.flatnonzero(~near)
-    row: Row = {"success": False, "wrong": bool(errors_m[after[-1]] > SUCCESS_RADIUS_M), "switch_m": None}
+    row: Row = {
+        "success": False,
+        "wrong": bool(errors_m[after[-1]] > SUCCESS_RADIUS_M),
+        "switch_m": None,
+    }
     for begin in np.concatenate([[0], far + 1]).tolist():
         ends = far[far >= begin]
         end = int(ends[0]) if ends.size else len(near)

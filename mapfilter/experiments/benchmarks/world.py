@@ -23,6 +23,7 @@ from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.predict import PredictionModel, RealityErrors, realise
 from mapfilter.roads.ways import Buildings
 from mapfilter.simulation.reports import Levels, array_sampler
+from mapfilter.simulation.satellites import ReceptionModel
 from mapfilter.simulation.simulate import SimulationSettings
 
 STREETS, FULL, THINNED = "streets", "database", "database-thinned"
@@ -46,6 +47,8 @@ class BenchmarkWorld:
         How one walks, what is reported, and the errors of dead reckoning.
     antennas : mapping of str to MeasuredAntenna
         That the cell plan names.
+    reception : ReceptionModel
+        How satellites are received.
     """
 
     folder: Path
@@ -53,13 +56,14 @@ class BenchmarkWorld:
     errors: RealityErrors = field(default_factory=RealityErrors)
     settings: SimulationSettings = field(default_factory=SimulationSettings)
     antennas: Mapping[str, MeasuredAntenna] = field(default_factory=dict)
+    reception: ReceptionModel = field(default_factory=ReceptionModel)
 
     @property
     def sha256(self) -> str:
         """Of streets, cells, levels and buildings, and of all that is simulated."""
         parts = (*(f"{name}/manifest.json" for name in (FULL, THINNED)), BUILDINGS)
         drawn = [sha256_file(self.folder / part) for part in (f"{STREETS}/world.json", *parts)]
-        simulated = (repr(self.model), repr(self.errors), repr(self.settings))
+        simulated = map(repr, (self.model, self.errors, self.settings, self.reception))
         return hashlib.sha256("".join((*drawn, *simulated)).encode()).hexdigest()
 
     @property

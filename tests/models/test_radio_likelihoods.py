@@ -1,0 +1,231 @@
+"""Likelihoods of serving cells and levels against the scalar oracle."""
+
+import numpy as np
+import pytest
+import scalar_oracle as oracle
+
+from mapfilter.models import cell_id, fingerprint
+from mapfilter.models.cell_id import ServingWeights
+from mapfilter.models.fingerprint import LevelErrors
+
+ROWS, COLS, CELLS, RESOLUTION_M = 6, 9, 4, 10.0
+BANDS = CELLS + 2
+
+
+def raster(seed=0, low=-110.0, high=-50.0):
+    """Levels in quarters of a dB, then the best and the second best of each pixel."""
+    rng = np.random.default_rng(seed)
+    level = np.round(4 * rng.uniform(low, high, (ROWS * COLS, CELLS))) / 4
+    ordered = np.sort(level, axis=1)
+    return np.column_stack([level, ordered[:, -1], ordered[:, -2]]).astype(np.float32)
+
+
+EVERY = np.arange(ROWS * COLS, dtype=np.int32)
+
+
+def by_serving(table, cell, weights, weight=1.0):
+    found = np.zeros(EVERY.size)
+    cell_id.weigh_by_serving(
+        EVERY, table.reshape(-1), BANDS, cell, cell_id.serving_table(weights), weight, found
+    )
+    return found
+
+
+@pytest.mark.parametrize("cell", range(CELLS))
+def test_a_serving_cell_counts_by_its_margin_over_the_best_other_cell(cell):
+    # Margins within 64 dB in steps of the table are exact but for single precision.
+    table, weights = raster(), ServingWeights(hysteresis_db=3.0, sd_db=7.0)
+    expected = [oracle.serving_log_likelihood(row[:CELLS], cell, weights) for row in table]
+    np.testing.assert_allclose(by_serving(table, cell, weights), expected, rtol=2e-6, atol=1e-7)
+    # A quarter of the places are such where the cell itself is the best.
+    assert (table[:, cell] == table[:, CELLS]).sum() > 5
+
+
+def test_the_best_cell_is_not_compared_with_itself():
+    table, weights = np.full((ROWS * COLS, BANDS), -100.0, dtype=np.float32), ServingWeights()
+    table[:, :CELLS] = [-60.0, -75.0, -90.0, -90.0]
+    table[:, CELLS:] = [-60.0, -75.0]
+    best, second = (by_serving(table, cell, weights)[0] for cell in (0, 1))
+    assert best == pytest.approx(oracle.log_normal_cdf((15.0 + 2.0) / 9.0), rel=1e-6)
+    assert second == pytest.approx(oracle.log_normal_cdf((-15.0 + 2.0) / 9.0), rel=1e-6)
+
+
+def test_a_serving_weight_is_an_exponent_and_adds_to_what_is_there():
+    table, weights = raster(), ServingWeights()
+    once = by_serving(table, 2, weights)
+    found = np.full(EVERY.size, -1.0)
+    cell_id.weigh_by_serving(
+        EVERY, table.reshape(-1), BANDS, 2, cell_id.serving_table(weights), 0.25, found
+    )
+    np.testing.assert_allclose(found, -1.0 + 0.25 * once, rtol=1e-6)
+
+
+def test_margins_beyond_the_table_count_as_its_ends():
+    table = raster()
+    table[:, :CELLS] = [-20.0, -120.0, -120.0, -120.0]
+    table[:, CELLS:] = [-20.0, -120.0]
+    weights = ServingWeights()
+    lowest = oracle.log_normal_cdf((-64.0 + weights.hysteresis_db) / weights.sd_db)
+    assert by_serving(table, 1, weights)[0] == pytest.approx(lowest, rel=1e-6)
+    assert by_serving(table, 0, weights)[0] == pytest.approx(0.0, abs=1e-6)
+
+
+def innovations(table, before, reading):
+    """Standardised innovations at each pixel by the formula, from the report's two halves."""
+    rows = []
+    for now, then in zip(EVERY, before, strict=True):
+        rows.append([
+            oracle.innovation_db(r, float(table[now, c]), rho, r0, float(table[then, c])) / sd
+            for c, r, r0, rho, sd in reading
+        ])  # fmt: skip
+    return rows
+
+
+def by_levels(table, before, reading, errors):
+    cell, now, then, rho, sd = (np.array(column) for column in zip(*reading, strict=True))
+    found = np.zeros(EVERY.size)
+    fingerprint.weigh_by_levels(
+        EVERY, before, table.reshape(-1), BANDS, cell.astype(np.int32),
+        (now - rho * then).astype(np.float32), rho.astype(np.float32),
+        (1 / sd).astype(np.float32), errors.common, errors.weight, errors.clip_sd, found,
+    )  # fmt: skip
+    return found
+
+
+READING = ((2, -70.0, -74.0, 0.8, 6.0), (0, -82.0, -75.0, 0.55, 8.0), (3, -64.0, 0.0, 0.0, 11.0))
+
+
+@pytest.mark.parametrize("common", [0.0, 0.3, 0.7])
+@pytest.mark.parametrize("clip_sd", [3.0, 100.0])
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_levels_are_a_gaussian_with_equal_correlations(common, clip_sd, count):
+    errors = LevelErrors(common=common, clip_sd=clip_sd, weight=0.7)
+    table, before = raster(1), np.random.default_rng(2).permutation(EVERY)
+    reading = READING[:count]
+    expected = [
+        oracle.levels_log_likelihood(z, common, errors.weight, clip_sd)
+        for z in innovations(table, before, reading)
+    ]
+    found = by_levels(table, before, reading, errors)
+    np.testing.assert_allclose(found, expected, rtol=2e-5, atol=1e-5)
+
+
+def test_an_error_that_all_cells_share_costs_less_than_opposite_ones():
+    errors = LevelErrors(common=0.6, weight=1.0)
+    table = np.full((ROWS * COLS, BANDS), -80.0, dtype=np.float32)
+    alike, opposite = (
+        by_levels(table, EVERY, ((0, -74.0, 0.0, 0.0, 6.0), (1, other, 0.0, 0.0, 6.0)), errors)[0]
+        for other in (-74.0, -86.0)
+    )
+    # For two deviations of one: -1/(1+c) when alike, -1/(1-c) when opposite.
+    assert alike == pytest.approx(-1 / 1.6, rel=1e-5)
+    assert opposite == pytest.approx(-1 / 0.4, rel=1e-5)
+
+
+def by_bound(table, cells, level_dbm, censored, sd_db=9.0, weight=1.0):
+    found = np.zeros(EVERY.size)
+    fingerprint.weigh_by_bound(
+        EVERY, table.reshape(-1), BANDS, np.array(cells, dtype=np.int32), level_dbm, censored,
+        sd_db, weight, fingerprint.bound_table(), found,
+    )  # fmt: skip
+    return found
+
+
+@pytest.mark.parametrize("censored", [-1, 1])
+@pytest.mark.parametrize("cells", [(1,), (3, 0), (0, 1, 2, 3)])
+def test_a_bound_is_the_probability_of_its_side(censored, cells):
+    # A deviation of 8 dB and levels in quarters lie on the steps of the table.
+    table, level_dbm, weight = raster(3), -78.5, 0.6
+    expected = [
+        weight * oracle.bound_log_likelihood(level_dbm, [float(row[c]) for c in cells], censored, 8)
+        for row in table
+    ]
+    found = by_bound(table, cells, level_dbm, censored, 8.0, weight)
+    np.testing.assert_allclose(found, expected, rtol=2e-5, atol=2e-6)
+
+
+def test_a_level_below_the_scale_is_likelier_where_the_prediction_is_low():
+    table = np.full((ROWS * COLS, BANDS), -70.0, dtype=np.float32)
+    table[0] = -130.0
+    quiet, loud = by_bound(table, (0,), -110.5, -1)[:2]
+    assert quiet > -0.05
+    assert loud < -5.0
+    quiet, loud = by_bound(table, (0,), -80.5, 1)[:2]
+    assert quiet < -5.0
+    assert -0.2 < loud < -0.1
+
+
+@pytest.mark.parametrize("cells", [(2,), (1, 3), (0, 1, 2)])
+def test_an_ambiguous_level_is_the_mean_over_its_candidates(cells):
+    # Deviations stay below the 4 at which the kernel clips them.
+    table, level_dbm = raster(4, -95.0, -65.0), -80.0
+    expected = [
+        0.5 * oracle.bound_log_likelihood(level_dbm, [float(row[c]) for c in cells], 0, 9.0)
+        for row in table
+    ]
+    found = by_bound(table, cells, level_dbm, 0, weight=0.5)
+    np.testing.assert_allclose(found, expected, rtol=2e-5, atol=2e-6)
+
+
+def test_an_ambiguous_level_far_from_all_candidates_counts_as_four_deviations():
+    table = np.full((ROWS * COLS, BANDS), -60.0, dtype=np.float32)
+    for level_dbm in (-110.0, -10.0):
+        assert by_bound(table, (0, 1), level_dbm, 0, 9.0)[0] == pytest.approx(-8.0, rel=1e-5)
+
+
+def pixels(state, back_m=(0.0, 0.0)):
+    found = np.empty(state.shape[1], dtype=np.int32)
+    fingerprint.pixels(
+        state, *back_m, 0.0, ROWS * RESOLUTION_M, 1 / RESOLUTION_M, ROWS, COLS, found
+    )
+    return found
+
+
+def hypotheses(count=400, seed=5):
+    """Places within the raster and up to 20 m beyond it."""
+    rng = np.random.default_rng(seed)
+    state = np.zeros((5, count), dtype=np.float32)
+    state[0] = rng.uniform(-20.0, COLS * RESOLUTION_M + 20.0, count)
+    state[1] = rng.uniform(-20.0, ROWS * RESOLUTION_M + 20.0, count)
+    state[2] = rng.uniform(-3.0, 3.0, count)
+    state[3] = rng.normal(0.0, 0.2, count)
+    return state
+
+
+def off_edge(east_m, north_m):
+    """Whether a place is so far from pixel edges that single precision cannot matter."""
+    within = np.array([east_m, north_m]) / RESOLUTION_M
+    return bool(np.all(np.abs(within - np.round(within)) > 1e-4))
+
+
+@pytest.mark.parametrize("back_m", [(0.0, 0.0), (12.0, 0.0), (0.0, 17.0), (-9.0, 21.0)])
+def test_the_place_at_the_last_report_lies_against_the_displacement(back_m):
+    state, compared = hypotheses(), 0
+    for i, found in enumerate(pixels(state, back_m)):
+        place = oracle.came_from(*(float(x) for x in state[:4, i]), *back_m)
+        if off_edge(*place):
+            row, col = oracle.pixel_of(*place, RESOLUTION_M, ROWS, COLS)
+            assert found == row * COLS + col
+            compared += 1
+    assert compared > 390
+
+
+def test_one_who_went_east_was_farther_west_before():
+    state = np.zeros((5, 1), dtype=np.float32)
+    state[0], state[1] = 55.0, 25.0
+    here, before = pixels(state)[0], pixels(state, (20.0, 0.0))[0]
+    assert divmod(here, COLS) == (3, 5)
+    assert divmod(before, COLS) == (3, 3)
+    # A heading error of +90° turns the way east into one north.
+    state[2] = np.pi / 2
+    assert divmod(pixels(state, (20.0, 0.0))[0], COLS) == (5, 5)
+    # Steps that are in truth twice as long reach twice as far back.
+    state[2], state[3] = 0.0, np.log(2.0)
+    assert divmod(pixels(state, (20.0, 0.0))[0], COLS) == (3, 1)
+
+
+def test_a_prediction_beside_the_truth_varies_by_the_variogram():
+    errors = LevelErrors(roughness_db=5.0, correlation_m=40.0)
+    for grain_m in (0.0, 1.5, 5.0, 40.0, 1e4):
+        expected = oracle.beside_variance(errors, grain_m)
+        assert errors.beside_db2(grain_m) == pytest.approx(expected, abs=1e-12)

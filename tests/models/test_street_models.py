@@ -1,0 +1,202 @@
+"""Motion over streets against the scalar oracle: signs, moments, the map, and going back."""
+
+from math import exp, log, pi
+
+import numpy as np
+import pytest
+import scalar_oracle as oracle
+
+from mapfilter.models import fingerprint
+from mapfilter.models.street_motion import (
+    BIAS,
+    EAST,
+    LOG_SCALE,
+    NORTH,
+    OFF,
+    STATES,
+    MapWeights,
+    MotionErrors,
+    interpolate,
+    map_log_likelihood,
+    move,
+    weigh_by_map,
+)
+from mapfilter.models.street_smoothing import draw_ancestors
+
+EXACT = MotionErrors(
+    step_sd_m=0.0, heading_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0, scale_drift_per_sqrt_m=0.0
+)
+KEY = np.uint64(11)
+
+
+def states(count, bias_rad=0.0, log_scale=0.0, seed=1):
+    state = np.zeros((STATES, count), dtype=np.float32)
+    state[:2] = np.random.default_rng(seed).uniform(100.0, 300.0, (2, count))
+    state[BIAS], state[LOG_SCALE], state[OFF] = bias_rad, log_scale, 0.25
+    return state
+
+
+@pytest.mark.parametrize(
+    ("heading_rad", "bias_rad", "toward"),
+    [
+        (0.0, 0.0, (10.0, 0.0)),
+        (0.0, pi / 2, (0.0, 10.0)),
+        (0.0, -pi / 2, (0.0, -10.0)),
+        (pi / 2, pi / 6, (-5.0, 8.6602540)),
+        (pi, pi / 6, (-8.6602540, -5.0)),
+    ],
+)
+def test_a_positive_bias_turns_a_step_anticlockwise(heading_rad, bias_rad, toward):
+    before = states(3, bias_rad)
+    after = move(before, 10.0, heading_rad, EXACT, KEY)
+    np.testing.assert_allclose(after[:2] - before[:2], np.outer(toward, np.ones(3)), atol=1e-4)
+    np.testing.assert_array_equal(after[2:], before[2:])
+
+
+def test_a_step_without_noise_is_that_of_the_oracle():
+    rng = np.random.default_rng(2)
+    before = states(60)
+    before[BIAS], before[LOG_SCALE] = rng.uniform(-3, 3, 60), rng.normal(0, 0.3, 60)
+    for step_m, heading_rad in ((7.0, 0.4), (7.0, -2.9), (-4.0, 1.1)):
+        after = move(before, step_m, heading_rad, EXACT, KEY)
+        for one, place in zip(before.T, after.T, strict=True):
+            expected = oracle.moved(*(float(x) for x in one[:4]), step_m, heading_rad)
+            assert place[:2] == pytest.approx(expected, abs=2e-4)
+
+
+# Correlations of 1e5 draws are good to 1/sqrt(1e5); five standard errors are allowed.
+COUNT, SPREAD = 100_000, 5 / 100_000**0.5
+
+
+@pytest.mark.parametrize("step_m", [1.4, 5.0, -3.0])
+def test_the_moments_of_a_step_are_those_of_the_oracle(step_m):
+    errors = MotionErrors(
+        step_sd_m=0.4, typical_step_m=1.4, heading_sd_rad=0.35, bias_drift_rad_per_sqrt_m=0.0
+    )
+    before = states(COUNT, 0.5, 0.2)
+    before[:2] = 100.0
+    gone = (move(before, step_m, -1.1, errors, KEY)[:2] - 100.0).astype(np.float64)
+    mean, covariance = oracle.step_moments(0.5, 0.2, step_m, -1.1, errors)
+    sd = np.sqrt(np.diag(covariance))
+    assert np.all(np.abs(gone.mean(axis=1) - mean) < SPREAD * sd)
+    # Of a variance the relative standard error is sqrt(2/N).
+    np.testing.assert_allclose(
+        np.cov(gone), covariance, rtol=0, atol=1.5 * SPREAD * np.outer(sd, sd).max()
+    )
+
+
+def test_bias_and_scale_walk_and_the_step_follows_them():
+    errors = MotionErrors(
+        step_sd_m=0.0, heading_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.1,
+        scale_drift_per_sqrt_m=0.05,
+    )  # fmt: skip
+    before = states(COUNT, 0.3, -0.1)
+    after = move(before, 9.0, 0.7, errors, KEY)
+    walked = (after[[BIAS, LOG_SCALE]] - before[[BIAS, LOG_SCALE]]).astype(np.float64)
+    assert np.all(np.abs(walked.mean(axis=1)) < SPREAD * np.array([0.3, 0.15]))
+    # 0.1 and 0.05 per root of a metre over 9 m.
+    np.testing.assert_allclose(walked.std(axis=1), [0.3, 0.15], rtol=SPREAD)
+    assert abs(np.corrcoef(walked)[0, 1]) < SPREAD
+    # The state that is kept is the one that the step was made with.
+    for one, start in zip(after.T[:50], before.T[:50], strict=True):
+        expected = oracle.moved(*(float(x) for x in start[:2]), float(one[BIAS]),
+                                float(one[LOG_SCALE]), 9.0, 0.7)  # fmt: skip
+        assert one[:2] == pytest.approx(expected, abs=2e-4)
+
+
+def test_a_bias_that_walks_past_half_a_turn_wraps():
+    errors = MotionErrors(bias_drift_rad_per_sqrt_m=0.2)
+    after = move(states(2000, 3.1), 4.0, 0.0, errors, KEY)
+    assert np.abs(after[BIAS]).max() <= pi + 1e-6
+    # P(z > (π - 3.1) / 0.4) = 0.459; five standard errors of 2000 draws.
+    assert (after[BIAS] < 0).mean() == pytest.approx(0.459, abs=0.056)
+
+
+def test_what_moved_came_from_where_it_was():
+    """The motion and the look back at the last report agree on the bias and the scale."""
+    rows, cols, side_m = 40, 40, 10.0
+    before = states(300)
+    rng = np.random.default_rng(3)
+    before[BIAS], before[LOG_SCALE] = rng.uniform(-3, 3, 300), rng.normal(0, 0.2, 300)
+    # The middles of pixels, so that rounding cannot matter.
+    before[:2] = side_m * (np.floor(before[:2] / side_m) + 0.5)
+    after = move(before, 23.0, 0.9, EXACT, KEY)
+
+    def found(state, back_east_m, back_north_m):
+        pixel = np.empty(300, dtype=np.int32)
+        fingerprint.pixels(
+            state, back_east_m, back_north_m, 0.0, rows * side_m, 1 / side_m, rows, cols, pixel
+        )
+        return pixel
+
+    back = found(after, 23.0 * np.cos(0.9), 23.0 * np.sin(0.9))
+    np.testing.assert_array_equal(back, found(before, 0.0, 0.0))
+
+
+def test_the_likelihood_of_the_map_is_that_of_the_oracle():
+    distance_m = np.linspace(0.0, 120.0, 41, dtype=np.float32)
+    for sd_m in (2.0, 4.0, 8.0):
+        expected = [oracle.map_log_likelihood(float(d), sd_m) for d in distance_m]
+        np.testing.assert_allclose(map_log_likelihood(distance_m, sd_m), expected, rtol=1e-6)
+
+
+def test_a_raster_is_read_between_the_middles_of_its_pixels():
+    rng = np.random.default_rng(4)
+    raster, side_m = rng.normal(0, 5, (5, 7)).astype(np.float32), 8.0
+    state = np.zeros((STATES, 300), dtype=np.float32)
+    state[EAST], state[NORTH] = rng.uniform(-10, 66, 300), rng.uniform(-10, 50, 300)
+    found = np.empty(300, dtype=np.float32)
+    interpolate(
+        state, raster, np.float32(side_m / 2), np.float32(4.5 * side_m), np.float32(1 / side_m),
+        found,
+    )  # fmt: skip
+    expected = [oracle.bilinear(raster, float(x), float(y), side_m) for x, y in state[:2].T]
+    np.testing.assert_allclose(found, expected, atol=2e-5)
+
+
+@pytest.mark.parametrize("length_m", [1.4, 30.0, 400.0])
+def test_being_off_the_map_is_a_hidden_mode_that_is_summed_out(length_m):
+    weights = MapWeights(weight_per_m=0.1, off_cost_per_m=0.05, leave_per_m=4e-3, return_per_m=0.02)
+    rng = np.random.default_rng(5)
+    log_map = -rng.uniform(0.0, 5.0, 80).astype(np.float32)
+    off = np.concatenate([[0.0, 1.0], rng.random(78)]).astype(np.float32)
+    after, log_weight = off.copy(), np.full(80, -3.0)
+    weigh_by_map(
+        log_map, after,
+        *(np.float32(x) for x in (
+            weights.weight_per_m * length_m, exp(-weights.off_cost_per_m * length_m),
+            1 - exp(-weights.leave_per_m * length_m), 1 - exp(-weights.return_per_m * length_m),
+        )),
+        log_weight,
+    )  # fmt: skip
+    for i in range(80):
+        gained, expected = oracle.map_step(float(log_map[i]), float(off[i]), length_m, weights)
+        assert log_weight[i] == pytest.approx(-3.0 + gained, abs=1e-4)
+        assert after[i] == pytest.approx(expected, abs=2e-6)
+
+
+def test_ancestors_with_large_biases_are_reached_by_the_oracle():
+    """Headings at half a turn, steps a third too long: signs and wrapping matter."""
+    rng = np.random.default_rng(6)
+    count, draws, moved_m, variances = 12, 30_000, (-14.0, 9.0), (60.0, 0.6, 0.1)
+    earlier = states(count, seed=7)
+    earlier[:2] = 200.0 + rng.normal(0, 6, (2, count))
+    earlier[BIAS] = (pi + rng.normal(0, 0.5, count) + pi) % (2 * pi) - pi
+    earlier[LOG_SCALE] = log(1.3) + rng.normal(0, 0.2, count)
+    log_weight = rng.normal(0, 0.7, count).astype(np.float32)
+    aim = oracle.moved(200.0, 200.0, pi, log(1.3), *_polar(moved_m))
+    later = np.array([*aim, -3.1, log(1.25), 0.0], dtype=np.float32)
+    chosen = np.empty(draws, dtype=np.int32)
+    draw_ancestors(
+        np.repeat(later[:, None], draws, axis=1), earlier, log_weight, *moved_m, *variances,
+        -12.0, KEY, chosen,
+    )  # fmt: skip
+    expected = oracle.ancestor_probabilities(later, earlier, log_weight, moved_m, variances, -12.0)
+    counted = np.bincount(chosen, minlength=count) / draws
+    # Five standard errors.
+    assert np.all(np.abs(counted - expected) <= 5 * np.sqrt(expected * (1 - expected) / draws))
+    assert expected.max() < 0.5
+
+
+def _polar(moved_m):
+    return float(np.hypot(*moved_m)), float(np.arctan2(moved_m[1], moved_m[0]))

@@ -1,0 +1,251 @@
+"""First hypotheses on and off the map, and one step over the streets, against the oracle."""
+
+from math import exp, log, pi, sqrt
+
+import numpy as np
+import pytest
+import scalar_oracle as oracle
+from small_area import (
+    BANDS,
+    COLS,
+    DISTANCE_M,
+    HEIGHT_M,
+    LEVEL_DBM,
+    ON_WAY,
+    OPTIONS,
+    PIXEL_M,
+    POINTS,
+    ROWS,
+    SOUTH_M,
+    WEST_M,
+    WIDTH_M,
+    make_area,
+)
+
+from mapfilter.filters.contract import MotionStep
+from mapfilter.filters.particle import ParticleFilter
+from mapfilter.filters.particle_options import ParticleOptions
+from mapfilter.models.street_motion import (
+    BIAS,
+    EAST,
+    LOG_SCALE,
+    NORTH,
+    OFF,
+    MapWeights,
+    MotionErrors,
+)
+from mapfilter.positioning.bayes_model import BayesModel, Start
+from mapfilter.positioning.epochs import Epoch, Heard
+from mapfilter.positioning.evidence import Memory, reading_of
+from mapfilter.positioning.grid_model import StreetGrid
+
+AREA = make_area()
+ERRORS = MotionErrors(
+    step_sd_m=1.2, typical_step_m=4.0, heading_sd_rad=0.2, bias_sd_rad=0.3,
+    bias_drift_rad_per_sqrt_m=0.02, scale_sd=0.1,
+)  # fmt: skip
+EXACT = MotionErrors(
+    step_sd_m=0.0, heading_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0, scale_drift_per_sqrt_m=0.0
+)
+WEIGHTS = MapWeights(
+    sd_m=6.0, weight_per_m=0.08, off_cost_per_m=0.06, leave_per_m=4e-3, return_per_m=0.03
+)
+MODEL = BayesModel(AREA, ERRORS, WEIGHTS, OPTIONS)
+COUNT = 20_000
+BAND = BANDS["B"]
+
+
+def first_reading():
+    heard = (
+        Heard("serving", "B", None, None, -75.0, 0),
+        Heard("neighbour", "D", None, None, -90, 0),
+    )
+    _, reading, _, _ = reading_of(
+        AREA, OPTIONS, Memory.empty(len(BANDS)), Epoch(0.0, heard=heard), 5.0
+    )
+    return reading
+
+
+def likelihoods():
+    """Of the first reading at every pixel."""
+    levels = [(BAND, -75.0, None, np.inf), (BANDS["D"], -90.0, None, np.inf)]
+    report = {"serving": BAND, "levels": levels, "bounds": []}
+    return np.array([
+        [exp(oracle.report_log_likelihood(LEVEL_DBM, (r, c), (r, c), report, OPTIONS, 20.0, 5.0))
+         for c in range(COLS)] for r in range(ROWS)
+    ])  # fmt: skip
+
+
+def started(prior, seed=0, count=COUNT):
+    state, log_weight = MODEL.start(prior, count, np.random.default_rng(seed))
+    return state.astype(np.float64), log_weight
+
+
+def pixels(state):
+    found = [oracle.pixel_of(east, north, PIXEL_M, ROWS, COLS) for east, north in state[:2].T]
+    return np.array(found)
+
+
+def test_most_first_hypotheses_lie_on_the_map_by_the_likelihood_of_their_point():
+    state, log_weight = started(Start(first_reading()))
+    on = state[OFF] == 0.0
+    likelihood = likelihoods()[ON_WAY]
+    assert on.sum() == 0.8 * COUNT
+    total = np.log(np.exp(log_weight[on]).sum())
+    assert total == pytest.approx(log(0.95 * likelihood.mean()), abs=1e-4)
+    assert np.ptp(log_weight[on]) == 0.0
+    row, col = pixels(state[:, on]).T
+    copies = np.zeros((ROWS, COLS))
+    np.add.at(copies, (row, col), 1.0)
+    # Systematic draws of points in order are one copy off at most.
+    expected = np.zeros((ROWS, COLS))
+    expected[ON_WAY] = on.sum() * likelihood / likelihood.sum()
+    assert np.abs(copies - expected).max() <= 1.01
+    # Anywhere in the pixel: moments of a uniform number, within five standard errors.
+    inside = state[:2, on] / PIXEL_M % 1.0
+    assert np.all(np.abs(inside.mean(axis=1) - 0.5) < 5 * sqrt(1 / 12 / on.sum()))
+    np.testing.assert_allclose(inside.var(axis=1), 1 / 12, rtol=0.03)
+
+
+def test_a_fifth_of_the_first_hypotheses_lie_anywhere_off_the_map():
+    state, log_weight = started(Start(first_reading()))
+    off = state[OFF] == 1.0
+    assert off.sum() == 0.2 * COUNT
+    assert np.array_equal(off, state[OFF] != 0.0)
+    likelihood, tries = likelihoods(), 2 * off.sum()
+    # The mean over the area is estimated by places drawn anywhere: five standard errors.
+    found = np.exp(log_weight[off]).sum() / 0.05
+    assert abs(found - likelihood.mean()) < 5 * likelihood.std() / sqrt(tries)
+    assert np.ptp(log_weight[off]) == 0.0
+    row, col = pixels(state[:, off]).T
+    share = np.zeros((ROWS, COLS))
+    np.add.at(share, (row, col), 1 / off.sum())
+    expected = likelihood / likelihood.sum()
+    # Tries fall into a pixel by chance, and each counts by the pixel's likelihood.
+    error = expected * sqrt(likelihood.size / tries) + np.sqrt(expected / off.sum()) + 1 / off.sum()
+    assert np.all(np.abs(share - expected) < 5 * error)
+    assert share[~ON_WAY].sum() > 0.5
+
+
+def test_the_belief_of_the_filter_keeps_five_in_a_hundred_off_the_map():
+    given = ParticleOptions(most=COUNT, searching=COUNT, least=1000)
+    belief = ParticleFilter(MODEL, given).init(Start(None), np.random.default_rng(3))
+    assert belief.state.shape == (5, COUNT)
+    assert float(belief.weight @ belief.state[OFF]) == pytest.approx(0.05, abs=1e-5)
+
+
+def test_without_a_reading_all_places_are_alike():
+    state, log_weight = started(Start(None))
+    on = state[OFF] == 0.0
+    assert np.exp(log_weight[on]).sum() == pytest.approx(0.95)
+    assert np.exp(log_weight[~on]).sum() == pytest.approx(0.05)
+    row, col = pixels(state[:, on]).T
+    copies = np.zeros((ROWS, COLS))
+    np.add.at(copies, (row, col), 1)
+    assert copies[~ON_WAY].sum() == 0
+    assert np.abs(copies[ON_WAY] - on.sum() / len(POINTS)).max() <= 1.01
+    east, north = state[:2, ~on]
+    size = np.array([WIDTH_M, HEIGHT_M])
+    mean = np.array([east.mean(), north.mean()])
+    assert np.all(np.abs(mean - size / 2) < 5 * size / sqrt(12 * (~on).sum()))
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_first_errors_of_heading_and_scale_are_those_of_the_options(known):
+    place = (WEST_M + 40.0, SOUTH_M + 30.0, 6.0) if known else ()
+    state, _ = started(Start(first_reading(), True, *place))
+    for row, sd in ((BIAS, 0.3), (LOG_SCALE, 0.1)):
+        assert abs(state[row].mean()) < 5 * sd / sqrt(COUNT)
+        assert state[row].std() == pytest.approx(sd, rel=5 / sqrt(2 * COUNT))
+    turned, _ = started(Start(first_reading(), False, *place))
+    # Uniform over the circle: no mean direction, and a quarter of it in each quadrant.
+    assert abs(np.exp(1j * turned[BIAS]).mean()) < 5 / sqrt(COUNT)
+    share = np.histogram(turned[BIAS], bins=4, range=(-pi, pi))[0] / COUNT
+    assert np.abs(share - 0.25).max() < 5 * sqrt(0.25 * 0.75 / COUNT)
+
+
+def test_a_known_start_lies_about_its_place_and_is_weighed_by_the_report():
+    prior = Start(first_reading(), True, WEST_M + 45.0, SOUTH_M + 30.0, 6.0)
+    state, log_weight = started(prior)
+    for row, middle in ((EAST, 45.0), (NORTH, 30.0)):
+        assert abs(state[row].mean() - middle) < 5 * 6.0 / sqrt(COUNT)
+        assert state[row].std() == pytest.approx(6.0, rel=5 / sqrt(2 * COUNT))
+    np.testing.assert_allclose(state[OFF], 0.05, rtol=1e-6)
+    table = np.log(likelihoods())
+    for i, (row, col) in enumerate(pixels(state[:, :500])):
+        assert log_weight[i] + log(COUNT) == pytest.approx(table[row, col], rel=1e-4, abs=1e-4)
+
+
+def test_a_step_moves_by_the_bias_and_weighs_by_the_map_where_it_ends():
+    model, rng, count = BayesModel(AREA, EXACT, WEIGHTS), np.random.default_rng(4), 200
+    state = np.zeros((5, count), dtype=np.float32)
+    state[EAST], state[NORTH] = (
+        rng.uniform(5, WIDTH_M - 5, count),
+        rng.uniform(5, HEIGHT_M - 5, count),
+    )
+    state[BIAS], state[LOG_SCALE] = rng.uniform(-3, 3, count), rng.normal(0, 0.2, count)
+    state[OFF] = rng.random(count)
+    before, given = state.copy(), rng.normal(0, 1, count)
+    moved, weighed = model.move(state, given, MotionStep(8.0, 0.6), np.uint64(1))
+    np.testing.assert_array_equal(state, before)
+    log_map = np.array(
+        [[oracle.map_log_likelihood(float(d), 6.0) for d in row] for row in DISTANCE_M]
+    )
+    for i, one in enumerate(before.T.astype(np.float64)):
+        place = oracle.moved(*one[:4], 8.0, 0.6)
+        gained, off = oracle.map_step(
+            oracle.bilinear(log_map, *place, PIXEL_M), one[4], 8.0, WEIGHTS
+        )
+        assert moved[:2, i] == pytest.approx(place, abs=1e-3)
+        assert weighed[i] - given[i] == pytest.approx(gained, abs=2e-4)
+        assert moved[OFF, i] == pytest.approx(off, abs=1e-4)
+
+
+def test_a_step_without_a_heading_spreads_to_all_sides():
+    state = np.zeros((5, COUNT), dtype=np.float32)
+    state[EAST], state[NORTH], state[BIAS] = 45.0, 35.0, 0.4
+    moved, _ = MODEL.move(state, np.zeros(COUNT), MotionStep(8.0, np.nan), np.uint64(5))
+    gone = moved[:2].astype(np.float64) - np.array([[45.0], [35.0]])
+    # The mean square of the distance is that of the step; five standard errors.
+    assert np.all(np.abs(gone.mean(axis=1)) < 5 * 8.0 / sqrt(2 * COUNT))
+    np.testing.assert_allclose(gone.var(axis=1), 32.0, rtol=5 * sqrt(2 / COUNT))
+    np.testing.assert_array_equal(moved[2:4], state[2:4])
+
+
+@pytest.mark.parametrize(("step_m", "heading_rad"), [(4.0, 0.0), (4.0, 2.2), (12.0, -1.0)])
+def test_the_grid_moves_mass_as_the_oracle_moves_hypotheses(step_m, heading_rad):
+    """Over three typical steps the noise adds up; the scale's error is one of the whole way."""
+    grid, steps = StreetGrid(MODEL, bin_rad=0.15), step_m / ERRORS.typical_step_m
+    way = grid.transport(step_m * np.cos(heading_rad), step_m * np.sin(heading_rad), step_m)
+    assert grid.bias_rad.tolist() == pytest.approx(list(np.arange(-6, 7) * 0.15))
+    for b, bias_rad in enumerate(grid.bias_rad):
+        mean, covariance = oracle.step_moments(bias_rad, 0.0, 4.0, heading_rad, ERRORS)
+        ahead = mean / np.hypot(*mean)
+        covariance = steps * covariance + (0.1 * step_m) ** 2 * np.outer(ahead, ahead)
+        found = PIXEL_M * way.right_px[b], -PIXEL_M * way.down_px[b]
+        assert found == pytest.approx(tuple(steps * mean), abs=1e-6)
+        sd_m = PIXEL_M * way.sd_right_px[b], PIXEL_M * way.sd_down_px[b]
+        assert sd_m == pytest.approx(tuple(np.sqrt(np.diag(covariance))), rel=1e-6)
+    assert way.turned_bins == pytest.approx(0.02 * sqrt(step_m) / 0.15)
+    for row, col in ((0, 0), (2, 5), (6, 8)):
+        distance_m = float(DISTANCE_M[row, col])
+        on = exp(0.08 * step_m * oracle.map_log_likelihood(distance_m, 6.0))
+        assert way.on[row, col] == pytest.approx(on, rel=1e-5)
+    rates = way.off, way.leave, way.come_back
+    expected = exp(-0.06 * step_m), 1 - exp(-4e-3 * step_m), 1 - exp(-0.03 * step_m)
+    assert rates == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_the_grid_starts_with_the_prior_times_the_likelihood(known):
+    place = (WEST_M + 45.0, SOUTH_M + 30.0, 12.0) if known else ()
+    on, off = StreetGrid(MODEL, bin_rad=0.15).start(Start(first_reading(), True, *place))
+    prior = np.exp(-0.5 * (np.arange(-6, 7) * 0.15 / 0.3) ** 2)[:, None, None]
+    everywhere = np.full((ROWS, COLS), 1 / (ROWS * COLS))
+    where, here = ON_WAY / ON_WAY.sum(), likelihoods()
+    if known:
+        col, row = np.meshgrid(np.arange(COLS), np.arange(ROWS))
+        apart = (10.0 * (col + 0.5) - 45.0) ** 2 + (10.0 * (ROWS - row - 0.5) - 30.0) ** 2
+        where, here = everywhere, here * np.exp(-apart / (2 * 12.0**2))
+    expected = np.stack([0.95 * prior * where * here, 0.05 * prior * everywhere * here])
+    np.testing.assert_allclose(np.stack([on, off]), expected / expected.sum(), rtol=1e-3, atol=1e-9)

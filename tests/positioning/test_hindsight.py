@@ -1,0 +1,221 @@
+"""Smoothed tracks against the oracle: ancestors by probability, places in between by hand."""
+
+from math import cos, log, nan, sin, sqrt
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import scalar_oracle as oracle
+from small_area import HEIGHT_M, ON_WAY, SOUTH_M, WEST_M, WIDTH_M, make_area
+
+from mapfilter.filters.contract import Reason, Status
+from mapfilter.models.street_motion import MotionErrors
+from mapfilter.positioning.bayes_smoothing import History, Kept, settled, smoothed
+from mapfilter.positioning.estimate import Fix, TrackEstimate
+
+AREA = make_area()
+ERRORS = MotionErrors(
+    step_sd_m=0.4, typical_step_m=1.6, heading_sd_rad=0.1, bias_drift_rad_per_sqrt_m=0.006,
+    scale_drift_per_sqrt_m=0.004,
+)  # fmt: skip
+JITTER = (1.5, 1.5, 0.05, 0.02, 0.0)
+# East, north and distance by dead reckoning: a way that bends.
+MOVED = [
+    (0.0, 0.0, 0.0),
+    (6.0, 0.0, 6.0),
+    (12.0, 2.5, 12.5),
+    (13.0, 10.0, 20.0),
+    (20.0, 11.0, 27.0),
+]
+
+
+def cloud(*rows):
+    """States of (east, north, bias, log scale)."""
+    return np.array([[*row, 0.0] for row in rows], dtype=np.float32).T
+
+
+def kept(epoch, state, weight=None):
+    count = state.shape[1]
+    log_weight = np.zeros(count) if weight is None else np.log(weight)
+    east_m, north_m, travelled_m = MOVED[epoch]
+    return Kept(epoch, state, log_weight.astype(np.float32), (east_m, north_m), travelled_m)
+
+
+def forward_pass():
+    nowhere, status = (WEST_M, SOUTH_M, np.zeros((2, 2)), np.zeros(3)), Status.TRACKING
+    fixes = [
+        Fix(float(k), *nowhere, status, 1, 1.0, 0, 0.0, Reason.USED) for k in range(len(MOVED))
+    ]
+    return TrackEstimate.of_fixes(AREA.lattice.crs, "bayes", fixes)
+
+
+def hindsight(*beliefs, paths=200):
+    history = History(kept=list(beliefs), moved=MOVED)
+    rng = np.random.default_rng(2)
+    return smoothed(forward_pass(), history, AREA, ERRORS, rng, paths=paths, jitter=JITTER)
+
+
+def places(estimate):
+    return np.column_stack([estimate.east_m - WEST_M, estimate.north_m - SOUTH_M])
+
+
+START = (20.0, 15.0, 0.4, log(1.1))
+ENDS = [(45.0, 40.0), (30.0, 38.0)]
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_between_two_beliefs_a_path_is_bent_to_end_at_the_later_one(end):
+    found = places(hindsight(kept(0, cloud(START)), kept(4, cloud((*end, 0.1, 0.0)))))
+
+    def reckoned(epoch):
+        length_m = float(np.hypot(*MOVED[epoch][:2]))
+        heading_rad = float(np.arctan2(MOVED[epoch][1], MOVED[epoch][0]))
+        return np.array(oracle.moved(*START, length_m, heading_rad))
+
+    missed = np.array(end) - reckoned(4)
+    for epoch, (_, _, gone_m) in enumerate(MOVED):
+        expected = reckoned(epoch) + gone_m / 27.0 * missed
+        np.testing.assert_allclose(found[epoch], expected, atol=1e-3)
+
+
+def test_what_comes_later_moves_the_epochs_in_between():
+    one, other = (
+        places(hindsight(kept(0, cloud(START)), kept(4, cloud((*end, 0.1, 0.0))))) for end in ENDS
+    )
+    apart = np.subtract(*ENDS)
+    shares = np.array([gone_m / 27.0 for *_, gone_m in MOVED])
+    np.testing.assert_allclose(one - other, shares[:, None] * apart, atol=1e-3)
+
+
+def test_epochs_before_the_first_belief_stay_those_of_the_forward_pass():
+    first, last = kept(2, cloud(START)), kept(4, cloud((*ENDS[0], 0.1, 0.0)))
+    found = places(hindsight(first, last))
+    np.testing.assert_array_equal(found[:2], 0.0)
+    np.testing.assert_allclose(found[2], START[:2], atol=1e-4)
+    # Dead reckoning counts from the first belief: 1.0 and 7.5 m of 8.0 and 8.5 m.
+    turned = [[cos(0.4), -sin(0.4)], [sin(0.4), cos(0.4)]]
+    here, there = (START[:2] + 1.1 * np.array(turned) @ way for way in ([1.0, 7.5], [8.0, 8.5]))
+    np.testing.assert_allclose(found[3], here + 7.5 / 14.5 * (ENDS[0] - there), atol=1e-3)
+
+
+def variances(length_m):
+    """Of place, bias and scale: what the motion adds, and how far copies are parted."""
+    steps = length_m / ERRORS.typical_step_m
+    along, across = ERRORS.step_sd_m, ERRORS.typical_step_m * ERRORS.heading_sd_rad
+    return (
+        steps * max(along, across) ** 2 + JITTER[0] ** 2,
+        length_m * ERRORS.bias_drift_rad_per_sqrt_m**2 + JITTER[2] ** 2,
+        length_m * ERRORS.scale_drift_per_sqrt_m**2 + JITTER[3] ** 2,
+    )
+
+
+def ancestors(later, earlier):
+    """Probability of each hypothesis of an earlier belief, for each of a later one."""
+    way_m = tuple(b - a for a, b in zip(earlier.moved_m, later.moved_m, strict=True))
+    spread = variances(later.travelled_m - earlier.travelled_m)
+    log_jump = log(1e-4 * spread[0] / (WIDTH_M * HEIGHT_M))
+    return np.array([
+        oracle.ancestor_probabilities(
+            one.astype(float), earlier.state, earlier.log_weight, way_m, spread, log_jump
+        )
+        for one in later.state.T
+    ])  # fmt: skip
+
+
+def test_paths_go_back_by_weight_and_by_fit_over_three_beliefs():
+    first = kept(0, cloud((20.0, 15.0, 0.08, 0.0), (24.0, 13.0, -0.04, 0.04)), [0.5, 0.5])
+    middle = kept(2, cloud((33.0, 17.0, 0.0, 0.03), (35.5, 16.0, 0.05, -0.02)), [0.7, 0.3])
+    last = kept(4, cloud((43.5, 25.5, 0.1, 0.015), (45.0, 24.0, -0.03, 0.03)), [0.4, 0.6])
+    paths = 6000
+    estimate = hindsight(first, middle, last, paths=paths)
+    at_last = np.array([0.4, 0.6])
+    at_middle = at_last @ ancestors(last, middle)
+    at_first = at_middle @ ancestors(middle, first)
+    for epoch, belief, share in ((0, first, at_first), (2, middle, at_middle), (4, last, at_last)):
+        assert 0.2 < share[0] < 0.8
+        places_m = belief.state[:2].astype(float)
+        mean = places_m @ share
+        # Five standard errors of a share drawn by so many paths.
+        error = sqrt(share[0] * share[1] / paths) * np.abs(places_m[:, 0] - places_m[:, 1])
+        assert np.all(np.abs(places(estimate)[epoch] - mean) < 5 * error + 1e-4)
+        spread = np.cov(places_m, aweights=share, ddof=0)
+        np.testing.assert_allclose(estimate.covariance_m2[epoch], spread, rtol=0.1, atol=0.02)
+
+
+def test_a_path_that_no_ancestor_reaches_takes_one_by_weight():
+    """An unmeasured displacement: the later place tells nothing of the earlier one."""
+    first = kept(0, cloud((20.0, 15.0, 0.0, 0.0), (30.0, 15.0, 0.0, 0.0)), [0.3, 0.7])
+    estimate = hindsight(first, kept(4, cloud((85.0, 65.0, 0.0, 0.0))), paths=4000)
+    share = (places(estimate)[0, 0] - 20.0) / 10.0
+    assert abs(share - 0.7) < 5 * sqrt(0.21 / 4000)
+
+
+def test_a_far_ancestor_counts_by_its_fit_as_long_as_a_jump_is_less_likely():
+    """Ten and twelve nats away, where a jump anywhere in the area costs seventeen."""
+    first = kept(0, cloud((20.0, 15.0, 0.0, 0.0), (19.0, 15.0, 0.0, 0.0)))
+    last = kept(4, cloud((49.95, 26.0, 0.0, 0.0)))
+    share = ancestors(last, first)[0, 0]
+    assert share == pytest.approx(0.89, abs=0.01)
+    estimate = hindsight(first, last, paths=4000)
+    assert abs(places(estimate)[0, 0] - 19.0 - share) < 5 * sqrt(share * (1 - share) / 4000)
+
+
+def test_positions_ways_and_masses_are_those_of_the_paths():
+    # On the way along row 4, two thirds; off it, too near to be another place.
+    last = kept(4, cloud((45.0, 25.0, 0.0, 0.0), (45.0, 5.0, 0.0, 0.0)), [2 / 3, 1 / 3])
+    estimate = hindsight(kept(0, cloud(START)), last, paths=300)
+    assert ON_WAY[4, 4]
+    assert not ON_WAY[6, 4]
+    assert (estimate.way_id[4], estimate.way_probability[4]) == (7, pytest.approx(2 / 3, abs=0.01))
+    assert estimate.mass_50m[4] == pytest.approx(1.0)
+    assert places(estimate)[4].tolist() == pytest.approx([45.0, 25.0 - 20.0 / 3], abs=0.1)
+
+
+def at(epoch, state, challenger=None, wins=0):
+    """A forward pass's track after an epoch, as far as the history looks at it."""
+    east_m, north_m, travelled_m = MOVED[epoch]
+    memory = SimpleNamespace(east_m=east_m, north_m=north_m, travelled_m=travelled_m)
+    belief = SimpleNamespace(state=state, log_weight=np.zeros(state.shape[1]))
+    return SimpleNamespace(
+        memory=memory, belief=belief, leading=belief, challenger=challenger, wins=wins
+    )
+
+
+def test_beliefs_are_kept_every_few_metres_and_at_the_end():
+    history, before = History(every_m=20.0), at(0, cloud(START))
+    for epoch in range(5):
+        after = at(epoch, cloud((20.0 + epoch, 15.0, 0.0, 0.0)))
+        history.add(before, after)
+        before = after
+    assert [k.epoch for k in history.kept] == [0, 3]
+    history.close(before)
+    assert [k.epoch for k in history.kept] == [0, 3, 4]
+    assert [float(k.state[0, 0]) for k in history.kept] == [20.0, 23.0, 24.0]
+    assert [k.moved_m for k in history.kept] == [MOVED[k][:2] for k in (0, 3, 4)]
+    assert [k.travelled_m for k in history.kept] == [MOVED[k][2] for k in (0, 3, 4)]
+    assert history.moved == MOVED
+
+
+@pytest.mark.parametrize("won", [False, True])
+def test_a_challenger_that_won_takes_the_place_of_what_was_kept_since(won):
+    history, main, other = History(every_m=1.0), cloud((1.0, 1.0, 0, 0)), cloud((9.0, 9.0, 0, 0))
+    rival = SimpleNamespace(
+        belief=SimpleNamespace(state=other, log_weight=np.zeros(1)), began_at_m=6.0
+    )
+    then = other if won else main
+    tracks = [at(0, main), at(1, main, rival), at(2, main, rival)]
+    tracks += [at(3, then, wins=int(won)), at(4, then, wins=int(won))]
+    for before, after in zip([tracks[0], *tracks], tracks, strict=False):
+        history.add(before, after)
+    assert [k.epoch for k in history.kept] == [0, 1, 2, 3, 4]
+    expected = [1.0, 9.0, 9.0, 9.0, 9.0] if won else [1.0] * 5
+    assert [float(k.state[0, 0]) for k in history.kept] == expected
+    assert history.challenging == []
+
+
+def test_a_fix_is_settled_where_it_tracks_within_ten_metres():
+    estimate = forward_pass()
+    estimate.radii_m[:, 2] = [10.0, 10.1, 5.0, nan, 9.0]
+    status = (*[Status.TRACKING] * 2, Status.CONVERGED, *[Status.TRACKING] * 2)
+    told = SimpleNamespace(status=status, radii_m=estimate.radii_m)
+    assert settled(told).tolist() == [True, False, False, False, True]
