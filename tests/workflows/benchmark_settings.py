@@ -111,10 +111,8 @@ OF_THE_GROUND_TRUTH = {
 # The plain world's model has no streets; Walfisch-Ikegami does.
 GROUND_TRUTH_BESIDE = {
     "clutter": _CLUTTER,
-    **dict.fromkeys(
-        ("street_width_m", "building_separation_m"),
-        {"prediction.reality.model": "cost231_walfisch_ikegami"},
-    ),
+    "street_width_m": {"prediction.reality.model": "cost231_walfisch_ikegami"},
+    "building_separation_m": {"prediction.reality.model": "cost231_walfisch_ikegami"},
 }
 
 OF_THE_MAP = {
@@ -176,6 +174,7 @@ READ_AS_FOR_A_BUILD = (
 OTHERWISE = {
     "filter.name",
     "output.dir",
+    "journeys.nlos_satellites",
     "prediction.default_roof_height_m",
     "prediction.reality.default_roof_height_m",
 }

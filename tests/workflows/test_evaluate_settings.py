@@ -266,14 +266,20 @@ def test_roofs_where_no_building_is_near(world_of, tmp_path):
     predicted = world_of({**given, "prediction.default_roof_height_m": 20.0})
     real = world_of({**given, "prediction.reality.default_roof_height_m": 20.0})
     usual_map, other_map, real_map = (
-        sha256_file(made.folder / "database" / "manifest.json")
-        for made in (usual, predicted, real)
+        sha256_file(made.folder / "database" / "manifest.json") for made in (usual, predicted, real)
     )
     assert other_map != usual_map == real_map
     far = np.repeat([500_100.0, 500_500.0], 2), np.tile([30.0, 570.0], 2)
     truths = [world.ground_truth(1)(*far) for world in (usual, predicted, real)]
     np.testing.assert_array_equal(truths[0], truths[1])
     assert np.abs(truths[2] - truths[0]).max() > 0.1
+
+
+def test_reflected_satellites(world_of):
+    usual, without = world_of(SMALL), world_of({**SMALL, "journeys.nlos_satellites": False})
+    assert usual.reception.nlos is not None
+    assert without.reception.nlos is None
+    assert usual.sha256 != without.sha256
 
 
 def test_the_same_settings_make_the_same_world(world_of, tmp_path):
