@@ -81,6 +81,14 @@ def test_a_track_scored_by_hand():
     assert (score.error_67_m, score.error_95_m, score.scored_epochs) == (3.0, 5.0, 4)
 
 
+def test_positions_before_the_switch_do_not_count():
+    """A filter may state where it is most probable while it still searches."""
+    found = estimate([(0, 900, 0, S), (4, 900, 0, S), (5, 50, 4, C), (6, 60, 2, T), (7, 70, 6, L)])
+    score = accuracy(found, TRUTH)
+    assert (score.error_mean_m, score.error_67_m, score.error_95_m) == (4.0, 6.0, 6.0)
+    assert score.scored_epochs == 3
+
+
 @pytest.mark.parametrize(("off", "success"), [(49.99, True), (50.0, True), (50.01, False)])
 def test_fifty_metres_at_the_switch_are_the_limit(off, success):
     score = accuracy(estimate([(0, nan, nan, S), (10, 100, off, C), (20, 100, 100, T)]), TRUTH)

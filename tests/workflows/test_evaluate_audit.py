@@ -13,11 +13,13 @@ from mapfilter.radio.predict import PredictionModel, RealityErrors
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
+from mapfilter.workflows.evaluate import _world as prepare_world
 from mapfilter.workflows.evaluate_audit import CHANGES
 from mapfilter.workflows.evaluate_settings import load_benchmark
 from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.predict import ground_truth_errors, prediction_model
 from mapfilter.workflows.simulate import simulation_settings
+from mapfilter.workflows.world import World
 
 EASY = (
     PredictionModel(shadowing_db=6.0),
@@ -172,6 +174,15 @@ def test_a_row_is_the_benchmark_with_its_settings(world, tmp_path):
     (case,) = assert_done(told).json["cases"]
     times = {"seconds_per_track": None}
     assert {**case, **times} == {**row["result"], **times}
+    # Of the same world, which is not the unchanged one.
+    ran, alone = (
+        json.loads((folder / "benchmark.json").read_text())
+        for folder in (tmp_path / "a" / "fading", tmp_path / "b")
+    )
+    assert ran == alone
+    unchanged = load_benchmark("easy", world.benchmark_toml, [])[0]
+    made, _ = prepare_world(World.of(unchanged), tmp_path / "easy", 0)
+    assert made.sha256 != ran["world"]
 
 
 def test_the_audit_goes_to_the_output_folder_that_is_set(world, tmp_path):
