@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 from grid_town import levels, streets
 
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
@@ -15,6 +16,7 @@ from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.simulate import SimulationSettings
+from mapfilter.simulation.walking import WalkerModel
 from mapfilter.tracks.deadreckoning import dead_reckon
 
 SEED = 11
@@ -41,6 +43,27 @@ def made(town, name, number=0, *, walked=None, fixed=frozenset(), **settings):
     walked = walked or walk(town, SHORT, SEED, number)
     given = SimulationSettings(**settings)
     return walked, log_of(CASES[name], walked, levels, town, given, SEED, number, fixed)
+
+
+@pytest.mark.parametrize("make", [walk, displaced_walk])
+def test_walkers_keep_out_of_the_towns_buildings(town, make):
+    """Where everything is built over, they stay on the centre lines."""
+    e, n = town.network.east_m, town.network.north_m
+    lines = shapely.union_all(
+        [
+            shapely.LineString([(e[a], n[a]), (e[b], n[b])])
+            for a, b in zip(town.network.node_a, town.network.node_b, strict=True)
+        ]
+    )
+    beside = replace(SHORT, walker=WalkerModel(8.0))
+
+    def away_m(streets):
+        truth = make(streets, beside, SEED, 0).truth
+        places = shapely.points(truth["east_m"], truth["north_m"])
+        return np.median(shapely.distance(places, lines))
+
+    assert away_m(town) > 5.0
+    assert away_m(replace(town, heights_m=np.ones((150, 150), np.float32))) < 0.1
 
 
 def chords(walked):

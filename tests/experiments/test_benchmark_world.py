@@ -15,6 +15,7 @@ from mapfilter.experiments.benchmarks.world import BenchmarkWorld, write_buildin
 from mapfilter.experiments.sweep.world import SweepWorld, write_world
 from mapfilter.geodesy import Lattice
 from mapfilter.positioning.locators import FilterChoice
+from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.predict import PredictionModel, RealityErrors, predict
 from mapfilter.radio.rasters import open_rasters, write_rasters
@@ -76,6 +77,18 @@ def test_a_case_may_have_another_deviation(folder):
     offset = replace(errors, offset_db=30.0)
     found = received(folder, offset, 5, 10.0) - predicted()
     np.testing.assert_allclose(found, more + 30.0, atol=1e-3)
+
+
+def test_measured_antennas_are_the_ground_truths_too(tmp_path):
+    turn = np.arange(0.0, 360.0, 10.0)
+    zero = np.zeros(36)
+    shut = MeasuredAntenna("shut", turn, zero + 40.0, turn, zero + 40.0)
+    cells = tuple(replace(cell, antenna="panel", azimuth_deg=0.0) for cell in PLAN.cells)
+    towns = SweepWorld(network(), CellPlan(CRS, cells), LATTICE, {})
+    write_world(towns, tmp_path / "streets")
+    world = BenchmarkWorld(tmp_path, MODEL, NONE, antennas={"panel": shut})
+    levels = world.ground_truth(1)(*PLACES)
+    np.testing.assert_allclose(levels, predicted() - 40.0, atol=0.01)
 
 
 def test_the_default_ground_truth_is_not_the_prediction(folder):
