@@ -35,6 +35,8 @@ _SWAPS = {a: b for pair in _PAIRS for a, b in (pair, pair[::-1])}
 _SIDES = {"left": "right", "right": "left"}
 _UNITS = frozenset(("m", "s", "rad", "deg", "dbm", "db", "m2", "row", "col", "rows", "cols"))
 _SHOWN = 60
+_SMALL = 10
+"""Whole numbers up to here are off by one, larger ones doubled."""
 
 
 @dataclass(frozen=True)
@@ -208,7 +210,7 @@ def _constant(source: Source, node: ast.Constant) -> Iterator[_Change]:
     if isinstance(value, bool):
         yield "constant", start, end, str(not value)
     elif isinstance(value, int):
-        yield "constant", start, end, str(value + 1)
+        yield "constant", start, end, str(value + 1 if value <= _SMALL else 2 * value)
     elif isinstance(value, float):
         yield "constant", start, end, repr(value * 2 or 1.0)
     elif isinstance(value, str) and value in _SIDES:

@@ -137,7 +137,9 @@ class Score:
     def of(cls, room: str, statuses: Sequence[str]) -> Score:
         """Count the statuses of a room's mutants."""
         count = Counter(statuses)
-        return cls(room, len(statuses), *(count[s] for s in (KILLED, SURVIVED, TIMEOUT, EQUIVALENT)))
+        return cls(
+            room, len(statuses), *(count[s] for s in (KILLED, SURVIVED, TIMEOUT, EQUIVALENT))
+        )
 
     @property
     def judged(self) -> int:

@@ -21,11 +21,6 @@ from typing import Any
 
 import pytest
 
-LIBRARIES = (
-    "numpy", "scipy.stats", "scipy.ndimage", "scipy.optimize", "scipy.interpolate",
-    "scipy.spatial", "pandas", "pyarrow.parquet", "pyarrow.dataset", "shapely", "pyproj",
-    "geopandas", "rasterio", "pydantic", "numba",
-)  # fmt: skip
 BROKEN = 70
 """Exit status of a run that pytest never began."""
 _POLL_S = 0.02
@@ -121,15 +116,20 @@ def run(request: Request) -> Outcome:
     child = os.fork()
     if child == 0:
         _become(request, note)
-    while (ended := os.waitpid(child, os.WNOHANG))[0] == 0:
-        if time.monotonic() - began_s > request.limit_s:
-            os.kill(child, signal.SIGKILL)
-            ended = os.waitpid(child, 0)
-            break
-        time.sleep(_POLL_S)
-    # Workers that the tests started go with it.
-    with contextlib.suppress(ProcessLookupError, PermissionError):
-        os.killpg(child, signal.SIGKILL)
+    owner = os.getppid()
+    try:
+        while (ended := os.waitpid(child, os.WNOHANG))[0] == 0:
+            if time.monotonic() - began_s > request.limit_s:
+                os.kill(child, signal.SIGKILL)
+                ended = os.waitpid(child, 0)
+                break
+            if os.getppid() != owner:
+                raise SystemExit
+            time.sleep(_POLL_S)
+    finally:
+        # Workers that the tests started go with it.
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(child, signal.SIGKILL)
     test, files_s = json.loads(note.read_text()) if note.exists() else ("", {})
     seconds = time.monotonic() - began_s
     return Outcome(os.waitstatus_to_exitcode(ended[1]), test, seconds, files_s)
@@ -138,6 +138,7 @@ def run(request: Request) -> Outcome:
 def _become(request: Request, note: Path) -> None:
     code = BROKEN
     try:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
         os.setsid()
         nothing = os.open(os.devnull, os.O_RDONLY)
         log = os.open(request.log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
@@ -154,8 +155,10 @@ def _become(request: Request, note: Path) -> None:
 
 
 def main() -> None:
-    """Answer requests until there are no more."""
-    for name in LIBRARIES:
+    """Load the libraries named as arguments and answer requests until there are no more."""
+    # Whoever ends this process ends what runs in its fork.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit())
+    for name in sys.argv[1:]:
         # Only speed is lost without one.
         with contextlib.suppress(ImportError):
             importlib.import_module(name)

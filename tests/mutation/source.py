@@ -63,7 +63,9 @@ def _walk(node: ast.AST, inside: bool, condition: bool) -> Iterator[tuple[ast.AS
     for name, value in ast.iter_fields(node):
         if name in ("decorator_list", "annotation", "returns", "bases", "type_params"):
             continue
-        is_test = name in ("test", "ifs") and isinstance(node, ast.If | ast.IfExp | ast.comprehension)
+        is_test = name in ("test", "ifs") and isinstance(
+            node, ast.If | ast.IfExp | ast.comprehension
+        )
         for child in value if isinstance(value, list) else [value]:
             if isinstance(child, ast.AST):
                 yield from _walk(child, inside, is_test)

@@ -21,7 +21,13 @@ from .operators import Mutant, applied
 from .rooms import Imports
 from .server import BROKEN, Outcome, Request
 
-PARTS = ("mapfilter", "data", "pipelines", "tests", "docs", "pyproject.toml", "README.md")
+PARTS = ("data", "pipelines", "tests", "docs", "pyproject.toml", "README.md")
+LIBRARIES = (
+    "numpy", "scipy.stats", "scipy.ndimage", "scipy.optimize", "scipy.interpolate",
+    "scipy.spatial", "pandas", "pyarrow.parquet", "pyarrow.dataset", "shapely", "pyproj",
+    "geopandas", "rasterio", "pydantic", "numba",
+)  # fmt: skip
+"""Loaded once, before any fork, by the process that the package's tests are forked from."""
 _NEVER_COPIED = ("__pycache__", "_build", ".hypothesis")
 _LATER_NS = 3_600_000_000_000
 """By how much a mutated file is newer: caches are asked for by the time of their file."""
@@ -43,6 +49,7 @@ class Workshop:
     def __init__(self, root: Path, folder: Path, package: str = "mapfilter") -> None:
         self.copy = folder / "copy"
         self._root, self._folder, self._package = root, folder, package
+        self._parts = (package, *PARTS)
         self._kernels, self._warm = folder / "kernels", folder / "kernels-warm"
         self._log, self._examples = folder / "log.txt", folder / "hypothesis"
         self._process: subprocess.Popen[str] | None = None
@@ -59,8 +66,8 @@ class Workshop:
         self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None
     ) -> None:
         if self._process is not None:
-            self._process.kill()
-            self._process.wait()
+            with self._process as process:
+                process.terminate()
 
     def warm(self, request: Request) -> Outcome:
         """Run tests on the sources as they are, and keep the kernels that they compile."""
@@ -119,6 +126,8 @@ class Workshop:
         }
         # By its path: the copy's own tests are what is imported in the forks.
         command = [sys.executable, str(Path(__file__).with_name("server.py"))]
+        if self._package == "mapfilter":
+            command += LIBRARIES
         return subprocess.Popen(
             command,
             cwd=self.copy,
@@ -143,8 +152,8 @@ class Workshop:
 
     def _synchronise(self) -> list[Path]:
         """Make the copy equal to the repository and return the package's changed files."""
-        wanted = {file for part in PARTS for file in self._files(self._root, part)}
-        there = {file for part in PARTS for file in self._files(self.copy, part)}
+        wanted = {file for part in self._parts for file in self._files(self._root, part)}
+        there = {file for part in self._parts for file in self._files(self.copy, part)}
         for file in there - wanted:
             (self.copy / file).unlink()
         changed = []
