@@ -21,6 +21,9 @@ _PATIENCE_S = 45.0
 """A test may take this many times as long as its whole file does, and this much longer: kernels
 of the mutant are compiled in it."""
 _NO_TESTS = 5
+_INDIRECT = 4
+"""A test that does not import the file itself is as likely to notice as one that takes so many
+times as long."""
 
 Key = tuple[str, str]
 Rooms = Mapping[str, Room]
@@ -195,12 +198,13 @@ class _Worker:
     def _ordered(
         self, imports: Imports, mutant: Mutant, tests: Sequence[Path], seconds: Mapping[str, float]
     ) -> list[Path]:
-        """Put the tests first that are likely to notice, then the quick ones."""
+        """Put the tests first that are likely to notice, quick ones before slow ones."""
 
-        def rank(test: Path) -> tuple[int, bool, float]:
+        def rank(test: Path) -> tuple[int, float]:
             name = test.as_posix()
             direct = Path(mutant.file) in imports.direct(test)
-            return -self._kills[mutant.file, name], not direct, seconds.get(name, 0.0)
+            cost = seconds.get(name, 0.0) * (1 if direct else _INDIRECT)
+            return -self._kills[mutant.file, name], cost
 
         ordered = sorted(tests, key=rank)
         # The examples in the docstrings of the file are tests of it, too.
