@@ -7,6 +7,7 @@ import pytest
 from mutation import judge, record
 from mutation.operators import applied, mutants
 from mutation.rooms import ROOMS, Imports, Room
+from mutation.workshop import Workshop
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -173,6 +174,15 @@ def test_tests_that_fail_anyway_are_an_error(toy):
     (toy / "tests" / "test_more.py").write_text("def test_no():\n    assert False\n")
     with pytest.raises(RuntimeError, match="without any mutant"):
         judged(toy)
+
+
+def test_two_runs_never_share_a_copy(toy):
+    with (
+        Workshop(toy, toy / "out", "toy"),
+        pytest.raises(RuntimeError, match="another run"),
+        Workshop(toy, toy / "out", "toy"),
+    ):
+        pass
 
 
 def test_samples_are_the_same_for_a_seed_and_grow(toy):

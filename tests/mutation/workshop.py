@@ -7,6 +7,7 @@ at the file in which the kernel itself stands.
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import shutil
@@ -44,6 +45,11 @@ class Workshop:
         Where the copy and the caches lie; kept from run to run.
     package : str
         The package that is mutated.
+
+    Raises
+    ------
+    RuntimeError
+        Another run works in the folder.
     """
 
     def __init__(self, root: Path, folder: Path, package: str = "mapfilter") -> None:
@@ -56,6 +62,12 @@ class Workshop:
 
     def __enter__(self) -> Workshop:
         self._folder.mkdir(parents=True, exist_ok=True)
+        self._lock = (self._folder / "lock").open("w")
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            self._lock.close()
+            raise RuntimeError(f"{self._folder}: another run is at work here") from None
         changed = self._synchronise()
         self.imports = Imports(self.copy, self._package)
         for file in changed:
@@ -68,6 +80,7 @@ class Workshop:
         if self._process is not None:
             with self._process as process:
                 process.terminate()
+        self._lock.close()
 
     def warm(self, request: Request) -> Outcome:
         """Run tests on the sources as they are, and keep the kernels that they compile."""
