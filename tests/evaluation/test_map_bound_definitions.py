@@ -128,3 +128,30 @@ def test_points_of_a_cell_are_within_the_margin_and_above_the_floor():
     assert first.tolist() == [0, 3, 5]
     assert point.tolist() == [0, 1, 3, 0, 2]
     assert len(radio) == 4
+
+
+@pytest.mark.parametrize("factor", [1e-4, 1e4])
+def test_bounds_are_proportional_to_the_errors(factor):
+    rng = np.random.default_rng(2)
+    radio = made_map(rng.normal(-80, 10, (12, 12, 3)), np.ones((12, 12), dtype=bool), [0, 1, 1])
+    one = position_bound(radio, ErrorModel(7.0, 30.0, 0.3))
+    other = position_bound(radio, ErrorModel(7.0 * factor, 30.0, 0.3))
+    assert np.isfinite(one.plane_m).all()
+    np.testing.assert_allclose(other.plane_m, factor * one.plane_m, rtol=1e-9)
+    np.testing.assert_allclose(other.along_m, factor * one.along_m, rtol=1e-9)
+
+
+def test_cells_that_rise_alike_tell_one_direction_only():
+    row, col = np.mgrid[:12, :12]
+    level = np.stack([-60.0 - row - 2 * col, -70.0 - 2 * row - 4 * col], axis=-1)
+    radio = made_map(level, np.ones((12, 12), dtype=bool), [0, 1])
+    assert np.isinf(position_bound(radio, ErrorModel(7.0, 30.0, 0.0)).plane_m).all()
+
+
+def test_no_place_is_told_by_more_bits_than_there_are_points():
+    # Every place is unlike all others; most are not among the 500 that stand for the cell.
+    count = 2 * COMPARED
+    level = (-60 - 0.02 * np.arange(count)).reshape(1, count, 1)
+    radio = made_map(level, np.ones((1, count), dtype=bool), [0])
+    bits = distinctness(radio, ErrorModel(1e-4, 50.0, 0.0)).level_bits
+    np.testing.assert_allclose(np.unique(bits.round(6)), np.log2([COMPARED, count]), atol=1e-6)

@@ -10,6 +10,7 @@ from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio import _resampling
 from mapfilter.radio._resampling import common_lattice, read_on
+from mapfilter.radio.rasters import RxLevRasters
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 6, 8)
@@ -23,6 +24,7 @@ class InMemory:
     values: np.ndarray
     path: Path = Path("rasters/a.tif")
     cell_ids: tuple[str, ...] = ("A", "B")
+    parts: tuple[Path, ...] = ()
     reads: tuple = ()
 
     def read(self, bands, window):
@@ -38,7 +40,7 @@ class InMemory:
 def made(lattice=LATTICE, seed=1, **more):
     rng = np.random.default_rng(seed)
     values = rng.uniform(-100, -60, (2, lattice.rows, lattice.cols)).astype(np.float32)
-    values[1, 2, 3] = np.nan
+    values[1, 2:3, 3:4] = np.nan
     return InMemory(lattice, values, **more)
 
 
@@ -156,3 +158,38 @@ def test_files_far_apart_or_of_two_systems():
     other = replace(LATTICE, crs="EPSG:32634")
     with pytest.raises(InputError, match="two systems mixed up"):
         common_lattice([made(), made(other)], None, "nearest")
+
+
+def test_pixels_a_hair_before_a_multiple_are_in_step_with_it():
+    # 384999.999 / 5 is 0.9998 pixels on, which is 0 to three digits.
+    hair = replace(LATTICE, west_m=384999.999)
+    lattice, notes = common_lattice([made(hair), made(replace(hair, rows=7))], None, "nearest")
+    assert lattice == replace(hair, rows=7)
+    assert len(notes) == 1
+
+
+def set_of(*lattices):
+    """Return a set with one file, of one cell, on each lattice."""
+    files = tuple(
+        made(lattice, path=Path(f"{n}.tif"), cell_ids=(f"C{n}",), parts=(Path(f"{n}.tif"),))
+        for n, lattice in enumerate(lattices)
+    )
+    ids = tuple(cell_id for file in files for cell_id in file.cell_ids)
+    return RxLevRasters(Path("rasters"), ids, LATTICE, "level", files, ())
+
+
+def test_files_that_reach_a_window_by_a_pixel():
+    # Pixels of columns 0 to 3, and of 5 to 7: each file may be needed one pixel beside its own.
+    left, right = replace(LATTICE, cols=4), replace(LATTICE, west_m=385025.0, cols=3)
+    rasters = set_of(left, right)
+    assert rasters.reaching((0, 0, 6, 8)) is rasters
+    for col, cols, ids in [
+        (0, 4, ("C0",)), (0, 5, ("C0", "C1")), (4, 1, ("C0", "C1")), (5, 1, ("C1",)),
+        (3, 1, ("C0",)), (5, 3, ("C1",)),
+    ]:  # fmt: skip
+        assert rasters.reaching((0, col, 6, cols)).cell_ids == ids, (col, cols)
+    upper = set_of(replace(LATTICE, rows=2))
+    for row, ids in [(0, ("C0",)), (2, ("C0",)), (3, ())]:
+        found = upper.reaching((row, 0, 1, 8))
+        assert found.cell_ids == ids
+        assert found.parts == ((Path("0.tif"),) if ids and found is not upper else ())
