@@ -62,20 +62,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def report(
     rooms: Sequence[str], tasks: Sequence[Task], verdicts: dict[tuple[str, str], record.Verdict]
 ) -> int:
-    """Print the survivors and the table."""
+    """Print what survived, what nobody can notice, and the table; return the exit status."""
     statuses: dict[str, list[str]] = {room: [] for room in rooms}
     survivors = 0
     for task in tasks:
         verdict = verdicts.get((task.room, task.mutant.stable))
+        mutant = task.mutant
         if task.equivalent:
             statuses[task.room].append(record.EQUIVALENT)
+            print(f"equivalent  {mutant.file}:{mutant.line}  {mutant.change}")  # noqa: T201
+            print(f"            {task.equivalent}")  # noqa: T201
         elif verdict is not None:
             statuses[task.room].append(verdict.status)
             if verdict.status == record.SURVIVED:
                 survivors += 1
-                mutant = task.mutant
-                print(f"survived  {mutant.file}:{mutant.line}  {mutant.change}")  # noqa: T201
-                print(f"          {mutant.source}")  # noqa: T201
+                print(f"survived    {mutant.file}:{mutant.line}  {mutant.change}")  # noqa: T201
+                print(f"            {mutant.source}")  # noqa: T201
     print(record.HEAD)  # noqa: T201
     for room in rooms:
         print(record.Score.of(room, statuses[room]).row())  # noqa: T201
