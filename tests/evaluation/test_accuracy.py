@@ -81,6 +81,24 @@ def test_a_track_scored_by_hand():
     assert (score.error_67_m, score.error_95_m, score.scored_epochs) == (3.0, 5.0, 4)
 
 
+def test_positions_before_the_switch_do_not_count():
+    # A filter that holds a belief has a position from its first epoch: 400, 300 and 200 m off.
+    found = estimate(
+        [
+            (0, -400, 0, S),
+            (1, 310, 0, S),
+            (2, 20, 200, S),
+            (3, 30, 8, C),
+            (4, 40, 4, T),
+            (5, 50, 0, T),
+        ]
+    )
+    score = accuracy(found, TRUTH)
+    assert (score.switch_time_s, score.error_at_switch_m, score.success) == (3, 8, True)
+    assert (score.error_mean_m, score.error_67_m, score.error_95_m) == (4, 8, 8)
+    assert score.scored_epochs == 3
+
+
 @pytest.mark.parametrize(("off", "success"), [(49.99, True), (50.0, True), (50.01, False)])
 def test_fifty_metres_at_the_switch_are_the_limit(off, success):
     score = accuracy(estimate([(0, nan, nan, S), (10, 100, off, C), (20, 100, 100, T)]), TRUTH)
