@@ -70,7 +70,9 @@ def test_dead_reckoning_is_noisy_in_every_case_by_its_size(town, name):
     walked = make(town, SHORT, SEED, 0)
     _, log = made(town, name, walked=walked)
     step_m, heading = chords(walked)
-    carried = np.arange(step_m.size) == np.searchsorted(walked.truth["time_s"], walked.displaced_at_s)
+    carried = np.arange(step_m.size) == np.searchsorted(
+        walked.truth["time_s"], walked.displaced_at_s
+    )
     count = step_m.size
     scale = log.motion["step_m"][~carried].sum() / step_m[~carried].sum()
     error_m = (log.motion["step_m"] - scale * step_m)[~carried]
@@ -205,5 +207,7 @@ def test_the_units_period_is_the_worlds(town, period_s):
     np.testing.assert_allclose(time_s, period_s * np.arange(1, round(200 / period_s) + 1))
     start = walked.truth[["east_m", "north_m"]].iloc[0]
     east, north = dead_reckon(*start, log.motion["step_m"], log.motion["heading_rad"])
-    np.testing.assert_allclose(east, np.interp(time_s, walked.truth["time_s"], walked.truth["east_m"]))
+    np.testing.assert_allclose(
+        east, np.interp(time_s, walked.truth["time_s"], walked.truth["east_m"])
+    )
     assert abs(north[-1] - walked.truth["north_m"].iloc[-1]) < 1e-6

@@ -28,9 +28,7 @@ PLAN = CellPlan(
 ONE = CellPlan(CRS, PLAN.cells[:1])
 MODEL = PredictionModel(model="cost231_hata")
 CLUTTERED = replace(MODEL, shadowing_db=6.0)
-NONE = RealityErrors(
-    level_error_db=0.0, eirp_error_db=0.0, azimuth_error_deg=0.0, slope_error=0.0
-)
+NONE = RealityErrors(level_error_db=0.0, eirp_error_db=0.0, azimuth_error_deg=0.0, slope_error=0.0)
 SEEDS = range(30)
 
 
