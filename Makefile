@@ -1,9 +1,11 @@
 # Two commands, each from a fresh clone: make demo, make test. Both set up .venv themselves.
+# make mutants plants small bugs and sees whether tests notice: MUTANTS="--room models --seed 2".
 PYTHON ?= python3
+MUTANTS ?= --sample 40 --seed 1
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test check docs clean
+.PHONY: demo test check docs mutants clean
 
 demo: $(VENV)/.demo
 	$(BIN)/mapfilter demo --out out/demo
@@ -29,6 +31,9 @@ $(VENV)/.test: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[test,docs]'
 	touch $@
+
+mutants: $(VENV)/.test
+	$(BIN)/python -m tests.mutation $(MUTANTS)
 
 clean:
 	rm -rf $(VENV) out build docs/_build *.egg-info

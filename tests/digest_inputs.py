@@ -64,8 +64,6 @@ map = "synthetic"
 size_m = [900, 900]
 southwest = [3.0, 0.0]
 seed = 5
-[output]
-pictures = "none"
 """
 
 

@@ -163,7 +163,7 @@ def paper_digests(folder: Path, paper: str) -> dict[str, Any]:
 
 
 def all_digests(folder: Path, world: Sequence[str] = ()) -> dict[str, Any]:
-    """Return the digests of all cases; how long each takes goes to stderr."""
+    """Return the digests of all cases, or how one failed; how long each takes goes to stderr."""
     sys.path.insert(0, str(folder))
     page = (ROOT / "docs" / "howto" / "own-filter.rst").read_text(encoding="utf-8")
     text = re.search(r"code-block:: python\n\n((?:   .*\n|\n)+)", page)
@@ -186,7 +186,12 @@ def all_digests(folder: Path, world: Sequence[str] = ()) -> dict[str, Any]:
     tasks["evaluate"] = lambda: benchmark_digests(folder, world)
     for name, task in tasks.items():
         began_s = time.perf_counter()
-        found[name] = task()
+        try:
+            found[name] = task()
+        except Exception as error:
+            # One case that a commit refuses says nothing of the others.
+            found[name] = {"failed": f"{type(error).__name__}: {error}"}
+            sys.stderr.write(f"{name}: {error}\n")
         sys.stderr.write(f"{name}: {time.perf_counter() - began_s:.1f} s\n")
     return found
 

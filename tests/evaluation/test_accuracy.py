@@ -82,10 +82,20 @@ def test_a_track_scored_by_hand():
 
 
 def test_positions_before_the_switch_do_not_count():
-    """A filter may state where it is most probable while it still searches."""
-    found = estimate([(0, 900, 0, S), (4, 900, 0, S), (5, 50, 4, C), (6, 60, 2, T), (7, 70, 6, L)])
+    # A filter that holds a belief has a position from its first epoch: 400, 300 and 200 m off.
+    found = estimate(
+        [
+            (0, -400, 0, S),
+            (1, 310, 0, S),
+            (2, 20, 200, S),
+            (3, 30, 8, C),
+            (4, 40, 4, T),
+            (5, 50, 0, T),
+        ]
+    )
     score = accuracy(found, TRUTH)
-    assert (score.error_mean_m, score.error_67_m, score.error_95_m) == (4.0, 6.0, 6.0)
+    assert (score.switch_time_s, score.error_at_switch_m, score.success) == (3, 8, True)
+    assert (score.error_mean_m, score.error_67_m, score.error_95_m) == (4, 8, 8)
     assert score.scored_epochs == 3
 
 

@@ -173,3 +173,21 @@ def test_sixteenths_of_a_decibel(tmp_path: Path) -> None:
     write_bil(tmp_path / "a.bil", LATTICE, LOSS)
     with pytest.raises(InputError, match="a factor that is not the file's"):
         _open(tmp_path, factor=1 / 16).read()
+
+
+def test_an_index_may_name_geotiffs_and_raw_pixels_of_any_suffix(tmp_path: Path) -> None:
+    profile = {
+        "driver": "GTiff", "width": 8, "height": 6, "count": 1, "dtype": "int16", "crs": CRS,
+        "transform": rasterio.Affine.from_gdal(*LATTICE.gdal_transform),
+    }  # fmt: skip
+    with rasterio.open(tmp_path / "a.tif", "w", **profile) as target:
+        target.write(LOSS, 1)
+    write_bil(tmp_path / "b.bil", LATTICE, LOSS + 1).rename(tmp_path / "b.los")
+    rows = index_row("A", Path("a.tif"), LATTICE) + index_row("B", Path("b.los"), LATTICE)
+    (tmp_path / "index.txt").write_text(INDEX_HEADER + rows)
+    rasters = _open(tmp_path)
+    assert rasters.cell_ids == ("A", "B")
+    np.testing.assert_array_equal(rasters.read(), np.stack([LOSS, LOSS + 1]))
+    # Outside an index the same file is none.
+    with pytest.raises(InputError, match="a raster that GDAL can read"):
+        open_rasters(tmp_path / "b.los", "loss", crs=CRS)

@@ -1,0 +1,242 @@
+"""The command that plants small bugs: which bugs, which sample, and what it makes of the tests."""
+
+import ast
+from pathlib import Path
+
+import pytest
+from mutation import judge, record
+from mutation.operators import applied, mutants
+from mutation.rooms import ROOMS, Imports, Room
+from mutation.workshop import Workshop
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def changes(text):
+    """Return (operator, line as mutated) of all mutants of a text."""
+    found = []
+    for mutant in mutants(text, "file.py"):
+        lines = applied(text, mutant).splitlines()
+        found.append((mutant.operator, lines[mutant.line - 1].strip()))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("x = a < b", [("boundary", "x = a <= b"), ("comparison", "x = a >= b")]),
+        ("x = a == b", [("comparison", "x = a != b")]),
+        ("x = a is not b", [("comparison", "x = a is b")]),
+        ("x = a not in b", [("comparison", "x = a in b")]),
+        ("x = (a) + (b)", [("arithmetic", "x = (a) - (b)")]),
+        ("x = a // b", [("arithmetic", "x = a * b")]),
+        ("x = a ** b", [("arithmetic", "x = a * b")]),
+        ("x = -a", [("unary", "x = (a)")]),
+        ("x = not a", [("unary", "x = (a)")]),
+        ("x = a and b", [("boolean", "x = a or b")]),
+        ("x = 0", [("constant", "x = 1")]),
+        ("x = 1.5", [("constant", "x = 3.0")]),
+        ("x = 0.0", [("constant", "x = 1.0")]),
+        ("x = True", [("constant", "x = False")]),
+        ("x += y", [("deletion", "pass"), ("arithmetic", "x -= y")]),
+        ("x[i] = y", [("deletion", "pass")]),
+        ("f(x)", [("deletion", "pass")]),
+        ("x = np.min(y)", [("swap", "x = np.max(y)")]),
+        ("x = max(y)", [("swap", "x = min(y)")]),
+        ("x = np.sum(y, axis=0)", [("constant", "x = np.sum(y, axis=1)")]),
+        ("x = np.searchsorted(a, b)", [("swap", 'x = np.searchsorted(a, b, side="right")')]),
+        ('x = np.searchsorted(a, b, "left")', [("swap", 'x = np.searchsorted(a, b, "right")')]),
+        ("x = f(east_m, north_m)", [("arguments", "x = f(north_m, east_m)")]),
+        ("x = a if b else c", [("negation", "x = a if (not (b)) else c")]),
+        ("def f() -> bool:\n    return a", [("negation", "return (not (a))")]),
+        ("def f():\n    raise g", [("deletion", "pass")]),
+        ("x = 'ä' + b; y = c * d", [("arithmetic", "x = 'ä' + b; y = c / d")]),
+    ],
+)
+def test_small_bugs(text, expected):
+    assert changes(text) == expected
+
+
+def test_a_condition_of_one_comparison_is_negated_once():
+    found = [line for _, line in changes("if a < b:\n    pass")]
+    assert found == ["if (not (a < b)):", "if a <= b:"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '"""Words 1."""',
+        "x: tuple[int, 3]",
+        "def f(x: 'a < b' = None) -> 1: ...",
+        "@njit(cache=True)\ndef f(): pass",
+        "if TYPE_CHECKING:\n    x = 1",
+        "__all__ = ['a' + 'b']",
+        "x = f'{a + 1:.{2}f}'",
+        "x = 'a' + b",
+        "Both = A | B",
+        "import a",
+        "assert a < 1",
+        "for a in zip(b, c, strict=True): pass",
+    ],
+)
+def test_what_is_left_alone(text):
+    assert changes(text) == []
+
+
+def test_the_words_of_a_message_are_left_alone_but_not_the_message():
+    text = "faults.add('x', 1 + 2)\nraise fail(InputError, 'x', n + 1)"
+    assert changes(text) == [("deletion", "pass"), ("deletion", "pass")]
+
+
+def test_names_do_not_depend_on_what_stands_above():
+    text = "x = a + 1\ny = a + 1\nx = a + 1\n"
+    below = f"import b\n{text}"
+    assert [m.stable for m in mutants(text, "f")] == [m.stable for m in mutants(below, "f")]
+    assert len({m.stable for m in mutants(text, "f")}) == len(mutants(text, "f")) == 6
+    first = mutants(text, "mapfilter/f.py")[0]
+    assert first.id == f"mapfilter/f.py:1:6:arithmetic:{first.stable}"
+    assert first.change == "+ → -"
+
+
+def test_every_room_has_files_and_tests_and_every_mutant_is_python():
+    for room in ROOMS.values():
+        assert room.sources(ROOT)
+        assert room.test_files(ROOT)
+    for file in ROOMS["evaluation"].sources(ROOT)[:4]:
+        text = (ROOT / file).read_text()
+        for mutant in mutants(text, file.as_posix()):
+            assert ast.dump(ast.parse(applied(text, mutant))) != ast.dump(ast.parse(text))
+
+
+def test_imports_through_others():
+    imports = Imports(ROOT)
+    models = Path("mapfilter/models")
+    assert models / "clock.py" in imports.direct(models / "motion.py")
+    assert models / "motion.py" in imports.importers(models / "clock.py")
+    assert Path("mapfilter/positioning/bayes.py") in imports.importers(models / "clock.py")
+    assert models / "motion.py" not in imports.importers(models / "state.py")
+
+
+# A file, and tests that notice a bug in its first function and none in its second.
+TOY = {
+    "toy/__init__.py": "",
+    "toy/sums.py": (
+        "def add(a, b):\n    return a + b\n\n\n"
+        "def spin(n):\n    while n > 0:\n        n -= 1\n\n\n"
+        "def unseen(a, b):\n    return a - b\n"
+    ),
+    "tests/test_sums.py": (
+        "from toy.sums import add, spin\n\n\n"
+        "def test_add():\n    assert add(2, 3) == 5\n\n\ndef test_spin():\n    spin(3)\n"
+    ),
+    "pyproject.toml": "[tool.pytest.ini_options]\n",
+}
+ROOM = {"toy": Room(("toy/*.py",), ("tests/test_*.py",))}
+
+
+@pytest.fixture
+def toy(tmp_path, monkeypatch):
+    for name, text in TOY.items():
+        (tmp_path / "toy" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "toy" / name).write_text(text)
+    monkeypatch.setattr(judge, "_PATIENCE_S", 1.0)
+    return tmp_path / "toy"
+
+
+def judged(toy, **more):
+    tasks = judge.plan(toy, "toy", None, 1, rooms=ROOM)
+    path = toy / "out" / "verdicts.jsonl"
+    holding = judge.known(toy, tasks, record.read(path), rooms=ROOM)
+    made = list(judge.judged(toy, toy / "out", tasks, holding, rooms=ROOM, package="toy", **more))
+    for verdict in made:
+        record.append(path, verdict)
+    return {v.change + v.id.split(":")[1]: v.status for v in made}
+
+
+def test_killed_survived_timed_out_and_not_judged_twice(toy):
+    before = {name: (toy / name).read_text() for name in TOY}
+    verdicts = judged(toy)
+    assert verdicts["+ → -2"] == record.KILLED
+    assert verdicts["- → +11"] == record.SURVIVED
+    assert verdicts["n -= 1 → pass7"] == record.TIMEOUT
+    assert {name: (toy / name).read_text() for name in TOY} == before
+    assert judged(toy) == {}
+    # A further test: only those that no test noticed are judged again.
+    (toy / "tests" / "test_more.py").write_text(
+        "from toy.sums import unseen\n\n\ndef test_unseen():\n    assert unseen(3, 2) == 1\n"
+    )
+    again = judged(toy, jobs=2)
+    assert again["- → +11"] == record.KILLED
+    assert "+ → -2" not in again
+
+
+def test_tests_that_fail_anyway_are_an_error(toy):
+    (toy / "tests" / "test_more.py").write_text("def test_no():\n    assert False\n")
+    with pytest.raises(RuntimeError, match="without any mutant"):
+        judged(toy)
+
+
+def test_two_runs_never_share_a_copy(toy):
+    with (
+        Workshop(toy, toy / "out", "toy"),
+        pytest.raises(RuntimeError, match="another run"),
+        Workshop(toy, toy / "out", "toy"),
+    ):
+        pass
+
+
+def test_samples_are_the_same_for_a_seed_and_grow(toy):
+    def sample(count, seed):
+        return [task.mutant.id for task in judge.plan(toy, "toy", count, seed, rooms=ROOM)]
+
+    assert sample(3, 1) == sample(3, 1) == sample(6, 1)[:3]
+    assert sorted(sample(None, 1)) == sorted(sample(None, 2))
+    assert sample(None, 1) != sample(None, 2)
+    before = sample(None, 1)
+    (toy / "toy" / "sums.py").write_text("import os\n" + TOY["toy/sums.py"])
+    assert [name.split(":")[-1] for name in sample(None, 1)] == [
+        name.split(":")[-1] for name in before
+    ]
+
+
+def test_equivalents_are_matched_by_line_and_change(toy):
+    entry = record.Reviewed("toy/sums.py", "return a - b", "- → +", "an example")
+    tasks = judge.plan(toy, "toy", None, 1, [entry], rooms=ROOM)
+    assert [task.mutant.line for task in tasks if task.equivalent] == [11]
+    gone = record.Reviewed("toy/sums.py", "return a * b", "* → /", "an example")
+    assert record.unmatched([task.mutant for task in tasks], [entry, gone]) == [gone]
+
+
+def test_the_list_of_equivalents_is_up_to_date():
+    entries = record.reviewed(ROOT / "tests" / "mutation" / "equivalent.toml")
+    files = {entry.file for entry in entries}
+    there = [m for file in files for m in mutants((ROOT / file).read_text(), file)]
+    assert record.unmatched(there, entries) == []
+
+
+def test_an_equivalent_without_a_reason_is_an_error(tmp_path):
+    file = tmp_path / "equivalent.toml"
+    file.write_text('[[mutant]]\nfile = "f"\nline = "x"\nchange = "y"\nreason = " "\n')
+    with pytest.raises(ValueError, match="a reason"):
+        record.reviewed(file)
+
+
+def test_verdicts_cut_short_are_left_out_and_the_last_one_counts(tmp_path):
+    path = tmp_path / "verdicts.jsonl"
+    first = record.Verdict("f:1", "s", "r", "c", record.SURVIVED, "", 1.0, "a", "b", "c")
+    last = record.Verdict("f:1", "s", "r", "c", record.KILLED, "t", 1.0, "a", "b", "c")
+    record.append(path, first)
+    record.append(path, last)
+    path.write_text(path.read_text() + '{"id": "f:2", "sta')
+    assert record.read(path) == [last]
+
+
+def test_the_score_counts_what_can_be_noticed():
+    statuses = [record.KILLED] * 7 + [record.TIMEOUT] + [record.SURVIVED] * 2
+    score = record.Score.of("room", [*statuses, record.EQUIVALENT])
+    assert (score.sampled, score.judged) == (11, 10)
+    low, high = record.wilson(8, 10)
+    assert (round(low, 3), round(high, 3)) == (0.49, 0.943)
+    assert "80 %" in score.row()
+    assert record.wilson(0, 0) == (0.0, 1.0)
+    assert "–" in record.Score.of("room", []).row()

@@ -1,0 +1,109 @@
+"""Which tests have to notice a bug in which files: those of its own room, without real data."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Room:
+    """Files and the tests that watch over them, as patterns relative to the repository."""
+
+    files: tuple[str, ...]
+    tests: tuple[str, ...]
+
+    def sources(self, root: Path) -> list[Path]:
+        """Return the files, relative to the repository."""
+        return _matching(root, self.files)
+
+    def test_files(self, root: Path) -> list[Path]:
+        """Return the files of tests, relative to the repository."""
+        return _matching(root, self.tests)
+
+
+ROOMS = {
+    "filters": Room(("mapfilter/filters/*.py",), ("tests/filters/test_*.py",)),
+    # Kernels of the models take the state of the filter that drives them; the tests beside the
+    # models call them without one.
+    "models": Room(("mapfilter/models/*.py",), ("tests/models/test_*.py",)),
+    "positioning": Room(("mapfilter/positioning/*.py",), ("tests/positioning/test_*.py",)),
+    "database": Room(("mapfilter/database/*.py",), ("tests/database/test_*.py",)),
+    "rasters": Room(
+        (
+            "mapfilter/radio/_raster*.py", "mapfilter/radio/_grid_header.py",
+            "mapfilter/radio/_resampling.py", "mapfilter/radio/atoll.py", "mapfilter/radio/bil.py",
+            "mapfilter/radio/esri_ascii.py", "mapfilter/radio/geotiff.py",
+            "mapfilter/radio/raster*.py",
+        ),
+        (
+            "tests/radio/test_radio_raster*.py", "tests/radio/test_radio_grids.py",
+            "tests/radio/test_radio_atoll.py",
+        ),
+    ),
+    "evaluation": Room(("mapfilter/evaluation/*.py",), ("tests/evaluation/test_*.py",)),
+    "benchmarks": Room(
+        ("mapfilter/experiments/benchmarks/*.py",),
+        (
+            "tests/experiments/test_ottawa*.py", "tests/experiments/test_satellite_cases.py",
+            "tests/experiments/test_benchmark*.py",
+        ),
+    ),
+}  # fmt: skip
+
+
+def _matching(root: Path, patterns: Iterable[str]) -> list[Path]:
+    found = {path for pattern in patterns for path in root.glob(pattern)}
+    return sorted(path.relative_to(root) for path in found if path.name != "__init__.py")
+
+
+def checksum(root: Path, files: Iterable[Path]) -> str:
+    """Return a checksum of names and contents of files."""
+    whole = hashlib.sha256()
+    for file in sorted(files):
+        whole.update(f"{file.as_posix()}\0".encode() + (root / file).read_bytes())
+    return whole.hexdigest()[:16]
+
+
+class Imports:
+    """Which files of a package and of its tests import which."""
+
+    def __init__(self, root: Path, package: str = "mapfilter") -> None:
+        self._root, self._package = root, package
+
+    def direct(self, file: Path) -> frozenset[Path]:
+        """Return the package's files that a file imports itself."""
+        found = set()
+        for node in ast.walk(ast.parse((self._root / file).read_bytes())):
+            if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+            elif isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            else:
+                continue
+            found |= {self._files[name] for name in names if name in self._files}
+        return frozenset(found)
+
+    def importers(self, file: Path) -> frozenset[Path]:
+        """Return the package's files that import a file, be it through others."""
+        reached, front = set(), {file}
+        while front:
+            front = {a for a, b in self._graph.items() if b & front} - reached
+            reached |= front
+        return frozenset(reached - {file})
+
+    @cached_property
+    def _files(self) -> dict[str, Path]:
+        files = {}
+        for path in sorted((self._root / self._package).rglob("*.py")):
+            relative = path.relative_to(self._root)
+            files[".".join(relative.with_suffix("").parts)] = relative
+        return files
+
+    @cached_property
+    def _graph(self) -> dict[Path, frozenset[Path]]:
+        return {file: self.direct(file) for file in self._files.values()}
