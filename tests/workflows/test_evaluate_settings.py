@@ -255,8 +255,8 @@ def test_settings_of_the_map(key, world_of):
 def test_roofs_where_no_building_is_near(world_of, tmp_path):
     """A wall across the area: beyond 100 m of it, roofs have the default height."""
     ring = [[3.0, 0.0022], [3.0054, 0.0022], [3.0054, 0.0024], [3.0, 0.0024], [3.0, 0.0022]]
-    shape = {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon"}}
-    shape["geometry"]["coordinates"] = [ring]
+    polygon = {"type": "Polygon", "coordinates": [ring]}
+    shape = {"type": "Feature", "properties": {}, "geometry": polygon}
     file = tmp_path / "buildings.geojson"
     file.write_text(json.dumps({"type": "FeatureCollection", "features": [shape]}))
     given = {**SMALL, "area.size_m": [600.0, 600.0], "buildings.layer": str(file)}
