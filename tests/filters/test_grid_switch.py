@@ -146,6 +146,9 @@ def test_one_heading_does_not_turn():
     # The first bin of three: 0.36 / 2 go to either side, and one side is lost.
     np.testing.assert_allclose(shares, np.array([0.64, 0.18, 0.0]) / 0.82, rtol=1e-4)
     assert belief.log_evidence == pytest.approx(LOG_GAIN + log(0.82), abs=1e-5)
+    belief, _ = followed(GridFilter(Places(headings=2, turned_bins=0.6)), ONE, 1)
+    shares = (belief.on + belief.off).sum(axis=(1, 2))
+    np.testing.assert_allclose(shares, np.array([0.64, 0.18]) / 0.82, rtol=1e-4)
 
 
 def test_what_is_stored_of_a_grid_is_what_it_was_made_of():

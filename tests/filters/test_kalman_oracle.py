@@ -255,6 +255,22 @@ def test_a_mixture_is_that_of_the_formula():
             assert found.counts[t, k] == left
 
 
+def test_components_that_lost_all_weight_are_not_missed():
+    """Of twelve components far apart most are dropped by the first readings."""
+    rng = np.random.default_rng(12)
+    means = np.zeros((12, 5))
+    means[:, 0], means[:, 2] = rng.uniform(-200, 200, (2, 12))
+    first = Mixture(rng.dirichlet(np.ones(12)), means, 0.3 * WIDE)
+    starts, _, readings = trials(FULL, 1, 4, seed=9)
+    found = run_mixtures(compiled(FULL), PHI, PROCESS, EKF, first, starts, readings)
+    for k, step in enumerate(mixture_by_formula(first, starts[0], readings[0], 1e-8)):
+        mean, covariance, evidence, left = step
+        np.testing.assert_allclose(found.means[0, k], mean, atol=1e-4)
+        np.testing.assert_allclose(found.covariances[0, k], covariance, atol=1e-4)
+        assert found.evidence[0, k] == pytest.approx(evidence, abs=1e-4)
+        assert 1 <= found.counts[0, k] == left < 9
+
+
 def test_sizes_that_do_not_fit_are_told():
     first = Mixture(np.ones(1), np.zeros((1, 5)), WIDE)
     for readings, said in ((np.zeros((2, 3)), "readings"), (np.zeros((1, 1, 6)), "steps, 7"),
