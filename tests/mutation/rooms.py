@@ -50,7 +50,7 @@ ROOMS = {
         ("mapfilter/experiments/benchmarks/*.py",),
         (
             "tests/experiments/test_ottawa*.py", "tests/experiments/test_satellite_cases.py",
-            "tests/experiments/test_benchmark*.py",
+            "tests/experiments/test_benchmark*.py", "tests/experiments/test_missing_ways.py",
         ),
     ),
 }  # fmt: skip

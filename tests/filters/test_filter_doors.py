@@ -1,0 +1,244 @@
+"""What filters assume unless told otherwise, and where they stop taking input."""
+
+from dataclasses import asdict
+from math import inf, isnan, nan, sqrt
+
+import numpy as np
+import pytest
+
+from mapfilter.errors import ConfigError, InputError
+from mapfilter.filters import kalman
+from mapfilter.filters.candidate_options import CandidateOptions
+from mapfilter.filters.contract import MotionStep, Status
+from mapfilter.filters.gaussian import (
+    CKF,
+    CUBATURE,
+    EKF,
+    IEKF,
+    METHODS,
+    RBUKF,
+    UKF,
+    Method,
+    SigmaPoints,
+    factor_of,
+)
+from mapfilter.filters.gaussian_sum import split
+from mapfilter.filters.particle_options import ParticleOptions
+from mapfilter.filters.rao_blackwell import init
+from mapfilter.filters.sir_options import REGULARISED, SIR, SirOptions
+from mapfilter.filters.smoothing import smooth
+from mapfilter.filters.switch import switched
+from mapfilter.filters.trials import factors_of, is_diagonal, method_numbers
+
+
+def test_the_usual_options():
+    assert asdict(ParticleOptions()) == {
+        "most": 20_000, "searching": 12_000, "least": 1000, "per_bin": 60.0,
+        "resample_below": 0.5, "flatten": 0.5, "jitter": (0.2, 0.2, 0.005, 0.003, 0.0),
+        "searching_jitter": (1.5, 1.5, 0.015, 0.009, 0.0), "switch_mass": 0.99,
+        "switch_hold_m": 14.0,
+    }  # fmt: skip
+    assert asdict(CandidateOptions()) == {
+        "resolution_m": 5.0, "update_length_m": 22.0, "tracking_length_m": None,
+        "prediction": "displacement", "duplicates": "set", "threshold": 1,
+        "at_threshold": "switch", "switch_check": "same_call", "when_empty": "fail",
+    }  # fmt: skip
+    assert SirOptions() == SIR == SirOptions(1.0, 0.0)
+    assert SirOptions(0.5, 0.5) == REGULARISED
+    assert SigmaPoints() == SigmaPoints(1e-3, 2.0, 0.0)
+    assert SigmaPoints(1.0, 0.0, 0.0) == CUBATURE
+    assert Method("ekf", None, 1) == EKF
+    assert Method("iekf", None, 30) == IEKF
+    assert Method("rbukf", SigmaPoints(1e-3, 2.0, 0.0)) == RBUKF
+    assert Method("ukf", SigmaPoints(1.0, 2.0, 0.0)) == UKF
+    assert Method("ckf", CUBATURE) == CKF
+    assert list(METHODS) == ["ekf", "iekf", "rbukf", "ukf", "ckf"]
+    assert isnan(MotionStep(1.0, 2.0).turn_rad)
+
+
+def test_where_sigma_points_lie():
+    points = SigmaPoints(0.5, 1.0, 1.0)
+    assert points.spread(3) == 1.0
+    assert points.bend_weight == 0.75
+    mean, covariance = points.weights(3)
+    # n + λ = 1, λ = -2.
+    assert mean.tolist() == [-2.0, *[0.5] * 6]
+    assert covariance.tolist() == [-2.0 + 1 - 0.25 + 1, *[0.5] * 6]
+    assert SigmaPoints(2.0, 0.0, -1.0).spread(2) == 2.0
+    assert method_numbers(Method("far", SigmaPoints(2.0, 5.0, 2.0)), 2) == (1, 4.0, 1.0)
+    assert method_numbers(IEKF, 4) == (30, 1.0, 0.0)
+
+
+def test_factors_of_covariances():
+    np.testing.assert_allclose(factor_of([[4.0, 2.0], [2.0, 10.0]], 2), [[2.0, 0.0], [1.0, 3.0]])
+    wide = factor_of([[1e16, 0.0], [0.0, 1e-16]], 2)
+    np.testing.assert_allclose(wide, [[1e8, 0], [0, 1e-8]], atol=0)
+    np.testing.assert_array_equal(factor_of(np.zeros((2, 2)), 2), np.zeros((2, 2)))
+    singular = np.array([[4.0, -2.0, 0.0], [-2.0, 1.0, 0.0], [0.0, 0.0, 0.0]])
+    root = factor_of(singular, 3)
+    np.testing.assert_allclose(root @ root.T, singular, atol=1e-9)
+    np.testing.assert_allclose(root, [[2.0, 0, 0], [-1.0, 0, 0], [0, 0, 0]], atol=1e-9)
+    both = np.outer([1.0, 2.0, 3.0], [1.0, 2.0, 3.0]) + np.outer([1.0, 0, -1], [1.0, 0, -1])
+    root = factor_of(both, 3)
+    np.testing.assert_allclose(root @ root.T, both, atol=1e-9)
+    assert np.all(np.triu(root, 1) == 0.0)
+    assert np.all(np.diagonal(root) >= 0.0)
+    # Rounding may leave a negative eigenvalue of a billionth for each component.
+    assert factor_of([[1.0, 1.0 + 1.9e-9], [1.0 + 1.9e-9, 1.0]], 2).shape == (2, 2)
+    assert factor_of([[1.0, 0.5], [0.5 * (1 + 0.9e-9), 1.0]], 2).shape == (2, 2)
+    for given in (np.eye(2), [np.eye(2)] * 3):
+        np.testing.assert_array_equal(factors_of(given, 2, 3), [np.eye(2)] * 3)
+    two = factors_of([4.0 * np.eye(2), 9.0 * np.eye(2)], 2, 2)
+    np.testing.assert_array_equal(two, [2.0 * np.eye(2), 3.0 * np.eye(2)])
+    assert is_diagonal(np.diag([1.0, 2.0]))
+    assert not is_diagonal(np.array([[1.0, 0.0], [1e-9, 1.0]]))
+    belief = kalman.as_belief([1, 2], [[1, 0], [0, 0]])
+    assert (belief.mean.tolist(), belief.covariance.tolist()) == ([1.0, 2.0], [[1.0, 0], [0, 0]])
+
+
+def test_a_split_keeps_mean_and_variance():
+    wide = np.diag([4.0, 1.0, 9.0])
+    whole = split([1.0, 2.0, 3.0], wide, {0: 1})
+    assert (whole.weights.tolist(), whole.means.tolist()) == ([1.0], [[1.0, 2.0, 3.0]])
+    np.testing.assert_array_equal(whole.covariance, wide)
+    cut = split([1.0, 2.0, 3.0], wide, {2: 5, 0: 11})
+    assert cut.means.shape == (55, 3)
+    assert cut.weights.sum() == pytest.approx(1.0)
+    np.testing.assert_allclose(cut.weights @ cut.means, [1.0, 2.0, 3.0])
+    # Means within ± 2.5 deviations.
+    np.testing.assert_allclose(cut.means.min(axis=0), [-4.0, 2.0, -4.5])
+    np.testing.assert_allclose(cut.means.max(axis=0), [6.0, 2.0, 10.5])
+    own = (cut.means - [1.0, 2.0, 3.0]).T @ np.diag(cut.weights) @ (cut.means - [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(own + cut.covariance, wide, atol=1e-9)
+    # The deviation of each is the spacing: half of one, and at most nine tenths.
+    np.testing.assert_allclose(np.diag(cut.covariance), [4.0 * 0.25, 1.0, 9.0 * 0.81], rtol=1e-6)
+    # Weights are those of a normal shape: their logarithms are a parabola.
+    line = split([0.0], [[1.0]], {0: 11})
+    bend = np.diff(np.log(line.weights), 2)
+    np.testing.assert_allclose(bend, bend[0], rtol=1e-6)
+    assert bend[0] < 0
+    assert split([0.0], [[1.0]], {0: 3}, 1.0).means.tolist() == [[-1.0], [0.0], [1.0]]
+
+
+def test_what_switches():
+    def told(status, travelled_m, agreed_at_m, agrees=True):
+        return switched(status, travelled_m, agreed_at_m, agrees=agrees, hold_m=14.0)
+
+    assert told(Status.SEARCHING, 100.0, 86.0) == (Status.CONVERGED, 86.0)
+    assert told(Status.SEARCHING, 100.0, 86.1) == (Status.SEARCHING, 86.1)
+    assert told(Status.SEARCHING, 100.0, nan) == (Status.SEARCHING, 100.0)
+    status, since_m = told(Status.SEARCHING, 100.0, 20.0, agrees=False)
+    assert (status, isnan(since_m)) == (Status.SEARCHING, True)
+    assert told(Status.CONVERGED, 100.0, 86.0, agrees=False) == (Status.TRACKING, 86.0)
+    for status in (Status.TRACKING, Status.LOST):
+        assert told(status, 100.0, 5.0, agrees=False) == (status, 5.0)
+
+
+def test_what_lies_on_the_border_is_taken():
+    one = ParticleOptions(most=1, least=1, searching=1, flatten=1.0, switch_hold_m=0.0)
+    assert one.most == 1
+    still = ParticleOptions(jitter=(0.0,), searching_jitter=(), per_bin=1e-9)
+    assert still.jitter == (0.0,)
+    near = ParticleOptions(resample_below=1e-9, switch_mass=1 - 1e-9, flatten=1e-9)
+    assert near.flatten == 1e-9
+    assert SirOptions(0.0, 2.0) != SirOptions(1.0, 0.0)
+    assert SirOptions(0.0, 0.0).resample_below == 0.0
+    assert SigmaPoints(1e-9, -1.0, -1.0).spread(2) == 1e-9
+    options = CandidateOptions(resolution_m=0.1, update_length_m=0.0, tracking_length_m=0.0)
+    assert options.tracking_length_m == 0.0
+    assert Method("one", iterations=1).iterations == 1
+    assert init(np.zeros(2), np.eye(2), [1], 2, np.random.default_rng(0)).state.shape == (2, 2)
+    assert split([0.0, 0.0], np.eye(2), {1: 3}).means.shape == (3, 2)
+
+
+P, C, S = ParticleOptions, CandidateOptions, SirOptions
+ODD = np.array([[1.0, 0.5], [0.5 * (1 + 1.5e-9), 1.0]])
+DOORS = {
+    "least and most": (lambda: P(least=0, most=5), ConfigError),
+    "least and most: expected 1 <= least": (lambda: P(least=6, most=5), ConfigError),
+    "particles, searching": (lambda: P(searching=0), ConfigError),
+    "particles, per_bin": (lambda: P(per_bin=0.0), ConfigError),
+    "particles, per_bin: expected a finite": (lambda: P(per_bin=inf), ConfigError),
+    "particles, flatten": (lambda: P(flatten=0.0), ConfigError),
+    "particles, flatten: expected a power": (lambda: P(flatten=1.01), ConfigError),
+    "particles, resample_below": (lambda: P(resample_below=0.0), ConfigError),
+    "particles, resample_below: expected": (lambda: P(resample_below=1.0), ConfigError),
+    "particles, switch_mass": (lambda: P(switch_mass=1.0), ConfigError),
+    "particles, switch_mass: expected a": (lambda: P(switch_mass=0.0), ConfigError),
+    "particles, switch_hold_m": (lambda: P(switch_hold_m=-0.1), ConfigError),
+    "particles, switch_hold_m: exp": (lambda: P(switch_hold_m=inf), ConfigError),
+    "particles, jitter": (lambda: P(jitter=(1.0, -1.0)), ConfigError),
+    "particles, jitter: exp": (lambda: P(jitter=(inf, 1.0)), ConfigError),
+    "particles, searching_jitter": (lambda: P(searching_jitter=(nan,)), ConfigError),
+    "resolution_m": (lambda: C(resolution_m=0.0), ConfigError),
+    "resolution_m: expected": (lambda: C(resolution_m=inf), ConfigError),
+    "update_length_m": (lambda: C(update_length_m=-0.1), ConfigError),
+    "update_length_m: expected": (lambda: C(update_length_m=inf), ConfigError),
+    "tracking_length_m": (lambda: C(tracking_length_m=-0.1), ConfigError),
+    "threshold": (lambda: C(threshold=0), ConfigError),
+    "SIR, resample_below": (lambda: S(-0.01), InputError),
+    "SIR, resample_below: expected": (lambda: S(1.01), InputError),
+    "SIR, regularise": (lambda: S(1.0, -0.01), InputError),
+    "SIR, regularise: expected": (lambda: S(1.0, 2.01), InputError),
+    "sigma points, alpha": (lambda: SigmaPoints(0.0), InputError),
+    "sigma points, alpha: expected": (lambda: SigmaPoints(inf), InputError),
+    "sigma points, beta": (lambda: SigmaPoints(1.0, nan), InputError),
+    "sigma points, kappa": (lambda: SigmaPoints(1.0, 2.0, inf), InputError),
+    "kappa: expected more than -2": (lambda: SigmaPoints(1.0, 2.0, -2.0).spread(2), InputError),
+    "kappa: expected more than -3": (lambda: SigmaPoints(1.0, 2.0, -3.5).weights(3), InputError),
+    "method, iterations": (lambda: Method("none", iterations=0), InputError),
+    "covariance: expected shape .2, 2.": (lambda: factor_of(np.eye(3), 2), InputError),
+    "there: expected shape": (lambda: factor_of(1.0, 1, "there"), InputError),
+    "covariance: expected finite": (lambda: factor_of([[nan]], 1), InputError),
+    "covariance: expected a symmetric": (lambda: factor_of(ODD, 2), InputError),
+    "covariance: expected variances >= 0": (lambda: factor_of(np.diag([1, -1.0]), 2), InputError),
+    "covariance: expected no negative eigenvalue": (
+        lambda: factor_of([[1.0, 1 + 2.5e-9], [1 + 2.5e-9, 1.0]], 2), InputError,
+    ),
+    "covariance: expected shape": (lambda: kalman.as_belief([1.0], np.eye(2)), InputError),
+    "parts": (lambda: split([0.0, 0.0], np.eye(2), {2: 2}), InputError),
+    "parts: expected indices below 2": (lambda: split([0.0, 0.0], np.eye(2), {-1: 2}), InputError),
+    "parts: expected indices below 2 and": (lambda: split([0, 0], np.eye(2), {1: 0}), InputError),
+    "covariance, row 0: expected no correlation": (
+        lambda: split([0.0] * 2, [[1.0, 0.1], [0.1, 1.0]], {0: 2}), InputError,
+    ),
+    "sampled: expected indices in 0..1": (lambda: drawn([-1]), InputError),
+    "sampled: expected indices in 0..1, found": (lambda: drawn([0, 2]), InputError),
+    "particles: expected at least 2, found 1": (lambda: drawn([0], 1), InputError),
+    "covariances: expected shape": (
+        lambda: smooth(np.eye(2), np.eye(2), np.zeros((1, 3, 2)), np.zeros((1, 2, 2, 2))),
+        InputError,
+    ),
+    "covariances": (
+        lambda: smooth(np.eye(3), np.eye(3), np.zeros((1, 2, 2)), np.zeros((1, 2, 2, 2))),
+        InputError,
+    ),
+}  # fmt: skip
+
+
+def drawn(sampled, count=5):
+    return init(np.zeros(2), np.eye(2), sampled, count, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize(("said", "door"), DOORS.items(), ids=range(len(DOORS)))
+def test_what_lies_beyond_is_told(said, door):
+    make, error = door
+    with pytest.raises(error, match=said):
+        make()
+
+
+def test_faults_of_particles_are_told_one_by_one():
+    with pytest.raises(ConfigError) as told:
+        P(searching=0, flatten=2.0, switch_mass=nan, switch_hold_m=nan, jitter=(nan,))
+    assert len(told.value.faults) == 5
+
+
+def test_smoothing_of_one_step_changes_nothing():
+    means, covariances = np.ones((2, 1, 2)), np.tile(np.eye(2), (2, 1, 1, 1))
+    found = smooth(np.eye(2), np.eye(2), means, covariances)
+    np.testing.assert_array_equal(found.means, means)
+    np.testing.assert_array_equal(found.covariances, covariances)
+    # Something known without error is no division by nothing.
+    still = smooth(np.eye(1), np.zeros((1, 1)), np.ones((1, 2, 1)), np.full((1, 2, 1, 1), 1e-20))
+    assert np.isfinite(still.means).all()
+    assert sqrt(still.covariances[0, 0, 0, 0]) == pytest.approx(1e-10)

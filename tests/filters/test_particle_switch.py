@@ -1,0 +1,116 @@
+"""When the particle filter switches, refuses and draws anew: particles at two places."""
+
+import pickle
+from dataclasses import dataclass, replace
+from math import log, nan
+
+import numpy as np
+import pytest
+
+from mapfilter.filters.contract import MotionStep, Reason, Status
+from mapfilter.filters.hypotheses import Bins
+from mapfilter.filters.particle import ParticleFilter
+from mapfilter.filters.particle_options import ParticleOptions
+
+
+@dataclass(frozen=True)
+class Two:
+    """Particles at two places far apart; readings weigh the first one."""
+
+    believable: bool = True
+
+    @property
+    def bins(self):
+        return Bins.over((0.0, 0.0, 400.0, 10.0))
+
+    def start(self, prior, most, rng):  # noqa: ARG002
+        state = np.zeros((3, most), dtype=np.float32)
+        state[0, most // 2 :] = 300.0
+        return state, np.full(most, float(prior))
+
+    def move(self, state, log_weight, motion, key):  # noqa: ARG002
+        return state + np.float32(1.0), log_weight
+
+    def weigh(self, state, log_weight, reading):
+        if reading is None:
+            return Reason.NO_READING
+        log_weight[state[0] < 150.0] += reading
+        return Reason.USED
+
+    def credible(self, summary):  # noqa: ARG002
+        return self.believable
+
+
+STILL = {"jitter": (0.0,), "searching_jitter": (0.0,)}
+
+
+def updated(reading, **given):
+    options = ParticleOptions(**STILL | {"most": 64, "searching": 64, "least": 4} | given)
+    filter_, rng = ParticleFilter(Two(), options), np.random.default_rng(0)
+    return filter_.update(filter_.init(0.0, rng), reading, rng)
+
+
+def test_particles_are_drawn_anew_where_too_few_carry_the_weight():
+    def kept(log_gain, below):
+        after, info = updated(log_gain, flatten=1.0, resample_below=below)
+        assert info.hypotheses == after.log_weight.size == 64
+        return not np.allclose(after.log_weight, -log(64))
+
+    # Weights of 2 and 1: 32² · 3² / (32 · 5) = 57.6 of 64 are effective, nine tenths.
+    assert kept(log(2.0), 0.89)
+    assert not kept(log(2.0), 0.91)
+    # All alike are 64 of 64: no fewer than any share.
+    assert updated(0.0, flatten=1.0, resample_below=0.999)[0].weight[0] == 1 / 64
+
+
+def test_the_number_of_particles_follows_the_bins_that_are_covered():
+    # Two bins of one half each: ten for each of two bins.
+    after, info = updated(0.0, flatten=1.0, searching=4, per_bin=10.0)
+    assert (after.state.shape, info.hypotheses) == ((3, 20), 20)
+    # Half of what there is is not drawn anew: 32 wanted of 64.
+    assert updated(0.0, flatten=1.0, searching=4, per_bin=16.0)[1].hypotheses == 64
+    assert updated(0.0, flatten=1.0, searching=4, per_bin=15.6)[1].hypotheses == 31
+    assert updated(0.0, flatten=1.0, searching=9, per_bin=0.1)[1].hypotheses == 9
+    # Once it has converged the least number counts.
+    options = {"switch_mass": 0.4, "switch_hold_m": 0.0, "flatten": 1.0, "per_bin": 0.1}
+    after, info = updated(0.0, **options)
+    assert (info.status, info.hypotheses) == (Status.CONVERGED, 4)
+    assert after.status is Status.CONVERGED
+    assert after.agreed_at_m == 0.0
+    # What it says is said before it is drawn anew.
+    assert after.summary.mass_50m == pytest.approx(0.5)
+
+
+def test_which_jitter_parts_copies():
+    given = {"flatten": 1.0, "per_bin": 5.0, "searching": 4, "jitter": (0.0, 2.0),
+             "searching_jitter": (0.0, 0.0, 3.0)}  # fmt: skip
+    searching, _ = updated(0.0, **given)
+    assert searching.state[1].tolist() == [0.0] * 10
+    assert searching.state[2].std() > 1.0
+    found, info = updated(0.0, **given, switch_mass=0.4, switch_hold_m=0.0)
+    assert info.status is Status.CONVERGED
+    assert found.state[2].tolist() == [0.0] * 10
+    assert found.state[1].std() > 0.6
+
+
+def test_particles_without_any_weight():
+    filter_, rng = ParticleFilter(Two(), ParticleOptions(most=8, least=4)), np.random.default_rng(0)
+    start = filter_.init(-np.inf, rng)
+    np.testing.assert_allclose(start.log_weight, -log(8))
+    after, info = filter_.update(replace(start, log_weight=np.full(8, -np.inf)), 0.0, rng)
+    assert (info.reason, info.hypotheses) == (Reason.NO_CANDIDATES_LEFT, 8)
+    assert after.log_weight[0] == -np.inf
+    same, info = filter_.update(start, None, rng)
+    assert same is start
+    assert (info.reason, info.status, info.hypotheses) == (Reason.NO_READING, Status.SEARCHING, 8)
+    empty = replace(start, state=start.state[:, :0], log_weight=np.empty(0))
+    assert np.isnan(filter_.locate(empty).east_m)
+    for motion, why in ((MotionStep(nan, 0.0), Reason.NO_STEP),
+                        (MotionStep(0.0, nan), Reason.NO_HEADING),
+                        (MotionStep(0.0, 1.0), Reason.USED)):  # fmt: skip
+        same, reason = filter_.predict(start, motion, rng)
+        assert same is start
+        assert reason is why
+    moved, reason = filter_.predict(start, MotionStep(-2.0, nan), rng)
+    assert (moved.travelled_m, reason) == (2.0, Reason.NO_HEADING)
+    assert set(vars(pickle.loads(pickle.dumps(moved)))) == set(type(moved).__dataclass_fields__)

@@ -1,0 +1,211 @@
+"""Tables and elementary functions of the kernels, entry by entry, and the usual options."""
+
+from dataclasses import asdict
+from math import atan2, erfc, exp, log, pi, radians, sqrt
+
+import numpy as np
+import pytest
+
+from mapfilter.models import cell_id, fingerprint
+from mapfilter.models._lanes import atan2_lanes, log_lanes
+from mapfilter.models.cell_id import ServingWeights, log_serving, serving_table
+from mapfilter.models.fingerprint import LevelErrors, bound_table
+from mapfilter.models.street_motion import (
+    BIAS,
+    EAST,
+    LOG_SCALE,
+    NORTH,
+    OFF,
+    STATES,
+    MapWeights,
+    MotionErrors,
+    move,
+)
+from mapfilter.models.street_smoothing import _sorted, _squares, draw_ancestors
+
+
+def log_cdf(x):
+    return log(0.5 * erfc(-x / sqrt(2)))
+
+
+def test_the_usual_options():
+    assert asdict(ServingWeights()) == {
+        "hysteresis_db": 2.0, "sd_db": 9.0, "weight_per_m": 1 / 22,
+    }  # fmt: skip
+    assert asdict(LevelErrors()) == {
+        "sd_db": 10.0, "correlation_m": 50.0, "measurement_db": 1.5, "roughness_db": 6.0,
+        "common": 0.3, "clip_sd": 3.0, "weight": 0.7,
+    }  # fmt: skip
+    assert asdict(MotionErrors()) == {
+        "step_sd_m": 0.3, "typical_step_m": 1.4, "heading_sd_rad": radians(6),
+        "bias_sd_rad": radians(3), "bias_drift_rad_per_sqrt_m": radians(0.05), "scale_sd": 0.02,
+        "scale_drift_per_sqrt_m": 0.0,
+    }  # fmt: skip
+    assert asdict(MapWeights()) == {
+        "sd_m": 4.0, "weight_per_m": 1 / 18, "off_cost_per_m": 0.1, "leave_per_m": 0.001,
+        "return_per_m": 0.01,
+    }  # fmt: skip
+    assert (EAST, NORTH, BIAS, LOG_SCALE, OFF, STATES) == (0, 1, 2, 3, 4, 5)
+
+
+def test_the_table_of_margins_goes_from_minus_64_to_64_db_in_quarters():
+    weights = ServingWeights(hysteresis_db=1.0, sd_db=10.0)
+    table = serving_table(weights)
+    assert (table.shape, table.dtype) == ((513,), np.float32)
+    for place, margin_db in ((0, -64.0), (1, -63.75), (256, 0.0), (300, 11.0), (512, 64.0)):
+        assert table[place] == pytest.approx(log_cdf((margin_db + 1) / 10), rel=1e-6)
+    assert log_serving(3.0, weights) == pytest.approx(log_cdf(0.4), rel=1e-12)
+
+
+def test_the_table_of_bounds_goes_from_minus_8_to_8_deviations_in_32nds():
+    table = bound_table()
+    assert (table.shape, table.dtype) == ((513,), np.float32)
+    for place, deviations in ((0, -8.0), (1, -8 + 1 / 32), (256, 0.0), (320, 2.0), (512, 8.0)):
+        assert table[place] == pytest.approx(log_cdf(deviations), rel=1e-6, abs=1e-15)
+
+
+def marked():
+    """A table that says which of its entries was read; what lies beside it is absurd."""
+    whole = np.full(1600, 1e6, dtype=np.float32)
+    whole[500:1013] = np.arange(513)
+    return whole[500:1013]
+
+
+MARGINS_DB = (-200.0, -64.2, -64.0, -63.8, -0.25, -0.12, 0.0, 0.12, 0.13, 10.0, 63.7, 64.0, 200.0)
+PLACES = (0, 0, 0, 1, 255, 256, 256, 256, 257, 296, 511, 512, 512)
+
+
+def test_a_margin_is_looked_up_at_the_nearest_quarter():
+    level = np.zeros((len(MARGINS_DB), 5), dtype=np.float32)
+    level[:, 1] = MARGINS_DB
+    level[:, 3], level[:, 4] = np.maximum(MARGINS_DB, 0.0), np.minimum(MARGINS_DB, 0.0)
+    # The second best is worth its name where there are three cells: the other two are at 0.
+    level[:, 4] = np.where(np.array(MARGINS_DB) > 0, 0.0, level[:, 4])
+    found, pixel = np.zeros(len(MARGINS_DB)), np.arange(len(MARGINS_DB), dtype=np.int32)
+    cell_id.weigh_by_serving(pixel, level.ravel(), 5, 1, marked(), 1.0, found)
+    np.testing.assert_array_equal(found, PLACES)
+
+
+def test_a_bound_is_looked_up_at_the_nearest_thirty_second():
+    deviations = np.array([-20.0, -8.1, -8.0, -0.02, -0.01, 0.0, 0.01, 0.02, 1.0, 8.0, 20.0])
+    table = np.log1p(np.arange(513, dtype=np.float32))
+    places = np.clip(np.round(32 * deviations) + 256, 0, 512)
+    for censored, seen in ((-1, deviations), (1, -deviations)):
+        level = (-3.0 * seen).astype(np.float32)
+        found, pixel = np.zeros(seen.size), np.arange(seen.size, dtype=np.int32)
+        fingerprint.weigh_by_bound(
+            pixel, level, 1, np.zeros(1, dtype=np.int32), 0.0, censored, 3.0, 1.0, table, found
+        )
+        np.testing.assert_allclose(np.exp(found), places + 1, rtol=1e-5)
+
+
+def test_corners_of_a_raster_have_their_own_pixels():
+    places = np.array([[0.5, 29.5], [49.5, 29.5], [0.5, 0.5], [49.5, 0.5], [-99, 99], [99, -99],
+                       [10.5, 19.5]])  # fmt: skip
+    state, pixel = np.zeros((5, 7), dtype=np.float32), np.empty(7, dtype=np.int32)
+    state[:2] = places.T + np.array([[200.0], [-70.0]])
+    fingerprint.pixels(state, 0.0, 0.0, 200.0, -40.0, 0.1, 3, 5, pixel)
+    assert pixel.tolist() == [0, 4, 10, 14, 0, 14, 6]
+
+
+def test_clipped_innovations_count_as_the_clip_on_both_sides():
+    level = np.array([-50.0, 50.0, 1.0], dtype=np.float32)
+    found, pixel = np.zeros(3), np.arange(3, dtype=np.int32)
+    one, none = np.ones(1, dtype=np.float32), np.zeros(1, dtype=np.float32)
+    fingerprint.weigh_by_levels(
+        pixel, pixel, level, 1, none.astype(np.int32), none, none, one, 0.3, 0.5, 2.0, found
+    )
+    # With one level the common part does not matter: half of weight times square.
+    np.testing.assert_allclose(found, [-1.0, -1.0, -0.25], rtol=1e-6)
+
+
+def test_logarithms_over_all_magnitudes():
+    value = np.concatenate([
+        np.logspace(-300, 300, 5001), np.linspace(0.4, 3.0, 5001), [1.0, 2.0, sqrt(0.5), sqrt(2.0)],
+        np.nextafter(1.0, [0.0, 2.0]),
+    ])  # fmt: skip
+    out, work = np.empty_like(value), np.empty_like(value)
+    log_lanes(value, out, work)
+    np.testing.assert_allclose(out, [log(x) for x in value], rtol=4e-16, atol=2e-16)
+
+
+def test_angles_all_around():
+    turn = np.concatenate([np.linspace(-pi, pi, 7201), np.arctan2([0.4142, 0.41422], 1.0)])
+    left, ahead = 7.0 * np.sin(turn), 7.0 * np.cos(turn)
+    out = np.empty_like(turn)
+    atan2_lanes(left, ahead, out)
+    np.testing.assert_allclose(out, [*map(atan2, left, ahead)], rtol=4e-16, atol=2e-16)
+    # Backwards is half a turn to the left; where a direction is none it is 0.
+    out = np.empty(5)
+    atan2_lanes(np.array([0.0, 0, 0, 2, -2]), np.array([-3.0, 0, 5, 0, 0]), out)
+    np.testing.assert_array_equal(out, [pi, 0.0, 0.0, pi / 2, -pi / 2])
+
+
+def test_no_two_numbers_of_a_step_are_drawn_alike():
+    count, key = 4000, np.uint64(77)
+    still = {"bias_drift_rad_per_sqrt_m": 0.0, "heading_sd_rad": 0.0, "step_sd_m": 0.0}
+    state = np.zeros((STATES, count), dtype=np.float32)
+    along = move(state, 1.4, 0.0, MotionErrors(**still | {"step_sd_m": 1.0}), key)[EAST] - 1.4
+    across = move(state, 1.0, 0.0, MotionErrors(**still | {"heading_sd_rad": 1.0}), key)[NORTH]
+    walk = MotionErrors(**still | {"bias_drift_rad_per_sqrt_m": 0.5}, scale_drift_per_sqrt_m=1.0)
+    after = move(state, 1.0, 0.0, walk, key)
+    drawn = np.array([along, across, 2 * after[BIAS], after[LOG_SCALE]])
+    assert np.unique(np.round(drawn, 5)).size > 0.96 * drawn.size
+    # Neither beside each other, nor of one hypothesis and another one.
+    for shift in range(1, 4):
+        both = np.vstack([drawn[:, shift:], drawn[:, :-shift]])
+        off = np.corrcoef(both) - np.eye(8)
+        assert np.abs(off).max() < 5 / sqrt(count)
+    spread = np.vstack([drawn[:, : count // 2], drawn[:, : 2 * (count // 2) : 2]])
+    assert np.abs(np.corrcoef(spread) - np.eye(8)).max() < 0.5
+
+
+def test_a_step_of_nothing_changes_nothing():
+    state = np.array([[1.0], [2.0], [0.3], [0.1], [0.4], [9.0]], dtype=np.float32)
+    np.testing.assert_array_equal(move(state, 0.0, 1.0, MotionErrors(), np.uint64(1)), state)
+
+
+def test_squares_cover_places_with_at_most_400_a_side():
+    east, north = np.array([3.0, 103.0, 5.0], "f4"), np.array([20.0, 70.0, 30.0], "f4")
+    assert _squares(east, north, 10.0) == (3.0, 70.0, 10.0, 6, 11)
+    assert _squares(east, north, 0.01) == (3.0, 70.0, 0.25, 201, 401)
+    assert _squares(north, east, 0.01) == (20.0, 103.0, 0.25, 401, 201)
+
+
+def test_places_are_sorted_by_their_square():
+    east, north = np.array([25.0, 0.0, 5.0, 30.0, 9.0], "f4"), np.array([0, 20, 11, 20, 1], "f4")
+    start, order = _sorted(east, north, 0.0, 20.0, 10.0, 2, 3)
+    # Square 0 holds two, 2 the one on the eastern edge, 3 and 5 those on the southern one.
+    assert start.tolist() == [0, 2, 2, 3, 4, 4, 5]
+    assert order.tolist() == [1, 2, 3, 4, 0]
+
+
+def drawn(later, earlier, log_weight, key=5, log_jump=-6.0):
+    chosen = np.empty(later.shape[1], dtype=np.int32)
+    draw_ancestors(later, earlier, log_weight, 0.0, 0.0, 4.0, 0.01, 0.01, log_jump,
+                   np.uint64(key), chosen)  # fmt: skip
+    return chosen
+
+
+def test_an_ancestor_three_deviations_away_is_seen_in_a_wide_cloud():
+    # A cloud of 3 km has squares of 7.5 m, of which the reach of 6.9 m needs one beside.
+    earlier = np.zeros((5, 4), dtype=np.float32)
+    earlier[0] = [1506.0, 0.0, 2.0, 3000.0]
+    for side_m in (-6.0, 6.0):
+        later = np.zeros((5, 20_000), dtype=np.float32)
+        later[0] = 1506.0 + side_m
+        share = (drawn(later, earlier, np.zeros(4, dtype=np.float32)) == 0).mean()
+        near, jump = exp(-36 / 8), exp(-6.0)
+        # Five standard errors.
+        assert share == pytest.approx(near / (near + 3 * jump), abs=0.018)
+
+
+def test_ancestors_at_one_place_are_told_apart_by_their_weights():
+    later, earlier = np.zeros((5, 20_000), dtype=np.float32), np.zeros((5, 3), dtype=np.float32)
+    weight = np.log(np.array([0.2, 0.5, 0.3])).astype(np.float32)
+    share = np.bincount(drawn(later, earlier, weight), minlength=3) / 20_000
+    np.testing.assert_allclose(share, [0.2, 0.5, 0.3], atol=0.018)
+    # Far from all of them, too.
+    later[0] = 1e5
+    share = np.bincount(drawn(later, earlier, weight), minlength=3) / 20_000
+    np.testing.assert_allclose(share, [0.2, 0.5, 0.3], atol=0.018)

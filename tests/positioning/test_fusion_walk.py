@@ -1,0 +1,274 @@
+"""A Kalman-type filter's walk step by step: motion, starts, noise that lasts, statuses."""
+
+from dataclasses import asdict, replace
+from math import cos, hypot, inf, log10, nan, pi, sin
+
+import numpy as np
+import pytest
+
+from mapfilter.errors import InputError
+from mapfilter.filters.contract import MotionStep, Reason, Status
+from mapfilter.filters.gaussian import EKF
+from mapfilter.models.state import POSITION
+from mapfilter.positioning.epochs import Epoch, GnssFix, Heard
+from mapfilter.positioning.fusion_belief import SumBelief
+from mapfilter.positioning.fusion_models import FusionOptions, SiteModels
+from mapfilter.positioning.fusion_readings import SiteReadings, site_readings
+from mapfilter.positioning.fusion_replay import _Walk
+from mapfilter.positioning.fusion_smoothing import FusionHistory
+from mapfilter.radio.cells import Cell, CellPlan
+
+CRS = "EPSG:32629"
+# On the central meridian of the zone.
+EAST, NORTH = 500_000.0, 4_600_000.0
+
+
+def cell(name, east_m, **more):
+    given = {"height_m": 30.0, "azimuth_deg": None, "eirp_dbm": 50.0, "frequency_mhz": 1800.0,
+             "antenna": "omni"}  # fmt: skip
+    return Cell(name, name, EAST + east_m, NORTH, **(given | more))
+
+
+PLAN = CellPlan(CRS, (
+    cell("A", 0.0, arfcn=600, bsic=1), cell("B", 2000.0, arfcn=601, bsic=2),
+    cell("C", 3000.0, antenna="sector", azimuth_deg=90.0, arfcn=601, bsic=3),
+))  # fmt: skip
+SITES = SiteModels(PLAN, FusionOptions())
+NOTHING = SiteReadings((), (), (), (), ())
+
+
+def walk(*, reckoned=True, sites=SITES, history=None):
+    return _Walk(sites, EKF, reckoned=reckoned, history=history)
+
+
+def started(reckoned=True, **more):
+    made = walk(reckoned=reckoned, **more)
+    size = made.layout.size
+    made.belief = SumBelief.start(np.full(size, 5.0), np.diag(np.full(size, 9.0)))
+    made.time_s = 10.0
+    return made
+
+
+def test_the_usual_options():
+    assert asdict(FusionOptions()) == {
+        "level_sigma_db": 9.0, "timing_step_m": pytest.approx(553.46, abs=0.01),
+        "timing_sigma_m": 200.0, "level_memory_m": 100.0, "timing_memory_m": 500.0,
+        "fix_sigma_m": 10.0, "acceleration": 0.7, "speed_sigma_mps": 8.0, "step_sigma_m": 0.3,
+        "heading_sigma_rad": 0.2, "drift_m": 0.3, "start_sigma_m": 1500.0, "start_parts": 11,
+        "start_spacing_m": 600.0, "reach_m": 35_000.0, "settled_m": 1000.0,
+    }  # fmt: skip
+    for name in asdict(FusionOptions()):
+        for value in (0, -1.0, inf, nan):
+            with pytest.raises(InputError, match=f"fusion, {name}: expected a number above 0"):
+                FusionOptions(**{name: value})
+        assert getattr(FusionOptions(**{name: 0.5}), name) == 0.5
+
+
+def test_steps_shift_and_spread():
+    made = started()
+    steps = (MotionStep(2.0, 0.5), MotionStep(3.0, nan), MotionStep(nan, 0.1), MotionStep(1.0, 2.0))
+    made.moved_m = 7.0
+    transition, noise, shift = made._move(Epoch(14.0, steps))
+    np.testing.assert_array_equal(transition, np.eye(2))
+    expected = 0.09 * 4.0 * np.eye(2)
+    way = np.zeros(2)
+    for length_m, heading in ((2.0, 0.5), (1.0, 2.0)):
+        along = np.array([cos(heading), sin(heading)])
+        across = np.array([-along[1], along[0]])
+        way += length_m * along
+        expected += 0.09 * np.outer(along, along)
+        expected += (0.2 * length_m) ** 2 * np.outer(across, across)
+    # Without a direction it may have led anywhere.
+    expected += 9.0 * np.eye(2)
+    np.testing.assert_allclose(shift, way)
+    np.testing.assert_allclose(noise, expected)
+    assert made.moved_m == 13.0
+    np.testing.assert_allclose(made.belief.means[0], 5.0 + way)
+    np.testing.assert_allclose(made.belief.covariances[0], 9.0 * np.eye(2) + expected)
+    assert [one.reason for one in made.unused] == [Reason.NO_HEADING, Reason.NO_STEP]
+    assert {(one.time_s, one.kind, one.what) for one in made.unused} == {(14.0, "motion", "")}
+
+
+def test_without_dead_reckoning_one_keeps_going():
+    made = started(reckoned=False)
+    made.moved_m = 1.0
+    transition, noise, shift = made._move(Epoch(12.0))
+    pair = np.array([[1.0, 2.0], [0.0, 1.0]])
+    np.testing.assert_array_equal(transition, np.kron(np.eye(2), pair))
+    own = 0.49 * np.array([[8 / 3, 2.0], [2.0, 2.0]])
+    np.testing.assert_allclose(noise, np.kron(np.eye(2), own))
+    assert not shift.any()
+    np.testing.assert_allclose(made.belief.means[0], [15.0, 5.0, 15.0, 5.0])
+    # Two seconds at the root of 50 m/s.
+    assert made.moved_m == pytest.approx(1.0 + 2.0 * hypot(5.0, 5.0))
+    slow = started(reckoned=False)
+    slow.belief = replace(slow.belief, means=np.array([[0.0, 0.6, 0.0, 0.8]]))
+    slow.moved_m = 0.0
+    slow._move(Epoch(14.0))
+    assert slow.moved_m == 6.0
+    # No time, or time that goes back, changes nothing.
+    for time_s in (10.0, 9.0):
+        made = started(reckoned=False)
+        transition, noise, _ = made._move(Epoch(time_s))
+        np.testing.assert_array_equal(transition, np.eye(4))
+        assert not noise.any()
+
+
+def test_before_the_start_nothing_moves():
+    made = walk()
+    fix = made.take(Epoch(3.0, (MotionStep(1.0, 0.0),) * 2), {})
+    assert [one.reason for one in made.unused] == [Reason.NOT_STARTED] * 2
+    assert (fix.status, fix.hypotheses, fix.reason) == (Status.SEARCHING, 0, Reason.NO_READING)
+    assert (fix.way_id, np.isnan(fix.east_m), np.isnan(fix.mass_50m)) == (0, True, True)
+    assert made.time_s == 3.0
+    heard = (Heard("serving", "Z", None, None, -70.0, 0),)
+    assert made.take(Epoch(4.0, heard=heard), {}).reason is Reason.UNKNOWN_CELL
+    assert made.take(Epoch(5.0, fix=GnssFix(nan, 1.0)), {}).reason is Reason.NO_READING
+    assert made.unused[-1].kind == "gnss"
+    assert made.belief is None
+
+
+def test_where_a_belief_starts():
+    made = walk(reckoned=False)
+    at_fix = made._start(GnssFix(1.0, 2.0), NOTHING)
+    np.testing.assert_array_equal(at_fix.means, [[1.0, 0.0, 2.0, 0.0]])
+    np.testing.assert_array_equal(at_fix.covariances[0], np.diag([1500.0, 8, 1500, 8]) ** 2)
+    about = walk()._start(None, SiteReadings(("B",), (-70.0,), (), (), ()))
+    assert about.means.shape == (121, 2)
+    np.testing.assert_allclose(about.weights @ about.means, [EAST + 2000.0, NORTH])
+    np.testing.assert_allclose(about.moments.covariance, 1500.0**2 * np.eye(2), rtol=1e-6)
+    on_circle = walk()._start(None, SiteReadings(("B",), (-70.0,), ("A",), (2,), ()))
+    radius = 2.5 * FusionOptions().timing_step_m
+    # 8 694 m around by 600 m.
+    assert on_circle.means.shape == (14, 2)
+    np.testing.assert_allclose(on_circle.weights, 1 / 14)
+    np.testing.assert_allclose(np.hypot(*(on_circle.means - [EAST, NORTH]).T), radius)
+    np.testing.assert_allclose(on_circle.means[0], [EAST + radius, NORTH])
+    assert on_circle.means[1, 1] > NORTH
+    np.testing.assert_allclose(on_circle.covariances[0], 600.0**2 * np.eye(2))
+    near = walk()._start(None, SiteReadings((), (), ("A",), (0,), ()))
+    assert near.weights.size == 8
+    far = walk()._start(None, SiteReadings((), (), ("A",), (60,), ()))
+    assert far.weights.size == 64
+    around = 0.7 * 2 * pi * 60.5 * FusionOptions().timing_step_m / 64
+    np.testing.assert_allclose(far.covariances[0], around**2 * np.eye(2))
+
+
+def test_errors_that_last_are_told_once():
+    made = walk()
+    model = SITES.of(POSITION, ("A",), ("B",))
+    sigma = hypot(200.0, FusionOptions().timing_step_m / 12**0.5)
+    np.testing.assert_allclose(model.noise, np.diag([81.0, sigma**2]))
+    # Before the first report nothing has been told.
+    np.testing.assert_allclose(made._aged(model, [100.0, 500.0]).noise, model.noise)
+    made.moved_m = 25.0
+    aged = made._aged(model, [100.0, 500.0]).noise
+    np.testing.assert_allclose(aged, np.diag([81.0 * 4, sigma**2 * 20]))
+    made.moved_m = 0.0
+    assert made._aged(model, [100.0, 500.0]).noise[0, 0] == pytest.approx(81.0 * 1000)
+
+
+def test_noise_of_fixes():
+    def gain(**variances):
+        made = started()
+        made._update_fix(GnssFix(9.0, 5.0, **variances))
+        return (made.belief.means[0] - 5.0) / 4.0
+
+    np.testing.assert_allclose(gain(), [9 / 109, 0.0], atol=1e-12)
+    assert gain(var_east_m2=3.0, var_north_m2=1.0)[0] == pytest.approx(9 / 12)
+    told = gain(var_east_m2=3.0, var_north_m2=2.0, cov_east_north_m2=1.0)
+    spread = np.array([[12.0, 1.0], [1.0, 11.0]])
+    np.testing.assert_allclose(told, 9.0 * np.linalg.inv(spread)[:, 0])
+    for odd in ({"var_east_m2": 0.0, "var_north_m2": 1.0},
+                {"var_east_m2": -1.0, "var_north_m2": -1.0},
+                {"var_east_m2": 1.0, "var_north_m2": nan},
+                {"var_east_m2": 1.0, "var_north_m2": 1.0, "cov_east_north_m2": 1.0}):  # fmt: skip
+        np.testing.assert_allclose(gain(**odd), [9 / 109, 0.0], atol=1e-12)
+
+
+def test_statuses():
+    made = started()
+    made._tell(1000.1)
+    assert made.status is Status.SEARCHING
+    made._tell(1000.0)
+    assert made.status is Status.CONVERGED
+    made._tell(5000.0)
+    assert made.status is Status.TRACKING
+    made.surprise = [5.1] * 9
+    made._tell(5.0)
+    assert made.status is Status.TRACKING
+    made.surprise = [5.0] * 10
+    made._tell(5.0)
+    assert made.status is Status.TRACKING
+    made.surprise = [0.0] * 9 + [50.1]
+    made._tell(5.0)
+    assert made.status is Status.LOST
+    # Ten readings are remembered, each by its square for one component.
+    for _ in range(12):
+        made._update_fix(GnssFix(5.0, 5.0 + 1e-9))
+    assert len(made.surprise) == 10
+    far = started()
+    far._update_fix(GnssFix(5.0 + 109**0.5 * 2, 5.0))
+    assert far.surprise == [pytest.approx(2.0)]
+
+
+def test_an_epoch_is_moved_and_then_measured():
+    history = FusionHistory()
+    made = walk(history=history)
+    heard = (Heard("serving", "A", None, None, -70.0, 0),)
+    first = made.take(Epoch(0.0, heard=heard), {"A": 1})
+    assert (first.reason, made.moved_m, len(history.beliefs)) == (Reason.USED, 0.0, 1)
+    assert first.hypotheses == made.belief.weights.size > 1
+    assert 0.0 < first.mass_50m < made.belief.weights.max()
+    made.take(Epoch(1.0, (MotionStep(30.0, 0.0),)), {})
+    assert made.moved_m == 30.0
+    np.testing.assert_array_equal(history.shifts[1], [30.0, 0.0])
+    at = GnssFix(EAST + 700.0, NORTH, 4.0, 4.0)
+    fix = made.take(Epoch(2.0, fix=at), {})
+    assert (fix.status, fix.reason, made.moved_m) == (Status.CONVERGED, Reason.USED, 30.0)
+    assert hypot(fix.east_m - EAST - 700.0, fix.north_m - NORTH) < 2.0
+    assert fix.mass_50m == pytest.approx(1.0, abs=1e-6)
+
+
+def test_which_rows_are_taken():
+    rows = (
+        Heard("serving", "A", None, None, -70.0, 0), Heard("neighbour", None, 601, 2, -80.0, 0),
+        Heard("neighbour", None, 601, None, -81.0, 0), Heard("neighbour", None, 700, 1, -82.0, 0),
+        Heard("neighbour", "C", None, None, -110.0, -1), Heard("neighbour", "Z", 1, 1, -83.0, 0),
+        Heard("neighbour", None, None, None, -84.0, 0), Heard("serving", "B", None, None, nan, 0),
+    )  # fmt: skip
+    found = site_readings(SITES, Epoch(3.0, heard=rows), {"B": 4, "Z": 5})
+    assert (found.cells, found.levels_dbm) == (("A", "B"), (-70.0, -80.0))
+    assert (found.timed, found.steps) == (("B",), (4,))
+    assert [(one.kind, one.what, one.reason) for one in found.unused] == [
+        ("neighbour", "ARFCN 601, BSIC unknown", Reason.AMBIGUOUS_CELL),
+        ("neighbour", "ARFCN 700, BSIC 1", Reason.UNKNOWN_CELL),
+        ("neighbour", "C", Reason.NOT_USED_BY_FILTER),
+        ("neighbour", "Z", Reason.UNKNOWN_CELL),
+        ("neighbour", "", Reason.NOT_USED_BY_FILTER),
+    ]
+    assert {one.time_s for one in found.unused} == {3.0}
+
+
+def test_levels_fall_as_cost_231_hata_says():
+    # The formula for a medium town: 1800 MHz, 30 m and 1.5 m above ground.
+    lift = (1.1 * log10(1800.0) - 0.7) * 1.5 - (1.56 * log10(1800.0) - 0.8)
+    at_km = 46.3 + 33.9 * log10(1800.0) - 13.82 * log10(30.0) - lift
+    slope = 44.9 - 6.55 * log10(30.0)
+    model = SITES.of(POSITION, ("A", "C"), ())
+    for away_m in (500.0, 1000.0, 4000.0):
+        expected = 50.0 - at_km - slope * log10(away_m / 1000)
+        # The sector looks east.
+        plain = model.mean([EAST + away_m, NORTH])[0]
+        assert plain == pytest.approx(expected, abs=1e-6)
+        ahead = model.mean([EAST + 3000.0 + away_m, NORTH])[1]
+        behind = model.mean([EAST + 3000.0 - away_m, NORTH])[1]
+        assert ahead == pytest.approx(expected, abs=1e-3)
+        assert behind == pytest.approx(expected - PLAN.cells[2].max_attenuation_db, abs=1e-6)
+    near = SITES.of(POSITION, ("A",), ()).mean([[EAST + 20.0, NORTH], [EAST + 3.0, NORTH]])
+    assert near[0] == near[1]
+    low = SiteModels(CellPlan(CRS, (cell("L", 0.0, height_m=4.0, indoor=True,
+                                         penetration_loss_db=15.0),)), FusionOptions())  # fmt: skip
+    at_10 = 46.3 + 33.9 * log10(1800.0) - 13.82 * log10(10.0) - lift
+    found = low.of(POSITION, ("L",), ()).mean([EAST + 1000.0, NORTH])[0]
+    assert found == pytest.approx(50.0 - at_10 - 15.0, abs=1e-6)
