@@ -179,3 +179,9 @@ OTHERWISE = {
     "prediction.reality.default_roof_height_m",
 }
 """Settings with a test of their own."""
+
+
+def toml(value):
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f'"{value}"' if isinstance(value, str) else repr(value)

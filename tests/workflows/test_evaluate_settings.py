@@ -16,6 +16,7 @@ from benchmark_settings import (
     READ_AS_FOR_A_BUILD,
     REFUSED,
     REFUSED_SECTIONS,
+    toml,
 )
 from pydantic import BaseModel
 
@@ -48,12 +49,6 @@ def leaves(model=Config, before=""):
             yield from leaves(inner, f"{before}{name}.")
         else:
             yield f"{before}{name}"
-
-
-def toml(value):
-    if isinstance(value, bool):
-        return str(value).lower()
-    return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
 def load(given, world="plain"):
