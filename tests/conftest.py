@@ -4,6 +4,11 @@ from pathlib import Path
 
 import pytest
 from fuzz import MUTATIONS
+from hypothesis import settings
+
+# A slow machine is no failure: speed belongs in benchmarks.
+settings.register_profile("mapfilter", deadline=None)
+settings.load_profile("mapfilter")
 
 _SHARED = Path(__file__).resolve().parents[2] / "shared"
 
