@@ -13,10 +13,8 @@ from numpy.typing import NDArray
 
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.geodesy import Floats, wrap_rad
-from mapfilter.simulation.routes import Route, route
+from mapfilter.simulation.routes import Route
 from mapfilter.simulation.walking import Inside, WalkerModel, path_beside, with_stops
-
-__all__ = ["DRIVING_SPEED_MPS", "JourneyPlan", "Route", "journey", "route", "speed_profile"]
 
 DRIVING_SPEED_MPS: Mapping[str, float] = MappingProxyType(
     {

@@ -5,13 +5,15 @@ from __future__ import annotations
 import csv
 import time
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 
 from mapfilter._io import atomic_file, ensure_writable_folder
 from mapfilter._parallel import Progress
 from mapfilter.errors import ConfigError, fail
 from mapfilter.experiments.papers import tesa
-from mapfilter.experiments.papers.tesa_scene import ASSUMPTIONS, BETA_DB, Motion
+from mapfilter.experiments.papers.tesa_models import IDENTITY, KNOWN_BEARING, VELOCITY, Motion
+from mapfilter.experiments.papers.tesa_scene import ASSUMPTIONS, BETA_DB
 from mapfilter.workflows.sweep import sweep_executor
 from mapfilter.workflows.tesa_pictures import draw_tesa
 
@@ -20,7 +22,7 @@ TRIALS = 50
 
 CLAIMS = (
     "Figs. 6 and 7: with powers of GSM the accuracy improves slightly",
-    "Fig. 8: without satellites a position is still told, with a far larger error",
+    "Fig. 8: without satellites a position is still available, with a far larger error",
 )
 """What the paper says; it prints no figures."""
 
@@ -29,7 +31,9 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True)
 class Scenario1:
-    """Mean errors with five satellites all the way, β = 1 dB; norms in three dimensions.
+    """Mean errors with five satellites all the way, β = 1 dB, by the identity model.
+
+    Errors are norms in three dimensions.
 
     Parameters
     ----------
@@ -42,38 +46,71 @@ class Scenario1:
 
 @dataclass(frozen=True)
 class Below:
-    """Shares of the outage's epochs with less than 100 m of error.
+    """Shares of the outage's epochs with less than 100 m of error, satellites and GSM.
 
     Parameters
     ----------
-    identity, velocity : float
+    velocity, identity, known_bearing : float
         By the filter's model of motion.
     """
 
-    identity: float
     velocity: float
+    identity: float
+    known_bearing: float
 
 
 @dataclass(frozen=True)
 class Scenario2:
-    """What an outage of 200 s leaves, β = 1 dB.
+    """Mean errors over an outage of 200 s, β = 1 dB, and availability.
+
+    Only ``hybrid_known_bearing_outage_m`` uses the true bearing of the road.
 
     Parameters
     ----------
-    gnss_outage_m, hybrid_outage_m, hybrid_velocity_outage_m : float
-        Mean errors over the outage: satellites alone and both by the identity model, both by the
-        velocity model.
-    availability_gnss, availability_hybrid : float
-        Shares of all 720 s with less than 100 m of error, by the identity model.
+    hybrid_outage_m : float
+        Headline: satellites and GSM by the velocity model.
+    hybrid_outage_interval_m : (float, float)
+        Its 95 % interval over trials.
+    gnss_velocity_outage_m : float
+        Satellites alone by the velocity model.
+    hybrid_identity_outage_m, gnss_outage_m : float
+        Satellites with GSM and satellites alone, by the paper's identity model.
+    hybrid_known_bearing_outage_m : float
+        Satellites and GSM by an identity model with noise along the true road; a comparison only.
+    availability_gnss, availability_hybrid_identity, availability_hybrid : float
+        Shares of all 720 s with less than 100 m of error: satellites alone and with GSM by the
+        identity model, with GSM by the velocity model.
     outage_below_100m : Below
     """
 
-    gnss_outage_m: float
     hybrid_outage_m: float
-    hybrid_velocity_outage_m: float
+    hybrid_outage_interval_m: Interval
+    gnss_velocity_outage_m: float
+    hybrid_identity_outage_m: float
+    gnss_outage_m: float
+    hybrid_known_bearing_outage_m: float
     availability_gnss: float
+    availability_hybrid_identity: float
     availability_hybrid: float
     outage_below_100m: Below
+
+
+@dataclass(frozen=True)
+class Scenario3:
+    """Mean errors over the same outage where the vehicle halts in it, β = 1 dB.
+
+    Not in the paper: at constant speed a velocity model keeps its position even without levels.
+
+    Parameters
+    ----------
+    hybrid_outage_m, gnss_velocity_outage_m : float
+        Satellites with GSM and satellites alone by the velocity model.
+    hybrid_identity_outage_m : float
+    """
+
+    hybrid_outage_m: float
+    gnss_velocity_outage_m: float
+    hybrid_identity_outage_m: float
 
 
 @dataclass(frozen=True)
@@ -107,12 +144,13 @@ class TesaRow:
 
 @dataclass(frozen=True)
 class TesaResult:
-    """The two scenarios, and all filters by β.
+    """The scenarios, and all filters by β.
 
     Parameters
     ----------
     scenario1 : Scenario1
     scenario2 : Scenario2
+    scenario3 : Scenario3
     hybrid_less_gnss_m : float
         Of scenario 1, trial by trial; below 0 where GSM helps.
     hybrid_less_gnss_interval_m : (float, float)
@@ -128,6 +166,7 @@ class TesaResult:
 
     scenario1: Scenario1
     scenario2: Scenario2
+    scenario3: Scenario3
     hybrid_less_gnss_m: float
     hybrid_less_gnss_interval_m: Interval
     rows: tuple[TesaRow, ...]
@@ -147,7 +186,7 @@ def run_reproduce_tesa(
     cluster: str | None = None,
     progress: Progress | None = None,
 ) -> TesaResult:
-    """Run the paper's two scenarios; draw its figures and write its table.
+    """Run the paper's two scenarios and a halt; draw its figures and write its table.
 
     Parameters
     ----------
@@ -184,14 +223,22 @@ def summarised(run: tesa.PaperRun, out: Path, began_s: float) -> TesaResult:
     pictures = draw_tesa(run, out)
     gnss, hybrid = tesa.Run(1, "identity"), tesa.Run(1, "identity", BETA_DB)
     gain = tesa.estimate((run.errors_m[hybrid] - run.errors_m[gnss]).mean(axis=1))
-    alone = rows[tesa.Run(2, "identity")]
-    identity = rows[tesa.Run(2, "identity", BETA_DB)]
-    velocity = rows[tesa.Run(2, "velocity", BETA_DB)]
+    alone, alone_velocity = rows[tesa.Run(2, "identity")], rows[tesa.Run(2, "velocity")]
+    velocity, identity, bearing = (
+        rows[tesa.Run(2, motion, BETA_DB)] for motion in (VELOCITY, IDENTITY, KNOWN_BEARING)
+    )
     return TesaResult(
         Scenario1(rows[gnss].mean_m, rows[hybrid].mean_m),
         Scenario2(
-            alone.outage_m, identity.outage_m, velocity.outage_m, alone.availability,
-            identity.availability, Below(identity.below_100m, velocity.below_100m),
+            velocity.outage_m, velocity.outage_interval_m, alone_velocity.outage_m,
+            identity.outage_m, alone.outage_m, bearing.outage_m, alone.availability,
+            identity.availability, velocity.availability,
+            Below(velocity.below_100m, identity.below_100m, bearing.below_100m),
+        ),
+        Scenario3(
+            rows[tesa.Run(3, "velocity", BETA_DB)].outage_m,
+            rows[tesa.Run(3, "velocity")].outage_m,
+            rows[tesa.Run(3, "identity", BETA_DB)].outage_m,
         ),
         gain.value, (gain.low, gain.high), tuple(rows.values()), CLAIMS,
         len(run.errors_m[gnss]), ASSUMPTIONS, (table, *pictures),
@@ -202,7 +249,10 @@ def summarised(run: tesa.PaperRun, out: Path, began_s: float) -> TesaResult:
 def _row(run: tesa.PaperRun, key: tesa.Run) -> TesaRow:
     errors, outage = run.errors_m[key], run.scene.outage
     near = errors < tesa.AVAILABLE_M
-    mean, within = (tesa.estimate(values.mean(axis=1)) for values in (errors, errors[:, outage]))
+    mean, within = (
+        tesa.estimate(values.mean(axis=1)).within(0.0, inf)
+        for values in (errors, errors[:, outage])
+    )
     below, available = (
         tesa.estimate(values.mean(axis=1)).within(0.0, 1.0) for values in (near[:, outage], near)
     )

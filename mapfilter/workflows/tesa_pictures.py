@@ -8,6 +8,7 @@ import numpy as np
 
 from mapfilter.experiments.papers import tesa
 from mapfilter.experiments.papers import tesa_scene as scene
+from mapfilter.experiments.papers.tesa_models import IDENTITY, VELOCITY
 from mapfilter.report.canvas import BLACK, BLUE, GREY, ORANGE, PURPLE, SKY, VERMILLION
 from mapfilter.report.fusion import Curve, Panel, plot_error_panels
 from mapfilter.simulation.drives import Drive, shadowing_db, straight_drive
@@ -19,9 +20,9 @@ _SEED = 4
 
 
 def draw_tesa(run: tesa.PaperRun, out: Path) -> tuple[Path, ...]:
-    """Draw Figs. 4, 6, 7 and 8, and the outage by β and by model of motion."""
+    """Draw Figs. 4, 6, 7 and 8, and the outage by β, by model of motion, and with a halt."""
     paths = tuple(out / f"{name}.png" for name in (
-        "figure-4", "figure-6", "figure-7", "figure-8", "outage",
+        "figure-4", "figure-6", "figure-7", "figure-8", "outage", "halt",
     ))  # fmt: skip
     drive = straight_drive(scene.LENGTH_M * _FIGURE_4_S / scene.DURATION_S, 90.0, _FIGURE_4_S)
     plot_error_panels(
@@ -35,17 +36,19 @@ def draw_tesa(run: tesa.PaperRun, out: Path) -> tuple[Path, ...]:
     for path, figure, name in zip(paths[1:3], ("6", "7"), first, strict=True):
         plot_error_panels(
             [Panel("", "error / m", _of(run, first[name], name, BLUE), top=top)], path,
-            title=f"Fig. {figure}: scenario 1, {name}, {trials} trials", across=_ACROSS,
+            title=f"Fig. {figure}: scenario 1, {name}, identity model, {trials} trials",
+            across=_ACROSS,
         )  # fmt: skip
-    told = f"scenario 2, β = {beta:g} dB, {trials} trials"
     panels = [
-        Panel("GNSS alone", "error / m", _of(run, tesa.Run(2, "identity"), "GNSS", VERMILLION)),
-        Panel("GNSS + GSM, identity model", "error / m",
+        Panel("GNSS alone, identity model", "error / m",
+              _of(run, tesa.Run(2, "identity"), "GNSS", VERMILLION)),
+        Panel("GNSS + GSM, identity model (the paper's)", "error / m",
               _of(run, tesa.Run(2, "identity", beta), "identity", BLUE)),
         Panel("GNSS + GSM, velocity model", "error / m",
               _of(run, tesa.Run(2, "velocity", beta), "velocity", ORANGE)),
     ]  # fmt: skip
-    plot_error_panels(panels, paths[3], title=f"Fig. 8: {told}", columns=3, across=_ACROSS)
+    title = f"Fig. 8: scenario 2, β = {beta:g} dB, {trials} trials"
+    plot_error_panels(panels, paths[3], title=title, columns=3, across=_ACROSS)
     panels = [
         Panel(
             f"{motion} model", "mean error / m",
@@ -56,12 +59,26 @@ def draw_tesa(run: tesa.PaperRun, out: Path) -> tuple[Path, ...]:
             ],
             logarithmic=True,
         )
-        for motion in (scene.IDENTITY, scene.VELOCITY_MODEL)
+        for motion in (IDENTITY, VELOCITY)
     ]  # fmt: skip
-    plot_error_panels(
-        panels, paths[4], title=f"Scenario 2 by shadowing, {trials} trials", across=_ACROSS
-    )
+    title = f"Scenario 2 by shadowing, GNSS + GSM, {trials} trials"
+    plot_error_panels(panels, paths[4], title=title, across=_ACROSS)
+    panels = [
+        Panel(name, "mean error / m", _compared(run, scenario, beta))
+        for scenario, name in ((2, "scenario 2: constant speed"), (3, "scenario 3: halt"))
+    ]
+    title = f"Outage with and without a halt, β = {beta:g} dB, {trials} trials"
+    plot_error_panels(panels, paths[5], title=title, across=_ACROSS)
     return paths
+
+
+def _compared(run: tesa.PaperRun, scenario: int, beta: float) -> list[Curve]:
+    compared = (
+        ("GNSS alone, velocity model", tesa.Run(scenario, "velocity"), VERMILLION),
+        ("GNSS + GSM, velocity model", tesa.Run(scenario, "velocity", beta), ORANGE),
+        ("GNSS + GSM, identity model", tesa.Run(scenario, "identity", beta), BLUE),
+    )
+    return [Curve(name, run.errors_m[key].mean(axis=0), colour) for name, key, colour in compared]
 
 
 def _of(run: tesa.PaperRun, key: tesa.Run, name: str, colour: str) -> list[Curve]:

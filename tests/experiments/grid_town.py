@@ -15,9 +15,7 @@ SIZE = 15
 def network():
     node = np.arange(SIZE * SIZE).reshape(SIZE, SIZE)
     pairs = [(node[:, :-1], node[:, 1:]), (node[:-1], node[1:])]
-    a, b = (
-        np.concatenate([ends[i].ravel() for ends in pairs]).astype(np.int32) for i in range(2)
-    )
+    a, b = (np.concatenate([ends[i].ravel() for ends in pairs]).astype(np.int32) for i in range(2))
     row, col = np.divmod(np.arange(SIZE * SIZE), SIZE)
     shift = np.random.default_rng(1).uniform(-20, 20, (2, SIZE * SIZE))
     east = WEST_M + 50.0 + 100.0 * col + shift[0]

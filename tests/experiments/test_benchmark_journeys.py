@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 from grid_town import levels, streets
 
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
@@ -15,6 +16,7 @@ from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.simulate import SimulationSettings
+from mapfilter.simulation.walking import WalkerModel
 from mapfilter.tracks.deadreckoning import dead_reckon
 
 SEED = 11
@@ -41,6 +43,27 @@ def made(town, name, number=0, *, walked=None, fixed=frozenset(), **settings):
     walked = walked or walk(town, SHORT, SEED, number)
     given = SimulationSettings(**settings)
     return walked, log_of(CASES[name], walked, levels, town, given, SEED, number, fixed)
+
+
+@pytest.mark.parametrize("make", [walk, displaced_walk])
+def test_walkers_keep_out_of_the_towns_buildings(town, make):
+    """Where everything is built over, they stay on the centre lines."""
+    e, n = town.network.east_m, town.network.north_m
+    lines = shapely.union_all(
+        [
+            shapely.LineString([(e[a], n[a]), (e[b], n[b])])
+            for a, b in zip(town.network.node_a, town.network.node_b, strict=True)
+        ]
+    )
+    beside = replace(SHORT, walker=WalkerModel(8.0))
+
+    def away_m(streets):
+        truth = make(streets, beside, SEED, 0).truth
+        places = shapely.points(truth["east_m"], truth["north_m"])
+        return np.median(shapely.distance(places, lines))
+
+    assert away_m(town) > 5.0
+    assert away_m(replace(town, heights_m=np.ones((150, 150), np.float32))) < 0.1
 
 
 def chords(walked):
@@ -70,7 +93,9 @@ def test_dead_reckoning_is_noisy_in_every_case_by_its_size(town, name):
     walked = make(town, SHORT, SEED, 0)
     _, log = made(town, name, walked=walked)
     step_m, heading = chords(walked)
-    carried = np.arange(step_m.size) == np.searchsorted(walked.truth["time_s"], walked.displaced_at_s)
+    carried = np.arange(step_m.size) == np.searchsorted(
+        walked.truth["time_s"], walked.displaced_at_s
+    )
     count = step_m.size
     scale = log.motion["step_m"][~carried].sum() / step_m[~carried].sum()
     error_m = (log.motion["step_m"] - scale * step_m)[~carried]
@@ -205,5 +230,7 @@ def test_the_units_period_is_the_worlds(town, period_s):
     np.testing.assert_allclose(time_s, period_s * np.arange(1, round(200 / period_s) + 1))
     start = walked.truth[["east_m", "north_m"]].iloc[0]
     east, north = dead_reckon(*start, log.motion["step_m"], log.motion["heading_rad"])
-    np.testing.assert_allclose(east, np.interp(time_s, walked.truth["time_s"], walked.truth["east_m"]))
+    np.testing.assert_allclose(
+        east, np.interp(time_s, walked.truth["time_s"], walked.truth["east_m"])
+    )
     assert abs(north[-1] - walked.truth["north_m"].iloc[-1]) < 1e-6

@@ -16,6 +16,7 @@ from mapfilter.positioning.track import PositionedTrack
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
+from mapfilter.simulation.satellites import ReceptionModel
 from mapfilter.simulation.simulate import SimulationSettings
 
 CHOICE = FilterChoice(BayesOptions())
@@ -31,6 +32,7 @@ class RecordedWorld:
     opened: list = field(default_factory=list)
     logs: list = field(default_factory=list)
     draws: list = field(default_factory=list)
+    reception: ReceptionModel = field(default_factory=ReceptionModel)
     streets = streets()
 
     def ground_truth(self, seed, level_error_db=None):
@@ -38,7 +40,7 @@ class RecordedWorld:
         shift_db = float(seed % 20) + (100.0 if level_error_db else 0.0)
         return lambda east_m, north_m: levels(east_m, north_m) - shift_db / 10
 
-    def skyline(self, case):
+    def skyline(self, _case):
         return None
 
     def locator(self, choice, *, thinned):
@@ -80,11 +82,12 @@ def test_every_route_has_a_ground_truth_of_its_own():
 
 
 def test_only_one_case_has_10_db_in_the_same_ground_truth():
-    world, _ = run(*[name for name in USUAL if not CASES[name].recovery_within_m])
+    names = [name for name in USUAL if not CASES[name].recovery_within_m]
+    world, _ = run(*names)
     (seed, none), (again, error_db) = world.truths
     assert (none, error_db) == (None, 10.0)
     assert seed == again
-    by_case = dict(zip([name for name in USUAL if not CASES[name].recovery_within_m], world.logs))
+    by_case = dict(zip(names, world.logs, strict=True))
     strange = by_case.pop("levels-error10").radio["level_dbm"].mean()
     usual = {by_case[n].radio["level_dbm"].mean() for n in by_case if CASES[n].levels}
     assert len(usual) == 1
@@ -170,3 +173,11 @@ def test_windows_are_scored_with_satellites_only():
     assert rows[1]["window_median_m"] == 0.0
     assert world.logs[0].pseudoranges.empty
     assert not world.logs[1].pseudoranges.empty
+
+
+def test_satellites_are_received_as_in_the_world():
+    noisy = RecordedWorld(reception=ReceptionModel(zenith_m=50.0))
+    usual, _ = run("satellites-2")
+    other, _ = run("satellites-2", world=noisy)
+    ranges = [world.logs[0].pseudoranges["pseudorange_m"].to_numpy() for world in (usual, other)]
+    assert 30.0 < (ranges[1] - ranges[0]).std() < 300.0

@@ -15,6 +15,7 @@ from mapfilter.experiments.benchmarks.world import BenchmarkWorld, write_buildin
 from mapfilter.experiments.sweep.world import SweepWorld, write_world
 from mapfilter.geodesy import Lattice
 from mapfilter.positioning.locators import FilterChoice
+from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.predict import PredictionModel, RealityErrors, predict
 from mapfilter.radio.rasters import open_rasters, write_rasters
@@ -26,9 +27,7 @@ from mapfilter.simulation.simulate import SimulationSettings
 LATTICE = Lattice(CRS, WEST_M, SOUTH_M + 600.0, 10.0, 60, 60)
 PLAN = CellPlan(CRS, plan().cells[:2])
 MODEL = PredictionModel(model="cost231_hata")
-NONE = RealityErrors(
-    level_error_db=0.0, eirp_error_db=0.0, azimuth_error_deg=0.0, slope_error=0.0
-)
+NONE = RealityErrors(level_error_db=0.0, eirp_error_db=0.0, azimuth_error_deg=0.0, slope_error=0.0)
 ROWS, COLS = np.indices((60, 60))
 PLACES = LATTICE.east_north(ROWS.ravel(), COLS.ravel())
 
@@ -65,7 +64,9 @@ def test_the_ground_truth_differs_by_the_worlds_errors(folder):
     again = received(folder, errors, 3) - predicted()
     np.testing.assert_array_equal(again, off[3])
     # The errors' own seed has no say.
-    np.testing.assert_array_equal(received(folder, replace(errors, seed=9), 3) - predicted(), off[3])
+    np.testing.assert_array_equal(
+        received(folder, replace(errors, seed=9), 3) - predicted(), off[3]
+    )
 
 
 def test_a_case_may_have_another_deviation(folder):
@@ -76,6 +77,18 @@ def test_a_case_may_have_another_deviation(folder):
     offset = replace(errors, offset_db=30.0)
     found = received(folder, offset, 5, 10.0) - predicted()
     np.testing.assert_allclose(found, more + 30.0, atol=1e-3)
+
+
+def test_measured_antennas_are_the_ground_truths_too(tmp_path):
+    turn = np.arange(0.0, 360.0, 10.0)
+    zero = np.zeros(36)
+    shut = MeasuredAntenna("shut", turn, zero + 40.0, turn, zero + 40.0)
+    cells = tuple(replace(cell, antenna="panel", azimuth_deg=0.0) for cell in PLAN.cells)
+    towns = SweepWorld(network(), CellPlan(CRS, cells), LATTICE, {})
+    write_world(towns, tmp_path / "streets")
+    world = BenchmarkWorld(tmp_path, MODEL, NONE, antennas={"panel": shut})
+    levels = world.ground_truth(1)(*PLACES)
+    np.testing.assert_allclose(levels, predicted() - 40.0, atol=0.01)
 
 
 def test_the_default_ground_truth_is_not_the_prediction(folder):
@@ -98,7 +111,9 @@ def lay_out(folder, *, height_m=10.0, tile_px=64):
         build(open_rasters(rasters), PLAN, LaidRoutes(routes), folder / name, tile_px=tile_px)
     box = shapely.box(WEST_M + 10, SOUTH_M + 10, WEST_M + 50, SOUTH_M + 50)
     shapes = np.array([box], dtype=object)
-    write_buildings(Buildings(CRS, shapes, np.array([height_m]), 1, 0, 0), folder / "buildings.parquet")
+    write_buildings(
+        Buildings(CRS, shapes, np.array([height_m]), 1, 0, 0), folder / "buildings.parquet"
+    )
     return BenchmarkWorld(folder, MODEL)
 
 
@@ -125,9 +140,12 @@ def test_the_checksum_is_of_all_that_is_simulated(tmp_path):
 
 def test_another_world_in_the_same_folder_is_read_anew(tmp_path, monkeypatch):
     opened = []
-    monkeypatch.setattr(
-        module, "open_locator", lambda database, choice, ways: opened.append(database) or opened
-    )
+
+    def open_locator(database, _choice, **_):
+        opened.append(database)
+        return opened
+
+    monkeypatch.setattr(module, "open_locator", open_locator)
     world = lay_out(tmp_path)
     first = world.streets
     assert world.streets is first

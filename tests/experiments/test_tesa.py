@@ -9,15 +9,22 @@ import pytest
 from mapfilter._parallel import SerialExecutor
 from mapfilter.errors import InputError
 from mapfilter.experiments.papers import tesa
+from mapfilter.experiments.papers import tesa_models as models
 from mapfilter.experiments.papers import tesa_scene as scene
 from mapfilter.models.signal_strength import levels
 from mapfilter.models.state import POSITION_CLOCK_3D
-from mapfilter.simulation.drives import clock_walk_m, shadowing_db, straight_drive
+from mapfilter.simulation.drives import (
+    ahead_and_left,
+    clock_walk_m,
+    shadowing_db,
+    straight_drive,
+)
 
 CASES = json.loads((Path(__file__).parents[1] / "fusion_cases.json").read_text(encoding="utf-8"))
 RUNS = (
     tesa.Run(1, "identity"), tesa.Run(1, "identity", 1.0), tesa.Run(2, "identity"),
     tesa.Run(2, "identity", 1.0), tesa.Run(2, "velocity", 1.0),
+    tesa.Run(2, "known-bearing", 1.0), tesa.Run(3, "velocity"), tesa.Run(3, "velocity", 1.0),
 )  # fmt: skip
 
 
@@ -46,7 +53,7 @@ def test_the_scene():
 def test_readings_are_what_filters_take_them_for():
     found, rng = scene.tesa_scene(), np.random.default_rng(1)
     ranges, level, shadow = scene.draw_readings(found, rng)
-    model = scene.measurements(found, "identity", 1.0)[300]
+    model = models.measurements(found, "identity", 1.0)[300]
     clock = ranges[300] - np.linalg.norm(found.satellites_m[300] - found.drive.place_m[300], axis=1)
     state = np.array([*found.drive.place_m[300], clock.mean()])
     mean, slope = np.empty((12, 1)), np.zeros((12, 4, 1))
@@ -57,24 +64,72 @@ def test_readings_are_what_filters_take_them_for():
     assert np.diag(model.noise)[5:] == pytest.approx(1.0)
 
 
-def test_longer_memory_takes_levels_for_noisier():
-    assert scene.level_sigma_db("identity", 4.0) == 4.0
-    assert scene.level_sigma_db("identity", 0.0) == 0.5
-    assert scene.level_sigma_db("velocity", 1.0) == pytest.approx(3.91, abs=0.01)
+def test_only_the_known_bearing_model_depends_on_the_bearing():
+    east_north = np.ix_((0, 1), (0, 1))
+    for beta in (None, 1.0):
+        identity = models.assumed("identity", beta).motion.noise
+        np.testing.assert_array_equal(identity[east_north], 25.0**2 * np.eye(2))
+        noise = models.assumed("velocity", beta).motion.noise
+        np.testing.assert_array_equal(noise[:2, :2], noise[2:4, 2:4])
+        assert not noise[:2, 2:4].any()
+    known = models.assumed("known-bearing").motion.noise[east_north]
+    ahead, left = ahead_and_left(scene.BEARING_DEG)
+    assert (ahead @ known @ ahead, left @ known @ left) == pytest.approx((625.0, 25.0))
+
+
+def test_shadowing_is_a_state_of_each_station_in_the_velocity_model():
+    known = models.assumed("velocity", 4.0)
+    assert known.layout.size == 13
+    # Stationary: the process keeps the variance that it starts with.
+    phi, noise, first = known.motion.transition, known.motion.noise, known.first_covariance
+    own = np.ix_(known.shadowing, known.shadowing)
+    np.testing.assert_allclose((phi @ first @ phi.T + noise)[own], 16.0 * np.eye(7))
+    assert phi[6, 6] == pytest.approx(np.exp(-50 / 3.6 / 100))
+    adds = models.loading(known, 12)
+    assert not adds[:5].any()
+    np.testing.assert_array_equal(adds[5:, 6:], np.eye(7))
+    for motion, beta in (("velocity", None), ("identity", 4.0)):
+        assert models.loading(models.assumed(motion, beta), 12) is None
+    model = models.measurements(scene.tesa_scene(), "velocity", 4.0)[0]
+    assert np.sqrt(np.diag(model.noise)[5:]) == pytest.approx(0.29)
+
+
+def test_filters_start_around_a_drawn_start():
+    rng = np.random.default_rng(4)
+    starts = np.array([scene.draw_start_m(rng) for _ in range(2000)])
+    assert starts.std(axis=0) == pytest.approx([50.0, 50.0, 10.0], rel=0.06)
+    # 3.6 standard deviations of the mean.
+    assert (np.abs(starts.mean(axis=0)) < [4.0, 4.0, 0.8]).all()
+    for motion in ("velocity", "identity", "known-bearing"):
+        known = models.assumed(motion, 1.0)
+        mean = known.first_mean(starts[0])
+        np.testing.assert_array_equal(mean[list(known.sampled)], starts[0])
+        assert np.count_nonzero(mean) == 3
+
+
+def test_a_halt_on_the_way():
+    steady, halted = scene.tesa_scene().drive, scene.tesa_scene(halt=True).drive
+    np.testing.assert_allclose(halted.travelled_m[:240], steady.travelled_m[:240])
+    speed_mps = np.diff(halted.travelled_m)
+    assert speed_mps[254:298] == pytest.approx(0.0)
+    assert speed_mps[314:] == pytest.approx(9456 / 720)
+    assert np.abs(np.diff(speed_mps)).max() < 1.0 + 1e-9
+    assert np.hypot(*halted.place_m[-1, :2]) == pytest.approx(halted.travelled_m[-1])
 
 
 def test_claims_hold_with_few_particles():
     outage = scene.tesa_scene().outage
     errors = np.stack([tesa.trial_errors_m(trial, 3, 1500, RUNS) for trial in range(2)], axis=1)
-    gnss, hybrid, alone, identity, velocity = errors
-    assert hybrid.mean() < gnss.mean() + 0.5 < 6.5
+    gnss, hybrid, alone, identity, velocity, bearing, halted_alone, halted = errors
+    assert hybrid.mean() < gnss.mean() + 0.5 < 7.5
     assert alone[:, outage].mean() == pytest.approx(1313, abs=80)
     assert identity[:, outage].mean() < 250
-    assert velocity[:, outage].mean() < 100
+    assert max(velocity[:, outage].mean(), bearing[:, outage].mean()) < 150
+    assert halted[:, outage].mean() < 0.5 * halted_alone[:, outage].mean()
     assert (alone < 100).mean() == pytest.approx(0.72, abs=0.03)
-    assert (identity[:, 500:] < 50).all()
+    assert (velocity[:, 500:] < 50).all()
     # Before the outage both scenarios are alike.
-    assert np.abs(gnss[:, :199].mean() - alone[:, :199].mean()) < 0.5
+    assert np.abs(gnss[:, 20:199].mean() - alone[:, 20:199].mean()) < 0.5
 
 
 def test_equal_seeds_give_equal_errors():
@@ -85,11 +140,11 @@ def test_equal_seeds_give_equal_errors():
 
 def test_a_paper_run_holds_all_runs(monkeypatch):
     monkeypatch.setattr(
-        tesa, "trial_errors_m", lambda trial, seed: np.full((12, 720), trial + seed)
+        tesa, "trial_errors_m", lambda trial, seed: np.full((14, 720), trial + seed)
     )
     done = []
     run = tesa.run_paper(3, 1, SerialExecutor(), lambda *told: done.append(told))
-    assert len(run.errors_m) == len(tesa.RUNS) == 12
+    assert len(run.errors_m) == len(tesa.RUNS) == 14
     assert run.errors_m[tesa.RUNS[5]][:, 7].tolist() == [1, 2, 3]
     assert done == [(1, 3), (2, 3), (3, 3)]
 

@@ -28,9 +28,7 @@ PLAN = CellPlan(
 ONE = CellPlan(CRS, PLAN.cells[:1])
 MODEL = PredictionModel(model="cost231_hata")
 CLUTTERED = replace(MODEL, shadowing_db=6.0)
-NONE = RealityErrors(
-    level_error_db=0.0, eirp_error_db=0.0, azimuth_error_deg=0.0, slope_error=0.0
-)
+NONE = RealityErrors(level_error_db=0.0, eirp_error_db=0.0, azimuth_error_deg=0.0, slope_error=0.0)
 SEEDS = range(30)
 
 
@@ -78,10 +76,11 @@ def test_the_whole_error_is_what_its_parts_imply():
     assert expected > 60.0
 
 
-@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
-def test_shadowing_has_its_deviation_however_it_is_shared_between_lengths(share):
+@pytest.mark.parametrize(("share", "local_m"), [(0.0, 10.0), (0.5, 10.0), (1.0, 10.0), (0.5, 40.0)])
+def test_shadowing_has_its_deviation_however_it_is_shared_between_lengths(share, local_m):
+    """Its parts are independent: even of one length, their variances add up."""
     errors = replace(
-        NONE, level_error_db=7.0, correlation_m=40.0, local_share=share, local_correlation_m=10.0
+        NONE, level_error_db=7.0, correlation_m=40.0, local_share=share, local_correlation_m=local_m
     )
     assert_mean((drawn(errors) ** 2).mean(axis=(1, 2, 3)), 49.0, 15.0)
 

@@ -143,7 +143,9 @@ def test_a_turn_of_a_gyro_wraps_and_standing_turns_nothing():
             "north_m": [0.0, 0.1, 0.1, 0.1, 0.0, -0.1],
         }
     )
-    turn = noisy_motion(truth, ImuErrors(**NONE, turns="gyro"), np.random.default_rng(0))["turn_rad"]
+    turn = noisy_motion(truth, ImuErrors(**NONE, turns="gyro"), np.random.default_rng(0))[
+        "turn_rad"
+    ]
     expected = [0.0, 0.0, 2 * np.arctan(0.1), 0.0]
     np.testing.assert_allclose(turn[1:], expected, atol=1e-12)
 

@@ -34,6 +34,16 @@ dir = "out"
 pictures = "none"
 """
 
+BENCHMARK_TOML = """[area]
+bbox = [24.9420, 60.1660, 24.9495, 60.1697]
+[cells]
+plan = "cells.csv"
+[prediction]
+shadowing_db = 8.0
+[journeys]
+length_m = 250
+"""
+
 
 @dataclass(frozen=True)
 class World:
@@ -44,6 +54,11 @@ class World:
     @property
     def toml(self) -> Path:
         return self.folder / "world.toml"
+
+    @property
+    def benchmark_toml(self) -> Path:
+        """The same place with no settings but those that benchmarks take."""
+        return self.folder / "benchmark.toml"
 
     @property
     def plan(self) -> Path:
@@ -70,6 +85,7 @@ def make_world(folder: Path) -> World:
     world = World(folder)
     world.plan.write_text(PLAN, encoding="utf-8")
     world.toml.write_text(TOML, encoding="utf-8")
+    world.benchmark_toml.write_text(BENCHMARK_TOML, encoding="utf-8")
     for command in ("predict", "build", "simulate"):
         assert_done(mapfilter(command, "-c", world.toml))
     return world

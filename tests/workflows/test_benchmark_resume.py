@@ -4,22 +4,14 @@ import json
 
 from command_line import assert_done, assert_refused, mapfilter, settings
 
-AREA = """[area]
-bbox = [24.9420, 60.1660, 24.9495, 60.1697]
-[cells]
-plan = "{plan}"
-[journeys]
-length_m = 250
-"""
 GIVEN = ["--filter", "candidate", "--case", "cell-6", "--runs", 1, "--workers", 1, "--json"]
 
 
 def test_a_benchmark_is_resumed_on_its_own_map_only(world, tmp_path):
-    out, toml = tmp_path / "out", tmp_path / "area.toml"
-    toml.write_text(AREA.format(plan=world.plan))
+    out = tmp_path / "out"
 
     def evaluate(*more):
-        given = ["-c", toml, *GIVEN, "--out", out, *more]
+        given = ["-c", world.benchmark_toml, *GIVEN, "--out", out, *more]
         return mapfilter("evaluate", "global-positioning", *given)
 
     assert_done(evaluate())

@@ -23,10 +23,11 @@ def test_a_replay_by_the_grid(world, tmp_path):
 
 def test_a_benchmark_of_the_grid(world, tmp_path):
     given = [*settings(area__resolution_m=10), "--filter", "grid", "--runs", 1, "--workers", 1]
+    given += ["--world", "easy", *settings(prediction__shadowing_db=6, journeys__length_m=1940)]
     cases = ["--case", "levels-6", "--case", "smooth-6"]
     told = mapfilter(
-        "evaluate", "global-positioning", "-c", world.toml, *given, *cases, "--out", tmp_path,
-        "--json",
+        "evaluate", "global-positioning", "-c", world.benchmark_toml, *given, *cases,
+        "--out", tmp_path, "--json",
     )  # fmt: skip
     plain, smoothed = told.json["cases"]
     assert plain["filter"] == smoothed["filter"] == "grid"

@@ -76,9 +76,8 @@ def test_a_sweep_on_a_cluster(own_world):
 def test_a_benchmark(world, here):
     given = ["--filter", MINE, "--case", "cell-6", "--runs", "1", "--workers", "1"]
     out = here / "cases"
-    told = mapfilter(
-        "evaluate", "global-positioning", "-c", world.toml, *given, "--out", out, "--json"
-    )
+    file = world.benchmark_toml
+    told = mapfilter("evaluate", "global-positioning", "-c", file, *given, "--out", out, "--json")
     (case,) = told.json["cases"]
     assert (case["name"], case["filter"], case["runs"]) == ("cell-6", MINE, 1)
     assert case["error_mean_m"] is None or case["error_mean_m"] < 200
@@ -90,7 +89,8 @@ def test_a_filter_that_is_not_there_is_refused_before_anything_runs(command, wor
     gone = settings(filter__name="not_there:MyFilter")
     if command == "evaluate":
         gone = ["--filter", "not_there:MyFilter"]
-    told = mapfilter(command, *name, "-c", world.toml, *gone, "--out", here / "out")
+    file = world.benchmark_toml if name else world.toml
+    told = mapfilter(command, *name, "-c", file, *gone, "--out", here / "out")
     assert_refused(told, "not_there:MyFilter", "No module named 'not_there'")
     assert not (here / "out").exists()
 
@@ -114,5 +114,6 @@ def test_filters_without_a_map_are_those_that_replay_has():
 def test_a_filter_without_a_map_is_refused_where_there_is_one(command, own_world, tmp_path):
     ekf = settings(filter__name="ekf") if command == "sweep" else ["--filter", "ekf"]
     name = ["global-positioning"] if command == "evaluate" else []
-    told = mapfilter(command, *name, "-c", own_world.toml, *ekf, "--out", tmp_path / "out")
+    file = own_world.benchmark_toml if name else own_world.toml
+    told = mapfilter(command, *name, "-c", file, *ekf, "--out", tmp_path / "out")
     assert_refused(told, "a filter that takes a database", "ekf")

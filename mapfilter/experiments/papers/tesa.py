@@ -9,16 +9,16 @@ from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from mapfilter._parallel import Progress, ordered_results
+from mapfilter.experiments.papers.tesa_models import Motion, assumed, loading, measurements
 from mapfilter.experiments.papers.tesa_scene import (
     BETA_DB,
     BETAS_DB,
-    Motion,
     Scene,
-    assumed,
     draw_readings,
-    measurements,
+    draw_start_m,
     tesa_scene,
 )
 from mapfilter.filters import rao_blackwell
@@ -38,8 +38,8 @@ class Run:
     Parameters
     ----------
     scenario : int
-        1: satellites all the way; 2: none during the outage.
-    motion : {"identity", "isotropic", "velocity"}
+        1: satellites all the way; 2: none during the outage; 3: as 2, with a halt in the outage.
+    motion : {"velocity", "identity", "known-bearing"}
     beta_db : float or None
         Shadowing; None for satellites alone.
     """
@@ -51,11 +51,15 @@ class Run:
 
 RUNS = (
     Run(1, "identity"),
-    *(Run(1, "identity", beta) for beta in BETAS_DB),
+    Run(1, "identity", BETA_DB),
+    Run(2, "velocity"),
+    *(Run(2, "velocity", beta) for beta in BETAS_DB),
     Run(2, "identity"),
     *(Run(2, "identity", beta) for beta in BETAS_DB),
-    *(Run(2, "velocity", beta) for beta in BETAS_DB),
-    Run(2, "isotropic", BETA_DB),
+    Run(2, "known-bearing", BETA_DB),
+    Run(3, "velocity"),
+    Run(3, "velocity", BETA_DB),
+    Run(3, "identity", BETA_DB),
 )
 
 
@@ -63,41 +67,44 @@ def run_filter(
     run: Run,
     readings: Floats,
     models: Sequence[CompiledMeasurement],
+    start_m: Floats,
     rng: np.random.Generator,
     particles: int = PARTICLES,
     options: SirOptions = SIR,
 ) -> Floats:
-    """Run the filter over readings (K, m); return the positions it tells, (K, 3)."""
-    known = assumed(run.motion)
+    """Run the filter over readings (K, m) from an assumed start (3,); return positions (K, 3)."""
+    known = assumed(run.motion, run.beta_db)
     where = np.array(known.sampled)
     belief = rao_blackwell.init(
-        known.first_mean, known.first_covariance, known.sampled, particles, rng
+        known.first_mean(start_m), known.first_covariance, known.sampled, particles, rng
     )
-    told = np.empty((len(readings), 3))
+    shadowing = loading(known, readings.shape[1])
+    found = np.empty((len(readings), 3))
     for k, (reading, model) in enumerate(zip(readings, models, strict=True)):
         belief = rao_blackwell.predict(belief, known.motion.transition, known.motion.noise, rng)
-        belief, _ = rao_blackwell.update(belief, model, reading, rng, options)
-        told[k] = belief.mean()[where]
-    return told
+        belief, _ = rao_blackwell.update(belief, model, reading, rng, options, shadowing)
+        found[k] = belief.mean()[where]
+    return found
 
 
 def trial_errors_m(
     trial: int, seed: int, particles: int = PARTICLES, runs: Sequence[Run] = RUNS
 ) -> Floats:
     """Draw one trial's readings and return the error of each run at each epoch, (runs, K)."""
-    scene = _scene()
-    drawn, *streams = np.random.default_rng([seed, trial]).spawn(1 + len(runs))
-    ranges, level, shadow = draw_readings(scene, drawn)
-    found = np.empty((len(runs), scene.drive.time_s.size))
-    for own, run, rng in zip(found, runs, streams, strict=True):
+    streams = np.random.default_rng([seed, trial]).spawn(3 + len(runs))
+    start_m = draw_start_m(streams[0])
+    drawn = {halt: draw_readings(_scene(halt), streams[1 + halt]) for halt in (False, True)}
+    found = np.empty((len(runs), _scene(False).drive.time_s.size))
+    for own, run, rng in zip(found, runs, streams[3:], strict=True):
+        halt = run.scenario == 3
+        scene, (ranges, level, shadow) = _scene(halt), drawn[halt]
         seen = ranges.copy()
-        if run.scenario == 2:
+        if run.scenario > 1:
             seen[scene.outage] = np.nan
-        heard = [] if run.beta_db is None else [level + run.beta_db * shadow]
-        told = run_filter(
-            run, np.hstack([seen, *heard]), _models(run.motion, run.beta_db), rng, particles
-        )
-        own[:] = np.linalg.norm(told - scene.drive.place_m, axis=1)
+        received = [] if run.beta_db is None else [level + run.beta_db * shadow]
+        models = _models(halt, run.motion, run.beta_db)
+        places = run_filter(run, np.hstack([seen, *received]), models, start_m, rng, particles)
+        own[:] = np.linalg.norm(places - scene.drive.place_m, axis=1)
     return found
 
 
@@ -124,7 +131,7 @@ class Estimate:
     ----------
     value : float
     low, high : float
-        95 % interval, by the normal distribution of means of trials.
+        95 % interval, by Student's t over trials.
     """
 
     value: float
@@ -143,11 +150,14 @@ def estimate(values: Floats) -> Estimate:
     --------
     >>> found = estimate(np.array([1.0, 3.0]))
     >>> found.value, round(found.low, 2), round(found.high, 2)
-    (2.0, 0.04, 3.96)
+    (2.0, -10.71, 14.71)
     """
     mean = float(np.mean(values))
-    half = 1.96 * float(np.std(values, ddof=1)) / np.sqrt(values.size) if values.size > 1 else 0.0
-    return Estimate(mean, float(mean - half), float(mean + half))
+    if values.size < 2:
+        return Estimate(mean, mean, mean)
+    factor = float(stdtrit(values.size - 1, 0.975))
+    half = factor * float(np.std(values, ddof=1)) / float(np.sqrt(values.size))
+    return Estimate(mean, mean - half, mean + half)
 
 
 def run_paper(
@@ -166,14 +176,14 @@ def run_paper(
     one = partial(trial_errors_m, seed=seed)
     found = ordered_results(executor, one, range(trials), progress=progress)
     errors = np.stack(list(found), axis=1)
-    return PaperRun(_scene(), dict(zip(RUNS, errors, strict=True)))
+    return PaperRun(_scene(False), dict(zip(RUNS, errors, strict=True)))
 
 
-@lru_cache(maxsize=1)
-def _scene() -> Scene:
-    return tesa_scene()
+@lru_cache(maxsize=2)
+def _scene(halt: bool) -> Scene:
+    return tesa_scene(halt=halt)
 
 
 @lru_cache(maxsize=len(RUNS))
-def _models(motion: Motion, beta_db: float | None) -> tuple[CompiledMeasurement, ...]:
-    return measurements(_scene(), motion, beta_db)
+def _models(halt: bool, motion: Motion, beta_db: float | None) -> tuple[CompiledMeasurement, ...]:
+    return measurements(_scene(halt), motion, beta_db)
