@@ -1,5 +1,7 @@
 """Scores of single runs of the benchmark, by hand on a straight walk of 10 m/s."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -102,6 +104,11 @@ def test_recovery_is_within_50_m_again_for_10_s():
     assert scored["error_mean_m"] == pytest.approx(20.0)
 
 
+def test_a_metre_is_enough_to_ask_for_a_recovery():
+    near = recovered(errors_after((60, 20)), replace(RECOVERY, recovery_within_m=1.0))
+    assert (near["success"], near["switch_m"]) == (True, 0.0)
+
+
 def test_being_near_for_less_than_10_s_is_no_recovery():
     # Ten epochs are 9 s.
     scored = recovered(errors_after((15, 500), (10, 20), (5, 200), (30, 30)))
@@ -177,3 +184,11 @@ def test_a_window_of_two_minutes():
     assert score_window(walked(table), found, 100.0) == {"window_median_m": 20.0}
     found = located(estimate(table, 401 * "S", errors))
     assert score_window(walked(table), found, 100.0) == {"window_median_m": None}
+
+
+def test_the_end_of_a_window_is_not_in_it():
+    table = line(400)
+    # 60 epochs of 10 m and 60 of 30 m; an epoch more at either end would tip the median.
+    errors = np.where(np.arange(401) < 160, 10.0, 30.0)
+    found = located(estimate(table, "C" + 400 * "T", errors))
+    assert score_window(walked(table), found, 100.0) == {"window_median_m": 20.0}

@@ -6,6 +6,7 @@ import pytest
 import shapely
 
 from mapfilter.errors import ConfigError
+from mapfilter.experiments.benchmarks import satellites
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.journeys import Walk
 from mapfilter.experiments.benchmarks.satellites import SPOOFED_S, spoofer_of, with_satellites
@@ -64,3 +65,42 @@ def test_reflections_are_switched_on_by_a_model_and_change_nothing_else():
     pd.testing.assert_frame_equal(plain, same, check_exact=True)
     assert more.groupby("time_s").size().max() == 4
     assert not more["pseudorange_m"].equals(plain["pseudorange_m"])
+
+
+class Quarters:
+    """Draws a quarter of the way between two ends, or half a deviation above the mean."""
+
+    def uniform(self, low, high):
+        return low + 0.25 * (high - low)
+
+    def normal(self, mean, sd):
+        return mean + 0.5 * sd
+
+
+def test_when_and_whither_a_spoofer_leads(monkeypatch):
+    monkeypatch.setattr(satellites, "named_rng", lambda *_: Quarters())
+    # From 160 s, 40 % of the walk, to two minutes before its end.
+    found = spoofer_of(WALKED, 1, 2)
+    assert found.from_s == pytest.approx(160.0 + 0.25 * 120.0)
+    assert (found.east_m, found.north_m) == pytest.approx((0.0, 500.0), abs=1e-9)
+    # A walk that is too short for that is spoofed at once.
+    assert spoofer_of(Walk(TRUTH.iloc[:101]), 1, 2).from_s == pytest.approx(40.0)
+
+
+def test_a_walk_is_at_any_time_of_a_day(monkeypatch):
+    given = []
+
+    def received(*arguments):
+        given.append(arguments)
+        return log_of_none
+
+    log_of_none = make_log(CRS, truth=TRUTH).pseudoranges
+    monkeypatch.setattr(satellites, "named_rng", lambda *_: Quarters())
+    monkeypatch.setattr(satellites, "receive", received)
+    log = log_of("satellites-3")
+    assert log.start_utc_s == 1_700_000_000.0 + 21_600.0
+    ((truth, crs, skyline, _, start_utc_s, model, _, spoofer),) = given
+    assert (truth is TRUTH, crs, skyline, start_utc_s) == (True, CRS, None, log.start_utc_s)
+    assert (model.most, model.height_m, spoofer) == (3, 100.0, None)
+    log_of("spoofed")
+    assert given[1][-1].from_s == pytest.approx(190.0)
