@@ -70,6 +70,11 @@ CHANGES = {
         Change("easy", "nothing", {}),
         Change("own-clutter", "the ground truth's clutter is its own", _CLUTTER),
         Change("no-clutter", "prediction without random clutter", {"prediction.shadowing_db": "0"}),
+        Change(
+            "noisy-truth",
+            "the same, and 6 dB more of shadowing in the ground truth",
+            {"prediction.shadowing_db": "0", "prediction.reality.level_error_db": "9.22"},
+        ),
         Change("heading", "heading error of 10°, correlated over 20 s", _HEADING),
         Change("gyro", "no compass; a gyro's errors accumulate", _GYRO, case="levels-nocompass"),
         Change("beside", "8 m beside the centre line", _BESIDE),
@@ -89,6 +94,12 @@ CHANGES = {
             "plain-clutter",
             "the plain world, prediction with 6 dB of random clutter",
             {"prediction.shadowing_db": "6"},
+            "plain",
+        ),
+        Change(
+            "plain-noisy-truth",
+            "the plain world, 6 dB more of shadowing in the ground truth",
+            {"prediction.reality.level_error_db": "7.81"},
             "plain",
         ),
     )
