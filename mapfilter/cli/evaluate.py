@@ -80,7 +80,7 @@ def evaluate(
     out: OutOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Tell how well a filter finds itself: in many cases, on any map, or on real sessions."""
+    """Benchmark localization accuracy: simulated on any map, or on real sessions."""
     from mapfilter.workflows.evaluate import RUNS, check_benchmark, run_global_positioning
     from mapfilter.workflows.evaluate_settings import load_benchmark
 
@@ -92,6 +92,7 @@ def evaluate(
         refuse(unheeded | {"--config": config, "--set": settings}, name)
         _ottawa(data, out, runs, seed, workers, resume, as_json)
         return
+    refuse({"--data": data}, name)
     given = list(settings or ())
     if map_file is not None:
         given.append(f"area.map={toml(str(map_file))}")

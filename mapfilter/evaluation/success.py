@@ -58,10 +58,10 @@ def wilson_interval_of_routes(
     """
     good, of = np.asarray(successes, dtype=np.float64), np.asarray(runs, dtype=np.float64)
     routes, total = good.size, float(of.sum())
-    if routes and np.all(of == 1):
-        return _wilson(float(good.mean()), routes, z)
     if routes < 2:
         return float("nan"), float("nan")
+    if np.all(of == 1):
+        return _wilson(float(good.mean()), routes, z)
     share = float(good.sum()) / total
     if share in (0.0, 1.0):
         return _wilson(share, routes, z)

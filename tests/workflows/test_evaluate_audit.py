@@ -40,6 +40,8 @@ EXPECTED = {
     "easy": EASY,
     "own-clutter": (MODEL, OWN, IMU, REPORTS, WALKER),
     "no-clutter": (PredictionModel(), ERRORS, IMU, REPORTS, WALKER),
+    # As far off as with 6 dB of clutter in the prediction and other 6 dB in the ground truth.
+    "noisy-truth": (PredictionModel(), replace(ERRORS, level_error_db=9.22), IMU, REPORTS, WALKER),
     "heading": (MODEL, ERRORS, replace(IMU, **HARD["heading"]), REPORTS, WALKER),
     "gyro": (
         MODEL,
@@ -131,8 +133,11 @@ def test_the_rows_of_the_plain_world():
     assert {name for name, change in CHANGES.items() if change.world == "plain"} == {
         "plain",
         "plain-clutter",
+        "plain-noisy-truth",
     }
-    assert set(CHANGES) == {*EXPECTED, "plain", "plain-clutter"}
+    noisy, _ = load_benchmark("plain", None, ["prediction.reality.level_error_db=7.81"])
+    assert simulated(load("plain-noisy-truth")[0]) == simulated(noisy)
+    assert set(CHANGES) == {*EXPECTED, "plain", "plain-clutter", "plain-noisy-truth"}
     assert all(name == change.name for name, change in CHANGES.items())
 
 

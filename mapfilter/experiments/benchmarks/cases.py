@@ -71,7 +71,7 @@ class Case:
         ----------
         world : ImuErrors
         fixed : frozenset of str
-            Names that somebody set for all cases.
+            Names that were set for all cases.
         """
         changes: dict[str, Any] = {k: v for k, v in self.imu.items() if k not in fixed}
         return replace(world, **changes)
@@ -84,7 +84,7 @@ class Case:
         motion : MotionErrors
             The filter's own.
         fixed : frozenset of str
-            Names that somebody set for all cases.
+            Names that were set for all cases.
         """
         return replace(motion, **{k: v for k, v in self.data_sheet.items() if k not in fixed})
 

@@ -50,7 +50,7 @@ class SweepWorld:
 
     @property
     def inside(self) -> Inside | None:
-        """Tells where buildings stand; None where that is not known."""
+        """Lookup of buildings; None where heights are unknown."""
         if self.heights_m is None:
             return None
         return inside_buildings(self.heights_m, self.lattice)
