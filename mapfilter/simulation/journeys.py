@@ -80,7 +80,7 @@ class JourneyPlan:
     leg_m: tuple[float, float] = (300.0, 1200.0)
     acceleration_mps2: float = 2.0
     lateral_acceleration_mps2: float = 2.0
-    driving_speed_mps: Mapping[str, float] = field(default_factory=lambda: DRIVING_SPEED_MPS)
+    driving_speed_mps: Mapping[str, float] = field(default_factory=lambda: dict(DRIVING_SPEED_MPS))
     walker: WalkerModel = field(default_factory=WalkerModel)
 
     def __post_init__(self) -> None:

@@ -94,7 +94,7 @@ def check_cases(names: Sequence[str]) -> tuple[str, ...]:
     faults = Faults()
     for name in names:
         if name not in CASES:
-            faults.add("--case", ", ".join(CASES), name)
+            faults.add("--case", ", ".join(CASES), repr(name))
     faults.raise_if_any(ConfigError)
     return tuple(dict.fromkeys(names)) or USUAL
 

@@ -185,7 +185,7 @@ def run_audit(
     faults = Faults()
     for name in names:
         if name not in CHANGES:
-            faults.add("--case", ", ".join(CHANGES), name)
+            faults.add("--case", ", ".join(CHANGES), repr(name))
     faults.raise_if_any(ConfigError)
     wanted = [CHANGES[name] for name in dict.fromkeys(names)] or list(CHANGES.values())
     rows, map_name = [], ""

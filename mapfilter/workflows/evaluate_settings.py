@@ -103,7 +103,7 @@ def _check(given: Sequence[str], config: Config) -> None:
     for key in given:
         why = _refused(key, config)
         if why:
-            faults.add(f"setting {key}", "no such setting in this benchmark", "one", why)
+            faults.add(f"setting {key}", "none, as the benchmark does not take it", "one", why)
     if config.prediction.model == "survey":
         faults.add("setting prediction.model", "a propagation model", "survey", _PREDICTS)
     faults.raise_if_any(ConfigError)

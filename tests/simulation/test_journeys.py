@@ -1,5 +1,7 @@
 """Walking at one speed; driving within the limits of ways, turns and accelerations."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -117,3 +119,8 @@ def test_every_wrong_value_is_told():
     message = str(caught.value)
     for part in ("length_m", "speed_mps", "walking or driving", "leg_m", "primary"):
         assert part in message
+
+
+def test_a_plan_travels_to_other_processes():
+    plan = JourneyPlan(length_m=500.0, profile="driving")
+    assert pickle.loads(pickle.dumps(plan)) == plan

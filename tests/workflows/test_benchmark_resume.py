@@ -33,3 +33,18 @@ def test_what_real_sessions_take_no_heed_of_is_refused(tmp_path):
     more = ["--case", "cell-6", "--filter", "grid", *settings(filter__bayes__scale=0.1)]
     told = mapfilter("evaluate", "ottawa", "--data", tmp_path, *more, "--out", tmp_path / "out")
     assert_refused(told, "--case", "--filter", "--set", "ottawa takes none")
+
+
+def test_two_workers_find_what_one_finds(world, tmp_path):
+    found = {}
+    for workers in (1, 2):
+        out = tmp_path / str(workers)
+        given = ["--filter", "candidate", "--case", "cell-6", "--case", "satellites-1"]
+        given += ["--runs", 4, "--workers", workers, "--out", out, "--json"]
+        told = mapfilter("evaluate", "global-positioning", "-c", world.benchmark_toml, *given)
+        assert_done(told)
+        batches = sorted((out / "batches").glob("*.json"))
+        rows = [row for batch in batches for row in json.loads(batch.read_text())["rows"]]
+        found[workers] = [{**row, "seconds": None} for row in rows]
+    assert len(found[1]) == 8
+    assert found[1] == found[2]
