@@ -1,7 +1,8 @@
 """State, motion and measurement models of the filters of TESA's scenarios.
 
-Everything here is available to a receiver, with one exception that its name states: the
-known-bearing model takes the bearing of the road from the simulation.
+Everything here is available to a receiver, with two exceptions: the law and the correlation
+distance of the shadowing are those of the simulation, and the known-bearing model, as its name
+states, takes the bearing of the road from it.
 """
 
 from __future__ import annotations
