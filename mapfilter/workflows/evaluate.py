@@ -99,6 +99,15 @@ def check_cases(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names)) or USUAL
 
 
+def _check_lengths(names: Sequence[str], fixed: frozenset[str]) -> None:
+    """See that no length was set for cases that have their own."""
+    own = [name for name in names if CASES[name].recovery_within_m > 0]
+    if own and "length_m" in fixed:
+        expected = f"none, as {' and '.join(own)} walk 800 m and 1 km"
+        hint = "name the other cases with --case"
+        raise fail(ConfigError, "setting journeys.length_m", expected, "one", hint)
+
+
 def run_global_positioning(
     config: Config,
     out: Path,
@@ -140,6 +149,7 @@ def run_global_positioning(
     began_s = time.perf_counter()
     wanted = check_cases(cases)
     choice = filter_choice(config.filter, config.area.resolution_m)
+    _check_lengths(wanted, fixed)
     ensure_writable_folder(out)
     world, points = _world(World.of(config), out / "world", seed)
     with local_executor(workers) as executor:

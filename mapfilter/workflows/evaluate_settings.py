@@ -51,6 +51,8 @@ _OF_PARTICLES = frozenset(
 )
 
 _OF_THE_CASES: Mapping[str, str] = {
+    "prediction.reality.level_error_db": "level_error_db",
+    "journeys.length_m": "length_m",
     "imu.sigma_orient_deg": "sigma_orient_rad",
     "imu.bias_deg": "heading_bias_sd_rad",
     "imu.drift_deg_per_sqrt_s": "heading_drift_rad_per_sqrt_s",

@@ -94,6 +94,11 @@ def test_only_one_case_has_10_db_in_the_same_ground_truth():
     assert usual.pop() - strange == pytest.approx(10.0, abs=0.5)
 
 
+def test_an_error_of_the_levels_that_was_set_holds_in_all_cases():
+    world, _ = run("levels-6", "levels-error10", fixed=frozenset({"level_error_db"}))
+    assert [error_db for _, error_db in world.truths] == [None]
+
+
 def test_only_one_case_lacks_ways():
     world, _ = run(*USUAL)
     thinned = [name for name, (_, less) in zip(USUAL, world.opened, strict=True) if less]

@@ -35,6 +35,12 @@ def test_what_real_sessions_take_no_heed_of_is_refused(tmp_path):
     assert_refused(told, "--case", "--filter", "--set", "ottawa takes none")
 
 
+def test_a_length_is_refused_where_cases_have_their_own(world, tmp_path):
+    given = ["-c", world.benchmark_toml, "--out", tmp_path, *settings(journeys__length_m=300.0)]
+    told = mapfilter("evaluate", "global-positioning", *given, "--case", "recovery-cell")
+    assert_refused(told, "journeys.length_m", "recovery-cell", "--case")
+
+
 def test_two_workers_find_what_one_finds(world, tmp_path):
     found = {}
     for workers in (1, 2):

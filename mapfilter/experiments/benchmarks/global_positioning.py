@@ -74,9 +74,10 @@ def _run_route(batch: Batch, route: int) -> list[Row]:
     truths: dict[float | None, Levels] = {}
     for name in batch.cases:
         case = CASES[name]
-        if case.level_error_db not in truths:
-            truths[case.level_error_db] = world.ground_truth(truth_seed, case.level_error_db)
-        levels = truths[case.level_error_db]
+        error_db = None if "level_error_db" in batch.fixed else case.level_error_db
+        if error_db not in truths:
+            truths[error_db] = world.ground_truth(truth_seed, error_db)
+        levels = truths[error_db]
         make = displaced_walk if case.recovery_within_m > 0 else walk
         walked = make(streets, settings.journey, batch.seed, route)
         log = log_of(case, walked, levels, streets, settings, batch.seed, route, batch.fixed)
