@@ -203,3 +203,10 @@ def _keep_freed_memory() -> None:
 def _died() -> MapfilterError:
     hint = "out of memory: take fewer workers or a smaller tile_px; finished work is kept"
     return fail(MapfilterError, "worker processes", "all of them at work", "one that died", hint)
+
+
+def part_of(progress: Progress | None, part: int, parts: int) -> Progress | None:
+    """Return a progress that counts one of several equal parts of the work."""
+    if progress is None:
+        return None
+    return lambda done, total: progress(part * total + done, parts * total)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mapfilter._io import write_json
-from mapfilter._parallel import Progress
+from mapfilter._parallel import Progress, part_of
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.experiments.benchmarks.scores import CaseResult
 from mapfilter.workflows.evaluate import TABLE, run_global_positioning
@@ -200,7 +200,7 @@ def run_audit(
             cases=(change.case,),
             workers=workers,
             resume=resume,
-            progress=_part(progress, number, len(wanted)),
+            progress=part_of(progress, number, len(wanted)),
             fixed=fixed,
         )
         map_name = result.map
@@ -217,10 +217,3 @@ def run_audit(
     audit = AuditResult(map_name, seed, tuple(rows), time.perf_counter() - began_s, out)
     write_json(out / TABLE, facts(audit))
     return audit
-
-
-def _part(progress: Progress | None, part: int, parts: int) -> Progress | None:
-    """Return a progress that counts one of several equal parts of the work."""
-    if progress is None:
-        return None
-    return lambda done, total: progress(part * total + done, parts * total)

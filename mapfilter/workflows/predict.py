@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from mapfilter import __version__
 from mapfilter._io import ensure_writable_folder
-from mapfilter._parallel import Progress
+from mapfilter._parallel import Progress, part_of
 from mapfilter.radio.cells import write_cell_plan
 from mapfilter.radio.predict import (
     PredictionModel,
@@ -88,12 +88,14 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     heights_m = world.heights_m
     wanted = 2 if config.prediction.reality.write else 1
     tags = {"SOFTWARE": f"mapfilter {__version__}", "MODEL": model.model, "MAP": world.map_name}
-    levels = predict(plan, lattice, heights_m, model, _part(progress, 0, wanted), antennas=antennas)
+    levels = predict(
+        plan, lattice, heights_m, model, part_of(progress, 0, wanted), antennas=antennas
+    )
     write_rasters(target, lattice, levels, plan.ids, tags)
     if wanted == 2:
         errors = ground_truth_errors(config.prediction)
         real = realise(
-            plan, lattice, heights_m, model, errors, _part(progress, 1, wanted), antennas=antennas
+            plan, lattice, heights_m, model, errors, part_of(progress, 1, wanted), antennas=antennas
         )
         write_rasters(reality, lattice, real, plan.ids, {**tags, **reality_tags(target)})
     plan_path = config.output.dir / "cells.csv"
@@ -117,10 +119,3 @@ def prediction_model(section: Prediction) -> PredictionModel:
 def ground_truth_errors(section: Prediction) -> RealityErrors:
     """Return how a configuration's ground truth differs from its prediction."""
     return RealityErrors(**section.reality.model_dump(exclude={"write"}))
-
-
-def _part(progress: Progress | None, part: int, parts: int) -> Progress | None:
-    """Return a progress that counts one of several equal parts of the work."""
-    if progress is None:
-        return None
-    return lambda done, total: progress(part * total + done, parts * total)

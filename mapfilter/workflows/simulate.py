@@ -73,7 +73,8 @@ def run_simulate(config: Config, progress: Progress | None = None) -> SimulateRe
     total = settings.journeys * settings.draws
     with atomic_dir(config.track_path) as folder:
         track_m = 0.0
-        inside = inside_buildings(world.heights_m, world.lattice)
+        on_pavement = section.beside != "centre"
+        inside = inside_buildings(world.heights_m, world.lattice) if on_pavement else None
         journeys = simulate_journeys(network, levels, world.plan, settings, section.seed, inside)
         for done, (name, log) in enumerate(journeys, start=1):
             write_log(log, folder / name)
