@@ -131,7 +131,8 @@ def path_beside(
 
     The distance from the centre line follows the class of way and changes its sign where the
     street is crossed, both over about ten metres; corners are cut by as much. Where a building
-    stands on the pavement, one walks closer to the centre line.
+    stands on the pavement, one walks closer to the centre line. A walker on the centre line cuts no
+    corners.
 
     Parameters
     ----------
@@ -145,6 +146,8 @@ def path_beside(
     distance = np.linspace(0.0, along.length_m, count + 1)
     spacing = distance[1]
     east, north, _ = along.at(distance)
+    if walker.on_centre_line:
+        return WalkedPath(distance, distance, east, north)
     segment = np.searchsorted(along.corner_m, distance, side="right") - 1
     segment = np.clip(segment, 0, len(along.way_id) - 1)
     crossings = rng.random(distance.size) < spacing / walker.change_side_m

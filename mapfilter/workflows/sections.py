@@ -19,6 +19,7 @@ from mapfilter.workflows.fields import (
     EMBEDDED_MAP,
     MADE_MAPS,
     NO_MAP,
+    Beside,
     Box,
     FilePath,
     FilterName,
@@ -190,7 +191,7 @@ class Journeys(Section):
     max_neighbours: Annotated[int, Field(ge=0, le=32)] = 6
     sensitivity_dbm: Annotated[float, Field(ge=-150, le=0)] = -104.0
     phone_offset_sd_db: NotNegative = 0.0
-    beside: Literal["centre", "pavement"] | Annotated[float, Field(ge=0, le=50)] = "centre"
+    beside: Beside = "centre"
     change_side_m: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 150.0
     stop_every_m: NotNegative = 0.0
     stop_s: NotNegative = 20.0

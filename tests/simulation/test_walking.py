@@ -154,6 +154,21 @@ def test_the_truth_keeps_its_speed_and_its_way():
         journey(along, plan)
 
 
+def test_a_walker_on_the_centre_line_cuts_no_corners():
+    corner = Route(
+        np.array([0.0, 40.0, 40.0]),
+        np.array([0.0, 0.0, 30.0]),
+        np.array([1, 2]),
+        np.zeros(2, dtype=np.int16),
+        ("residential",),
+    )
+    path = path_beside(corner, WalkerModel(stop_every_m=100.0), np.random.default_rng(0))
+    assert path.walked_m[-1] == path.distance_m[-1] == 70.0
+    at = np.flatnonzero(path.distance_m == 40.0)
+    assert (path.east_m[at].item(), path.north_m[at].item()) == (40.0, 0.0)
+    assert np.all((path.north_m == 0) | (path.east_m == 40.0))
+
+
 def test_a_walker_on_the_centre_line_needs_no_draws():
     along = route_of([0, 100, 100], [0, 0, 100])
     plain = journey(along, JourneyPlan())
