@@ -13,13 +13,12 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pyproj import CRS, Proj, Transformer
 from pyproj.exceptions import CRSError, ProjError
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
-
-Floats = NDArray[np.float64]
 
 
 def wrap_rad(angle_rad: ArrayLike) -> Floats:

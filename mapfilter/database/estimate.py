@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
+from mapfilter._types import Floats
 from mapfilter.database.build import FLOOR_DBM, MARGIN_DB, TILE_PX, BuildJob, check_parameters
 from mapfilter.database.columns import write_columns
 from mapfilter.database.parts import (
@@ -23,7 +24,6 @@ from mapfilter.database.parts import (
 from mapfilter.database.sources import LaidRoutes, Routes
 from mapfilter.database.store import cells_table
 from mapfilter.database.tiles import read_tile
-from mapfilter.geodesy import Floats
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rasters import RxLevRasters
 from mapfilter.roads.geoparquet import geo_metadata

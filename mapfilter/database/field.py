@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import distance_transform_edt
 
+from mapfilter._types import Bools, Floats32, Ints
 from mapfilter.geodesy import Lattice
-
-Floats32 = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,8 +41,8 @@ class RadioField:
     cell_ids: tuple[str, ...]
     level_dbm: Floats32
     distance_to_way_m: Floats32
-    way_id: NDArray[np.int64]
-    on_way: NDArray[np.bool_]
+    way_id: Ints
+    on_way: Bools
 
     def levels_at(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats32:
         """Return the levels at positions, shape (N, cells); NaN below the floor or off the area.
@@ -63,7 +62,7 @@ class RadioField:
 def fill_field(
     window: Lattice,
     pixels: tuple[NDArray[Any], NDArray[Any]],
-    way_id: NDArray[np.int64],
+    way_id: Ints,
     distance_m: Floats32,
     heard: Sequence[tuple[str, NDArray[Any], NDArray[Any], Floats32]],
 ) -> RadioField:

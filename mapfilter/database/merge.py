@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
 from mapfilter._io import atomic_dir, check_replaceable, sha256_file
 from mapfilter._parallel import Progress
+from mapfilter._types import Floats, Ints
 from mapfilter.database.assemble import Head, write_parts
 from mapfilter.database.manifest import FORMAT, MANIFEST, POINTS, InputFile
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -189,7 +189,7 @@ def _places(sources: Sequence[_Source], lattice: Lattice, window: Window) -> pa.
 def _levels(
     sources: Sequence[_Source],
     plan: CellPlan,
-    point: NDArray[np.int64],
+    point: Ints,
     lattice: Lattice,
     window: Window,
     floor_dbm: float,
@@ -197,7 +197,7 @@ def _levels(
     """Return what is heard at the places of a tile."""
     sorter = point.argsort()
     row, col = np.divmod(point, lattice.cols)
-    by_cell: dict[int, NDArray[np.float64]] = {}
+    by_cell: dict[int, Floats] = {}
     for source in sources:
         inside = source.window(window)
         if inside is None:

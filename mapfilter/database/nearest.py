@@ -10,12 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import Floats, Lattice
-
-Ints = NDArray[np.int64]
+from mapfilter.geodesy import Lattice
 
 
 @dataclass(frozen=True, slots=True, eq=False)

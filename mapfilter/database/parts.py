@@ -13,10 +13,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.database.columns import open_writer, write_columns
 from mapfilter.database.manifest import POINTS, describe_part, levels_folders
 from mapfilter.database.tiles import TileLevels, TileRows
-from mapfilter.geodesy import Floats
 from mapfilter.roads.geoparquet import dictionary, geo_metadata, point_coordinates
 
 LevelsRows = dict[str, NDArray[Any]]

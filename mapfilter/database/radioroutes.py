@@ -10,8 +10,8 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats32, Ints, Ints32
 from mapfilter.database.columns import read_columns
 from mapfilter.database.field import RadioField as RadioField
 from mapfilter.database.field import fill_field
@@ -21,8 +21,7 @@ from mapfilter.errors import InputError, StoreError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
 
-Rows = NDArray[np.int32]
-Floats32 = NDArray[np.float32]
+Rows = Ints32
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,12 +46,12 @@ class Points:
         Best level above the second best, NaN where only one cell is predicted.
     """
 
-    point: NDArray[np.int64]
+    point: Ints
     row: Rows
     col: Rows
-    way_id: NDArray[np.int64]
+    way_id: Ints
     way_class: tuple[Rows, tuple[str, ...]]
-    on_square: NDArray[np.bool_]
+    on_square: Bools
     distance_to_way_m: Floats32
     best_server: Rows
     best_level_dbm: Floats32
@@ -227,9 +226,7 @@ class RadioRouteDatabase:
             raise fail(InputError, "area", f"an area within {covered}", bounds_m, hint)
         return top, left, self.lattice.window(top, left, rows, cols)
 
-    def _cell_levels(
-        self, cell_id: str
-    ) -> tuple[NDArray[np.int64], Rows, Rows, Floats32, Floats32]:
+    def _cell_levels(self, cell_id: str) -> tuple[Ints, Rows, Rows, Floats32, Floats32]:
         columns = ["point", "row", "col", "level_dbm", "below_best_db"]
         kinds = (np.int64, np.int32, np.int32, np.float32, np.float32)
         tables = []
@@ -242,7 +239,7 @@ class RadioRouteDatabase:
         )
         return point, row, col, level, below
 
-    def _check_places(self, file: Path, point: NDArray[np.int64], row: Rows, col: Rows) -> None:
+    def _check_places(self, file: Path, point: Ints, row: Rows, col: Rows) -> None:
         """See that the points of a part lie on the lattice."""
         numbers = row.astype(np.int64) * self.lattice.cols + col
         if not (np.array_equal(point, numbers) and self.lattice.contains(row, col).all()):

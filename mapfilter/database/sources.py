@@ -12,6 +12,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely import STRtree
 
+from mapfilter._types import Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.roads.lattice import RouteLattice
@@ -104,12 +105,12 @@ class LaidRoutes:
     def _corner(self, window: Lattice) -> tuple[int, int]:
         return pixels_between(self.lattice, window)
 
-    def _inside(self, window: Lattice) -> NDArray[np.int64]:
+    def _inside(self, window: Lattice) -> Ints:
         # The points are in row-major order: only the rows of the window are looked at.
         top, left = self._corner(window)
         first, last = np.searchsorted(self.points.row, [top, top + window.rows])
         col = self.points.col[first:last]
-        inside: NDArray[np.int64] = np.flatnonzero((col >= left) & (col < left + window.cols))
+        inside: Ints = np.flatnonzero((col >= left) & (col < left + window.cols))
         return inside + int(first)
 
 
@@ -234,7 +235,7 @@ def _areas_near(areas: AreaIndex | None, window: Lattice) -> AreaIndex | None:
     return AreaIndex.of(areas.geometry[near])
 
 
-def _reaching(index: WayIndex, window: Lattice, least_m: float = 0.0) -> NDArray[np.int64]:
+def _reaching(index: WayIndex, window: Lattice, least_m: float = 0.0) -> Ints:
     """Return the segments that reach a window, or are at most ``least_m`` away from it."""
     west, south, east, north = window.bounds_m
     reach_m = max(float(index.half_width_m.max(initial=0.0)), least_m)

@@ -9,15 +9,14 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from mapfilter._types import Floats, Floats32, Ints, Ints32
 from mapfilter.database.sources import RoutePart
 from mapfilter.database.windows import Window
-from mapfilter.geodesy import Floats, Lattice
+from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rasters import RxLevRasters
 from mapfilter.roads.geoparquet import dictionary, point_geometry
 from mapfilter.roads.lattice import RouteLattice
-
-Floats32 = NDArray[np.float32]
 
 _CELLS_AT_A_TIME = 128
 
@@ -66,11 +65,11 @@ class TileLevels:
         Rounded to 0.01 dB.
     """
 
-    best: NDArray[np.int32]
+    best: Ints32
     best_level_dbm: Floats32
     margin_db: Floats32
-    cell: NDArray[np.int32]
-    which: NDArray[np.int32]
+    cell: Ints32
+    which: Ints32
     level_dbm: Floats32
     below_best_db: Floats32
 
@@ -219,7 +218,7 @@ def places_table(routes: RouteLattice, lattice: Lattice) -> pa.Table:
     )
 
 
-def z_order(row: NDArray[np.int64], col: NDArray[np.int64]) -> NDArray[np.uint64]:
+def z_order(row: Ints, col: Ints) -> NDArray[np.uint64]:
     """Return positions along the Z-order (Morton) curve: the bits of row and col in turns.
 
     Examples
@@ -230,7 +229,7 @@ def z_order(row: NDArray[np.int64], col: NDArray[np.int64]) -> NDArray[np.uint64
     return (_spread(row) << np.uint64(1)) | _spread(col)
 
 
-def _spread(number: NDArray[np.int64]) -> NDArray[np.uint64]:
+def _spread(number: Ints) -> NDArray[np.uint64]:
     """Put a zero between any two bits of 32-bit numbers."""
     bits = np.asarray(number).astype(np.uint64)
     for shift, mask in (

@@ -8,7 +8,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mapfilter.filters.contract import Floats
+from mapfilter._types import Floats
 from mapfilter.positioning.estimate import TrackEstimate
 
 SUCCESS_RADIUS_M = 50.0

@@ -10,14 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
 from mapfilter.filters.gaussian import factor_of
 from mapfilter.models.protocols import GaussianMeasurement
 from mapfilter.models.state import StateLayout
-
-Floats = NDArray[np.float64]
 
 _BATCH = 20_000
 

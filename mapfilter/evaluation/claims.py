@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from math import inf, nan
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth, position_errors_m
-from mapfilter.filters.contract import Floats, Status
+from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import TrackEstimate
-
-Bools = NDArray[np.bool_]
 
 RADII = (50, 67, 95)
 """Per cent of the belief that the radii of an estimate hold."""

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
+from mapfilter._types import Floats
 from mapfilter.evaluation.success import wilson_interval
-from mapfilter.filters.contract import Floats
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numba import njit
 
+from mapfilter._types import Floats
 from mapfilter.evaluation.radio_map import (
     MOST_HEARD,
     ErrorModel,
@@ -22,7 +23,6 @@ from mapfilter.evaluation.radio_map import (
     distance_squared,
     heard_cells,
 )
-from mapfilter.geodesy import Floats
 
 COMPARED = 500
 

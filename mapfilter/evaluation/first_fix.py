@@ -21,14 +21,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from mapfilter._parallel import Progress
+from mapfilter._types import Bools, Floats
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
 from mapfilter.evaluation.ideal_filter import judged_by_cells, judged_by_levels, walk
-from mapfilter.evaluation.radio_map import ErrorModel, Indices, RadioMap
-from mapfilter.geodesy import Floats
+from mapfilter.evaluation.radio_map import ErrorModel, Ints, RadioMap
 
 _AT_A_TIME = 128
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
@@ -102,17 +101,17 @@ class FirstFix:
         Probability of taking the twin for the truth, or the reverse: 0.5 is a perfect twin.
     """
 
-    start: Indices
+    start: Ints
     cells_m: Floats
     levels_m: Floats
-    right: NDArray[np.bool_]
+    right: Bools
     cells_bits: Floats
     levels_bits: Floats
-    twin: Indices
+    twin: Ints
     twin_error: Floats
 
 
-def starts(radio: RadioMap, spacing_m: float) -> Indices:
+def starts(radio: RadioMap, spacing_m: float) -> Ints:
     """Return one point for each square of a side that has any, in row-major order.
 
     It is the first of the square's points in the order of a hash, so neither corner is preferred.

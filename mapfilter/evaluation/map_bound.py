@@ -6,15 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from mapfilter._parallel import Progress
+from mapfilter._types import Floats, Floats32
 from mapfilter.evaluation.distinctness import Distinctness, distinctness
 from mapfilter.evaluation.first_fix import FirstFix, FirstFixOptions, first_fix
 from mapfilter.evaluation.position_bound import PositionBound, position_bound
 from mapfilter.evaluation.radio_map import ErrorModel, RadioMap
-from mapfilter.geodesy import Floats
 
 TWIN_ERROR = 0.3
 """Two places count as twins when they are mistaken for each other with at least this chance."""
@@ -141,7 +140,7 @@ def map_bound(
     )
 
 
-def on_lattice(radio: RadioMap, values: Floats) -> NDArray[np.float32]:
+def on_lattice(radio: RadioMap, values: Floats) -> Floats32:
     """Return values of points as a raster, NaN elsewhere."""
     raster = np.full(radio.on_way.shape, np.nan, dtype=np.float32)
     raster[radio.row, radio.col] = values

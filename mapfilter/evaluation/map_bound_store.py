@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import rasterio
-from numpy.typing import NDArray
 from rasterio._err import CPLE_BaseError
 from rasterio.errors import RasterioError
 from rasterio.shutil import copy as copy_raster
 
 from mapfilter._io import atomic_file
+from mapfilter._types import Floats32
 from mapfilter.errors import OutputError, fail
 from mapfilter.evaluation.map_bound import BANDS
 from mapfilter.geodesy import Lattice
@@ -21,7 +21,7 @@ _BLOCK_PX = 512
 
 
 def write_bound(
-    rasters: Mapping[str, NDArray[np.float32]], lattice: Lattice, path: Path, attribution: str = ""
+    rasters: Mapping[str, Floats32], lattice: Lattice, path: Path, attribution: str = ""
 ) -> None:
     """Write the rasters of :data:`mapfilter.evaluation.map_bound.BANDS`, NaN off the points.
 

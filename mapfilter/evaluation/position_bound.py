@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from mapfilter._types import Floats
 from mapfilter.evaluation.radio_map import MOST_HEARD, ErrorModel, RadioMap, heard_cells
-from mapfilter.geodesy import Floats
 
 _STREET_M = 25.0
 # A fit across less than this share of the window says nothing of that direction.

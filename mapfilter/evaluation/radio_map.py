@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
+from mapfilter._types import Bools, Floats32, Ints
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.geodesy import Lattice
@@ -18,8 +18,6 @@ MOST_HEARD = 7
 MOST_LEVELS = 1_000_000_000
 
 _TOLERANCE_PX = 1.0
-
-Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,21 +101,21 @@ class RadioMap:
 
     lattice: Lattice
     cell_ids: tuple[str, ...]
-    site: Indices
-    level_dbm: NDArray[np.float32]
+    site: Ints
+    level_dbm: Floats32
     floor_dbm: float
     margin_db: float
-    on_way: NDArray[np.bool_]
-    near_way: NDArray[np.bool_]
-    row: Indices
-    col: Indices
-    way_id: Indices
-    server: Indices
+    on_way: Bools
+    near_way: Bools
+    row: Ints
+    col: Ints
+    way_id: Ints
+    server: Ints
 
     def __len__(self) -> int:
         return int(self.row.size)
 
-    def points_by_cell(self) -> tuple[Indices, Indices]:
+    def points_by_cell(self) -> tuple[Ints, Ints]:
         """Return the points where one can be when a cell serves, for all cells.
 
         A point belongs to its strongest cell and to those at most the margin weaker.

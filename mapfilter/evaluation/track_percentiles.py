@@ -10,12 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats
 from mapfilter.errors import InputError, fail
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 RESAMPLES = 500
 _SEED = 1997

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats, Ints
 from mapfilter.filters._square_root import settle_lanes, solve_lanes, through_lanes, whiten_lanes
 from mapfilter.filters._updates import (
     UPDATE_SIGNATURE,
@@ -16,10 +16,6 @@ from mapfilter.filters._updates import (
     noise_lanes,
     present_lanes,
 )
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 _SETTLED = 1e-9
 _ROUNDING = 1e-8

@@ -6,13 +6,10 @@ from typing import Any
 
 import numpy as np
 from numba import float64, int64, njit, types
-from numpy.typing import NDArray
 
 from mapfilter._kernels import hashed, normals
+from mapfilter._types import Floats, Floats32, Ints, Ints32
 from mapfilter.filters._updates import MEASURE_SIGNATURE
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _LANES = 256
 """Particles that are weighed at once: what they need stays in the nearest cache."""
@@ -252,7 +249,7 @@ def weigh(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def copies(state: Floats, chosen: NDArray[np.int32], out: Floats) -> None:  # pragma: no cover
+def copies(state: Floats, chosen: Ints32, out: Floats) -> None:  # pragma: no cover
     """Write the chosen particles of ``state`` (n, N) to ``out`` (n, M)."""
     for i in range(state.shape[0]):
         source, to = state[i], out[i]
@@ -261,7 +258,7 @@ def copies(state: Floats, chosen: NDArray[np.int32], out: Floats) -> None:  # pr
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def means(state: Floats, weight: NDArray[np.float32]) -> Floats:  # pragma: no cover
+def means(state: Floats, weight: Floats32) -> Floats:  # pragma: no cover
     """Return the weighted mean of particles (n, N), counted from the first one of them."""
     mean, total = np.empty(state.shape[0]), 0.0
     for k in range(weight.size):
@@ -276,7 +273,7 @@ def means(state: Floats, weight: NDArray[np.float32]) -> Floats:  # pragma: no c
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def sums(state: Floats, weight: NDArray[np.float32]) -> tuple[Floats, Floats]:  # pragma: no cover
+def sums(state: Floats, weight: Floats32) -> tuple[Floats, Floats]:  # pragma: no cover
     """Return the weighted mean and covariance of particles (n, N)."""
     n, count = state.shape
     mean, spread, total = means(state, weight), np.zeros((n, n)), 0.0

@@ -6,13 +6,10 @@ from typing import Any
 
 import numpy as np
 from numba import boolean, float64, int64, njit, types, void
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats, Ints
 from mapfilter.filters._square_root import covariance_lanes, predict_lanes
 from mapfilter.filters._updates import MEASURE_SIGNATURE, UPDATE_SIGNATURE
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

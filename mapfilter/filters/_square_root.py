@@ -16,10 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mapfilter._types import Floats, Ints
 
 _ROUNDING = 4e-15
 

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import boolean, float64, int64, njit, types, void
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats
 from mapfilter.filters._square_root import cholesky_lanes
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 _LOG_TWO_PI = np.log(2 * np.pi)
 

@@ -20,10 +20,10 @@ from math import cos, isfinite, nan, sin
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats, Ints
 from mapfilter.filters.candidate_options import CandidateOptions
-from mapfilter.filters.contract import Estimate, Floats, MotionStep, Reason, Status, UpdateInfo
+from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
 
 
 class PointSet(Protocol):
@@ -45,7 +45,7 @@ class PointSet(Protocol):
 
     def nearest(
         self, east_m: Floats, north_m: Floats, max_distance_m: float
-    ) -> tuple[NDArray[np.int64], Floats]:
+    ) -> tuple[Ints, Floats]:
         """Return (indices (N,), distances in metres (N,))."""
 
 

@@ -11,9 +11,8 @@ from enum import StrEnum
 from typing import Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from mapfilter._types import Floats
 
 PriorT = TypeVar("PriorT", contravariant=True)
 BeliefT = TypeVar("BeliefT")

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.filters._mixture_runs import run_mixture
 from mapfilter.filters.gaussian import Method, factor_of
@@ -25,9 +26,6 @@ from mapfilter.filters.trials import (
     kernel_of,
     method_numbers,
 )
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

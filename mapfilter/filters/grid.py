@@ -15,14 +15,12 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
 from mapfilter.filters.grid_transport import shifted, taps, turned
 from mapfilter.filters.hypotheses import Bins, Summary, nothing, summarise
 from mapfilter.filters.particle_options import ParticleOptions
 from mapfilter.filters.switch import switched
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
 
 PriorT = TypeVar("PriorT", contravariant=True)
 ReadingT = TypeVar("ReadingT", contravariant=True)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
-Floats32 = NDArray[np.float32]
+from mapfilter._types import Floats32
 
 _REACH_SD = 4.0
 _READ_INTO_PIXELS = 1 / 6

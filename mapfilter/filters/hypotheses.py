@@ -13,10 +13,8 @@ from math import ceil, log, nan
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
+from mapfilter._types import Floats, Floats32, Ints32
 
 NEAR_M = 50.0
 SHARES = (0.50, 0.67, 0.95)
@@ -149,7 +147,7 @@ def nothing(rows: int) -> Summary:
 
 
 @njit(error_model="numpy", cache=True)
-def _leader(mass: Floats32, touched: NDArray[np.int32]) -> tuple[int, float]:
+def _leader(mass: Floats32, touched: Ints32) -> tuple[int, float]:
     """Return the touched bin whose neighbourhood is the heaviest, and that mass."""
     rows, cols = mass.shape
     best, most = -1, 0.0
@@ -167,7 +165,7 @@ def _leader(mass: Floats32, touched: NDArray[np.int32]) -> tuple[int, float]:
 @njit(error_model="numpy", cache=True)
 def _bin_masses(
     east: Floats32, north: Floats32, weight: Floats32, west_m: float, south_m: float,
-    size_m: float, mass: Floats32, touched: NDArray[np.int32],
+    size_m: float, mass: Floats32, touched: Ints32,
 ) -> int:  # fmt: skip
     rows, cols = mass.shape
     per_m, w, s = np.float32(1 / size_m), np.float32(west_m), np.float32(south_m)

@@ -9,12 +9,11 @@ from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapfilter._types import Floats
 from mapfilter.filters.gaussian import Gaussian, Method, factor_of
 from mapfilter.filters.trials import CompiledMeasurement, run_trials
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

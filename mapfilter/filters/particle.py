@@ -14,17 +14,14 @@ from math import isfinite, nan
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapfilter._kernels import draw_key
+from mapfilter._types import Floats, Floats32, Ints32
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
 from mapfilter.filters.hypotheses import Bins, Summary, flattened, nothing, summarise
 from mapfilter.filters.particle_options import ParticleOptions
 from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
 from mapfilter.filters.switch import switched
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
 
 PriorT = TypeVar("PriorT", contravariant=True)
 ReadingT = TypeVar("ReadingT", contravariant=True)
@@ -215,7 +212,7 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         wanted: int,
         status: Status,
         rng: np.random.Generator,
-    ) -> tuple[Floats32, NDArray[np.int32]]:
+    ) -> tuple[Floats32, Ints32]:
         chosen = np.empty(wanted, dtype=np.int32)
         systematic(weight, rng.random(), chosen)
         copies = np.empty((state.shape[0], wanted), dtype=np.float32)

@@ -17,9 +17,10 @@ from dataclasses import dataclass
 from math import isfinite, nan
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mapfilter._kernels import draw_key
+from mapfilter._types import Floats, Floats32, Ints
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.filters._rao_blackwell import copies, gains, means, move, propagate, sums, weigh
 from mapfilter.filters.gaussian import Gaussian, factor_of
@@ -27,10 +28,6 @@ from mapfilter.filters.kalman import Taken
 from mapfilter.filters.resampling import normalise, systematic
 from mapfilter.filters.sir_options import SIR, SirOptions
 from mapfilter.filters.trials import CompiledMeasurement
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
-Ints = NDArray[np.int64]
 
 _LOG_TWO_PI = float(np.log(2 * np.pi))
 

@@ -8,12 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from mapfilter._kernels import exp32, hashed, normals
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
+from mapfilter._types import Floats, Floats32, Ints32
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
@@ -61,7 +58,7 @@ def normalise(log_weight: Floats, weight: Floats32) -> tuple[float, float]:
 
 
 @njit(error_model="numpy", cache=True)
-def systematic(weight: Floats32, offset: float, chosen: NDArray[np.int32]) -> None:
+def systematic(weight: Floats32, offset: float, chosen: Ints32) -> None:
     """Fill which particle each of M new ones copies.
 
     Parameters
@@ -92,7 +89,7 @@ def systematic(weight: Floats32, offset: float, chosen: NDArray[np.int32]) -> No
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def copy_with_jitter(
-    state: Floats32, chosen: NDArray[np.int32], jitter: Floats32, key: np.uint64, copies: Floats32
+    state: Floats32, chosen: Ints32, jitter: Floats32, key: np.uint64, copies: Floats32
 ) -> None:
     """Copy particles and move each copy by normal noise, so that copies of one part.
 

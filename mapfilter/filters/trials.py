@@ -13,14 +13,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.filters._runs import run_lanes
 from mapfilter.filters.gaussian import Method, factor_of
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 LANES = 64
 """Trials that a kernel takes at once."""

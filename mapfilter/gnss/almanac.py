@@ -6,11 +6,9 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError, fail
-
-Floats = NDArray[np.float64]
 
 WEEK_S = 604_800.0
 
@@ -59,7 +57,7 @@ class Almanac:
     node_rate_rad_s: Floats
     perigee_rad: Floats
     anomaly_rad: Floats
-    healthy: NDArray[np.bool_]
+    healthy: Bools
 
     def __post_init__(self) -> None:
         faults = Faults()
@@ -92,7 +90,7 @@ class Almanac:
         """Return the healthy satellites."""
         return self.only(np.flatnonzero(self.healthy))
 
-    def only(self, index: NDArray[np.int64]) -> Almanac:
+    def only(self, index: Ints) -> Almanac:
         """Return some of the satellites, by their indices."""
         kept = {f.name: getattr(self, f.name)[index] for f in fields(self) if f.name != "names"}
         return replace(self, names=tuple(self.names[i] for i in index), **kept)

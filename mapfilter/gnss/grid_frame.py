@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapfilter._types import Floats
 from mapfilter.geodesy import unproject
 from mapfilter.gnss.sky import LocalFrame, ecef_from_lonlat
-
-Floats = NDArray[np.float64]
 
 _ARM_M = 100.0
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 from scipy.special import log_ndtr
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
-
-Floats = NDArray[np.float64]
 
 
 def elevation_sigma_m(elevation_rad: ArrayLike, zenith_m: float = 2.0) -> Floats:

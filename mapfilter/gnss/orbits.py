@@ -5,12 +5,11 @@ from __future__ import annotations
 from datetime import UTC, datetime
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.gnss.almanac import WEEK_S, Almanac
-
-Floats = NDArray[np.float64]
 
 EARTH_GRAVITY_M3_S2 = 3.986005e14
 """μ of IS-GPS-200, as receivers take it."""

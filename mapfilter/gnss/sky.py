@@ -9,12 +9,11 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pyproj import Transformer
 
+from mapfilter._types import Bools, Floats
 from mapfilter.errors import Faults, InputError, fail
-
-Floats = NDArray[np.float64]
 
 
 @lru_cache(maxsize=1)
@@ -120,7 +119,7 @@ class Directions:
     elevation_rad: Floats
     azimuth_rad: Floats
 
-    def above(self, mask_deg: float) -> NDArray[np.bool_]:
+    def above(self, mask_deg: float) -> Bools:
         """Tell which are higher than a mask; satellites below the horizon never are.
 
         Raises

@@ -9,12 +9,9 @@ import shapely
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.gnss.sky import Directions
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 _MOST_PAIRS = 2_000_000
 

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from mapfilter._types import Floats
 
 _LN2 = 0.6931471805599453
 _SQRT_HALF_BITS = 0x3FE6A09E00000000

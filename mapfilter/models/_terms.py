@@ -21,12 +21,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import float64, int64, njit, types, void
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats, Ints
 from mapfilter.models._lanes import atan2_lanes, log_lanes
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 COLUMNS = 13
 RANGE, LEVEL, DIFFERENCE, COMPONENT = 0.0, 1.0, 2.0, 3.0

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import log_ndtr
 
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
+from mapfilter._types import Floats, Floats32, Ints32
 
 _F = np.float32
 _STEPS_PER_DB = 4
@@ -62,7 +61,7 @@ def serving_table(weights: ServingWeights) -> Floats32:
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def weigh_by_serving(
-    pixel: NDArray[np.int32],
+    pixel: Ints32,
     level_dbm: Floats32,
     bands: int,
     cell: int,

@@ -12,8 +12,8 @@ from typing import Literal
 
 import numpy as np
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
-from mapfilter.models.protocols import Floats
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 

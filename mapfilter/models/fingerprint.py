@@ -16,13 +16,10 @@ from math import exp
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
 from mapfilter._kernels import cos_sin32, exp32, log32
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
+from mapfilter._types import Floats, Floats32, Ints32
 
 _F = np.float32
 _STEPS_PER_SD = 32
@@ -86,7 +83,7 @@ class LevelReading:
         Displacement by dead reckoning since the last report.
     """
 
-    cell: NDArray[np.int32]
+    cell: Ints32
     offset_db: Floats32
     rho: Floats32
     scale: Floats32
@@ -111,7 +108,7 @@ class BoundReading:
     sd_db, weight : float
     """
 
-    cells: NDArray[np.int32]
+    cells: Ints32
     level_dbm: float
     censored: int
     sd_db: float
@@ -135,7 +132,7 @@ def pixels(
     per_m: float,
     rows: int,
     cols: int,
-    pixel: NDArray[np.int32],
+    pixel: Ints32,
 ) -> None:
     """Find the pixel that holds each hypothesis, or held it some displacement ago.
 
@@ -171,11 +168,11 @@ def pixels(
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def weigh_by_levels(
-    pixel: NDArray[np.int32],
-    before: NDArray[np.int32],
+    pixel: Ints32,
+    before: Ints32,
     level_dbm: Floats32,
     bands: int,
-    cell: NDArray[np.int32],
+    cell: Ints32,
     offset_db: Floats32,
     rho: Floats32,
     scale: Floats32,
@@ -213,10 +210,10 @@ def weigh_by_levels(
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def weigh_by_bound(
-    pixel: NDArray[np.int32],
+    pixel: Ints32,
     level_dbm: Floats32,
     bands: int,
-    cells: NDArray[np.int32],
+    cells: Ints32,
     reported_dbm: float,
     censored: int,
     sd_db: float,

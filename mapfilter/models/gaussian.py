@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.models._terms import COLUMNS, measure
-from mapfilter.models.protocols import Floats, fisher_information
+from mapfilter.models.protocols import fisher_information
 from mapfilter.models.state import StateLayout
 
 _LOG_TWO_PI = float(np.log(2 * np.pi))
@@ -53,12 +54,12 @@ class GaussianTerms:
         return int(self.rows.shape[0])
 
     @cached_property
-    def uses(self) -> NDArray[np.int64]:
+    def uses(self) -> Ints:
         """Indices of the components of the state that matter."""
         return np.array(self.layout.uses, dtype=np.int64)
 
     @cached_property
-    def slots(self) -> NDArray[np.int64]:
+    def slots(self) -> Ints:
         """Places of east, north, up and clock within :attr:`uses`; -1 for none."""
         up, clock = self.layout.up, self.layout.clock
         last = len(self.layout.uses) - 1

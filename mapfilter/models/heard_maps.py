@@ -18,13 +18,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from mapfilter._types import Bools, Floats, Floats32, Ints, Ints32
 from mapfilter.geodesy import Lattice
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
 
 _CLIP_SD = 4.0
 
@@ -64,7 +61,7 @@ class HeardRows:
         Steps; NaN where it was not told.
     """
 
-    cell: NDArray[np.int64]
+    cell: Ints
     east_m: Floats
     north_m: Floats
     timing_advance: Floats
@@ -88,7 +85,7 @@ class HeardMaps:
 
     @classmethod
     def of_rows(
-        cls, rows: HeardRows, lattice: Lattice, site: NDArray[np.int64], options: HeardOptions
+        cls, rows: HeardRows, lattice: Lattice, site: Ints, options: HeardOptions
     ) -> HeardMaps:
         """Count rows on a lattice.
 
@@ -110,7 +107,7 @@ class HeardMaps:
         scale = 2 * np.pi * max(sigma, 1 / np.sqrt(2 * np.pi)) ** 2
         shape = (lattice.rows, lattice.cols)
 
-        def spread(which: NDArray[np.bool_], value: Floats) -> Floats:
+        def spread(which: Bools, value: Floats) -> Floats:
             count = np.bincount(pixel[which], value[which], minlength=shape[0] * shape[1])
             smooth = gaussian_filter(count.reshape(shape), sigma, mode="constant", truncate=3.0)
             return np.asarray(scale * smooth, dtype=np.float64).ravel()
@@ -138,11 +135,11 @@ class HeardMaps:
                 maps[1, band], maps[2, band] = first, np.sqrt(variance)
         return cls(*maps)
 
-    def log_serving(self, band: int, pixel: NDArray[np.int32]) -> Floats32:
+    def log_serving(self, band: int, pixel: Ints32) -> Floats32:
         """Return the log-likelihood of a serving cell at pixels."""
         return np.asarray(self.log_share[band][pixel])
 
-    def log_advance(self, band: int, pixel: NDArray[np.int32], steps: float) -> Floats32:
+    def log_advance(self, band: int, pixel: Ints32, steps: float) -> Floats32:
         """Return the log-likelihood of a timing advance at pixels; 0 where nothing is known."""
         deviation = self.deviation_steps[band][pixel]
         beside = np.abs(steps - self.advance_steps[band][pixel]) / deviation
@@ -158,8 +155,8 @@ def _moments_of(values: Floats) -> tuple[Floats, Floats]:
 
 
 def _moments(
-    spread: Callable[[NDArray[np.bool_], Floats], Floats],
-    known: NDArray[np.bool_],
+    spread: Callable[[Bools, Floats], Floats],
+    known: Bools,
     told: Floats,
     otherwise: tuple[Floats, Floats],
     prior: float,

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import block_diag
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.models.clock import QUARTZ, Oscillator, clock_noise
-from mapfilter.models.protocols import Floats
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,9 +14,8 @@ from __future__ import annotations
 from typing import Protocol, TypeVar, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from mapfilter._types import Floats
 
 ReadingT = TypeVar("ReadingT")
 

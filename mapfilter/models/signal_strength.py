@@ -11,10 +11,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
 from mapfilter.models._terms import LEVEL
 from mapfilter.models.gaussian import GaussianTerms, checked, deviations, places, terms
-from mapfilter.models.protocols import Floats
 from mapfilter.models.state import StateLayout
 from mapfilter.radio.antenna import MeasuredAntenna, leaning
 

@@ -19,12 +19,9 @@ from math import exp, radians
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from mapfilter._kernels import cos_sin32, exp32, hashed, log32, normals, wrap32
-
-Floats32 = NDArray[np.float32]
-Floats = NDArray[np.float64]
+from mapfilter._types import Floats, Floats32
 
 EAST, NORTH, BIAS, LOG_SCALE, OFF = range(5)
 """Rows of the state: metres from the frame's origin, radians, a number, a probability."""

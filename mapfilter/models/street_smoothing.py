@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from mapfilter._kernels import cos_sin32, exp32, hashed, uniforms, wrap32
-
-Floats32 = NDArray[np.float32]
+from mapfilter._types import Floats32, Ints32
 
 _F = np.float32
 _MOST_SQUARES = 400
@@ -29,7 +27,7 @@ def draw_ancestors(
     scale_var: float,
     log_jump: float,
     key: np.uint64,
-    chosen: NDArray[np.int32],
+    chosen: Ints32,
 ) -> None:
     """Draw one ancestor of each later hypothesis: backward simulation (Godsill et al. 2004, eq. 6).
 
@@ -119,7 +117,7 @@ def _squares(
 def _sorted(
     east_m: Floats32, north_m: Floats32, west: float, north: float, side_m: float,
     rows: int, cols: int,
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:  # fmt: skip
+) -> tuple[Ints32, Ints32]:  # fmt: skip
     """Sort places by square; those of square q are ``order[start[q]:start[q + 1]]``."""
     square = np.empty(east_m.size, dtype=np.int32)
     start = np.zeros(rows * cols + 1, dtype=np.int32)

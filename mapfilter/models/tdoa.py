@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.models._terms import DIFFERENCE
 from mapfilter.models.gaussian import GaussianTerms, checked, deviations, places, terms
-from mapfilter.models.protocols import Floats
 from mapfilter.models.state import StateLayout
 
 

@@ -7,15 +7,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats32, Ints, Ints32
 from mapfilter.database.field import RadioField
 from mapfilter.geodesy import Lattice
 from mapfilter.models.street_motion import map_log_likelihood
 from mapfilter.radio.cells import CellPlan
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
 
 _BELOW_FLOOR_DB = 6.0
 
@@ -52,8 +49,8 @@ class AreaMap:
     known_ids: frozenset[str]
     level_dbm: Floats32
     distance_m: Floats32
-    way_id: NDArray[np.int64]
-    on_way: NDArray[np.bool_]
+    way_id: Ints
+    on_way: Bools
     carriers: dict[tuple[int, int], tuple[int, ...]]
     floor_dbm: float
     sites: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
@@ -114,12 +111,12 @@ class AreaMap:
         return {cell: band for band, cell in enumerate(self.cell_ids)}
 
     @cached_property
-    def way_ids(self) -> NDArray[np.int64]:
+    def way_ids(self) -> Ints:
         """All ways of the area in ascending order; 0 stands for none."""
         return np.unique(self.way_id)
 
     @cached_property
-    def way_rank(self) -> NDArray[np.int32]:
+    def way_rank(self) -> Ints32:
         """Index into ``way_ids`` of each pixel, shape (rows * cols,)."""
         return np.searchsorted(self.way_ids, self.way_id).astype(np.int32).ravel()
 

@@ -11,8 +11,8 @@ from functools import cached_property
 from math import exp, isfinite, pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats, Floats32, Ints32
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.hypotheses import Bins, Summary
 from mapfilter.filters.resampling import systematic
@@ -33,9 +33,6 @@ from mapfilter.models.street_motion import (
 from mapfilter.positioning.area_map import AreaMap
 from mapfilter.positioning.evidence import EvidenceOptions, RadioReading
 from mapfilter.positioning.fix_evidence import FixEvidence
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
 
 _F = np.float32
 OFF_AT_START = 0.05
@@ -150,7 +147,7 @@ class BayesModel:
 
     def _likely(
         self, points: Floats32, reading: RadioReading | None, count: int, rng: np.random.Generator
-    ) -> tuple[NDArray[np.int32], float]:
+    ) -> tuple[Ints32, float]:
         """Draw points by their likelihood; return them and the logarithm of its mean."""
         state = np.zeros((STATES, points.shape[1]), dtype=np.float32)
         state[EAST : NORTH + 1] = points
@@ -241,9 +238,7 @@ class BayesModel:
         """Tell whether the leading hypothesis is on the map rather than off it."""
         return bool(summary.mean[OFF] < 0.5)
 
-    def _pixels(
-        self, state: Floats32, back_east_m: float, back_north_m: float
-    ) -> NDArray[np.int32]:
+    def _pixels(self, state: Floats32, back_east_m: float, back_north_m: float) -> Ints32:
         lattice = self.area.lattice
         pixel = np.empty(state.shape[1], dtype=np.int32)
         step = lattice.resolution_m

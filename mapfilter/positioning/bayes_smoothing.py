@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 from math import log
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapfilter._kernels import draw_key
+from mapfilter._types import Bools, Floats, Floats32
 from mapfilter.filters.contract import Status
 from mapfilter.filters.hypotheses import Bins, summarise
 from mapfilter.filters.resampling import systematic
@@ -25,9 +25,6 @@ from mapfilter.positioning.bayes import BayesTrack
 from mapfilter.positioning.challenger import MapBelief
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.matched_way import matched_way
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
 
 _MOST_BYTES = 400 * 2**20
 _JUMPS = 1e-4
@@ -220,7 +217,7 @@ def _reckoned(state: Floats32, moved_m: Floats) -> Floats32:
     return np.asarray(state[:2] + stretch * moved, dtype=np.float32)
 
 
-def settled(estimate: TrackEstimate) -> NDArray[np.bool_]:
+def settled(estimate: TrackEstimate) -> Bools:
     """Tell which fixes of a forward pass will hardly be moved by what comes later.
 
     Such a fix is TRACKING, and 95 % of its belief lie within 10 m.

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError
-from mapfilter.filters.contract import Floats, Reason, Status
+from mapfilter.filters.contract import Reason, Status
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +98,7 @@ class TrackEvidence:
     runner_up_mass: Floats
     entropy_bits: Floats
     log_evidence: Floats
-    settled: NDArray[np.bool_]
+    settled: Bools
 
 
 @dataclass(frozen=True)
@@ -137,9 +137,9 @@ class TrackEstimate:
     covariance_m2: Floats
     radii_m: Floats
     status: tuple[Status, ...]
-    hypotheses: NDArray[np.int64]
+    hypotheses: Ints
     mass_50m: Floats
-    way_id: NDArray[np.int64]
+    way_id: Ints
     way_probability: Floats
     reason: tuple[Reason, ...]
     unused: tuple[UnusedReading, ...] = ()

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 from math import exp, isfinite, nan, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats, Ints32
 from mapfilter.filters.contract import Reason
 from mapfilter.models.cell_id import ServingWeights
 from mapfilter.models.fingerprint import BoundReading, LevelErrors, LevelReading
@@ -21,8 +21,6 @@ from mapfilter.positioning.epochs import Epoch, GnssFix, Heard
 from mapfilter.positioning.memory import Memory as Memory
 from mapfilter.positioning.place_evidence import PlaceEvidence
 from mapfilter.tracks.schema import SERVING
-
-Floats = NDArray[np.float64]
 
 _FIRST_GRAIN_M = 5.0
 _SERVING_NATS = 0.5
@@ -252,7 +250,7 @@ def _levels(
     )
 
 
-def _news(options: EvidenceOptions, memory: Memory, cell: NDArray[np.int32]) -> Floats:
+def _news(options: EvidenceOptions, memory: Memory, cell: Ints32) -> Floats:
     """Return how much of each level is new: 1 where it was in the last report, or never heard."""
     together = memory.heard_at_m[cell] == memory.used_at_m
     away_m = memory.travelled_m - memory.heard_at_m[cell]

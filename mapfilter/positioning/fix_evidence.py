@@ -6,13 +6,10 @@ from dataclasses import dataclass
 from math import isfinite, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats, Floats32
 from mapfilter.models.street_motion import EAST, NORTH
 from mapfilter.positioning.epochs import GnssFix
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
 
 _F = np.float32
 _FIX_SD_M = 10.0

@@ -11,14 +11,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapfilter._types import Floats, Ints
 from mapfilter.filters.gaussian import Gaussian, Method
 from mapfilter.filters.gaussian_sum import split
 from mapfilter.filters.kalman import Taken
 from mapfilter.filters.trials import CompiledMeasurement, run_trials
-
-Floats = NDArray[np.float64]
 
 _LEAST_WEIGHT = 1e-6
 _NEAR = 0.1
@@ -44,7 +43,7 @@ class SumBelief:
     weights: Floats
     means: Floats
     covariances: Floats
-    parts: NDArray[np.int64]
+    parts: Ints
 
     @classmethod
     def start(

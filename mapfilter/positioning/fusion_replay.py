@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.gaussian import Gaussian, Method
@@ -22,7 +23,6 @@ from mapfilter.geodesy import same_crs
 from mapfilter.models.gaussian import GaussianTerms
 from mapfilter.models.motion import constant_velocity
 from mapfilter.models.position_fix import position_fix
-from mapfilter.models.protocols import Floats
 from mapfilter.models.state import MOVING, POSITION
 from mapfilter.positioning.epochs import Epoch, GnssFix, epochs
 from mapfilter.positioning.estimate import Fix, TrackEstimate, UnusedReading

@@ -9,13 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.filters.gaussian import Gaussian
 from mapfilter.filters.smoothing import smooth
 from mapfilter.positioning.fusion_belief import SumBelief
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(eq=False)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from mapfilter._types import Floats
 
 _ANGLES = np.pi * (np.arange(256) + 0.5) / 256
 _SHARES = np.array([0.50, 0.67, 0.95])

@@ -9,6 +9,7 @@ from math import ceil, exp, isfinite, pi
 import numpy as np
 from numpy.typing import NDArray
 
+from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Reason
 from mapfilter.filters.grid import Transport
 from mapfilter.filters.hypotheses import Bins, Summary
@@ -16,9 +17,6 @@ from mapfilter.geodesy import wrap_rad
 from mapfilter.models.street_motion import BIAS, EAST, NORTH, OFF, STATES
 from mapfilter.positioning.bayes_model import OFF_AT_START, BayesModel, Start
 from mapfilter.positioning.evidence import RadioReading
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
 
 _CIRCLE_BINS = 72
 

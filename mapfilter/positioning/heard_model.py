@@ -10,16 +10,13 @@ from dataclasses import dataclass, replace
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats, Floats32, Ints32
 from mapfilter.filters.contract import Reason
 from mapfilter.models.fingerprint import LevelReading
 from mapfilter.models.heard_maps import HeardMaps
 from mapfilter.positioning.bayes_model import BayesModel
 from mapfilter.positioning.evidence import RadioReading
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
 
 _LEAST_VARIANCE = 0.25
 """Of an innovation, as a share of the usual one."""
@@ -65,7 +62,7 @@ class HeardModel(BayesModel):
         return Reason.USED
 
     def _log_levels(
-        self, state: Floats32, now: NDArray[np.int32], levels: LevelReading, sd_db: Floats32
+        self, state: Floats32, now: Ints32, levels: LevelReading, sd_db: Floats32
     ) -> Floats32:
         """Return the log-likelihood of levels that are more certain at some places than at others.
 

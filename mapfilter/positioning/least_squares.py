@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
-from mapfilter.models.protocols import Floats, GaussianMeasurement
+from mapfilter.models.protocols import GaussianMeasurement
 
 TOO_FEW = "not enough measurements"
 BAD_GEOMETRY = "bad geometry"

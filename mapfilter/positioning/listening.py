@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from math import isfinite, nan
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.challenger import MapBelief
@@ -38,10 +38,6 @@ from mapfilter.positioning.receiver import (
 from mapfilter.positioning.sky_memory import SkyMemory
 from mapfilter.positioning.sky_options import SkyOptions
 from mapfilter.positioning.sky_readings import LEAST_MOVED_M, Told, range_sigma_m, sky_over
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
-Bools = NDArray[np.bool_]
 
 _RESET_GATE = 0.5
 

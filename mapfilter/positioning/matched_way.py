@@ -7,14 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats32, Ints32
 from mapfilter.database.nearest import CellPointIndex
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.positioning.area_map import AreaMap
 from mapfilter.positioning.estimate import Fix
-
-Floats32 = NDArray[np.float32]
 
 
 def matched_way(
@@ -55,7 +53,7 @@ def nearest_ways(database: RadioRouteDatabase, fixes: Sequence[Fix]) -> list[Fix
 
 @njit(error_model="numpy", cache=True)
 def _heaviest(
-    east_m: Floats32, north_m: Floats32, weight: Floats32, way_rank: NDArray[np.int32],
+    east_m: Floats32, north_m: Floats32, weight: Floats32, way_rank: Ints32,
     ways: int, rows: int, cols: int, per_m: float,
 ) -> tuple[int, float]:  # fmt: skip
     mass = np.zeros(ways, dtype=np.float32)

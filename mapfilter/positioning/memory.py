@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from math import cos, inf, isfinite, nan, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.filters.contract import MotionStep
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

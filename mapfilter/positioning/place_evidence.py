@@ -5,11 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
+from mapfilter._types import Floats, Floats32
 
 
 class PlaceEvidence(Protocol):

@@ -11,8 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapfilter._types import Bools, Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.filters.gaussian import EKF, Gaussian
 from mapfilter.filters.kalman import as_belief, predict, update
@@ -21,8 +22,6 @@ from mapfilter.models.position_fix import position_fix
 from mapfilter.models.state import StateLayout
 from mapfilter.positioning.fusion import compiled
 from mapfilter.positioning.least_squares import StaticFix
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +38,7 @@ class PositionTrack:
 
     means: Floats
     covariances: Floats
-    used: NDArray[np.bool_]
+    used: Bools
 
 
 def filter_fixes(

@@ -12,8 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats, Floats32
 from mapfilter.filters import rao_blackwell
 from mapfilter.filters.rao_blackwell import MixedBelief
 from mapfilter.filters.sir_options import SirOptions
@@ -23,10 +23,6 @@ from mapfilter.models.state import StateLayout
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.fusion import compiled
 from mapfilter.positioning.sky_options import SkyOptions
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
-Bools = NDArray[np.bool_]
 
 LAYOUT = StateLayout(5, 0, 1, clock=2)
 """East and north from the frame's origin, the clock's error and rate, and the height."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats, Floats32
 from mapfilter.positioning.bayes_track import BayesTrack
 from mapfilter.positioning.challenger import Challenger, MapBelief
 from mapfilter.positioning.epochs import Epoch
@@ -17,9 +17,6 @@ from mapfilter.positioning.receiver import LINEAR, Sky, begun, near_clock, weigh
 from mapfilter.positioning.sky_memory import NO_SKY, SkyMemory
 from mapfilter.positioning.sky_options import SkyOptions
 from mapfilter.positioning.sky_readings import range_sigma_m, sky_over
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
 
 _FIRST_GRAIN_M = 10.0
 _BLIND_START = 0.1

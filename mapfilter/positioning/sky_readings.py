@@ -5,16 +5,14 @@ from __future__ import annotations
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.filters.contract import Reason
 from mapfilter.gnss.grid_frame import GridFrame
 from mapfilter.gnss.sky import directions
 from mapfilter.positioning.epochs import Epoch, Pseudorange
 from mapfilter.positioning.receiver import Sky
 from mapfilter.positioning.sky_options import SkyOptions
-
-Floats = NDArray[np.float64]
 
 Told = tuple[str, str, Reason]
 """Kind and name of what was left alone, and why."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mapfilter.filters.contract import Floats, Status
+from mapfilter._types import Floats
+from mapfilter.filters.contract import Status
 
 
 @dataclass(frozen=True, slots=True)

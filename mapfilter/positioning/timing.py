@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from math import exp, hypot, inf, isfinite, nan
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Reason
 from mapfilter.models.gaussian import GaussianTerms
 from mapfilter.models.state import StateLayout
@@ -22,9 +22,6 @@ from mapfilter.positioning.epochs import Difference, Epoch
 from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.evidence import RadioReading
 from mapfilter.positioning.sky_options import TimingOptions
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
 
 Timed = tuple[float, float]
 """Distance travelled when timing advances and differences were last used."""

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats32
 from mapfilter.errors import InputError, fail
 
 Quantity = Literal["level", "loss", "deviation"]
@@ -47,7 +47,7 @@ def check_file(path: Path) -> None:
         raise fail(InputError, str(path), "a raster file", "an empty file")
 
 
-def check_plausible(values: NDArray[np.float32], quantity: Quantity, path: Path) -> None:
+def check_plausible(values: Floats32, quantity: Quantity, path: Path) -> None:
     """See that numbers can be levels, losses or deviations; NaN is passed over.
 
     Raises
@@ -74,12 +74,12 @@ def check_plausible(values: NDArray[np.float32], quantity: Quantity, path: Path)
         raise fail(InputError, where, expected, got, "a factor that is not the file's, or RXLEV")
 
 
-def _most(chosen: NDArray[np.bool_], values: NDArray[np.float32]) -> bool:
+def _most(chosen: Bools, values: Floats32) -> bool:
     """Tell whether more than half of the known values are chosen."""
     return bool(2 * np.count_nonzero(chosen) > np.count_nonzero(~np.isnan(values)))
 
 
-def _hint(known: NDArray[np.float32], low: float, high: float) -> str:
+def _hint(known: Floats32, low: float, high: float) -> str:
     """Return a hint for numbers far beyond what is possible, or nothing."""
     wrong = known[(known < low) | (known > high)]
     alike = wrong.size < known.size and (wrong == wrong[0]).all()

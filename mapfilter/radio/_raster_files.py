@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats32
 from mapfilter.geodesy import Lattice
 
-Floats32 = NDArray[np.float32]
 Window = tuple[int, int, int, int]
 """Row, column, rows, columns."""
 

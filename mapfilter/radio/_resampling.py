@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats, Floats32, Ints
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, same_crs
-from mapfilter.radio._raster_files import Floats32, RasterFile, Window
+from mapfilter.radio._raster_files import RasterFile, Window
 
 Resampling = Literal["nearest", "bilinear"]
 
@@ -159,9 +159,7 @@ def _shift(source: Lattice, target: Lattice) -> tuple[int, int] | None:
     return (row, col) if max(abs(down - row), abs(right - col)) <= _ALIGNED_PX else None
 
 
-def _places(
-    first: int, count: int, target: Lattice, source: Lattice, *, vertical: bool
-) -> NDArray[np.float64]:
+def _places(first: int, count: int, target: Lattice, source: Lattice, *, vertical: bool) -> Floats:
     """Return where the target's centres lie, in pixels from the source's north or west edge."""
     centre = np.arange(first, first + count) + 0.5
     if vertical:
@@ -171,14 +169,12 @@ def _places(
     return np.asarray((east_m - source.west_m) / source.resolution_m)
 
 
-def _holding(place: NDArray[np.float64]) -> NDArray[np.int64]:
+def _holding(place: Floats) -> Ints:
     """Return the pixels that hold places; on an edge, whatever the rounding, the later one."""
     return np.floor(place + _EDGE_PX).astype(np.int64)
 
 
-def _nearest(
-    file: RasterFile, bands: Sequence[int], rows: NDArray[np.int64], cols: NDArray[np.int64]
-) -> Floats32:
+def _nearest(file: RasterFile, bands: Sequence[int], rows: Ints, cols: Ints) -> Floats32:
     """Take pixels; rows and columns ascend, and those beyond the file are NaN."""
     values = np.full((len(bands), rows.size, cols.size), np.nan, dtype=np.float32)
     r = np.flatnonzero((rows >= 0) & (rows < file.lattice.rows))
@@ -189,9 +185,7 @@ def _nearest(
     return values
 
 
-def _taken(
-    file: RasterFile, bands: Sequence[int], rows: NDArray[np.int64], cols: NDArray[np.int64]
-) -> Floats32:
+def _taken(file: RasterFile, bands: Sequence[int], rows: Ints, cols: Ints) -> Floats32:
     """Return the pixels at rows and columns of a file, in strips that fit into memory."""
     width = int(cols.max()) - int(cols.min()) + 1
     least, step = int(cols.min()), max(1, _LARGEST_SOURCE_BYTES // (4 * width * len(bands)))
@@ -210,8 +204,8 @@ def _taken(
 def _bilinear(
     file: RasterFile,
     bands: Sequence[int],
-    row: NDArray[np.float64],
-    col: NDArray[np.float64],
+    row: Floats,
+    col: Floats,
     nearest: Floats32,
 ) -> Floats32:
     """Weigh the four nearest pixels; at the file's edge, those that are there."""

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats, Floats32
 from mapfilter.geodesy import (
     Lattice,
     grid_convergence_rad,
@@ -31,10 +31,6 @@ from mapfilter.radio.pathloss import (
     probability_of_sight,
     shortest_distance_m,
 )
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
-Bools = NDArray[np.bool_]
 
 _ROOF_RADIUS_M = 100.0
 _SLOPE_REFERENCE_M = 100.0

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats, Ints
 from mapfilter.radio.measurements import Measurements
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +30,7 @@ class Points:
     east_m: Floats
     north_m: Floats
     level_dbm: Floats
-    session: NDArray[np.int64]
+    session: Ints
     heard_at: Floats
 
     def __len__(self) -> int:
@@ -49,7 +47,7 @@ class Points:
             return self
         return self.some(np.linspace(0, len(self) - 1, most).astype(np.int64))
 
-    def some(self, kept: NDArray[np.int64] | NDArray[np.bool_]) -> Points:
+    def some(self, kept: Ints | Bools) -> Points:
         """Return some of the points."""
         return Points(
             self.cell_id,

@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 from sklearn.neighbors import NearestNeighbors
 
+from mapfilter._types import Floats, Ints
 from mapfilter.radio._survey_points import Points
 from mapfilter.radio._survey_trend import Trend
-
-Floats = NDArray[np.float64]
 
 _CHUNK = 4096
 _LEARNT_FROM = 250
@@ -159,7 +157,7 @@ class _Nearest:
         self._search = NearestNeighbors(n_neighbors=count).fit(places)
         self._values = values
 
-    def mean(self, places: Floats | None) -> tuple[Floats, NDArray[np.int64], Floats]:
+    def mean(self, places: Floats | None) -> tuple[Floats, Ints, Floats]:
         """Return weighted means, and the neighbours and weights behind them.
 
         Without places: at each of its own points, from the others.

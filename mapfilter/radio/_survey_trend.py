@@ -11,10 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
-Floats = NDArray[np.float64]
+from mapfilter._types import Floats
+
 Covariate = Callable[[Floats, Floats], Floats]
 """From east and north (m) to a value for each place."""
 

@@ -9,12 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import wrap_rad
-
-Floats = NDArray[np.float64]
 
 SIDE_LOBE_DB = 20.0
 """Largest attenuation of the vertical pattern, SLA_V, in TR 36.814; in TR 38.901 it is 30 dB."""

@@ -17,10 +17,11 @@ from typing import cast
 
 import numpy as np
 
+from mapfilter._types import Floats32
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio._grid_header import GridHeader, crs_beside, crs_file, grid_lattice, is_placed
-from mapfilter.radio._raster_files import Floats32, Window, existing, without_nodata
+from mapfilter.radio._raster_files import Window, existing, without_nodata
 
 _ORDERS = {"I": "<", "LSBFIRST": "<", "M": ">", "MSBFIRST": ">"}
 _TYPES = {

@@ -17,12 +17,12 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats32, Ints
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio._grid_header import GridHeader, crs_beside, crs_file, grid_lattice
-from mapfilter.radio._raster_files import Floats32, Window, existing, without_nodata
+from mapfilter.radio._raster_files import Window, existing, without_nodata
 
 _NODATA = -9999.0
 _LARGEST_HEADER_BYTES = 4096
@@ -151,9 +151,7 @@ def open_ascii_grid(
 
 
 @lru_cache(maxsize=1024)
-def _row_starts(
-    path: Path, size: int, _modified_ns: int, header_bytes: int, rows: int
-) -> NDArray[np.int64]:
+def _row_starts(path: Path, size: int, _modified_ns: int, header_bytes: int, rows: int) -> Ints:
     """Return where each row begins, and the end of the last; the file is read through once.
 
     Raises
@@ -161,7 +159,7 @@ def _row_starts(
     InputError
         There are more or fewer rows than the header tells.
     """
-    ends: list[NDArray[np.int64]] = []
+    ends: list[Ints] = []
     found, at = 0, header_bytes
     with path.open("rb") as stream:
         stream.seek(header_bytes)

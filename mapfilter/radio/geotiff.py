@@ -12,15 +12,15 @@ from typing import Any, cast
 
 import numpy as np
 import rasterio
-from numpy.typing import NDArray
 from rasterio.errors import NotGeoreferencedWarning, RasterioError
 from rasterio.windows import Window as RasterioWindow
 
+from mapfilter._types import Floats32
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
 from mapfilter.radio._cell_rules import id_fault
 from mapfilter.radio._raster_checks import QUANTITY_TAG, Quantity, check_file, reason
-from mapfilter.radio._raster_files import Floats32, Window, existing, without_nodata
+from mapfilter.radio._raster_files import Window, existing, without_nodata
 
 _UNITS: dict[str, Quantity] = {"dbm": "level", "db": "loss"}
 _KINDS: tuple[Quantity, ...] = ("level", "loss", "deviation")
@@ -137,7 +137,7 @@ def _masked(source: Any, bands: list[int], window: Any) -> Floats32:
     if flags <= {"all_valid", "nodata"} and all(n is None or math.isnan(n) for n in own):
         return np.asarray(source.read(bands, window=window, out_dtype=np.float32))
     data = source.read(bands, window=window, masked=True)
-    return cast(NDArray[np.float32], data.astype(np.float32).filled(np.nan))
+    return cast(Floats32, data.astype(np.float32).filled(np.nan))
 
 
 def _quantity(source: Any) -> Quantity | None:

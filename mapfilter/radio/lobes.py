@@ -11,13 +11,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from mapfilter._types import Floats, Floats32, Ints
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.plausibility import RasterSample
-
-Floats = NDArray[np.float64]
 
 STEP_DEG = 5.0
 _DIRECTIONS = round(360 / STEP_DEG)
@@ -162,8 +160,8 @@ def mean_score(lobes: Sequence[Lobe], azimuths_deg: Sequence[float]) -> float:
 
 
 def _binned(
-    log_m: Floats, azimuth_deg: Floats, value: NDArray[np.float32]
-) -> tuple[Floats, Floats, NDArray[np.int64], Floats]:
+    log_m: Floats, azimuth_deg: Floats, value: Floats32
+) -> tuple[Floats, Floats, Ints, Floats]:
     """Return mean value, mean log distance, direction and weight of rings by directions."""
     low, high = log_m.min(), log_m.max()
     ring = ((log_m - low) / max(high - low, 1e-9) * _RINGS).astype(np.int64).clip(0, _RINGS - 1)

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.ndimage import label, uniform_filter
 
+from mapfilter._types import Bools, Floats32
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
-
-Floats32 = NDArray[np.float32]
-Bools = NDArray[np.bool_]
 
 _STEP_PX = 0.5
 _SAME_ROOF_M = 0.5

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats, Ints, Ints32
 from mapfilter.errors import Fault, InputError, fail
 from mapfilter.geodesy import project, projected_crs, utm_crs
 from mapfilter.radio._measurement_rows import Identity, Rows
@@ -17,7 +17,6 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.measurements_antennas import FIRST_WORD, read_antennas_log
 from mapfilter.radio.measurements_csv import DIALECTS, header_of, mapped, read_csv
 
-Floats = NDArray[np.float64]
 Format = Literal["auto", "csv", "opencellid", "towercollector", "antennas"]
 
 SESSION_GAP_S = 1800.0
@@ -56,8 +55,8 @@ class Measurements:
     cell_ids: tuple[str, ...]
     identities: Mapping[str, Identity]
     sessions: tuple[str, ...]
-    cell: NDArray[np.int32]
-    session: NDArray[np.int32]
+    cell: Ints32
+    session: Ints32
     time_s: Floats
     east_m: Floats
     north_m: Floats
@@ -68,7 +67,7 @@ class Measurements:
     def __len__(self) -> int:
         return len(self.level_dbm)
 
-    def where(self, kept: NDArray[np.bool_], *notes: str) -> Measurements:
+    def where(self, kept: Bools, *notes: str) -> Measurements:
         """Return some of the rows; cells and sessions keep their places."""
         return replace(
             self,
@@ -207,7 +206,7 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
     cells = tuple(sorted({cell for table in tables for cell in table.cells}))
     places = {cell: i for i, cell in enumerate(cells)}
     names: list[str] = []
-    session: list[NDArray[np.int32]] = []
+    session: list[Ints32] = []
     for table in tables:
         own = _sessions(table, gap_s)
         session.append((own + len(names)).astype(np.int32))
@@ -243,7 +242,7 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
     return _once(joined)
 
 
-def _sessions(table: Rows, gap_s: float) -> NDArray[np.int64]:
+def _sessions(table: Rows, gap_s: float) -> Ints:
     """Return the session of each row of a file, counted from 0 in the order of the rows."""
     named = np.array(table.session)
     time_s = np.array(table.time_s)

@@ -15,13 +15,11 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio._cell_rules import ANTENNAS, antenna_fault
 from mapfilter.radio.antenna import MeasuredAntenna
-
-Floats = NDArray[np.float64]
 
 DBI_OVER_DBD = 2.15
 """Gain of a half-wave dipole over an isotropic antenna, in dB."""

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapfilter._types import Floats
 from mapfilter.radio._models import ModelName, PredictionModel
 from mapfilter.radio.pathloss_free import SHORTEST_FREE_DISTANCE_M, friis_db, log_distance_db
 from mapfilter.radio.pathloss_hata import SHORTEST_DISTANCE_M, cost231_hata_db, okumura_hata_db
@@ -20,7 +21,6 @@ from mapfilter.radio.tr38901 import (
     sight_probability,
 )
 
-Floats = NDArray[np.float64]
 Range = tuple[float, float]
 
 _HATA = {"base_height_m": (30.0, 200.0), "mobile_height_m": (1.0, 10.0)}

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from mapfilter._types import Floats
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 SHORTEST_FREE_DISTANCE_M = 1.0

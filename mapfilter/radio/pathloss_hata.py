@@ -13,9 +13,10 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from mapfilter._types import Floats
+
 Environment = Literal["large_city", "city", "suburban", "open"]
 
 SHORTEST_DISTANCE_M = 20.0

@@ -11,11 +11,10 @@ everything else outside the published ranges is extrapolated by the same equatio
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapfilter._types import Floats
 from mapfilter.radio.pathloss_hata import SHORTEST_DISTANCE_M
-
-Floats = NDArray[np.float64]
 
 LOWEST_ROOF_ABOVE_MOBILE_M = 1.0
 """Lower roofs count as this high above the mobile."""

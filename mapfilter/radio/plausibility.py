@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats, Floats32
 from mapfilter.geodesy import (
     Lattice,
     azimuth_from_heading_deg,
@@ -19,8 +19,6 @@ from mapfilter.radio._resampling import read_on
 from mapfilter.radio.cells import Cell
 from mapfilter.radio.rasters import RxLevRasters
 
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
 Kind = Literal["level", "loss", "rxlev", "empty", "unclear"]
 
 MOST_PX = 1 << 22

@@ -11,9 +11,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapfilter._parallel import Progress
+from mapfilter._types import Floats32
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio._cell_rules import ANTENNAS
@@ -34,7 +34,6 @@ __all__ = [
     "realise",
 ]
 
-Floats32 = NDArray[np.float32]
 Antennas = Mapping[str, MeasuredAntenna]
 
 _MOST_NAMED = 3

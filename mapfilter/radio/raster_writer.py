@@ -14,10 +14,10 @@ from rasterio.errors import RasterioError
 from rasterio.shutil import copy as copy_raster
 
 from mapfilter._io import atomic_file
+from mapfilter._types import Floats32
 from mapfilter.errors import InputError, OutputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio._raster_checks import QUANTITY_TAG, Quantity, reason
-from mapfilter.radio._raster_files import Floats32
 
 _BLOCK_PX = 256
 

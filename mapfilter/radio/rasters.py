@@ -16,10 +16,11 @@ from pathlib import Path
 import numpy as np
 
 from mapfilter._io import sha256_file
+from mapfilter._types import Floats, Floats32
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Floats, Lattice, projected_crs
+from mapfilter.geodesy import Lattice, projected_crs
 from mapfilter.radio._raster_checks import Quantity, check_plausible
-from mapfilter.radio._raster_files import Floats32, RasterFile, Window
+from mapfilter.radio._raster_files import RasterFile, Window
 from mapfilter.radio._raster_sets import Declared, open_files
 from mapfilter.radio._raster_sets import is_raster_folder as is_raster_folder
 from mapfilter.radio._resampling import Resampling, common_lattice, read_on

@@ -12,10 +12,9 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mapfilter._types import Floats, Ints
 from mapfilter.errors import InputError, fail
 from mapfilter.radio.cells import CellPlan
-
-Floats = NDArray[np.float64]
 
 LOWEST_LEVEL_DBM = -110.0
 """RXLEV 0 means a level below this."""
@@ -72,7 +71,7 @@ def censored_from_rxlev(rxlev: ArrayLike) -> NDArray[np.int8]:
     return _censored(_checked_rxlev(rxlev))
 
 
-def rxlev_from_level_dbm(level_dbm: ArrayLike) -> NDArray[np.int64]:
+def rxlev_from_level_dbm(level_dbm: ArrayLike) -> Ints:
     """Return the raw RXLEV, 0..63, that a phone reports for levels in dBm.
 
     Parameters

@@ -12,14 +12,12 @@ from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
+from mapfilter._types import Floats, Floats32
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
-
-Floats32 = NDArray[np.float32]
 
 _PAD_LENGTHS = 10.0
 # About five arrays of 8 bytes per pixel are held at a time: 8 GiB.
@@ -150,7 +148,7 @@ def named_rng(seed: int, *names: str) -> np.random.Generator:
     return np.random.default_rng([seed, *np.frombuffer(digest, dtype="<u4").tolist()])
 
 
-def _spectral_amplitude(shape: tuple[int, ...], length_px: float) -> NDArray[np.float64]:
+def _spectral_amplitude(shape: tuple[int, ...], length_px: float) -> Floats:
     """Return the square root of the torus covariance's eigenvalues, for a unit variance."""
     rows, cols = (np.minimum(np.arange(n), n - np.arange(n)) for n in shape)
     covariance = np.exp(-np.hypot(rows[:, None], cols[None, :]) / length_px)

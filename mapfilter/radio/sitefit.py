@@ -11,12 +11,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.radio.lobes import peak_m
 from mapfilter.radio.plausibility import RasterSample
-
-Floats = NDArray[np.float64]
 
 _SIDE = 40
 _LEAST_SQUARES = 60

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from threadpoolctl import threadpool_limits
 
+from mapfilter._types import Floats
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.radio._survey_points import Points, points_by_cell
 from mapfilter.radio._survey_residuals import (
@@ -36,8 +36,6 @@ from mapfilter.radio._survey_trend import (
 )
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.measurements import Measurements
-
-Floats = NDArray[np.float64]
 
 _ROUNDS = 2
 _LOCATED_FROM = 300

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapfilter._parallel import Progress
+from mapfilter._types import Floats, Ints
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio._measurement_rows import Identity
@@ -19,8 +20,6 @@ from mapfilter.radio._survey_trend import Covariate
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.rasters import RxLevRasters, write_rasters
 from mapfilter.radio.survey import Survey, SurveyedCell
-
-Floats = NDArray[np.float64]
 
 _FIELD_LENGTHS = 4.0
 _LARGEST_WINDOW_PX = 1_000_000
@@ -149,7 +148,7 @@ def predicted_levels(rasters: RxLevRasters, plan: CellPlan | None) -> dict[str, 
 
 def _on_lattice(
     survey: Survey, cell: SurveyedCell, lattice: Lattice, fill: bool
-) -> tuple[NDArray[np.int64], Floats] | None:
+) -> tuple[Ints, Floats] | None:
     """Return the pixels with a value, and mean and deviation there; None if none was measured."""
     reach_m = survey.options.reach_m
     field_m = max(reach_m, _FIELD_LENGTHS * survey.shadowing.correlation_m) if fill else reach_m

@@ -6,16 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapfilter._parallel import Progress
+from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import InputError
 from mapfilter.radio._survey_trend import Covariate
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.measurements import Measurements
 from mapfilter.radio.survey import Survey, SurveyOptions, fit_survey
-
-Floats = NDArray[np.float64]
 
 _MOST_FOLDS = 20
 _PARTS_OF_ONE_SESSION = 5
@@ -164,7 +162,7 @@ def cross_validate(
     ).validation
 
 
-def _folds(measurements: Measurements) -> tuple[NDArray[np.int64], int]:
+def _folds(measurements: Measurements) -> tuple[Ints, int]:
     """Return the fold of each measurement, and the number of sessions."""
     sessions, which = np.unique(measurements.session, return_inverse=True)
     if len(sessions) > 1:
@@ -195,5 +193,5 @@ def _rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
 
 
-def _mean(values: Floats | NDArray[np.bool_]) -> float:
+def _mean(values: Floats | Bools) -> float:
     return float(np.mean(values)) if values.size else float("nan")

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from mapfilter._types import Floats
+
 Scenario = Literal["uma", "umi"]
 
 SHORTEST_TR38901_DISTANCE_M = 10.0

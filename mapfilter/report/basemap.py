@@ -10,12 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
 from matplotlib.patheffects import withStroke
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
 from mapfilter.report.canvas import BLACK, GREY, STREET
 
-Floats = NDArray[np.float64]
 Bounds = tuple[float, float, float, float]
 
 HALO = (withStroke(linewidth=2.5, foreground="white"),)

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.snapshot import Snapshot
@@ -57,7 +57,7 @@ def plot_belief(
     plot_panels(snapshots, truth, base, path, draw=draw, said=_said, marks=_marks())
 
 
-def fading(share: NDArray[np.float64]) -> NDArray[np.float64]:
+def fading(share: Floats) -> Floats:
     """Return how opaque a square is drawn that has a share of the likeliest square's probability.
 
     Examples

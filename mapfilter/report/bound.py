@@ -11,8 +11,9 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.errors import InputError
-from mapfilter.geodesy import Floats, Lattice
+from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.report.basemap import BaseMap, LocalFrame, attribute, draw_base
 from mapfilter.report.canvas import BLACK

@@ -10,10 +10,11 @@ from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.report.basemap import BaseMap, Floats, attribute, draw_base
+from mapfilter.report.basemap import BaseMap, attribute, draw_base
 from mapfilter.report.canvas import distinct_colours, grouped
 from mapfilter.report.layers import (
     MAP_IN,

@@ -8,12 +8,10 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.evaluation.track_percentiles import Percentile
 from mapfilter.report.canvas import GREY, bottom_legend, picture
-
-Floats = NDArray[np.float64]
 
 _SIZE_IN = (7.6, 5.2)
 

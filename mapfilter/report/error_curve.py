@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
+from mapfilter._types import Floats
 from mapfilter.evaluation.accuracy import (
     SUCCESS_RADIUS_M,
     Accuracy,
@@ -16,7 +17,7 @@ from mapfilter.evaluation.accuracy import (
 )
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.report.basemap import HALO, Floats
+from mapfilter.report.basemap import HALO
 from mapfilter.report.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION, picture
 
 _SIZE_IN = (9.0, 4.8)

@@ -10,11 +10,9 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats
 from mapfilter.report.canvas import BLACK, BLUE, GREY, ORANGE, VERMILLION, picture
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +65,7 @@ def plot_error_panels(
     title: str,
     columns: int = 2,
     across: str = "time index k",
-    shaded: tuple[str, NDArray[np.bool_]] | None = None,
+    shaded: tuple[str, Bools] | None = None,
 ) -> None:
     """Draw errors over the time index in panels side by side; ``across`` says what it counts.
 
@@ -121,7 +119,7 @@ def _draw_panel(axes: Axes, panel: Panel, across: str) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _shade(axes: Axes, name: str, where: NDArray[np.bool_]) -> None:
+def _shade(axes: Axes, name: str, where: Bools) -> None:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], where, [0]]).astype(np.int8)))
     for first, end in zip(edges[::2], edges[1::2], strict=True):
         axes.axvspan(first + 0.5, end + 0.5, color="#f3ddd0", linewidth=0, zorder=0, label=name)

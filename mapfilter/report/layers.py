@@ -12,10 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.report.basemap import HALO, BaseMap, Floats, map_height_in
+from mapfilter.report.basemap import HALO, BaseMap, map_height_in
 from mapfilter.report.canvas import picture
 
 MAP_IN = 7.0

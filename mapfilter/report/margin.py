@@ -11,6 +11,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap, to_hex
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from mapfilter._types import Ints
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
@@ -102,7 +103,7 @@ def plot_margin(
         )
 
 
-def _classes(margin_db: NDArray[np.floating]) -> NDArray[np.int64]:
+def _classes(margin_db: NDArray[np.floating]) -> Ints:
     """Return the class of each margin; the last is that of one cell alone."""
     found = np.searchsorted(np.array(STEPS_DB), margin_db, side="right") - 1
     return np.where(np.isinf(margin_db), len(STEPS_DB), found)

@@ -13,16 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, NullLocator
 from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
-from mapfilter.report.basemap import (
-    BaseMap,
-    Bounds,
-    Floats,
-    LocalFrame,
-    attribute,
-    draw_base,
-)
+from mapfilter.report.basemap import BaseMap, Bounds, LocalFrame, attribute, draw_base
 from mapfilter.report.canvas import BLACK, BLUE, GREY, STREET, VERMILLION, grouped, picture
 from mapfilter.report.layers import OVER_RASTER, keep_extent, raster_extent, shape_faults
 

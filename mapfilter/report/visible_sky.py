@@ -11,11 +11,9 @@ import shapely
 from matplotlib import colormaps
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Polygon
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.report.canvas import VERMILLION, picture
-
-Floats = NDArray[np.float64]
 
 _HOUSE = "#d9d9d9"
 

@@ -6,10 +6,7 @@ import itertools
 import math
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
-from mapfilter.geodesy import Floats
+from mapfilter._types import Bools, Floats
 
 Place = tuple[float, float]
 
@@ -109,7 +106,7 @@ class _Track:
 
 
 def grown_lines(
-    tracks: Sequence[Floats], usable: Sequence[NDArray[np.bool_]], reach_m: float
+    tracks: Sequence[Floats], usable: Sequence[Bools], reach_m: float
 ) -> list[list[Place]]:
     """Return the lines of a network that covers tracks once.
 

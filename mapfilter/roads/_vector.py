@@ -22,6 +22,7 @@ from pyarrow import ArrowException
 from pyproj.exceptions import CRSError, ProjError
 from shapely.errors import GEOSException
 
+from mapfilter._types import Ints
 from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.roads.clip import on_earth
 from mapfilter.roads.maps import box_deg
@@ -64,7 +65,7 @@ class Features:
     """
 
     geometry: Geometries
-    number: NDArray[np.int64]
+    number: Ints
     columns: Mapping[str, NDArray[np.object_]]
     notes: tuple[str, ...]
 

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from rasterio.features import rasterize
 from rasterio.transform import Affine
 
+from mapfilter._types import Floats, Floats32
 from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import Floats, Lattice
+from mapfilter.geodesy import Lattice
 from mapfilter.roads._elements import Query
 from mapfilter.roads.clip import polygons_inside
 from mapfilter.roads.maps import read_elements
@@ -130,7 +131,7 @@ def made_buildings(
     )
 
 
-def rasterise_heights(buildings: Buildings, lattice: Lattice) -> NDArray[np.float32]:
+def rasterise_heights(buildings: Buildings, lattice: Lattice) -> Floats32:
     """Return the roof height above ground at each lattice point, 0 where there is no building.
 
     Of buildings that overlap the highest counts.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Ints
 from mapfilter.roads.ways import Bounds, Geometries, Ways
 
 _LINE, _RING, _POLYGON = 1, 2, 3
@@ -13,10 +13,8 @@ _LINE, _RING, _POLYGON = 1, 2, 3
 _FARTHEST_M = 1e8
 """No map's coordinates are larger, and much larger ones overflow in products."""
 
-Indices = NDArray[np.int64]
 
-
-def on_earth(geometry: Geometries) -> NDArray[np.bool_]:
+def on_earth(geometry: Geometries) -> Bools:
     """Tell which geometries, in metres, have only coordinates that can be places."""
     corner, origin = shapely.get_coordinates(geometry, return_index=True)
     # Written so that NaN is no place.
@@ -26,7 +24,7 @@ def on_earth(geometry: Geometries) -> NDArray[np.bool_]:
     return good
 
 
-def lines_inside(geometry: Geometries, bounds_m: Bounds) -> tuple[Geometries, Indices]:
+def lines_inside(geometry: Geometries, bounds_m: Bounds) -> tuple[Geometries, Ints]:
     """Return the lines among geometries, cut at a box, and which geometry each comes from.
 
     Lines keep their direction, and within the box all their vertices.
@@ -44,7 +42,7 @@ def lines_inside(geometry: Geometries, bounds_m: Bounds) -> tuple[Geometries, In
 
 def polygons_inside(
     geometry: Geometries, bounds_m: Bounds, *, cut: bool
-) -> tuple[Geometries, Indices]:
+) -> tuple[Geometries, Ints]:
     """Return the polygons among geometries that touch a box, and which geometry each comes from.
 
     What crosses itself is mended first.

@@ -14,11 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Floats
 from mapfilter.roads._growth import grown_lines
 from mapfilter.roads.ways import Ways
 
@@ -67,7 +66,7 @@ class Corridors:
     """
 
     ways: Ways
-    sessions: NDArray[np.int64]
+    sessions: Ints
     half_width_m: float
     notes: tuple[str, ...]
 
@@ -211,7 +210,7 @@ def _pieces(
     return pieces, aside
 
 
-def _moving(place_m: Floats, step_m: float) -> NDArray[np.int64]:
+def _moving(place_m: Floats, step_m: float) -> Ints:
     """Return the positions that are a step from the last one taken: none of standing still."""
     taken: list[int] = []
     for i, place in enumerate(place_m):
@@ -260,9 +259,7 @@ def _drawn_together(
     return list(np.split(place_m, np.cumsum([len(piece.place_m) for piece in pieces])[:-1]))
 
 
-def _sessions_near(
-    place_m: Floats, measured: cKDTree, of_session: NDArray[np.int64], reach_m: float
-) -> NDArray[np.int64]:
+def _sessions_near(place_m: Floats, measured: cKDTree, of_session: Ints, reach_m: float) -> Ints:
     """Return how many sessions passed within reach of each place."""
     counts = []
     for first in range(0, len(place_m), _AT_A_TIME):
@@ -273,9 +270,7 @@ def _sessions_near(
     return np.concatenate(counts).astype(np.int64)
 
 
-def _pairs(
-    measured: cKDTree, place_m: Floats, reach_m: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _pairs(measured: cKDTree, place_m: Floats, reach_m: float) -> tuple[Ints, Ints]:
     """Return all pairs of a place and a measured one within reach, by their indices."""
     found = measured.query_ball_point(place_m, reach_m, return_sorted=True)
     of = np.repeat(np.arange(len(place_m)), [len(near) for near in found])

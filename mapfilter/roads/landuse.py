@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from rasterio.errors import NotGeoreferencedWarning, RasterioError
 from rasterio.windows import Window
 
+from mapfilter._types import Bools, Ints
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
 
@@ -70,7 +71,7 @@ class LandUse:
         faults.raise_if_any(InputError)
 
     @property
-    def walkable(self) -> NDArray[np.bool_]:
+    def walkable(self) -> Bools:
         """Where one can walk, shape (rows, cols)."""
         # The last entry is that of the negative codes.
         return np.asarray(np.array([*self.can_walk, False])[np.maximum(self.code, -1)])
@@ -187,7 +188,7 @@ def _code(row: dict[str, str], is_colour: bool, where: str, faults: Faults) -> i
 
 def _read_codes(
     path: Path, lattice: Lattice, *, colour: bool
-) -> tuple[NDArray[np.integer[Any]], NDArray[np.bool_], tuple[str, ...]]:
+) -> tuple[NDArray[np.integer[Any]], Bools, tuple[str, ...]]:
     """Return values or packed colours at the lattice points, which are known, and notes."""
     if not path.is_file():
         raise fail(InputError, str(path), "a raster file", "no such file", "a mistyped path")
@@ -203,7 +204,7 @@ def _read_codes(
 
 def _at_points(
     source: Any, lattice: Lattice, *, colour: bool
-) -> tuple[NDArray[np.integer[Any]], NDArray[np.bool_]]:
+) -> tuple[NDArray[np.integer[Any]], Bools]:
     shape = lattice.rows, lattice.cols
     kind = np.promote_types(np.int32 if colour else source.dtypes[0], np.uint8)
     codes, known = np.zeros(shape, dtype=kind), np.zeros(shape, dtype=np.bool_)
@@ -231,7 +232,7 @@ def _at_points(
     return codes, known
 
 
-def _pixels(source: Any, lattice: Lattice) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _pixels(source: Any, lattice: Lattice) -> tuple[Ints, Ints]:
     """Return the raster's row of each row of the lattice, and its column of each column."""
     east, _ = lattice.east_north(np.zeros(lattice.cols), np.arange(lattice.cols))
     _, north = lattice.east_north(np.arange(lattice.rows), np.zeros(lattice.rows))

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats, Floats32, Ints, Ints32
 from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import Floats, Lattice
+from mapfilter.geodesy import Lattice
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,13 +37,13 @@ class RouteLattice:
     """
 
     lattice: Lattice
-    row: NDArray[np.int32]
-    col: NDArray[np.int32]
-    way_id: NDArray[np.int64]
+    row: Ints32
+    col: Ints32
+    way_id: Ints
     way_class: NDArray[np.int16]
     class_names: tuple[str, ...]
-    distance_to_way_m: NDArray[np.float32]
-    on_square: NDArray[np.bool_]
+    distance_to_way_m: Floats32
+    on_square: Bools
 
     def __post_init__(self) -> None:
         faults = Faults()
@@ -65,7 +66,7 @@ class RouteLattice:
         return int(self.row.size)
 
     @property
-    def point(self) -> NDArray[np.int64]:
+    def point(self) -> Ints:
         """Point numbers, ``row * lattice.cols + col``: the same in every rebuild, shape (N,)."""
         return self.row.astype(np.int64) * self.lattice.cols + self.col
 
@@ -75,7 +76,7 @@ class RouteLattice:
         east, north = self.lattice.east_north(self.row, self.col)
         return east, north
 
-    def mask(self) -> NDArray[np.bool_]:
+    def mask(self) -> Bools:
         """Return where one can be, shape (lattice.rows, lattice.cols)."""
         mask = np.zeros((self.lattice.rows, self.lattice.cols), dtype=np.bool_)
         mask[self.row, self.col] = True

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mapfilter._types import Ints
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.roads._vector import read_layer
 from mapfilter.roads.buildings import (
@@ -173,7 +174,7 @@ def _classes(values: NDArray[np.object_] | None, count: int) -> NDArray[np.objec
     return words
 
 
-def _ids(values: NDArray[np.object_], where: str) -> NDArray[np.int64]:
+def _ids(values: NDArray[np.object_], where: str) -> Ints:
     numbers = np.zeros(len(values), dtype=np.int64)
     faults = Faults()
     for i, value in enumerate(values):

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numba import njit
-from numpy.typing import NDArray
 from shapely import STRtree
 
+from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import Floats, Lattice
+from mapfilter.geodesy import Lattice
 from mapfilter.roads.ways import Geometries, Ways
 
 HALF_WIDTH_M = 6.0
@@ -38,7 +38,7 @@ class WayIndex:
 
     ways: Ways
     tree: STRtree
-    way: NDArray[np.int64]
+    way: Ints
     ends_m: Floats
     half_width_m: Floats
 
@@ -73,9 +73,7 @@ class WayIndex:
         return cls._of_lines(ways, ways.geometry, np.arange(len(ways)), by_code)
 
     @classmethod
-    def _of_lines(
-        cls, ways: Ways, lines: Geometries, way: NDArray[np.int64], by_code: Floats
-    ) -> WayIndex:
+    def _of_lines(cls, ways: Ways, lines: Geometries, way: Ints, by_code: Floats) -> WayIndex:
         """Index the segments of lines that are parts of the ways with the given indices."""
         corner, origin = shapely.get_coordinates(lines, return_index=True)
         joined = (origin[1:] == origin[:-1]) & np.any(corner[1:] != corner[:-1], axis=1)
@@ -99,7 +97,7 @@ class WayIndex:
         by_code[self.ways.way_class[self.way]] = self.half_width_m
         return self._of_lines(self.ways, parts[line], self.way[segment[pair[line]]], by_code)
 
-    def reaching(self, window: Lattice) -> tuple[NDArray[np.int64], Floats]:
+    def reaching(self, window: Lattice) -> tuple[Ints, Floats]:
         """Return, of each pixel of a window, the nearest of the ways that it belongs to.
 
         Returns
@@ -128,7 +126,7 @@ class WayIndex:
             segment[found] = self.way[near[segment[found]]]
         return segment, distance_m
 
-    def nearest(self, east_m: Floats, north_m: Floats) -> tuple[NDArray[np.int64], Floats]:
+    def nearest(self, east_m: Floats, north_m: Floats) -> tuple[Ints, Floats]:
         """Return the nearest way of each position, however far, and its distance.
 
         Returns
@@ -171,7 +169,7 @@ def _burn(
     ends_m: Floats,
     half_width_m: Floats,
     place: tuple[float, float, float],
-    segment: NDArray[np.int64],
+    segment: Ints,
     distance_m: Floats,
 ) -> None:  # pragma: no cover
     """Write the nearest of the segments that reach a pixel centre, and its distance."""

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from mapfilter._types import Bools, Floats, Ints, Ints32
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Floats
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.ways import Ways
 
@@ -47,10 +47,10 @@ class StreetNetwork:
     crs: str
     east_m: Floats
     north_m: Floats
-    node_a: NDArray[np.int32]
-    node_b: NDArray[np.int32]
+    node_a: Ints32
+    node_b: Ints32
     length_m: Floats
-    way_id: NDArray[np.int64]
+    way_id: Ints
     way_class: NDArray[np.int16]
     class_names: tuple[str, ...]
     oneway: NDArray[np.int8]
@@ -140,7 +140,7 @@ def street_network(ways: Ways, allowed: RouteLattice | None = None) -> StreetNet
     )
 
 
-def _stays_on(allowed: RouteLattice, start: Floats, end: Floats) -> NDArray[np.bool_]:
+def _stays_on(allowed: RouteLattice, start: Floats, end: Floats) -> Bools:
     """Tell which straight edges keep to the pixels of a route lattice, shape (E,)."""
     steps = np.ceil(np.hypot(*(end - start).T) / SAMPLE_M).astype(np.int64) + 1
     edge = np.repeat(np.arange(len(start)), steps)

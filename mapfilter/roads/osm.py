@@ -26,6 +26,7 @@ import shapely
 from geopandas import GeoDataFrame
 from numpy.typing import NDArray
 
+from mapfilter._types import Bools
 from mapfilter.roads._elements import Query
 from mapfilter.roads.clip import lines_inside, polygons_inside
 from mapfilter.roads.maps import nothing_there, read_elements
@@ -125,14 +126,14 @@ def _read_highways(path: str | Path, crs: str, bounds_m: Bounds) -> GeoDataFrame
     return read_elements(path, crs, bounds_m, _HIGHWAYS)
 
 
-def _is_area(found: GeoDataFrame) -> NDArray[np.bool_]:
+def _is_area(found: GeoDataFrame) -> Bools:
     kind = shapely.get_type_id(found.geometry.to_numpy())
     polygon = np.isin(kind, (3, 6))
     meant = (found["area"] == "yes") | (found["place"] == "square")
     return np.asarray(polygon & (meant | (found["osm_type"] == "relation")), dtype=np.bool_)
 
 
-def _allowed(found: GeoDataFrame, profile: Profile) -> NDArray[np.bool_]:
+def _allowed(found: GeoDataFrame, profile: Profile) -> Bools:
     if profile == "walking":
         return _walkable(found) & np.asarray(found["highway"].isin(WALKING_CLASSES), np.bool_)
     verdict = np.where(found["access"].isin(_FORBIDDING), -1, 0)
@@ -142,7 +143,7 @@ def _allowed(found: GeoDataFrame, profile: Profile) -> NDArray[np.bool_]:
     return np.asarray(found["highway"].isin(DRIVING_CLASSES) & (verdict >= 0), dtype=np.bool_)
 
 
-def _walkable(found: GeoDataFrame) -> NDArray[np.bool_]:
+def _walkable(found: GeoDataFrame) -> Bools:
     barred = found["access"].isin(_FORBIDDING) & ~found["foot"].isin(_ALLOWING)
     barred |= found["foot"].isin(_FORBIDDING)
     outdoors = found["tunnel"].isin(_OPEN_TUNNELS) & ~found["indoor"].isin(["yes", "corridor"])

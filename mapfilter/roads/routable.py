@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import STRtree
 
 from mapfilter._parallel import Progress
+from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Floats, Lattice, same_crs
+from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.roads.buildings import burn
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.near import HALF_WIDTH_M, WayIndex, note_half_widths
@@ -35,7 +35,7 @@ class AreaIndex:
         """Index polygons."""
         return cls(geometry, STRtree(geometry))
 
-    def mask(self, window: Lattice) -> NDArray[np.bool_]:
+    def mask(self, window: Lattice) -> Bools:
         """Return which pixel centres of a window lie in a polygon, shape (rows, cols)."""
         near = np.sort(self.tree.query(shapely.box(*window.bounds_m)))
         return burn(((shape, 1) for shape in self.geometry[near]), window, "uint8").astype(bool)
@@ -183,7 +183,7 @@ def route_lattice(
 
 
 def route_lattice_from_landuse(
-    mask: NDArray[np.bool_],
+    mask: Bools,
     lattice: Lattice,
     ways: Ways | None = None,
     half_width_m: float = HALF_WIDTH_M,
@@ -219,17 +219,17 @@ def route_lattice_from_landuse(
     return landuse_tile(mask, lattice, index)
 
 
-def landuse_tile(mask: NDArray[np.bool_], window: Lattice, ways: WayIndex) -> RouteLattice:
+def landuse_tile(mask: Bools, window: Lattice, ways: WayIndex) -> RouteLattice:
     """Return the route lattice of a window of land use; there may be no point in it."""
     return _described(mask, window, mask, ways, ways.reaching(window), LANDUSE_CLASS)
 
 
 def _described(
-    allowed: NDArray[np.bool_],
+    allowed: Bools,
     window: Lattice,
-    on_square: NDArray[np.bool_],
+    on_square: Bools,
     ways: WayIndex,
-    nearest: tuple[NDArray[np.int64], Floats],
+    nearest: tuple[Ints, Floats],
     other_class: str,
 ) -> RouteLattice:
     """Return the allowed pixels with their ways, or the distance of the nearest that is."""
@@ -262,7 +262,7 @@ def _note_crs(
             faults.add(f"{name}, crs", crs, layer.crs, "layers of different CRS")
 
 
-def _mask(areas: AreaIndex | None, window: Lattice) -> NDArray[np.bool_]:
+def _mask(areas: AreaIndex | None, window: Lattice) -> Bools:
     if areas is None:
         return np.zeros((window.rows, window.cols), dtype=np.bool_)
     return areas.mask(window)

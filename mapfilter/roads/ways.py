@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError
 
 Bounds = tuple[float, float, float, float]
@@ -42,11 +43,11 @@ class Ways:
     """
 
     crs: str
-    way_id: NDArray[np.int64]
+    way_id: Ints
     way_class: NDArray[np.int16]
     class_names: tuple[str, ...]
     geometry: Geometries
-    covered: NDArray[np.bool_]
+    covered: Bools
     oneway: NDArray[np.int8]
 
     def __post_init__(self) -> None:
@@ -100,7 +101,7 @@ class Squares:
     """
 
     crs: str
-    area_id: NDArray[np.int64]
+    area_id: Ints
     geometry: Geometries
 
     def __post_init__(self) -> None:
@@ -131,7 +132,7 @@ class Buildings:
 
     crs: str
     footprints: Geometries
-    height_m: NDArray[np.float64]
+    height_m: Floats
     from_height: int
     from_levels: int
     from_default: int

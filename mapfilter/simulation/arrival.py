@@ -8,15 +8,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import comb, log_ndtr
 
+from mapfilter._types import Bools, Floats
 from mapfilter.errors import Faults, InputError
 from mapfilter.models.clock import SPEED_OF_LIGHT_MPS
 from mapfilter.simulation.lte_network import sites_along
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)

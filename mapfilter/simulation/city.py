@@ -12,8 +12,9 @@ import shapely
 from shapely.affinity import rotate, translate
 from shapely.geometry import LineString
 
+from mapfilter._types import Floats
 from mapfilter.errors import ConfigError, Faults
-from mapfilter.geodesy import Floats, Lattice
+from mapfilter.geodesy import Lattice
 from mapfilter.roads.clip import polygons_inside
 from mapfilter.roads.osm import DRIVING_CLASSES
 from mapfilter.roads.ways import Bounds, Buildings, Geometries, Squares, Water, Ways

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import STRtree
 from shapely.geometry import LineString, Polygon
 
+from mapfilter._types import Bools, Ints
 from mapfilter.roads.ways import Geometries
 from mapfilter.simulation.city_streets import GRID, INNER, OLD_TOWN, PARK, VILLAS
 
@@ -37,12 +37,12 @@ class Blocks:
     """
 
     outline: Geometries
-    style: NDArray[np.int64]
-    is_square: NDArray[np.bool_]
+    style: Ints
+    is_square: Bools
 
 
 def used_blocks(
-    blocks: Geometries, outlines: Geometries, styles: NDArray[np.int64], rng: np.random.Generator
+    blocks: Geometries, outlines: Geometries, styles: Ints, rng: np.random.Generator
 ) -> Blocks:
     """Give each block the style of its quarter; some become squares or parks.
 

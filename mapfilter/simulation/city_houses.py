@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
-from mapfilter.geodesy import Floats
+from mapfilter._types import Floats, Ints
 from mapfilter.roads.ways import Geometries
 from mapfilter.simulation.city_streets import GRID, INNER, OLD_TOWN, PARK, VILLAS
 
@@ -53,9 +52,7 @@ _SLABS = Manner(20.0, 45.0, 4.0, 2.0, (7.0, 13.0))
 _SLAB_SHARE = 0.1
 
 
-def houses(
-    blocks: Geometries, style: NDArray[np.int64], rng: np.random.Generator
-) -> tuple[Geometries, Floats]:
+def houses(blocks: Geometries, style: Ints, rng: np.random.Generator) -> tuple[Geometries, Floats]:
     """Build on blocks.
 
     Parameters

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from shapely import STRtree
 from shapely.geometry import LineString
 
-from mapfilter.geodesy import Floats
+from mapfilter._types import Bools, Floats, Ints
 from mapfilter.roads.ways import Bounds, Geometries, Ways
 from mapfilter.simulation.city_streets import CLASSES, SNAP_M
 
@@ -41,10 +41,10 @@ class Pieces:
     """
 
     geometry: Geometries
-    line: NDArray[np.int64]
+    line: Ints
     name: NDArray[np.str_]
 
-    def select(self, which: NDArray[np.bool_]) -> Pieces:
+    def select(self, which: Bools) -> Pieces:
         """Return some of the pieces."""
         return Pieces(self.geometry[which], self.line[which], self.name[which])
 
@@ -132,7 +132,7 @@ def connected(pieces: Pieces) -> Pieces:
     return pieces.select(part[start] == weight.argmax())
 
 
-def _ends(pieces: Pieces) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
+def _ends(pieces: Pieces) -> tuple[Floats, Ints, Ints]:
     """Return the places where pieces end, and which of them each begins and ends at."""
     ends = [shapely.get_coordinates(shapely.get_point(pieces.geometry, at)) for at in (0, -1)]
     place, node = np.unique(np.round(np.concatenate(ends), 3), axis=0, return_inverse=True)

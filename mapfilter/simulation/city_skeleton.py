@@ -10,7 +10,7 @@ import shapely
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from mapfilter.geodesy import Floats
+from mapfilter._types import Floats
 from mapfilter.roads.ways import Bounds, Geometries
 
 _RINGS = (1.0, 2.5, 4.7, 7.6)

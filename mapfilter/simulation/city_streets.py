@@ -18,7 +18,7 @@ import shapely
 from shapely.geometry import LineString, Polygon
 from shapely.ops import split
 
-from mapfilter.geodesy import Floats
+from mapfilter._types import Floats
 from mapfilter.roads.ways import Bounds
 from mapfilter.simulation.city_skeleton import Skeleton, lines_of, turned
 

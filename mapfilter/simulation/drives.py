@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
 from mapfilter.gnss.noise import correlated_along
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

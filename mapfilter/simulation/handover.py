@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapfilter.geodesy import Floats
+from mapfilter._types import Bools, Floats, Ints
 
 
 def running_mean_db(level_dbm: Floats, count: int) -> Floats:
@@ -27,9 +26,7 @@ def running_mean_db(level_dbm: Floats, count: int) -> Floats:
     return np.asarray(total / np.minimum(np.arange(len(total)) + 1, count)[:, np.newaxis])
 
 
-def serving_cells(
-    mean_dbm: Floats, heard: NDArray[np.bool_], hysteresis_db: float
-) -> NDArray[np.int64]:
+def serving_cells(mean_dbm: Floats, heard: Bools, hysteresis_db: float) -> Ints:
     """Return which cell serves at each report: handover with hysteresis.
 
     A cell serves until the strongest heard one is more than ``hysteresis_db`` above it, or until

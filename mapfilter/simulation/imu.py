@@ -8,8 +8,9 @@ from typing import Literal, get_args
 import numpy as np
 import pandas as pd
 
+from mapfilter._types import Floats
 from mapfilter.errors import ConfigError, Faults
-from mapfilter.geodesy import Floats, wrap_rad
+from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.deadreckoning import TranslationNoise, noisy_steps, steps_between
 
 Turns = Literal["headings", "gyro"]

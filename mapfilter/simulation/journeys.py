@@ -9,10 +9,10 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats, Ints
 from mapfilter.errors import ConfigError, Faults
-from mapfilter.geodesy import Floats, wrap_rad
+from mapfilter.geodesy import wrap_rad
 from mapfilter.simulation.routes import Route
 from mapfilter.simulation.walking import Inside, WalkerModel, path_beside, with_stops
 
@@ -158,9 +158,7 @@ def _ticks_s(end_s: float, period_s: float) -> Floats:
     return np.asarray(np.arange(ticks + 1) * period_s)
 
 
-def _truth(
-    tick_s: Floats, east_m: Floats, north_m: Floats, way_id: NDArray[np.int64]
-) -> pd.DataFrame:
+def _truth(tick_s: Floats, east_m: Floats, north_m: Floats, way_id: Ints) -> pd.DataFrame:
     ways = pd.array(way_id, "Int64")
     return pd.DataFrame({"time_s": tick_s, "east_m": east_m, "north_m": north_m, "way_id": ways})
 

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, find_objects, label
 from scipy.spatial import cKDTree
 
+from mapfilter._types import Floats, Floats32
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.los import check_heights
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
 
 _MOST_CANDIDATES_PER_SIDE = 96
 _LLOYD_ROUNDS = 40

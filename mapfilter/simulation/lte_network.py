@@ -9,15 +9,13 @@ from dataclasses import dataclass
 from math import log10
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapfilter._types import Bools, Floats
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.gnss.noise import correlated_along
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.tr38901 import hidden_loss_db, seen_loss_db
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 SECTORS = 3
 _LEAST_DISTANCE_M = 10.0

@@ -9,16 +9,14 @@ small, and never into a wall (Kammann, Angermann & Lami, *A new mobility model b
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
+from mapfilter._types import Bools, Floats
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 _ARRIVED_CELLS = 2.0
 _LEAST_TARGETS_M = 50.0

@@ -10,8 +10,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from mapfilter._types import Floats, Ints
 from mapfilter.errors import ConfigError, Faults, InputError, fail
-from mapfilter.geodesy import Floats, Lattice
+from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rasters import RxLevRasters
 from mapfilter.radio.rxlev import quantise_level_dbm
@@ -228,17 +229,17 @@ def _window(
     return top, left, bottom - top + 1, right - left + 1
 
 
-def _shared_carriers(plan: CellPlan) -> list[NDArray[np.int64]]:
+def _shared_carriers(plan: CellPlan) -> list[Ints]:
     shared = (ids for ids in plan.ids_by_carrier.values() if len(ids) > 1)
     return [np.array([plan.index(cell_id) for cell_id in ids]) for ids in shared]
 
 
 def _ranked(
     heard_dbm: Floats,
-    serving: NDArray[np.int64],
-    shared: list[NDArray[np.int64]],
+    serving: Ints,
+    shared: list[Ints],
     max_neighbours: int,
-) -> NDArray[np.int64]:
+) -> Ints:
     """Return the cells of each report, shape (N, 1 + neighbours), -1 where there is none."""
     report = np.arange(len(serving))
     served = serving >= 0
@@ -258,7 +259,7 @@ def _ranked(
 
 
 def _table(
-    tick_s: Floats, level_dbm: Floats, rank: NDArray[np.int64], plan: CellPlan, quantise: bool
+    tick_s: Floats, level_dbm: Floats, rank: Ints, plan: CellPlan, quantise: bool
 ) -> pd.DataFrame:
     report, place = np.nonzero(rank >= 0)
     cell = rank[report, place]

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from mapfilter._types import Bools, Floats, Ints, Ints32
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Floats
 from mapfilter.roads.network import StreetNetwork
 
 _STARTS = 50
@@ -34,7 +34,7 @@ class Route:
 
     east_m: Floats
     north_m: Floats
-    way_id: NDArray[np.int64]
+    way_id: Ints
     way_class: NDArray[np.int16]
     class_names: tuple[str, ...]
 
@@ -48,7 +48,7 @@ class Route:
         """Length of the whole route."""
         return float(self.corner_m[-1])
 
-    def at(self, distance_m: ArrayLike) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    def at(self, distance_m: ArrayLike) -> tuple[Floats, Floats, Ints]:
         """Return east (m), north (m) and way at distances along the route, clipped to its ends."""
         distance = np.asarray(distance_m, dtype=np.float64)
         segment = np.searchsorted(self.corner_m, distance, side="right") - 1
@@ -103,7 +103,7 @@ def route(
 
 def _wander(
     network: StreetNetwork,
-    through: NDArray[np.bool_],
+    through: Bools,
     start: int,
     length_m: float,
     leg_m: tuple[float, float],
@@ -124,7 +124,7 @@ def _wander(
 
 def _leg(
     network: StreetNetwork,
-    through: NDArray[np.bool_],
+    through: Bools,
     here: int,
     came_from: int,
     leg_m: tuple[float, float],
@@ -153,7 +153,7 @@ def _leg(
     return None
 
 
-def _through(network: StreetNetwork) -> NDArray[np.bool_]:
+def _through(network: StreetNetwork) -> Bools:
     """Tell which nodes are left when dead ends are taken off again and again."""
     left = np.ones(network.east_m.size, dtype=bool)
     ends = np.unique(np.sort(np.stack([network.node_a, network.node_b], axis=1), axis=1), axis=0)
@@ -175,7 +175,7 @@ def _without_edge(graph: csr_array, start: int, end: int) -> csr_array:
     return csr_array((lengths, graph.indices, graph.indptr), shape=graph.shape)
 
 
-def _path(before: NDArray[np.int32], start: int, goal: int) -> list[int]:
+def _path(before: Ints32, start: int, goal: int) -> list[int]:
     nodes = [goal]
     while (node := int(before[nodes[-1]])) != start:
         nodes.append(node)
@@ -201,7 +201,7 @@ def _lengths(east_m: Floats, north_m: Floats) -> Floats:
     return np.hypot(np.diff(east_m), np.diff(north_m))
 
 
-def _edges(network: StreetNetwork, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+def _edges(network: StreetNetwork, nodes: Ints) -> Ints:
     """Return the shortest edge between each two successive nodes."""
     size = network.east_m.size
     low = np.minimum(network.node_a, network.node_b).astype(np.int64)

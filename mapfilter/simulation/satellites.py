@@ -12,8 +12,8 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.geodesy import unproject
 from mapfilter.gnss.almanac import Almanac
@@ -25,9 +25,6 @@ from mapfilter.gnss.visibility import Skyline
 from mapfilter.models.clock import clock_noise
 from mapfilter.simulation.reflections import NlosModel, draw_reflections
 from mapfilter.tracks.satellites import sent_from_m
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)

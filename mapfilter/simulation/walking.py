@@ -8,11 +8,11 @@ from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
+from mapfilter._types import Bools, Floats, Floats32
 from mapfilter.errors import ConfigError, Faults
-from mapfilter.geodesy import Floats, Lattice
+from mapfilter.geodesy import Lattice
 from mapfilter.simulation.routes import Route
 
 PAVEMENT_M: Mapping[str, float] = MappingProxyType(
@@ -38,7 +38,7 @@ PAVEMENT_M: Mapping[str, float] = MappingProxyType(
 carriageway (two lanes of 2.75 m in residential streets, four of 3.25 m in main ones) and half of a
 pavement of 2.5 m, as in the German guideline for urban streets (FGSV, RASt 06)."""
 
-Inside = Callable[[Floats, Floats], NDArray[np.bool_]]
+Inside = Callable[[Floats, Floats], Bools]
 
 _OTHER_PAVEMENT_M = 3.0
 _GRID_M = 1.0
@@ -205,10 +205,10 @@ def with_stops(
     return knots_m[order], knots_s[order]
 
 
-def inside_buildings(heights_m: NDArray[np.float32], lattice: Lattice) -> Inside:
+def inside_buildings(heights_m: Floats32, lattice: Lattice) -> Inside:
     """Return a function that looks up whether a building stands at places of a lattice."""
 
-    def inside(east_m: Floats, north_m: Floats) -> NDArray[np.bool_]:
+    def inside(east_m: Floats, north_m: Floats) -> Bools:
         row, col = lattice.row_col(east_m, north_m)
         there = lattice.contains(row, col)
         built = heights_m[np.where(there, row, 0), np.where(there, col, 0)] > 0

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 
+from mapfilter._types import Ints
 from mapfilter.errors import InputError, fail
 from mapfilter.tracks.schema import SCHEMA
 
@@ -36,7 +36,7 @@ class ReadTable:
     """
 
     rows: pd.DataFrame
-    row_numbers: NDArray[np.int64]
+    row_numbers: Ints
     notes: tuple[str, ...] = ()
 
 

@@ -8,8 +8,8 @@ from datetime import UTC, datetime
 import numpy as np
 import pandas as pd
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults
-from mapfilter.geodesy import Floats
 
 _APART_S = 600.0
 """Tables may begin this long after another ends."""

@@ -7,7 +7,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mapfilter.geodesy import Floats, wrap_rad
+from mapfilter._types import Floats
+from mapfilter.geodesy import wrap_rad
 
 TranslationNoise = Literal["zero_mean", "as_printed"]
 

@@ -10,14 +10,12 @@ from collections.abc import Callable
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.gnss.almanac import Almanac
 from mapfilter.gnss.orbits import EARTH_RATE_RAD_S, gps_time, satellite_positions_m
 from mapfilter.tracks.schema import SATELLITE
-
-Floats = NDArray[np.float64]
 
 PLACE = ("x_m", "y_m", "z_m")
 _LIGHT_MPS = 299_792_458.0

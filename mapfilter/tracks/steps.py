@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults
-from mapfilter.geodesy import Floats
 
 _FEW_ROWS = 10
 _MANY_ROWS = 20

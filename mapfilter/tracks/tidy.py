@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.satellites import check_satellites
@@ -27,7 +28,7 @@ class _Door:
     """Where a table comes in: what messages call it and its rows, and who collects them."""
 
     where: str
-    row_numbers: NDArray[np.int64]
+    row_numbers: Ints
     faults: Faults
 
     def numbered(self, row: int) -> str:
@@ -136,7 +137,7 @@ def _text(column: Column, values: pd.Series, door: _Door) -> Any:
     return pd.Series(texts, dtype=object)
 
 
-def _numbers(values: pd.Series) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _numbers(values: pd.Series) -> tuple[Floats, Bools]:
     """Return values as floats, and which of them could be read as a number or as missing."""
     if pd.api.types.is_numeric_dtype(values.dtype):
         number = values.to_numpy(dtype=np.float64, na_value=np.nan)
@@ -153,7 +154,7 @@ def _numbers(values: pd.Series) -> tuple[NDArray[np.float64], NDArray[np.bool_]]
     return number, readable
 
 
-def _add_rows(door: _Door, bad: NDArray[np.bool_], column: Column, values: pd.Series) -> None:
+def _add_rows(door: _Door, bad: Bools, column: Column, values: pd.Series) -> None:
     rows = np.flatnonzero(bad)
     for row in rows[:_SHOWN_ROWS]:
         value = values.iloc[row]

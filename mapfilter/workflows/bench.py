@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mapfilter._parallel import local_executor
+from mapfilter._types import Floats
 from mapfilter.database.build import BuildJob, build
 from mapfilter.database.estimate import dry_run, peak_memory_bytes
 from mapfilter.database.tiles import read_tile
 from mapfilter.errors import ConfigError, fail
-from mapfilter.geodesy import Floats, Lattice
+from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.rasters import RxLevRasters, open_rasters, write_rasters
 from mapfilter.roads.lattice import RouteLattice

@@ -11,9 +11,9 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapfilter._kernels import draw_key
+from mapfilter._types import Floats32
 from mapfilter.database.store import open_database
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.particle import ParticleBelief, ParticleFilter
@@ -38,8 +38,6 @@ from mapfilter.workflows.build import run_build
 from mapfilter.workflows.config import load_config
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.simulate import run_simulate
-
-Floats32 = NDArray[np.float32]
 
 _LEVELS, _PER_ROW, _PEER_STEPS = 7, 20, 10
 _JITTER = (0.5, 0.5, 0.005, 0.003, 0.0)

@@ -11,8 +11,8 @@ from math import exp
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats, Ints
 from mapfilter.filters.contract import MotionStep
 from mapfilter.models.cell_id import log_serving
 from mapfilter.models.fingerprint import LevelReading
@@ -20,7 +20,6 @@ from mapfilter.models.street_motion import BIAS, EAST, LOG_SCALE, NORTH, OFF
 from mapfilter.positioning.bayes_model import BayesModel
 from mapfilter.positioning.evidence import RadioReading
 
-Floats = NDArray[np.float64]
 Step = Callable[[Floats], Floats]
 """From equally weighted particles, shape (6, N), to those after a whole step."""
 
@@ -117,7 +116,7 @@ class NumpyModel:
         total = away * off_cost + (1 - away) * on
         return away * off_cost / total, np.log(total)
 
-    def _pixels(self, east: Floats, north: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _pixels(self, east: Floats, north: Floats) -> tuple[Ints, Ints]:
         lattice = self.model.area.lattice
         step = lattice.resolution_m
         col = np.clip(east / step, 0, lattice.cols - 1).astype(np.int64)

@@ -9,8 +9,8 @@ from statistics import median
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.errors import ConfigError, fail
 from mapfilter.experiments.papers.fritsche_klein_2009 import bound_curves
 from mapfilter.experiments.papers.fritsche_klein_2009_scene import (
@@ -24,8 +24,6 @@ from mapfilter.experiments.papers.fritsche_klein_2009_scene import (
 from mapfilter.filters.gaussian import EKF, RBUKF, Method
 from mapfilter.filters.trials import run_trials
 from mapfilter.positioning.fusion import compiled
-
-Floats = NDArray[np.float64]
 
 _TRIALS = 500
 

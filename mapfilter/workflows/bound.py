@@ -11,12 +11,12 @@ import pandas as pd
 
 from mapfilter._io import atomic_file, ensure_writable_folder
 from mapfilter._parallel import Progress
+from mapfilter._types import Floats
 from mapfilter.database.store import open_database
 from mapfilter.evaluation.first_fix import FirstFixOptions
 from mapfilter.evaluation.map_bound import TWIN_ERROR, MapBound, map_bound, on_lattice
 from mapfilter.evaluation.map_bound_store import write_bound
 from mapfilter.evaluation.radio_map import ErrorModel, radio_map
-from mapfilter.geodesy import Floats
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.bound import plot_metres_to_fix, plot_position_bound, plot_twins
 

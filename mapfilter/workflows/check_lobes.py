@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats32
 from mapfilter.radio.azimuths import AzimuthMistake, azimuth_mistakes
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.lobes import Lobe, falls_with_distance, find_lobe
@@ -20,7 +20,7 @@ _TURNED_SLIGHTLY, _LOBES_BETTER = 0.1, 0.3
 _ABOVE_DB, _ONE_ABOVE_DB = 10.0, 18.0
 _SMALL_EIRP_DBM, _MAST_M = 25.0, 10.0
 
-_TURNS: tuple[tuple[str, Callable[[NDArray[np.float32]], NDArray[np.float32]]], ...] = (
+_TURNS: tuple[tuple[str, Callable[[Floats32], Floats32]], ...] = (
     ("rows and columns exchanged", lambda v: v.T),
     ("rows from south to north", lambda v: v[::-1]),
     ("columns from east to west", lambda v: v[:, ::-1]),
@@ -153,7 +153,7 @@ def _mean_score(samples: Sequence[RasterSample], plan: CellPlan) -> float:
     return float(np.mean(scores)) if scores else 0.0
 
 
-def _turned(sample: RasterSample, values: NDArray[np.float32]) -> RasterSample:
+def _turned(sample: RasterSample, values: Floats32) -> RasterSample:
     rows, cols = values.shape
     return replace(sample, values=values, lattice=replace(sample.lattice, rows=rows, cols=cols))
 

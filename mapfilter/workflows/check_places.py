@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice, project, projected_crs, same_crs, unproject, utm_crs
 from mapfilter.radio.cells import CellPlan
@@ -19,7 +19,6 @@ from mapfilter.workflows.findings import Findings, listed
 from mapfilter.workflows.sections import Area, Config
 from mapfilter.workflows.world import area_lattice
 
-Floats = NDArray[np.float64]
 BoxDeg = tuple[float, float, float, float]
 Move = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
@@ -173,7 +172,7 @@ def _overlap(a: BoxDeg, b: BoxDeg) -> bool:
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
-def _inside(east: Floats, north: Floats, lattice: Lattice) -> NDArray[np.bool_]:
+def _inside(east: Floats, north: Floats, lattice: Lattice) -> Bools:
     west, south, right, top = np.array(lattice.bounds_m) + _AT_EDGE_M * np.array([-1, -1, 1, 1])
     return np.asarray((east >= west) & (east <= right) & (north >= south) & (north <= top))
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
+from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Floats, Lattice, unproject
+from mapfilter.geodesy import Lattice, unproject
 from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.maps import map_bounds_deg
 from mapfilter.workflows.sections import Area

@@ -154,5 +154,5 @@ def draw_zhang_2006(run: zhang.PaperRun, trials: int, out: Path) -> tuple[Path, 
 
 def _of(
     curves: dict[str, fritsche_klein.Curves], quantity: str
-) -> dict[str, fritsche_klein.Floats]:
+) -> dict[str, Floats]:
     return {name: own[quantity] for name, own in curves.items() if quantity in own}

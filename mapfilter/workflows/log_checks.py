@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, MapfilterError
-from mapfilter.geodesy import Floats, Lattice, same_crs
+from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.schema import SERVING

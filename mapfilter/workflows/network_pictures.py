@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapfilter._io import ensure_writable_folder
+from mapfilter._types import Floats32
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.rasters import RxLevRasters
@@ -185,7 +185,7 @@ def street_map(database: RadioRouteDatabase, points: ServedPoints) -> BaseMap:
     )
 
 
-def _ends(level_dbm: NDArray[np.float32]) -> tuple[float, float]:
+def _ends(level_dbm: Floats32) -> tuple[float, float]:
     """Return tens of dBm between which nearly all levels lie."""
     known = level_dbm[np.isfinite(level_dbm)]
     low, high = np.percentile(known, _NEARLY_ALL) if known.size else _IF_NONE_DBM

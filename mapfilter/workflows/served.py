@@ -8,13 +8,13 @@ from math import ceil
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats, Floats32, Ints, Ints32
 from mapfilter.database.manifest import POINTS
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.windows import WindowReader
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Floats, Lattice, same_crs
+from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.radio.rasters import RxLevRasters
 from mapfilter.workflows.area import pixels_on
 
@@ -50,9 +50,9 @@ class BestServers:
     """
 
     lattice: Lattice
-    server: NDArray[np.int32]
-    level_dbm: NDArray[np.float32]
-    margin_db: NDArray[np.float32]
+    server: Ints32
+    level_dbm: Floats32
+    margin_db: Floats32
 
     @classmethod
     def nowhere(cls, lattice: Lattice) -> BestServers:
@@ -81,9 +81,9 @@ class ServedPoints:
 
     window: Window
     best: BestServers
-    number: NDArray[np.int64]
-    on_square: NDArray[np.bool_]
-    counts: NDArray[np.int64]
+    number: Ints
+    on_square: Bools
+    counts: Ints
 
     def places(self, cell: int | None = None) -> tuple[Floats, Floats]:
         """Return east and north of the points, or of those that a cell serves."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats32
 from mapfilter.errors import InputError, fail
 from mapfilter.experiments.sweep.plan import AS_PREDICTED, Radio
 from mapfilter.experiments.sweep.world import SweepWorld
@@ -67,17 +67,17 @@ def sweep_world(config: Config, radios: Sequence[Radio]) -> SweepWorld:
     return SweepWorld(network, world.plan, lattices[0], heard, heights_m)
 
 
-def _levels(rasters: RxLevRasters, plan: CellPlan) -> NDArray[np.float32]:
+def _levels(rasters: RxLevRasters, plan: CellPlan) -> Floats32:
     return np.asarray(rasters.read_levels_dbm(plan, None, plan.ids), dtype=np.float32)
 
 
 def _heard(
     config: Config,
     radio: Radio,
-    predicted_dbm: NDArray[np.float32],
+    predicted_dbm: Floats32,
     lattice: Lattice,
     plan: CellPlan,
-) -> NDArray[np.float32]:
+) -> Floats32:
     if radio.name in (AS_PREDICTED, REALITY):
         return predicted_dbm
     reality = config.prediction.reality

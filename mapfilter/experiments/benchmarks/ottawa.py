@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 from math import radians
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from mapfilter._types import Bools, Floats, Floats32
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
@@ -40,10 +40,6 @@ from mapfilter.positioning.heard_model import HeardModel
 from mapfilter.radio.rasters import RxLevRasters
 from mapfilter.radio.shadowing import named_rng
 from mapfilter.tracks.log import TrackLog
-
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
-Bools = NDArray[np.bool_]
 
 PARTS = ("lacolyoc", "uottawa", "carling")
 FOLDER = "cell-ottawa-lte"

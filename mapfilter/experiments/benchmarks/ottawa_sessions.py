@@ -13,14 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import grid_convergence_rad, heading_from_azimuth_rad, project
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.schema import SERVING
-
-Floats = NDArray[np.float64]
 
 LONGEST_GAP_S = 30.0
 """Nothing is known of the way over a longer silence."""

@@ -8,13 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapfilter._io import read_json, write_json
+from mapfilter._types import Floats
 from mapfilter.errors import StoreError, fail
 from mapfilter.experiments.benchmarks.ottawa import FoundSession
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats
 from mapfilter.evaluation.success import wilson_interval, wilson_interval_of_routes
 from mapfilter.experiments.benchmarks.ottawa import METHODS, FoundSession
-
-Floats = NDArray[np.float64]
 
 _MAPPED_SHARE = 0.5
 
@@ -195,6 +193,6 @@ def _median(values: Sequence[float] | Floats) -> float:
     return float(np.median(known)) if known.size else float("nan")
 
 
-def _share(covered: Sequence[NDArray[np.bool_]]) -> float:
+def _share(covered: Sequence[Bools]) -> float:
     every = np.concatenate([np.empty(0, dtype=np.bool_), *covered])
     return float(np.mean(every)) if every.size else float("nan")

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.evaluation.accuracy import (
     SUCCESS_RADIUS_M,
     Truth,
@@ -26,7 +26,6 @@ from mapfilter.positioning.global_positioning import PositionedTrack
 _STAY_S = 10.0
 _WINDOW_S = 120.0
 Row = dict[str, Any]
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

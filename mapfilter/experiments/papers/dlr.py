@@ -9,9 +9,9 @@ from functools import lru_cache, partial
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapfilter._parallel import Progress, ordered_results
+from mapfilter._types import Bools, Floats, Ints
 from mapfilter.experiments.papers import dlr_filters as filters
 from mapfilter.experiments.papers.dlr_scene import (
     ECHO_M,
@@ -28,8 +28,6 @@ from mapfilter.experiments.papers.dlr_scene import (
 )
 from mapfilter.models.state import POSITION_CLOCK_3D, StateLayout
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 Name = Literal["static", "pkf", "ekf", "pf"]
 Systems = Literal["none", "gps", "gps+galileo"]
 
@@ -100,8 +98,8 @@ class TrackErrors:
     """
 
     errors_m: Floats
-    satellites: NDArray[np.int64]
-    gps: NDArray[np.int64]
+    satellites: Ints
+    gps: Ints
 
 
 def errors_of(
@@ -193,8 +191,8 @@ class PaperRun:
     """
 
     errors_m: dict[Run, Floats]
-    satellites: NDArray[np.int64]
-    gps: NDArray[np.int64]
+    satellites: Ints
+    gps: Ints
     shown: int
     over_time_m: Floats
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.experiments.papers import dlr_scene as scene
 from mapfilter.filters import rao_blackwell
 from mapfilter.filters.gaussian import EKF, Gaussian
@@ -22,7 +22,6 @@ from mapfilter.positioning.fusion import compiled
 from mapfilter.positioning.least_squares import TOO_FEW, StaticFix, static_fix
 from mapfilter.positioning.position_filter import filter_fixes
 
-Floats = NDArray[np.float64]
 Mobility = Literal["diagonal", "discretised"]
 
 HYBRID = StateLayout(7, 0, 2, 4, 6)

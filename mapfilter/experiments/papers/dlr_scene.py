@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats
 from mapfilter.geodesy import Lattice
 from mapfilter.gnss.almanac import joined
 from mapfilter.gnss.constellations import nominal_galileo, nominal_gps
@@ -33,8 +34,6 @@ from mapfilter.simulation.lte_network import (
 )
 from mapfilter.simulation.pedestrians import GasGround, gas_walk
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 Where = Literal["edge", "near"]
 
 EDGE: Where = "edge"

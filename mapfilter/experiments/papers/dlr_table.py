@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools
 from mapfilter.evaluation.accuracy import percentile_m
 from mapfilter.evaluation.track_percentiles import (
     Percentile,
@@ -16,8 +16,6 @@ from mapfilter.evaluation.track_percentiles import (
 )
 from mapfilter.experiments.papers import dlr
 from mapfilter.experiments.papers.dlr_scene import Where
-
-Bools = NDArray[np.bool_]
 
 SHARE = 0.9
 SHARES = (0.5, 0.67, SHARE, 0.95)

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapfilter._parallel import Progress
+from mapfilter._types import Floats
 from mapfilter.evaluation.bounds import (
     bound_of,
     expected_information,
@@ -35,7 +35,6 @@ from mapfilter.filters.smoothing import smooth
 from mapfilter.filters.trials import run_trials
 from mapfilter.positioning.fusion import compiled
 
-Floats = NDArray[np.float64]
 Curves = dict[str, Floats]
 
 QUANTITIES = ("location_m", "velocity_mps", "bias_m", "drift_mps")

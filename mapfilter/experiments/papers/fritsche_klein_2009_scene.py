@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
 from mapfilter.models.gaussian import GaussianTerms, stack
 from mapfilter.models.motion import (
@@ -25,8 +25,6 @@ from mapfilter.models.pseudorange import pseudoranges
 from mapfilter.models.signal_strength import levels
 from mapfilter.models.state import MOVING, MOVING_CLOCK, StateLayout
 from mapfilter.models.timing_advance import timing_advances
-
-Floats = NDArray[np.float64]
 
 Combination = Literal["gsm", "hybrid1", "hybrid2"]
 COMBINATIONS: tuple[Combination, ...] = ("gsm", "hybrid1", "hybrid2")

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from mapfilter._parallel import Progress, ordered_results
+from mapfilter._types import Floats
 from mapfilter.experiments.papers.tesa_models import Motion, assumed, loading, measurements
 from mapfilter.experiments.papers.tesa_scene import (
     BETA_DB,
@@ -24,8 +24,6 @@ from mapfilter.experiments.papers.tesa_scene import (
 from mapfilter.filters import rao_blackwell
 from mapfilter.filters.sir_options import SIR, SirOptions
 from mapfilter.filters.trials import CompiledMeasurement
-
-Floats = NDArray[np.float64]
 
 PARTICLES = 10_000
 AVAILABLE_M = 100.0

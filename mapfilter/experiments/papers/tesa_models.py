@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Floats
 from mapfilter.experiments.papers.tesa_scene import (
     BEARING_DEG,
     CLOCK_M,
@@ -33,7 +33,6 @@ from mapfilter.models.state import POSITION_CLOCK_3D, StateLayout
 from mapfilter.positioning.fusion import compiled
 from mapfilter.simulation.drives import ahead_and_left
 
-Floats = NDArray[np.float64]
 Motion = Literal["velocity", "identity", "known-bearing"]
 
 VELOCITY: Motion = "velocity"

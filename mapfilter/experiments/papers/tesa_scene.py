@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapfilter._types import Bools, Floats
 from mapfilter.gnss.constellations import nominal_gps
 from mapfilter.gnss.noise import elevation_sigma_m
 from mapfilter.gnss.orbits import satellite_positions_m
@@ -22,8 +22,6 @@ from mapfilter.simulation.drives import (
     shadowing_db,
     straight_drive,
 )
-
-Floats = NDArray[np.float64]
 
 START_LON_LAT_DEG, START_HEIGHT_M = (4.86, 43.52), 20.0
 LENGTH_M, DURATION_S, BEARING_DEG = 9456.0, 720.0, 200.0
@@ -92,7 +90,7 @@ class Scene:
     satellites_m: Floats
     range_sigma_m: Floats
     stations_m: Floats
-    outage: NDArray[np.bool_]
+    outage: Bools
 
 
 def tesa_scene(*, halt: bool = False) -> Scene:

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapfilter._parallel import Progress
+from mapfilter._types import Floats
 from mapfilter.evaluation.bounds import (
     bound_of,
     expected_information,
@@ -29,8 +29,6 @@ from mapfilter.models.state import MOVING
 from mapfilter.models.timing_advance import timing_advances
 from mapfilter.positioning.fusion import compiled
 from mapfilter.positioning.least_squares import static_fix
-
-Floats = NDArray[np.float64]
 
 Combination = Literal["fusion", "ta", "rss"]
 COMBINATIONS: tuple[Combination, ...] = ("fusion", "ta", "rss")

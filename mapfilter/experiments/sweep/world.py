@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapfilter._io import atomic_dir, read_json, sha256_file, write_json
+from mapfilter._types import Floats32
 from mapfilter.database.store import read_cells, write_cells
 from mapfilter.errors import StoreError, fail
 from mapfilter.geodesy import Lattice
@@ -45,8 +45,8 @@ class SweepWorld:
     network: StreetNetwork
     plan: CellPlan
     lattice: Lattice
-    levels_dbm: Mapping[str, NDArray[np.float32]]
-    heights_m: NDArray[np.float32] | None = None
+    levels_dbm: Mapping[str, Floats32]
+    heights_m: Floats32 | None = None
 
     @property
     def inside(self) -> Inside | None:
