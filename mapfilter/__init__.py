@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mapfilter.database.build import build as build
-    from mapfilter.database.field import RadioField as RadioField
+    from mapfilter.database.radioroutes import RadioField as RadioField
     from mapfilter.database.radioroutes import RadioRouteDatabase as RadioRouteDatabase
     from mapfilter.database.store import open_database as open_database
     from mapfilter.errors import MapfilterError as MapfilterError
@@ -28,19 +28,19 @@ if TYPE_CHECKING:
     from mapfilter.evaluation.accuracy import accuracy as accuracy
     from mapfilter.evaluation.success import wilson_interval as wilson_interval
     from mapfilter.filters.candidate import CandidateFilter as CandidateFilter
-    from mapfilter.filters.candidate_options import CandidateOptions as CandidateOptions
+    from mapfilter.filters.candidate import CandidateOptions as CandidateOptions
     from mapfilter.filters.contract import Status as Status
     from mapfilter.geodesy import Lattice as Lattice
-    from mapfilter.positioning.estimate import Fix as Fix
-    from mapfilter.positioning.estimate import TrackEstimate as TrackEstimate
-    from mapfilter.positioning.global_positioning import cell_points as cell_points
-    from mapfilter.positioning.global_positioning import (
+    from mapfilter.positioning.candidate import cell_points as cell_points
+    from mapfilter.positioning.candidate import (
         position_by_candidates as position_by_candidates,
     )
+    from mapfilter.positioning.estimate import Fix as Fix
+    from mapfilter.positioning.estimate import TrackEstimate as TrackEstimate
     from mapfilter.radio.cells import CellPlan as CellPlan
     from mapfilter.radio.cells import read_cell_plan as read_cell_plan
-    from mapfilter.radio.rasters import RxLevRasters as RxLevRasters
-    from mapfilter.radio.rasters import open_rasters as open_rasters
+    from mapfilter.rasters.rxlev_rasters import RxLevRasters as RxLevRasters
+    from mapfilter.rasters.rxlev_rasters import open_rasters as open_rasters
     from mapfilter.roads.lattice import RouteLattice as RouteLattice
     from mapfilter.tracks.log import TrackLog as TrackLog
     from mapfilter.tracks.log import make_log as make_log
@@ -48,26 +48,26 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "CandidateFilter": "filters.candidate",
-    "CandidateOptions": "filters.candidate_options",
+    "CandidateOptions": "filters.candidate",
     "CellPlan": "radio.cells",
     "Fix": "positioning.estimate",
     "Lattice": "geodesy",
     "MapfilterError": "errors",
-    "RadioField": "database.field",
+    "RadioField": "database.radioroutes",
     "RadioRouteDatabase": "database.radioroutes",
     "RouteLattice": "roads.lattice",
-    "RxLevRasters": "radio.rasters",
+    "RxLevRasters": "rasters.rxlev_rasters",
     "Status": "filters.contract",
     "TrackEstimate": "positioning.estimate",
     "TrackLog": "tracks.log",
     "Truth": "evaluation.accuracy",
     "accuracy": "evaluation.accuracy",
     "build": "database.build",
-    "cell_points": "positioning.global_positioning",
+    "cell_points": "positioning.candidate",
     "make_log": "tracks.log",
     "open_database": "database.store",
-    "open_rasters": "radio.rasters",
-    "position_by_candidates": "positioning.global_positioning",
+    "open_rasters": "rasters.rxlev_rasters",
+    "position_by_candidates": "positioning.candidate",
     "read_cell_plan": "radio.cells",
     "read_log": "tracks.store",
     "wilson_interval": "evaluation.success",

@@ -16,8 +16,18 @@ from typing import Any
 
 import numpy as np
 
-from mapfilter.filters.contract import Estimate, Filter, MotionStep, Reason, Status, UpdateInfo
-from mapfilter.filters.run import Event, Step, run, step
+from mapfilter.filters.contract import (
+    Estimate,
+    Event,
+    Filter,
+    MotionStep,
+    Reason,
+    Status,
+    Step,
+    UpdateInfo,
+    run,
+    step,
+)
 
 AnyFilter = Filter[Any, Any, Any]
 

@@ -9,8 +9,7 @@ import sys
 from pathlib import Path
 
 from mapfilter.workflows.pipeline import Stage, run_pipeline
-from mapfilter.workflows.replay import run_replay
-from mapfilter.workflows.replayed import replay_facts
+from mapfilter.workflows.replay import replay_facts, run_replay
 from mapfilter.workflows.simulate import run_simulate
 
 if __name__ == "__main__":

@@ -7,11 +7,9 @@ import numpy as np
 
 from mapfilter.models.gaussian import stack
 from mapfilter.models.motion import constant_velocity
-from mapfilter.models.position_fix import position_fix
-from mapfilter.models.pseudorange import pseudoranges
+from mapfilter.models.ranging import position_fix, pseudoranges, timing_advances
 from mapfilter.models.signal_strength import levels
 from mapfilter.models.state import MOVING, MOVING_CLOCK
-from mapfilter.models.timing_advance import timing_advances
 
 CASES = json.loads((Path(__file__).parent / "fusion_cases.json").read_text(encoding="utf-8"))
 LAYOUT = CASES["fk_layout"]

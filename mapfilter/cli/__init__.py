@@ -13,7 +13,7 @@ from mapfilter.cli.evaluate import evaluate
 from mapfilter.cli.experiments import bench, reproduce, sweep
 from mapfilter.cli.options import DONE
 from mapfilter.cli.tracks import demo, replay, simulate
-from mapfilter.workflows.guard import guarded
+from mapfilter.workflows.terminal import guarded
 
 __all__ = ["app", "main"]
 

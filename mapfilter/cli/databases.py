@@ -31,9 +31,9 @@ def check(
     as_json: JsonOption = False,
 ) -> None:
     """Look at all inputs together before anything runs; exit code 2 if something is wrong."""
+    from mapfilter.check.findings import paragraphs
+    from mapfilter.config.load import load_config
     from mapfilter.workflows.check import run_check
-    from mapfilter.workflows.config import load_config
-    from mapfilter.workflows.findings import paragraphs
 
     with progress_bar("check") as progress:
         result = run_check(load_config(config, settings or ()), progress)
@@ -53,7 +53,7 @@ def predict(
     as_json: JsonOption = False,
 ) -> None:
     """Predict RxLev rasters from cell plan and buildings, and a set that plays reality."""
-    from mapfilter.workflows.config import load_config
+    from mapfilter.config.load import load_config
     from mapfilter.workflows.predict import run_predict
 
     settings = seeded(settings, seed, "prediction.seed", "prediction.reality.seed")
@@ -75,8 +75,8 @@ def build(
     as_json: JsonOption = False,
 ) -> None:
     """Build a radio-route database from RxLev rasters and roads."""
+    from mapfilter.config.load import load_config
     from mapfilter.workflows.build import run_build, run_dry_build
-    from mapfilter.workflows.config import load_config
 
     loaded = load_config(config, settings or (), out=out)
     if dry_run:
@@ -100,7 +100,7 @@ def merge(
     as_json: JsonOption = False,
 ) -> None:
     """Merge databases of other areas or cells; a later one replaces what it covers."""
-    from mapfilter.workflows.merge import run_merge
+    from mapfilter.workflows.databases import run_merge
 
     given = [given_path(path) or path for path in databases]
     with progress_bar("merge") as progress:
@@ -117,7 +117,7 @@ def export(
     as_json: JsonOption = False,
 ) -> None:
     """Write a radio-route database as GeoPackage, or best server and margin as GeoTIFF."""
-    from mapfilter.workflows.export import run_export
+    from mapfilter.workflows.databases import run_export
 
     print_result(run_export(database, to), as_json)
 

@@ -37,8 +37,7 @@ def sweep(
     as_json: JsonOption = False,
 ) -> None:
     """Run a filter over a grid of inertial noise; exit code 3 if it was stopped on the way."""
-    from mapfilter.workflows.sweep import load_sweep, run_sweep
-    from mapfilter.workflows.sweep_brief import brief
+    from mapfilter.workflows.sweep import brief, load_sweep, run_sweep
 
     loaded = load_sweep(config, seeded(settings, seed, "sweep.seed"), out=out)
     find_own_filter(loaded)
@@ -88,7 +87,7 @@ def reproduce(
     from mapfilter.workflows.reproduce_dlr import DLR, run_reproduce_dlr
     from mapfilter.workflows.reproduce_fusion import FUSION_PAPERS, run_reproduce_fusion
     from mapfilter.workflows.reproduce_tesa import TESA, run_reproduce_tesa
-    from mapfilter.workflows.sweep_brief import brief
+    from mapfilter.workflows.sweep import brief
 
     if paper in FUSION_PAPERS:
         with rate_bar("reproduce", "parts") as progress:

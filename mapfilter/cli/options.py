@@ -13,7 +13,7 @@ import typer
 from mapfilter.errors import ConfigError, Faults, fail
 
 if TYPE_CHECKING:
-    from mapfilter.workflows.sections import Config
+    from mapfilter.config.sections import Config
 
 DONE, WRONG, PARTIAL = 0, 2, 3
 """Exit codes."""
@@ -21,7 +21,7 @@ DONE, WRONG, PARTIAL = 0, 2, 3
 
 def given_path(path: Path | None) -> Path | None:
     """Refuse what cannot be a path, before anything is opened."""
-    from mapfilter.workflows.paths import path_fault, shown
+    from mapfilter._io import path_fault, shown
 
     if path is not None and (wrong := path_fault(path)):
         raise fail(ConfigError, "command line", wrong, shown(str(path)))

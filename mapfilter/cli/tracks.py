@@ -46,7 +46,7 @@ def simulate(
     as_json: JsonOption = False,
 ) -> None:
     """Simulate journeys with truth along the streets."""
-    from mapfilter.workflows.config import load_config
+    from mapfilter.config.load import load_config
     from mapfilter.workflows.simulate import run_simulate
 
     settings = seeded(settings, seed, "journeys.seed")
@@ -87,9 +87,8 @@ def replay(
     as_json: JsonOption = False,
 ) -> None:
     """Locate one log, or every log of a folder; exit code 3 if that was done in part only."""
-    from mapfilter.workflows.config import load_config
-    from mapfilter.workflows.replay import run_replay
-    from mapfilter.workflows.replayed import replay_facts
+    from mapfilter.config.load import load_config
+    from mapfilter.workflows.replay import replay_facts, run_replay
 
     given = seeded(settings, seed, "journeys.seed")
     for key, value in (("database.path", database), ("track.path", log)):

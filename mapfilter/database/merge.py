@@ -14,8 +14,8 @@ import pyarrow as pa
 from mapfilter._io import atomic_dir, check_replaceable, sha256_file
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats, Ints
-from mapfilter.database.assemble import Head, write_parts
 from mapfilter.database.manifest import FORMAT, MANIFEST, POINTS, InputFile
+from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.sources import overlap, pixels_between
 from mapfilter.database.store import open_database

@@ -150,7 +150,7 @@ def export_geopackage(
     OutputError
         The file cannot be written.
     """
-    from mapfilter.database.geopackage import write_geopackage
+    from mapfilter.database.export import write_geopackage
 
     write_geopackage(database, Path(path), cells)
 
@@ -172,7 +172,7 @@ def export_cog(database: RadioRouteDatabase, path: Path | str) -> None:
     OutputError
         The file cannot be written.
     """
-    from mapfilter.database.cog import write_cog
+    from mapfilter.database.export import write_cog
 
     write_cog(database, Path(path))
 

@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
 from mapfilter.filters.gaussian import factor_of
-from mapfilter.models.protocols import GaussianMeasurement
-from mapfilter.models.state import StateLayout
+from mapfilter.models.state import GaussianMeasurement, StateLayout
 
 _BATCH = 20_000
 

@@ -23,11 +23,11 @@ import numpy as np
 from numba import njit
 
 from mapfilter._parallel import Progress
-from mapfilter._types import Bools, Floats
+from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
 from mapfilter.evaluation.ideal_filter import judged_by_cells, judged_by_levels, walk
-from mapfilter.evaluation.radio_map import ErrorModel, Ints, RadioMap
+from mapfilter.evaluation.radio_map import ErrorModel, RadioMap
 
 _AT_A_TIME = 128
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)

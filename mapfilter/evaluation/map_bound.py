@@ -1,19 +1,107 @@
-"""Where a radio map will work, before anybody drives: all bounds together, by point and by way."""
+"""Where a radio map will work, before anybody drives: all bounds together, by point and by way.
+
+Of two places that differ by levels d, one report with error covariance S tells which it is with
+a probability of error of at most half the Bhattacharyya coefficient, exp(-d' S⁻¹ d / 8) (Kailath
+1967, "The divergence and Bhattacharyya distance measures in signal selection"). A point's bits are
+minus the logarithm of the mean of these over the places of its cell: with b bits, one place in 2^b
+is left on average.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import rasterio
+from numba import njit
+from rasterio._err import CPLE_BaseError
+from rasterio.errors import RasterioError
+from rasterio.shutil import copy as copy_raster
 from scipy.spatial import cKDTree
 
+from mapfilter._io import atomic_file
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats, Floats32
-from mapfilter.evaluation.distinctness import Distinctness, distinctness
+from mapfilter.errors import OutputError, fail
 from mapfilter.evaluation.first_fix import FirstFix, FirstFixOptions, first_fix
 from mapfilter.evaluation.position_bound import PositionBound, position_bound
-from mapfilter.evaluation.radio_map import ErrorModel, RadioMap
+from mapfilter.evaluation.radio_map import (
+    MOST_HEARD,
+    ErrorModel,
+    RadioMap,
+    distance_squared,
+    heard_cells,
+)
+from mapfilter.geodesy import Lattice
+
+COMPARED = 500
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Distinctness:
+    """What one report tells at each point, shape (N,) each, in the order of the points.
+
+    Parameters
+    ----------
+    cell_bits : numpy.ndarray
+        From the name of the serving cell: log2 of all points over the cell's. Exact.
+    level_bits : numpy.ndarray
+        From the levels, among the points of that cell. Exact for the error model, save that at most
+        500 places of a cell, evenly chosen, stand for all.
+    """
+
+    cell_bits: Floats
+    level_bits: Floats
+
+
+def distinctness(radio: RadioMap, errors: ErrorModel) -> Distinctness:
+    """Return what one report tells at every point of a radio map."""
+    first, point = radio.points_by_cell()
+    counts = np.diff(first)
+    chosen = [
+        point[begin:end][np.linspace(0, end - begin - 1, min(COMPARED, end - begin)).astype(int)]
+        for begin, end in pairwise(first)
+    ]
+    compared = np.concatenate(chosen)
+    from_ = np.concatenate([[0], np.cumsum([part.size for part in chosen])])
+    levels = radio.level_dbm[radio.row, radio.col]
+    mean = _mean_overlap(
+        levels,
+        radio.server,
+        from_,
+        levels[compared],
+        radio.site,
+        radio.floor_dbm,
+        errors.deviation_db**2,
+        errors.site_share,
+    )
+    cell_bits = np.log2(len(radio) / counts[radio.server])
+    return Distinctness(cell_bits, -np.log2(np.maximum(mean, 1.0 / len(radio))))
+
+
+@njit(cache=True)
+def _mean_overlap(  # type: ignore[no-untyped-def]
+    levels, server, first, others, site, floor_dbm, variance, share
+):
+    mean = np.zeros(server.size)
+    cells = np.empty(MOST_HEARD, dtype=np.int64)
+    off_db, part = np.empty(MOST_HEARD), np.empty(MOST_HEARD)
+    scale = -1.0 / (8.0 * variance * (1.0 - share))
+    for i in range(server.size):
+        heard = heard_cells(levels[i], floor_dbm, site, share, cells, part)
+        begin, end = first[server[i]], first[server[i] + 1]
+        total = 0.0
+        for other in range(begin, end):
+            for j in range(heard):
+                off_db[j] = levels[i, cells[j]] - others[other, cells[j]]
+            total += np.exp(scale * distance_squared(off_db, part, heard))
+        mean[i] = total / max(end - begin, 1)
+    return mean
+
 
 TWIN_ERROR = 0.3
 """Two places count as twins when they are mistaken for each other with at least this chance."""
@@ -149,3 +237,40 @@ def on_lattice(radio: RadioMap, values: Floats) -> Floats32:
 
 def _known(values: Floats) -> Floats:
     return np.where(np.isfinite(values), values, np.nan)
+
+
+_BLOCK_PX = 512
+
+
+def write_bound(
+    rasters: Mapping[str, Floats32], lattice: Lattice, path: Path, attribution: str = ""
+) -> None:
+    """Write the rasters of :data:`mapfilter.evaluation.map_bound.BANDS`, NaN off the points.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    profile = {
+        "driver": "GTiff", "width": lattice.cols, "height": lattice.rows, "count": len(BANDS),
+        "dtype": "float32", "nodata": np.nan, "crs": lattice.crs, "interleave": "band",
+        "transform": rasterio.Affine.from_gdal(*lattice.gdal_transform), "tiled": True,
+        "blockxsize": _BLOCK_PX, "blockysize": _BLOCK_PX, "bigtiff": "if_safer",
+    }  # fmt: skip
+    with atomic_file(path) as temporary:
+        bands = temporary.with_name("bands.tif")
+        try:
+            with rasterio.open(bands, "w", **profile) as target:
+                if attribution:
+                    target.update_tags(TIFFTAG_COPYRIGHT=attribution)
+                for band, (name, unit) in enumerate(BANDS, start=1):
+                    target.write(rasters[name], band)
+                    target.set_band_description(band, name)
+                    target.set_band_unit(band, unit)
+            copy_raster(
+                bands, temporary, driver="COG", compress="DEFLATE", predictor="YES",
+                blocksize=_BLOCK_PX, overview_resampling="nearest", bigtiff="if_safer",
+            )  # fmt: skip
+        except (RasterioError, CPLE_BaseError) as error:
+            raise fail(OutputError, str(path), "a place that can be written", error) from error

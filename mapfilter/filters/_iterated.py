@@ -8,13 +8,16 @@ import numpy as np
 from numba import njit
 
 from mapfilter._types import Floats, Ints
-from mapfilter.filters._square_root import settle_lanes, solve_lanes, through_lanes, whiten_lanes
-from mapfilter.filters._updates import (
+from mapfilter.filters._square_root import (
     UPDATE_SIGNATURE,
     drop_absent,
     evidence_lanes,
     noise_lanes,
     present_lanes,
+    settle_lanes,
+    solve_lanes,
+    through_lanes,
+    whiten_lanes,
 )
 
 _SETTLED = 1e-9

@@ -9,16 +9,14 @@ from numba import njit
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.filters._square_root import (
-    cholesky_lanes,
-    settle_lanes,
-    solve_lanes,
-    whiten_lanes,
-)
-from mapfilter.filters._updates import (
     UPDATE_SIGNATURE,
+    cholesky_lanes,
     drop_absent,
     evidence_lanes,
     present_lanes,
+    settle_lanes,
+    solve_lanes,
+    whiten_lanes,
 )
 
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError
-from mapfilter.filters._mixture_runs import run_mixture
+from mapfilter.filters._runs import run_mixture
 from mapfilter.filters.gaussian import Method, factor_of
 from mapfilter.filters.trials import (
     CompiledMeasurement,

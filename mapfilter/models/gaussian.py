@@ -11,16 +11,15 @@ from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.models._terms import COLUMNS, measure
-from mapfilter.models.protocols import fisher_information
-from mapfilter.models.state import StateLayout
+from mapfilter.models.state import StateLayout, fisher_information
+from mapfilter.models.terms import COLUMNS, measure
 
 _LOG_TWO_PI = float(np.log(2 * np.pi))
 
 
 @dataclass(frozen=True, eq=False)
 class GaussianTerms:
-    """A :class:`mapfilter.models.protocols.GaussianMeasurement` made of terms.
+    """A :class:`mapfilter.models.state.GaussianMeasurement` made of terms.
 
     The functions of this room make such objects; :func:`stack` puts several together.
 

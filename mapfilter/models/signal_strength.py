@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
-from mapfilter.models._terms import LEVEL
 from mapfilter.models.gaussian import GaussianTerms, checked, deviations, places, terms
 from mapfilter.models.state import StateLayout
+from mapfilter.models.terms import LEVEL
 from mapfilter.radio.antenna import MeasuredAntenna, leaning
 
 SHORTEST_DISTANCE_M = 1.0

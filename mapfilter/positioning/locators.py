@@ -8,16 +8,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.filters.candidate_options import CandidateOptions
-from mapfilter.positioning.bayes_options import BayesOptions, open_area
-from mapfilter.positioning.bayes_replay import position_by_bayes
-from mapfilter.positioning.global_positioning import (
+from mapfilter.filters.candidate import CandidateOptions
+from mapfilter.positioning.bayes.options import BayesOptions, open_area
+from mapfilter.positioning.bayes.replay import position_by_bayes
+from mapfilter.positioning.candidate import (
     PositionedTrack,
     cell_points,
     position_by_candidates,
 )
-from mapfilter.positioning.own_filter import OwnFilter, make_filter
-from mapfilter.positioning.own_replay import position_by_own
+from mapfilter.positioning.custom_filter import OwnFilter, make_filter, position_by_own
 from mapfilter.tracks.log import TrackLog
 
 Locator = Callable[[TrackLog, np.random.Generator], PositionedTrack]

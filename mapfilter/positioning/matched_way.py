@@ -11,7 +11,7 @@ from numba import njit
 from mapfilter._types import Floats32, Ints32
 from mapfilter.database.nearest import CellPointIndex
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.positioning.area_map import AreaMap
+from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.estimate import Fix
 
 

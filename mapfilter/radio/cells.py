@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -16,10 +16,102 @@ import numpy as np
 from mapfilter._io import atomic_file
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import project, projected_crs, same_crs, unproject
-from mapfilter.radio._cell_checks import check_cells
-from mapfilter.radio._cell_layouts import COLUMNS, Layout
-from mapfilter.radio._cell_selection import once, within
-from mapfilter.radio._cell_table import read_plan
+from mapfilter.radio.cell_layouts import COLUMNS, Layout
+from mapfilter.radio.cell_rules import (
+    OPTIONAL,
+    POINTED,
+    RANGES,
+    antenna_fault,
+    id_fault,
+    looks_like_radians,
+)
+from mapfilter.radio.cell_table import Row, read_plan
+
+
+def check_cells(
+    cells: tuple[Cell, ...],
+    where: Callable[[int, str], str],
+    faults: Faults,
+    *,
+    ranges: bool = True,
+) -> None:
+    """Note what is wrong with cells: each field (unless checked already), and all together."""
+    if not cells and not faults.found:
+        faults.add("cell plan", "at least one cell", "none")
+    first: dict[str, int] = {}
+    for i, cell in enumerate(cells):
+        if ranges:
+            _check_fields(cell, partial(where, i), faults)
+        if cell.antenna in POINTED and cell.azimuth_deg is None:
+            faults.add(
+                where(i, "azimuth_deg"),
+                "an azimuth, as the antenna is a sector",
+                "nothing",
+                "azimuth left out, or the antenna is omni",
+            )
+        if cell.id in first:
+            faults.add(where(i, "cell"), "an id used once", repr(cell.id), "a row given twice")
+        first.setdefault(cell.id, i)
+    azimuths = [cell.azimuth_deg for cell in cells if cell.azimuth_deg is not None]
+    if looks_like_radians(azimuths):
+        shown = ", ".join(f"{azimuth:g}" for azimuth in azimuths[:3])
+        faults.add(
+            where(0, "azimuth_deg"),
+            "degrees in 0..360",
+            f"{shown}, …, none above 2π",
+            "radians given for degrees",
+        )
+
+
+def _check_fields(cell: Cell, where: Callable[[str], str], faults: Faults) -> None:
+    for name in ("id", "site"):
+        if wrong := id_fault(getattr(cell, name)):
+            faults.add(where(name), *wrong)
+    if wrong := antenna_fault(cell.antenna):
+        faults.add(where("antenna"), *wrong)
+    for name, allowed in RANGES.items():
+        value = getattr(cell, name)
+        if not allowed.holds(value) and not (value is None and name in OPTIONAL):
+            hint = allowed.hint(value) if isinstance(value, int | float) else ""
+            faults.add(where(name), allowed.expected, value, hint)
+
+
+def once(rows: list[Row], notes: tuple[str, ...]) -> tuple[list[Row], tuple[str, ...]]:
+    """Return the first row of each cell, and the notes with what was left out."""
+    first: dict[str, Row] = {}
+    for row in rows:
+        first.setdefault(row.values["id"], row)
+    if len(first) < len(rows):
+        notes += (f"{len(rows) - len(first)} rows of cells told already left out",)
+    return list(first.values()), notes
+
+
+def within(
+    rows: list[Row],
+    bounds_m: tuple[float, float, float, float],
+    notes: tuple[str, ...],
+    where: str,
+) -> tuple[list[Row], tuple[str, ...]]:
+    """Return the rows in a box and the notes with what was left out.
+
+    Raises
+    ------
+    InputError
+        There are none.
+    """
+    west, south, east, north = bounds_m
+    inside = [
+        row
+        for row in rows
+        if west <= row.values["east_m"] <= east and south <= row.values["north_m"] <= north
+    ]
+    if rows and not inside:
+        bounds = ", ".join(f"{value:.0f}" for value in bounds_m)
+        raise fail(InputError, where, f"cells in {bounds}", "none", "cells of another area")
+    if len(inside) < len(rows):
+        notes += (f"{len(rows) - len(inside)} of {len(rows)} cells left out: far from the area",)
+    return inside, notes
+
 
 Antenna = str
 

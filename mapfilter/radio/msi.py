@@ -18,8 +18,8 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.radio._cell_rules import ANTENNAS, antenna_fault
 from mapfilter.radio.antenna import MeasuredAntenna
+from mapfilter.radio.cell_rules import ANTENNAS, antenna_fault
 
 DBI_OVER_DBD = 2.15
 """Gain of a half-wave dipole over an isotropic antenna, in dB."""

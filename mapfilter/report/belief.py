@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import sqrt
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +14,9 @@ from matplotlib.lines import Line2D
 from mapfilter._types import Floats
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth
 from mapfilter.filters.contract import Status
-from mapfilter.positioning.snapshot import Snapshot
+from mapfilter.positioning.estimate import Snapshot
 from mapfilter.report.basemap import BaseMap, LocalFrame
-from mapfilter.report.canvas import BLUE
+from mapfilter.report.canvas import BLUE, grouped
 from mapfilter.report.panels import plot_panels
 
 _SIDE_M, _MOST_SQUARES = 10.0, 200
@@ -110,3 +111,53 @@ def _marks() -> list[Line2D]:
         )
         for name, share in shares.items()
     ]  # fmt: skip
+
+
+_FAINTEST_CANDIDATE = 0.15
+
+
+def plot_candidates(
+    snapshots: Sequence[Snapshot], truth: Truth | None, base: BaseMap, path: Path
+) -> None:
+    """Draw the hypotheses at up to six moments, one panel each, with truth and estimate.
+
+    Every panel says how many hypotheses are left; a hypothesis fades with its share of the belief.
+
+    Parameters
+    ----------
+    snapshots : sequence of Snapshot
+        One to six, in the order of the panels.
+    truth : Truth or None
+        The true path, where known.
+    base : BaseMap
+        The map below.
+    path : Path
+        PNG to write.
+
+    Raises
+    ------
+    InputError
+        There is no snapshot, or more than six.
+    OutputError
+        The picture cannot be written.
+    """
+    dot = Line2D([], [], linestyle="", marker="o", markersize=5, color=BLUE, label="candidates")
+    plot_panels(snapshots, truth, base, path, draw=_draw_candidates, said=_left, marks=[dot])
+
+
+def _left(snapshot: Snapshot) -> str:
+    left = snapshot.hypothesis_east_m.size
+    return f"{grouped(left)} {'candidate' if left == 1 else 'candidates'}"
+
+
+def _draw_candidates(axes: Axes, frame: LocalFrame, snapshot: Snapshot) -> None:
+    count = snapshot.hypothesis_east_m.size
+    if count:
+        x, y = frame(snapshot.hypothesis_east_m, snapshot.hypothesis_north_m)
+        colours = np.empty((count, 4))
+        colours[:, :3] = to_rgb(BLUE)
+        share = snapshot.weight / snapshot.weight.max()
+        colours[:, 3] = _FAINTEST_CANDIDATE + (1 - _FAINTEST_CANDIDATE) * np.clip(share, 0.0, 1.0)
+        # Few are drawn large, thousands small enough to show the streets they lie on.
+        size = float(np.clip(90.0 / sqrt(count), 2.0, 36.0))
+        axes.scatter(x, y, s=size, c=colours, linewidths=0, zorder=4)

@@ -10,7 +10,7 @@ from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.report.canvas import BLUE, ORANGE, VERMILLION, bottom_legend, picture
-from mapfilter.report.error_curve import shade_searching_and_lost
+from mapfilter.report.errors import shade_searching_and_lost
 
 _SIZE_IN = (9.0, 5.6)
 _MOST_COLUMNS = 5

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 
 from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.accuracy import Truth
-from mapfilter.positioning.snapshot import Snapshot
+from mapfilter.positioning.estimate import Snapshot
 from mapfilter.report.basemap import BaseMap, LocalFrame, attribute, draw_base, map_height_in
 from mapfilter.report.canvas import BLACK, STREET, VERMILLION, bottom_legend, picture
 

@@ -9,6 +9,7 @@ these are; here tracks are drawn across their direction only, by mean shift over
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -16,10 +17,145 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from mapfilter._types import Floats, Ints
+from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.roads._growth import grown_lines
 from mapfilter.roads.ways import Ways
+
+Place = tuple[float, float]
+
+# A track's own last vertices, two to a reach, are not what it meets again.
+_TRAIL = 5
+# Two vertices are joined already when so few steps lead from one to the other.
+_NEIGHBOURHOOD = 12
+
+
+class _Net:
+    """Lines accepted so far, and their vertices in squares of one reach."""
+
+    def __init__(self, reach_m: float) -> None:
+        self.lines: list[list[Place]] = []
+        self.reach_m = reach_m
+        self._squares: dict[tuple[int, int], list[tuple[Place, int]]] = {}
+        self._next: dict[Place, set[Place]] = {}
+
+    def nearest(self, place: Place, before: int) -> Place | None:
+        """Return the nearest vertex within reach that was added before a moment."""
+        return next((other for other, moment in self._about(place, 1) if moment < before), None)
+
+    def join_end(self, place: Place) -> None:
+        """Join a line's end to the nearest vertex that it is apart from, within two reaches."""
+        for other, _ in self._about(place, 2):
+            if not self.are_joined(place, other):
+                self.keep([place, other])
+                return
+
+    def add(self, place: Place, moment: int) -> None:
+        """Add a vertex of a line that is still growing."""
+        self._squares.setdefault(self._square(place), []).append((place, moment))
+
+    def keep(self, line: list[Place]) -> None:
+        """Accept a line whose vertices were added."""
+        self.lines.append(line)
+        for a, b in itertools.pairwise(line):
+            self._next.setdefault(a, set()).add(b)
+            self._next.setdefault(b, set()).add(a)
+
+    def take_back(self, vertices: Sequence[tuple[Place, int]]) -> None:
+        """Forget vertices that were added."""
+        for place, moment in vertices:
+            self._squares[self._square(place)].remove((place, moment))
+
+    def are_joined(self, a: Place, b: Place) -> bool:
+        """Tell whether a few steps along lines lead from one vertex to another."""
+        seen, edge = {a}, {a}
+        for _ in range(_NEIGHBOURHOOD):
+            if b in seen:
+                return True
+            edge = {after for place in edge for after in self._next.get(place, ())} - seen
+            seen |= edge
+        return b in seen
+
+    def _about(self, place: Place, reaches: int) -> list[tuple[Place, int]]:
+        """Return the vertices within some reaches of a place, the nearest first."""
+        row, col = self._square(place)
+        steps = range(-reaches, reaches + 1)
+        found = [
+            (math.dist(other, place), moment, other)
+            for i in steps
+            for j in steps
+            for other, moment in self._squares.get((row + i, col + j), ())
+        ]
+        near = (entry for entry in sorted(found) if entry[0] <= reaches * self.reach_m)
+        return [(other, moment) for _, moment, other in near]
+
+    def _square(self, place: Place) -> tuple[int, int]:
+        return int(place[0] // self.reach_m), int(place[1] // self.reach_m)
+
+
+class _Track:
+    """The part of a track that is new, while it grows."""
+
+    def __init__(self, net: _Net) -> None:
+        self._net = net
+        self._own: list[tuple[Place, int]] = []
+        self._joint: Place | None = None
+
+    def goes_on(self, place: Place, moment: int) -> None:
+        """Take a vertex that is new."""
+        self._own.append((place, moment))
+        self._net.add(place, moment)
+
+    def meets(self, joint: Place | None) -> None:
+        """End the new part, at a vertex that is there already or at nothing."""
+        before, places = self._joint, [place for place, _ in self._own]
+        line = [place for place in (before, *places, joint) if place is not None]
+        long_enough = _length_m(places) >= self._net.reach_m
+        joins = before is not None and joint is not None and not self._net.are_joined(before, joint)
+        if long_enough or joins:
+            self._net.keep(line)
+        else:
+            self._net.take_back(self._own)
+        self._own, self._joint = [], joint
+
+
+def grown_lines(
+    tracks: Sequence[Floats], usable: Sequence[Bools], reach_m: float
+) -> list[list[Place]]:
+    """Return the lines of a network that covers tracks once.
+
+    An end within two reaches of another line is joined to it.
+
+    Parameters
+    ----------
+    tracks : sequence of numpy.ndarray, each of shape (N, 2)
+        Vertices no farther apart than half the reach.
+    usable : sequence of numpy.ndarray of bool, each of shape (N,)
+        Which vertices may be taken; the others interrupt a line.
+    reach_m : float
+        A vertex so near to an older one is not new. New parts that are shorter are left out,
+        unless they join what was apart.
+    """
+    net, moment = _Net(reach_m), 0
+    for vertices, taken in zip(tracks, usable, strict=True):
+        moment += _TRAIL
+        track = _Track(net)
+        for (x, y), may in zip(vertices.tolist(), taken.tolist(), strict=True):
+            moment += 1
+            there = net.nearest((x, y), moment - _TRAIL) if may else None
+            if may and there is None:
+                track.goes_on((x, y), moment)
+            else:
+                track.meets(there)
+        track.meets(None)
+    for line in tuple(net.lines):
+        net.join_end(line[0])
+        net.join_end(line[-1])
+    return net.lines
+
+
+def _length_m(line: Sequence[Place]) -> float:
+    return sum(math.dist(a, b) for a, b in itertools.pairwise(line))
+
 
 CORRIDOR_CLASS = "corridor"
 CORRIDOR_HALF_WIDTH_M = 15.0

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from mapfilter._types import Ints
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.roads._vector import read_layer
 from mapfilter.roads.buildings import (
     DEFAULT_HEIGHT_M,
     STOREY_HEIGHT_M,
@@ -23,6 +22,7 @@ from mapfilter.roads.buildings import (
     made_buildings,
 )
 from mapfilter.roads.clip import lines_inside, polygons_inside
+from mapfilter.roads.vector import read_layer
 from mapfilter.roads.ways import Bounds, Buildings, Squares, Ways
 
 ROAD_CLASS = "road"

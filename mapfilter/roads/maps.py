@@ -11,10 +11,15 @@ from geopandas import GeoDataFrame
 
 from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.geodesy import unproject
-from mapfilter.roads._elements import BoxDeg, Query
-from mapfilter.roads._osm_xml import read_xml, xml_bounds_deg
-from mapfilter.roads._pyrosm import pbf_bounds_deg, read_pbf
 from mapfilter.roads.clip import on_earth
+from mapfilter.roads.osm_readers import (
+    BoxDeg,
+    Query,
+    pbf_bounds_deg,
+    read_pbf,
+    read_xml,
+    xml_bounds_deg,
+)
 from mapfilter.roads.ways import Bounds
 
 EMBEDDED_MAPS: Mapping[str, str] = {"helsinki": "helsinki_pbf"}

@@ -27,9 +27,9 @@ from geopandas import GeoDataFrame
 from numpy.typing import NDArray
 
 from mapfilter._types import Bools
-from mapfilter.roads._elements import Query
 from mapfilter.roads.clip import lines_inside, polygons_inside
 from mapfilter.roads.maps import nothing_there, read_elements
+from mapfilter.roads.osm_readers import Query
 from mapfilter.roads.ways import Bounds, Squares, Ways
 
 Profile = Literal["walking", "driving"]

@@ -9,10 +9,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from mapfilter.errors import InputError, fail
-from mapfilter.roads._elements import Query
-from mapfilter.roads._vector import read_layer
 from mapfilter.roads.clip import polygons_inside
 from mapfilter.roads.maps import read_elements
+from mapfilter.roads.osm_readers import Query
+from mapfilter.roads.vector import read_layer
 from mapfilter.roads.ways import Bounds, Water
 
 _WATER = Query(

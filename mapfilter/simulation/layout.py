@@ -9,8 +9,8 @@ from scipy.spatial import cKDTree
 from mapfilter._types import Floats, Floats32
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.geodesy import Lattice
+from mapfilter.propagation.line_of_sight import check_heights
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.radio.los import check_heights
 
 _MOST_CANDIDATES_PER_SIDE = 96
 _LLOYD_ROUNDS = 40

@@ -22,7 +22,7 @@ from mapfilter.gnss.noise import correlated_along, multipath_bias_m
 from mapfilter.gnss.orbits import gps_time, satellite_positions_m
 from mapfilter.gnss.sky import Directions, directions, ecef_from_lonlat
 from mapfilter.gnss.visibility import Skyline
-from mapfilter.models.clock import clock_noise
+from mapfilter.models.motion import clock_noise
 from mapfilter.simulation.reflections import NlosModel, draw_reflections
 from mapfilter.tracks.satellites import sent_from_m
 

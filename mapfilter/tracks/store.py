@@ -7,10 +7,15 @@ almanac beside it (``almanac.txt``, YUMA) tells where satellites were whose rows
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Collection
+from dataclasses import dataclass
+from difflib import get_close_matches
 from math import inf, isnan, nan
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -23,19 +28,197 @@ from mapfilter._io import (
     sha256_file,
     write_json,
 )
+from mapfilter._types import Ints
 from mapfilter.errors import Faults, InputError, MapfilterError, StoreError, fail
 from mapfilter.gnss.almanac import read_yuma
-from mapfilter.tracks._folder import (
-    ALMANAC,
-    HEAD,
-    checked_parts,
-    ignored_files,
-    parts_by_name,
-    table_files,
-)
-from mapfilter.tracks._tables import read_table
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.schema import OPTIONAL, SCHEMA, TABLES
+
+HEAD = "log.json"
+ALMANAC = "almanac.txt"
+
+_SUFFIXES = (".parquet", ".csv")
+
+
+def checked_parts(folder: Path, head: dict[str, Any]) -> dict[str, Path]:
+    """Return the tables that the head lists, after a look at their sizes and checksums.
+
+    Raises
+    ------
+    StoreError
+        A table is missing, cut off or changed.
+    """
+    faults = Faults()
+    paths = {}
+    allowed = {f"{table}{suffix}": table for table in TABLES for suffix in _SUFFIXES}
+    listed = head["parts"] if isinstance(head["parts"], list) else [head["parts"]]
+    for part in listed:
+        if not isinstance(part, dict) or part.get("path") not in allowed:
+            faults.add(f"{folder / HEAD}, parts", "tables of a log", repr(part))
+            continue
+        name = part["path"]
+        path = folder / name
+        if not path.is_file():
+            faults.add(str(path), "a table of the log", "no such file")
+        elif path.stat().st_size != part.get("bytes"):
+            size, bytes_ = path.stat().st_size, part.get("bytes")
+            hint = "cut off" if isinstance(bytes_, int) and size < bytes_ else "changed by hand"
+            faults.add(str(path), f"{bytes_} bytes", f"{size} bytes", hint)
+        elif sha256_file(path) != part.get("sha256"):
+            faults.add(str(path), f"SHA-256 {part.get('sha256')}", "another", "changed or damaged")
+        paths[allowed[name]] = path
+    faults.raise_if_any(StoreError)
+    return paths
+
+
+def parts_by_name(folder: Path) -> dict[str, Path]:
+    """Return the tables of a log made by hand.
+
+    Raises
+    ------
+    InputError
+        A table is there twice, or a file is called almost as a table that is missing.
+    """
+    faults = Faults()
+    paths = {}
+    for table in TABLES:
+        found = [path for path in table_files(folder) if path.stem == table]
+        if len(found) > 1:
+            faults.add(str(folder), f"one file of {table}", "both Parquet and CSV")
+        elif found:
+            paths[table] = found[0]
+    absent = [table for table in TABLES if table not in paths]
+    for path in _others(folder, paths.values()):
+        near = get_close_matches(path.stem.lower(), absent, 1, 0.6)
+        if near and not faults.found:
+            expected = f"tables called {', '.join(TABLES)} (.csv or .parquet)"
+            faults.add(str(path), expected, path.name, f"{near[0]}.csv")
+    faults.raise_if_any(InputError)
+    return paths
+
+
+def table_files(folder: Path) -> list[Path]:
+    """Return the files of a folder that are called as tables of a log."""
+    named = (folder / f"{table}{suffix}" for table in TABLES for suffix in _SUFFIXES)
+    return [path for path in named if path.is_file()]
+
+
+def ignored_files(folder: Path, used: Collection[Path]) -> tuple[str, ...]:
+    """Return a note for each file of a log's folder that is not read; hidden ones do not count."""
+    return tuple(f"{path}: not a table of a log, not read" for path in _others(folder, used))
+
+
+def _others(folder: Path, used: Collection[Path]) -> list[Path]:
+    known = {HEAD, ALMANAC, *(path.name for path in used)}
+    return [
+        path
+        for path in sorted(folder.iterdir())
+        if path.name not in known and not path.name.startswith(".") and path.is_file()
+    ]
+
+
+_SEPARATORS = (",", ";", "\t")
+_LONGEST_ROW_BYTES = 1 << 16
+_DECIMAL_COMMA = r"^\s*([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)\s*$"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ReadTable:
+    """A table of a log as it was read.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        Values; texts where they come from CSV.
+    row_numbers : (N,) integer array
+        What messages call each row: the line of a CSV file, in which the header is line 1 as in
+        editors and spreadsheets; the row of a Parquet file, counted from 1.
+    notes : tuple of str
+        What was mended.
+    """
+
+    rows: pd.DataFrame
+    row_numbers: Ints
+    notes: tuple[str, ...] = ()
+
+
+def read_table(table: str, path: Path) -> ReadTable:
+    """Read a table of a log.
+
+    CSV is UTF-8 with commas, semicolons or tabs; decimal commas where commas separate nothing.
+
+    Parameters
+    ----------
+    table : str
+        Out of :data:`mapfilter.tracks.schema.TABLES`.
+    path : Path
+
+    Raises
+    ------
+    InputError
+        The file is empty, damaged or no such table.
+    """
+    try:
+        if path.suffix == ".csv":
+            return _read_csv(table, path)
+        rows = pq.read_table(path).to_pandas(types_mapper={pa.int64(): pd.Int64Dtype()}.get)
+        return ReadTable(rows, np.arange(1, len(rows) + 1))
+    except pd.errors.EmptyDataError as error:
+        raise fail(InputError, str(path), "a header line", "an empty file", "cut off") from error
+    except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
+        got = str(error).splitlines()[0]
+        hint = "decimal commas between commas (separate fields by semicolons), or cut off"
+        raise fail(InputError, str(path), "a readable table", got, hint) from error
+    except (pa.ArrowException, UnicodeDecodeError, OSError) as error:
+        got = str(error).splitlines()[0]
+        raise fail(InputError, str(path), "a readable table", got, "cut off") from error
+
+
+def _read_csv(table: str, path: Path) -> ReadTable:
+    header, blank_lines = _header(path)
+    separator = max(_SEPARATORS, key=header.count)
+    with warnings.catch_warnings():
+        # pandas only warns when rows have more fields than the header, and drops the rest.
+        warnings.simplefilter("error", pd.errors.ParserWarning)
+        rows = pd.read_csv(
+            path,
+            dtype=str,
+            sep=separator,
+            header=blank_lines,
+            keep_default_na=False,
+            index_col=False,
+            encoding="utf-8-sig",
+            skip_blank_lines=False,
+        )
+    rows.columns = [str(name).strip() for name in rows.columns]
+    lines = np.arange(len(rows)) + blank_lines + 2
+    blank = (rows == "").all(axis=1).to_numpy()
+    rows, lines = rows[~blank].reset_index(drop=True), lines[~blank]
+    if separator != ",":
+        numbers = [column.name for column in SCHEMA[table] if column.kind != "text"]
+        for name in rows.columns.intersection(numbers):
+            rows[name] = rows[name].str.replace(_DECIMAL_COMMA, r"\1.\2", regex=True)
+    return ReadTable(rows, lines, _cut_off(path, separator, header))
+
+
+def _header(path: Path) -> tuple[str, int]:
+    """Return the first line that holds something, and how many blank ones are before it."""
+    with path.open(encoding="utf-8-sig") as stream:
+        for number, line in enumerate(stream):
+            if line.strip():
+                return line, number
+    return "", 0
+
+
+def _cut_off(path: Path, separator: str, header: str) -> tuple[str, ...]:
+    """Return a note where a file ends without a line's end before the last row has all fields."""
+    with path.open("rb") as stream:
+        stream.seek(max(0, path.stat().st_size - _LONGEST_ROW_BYTES))
+        last = stream.read().splitlines(keepends=True)[-1].decode(errors="replace")
+    if last.endswith(("\n", "\r")) or last.count(separator) >= header.count(separator):
+        return ()
+    return (f"{path}: ends within a row, as if cut off",)
+
 
 FORMAT = "mapfilter track log"
 VERSION = 1

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
+from mapfilter.config.fields import MADE_MAPS, SYNTHETIC_MAP
+from mapfilter.config.sections import Area
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.geodesy import Lattice, check_bbox, project, projected_crs, unproject, utm_crs
 from mapfilter.roads.maps import check_on_map, map_bounds_deg
-from mapfilter.workflows.sections import Area
+from mapfilter.simulation.synthetic_city import SyntheticCity, manhattan, synthetic_city
 
 LARGEST_AREA_PX = 400_000_000
 EARTH_RADIUS_M = 6_371_000.0
@@ -111,3 +115,26 @@ def check_scale(crs: str, bounds_m: tuple[float, float, float, float], where: st
         expected = "a CRS whose metres are metres on the ground in this area"
         got = f"{crs}, of which {_SHORT_M:g} m are {ground_m:.0f} m"
         raise fail(InputError, where, expected, got, "a CRS of another region, or Web Mercator")
+
+
+def made_city(area: Area, crs: str) -> SyntheticCity | None:
+    """Return the city that is made for an area, in a CRS; None where a map or nothing is named.
+
+    It fills the area as configured, whatever part of it rasters cover.
+
+    Raises
+    ------
+    ConfigError
+        The area is too small or too large for one.
+    """
+    if area.map not in MADE_MAPS:
+        return None
+    return _made(area.model_copy(update={"crs": crs}))
+
+
+@lru_cache(maxsize=2)
+def _made(area: Area) -> SyntheticCity:
+    lattice = area_lattice(area)
+    if area.map == SYNTHETIC_MAP:
+        return synthetic_city(lattice, area.seed)
+    return manhattan(lattice)

@@ -14,17 +14,17 @@ import numpy as np
 
 from mapfilter._kernels import draw_key
 from mapfilter._types import Floats32
+from mapfilter.config.load import load_config
 from mapfilter.database.store import open_database
 from mapfilter.filters.contract import MotionStep
-from mapfilter.filters.particle import ParticleBelief, ParticleFilter
-from mapfilter.filters.particle_options import ParticleOptions
+from mapfilter.filters.particle import ParticleBelief, ParticleFilter, ParticleOptions
 from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
 from mapfilter.models.fingerprint import LevelReading
-from mapfilter.positioning.bayes import BayesPositioner
-from mapfilter.positioning.bayes_model import BayesModel, Start
-from mapfilter.positioning.bayes_options import BayesOptions, open_area
+from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.filter import BayesPositioner
+from mapfilter.positioning.bayes.model import BayesModel, Start
+from mapfilter.positioning.bayes.options import BayesOptions, open_area
 from mapfilter.positioning.epochs import epochs
-from mapfilter.positioning.evidence import RadioReading
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.store import list_logs, read_log
 from mapfilter.workflows.bench_filter_memory import locating_memory_bytes
@@ -35,7 +35,6 @@ from mapfilter.workflows.bench_filter_peers import (
     stone_soup_step,
 )
 from mapfilter.workflows.build import run_build
-from mapfilter.workflows.config import load_config
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.simulate import run_simulate
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from mapfilter.database.estimate import peak_memory_bytes
 from mapfilter.database.store import open_database
-from mapfilter.positioning.bayes_options import BayesOptions, open_area
-from mapfilter.positioning.bayes_replay import position_by_bayes
+from mapfilter.positioning.bayes.options import BayesOptions, open_area
+from mapfilter.positioning.bayes.replay import position_by_bayes
 from mapfilter.tracks.store import read_log
 
 

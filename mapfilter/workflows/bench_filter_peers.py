@@ -17,8 +17,8 @@ from mapfilter.filters.contract import MotionStep
 from mapfilter.models.cell_id import log_serving
 from mapfilter.models.fingerprint import LevelReading
 from mapfilter.models.street_motion import BIAS, EAST, LOG_SCALE, NORTH, OFF
-from mapfilter.positioning.bayes_model import BayesModel
-from mapfilter.positioning.evidence import RadioReading
+from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.model import BayesModel
 
 Step = Callable[[Floats], Floats]
 """From equally weighted particles, shape (6, N), to those after a whole step."""

@@ -12,8 +12,8 @@ from numba import njit
 
 from mapfilter._types import Floats
 from mapfilter.errors import ConfigError, fail
-from mapfilter.experiments.papers.fritsche_klein_2009 import bound_curves
-from mapfilter.experiments.papers.fritsche_klein_2009_scene import (
+from mapfilter.experiments.papers.fritsche_klein_2009.experiment import bound_curves
+from mapfilter.experiments.papers.fritsche_klein_2009.scene import (
     COMBINATIONS,
     Layout,
     Scene,
@@ -23,7 +23,7 @@ from mapfilter.experiments.papers.fritsche_klein_2009_scene import (
 )
 from mapfilter.filters.gaussian import EKF, RBUKF, Method
 from mapfilter.filters.trials import run_trials
-from mapfilter.positioning.fusion import compiled
+from mapfilter.positioning.kalman.models import compiled
 
 _TRIALS = 500
 

@@ -14,17 +14,16 @@ from statistics import median
 from mapfilter._parallel import SerialExecutor, cluster_executor, local_executor
 from mapfilter.database.store import open_database
 from mapfilter.evaluation.accuracy import accuracy
-from mapfilter.experiments.papers.khalaf_allah_2007 import ONE_SIGMA_TRANS_M, plans
-from mapfilter.experiments.sweep.journeys import heard, sensed, true_path, truth_of
+from mapfilter.experiments.papers.khalaf_allah_2007.experiment import ONE_SIGMA_TRANS_M, plans
+from mapfilter.experiments.sweep.journeys import filter_rng, heard, sensed, true_path, truth_of
 from mapfilter.experiments.sweep.plan import SweepPlan
 from mapfilter.experiments.sweep.run import sweep
-from mapfilter.experiments.sweep.seeds import filter_rng
 from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.positioning.locators import open_locator
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.reproduce import paper_config
-from mapfilter.workflows.sweep_world import sweep_world
+from mapfilter.workflows.sweep_plan import sweep_world
 
 _PROCESSES, _TIMED = 2, 12
 

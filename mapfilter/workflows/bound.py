@@ -14,8 +14,7 @@ from mapfilter._parallel import Progress
 from mapfilter._types import Floats
 from mapfilter.database.store import open_database
 from mapfilter.evaluation.first_fix import FirstFixOptions
-from mapfilter.evaluation.map_bound import TWIN_ERROR, MapBound, map_bound, on_lattice
-from mapfilter.evaluation.map_bound_store import write_bound
+from mapfilter.evaluation.map_bound import TWIN_ERROR, MapBound, map_bound, on_lattice, write_bound
 from mapfilter.evaluation.radio_map import ErrorModel, radio_map
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.bound import plot_metres_to_fix, plot_position_bound, plot_twins

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress, executor_of
+from mapfilter.config.sections import Area, Config
 from mapfilter.database.build import build
 from mapfilter.database.estimate import BuildEstimate, dry_run
 from mapfilter.database.manifest import InputFile
@@ -15,12 +16,11 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
 from mapfilter.radio.cells import CellPlan
-from mapfilter.radio.rasters import RxLevRasters
+from mapfilter.rasters.rxlev_rasters import RxLevRasters
 from mapfilter.workflows.area import pixels_on
 from mapfilter.workflows.cover import check_cells_near, map_cover, raster_cover
 from mapfilter.workflows.network_pictures import NETWORK_PICTURES, draw_network
 from mapfilter.workflows.results import clear_pictures
-from mapfilter.workflows.sections import Area, Config
 from mapfilter.workflows.world import World, area_lattice, check_scale, planned_rasters
 
 PIXELS_A_TASK = 10_000_000

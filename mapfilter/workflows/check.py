@@ -11,13 +11,16 @@ import rasterio
 from rasterio.errors import RasterioError
 
 from mapfilter._parallel import Progress
+from mapfilter.check.findings import CheckResult, Findings, Severity, listed
+from mapfilter.check.lobe_findings import check_against_sites, check_power
+from mapfilter.check.raster_findings import check_ids, is_surveyed, sampled
+from mapfilter.config.sections import Config
 from mapfilter.errors import MapfilterError
 from mapfilter.geodesy import Lattice
-from mapfilter.radio._cell_rules import ANTENNAS
+from mapfilter.propagation.predict import off_frequency
+from mapfilter.radio.cell_rules import ANTENNAS
 from mapfilter.radio.cells import CellPlan
-from mapfilter.radio.predict import off_frequency
-from mapfilter.radio.rasters import RxLevRasters, open_rasters
-from mapfilter.workflows.check_lobes import check_against_sites, check_power
+from mapfilter.rasters.rxlev_rasters import RxLevRasters, open_rasters
 from mapfilter.workflows.check_places import (
     check_pixels,
     check_rasters_place,
@@ -26,9 +29,6 @@ from mapfilter.workflows.check_places import (
     check_ways,
     has_box,
 )
-from mapfilter.workflows.check_rasters import check_ids, is_surveyed, sampled
-from mapfilter.workflows.findings import CheckResult, Findings, Severity, listed
-from mapfilter.workflows.sections import Config
 from mapfilter.workflows.survey import survey_inputs
 from mapfilter.workflows.world import World, area_lattice, planned_rasters
 

@@ -9,14 +9,14 @@ import numpy as np
 import shapely
 
 from mapfilter._types import Bools, Floats
+from mapfilter.check.findings import Findings, listed
+from mapfilter.config.sections import Area, Config
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice, project, projected_crs, same_crs, unproject, utm_crs
 from mapfilter.radio.cells import CellPlan
-from mapfilter.radio.rasters import RxLevRasters
+from mapfilter.rasters.rxlev_rasters import RxLevRasters
 from mapfilter.roads.maps import box_deg, map_bounds_deg
 from mapfilter.roads.ways import Ways
-from mapfilter.workflows.findings import Findings, listed
-from mapfilter.workflows.sections import Area, Config
 from mapfilter.workflows.world import area_lattice
 
 BoxDeg = tuple[float, float, float, float]

@@ -6,11 +6,11 @@ import numpy as np
 import shapely
 
 from mapfilter._types import Floats
+from mapfilter.config.sections import Area
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, unproject
 from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.maps import map_bounds_deg
-from mapfilter.workflows.sections import Area
 from mapfilter.workflows.world import World, area_lattice
 
 FARTHEST_M = 50_000.0

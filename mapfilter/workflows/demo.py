@@ -11,11 +11,10 @@ from pathlib import Path
 
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress
+from mapfilter.config.load import load_config
 from mapfilter.workflows.build import run_build
-from mapfilter.workflows.config import load_config
 from mapfilter.workflows.predict import run_predict
-from mapfilter.workflows.replay import run_replay
-from mapfilter.workflows.replayed import ReplayedLog
+from mapfilter.workflows.replay import ReplayedLog, run_replay
 from mapfilter.workflows.simulate import run_simulate
 
 _STAGES = ("predict", "build", "simulate", "replay")

@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from mapfilter.evaluation.track_percentiles import percentile_of_tracks
-from mapfilter.experiments.papers import dlr, dlr_scene, dlr_table
+from mapfilter.experiments.papers.dlr import experiment as dlr
+from mapfilter.experiments.papers.dlr import scene as dlr_scene
+from mapfilter.experiments.papers.dlr import table as dlr_table
 from mapfilter.gnss.sky import directions
 from mapfilter.report.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILLION
 from mapfilter.report.cumulative import (

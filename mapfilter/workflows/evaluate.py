@@ -9,12 +9,12 @@ from pathlib import Path
 
 from mapfilter._io import ensure_writable_folder, write_json
 from mapfilter._parallel import Progress, local_executor
+from mapfilter.config.sections import Config
 from mapfilter.database.build import build
 from mapfilter.database.sources import LaidRoutes
 from mapfilter.errors import ConfigError, Faults, fail
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.global_positioning import benchmark
-from mapfilter.experiments.benchmarks.missing_ways import without_ways
 from mapfilter.experiments.benchmarks.scores import CaseResult
 from mapfilter.experiments.benchmarks.world import (
     BUILDINGS,
@@ -22,19 +22,19 @@ from mapfilter.experiments.benchmarks.world import (
     STREETS,
     THINNED,
     BenchmarkWorld,
+    without_ways,
     write_buildings,
 )
 from mapfilter.experiments.sweep.world import SweepWorld, write_world
-from mapfilter.radio.predict import predict
-from mapfilter.radio.rasters import open_rasters, write_rasters
-from mapfilter.radio.shadowing import named_rng
+from mapfilter.propagation.predict import predict
+from mapfilter.propagation.shadowing import named_rng
+from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.reflections import NlosModel
 from mapfilter.simulation.satellites import ReceptionModel
 from mapfilter.workflows.facts import facts
 from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.predict import ground_truth_errors, prediction_model
-from mapfilter.workflows.sections import Config
 from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.world import World
 

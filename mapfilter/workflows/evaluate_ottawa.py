@@ -11,6 +11,7 @@ import numpy as np
 
 from mapfilter._io import ensure_writable_folder, write_json
 from mapfilter._parallel import Progress, local_executor, ordered_results
+from mapfilter.config.sections import Config
 from mapfilter.database.store import open_database
 from mapfilter.errors import InputError, fail
 from mapfilter.experiments.benchmarks.ottawa import (
@@ -27,20 +28,21 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
     read_session,
     step_factor_of,
 )
-from mapfilter.experiments.benchmarks.ottawa_store import LeftOut, read_left_out, write_left_out
 from mapfilter.experiments.benchmarks.ottawa_table import (
+    LeftOut,
     PartRow,
     SessionRow,
     part_rows,
+    read_left_out,
     session_rows,
+    write_left_out,
 )
 from mapfilter.experiments.benchmarks.resuming import begin
-from mapfilter.radio.rasters import open_rasters
+from mapfilter.rasters.rxlev_rasters import open_rasters
 from mapfilter.report.canvas import BLUE, GREEN, GREY
 from mapfilter.report.cumulative import Distribution, plot_cumulative
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.facts import facts
-from mapfilter.workflows.sections import Config
 from mapfilter.workflows.survey import run_survey
 
 HEAD, TABLE, FOUND, PICTURE = "benchmark.json", "table.json", "found.json", "errors.png"

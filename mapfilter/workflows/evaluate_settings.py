@@ -7,9 +7,9 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Literal, get_args
 
+from mapfilter.config.load import given_keys, load_config
+from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, Faults, fail
-from mapfilter.workflows.config import given_keys, load_config
-from mapfilter.workflows.sections import Config
 
 WorldName = Literal["easy", "plain"]
 WORLDS: tuple[str, ...] = get_args(WorldName)
@@ -78,7 +78,7 @@ def load_benchmark(
     world : str
         One of :data:`WORLDS`.
     file, settings, out
-        As for :func:`mapfilter.workflows.config.load_config`.
+        As for :func:`mapfilter.config.load.load_config`.
 
     Returns
     -------

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from mapfilter.config.sections import FilterSection
 from mapfilter.errors import ConfigError, fail
-from mapfilter.filters.candidate_options import CandidateOptions
+from mapfilter.filters.candidate import CandidateOptions
+from mapfilter.positioning.custom_filter import own_filter
 from mapfilter.positioning.locators import FilterChoice
-from mapfilter.positioning.own_filter import own_filter
-from mapfilter.workflows.sections import FilterSection
 
 
 def filter_choice(section: FilterSection, resolution_m: float) -> FilterChoice:

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from mapfilter._types import Floats
 from mapfilter.evaluation.bounds import bound_of
-from mapfilter.experiments.papers import fritsche_klein_2009 as fritsche_klein
-from mapfilter.experiments.papers import zhang_2006 as zhang
-from mapfilter.experiments.papers.fritsche_klein_2009_scene import COMBINATIONS
+from mapfilter.experiments.papers.fritsche_klein_2009 import experiment as fritsche_klein
+from mapfilter.experiments.papers.fritsche_klein_2009.scene import COMBINATIONS
+from mapfilter.experiments.papers.zhang_2006 import experiment as zhang
 from mapfilter.report.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION
 from mapfilter.report.fusion import Curve, Panel, curves_of, plot_error_panels, plot_scene
 
@@ -152,7 +153,5 @@ def draw_zhang_2006(run: zhang.PaperRun, trials: int, out: Path) -> tuple[Path, 
     return paths
 
 
-def _of(
-    curves: dict[str, fritsche_klein.Curves], quantity: str
-) -> dict[str, Floats]:
+def _of(curves: dict[str, fritsche_klein.Curves], quantity: str) -> dict[str, Floats]:
     return {name: own[quantity] for name, own in curves.items() if quantity in own}

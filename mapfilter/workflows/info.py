@@ -9,11 +9,11 @@ from typing import Any
 import rasterio
 from rasterio.errors import NotGeoreferencedWarning, RasterioError
 
-from mapfilter.database.cog import BANDS, CELLS_TAG
+from mapfilter.database.export import BANDS, CELLS_TAG
 from mapfilter.database.manifest import MANIFEST
 from mapfilter.database.store import info, open_database
 from mapfilter.errors import InputError, fail
-from mapfilter.radio.rasters import is_raster_folder, open_rasters
+from mapfilter.rasters.rxlev_rasters import is_raster_folder, open_rasters
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import is_log, read_log
 

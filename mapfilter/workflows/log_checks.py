@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from mapfilter._io import path_fault, shown
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, MapfilterError
 from mapfilter.geodesy import Lattice, same_crs
@@ -13,7 +14,6 @@ from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.schema import SERVING
 from mapfilter.tracks.store import read_log
 from mapfilter.workflows.cover import outside_m
-from mapfilter.workflows.paths import path_fault, shown
 
 _AWAY_M = 5000.0
 

@@ -13,12 +13,12 @@ from mapfilter._io import ensure_writable_folder
 from mapfilter._types import Floats32
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.geodesy import Lattice
-from mapfilter.radio.rasters import RxLevRasters
+from mapfilter.rasters.rxlev_rasters import RxLevRasters
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import BLUE, ORANGE
 from mapfilter.report.coverage import plot_best_server, plot_level, plot_points_per_cell
 from mapfilter.report.landuse import plot_landuse
-from mapfilter.report.margin import plot_margin
+from mapfilter.report.network import plot_margin
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.ways import Buildings

@@ -7,11 +7,14 @@ from pathlib import Path
 
 import pandas as pd
 
-from mapfilter.evaluation.success_cells import SuccessCell
-from mapfilter.experiments.papers import khalaf_allah_2007 as paper
-from mapfilter.report.run_distributions import plot_run_distributions
-from mapfilter.report.success_curves import Claim, plot_success_curves
-from mapfilter.report.success_map import plot_success_map
+from mapfilter.evaluation.success import SuccessCell
+from mapfilter.experiments.papers.khalaf_allah_2007 import experiment as paper
+from mapfilter.report.success import (
+    Claim,
+    plot_run_distributions,
+    plot_success_curves,
+    plot_success_map,
+)
 
 _CLAIMANT = "paper"
 

@@ -8,18 +8,17 @@ from pathlib import Path
 import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.positioning.global_positioning import PositionedTrack
-from mapfilter.positioning.snapshot import Snapshot
-from mapfilter.report.belief import plot_belief
-from mapfilter.report.candidates import plot_candidates
-from mapfilter.report.error_curve import plot_error_over_distance
+from mapfilter.evaluation.accuracy import Truth
+from mapfilter.positioning.candidate import PositionedTrack
+from mapfilter.positioning.estimate import Snapshot
+from mapfilter.report.belief import plot_belief, plot_candidates
+from mapfilter.report.errors import plot_error_over_distance
 from mapfilter.report.evidence import plot_evidence
 from mapfilter.report.panels import MAX_PANELS
 from mapfilter.report.track import plot_track
 from mapfilter.tracks.log import TrackLog
 from mapfilter.workflows.network_pictures import street_map
 from mapfilter.workflows.served import served_points
-from mapfilter.workflows.truth import truth_of
 
 _SQUARE_M = 5.0
 
@@ -31,7 +30,7 @@ def draw_track(
 
     Of the candidate filter these are candidates thinning out (Fig. 1 of the paper).
     """
-    base, truth = street_map(database, served_points(database)), truth_of(log)
+    base, truth = street_map(database, served_points(database)), Truth.of_table(log.truth)
     drawn = []
     evidence = track.estimate.evidence
     if track.snapshots:

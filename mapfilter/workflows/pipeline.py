@@ -8,11 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from mapfilter.workflows.config import load_config
+from mapfilter.config.load import load_config
+from mapfilter.config.sections import Config
 from mapfilter.workflows.facts import facts
-from mapfilter.workflows.guard import guarded
-from mapfilter.workflows.sections import Config
-from mapfilter.workflows.terminal import print_result
+from mapfilter.workflows.terminal import guarded, print_result
 
 Stage = Callable[[Config], Any]
 

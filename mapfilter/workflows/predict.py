@@ -6,11 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import rasterio
+
 from mapfilter import __version__
-from mapfilter._io import ensure_writable_folder
+from mapfilter._io import ensure_writable_folder, sha256_file
 from mapfilter._parallel import Progress, part_of
-from mapfilter.radio.cells import write_cell_plan
-from mapfilter.radio.predict import (
+from mapfilter.config.sections import Config, Prediction
+from mapfilter.errors import InputError, fail
+from mapfilter.propagation.predict import (
     PredictionModel,
     RealityErrors,
     off_frequency,
@@ -18,11 +21,61 @@ from mapfilter.radio.predict import (
     predict,
     realise,
 )
-from mapfilter.radio.rasters import write_rasters
+from mapfilter.radio.cells import write_cell_plan
+from mapfilter.rasters.rxlev_rasters import write_rasters
 from mapfilter.workflows.cover import check_cells_near, map_cover
-from mapfilter.workflows.reality import reality_tags
-from mapfilter.workflows.sections import Config, Prediction
 from mapfilter.workflows.world import World
+
+_PREDICTION_TAG = "PREDICTION_SHA256"
+
+
+def reality_tags(prediction: Path) -> dict[str, str]:
+    """Return the tags of rasters that play reality to a prediction that is written already."""
+    return {"PLAYS": "reality", _PREDICTION_TAG: sha256_file(prediction)}
+
+
+def check_reality_there(config: Config) -> None:
+    """See that there is reality to simulate in.
+
+    Raises
+    ------
+    InputError
+        It was not predicted yet.
+    """
+    if config.rasters.reality is None and not config.reality_path.exists():
+        hint = (
+            "not predicted yet; predict with prediction.reality.write = true, "
+            'or set journeys.radio = "as_predicted"'
+        )
+        got = "no such file"
+        raise fail(InputError, str(config.reality_path), "rasters that play reality", got, hint)
+
+
+def check_reality(config: Config) -> None:
+    """See that reality was played to the prediction that lies in the output folder now.
+
+    Reality that is named in ``rasters.reality``, or that tells of no prediction, is taken as it is.
+
+    Raises
+    ------
+    InputError
+        It was played to another prediction, such as one with another plan.
+    """
+    prediction, reality = config.rasters_path, config.reality_path
+    if config.rasters.reality is not None or not prediction.is_file():
+        return
+    with rasterio.open(reality) as source:
+        played_to = source.tags().get(_PREDICTION_TAG)
+    if played_to not in (None, sha256_file(prediction)):
+        raise fail(
+            InputError,
+            str(reality),
+            f"reality that was played to {prediction.name}, the prediction beside it",
+            "that of another prediction",
+            "predicted again without it; predict with prediction.reality.write = true, "
+            "or name the file in rasters.reality",
+        )
+
 
 if TYPE_CHECKING:
     from mapfilter.workflows.survey import SurveyResult

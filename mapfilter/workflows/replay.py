@@ -2,17 +2,34 @@
 
 from __future__ import annotations
 
+import hashlib
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from mapfilter._io import ensure_writable_folder, write_json
 from mapfilter._parallel import Progress
+from mapfilter.config.sections import Config
 from mapfilter.database.store import open_database
-from mapfilter.evaluation.accuracy import accuracy
-from mapfilter.evaluation.outcome import outcome
+from mapfilter.errors import ConfigError, fail
+from mapfilter.evaluation.accuracy import Accuracy, Outcome, Truth, accuracy, outcome
+from mapfilter.evaluation.success import SuccessSummary, summarise
+from mapfilter.filters.contract import Reason
+from mapfilter.filters.gaussian import METHODS
+from mapfilter.positioning.candidate import PositionedTrack
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
-from mapfilter.positioning.global_positioning import PositionedTrack
+from mapfilter.positioning.kalman.models import FusionOptions, SiteModels
+from mapfilter.positioning.kalman.replay import position_by_fusion
 from mapfilter.positioning.locators import open_locator
-from mapfilter.radio.shadowing import named_rng
+from mapfilter.propagation.shadowing import named_rng
+from mapfilter.radio.antenna import MeasuredAntenna
+from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.msi import read_antennas
+from mapfilter.report.errors import plot_error_over_distance
 from mapfilter.tracks.leave_out import leave_out
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.store import list_logs, read_log
@@ -20,17 +37,232 @@ from mapfilter.workflows.facts import facts
 from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.log_checks import check_logs, lacking
 from mapfilter.workflows.pictures import draw_track
-from mapfilter.workflows.replay_fusion import FUSION_FILTERS, run_replay_fusion
-from mapfilter.workflows.replayed import (
-    ReplayedLog,
-    ReplayResult,
-    route_of,
-    summary_figures,
-    summary_of,
-)
 from mapfilter.workflows.results import ESTIMATES, FIGURES, SUMMARY, clear_results
-from mapfilter.workflows.sections import Config
-from mapfilter.workflows.truth import truth_of
+from mapfilter.workflows.world import planned_cells
+
+_NAMED = 3
+
+
+@dataclass(frozen=True)
+class ReplayedLog:
+    """One log, located.
+
+    Parameters
+    ----------
+    name : str
+        Of the log's folder.
+    outcome : Outcome
+        What the filter says of itself.
+    accuracy : Accuracy or None
+        Against the truth, where the log has it.
+    notes : tuple of str
+        What was mended or passed over when the log was read.
+    lack : str
+        What it lacks so that nothing could be located in it, or an empty text.
+    filter_s : float
+        Processor time of the filter.
+    outputs : tuple of Path
+        Files written.
+    route : str
+        Equal for logs with the same true path; empty without a truth.
+    """
+
+    name: str
+    outcome: Outcome
+    accuracy: Accuracy | None
+    notes: tuple[str, ...]
+    lack: str
+    filter_s: float
+    outputs: tuple[Path, ...]
+    route: str = ""
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        """What is told of the log: its outcome, its notes, and its score where there is one."""
+        score = asdict(self.accuracy) if self.accuracy is not None else {}
+        return {**asdict(self.outcome), "notes": self.notes, **score}
+
+
+@dataclass(frozen=True)
+class ReplayResult:
+    """All logs, located.
+
+    Parameters
+    ----------
+    filter : str
+        Its name.
+    logs : tuple of ReplayedLog
+        In the order of their names.
+    summary : SuccessSummary or None
+        Over the logs with truth.
+    out : Path
+        Folder of the results.
+    """
+
+    filter: str
+    logs: tuple[ReplayedLog, ...]
+    summary: SuccessSummary | None
+    out: Path
+
+    @property
+    def partial(self) -> bool:
+        """Whether something was done in part only."""
+        return bool(self.warnings)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What was done in part only: cells unknown to the database, logs that lack something."""
+        told = []
+        unknown = _sum(log.outcome.unknown_cells for log in self.logs)
+        if unknown:
+            verb = "cell is" if len(unknown) == 1 else "cells are"
+            where = _named([log.name for log in self.logs if log.outcome.unknown_cells])
+            told.append(
+                f"{len(unknown)} {verb} unknown to the database ({_named(list(unknown))}; in "
+                f"{where}); their readings are labelled {Reason.UNKNOWN_CELL}"
+            )
+        for lack in sorted({log.lack for log in self.logs if log.lack}):
+            names = [log.name for log in self.logs if log.lack == lack]
+            told.append(f"nothing is located in {_named(names)}: {lack}")
+        return tuple(told)
+
+
+def route_of(log: TrackLog) -> str:
+    """Return what is equal for logs with the same true path; an empty text without a truth."""
+    if log.truth.empty:
+        return ""
+    path = log.truth[["east_m", "north_m"]].to_numpy(dtype=np.float64)
+    return hashlib.sha256(np.ascontiguousarray(path).tobytes()).hexdigest()
+
+
+def summary_of(logs: Sequence[ReplayedLog]) -> SuccessSummary | None:
+    """Put the scores of the logs with truth together; None without any."""
+    scored = [(log.accuracy, log.route) for log in logs if log.accuracy is not None]
+    if not scored:
+        return None
+    return summarise([score for score, _ in scored], [route for _, route in scored])
+
+
+def summary_figures(result: ReplayResult) -> dict[str, Any]:
+    """Return the sums over several logs, and the success rate of those with truth."""
+    outcomes = [log.outcome for log in result.logs]
+    scores = asdict(result.summary) if result.summary is not None else {}
+    return {
+        "logs": len(outcomes),
+        **scores,
+        "switched": sum(outcome.switched for outcome in outcomes),
+        "final_statuses": _sum({o.final_status: 1} for o in outcomes if o.final_status),
+        "unused": _sum(outcome.unused for outcome in outcomes),
+        "unknown_cells": _sum(outcome.unknown_cells for outcome in outcomes),
+        "logs_with_unknown_cells": [log.name for log in result.logs if log.outcome.unknown_cells],
+        "notes": _shared_notes(result.logs),
+    }
+
+
+def replay_facts(result: ReplayResult) -> dict[str, Any]:
+    """Return what a replay found, as JSON shows it.
+
+    One log gives its own figures, several the sums of all.
+    """
+    shown: dict[str, Any] = {"filter": result.filter, "logs": len(result.logs)}
+    if len(result.logs) == 1:
+        shown |= {**result.logs[0].figures, "outputs": result.logs[0].outputs}
+    else:
+        shown |= summary_figures(result)
+    filter_s = sorted(log.filter_s for log in result.logs)
+    shown["partial"] = result.partial
+    return {**shown, "filter_s": filter_s[len(filter_s) // 2], "out": result.out}
+
+
+def _sum(counts: Iterable[Mapping[str, int]]) -> dict[str, int]:
+    total: Counter[str] = Counter()
+    for count in counts:
+        total.update(count)
+    return dict(sorted(total.items()))
+
+
+def _named(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return f"{', '.join(names[:_NAMED])}{more}"
+
+
+def _shared_notes(logs: Sequence[ReplayedLog]) -> list[str]:
+    """Return each note once, with the logs that it is of."""
+    owners: dict[str, list[str]] = {}
+    for log in logs:
+        for note in log.notes:
+            # A note begins with the file that it is of; logs differ in its folder.
+            _, _, rest = note.rpartition(f"{log.name}/")
+            owners.setdefault(rest, []).append(log.name)
+    return [f"{note} (in {_named(names)})" for note, names in owners.items()]
+
+
+FUSION_FILTERS = tuple(METHODS)
+
+
+def run_replay_fusion(
+    config: Config, out: Path, *, progress: Progress | None = None
+) -> ReplayResult:
+    """Locate logs by their fixes, timing advances and levels; write what a replay writes.
+
+    Parameters
+    ----------
+    config : Config
+        Its cells, track and filter sections count; ``cells.plan`` tells the sites.
+    out : Path
+    progress : callable, optional
+        Called with logs done and logs in all.
+
+    Raises
+    ------
+    MapfilterError
+        There is no cell plan, it, an antenna or a log is missing or damaged, or the output cannot
+        be written.
+    """
+    if config.cells.plan is None:
+        hint = "filters without a map take the sites from there"
+        raise fail(ConfigError, "cells.plan", "a cell plan", "none", hint)
+    folders = list_logs(config.track_path)
+    ensure_writable_folder(out)
+    clear_results(out)
+    method = METHODS[config.filter.name]
+    logs: list[ReplayedLog] = []
+    for index, folder in enumerate(folders):
+        log = leave_out(read_log(folder), config.track.without)
+        plan = planned_cells(config, log.crs)
+        sites = SiteModels(plan, FusionOptions(), _antennas(config, plan))
+        track = position_by_fusion(sites, plan.crs, log, method, smooth=config.filter.smooth)
+        into = out if len(folders) == 1 else out / folder.name
+        files = tuple(into / file for file in ESTIMATES)
+        write_estimate(track.estimate, files[0])
+        write_gpx(track.estimate, files[1], folder.name)
+        write_geojson(track.estimate, files[2])
+        truth = Truth.of_table(log.truth)
+        pictures: tuple[Path, ...] = ()
+        wanted = config.output.pictures
+        if truth is not None and (wanted == "all" or (wanted == "first" and not index)):
+            pictures = (into / "error.png",)
+            plot_error_over_distance(track.estimate, truth, pictures[0])
+        score = accuracy(track.estimate, truth) if truth is not None else None
+        lack = "" if track.estimate.converged_at is not None else "too little was measured"
+        replayed = ReplayedLog(
+            folder.name, outcome(track.estimate), score, log.notes, lack, track.filter_s,
+            (*files, into / FIGURES, *pictures), route_of(log),
+        )  # fmt: skip
+        head = {"log": folder.name, "filter": method.name}
+        write_json(into / FIGURES, {**head, **facts(replayed.figures)})
+        logs.append(replayed)
+        if progress is not None:
+            progress(index + 1, len(folders))
+    result = ReplayResult(method.name, tuple(logs), summary_of(logs), out)
+    if len(folders) > 1:
+        write_json(out / SUMMARY, facts(summary_figures(result)))
+    return result
+
+
+def _antennas(config: Config, plan: CellPlan) -> dict[str, MeasuredAntenna]:
+    folder = config.cells.antennas
+    return {} if folder is None else read_antennas(folder, (cell.antenna for cell in plan.cells))
 
 
 def run_replay(
@@ -90,7 +322,7 @@ def _write(
     write_estimate(track.estimate, files[0])
     write_gpx(track.estimate, files[1], name)
     write_geojson(track.estimate, files[2])
-    truth = truth_of(log)
+    truth = Truth.of_table(log.truth)
     replayed = ReplayedLog(
         name,
         outcome(track.estimate),

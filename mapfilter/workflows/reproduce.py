@@ -12,23 +12,23 @@ import pandas as pd
 
 from mapfilter._io import atomic_file, ensure_writable_folder
 from mapfilter._parallel import Progress
+from mapfilter.config.load import load_config
+from mapfilter.config.sections import Config
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, fail
-from mapfilter.evaluation.success_cells import SuccessCell, success_cells
-from mapfilter.experiments.papers import khalaf_allah_2007 as paper
-from mapfilter.experiments.papers.khalaf_allah_2007 import Fit
+from mapfilter.evaluation.success import SuccessCell, success_cells
+from mapfilter.experiments.papers.khalaf_allah_2007 import experiment as paper
+from mapfilter.experiments.papers.khalaf_allah_2007.experiment import Fit
 from mapfilter.experiments.sweep.run import sweep
 from mapfilter.experiments.sweep.table import read_runs
 from mapfilter.workflows.build import run_build
-from mapfilter.workflows.config import load_config
 from mapfilter.workflows.paper_pictures import draw_khalaf_allah_2007
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.reproduce_dlr import DLR
 from mapfilter.workflows.reproduce_fusion import FUSION_PAPERS
 from mapfilter.workflows.reproduce_tesa import TESA
-from mapfilter.workflows.sections import Config
 from mapfilter.workflows.sweep import sweep_executor
-from mapfilter.workflows.sweep_world import sweep_world
+from mapfilter.workflows.sweep_plan import sweep_world
 
 PAPERS = ("khalaf-allah-2007",)
 CITY = "synthetic"

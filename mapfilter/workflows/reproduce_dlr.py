@@ -11,8 +11,9 @@ from pathlib import Path
 from mapfilter._io import atomic_file, ensure_writable_folder
 from mapfilter._parallel import Progress
 from mapfilter.errors import ConfigError, fail
-from mapfilter.experiments.papers import dlr, dlr_table
-from mapfilter.experiments.papers.dlr_assumptions import ASSUMPTIONS, CLAIMS
+from mapfilter.experiments.papers.dlr import experiment as dlr
+from mapfilter.experiments.papers.dlr import table as dlr_table
+from mapfilter.experiments.papers.dlr.assumptions import ASSUMPTIONS, CLAIMS
 from mapfilter.workflows.dlr_pictures import draw_dlr
 from mapfilter.workflows.sweep import sweep_executor
 

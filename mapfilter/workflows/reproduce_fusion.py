@@ -15,9 +15,9 @@ import numpy as np
 from mapfilter._io import atomic_file, ensure_writable_folder
 from mapfilter._parallel import Progress
 from mapfilter.errors import ConfigError, InputError, fail
-from mapfilter.experiments.papers import fritsche_klein_2009 as fritsche_klein
-from mapfilter.experiments.papers import zhang_2006 as zhang
-from mapfilter.experiments.papers.fritsche_klein_2009_scene import COMBINATIONS, Layout
+from mapfilter.experiments.papers.fritsche_klein_2009 import experiment as fritsche_klein
+from mapfilter.experiments.papers.fritsche_klein_2009.scene import COMBINATIONS, Layout
+from mapfilter.experiments.papers.zhang_2006 import experiment as zhang
 from mapfilter.workflows.fusion_pictures import draw_fritsche_klein_2009, draw_zhang_2006
 
 FUSION_PAPERS = ("fritsche-klein-2009", "zhang-2006")
@@ -125,7 +125,7 @@ def run_reproduce_fusion(
         Folder of everything.
     layout_file : Path, optional
         TOML with fields of
-        :class:`mapfilter.experiments.papers.fritsche_klein_2009_scene.Layout`.
+        :class:`mapfilter.experiments.papers.fritsche_klein_2009.scene.Layout`.
     trials : int, optional
         By default as in the paper: 500 or 1000.
     seed : int

@@ -11,9 +11,9 @@ from pathlib import Path
 from mapfilter._io import atomic_file, ensure_writable_folder
 from mapfilter._parallel import Progress
 from mapfilter.errors import ConfigError, fail
-from mapfilter.experiments.papers import tesa
-from mapfilter.experiments.papers.tesa_models import IDENTITY, KNOWN_BEARING, VELOCITY, Motion
-from mapfilter.experiments.papers.tesa_scene import ASSUMPTIONS, BETA_DB
+from mapfilter.experiments.papers.tesa import experiment as tesa
+from mapfilter.experiments.papers.tesa.models import IDENTITY, KNOWN_BEARING, VELOCITY, Motion
+from mapfilter.experiments.papers.tesa.scene import ASSUMPTIONS, BETA_DB
 from mapfilter.workflows.sweep import sweep_executor
 from mapfilter.workflows.tesa_pictures import draw_tesa
 

@@ -9,9 +9,10 @@ import numpy as np
 
 from mapfilter._io import atomic_dir
 from mapfilter._parallel import Progress
+from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, OutputError, fail
 from mapfilter.geodesy import same_crs
-from mapfilter.radio.rasters import check_against_plan, open_rasters
+from mapfilter.rasters.rxlev_rasters import check_against_plan, open_rasters
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.journeys import JourneyPlan
@@ -20,8 +21,7 @@ from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
 from mapfilter.simulation.walking import WalkerModel, inside_buildings
 from mapfilter.tracks.store import check_log_replaceable, is_log, write_log
 from mapfilter.workflows.cover import check_cells_near
-from mapfilter.workflows.reality import check_reality, check_reality_there
-from mapfilter.workflows.sections import Config
+from mapfilter.workflows.predict import check_reality, check_reality_there
 from mapfilter.workflows.world import World, planned_rasters
 
 

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import shapely
 
+from mapfilter.config.sections import Config
 from mapfilter.database.manifest import InputRole
 from mapfilter.errors import ConfigError, fail
 from mapfilter.geodesy import Lattice
-from mapfilter.radio.measurements import Measurements, read_measurements
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.roads.clip import clip_ways
 from mapfilter.roads.corridors import Positions, corridors
@@ -25,9 +25,9 @@ from mapfilter.roads.osm import read_squares, read_ways
 from mapfilter.roads.routable import RouteSource
 from mapfilter.roads.water import read_layer_water, read_water
 from mapfilter.roads.ways import Bounds, Buildings, Squares, Water, Ways
-from mapfilter.simulation.city import SyntheticCity
-from mapfilter.workflows.made_city import made_city
-from mapfilter.workflows.sections import Config
+from mapfilter.simulation.synthetic_city import SyntheticCity
+from mapfilter.survey.measurements import Measurements, read_measurements
+from mapfilter.workflows.area import made_city
 
 OSM_ATTRIBUTION = "© OpenStreetMap contributors (ODbL)"
 

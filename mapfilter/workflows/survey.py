@@ -11,20 +11,19 @@ import numpy as np
 from mapfilter import __version__
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress
+from mapfilter.config.sections import Config, SurveySection
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs
-from mapfilter.radio._survey_trend import Covariate
 from mapfilter.radio.cells import CellPlan, write_cell_plan
-from mapfilter.radio.measurements import Measurements, named_after, read_measurements
-from mapfilter.radio.rasters import RxLevRasters, open_rasters
-from mapfilter.radio.survey import Survey, SurveyOptions, fit_survey
-from mapfilter.radio.survey_rasters import predicted_levels, surveyed_plan, write_survey
-from mapfilter.radio.survey_validation import Validation, leave_out
+from mapfilter.rasters.rxlev_rasters import RxLevRasters, open_rasters
+from mapfilter.survey.fit import Survey, SurveyOptions, fit_survey
+from mapfilter.survey.measurements import Measurements, named_after, read_measurements
+from mapfilter.survey.rasters import predicted_levels, surveyed_plan, write_survey
+from mapfilter.survey.trend import Covariate
+from mapfilter.survey.validation import Validation, leave_out
 from mapfilter.workflows.cover import check_cells_near
 from mapfilter.workflows.results import clear_pictures
-from mapfilter.workflows.sections import Config
 from mapfilter.workflows.survey_pictures import SURVEY_PICTURES, SurveyEvidence, draw_survey
-from mapfilter.workflows.survey_section import SurveySection
 from mapfilter.workflows.world import (
     LARGEST_AREA_PX,
     area_lattice,

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from mapfilter.errors import InputError, fail
-from mapfilter.radio.measurements import Measurements
-from mapfilter.radio.rasters import RxLevRasters
-from mapfilter.radio.survey_validation import LeftOut
+from mapfilter.rasters.rxlev_rasters import RxLevRasters
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
+from mapfilter.survey.measurements import Measurements
+from mapfilter.survey.validation import LeftOut
 from mapfilter.workflows.cover import outside_m
 from mapfilter.workflows.served import thinned_lattice
 

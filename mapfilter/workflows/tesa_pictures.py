@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mapfilter.experiments.papers import tesa
-from mapfilter.experiments.papers import tesa_scene as scene
-from mapfilter.experiments.papers.tesa_models import IDENTITY, VELOCITY
+from mapfilter.experiments.papers.tesa import experiment as tesa
+from mapfilter.experiments.papers.tesa import scene
+from mapfilter.experiments.papers.tesa.models import IDENTITY, VELOCITY
 from mapfilter.report.canvas import BLACK, BLUE, GREY, ORANGE, PURPLE, SKY, VERMILLION
 from mapfilter.report.fusion import Curve, Panel, plot_error_panels
 from mapfilter.simulation.drives import Drive, shadowing_db, straight_drive

@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
+from mapfilter.config.sections import Config, Rasters
 from mapfilter.database.sources import LaidRoutes, LayerRoutes, Routes
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan, read_cell_plan
 from mapfilter.radio.msi import read_antennas
-from mapfilter.radio.rasters import RxLevRasters, open_rasters
+from mapfilter.rasters.rxlev_rasters import RxLevRasters, open_rasters
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.lattice import RouteLattice
@@ -25,7 +26,6 @@ from mapfilter.simulation.layout import lay_out_plan
 from mapfilter.workflows.area import LARGEST_AREA_PX as LARGEST_AREA_PX
 from mapfilter.workflows.area import area_lattice as area_lattice
 from mapfilter.workflows.area import check_scale as check_scale
-from mapfilter.workflows.sections import Config, Rasters
 from mapfilter.workflows.streets import Streets
 
 

@@ -10,12 +10,11 @@ import shapely
 from small_world import CRS, FLOOR_DBM, LATTICE, levels_of, make_plan, make_routes
 
 from mapfilter._parallel import SerialExecutor
-from mapfilter.database import finished
-from mapfilter.database.build import build
-from mapfilter.database.finished import FinishedTiles, work_key
+from mapfilter.database import build as finished
+from mapfilter.database.build import FinishedTiles, build, work_key
 from mapfilter.database.sources import LaidRoutes, LayerRoutes
 from mapfilter.errors import InputError, OutputError
-from mapfilter.radio.rasters import open_rasters, write_rasters
+from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
 from mapfilter.roads.buildings import Buildings
 from mapfilter.roads.routable import RouteSource
 from mapfilter.roads.water import Water

@@ -14,16 +14,16 @@ import typer
 from pydantic import BaseModel
 from typer.testing import CliRunner
 
+from mapfilter.check.findings import REMEDIES
 from mapfilter.cli import app
+from mapfilter.config.load import load_config
+from mapfilter.config.sections import Config
 from mapfilter.experiments.sweep.table import SCHEMA as SWEEP_SCHEMA
-from mapfilter.filters.candidate_options import CandidateOptions
+from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate_store import _COLUMNS as ESTIMATE_COLUMNS
-from mapfilter.radio._cell_layouts import COLUMNS as PLAN_COLUMNS
+from mapfilter.radio.cell_layouts import COLUMNS as PLAN_COLUMNS
 from mapfilter.tracks.schema import SCHEMA
-from mapfilter.workflows.config import load_config
-from mapfilter.workflows.findings import REMEDIES
-from mapfilter.workflows.sections import Config
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGES = sorted(path.relative_to(DOCS) for path in DOCS.rglob("*.rst") if "api" not in path.parts)

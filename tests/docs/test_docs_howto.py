@@ -11,9 +11,8 @@ import pytest
 import typer
 
 from mapfilter.cli import app
-from mapfilter.radio._models import ModelName
-from mapfilter.radio.pathloss import PUBLISHED
-from mapfilter.workflows.config import load_config
+from mapfilter.config.load import load_config
+from mapfilter.propagation.models import PUBLISHED, ModelName
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGES = sorted((DOCS / "howto").glob("*.rst"))

@@ -16,7 +16,7 @@ from mapfilter.filters.gaussian import EKF
 from mapfilter.filters.trials import run_trials
 from mapfilter.models.motion import constant_velocity
 from mapfilter.models.state import MOVING_CLOCK
-from mapfilter.positioning.fusion import compiled
+from mapfilter.positioning.kalman.models import compiled
 
 START = np.array([-200.0, 8.84, -200.0, 8.84, 0.0, 0.0])
 FIRST = np.diag([200.0**2, 100.0, 200.0**2, 100.0, 300e3**2 / 3, 100 / 3])

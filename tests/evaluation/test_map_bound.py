@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import ConfigError
-from mapfilter.evaluation.distinctness import distinctness
 from mapfilter.evaluation.first_fix import FirstFixOptions, first_fix, starts
-from mapfilter.evaluation.map_bound import BANDS, map_bound
+from mapfilter.evaluation.map_bound import BANDS, distinctness, map_bound
 from mapfilter.evaluation.position_bound import position_bound
 from mapfilter.evaluation.radio_map import ErrorModel, RadioMap, distance_squared, heard_cells
 from mapfilter.geodesy import Lattice

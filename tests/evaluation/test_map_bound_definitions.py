@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from radio_maps import FLOOR_DBM, made_map
 
-from mapfilter.evaluation.distinctness import COMPARED, distinctness
+from mapfilter.evaluation.map_bound import COMPARED, distinctness
 from mapfilter.evaluation.position_bound import position_bound
 from mapfilter.evaluation.radio_map import ErrorModel
 

@@ -10,8 +10,7 @@ from radio_maps import FLOOR_DBM, made_map
 
 from mapfilter.errors import ConfigError
 from mapfilter.evaluation.first_fix import FirstFix, FirstFixOptions, first_fix, starts
-from mapfilter.evaluation.map_bound import BANDS, MapBound, on_lattice
-from mapfilter.evaluation.map_bound_store import write_bound
+from mapfilter.evaluation.map_bound import BANDS, MapBound, on_lattice, write_bound
 from mapfilter.evaluation.radio_map import ErrorModel, radio_map
 from mapfilter.geodesy import Lattice
 

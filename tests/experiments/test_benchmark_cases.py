@@ -7,9 +7,9 @@ import pytest
 
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.global_positioning import informed
-from mapfilter.filters.candidate_options import CandidateOptions
+from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.models.street_motion import MotionErrors
-from mapfilter.positioning.bayes_options import BayesOptions
+from mapfilter.positioning.bayes.options import BayesOptions
 from mapfilter.positioning.locators import FilterChoice
 from mapfilter.simulation.imu import ImuErrors
 

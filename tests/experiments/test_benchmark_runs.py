@@ -9,10 +9,9 @@ from grid_town import CRS, levels, streets
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.global_positioning import Batch, informed, run_batch
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.bayes_options import BayesOptions
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.bayes.options import BayesOptions
+from mapfilter.positioning.estimate import Fix, PositionedTrack, TrackEstimate
 from mapfilter.positioning.locators import FilterChoice
-from mapfilter.positioning.track import PositionedTrack
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel

@@ -15,10 +15,10 @@ from mapfilter.experiments.benchmarks.world import BenchmarkWorld, write_buildin
 from mapfilter.experiments.sweep.world import SweepWorld, write_world
 from mapfilter.geodesy import Lattice
 from mapfilter.positioning.locators import FilterChoice
+from mapfilter.propagation.predict import PredictionModel, RealityErrors, predict
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
-from mapfilter.radio.predict import PredictionModel, RealityErrors, predict
-from mapfilter.radio.rasters import open_rasters, write_rasters
+from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.ways import Buildings
 from mapfilter.simulation.imu import ImuErrors

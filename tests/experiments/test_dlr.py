@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from mapfilter._parallel import SerialExecutor
-from mapfilter.experiments.papers import dlr, dlr_table
-from mapfilter.experiments.papers import dlr_filters as filters
-from mapfilter.experiments.papers import dlr_scene as scene
-from mapfilter.experiments.papers.dlr_assumptions import ASSUMPTIONS
+from mapfilter.experiments.papers.dlr import experiment as dlr
+from mapfilter.experiments.papers.dlr import filters, scene
+from mapfilter.experiments.papers.dlr import table as dlr_table
+from mapfilter.experiments.papers.dlr.assumptions import ASSUMPTIONS
 from mapfilter.models.state import POSITION_CLOCK_3D
-from mapfilter.positioning.least_squares import TOO_FEW
+from mapfilter.positioning.kalman.static_fix import TOO_FEW
 
 CASES = json.loads((Path(__file__).parents[1] / "fusion_cases.json").read_text(encoding="utf-8"))
 CASE = CASES["gauss_newton"]

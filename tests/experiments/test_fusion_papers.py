@@ -5,20 +5,20 @@ import pytest
 
 from mapfilter.errors import InputError
 from mapfilter.evaluation.bounds import rmse_over_time
-from mapfilter.experiments.papers import zhang_2006 as zhang
-from mapfilter.experiments.papers.fritsche_klein_2009 import TABLE_III, bound_curves
-from mapfilter.experiments.papers.fritsche_klein_2009_scene import (
+from mapfilter.experiments.papers.fritsche_klein_2009.experiment import TABLE_III, bound_curves
+from mapfilter.experiments.papers.fritsche_klein_2009.scene import (
     COMBINATIONS,
     Layout,
     draw,
     hard_layout,
     scene,
 )
+from mapfilter.experiments.papers.zhang_2006 import experiment as zhang
 from mapfilter.filters.gaussian import EKF, RBUKF
 from mapfilter.filters.gaussian_sum import run_mixtures, split
-from mapfilter.filters.smoothing import smooth
+from mapfilter.filters.kalman import smooth
 from mapfilter.filters.trials import run_trials
-from mapfilter.positioning.fusion import compiled
+from mapfilter.positioning.kalman.models import compiled
 
 # Measured with 500 trials by an independent prototype.
 PCRLB = {

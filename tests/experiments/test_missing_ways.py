@@ -3,7 +3,7 @@
 import numpy as np
 import shapely
 
-from mapfilter.experiments.benchmarks.missing_ways import without_ways
+from mapfilter.experiments.benchmarks.world import without_ways
 from mapfilter.geodesy import Lattice
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.ways import Ways

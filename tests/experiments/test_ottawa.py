@@ -23,14 +23,14 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
     session_log,
     step_factor_of,
 )
-from mapfilter.experiments.benchmarks.ottawa_store import read_left_out
-from mapfilter.filters.particle_options import ParticleOptions
+from mapfilter.experiments.benchmarks.ottawa_table import read_left_out
+from mapfilter.filters.particle import ParticleOptions
 from mapfilter.geodesy import Lattice, unproject
 from mapfilter.models.fingerprint import LevelReading
-from mapfilter.models.heard_maps import HeardMaps, HeardOptions, HeardRows
-from mapfilter.positioning.bayes_model import BayesModel
-from mapfilter.positioning.evidence import RadioReading
-from mapfilter.radio.rasters import open_rasters
+from mapfilter.models.measured_map import HeardMaps, HeardOptions, HeardRows
+from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.rasters.rxlev_rasters import open_rasters
 from mapfilter.workflows.evaluate_ottawa import Task, find_left_out, run_ottawa
 
 CRS = "EPSG:32618"

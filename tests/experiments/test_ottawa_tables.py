@@ -20,8 +20,13 @@ from mapfilter.experiments.benchmarks.ottawa import (
     OttawaOptions,
 )
 from mapfilter.experiments.benchmarks.ottawa_sessions import LONGEST_GAP_S, ReckoningErrors
-from mapfilter.experiments.benchmarks.ottawa_store import LeftOut, read_left_out, write_left_out
-from mapfilter.experiments.benchmarks.ottawa_table import part_rows, session_rows
+from mapfilter.experiments.benchmarks.ottawa_table import (
+    LeftOut,
+    part_rows,
+    read_left_out,
+    session_rows,
+    write_left_out,
+)
 
 
 def test_the_options_that_were_chosen():

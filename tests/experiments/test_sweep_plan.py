@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapfilter.errors import ConfigError
+from mapfilter.experiments.sweep.journeys import filter_rng, imu_rng, radio_rng, route_rng
 from mapfilter.experiments.sweep.plan import (
     LONGEST_BATCH,
     Noise,
@@ -18,8 +19,7 @@ from mapfilter.experiments.sweep.plan import (
     SweepPlan,
     noise_grid,
 )
-from mapfilter.experiments.sweep.seeds import filter_rng, imu_rng, radio_rng, route_rng
-from mapfilter.filters.candidate_options import CandidateOptions
+from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.positioning.locators import FilterChoice
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.walking import WalkerModel

@@ -8,9 +8,8 @@ import pytest
 
 from mapfilter._parallel import SerialExecutor
 from mapfilter.errors import InputError
-from mapfilter.experiments.papers import tesa
-from mapfilter.experiments.papers import tesa_models as models
-from mapfilter.experiments.papers import tesa_scene as scene
+from mapfilter.experiments.papers.tesa import experiment as tesa
+from mapfilter.experiments.papers.tesa import models, scene
 from mapfilter.models.signal_strength import levels
 from mapfilter.models.state import POSITION_CLOCK_3D
 from mapfilter.simulation.drives import (

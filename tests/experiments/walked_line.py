@@ -6,8 +6,7 @@ import pandas as pd
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.experiments.benchmarks.journeys import Walk
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, TrackEstimate
-from mapfilter.positioning.track import PositionedTrack
+from mapfilter.positioning.estimate import Fix, PositionedTrack, TrackEstimate
 
 CRS = "EPSG:32629"
 STATUS = {

@@ -17,10 +17,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapfilter.errors import ConfigError
-from mapfilter.filters.candidate import CandidateBelief, CandidateFilter, Mode
-from mapfilter.filters.candidate_options import CandidateOptions
-from mapfilter.filters.contract import MotionStep, Reason, Status
-from mapfilter.filters.run import Event, run
+from mapfilter.filters.candidate import CandidateBelief, CandidateFilter, CandidateOptions, Mode
+from mapfilter.filters.contract import Event, MotionStep, Reason, Status, run
 
 RNG = np.random.default_rng(0)
 POINTS = [(0.0, 10.0), (5.0, 10.0), (0.0, 0.0), (5.0, 0.0), (10.0, 0.0), (15.0, 0.0)]

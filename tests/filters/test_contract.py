@@ -18,8 +18,16 @@ import pytest
 
 from mapfilter.database.nearest import CellPointIndex
 from mapfilter.filters.candidate import CandidateFilter, CandidateOptions
-from mapfilter.filters.contract import Estimate, Filter, MotionStep, Reason, Status, UpdateInfo
-from mapfilter.filters.run import Event, run
+from mapfilter.filters.contract import (
+    Estimate,
+    Event,
+    Filter,
+    MotionStep,
+    Reason,
+    Status,
+    UpdateInfo,
+    run,
+)
 from mapfilter.geodesy import Lattice, wrap_rad
 
 LATTICE = Lattice("EPSG:32629", 5_000.0, 8_000.0, 5.0, 60, 70)

@@ -8,9 +8,8 @@ import scalar_oracle as oracle
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.hypotheses import Bins, flattened
-from mapfilter.filters.particle import ParticleFilter
-from mapfilter.filters.particle_options import ParticleOptions
-from mapfilter.filters.smoothing import smooth
+from mapfilter.filters.kalman import smooth
+from mapfilter.filters.particle import ParticleFilter, ParticleOptions
 
 PRIOR = np.array([0.5, 0.3, 0.2])
 CHANGE = np.array([[0.7, 0.2, 0.1], [0.1, 0.6, 0.3], [0.25, 0.05, 0.7]])

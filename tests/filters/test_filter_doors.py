@@ -8,7 +8,7 @@ import pytest
 
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.filters import kalman
-from mapfilter.filters.candidate_options import CandidateOptions
+from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.filters.gaussian import (
     CKF,
@@ -23,11 +23,9 @@ from mapfilter.filters.gaussian import (
     factor_of,
 )
 from mapfilter.filters.gaussian_sum import split
-from mapfilter.filters.particle_options import ParticleOptions
-from mapfilter.filters.rao_blackwell import init
-from mapfilter.filters.sir_options import REGULARISED, SIR, SirOptions
-from mapfilter.filters.smoothing import smooth
-from mapfilter.filters.switch import switched
+from mapfilter.filters.kalman import smooth
+from mapfilter.filters.particle import ParticleOptions, switched
+from mapfilter.filters.rao_blackwell import REGULARISED, SIR, SirOptions, init
 from mapfilter.filters.trials import factors_of, is_diagonal, method_numbers
 
 

@@ -16,12 +16,9 @@ from mapfilter.filters.gaussian import CKF, EKF, IEKF, UKF, Gaussian, Method, Si
 from mapfilter.filters.gaussian_sum import Mixture, run_mixtures
 from mapfilter.filters.trials import run_trials
 from mapfilter.models.gaussian import stack
-from mapfilter.models.position_fix import position_fix
-from mapfilter.models.pseudorange import pseudoranges
+from mapfilter.models.ranging import position_fix, pseudoranges, range_differences, timing_advances
 from mapfilter.models.state import StateLayout
-from mapfilter.models.tdoa import range_differences
-from mapfilter.models.timing_advance import timing_advances
-from mapfilter.positioning.fusion import compiled
+from mapfilter.positioning.kalman.models import compiled
 
 # North, a rate nobody measures, east, the clock, and one more behind all that matters.
 LAYOUT = StateLayout(5, 2, 0, clock=3)

@@ -7,14 +7,11 @@ import pytest
 
 from mapfilter.errors import InputError
 from mapfilter.filters import rao_blackwell as rb
-from mapfilter.filters.sir_options import SIR, SirOptions
+from mapfilter.filters.rao_blackwell import SIR, SirOptions
 from mapfilter.models.gaussian import stack
-from mapfilter.models.position_fix import position_fix
-from mapfilter.models.pseudorange import pseudoranges
+from mapfilter.models.ranging import position_fix, pseudoranges, range_differences, timing_advances
 from mapfilter.models.state import StateLayout
-from mapfilter.models.tdoa import range_differences
-from mapfilter.models.timing_advance import timing_advances
-from mapfilter.positioning.fusion import compiled
+from mapfilter.positioning.kalman.models import compiled
 
 LAYOUT = StateLayout(5, 3, 0, clock=2)
 SITES = np.array([[90.0, 0.0], [-20.0, 110.0], [-60.0, -70.0]])

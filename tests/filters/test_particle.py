@@ -8,8 +8,7 @@ import pytest
 from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.hypotheses import Bins
-from mapfilter.filters.particle import ParticleFilter
-from mapfilter.filters.particle_options import ParticleOptions
+from mapfilter.filters.particle import ParticleFilter, ParticleOptions
 
 PRIOR_SD, STEP_SD, FIX_SD = 20.0, 3.0, 8.0
 PLAIN = ParticleOptions(

@@ -9,8 +9,7 @@ import pytest
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.hypotheses import Bins
-from mapfilter.filters.particle import ParticleFilter
-from mapfilter.filters.particle_options import ParticleOptions
+from mapfilter.filters.particle import ParticleFilter, ParticleOptions
 
 
 @dataclass(frozen=True)

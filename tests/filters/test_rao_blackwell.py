@@ -7,15 +7,13 @@ from mapfilter.errors import InputError
 from mapfilter.filters import kalman
 from mapfilter.filters import rao_blackwell as rb
 from mapfilter.filters.gaussian import EKF, Gaussian
-from mapfilter.filters.sir_options import REGULARISED, SIR, SirOptions
+from mapfilter.filters.rao_blackwell import REGULARISED, SIR, SirOptions
 from mapfilter.models.gaussian import stack
 from mapfilter.models.motion import clock_motion, constant_velocity, random_walk, together
-from mapfilter.models.position_fix import position_fix
-from mapfilter.models.pseudorange import pseudoranges
+from mapfilter.models.ranging import position_fix, pseudoranges, range_differences
 from mapfilter.models.signal_strength import levels
 from mapfilter.models.state import MOVING_CLOCK, MOVING_CLOCK_3D, POSITION_CLOCK_3D, StateLayout
-from mapfilter.models.tdoa import range_differences
-from mapfilter.positioning.fusion import compiled
+from mapfilter.positioning.kalman.models import compiled
 
 AWAY = np.array([[0.6, 0.0, 0.8], [-0.5, 0.6, 0.62], [0.1, -0.8, 0.59], [0.3, 0.4, 0.87],
                  [-0.7, -0.3, 0.65]])  # fmt: skip

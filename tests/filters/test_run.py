@@ -5,8 +5,16 @@ from math import nan
 import numpy as np
 import pytest
 
-from mapfilter.filters.contract import MotionStep, Reason, Status, UpdateInfo
-from mapfilter.filters.run import Event, Step, run, step
+from mapfilter.filters.contract import (
+    Event,
+    MotionStep,
+    Reason,
+    Status,
+    Step,
+    UpdateInfo,
+    run,
+    step,
+)
 
 MOVE = MotionStep(1.0, 0.5)
 

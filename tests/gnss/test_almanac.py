@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.gnss.almanac import joined, read_yuma
-from mapfilter.gnss.constellations import nominal_galileo, nominal_gps
+from mapfilter.gnss.almanac import joined, nominal_galileo, nominal_gps, read_yuma
 from mapfilter.gnss.orbits import satellite_positions_m
 from mapfilter.gnss.sky import LocalFrame, directions
 

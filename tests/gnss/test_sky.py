@@ -11,8 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapfilter.errors import InputError
-from mapfilter.gnss.almanac import Almanac
-from mapfilter.gnss.constellations import nominal_gps
+from mapfilter.gnss.almanac import Almanac, nominal_gps
 from mapfilter.gnss.noise import correlated_along, elevation_sigma_m, multipath_bias_m
 from mapfilter.gnss.orbits import gps_time, satellite_positions_m
 from mapfilter.gnss.sky import (

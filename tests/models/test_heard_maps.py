@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mapfilter.geodesy import Lattice
-from mapfilter.models.heard_maps import HeardMaps, HeardOptions, HeardRows
+from mapfilter.models.measured_map import HeardMaps, HeardOptions, HeardRows
 
 NAN = float("nan")
 ROWS, COLS, SIDE_M = 12, 15, 10.0

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from mapfilter.models import cell_id, fingerprint
-from mapfilter.models._lanes import atan2_lanes, log_lanes
 from mapfilter.models.cell_id import ServingWeights, log_serving, serving_table
 from mapfilter.models.fingerprint import LevelErrors, bound_table
 from mapfilter.models.street_motion import (
@@ -19,9 +18,12 @@ from mapfilter.models.street_motion import (
     STATES,
     MapWeights,
     MotionErrors,
+    _sorted,
+    _squares,
+    draw_ancestors,
     move,
 )
-from mapfilter.models.street_smoothing import _sorted, _squares, draw_ancestors
+from mapfilter.models.terms import atan2_lanes, log_lanes
 
 
 def log_cdf(x):

@@ -7,8 +7,16 @@ import pytest
 
 from mapfilter.errors import InputError
 from mapfilter.models.gaussian import stack
-from mapfilter.models.position_fix import position_fix
-from mapfilter.models.pseudorange import pseudoranges
+from mapfilter.models.ranging import (
+    GSM_STEP_M,
+    LTE_STEP_M,
+    difference_covariance,
+    metres_of_steps,
+    position_fix,
+    pseudoranges,
+    range_differences,
+    timing_advances,
+)
 from mapfilter.models.signal_strength import levels, sampled_pattern
 from mapfilter.models.state import (
     MOVING,
@@ -18,13 +26,6 @@ from mapfilter.models.state import (
     POSITION,
     POSITION_CLOCK_3D,
     StateLayout,
-)
-from mapfilter.models.tdoa import difference_covariance, range_differences
-from mapfilter.models.timing_advance import (
-    GSM_STEP_M,
-    LTE_STEP_M,
-    metres_of_steps,
-    timing_advances,
 )
 from mapfilter.radio.antenna import MeasuredAntenna
 

@@ -9,11 +9,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapfilter.errors import InputError
-from mapfilter.models._lanes import atan2_lanes, log_lanes
 from mapfilter.models.gaussian import stack
-from mapfilter.models.position_fix import position_fix
-from mapfilter.models.protocols import GaussianMeasurement, Likelihood, fisher_information
-from mapfilter.models.pseudorange import pseudoranges
+from mapfilter.models.ranging import (
+    GSM_STEP_M,
+    difference_covariance,
+    metres_of_steps,
+    position_fix,
+    pseudoranges,
+    range_differences,
+    timing_advances,
+)
 from mapfilter.models.signal_strength import levels, sampled_pattern
 from mapfilter.models.state import (
     MOVING,
@@ -22,10 +27,12 @@ from mapfilter.models.state import (
     MOVING_CLOCK_3D,
     POSITION,
     POSITION_CLOCK_3D,
+    GaussianMeasurement,
+    Likelihood,
     StateLayout,
+    fisher_information,
 )
-from mapfilter.models.tdoa import difference_covariance, range_differences
-from mapfilter.models.timing_advance import GSM_STEP_M, metres_of_steps, timing_advances
+from mapfilter.models.terms import atan2_lanes, log_lanes
 from mapfilter.radio.antenna import MeasuredAntenna, sector_gain_db
 
 

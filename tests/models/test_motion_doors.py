@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.models.clock import QUARTZ, SPEED_OF_LIGHT_MPS, Oscillator, clock_noise
 from mapfilter.models.motion import (
+    QUARTZ,
+    SPEED_OF_LIGHT_MPS,
     LinearMotion,
+    Oscillator,
     clock_motion,
+    clock_noise,
     constant_velocity,
     random_walk,
     scaled,

@@ -6,10 +6,12 @@ from fusion_world import CASES
 from scipy.linalg import expm
 
 from mapfilter.errors import InputError
-from mapfilter.models.clock import QUARTZ, Oscillator, clock_noise
 from mapfilter.models.motion import (
+    QUARTZ,
     LinearMotion,
+    Oscillator,
     clock_motion,
+    clock_noise,
     constant_velocity,
     random_walk,
     scaled,

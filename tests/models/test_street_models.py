@@ -16,12 +16,12 @@ from mapfilter.models.street_motion import (
     STATES,
     MapWeights,
     MotionErrors,
+    draw_ancestors,
     interpolate,
     map_log_likelihood,
     move,
     weigh_by_map,
 )
-from mapfilter.models.street_smoothing import draw_ancestors
 
 EXACT = MotionErrors(
     step_sd_m=0.0, heading_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0, scale_drift_per_sqrt_m=0.0

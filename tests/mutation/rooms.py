@@ -31,19 +31,12 @@ ROOMS = {
     # Kernels of the models take the state of the filter that drives them; the tests beside the
     # models call them without one.
     "models": Room(("mapfilter/models/*.py",), ("tests/models/test_*.py",)),
-    "positioning": Room(("mapfilter/positioning/*.py",), ("tests/positioning/test_*.py",)),
+    "positioning": Room(("mapfilter/positioning/**/*.py",), ("tests/positioning/test_*.py",)),
     "database": Room(("mapfilter/database/*.py",), ("tests/database/test_*.py",)),
     "rasters": Room(
-        (
-            "mapfilter/radio/_raster*.py", "mapfilter/radio/_grid_header.py",
-            "mapfilter/radio/_resampling.py", "mapfilter/radio/atoll.py", "mapfilter/radio/bil.py",
-            "mapfilter/radio/esri_ascii.py", "mapfilter/radio/geotiff.py",
-            "mapfilter/radio/raster*.py",
-        ),
-        (
-            "tests/radio/test_radio_raster*.py", "tests/radio/test_radio_grids.py",
-            "tests/radio/test_radio_atoll.py",
-        ),
+        ("mapfilter/rasters/*.py",),
+        ("tests/radio/test_radio_raster*.py", "tests/radio/test_radio_grids.py",
+         "tests/radio/test_radio_atoll.py"),
     ),
     "evaluation": Room(("mapfilter/evaluation/*.py",), ("tests/evaluation/test_*.py",)),
     "benchmarks": Room(

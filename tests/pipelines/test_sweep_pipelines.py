@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from mapfilter.workflows.config import load_config
+from mapfilter.config.load import load_config
 
 PIPELINES = Path(__file__).resolve().parents[2] / "pipelines"
 SMALL = ["--set", "area.bbox=24.938,60.164,24.950,60.170"]

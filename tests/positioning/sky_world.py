@@ -4,10 +4,9 @@ import numpy as np
 import pandas as pd
 from cross_world import CRS, walk_log
 
-from mapfilter.gnss.almanac import joined
-from mapfilter.gnss.constellations import nominal_galileo, nominal_gps
+from mapfilter.gnss.almanac import joined, nominal_galileo, nominal_gps
 from mapfilter.gnss.orbits import gps_time
-from mapfilter.positioning.sky_options import SkyOptions
+from mapfilter.positioning.gnss.options import SkyOptions
 from mapfilter.simulation.satellites import ReceptionModel, receive
 from mapfilter.tracks.log import make_log
 

@@ -6,12 +6,12 @@ level. Levels are quarters of a dB, which the kernels' tables hold exactly.
 
 import numpy as np
 
-from mapfilter.database.field import RadioField
+from mapfilter.database.radioroutes import RadioField
 from mapfilter.geodesy import Lattice
 from mapfilter.models.cell_id import ServingWeights
 from mapfilter.models.fingerprint import LevelErrors
-from mapfilter.positioning.area_map import AreaMap
-from mapfilter.positioning.evidence import EvidenceOptions
+from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.evidence import EvidenceOptions
 from mapfilter.radio.cells import Cell, CellPlan
 
 ROWS, COLS, PIXEL_M = 7, 9, 10.0

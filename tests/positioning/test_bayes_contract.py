@@ -11,14 +11,13 @@ from cross_world import CRS, EAST, WALK, make_database, walk_log, walk_tables
 
 from mapfilter.filters.contract import MotionStep, Reason, Status, UpdateInfo
 from mapfilter.filters.grid import GridFilter
-from mapfilter.filters.particle import ParticleFilter
-from mapfilter.filters.particle_options import ParticleOptions
-from mapfilter.positioning.bayes_model import BayesModel, Start
-from mapfilter.positioning.bayes_options import BayesOptions, open_area
-from mapfilter.positioning.bayes_replay import estimate_of, position_by_bayes
+from mapfilter.filters.particle import ParticleFilter, ParticleOptions
+from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.grid import StreetGrid
+from mapfilter.positioning.bayes.model import BayesModel, Start
+from mapfilter.positioning.bayes.options import BayesOptions, open_area
+from mapfilter.positioning.bayes.replay import estimate_of, position_by_bayes
 from mapfilter.positioning.epochs import epochs
-from mapfilter.positioning.evidence import RadioReading
-from mapfilter.positioning.grid_model import StreetGrid
 from mapfilter.testing import ContractError, check_filter
 from mapfilter.tracks.log import make_log
 

@@ -5,14 +5,14 @@ import pandas as pd
 import pytest
 from cross_world import CRS, WALK, make_database, make_plan, truth
 
-from mapfilter.filters.particle_options import ParticleOptions
+from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.fingerprint import LevelErrors
 from mapfilter.models.street_motion import MapWeights, MotionErrors
-from mapfilter.positioning.bayes import BayesPositioner
-from mapfilter.positioning.bayes_model import BayesModel
-from mapfilter.positioning.bayes_options import open_area
+from mapfilter.positioning.bayes.evidence import EvidenceOptions
+from mapfilter.positioning.bayes.filter import BayesPositioner
+from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.options import open_area
 from mapfilter.positioning.epochs import epochs
-from mapfilter.positioning.evidence import EvidenceOptions
 from mapfilter.tracks.log import make_log
 
 # Wide enough that a pixel of 5 m resolves what one step adds.

@@ -9,10 +9,10 @@ from cross_world import make_database, walk_log
 
 from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Status
-from mapfilter.filters.particle_options import ParticleOptions
-from mapfilter.positioning.bayes_options import BayesOptions, open_area
-from mapfilter.positioning.bayes_replay import position_by_bayes
-from mapfilter.positioning.challenger import ChallengeRules
+from mapfilter.filters.particle import ParticleOptions
+from mapfilter.positioning.bayes.alternative import ChallengeRules
+from mapfilter.positioning.bayes.options import BayesOptions, open_area
+from mapfilter.positioning.bayes.replay import position_by_bayes
 from mapfilter.positioning.epochs import epochs
 
 FEW = ParticleOptions(most=4000, searching=2000, least=500)

@@ -8,7 +8,7 @@ import pytest
 
 from mapfilter.filters.contract import Status
 from mapfilter.filters.hypotheses import Summary
-from mapfilter.positioning.challenger import Challenger, ChallengeRules, Doubt, settle
+from mapfilter.positioning.bayes.alternative import Challenger, ChallengeRules, Doubt, settle
 
 RULES = ChallengeRules(ahead=4.0, lost=10.0, lost_of_cells=6.0)
 SEARCHING, CONVERGED = Status.SEARCHING, Status.CONVERGED

@@ -4,9 +4,9 @@ import numpy as np
 from cross_world import make_database
 
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.positioning.bayes_options import open_area
+from mapfilter.positioning.bayes.evidence import EvidenceOptions, Memory, reading_of
+from mapfilter.positioning.bayes.options import open_area
 from mapfilter.positioning.epochs import Epoch, Heard
-from mapfilter.positioning.evidence import EvidenceOptions, Memory, reading_of
 
 
 def report(level_dbm):

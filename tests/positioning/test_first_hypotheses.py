@@ -23,8 +23,7 @@ from small_area import (
 )
 
 from mapfilter.filters.contract import MotionStep
-from mapfilter.filters.particle import ParticleFilter
-from mapfilter.filters.particle_options import ParticleOptions
+from mapfilter.filters.particle import ParticleFilter, ParticleOptions
 from mapfilter.models.street_motion import (
     BIAS,
     EAST,
@@ -34,10 +33,10 @@ from mapfilter.models.street_motion import (
     MapWeights,
     MotionErrors,
 )
-from mapfilter.positioning.bayes_model import BayesModel, Start
+from mapfilter.positioning.bayes.evidence import Memory, reading_of
+from mapfilter.positioning.bayes.grid import StreetGrid
+from mapfilter.positioning.bayes.model import BayesModel, Start
 from mapfilter.positioning.epochs import Epoch, Heard
-from mapfilter.positioning.evidence import Memory, reading_of
-from mapfilter.positioning.grid_model import StreetGrid
 
 AREA = make_area()
 ERRORS = MotionErrors(

@@ -26,7 +26,7 @@ from mapfilter.filters.gaussian import (
     SigmaPoints,
 )
 from mapfilter.filters.trials import run_trials
-from mapfilter.positioning.fusion import compiled
+from mapfilter.positioning.kalman.models import compiled
 
 STEPS = [
     (name, filter_name)

@@ -7,14 +7,13 @@ from fusion_world import FIRST, FIRST_COVARIANCE, PHI, Q, hybrid_readings, linea
 from mapfilter.errors import InputError
 from mapfilter.filters.gaussian import EKF, METHODS, UKF, Method, SigmaPoints, factor_of
 from mapfilter.filters.gaussian_sum import run_mixtures, split
-from mapfilter.filters.smoothing import smooth
+from mapfilter.filters.kalman import smooth
 from mapfilter.filters.trials import run_trials
 from mapfilter.models.gaussian import stack
 from mapfilter.models.motion import constant_velocity
-from mapfilter.models.position_fix import position_fix
+from mapfilter.models.ranging import position_fix, range_differences
 from mapfilter.models.state import MOVING
-from mapfilter.models.tdoa import range_differences
-from mapfilter.positioning.fusion import compiled
+from mapfilter.positioning.kalman.models import compiled
 
 
 def test_a_trial_does_not_depend_on_its_neighbours():

@@ -9,15 +9,14 @@ import pytest
 from mapfilter.errors import InputError
 from mapfilter.filters.contract import Reason
 from mapfilter.filters.gaussian import EKF, UKF, Method, SigmaPoints
-from mapfilter.filters.smoothing import smooth
+from mapfilter.filters.kalman import smooth
 from mapfilter.filters.trials import run_trials
 from mapfilter.models.motion import constant_velocity
-from mapfilter.models.position_fix import position_fix
+from mapfilter.models.ranging import position_fix
 from mapfilter.models.state import MOVING, POSITION
-from mapfilter.positioning.fusion import compiled
-from mapfilter.positioning.fusion_belief import SumBelief
-from mapfilter.positioning.fusion_models import FusionOptions, SiteModels
-from mapfilter.positioning.fusion_replay import position_by_fusion
+from mapfilter.positioning.kalman.belief import SumBelief
+from mapfilter.positioning.kalman.models import FusionOptions, SiteModels, compiled
+from mapfilter.positioning.kalman.replay import position_by_fusion
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.tracks.log import make_log

@@ -11,11 +11,10 @@ from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.gaussian import EKF
 from mapfilter.models.state import POSITION
 from mapfilter.positioning.epochs import Epoch, GnssFix, Heard
-from mapfilter.positioning.fusion_belief import SumBelief
-from mapfilter.positioning.fusion_models import FusionOptions, SiteModels
-from mapfilter.positioning.fusion_readings import SiteReadings, site_readings
-from mapfilter.positioning.fusion_replay import _Walk
-from mapfilter.positioning.fusion_smoothing import FusionHistory
+from mapfilter.positioning.kalman.belief import FusionHistory, SumBelief
+from mapfilter.positioning.kalman.models import FusionOptions, SiteModels
+from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
+from mapfilter.positioning.kalman.replay import _Walk
 from mapfilter.radio.cells import Cell, CellPlan
 
 CRS = "EPSG:32629"

@@ -23,12 +23,11 @@ from hypothesis import strategies as st
 from mapfilter.errors import InputError
 from mapfilter.evaluation.accuracy import Truth, accuracy, position_errors_m
 from mapfilter.filters.candidate import CandidateFilter, CandidateOptions, Mode
-from mapfilter.filters.contract import Reason, Status
-from mapfilter.filters.run import run, step
+from mapfilter.filters.contract import Reason, Status, run, step
+from mapfilter.positioning.candidate import cell_points, position_by_candidates
+from mapfilter.positioning.epochs import serving_events
 from mapfilter.positioning.estimate import TrackEstimate, UnusedReading
 from mapfilter.positioning.estimate_store import write_estimate
-from mapfilter.positioning.events import serving_events
-from mapfilter.positioning.global_positioning import cell_points, position_by_candidates
 from mapfilter.tracks.log import make_log
 
 # 16 steps of 1.25 m: every match lands on a lattice point, so the walk is followed exactly.

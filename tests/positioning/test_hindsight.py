@@ -10,7 +10,7 @@ from small_area import HEIGHT_M, ON_WAY, SOUTH_M, WEST_M, WIDTH_M, make_area
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.models.street_motion import MotionErrors
-from mapfilter.positioning.bayes_smoothing import History, Kept, settled, smoothed
+from mapfilter.positioning.bayes.smoothing import History, Kept, settled, smoothed
 from mapfilter.positioning.estimate import Fix, TrackEstimate
 
 AREA = make_area()

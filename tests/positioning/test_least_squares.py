@@ -6,11 +6,9 @@ from fusion_world import CASES
 
 from mapfilter.errors import InputError
 from mapfilter.models.gaussian import stack
-from mapfilter.models.pseudorange import pseudoranges
+from mapfilter.models.ranging import pseudoranges, range_differences, timing_advances
 from mapfilter.models.state import POSITION, POSITION_CLOCK_3D
-from mapfilter.models.tdoa import range_differences
-from mapfilter.models.timing_advance import timing_advances
-from mapfilter.positioning.least_squares import BAD_GEOMETRY, TOO_FEW, static_fix
+from mapfilter.positioning.kalman.static_fix import BAD_GEOMETRY, TOO_FEW, static_fix
 
 CASE = CASES["gauss_newton"]
 GNSS = pseudoranges(POSITION_CLOCK_3D, CASE["sats"], CASE["s_pr"])

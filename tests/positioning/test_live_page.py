@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from cross_world import SPEED_MPS, make_database, walk_log
 
-from mapfilter.positioning.bayes_options import BayesOptions, open_area
-from mapfilter.positioning.bayes_replay import position_by_bayes
+from mapfilter.positioning.bayes.options import BayesOptions, open_area
+from mapfilter.positioning.bayes.replay import position_by_bayes
 from mapfilter.tracks.log import make_log
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "howto" / "live.rst"

@@ -4,8 +4,8 @@ import numpy as np
 from cross_world import make_database, walk_log
 
 from mapfilter.evaluation.accuracy import Truth, accuracy
-from mapfilter.filters.candidate_options import CandidateOptions
-from mapfilter.positioning.global_positioning import cell_points, position_by_candidates
+from mapfilter.filters.candidate import CandidateOptions
+from mapfilter.positioning.candidate import cell_points, position_by_candidates
 from mapfilter.positioning.locators import FilterChoice, open_locator
 
 OPTIONS = CandidateOptions(update_length_m=20.0)

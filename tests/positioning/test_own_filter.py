@@ -12,9 +12,8 @@ from sky_world import sky_log
 
 from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
+from mapfilter.positioning.custom_filter import OwnFilter, make_filter, own_filter, position_by_own
 from mapfilter.positioning.locators import FilterChoice, open_locator
-from mapfilter.positioning.own_filter import OwnFilter, make_filter, own_filter
-from mapfilter.positioning.own_replay import position_by_own
 from mapfilter.tracks.log import make_log
 
 HERE = __name__

@@ -7,16 +7,14 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import ConfigError
-from mapfilter.filters.candidate_options import CandidateOptions
+from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.filters.contract import Status
 from mapfilter.filters.hypotheses import Summary
-from mapfilter.filters.particle_options import ParticleOptions
+from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.cell_id import ServingWeights
 from mapfilter.models.fingerprint import LevelErrors
 from mapfilter.models.street_motion import MapWeights, MotionErrors
-from mapfilter.positioning.bayes_options import BayesOptions
-from mapfilter.positioning.bayes_track import BayesTrack
-from mapfilter.positioning.challenger import (
+from mapfilter.positioning.bayes.alternative import (
     Challenger,
     ChallengeRules,
     Doubt,
@@ -24,11 +22,12 @@ from mapfilter.positioning.challenger import (
     judge,
     settle,
 )
-from mapfilter.positioning.evidence import EvidenceOptions, RadioReading
+from mapfilter.positioning.bayes.evidence import EvidenceOptions, Memory, RadioReading
+from mapfilter.positioning.bayes.options import BayesOptions
+from mapfilter.positioning.bayes.state import BayesTrack
+from mapfilter.positioning.gnss.options import SkyOptions, TimingOptions
+from mapfilter.positioning.gnss.state import NO_SKY, SkyMemory
 from mapfilter.positioning.locators import FilterChoice
-from mapfilter.positioning.memory import Memory
-from mapfilter.positioning.sky_memory import NO_SKY, SkyMemory
-from mapfilter.positioning.sky_options import SkyOptions, TimingOptions
 
 
 def test_the_usual_options():

@@ -12,21 +12,19 @@ from scipy.special import ndtr
 from mapfilter.errors import InputError
 from mapfilter.filters.contract import MotionStep
 from mapfilter.models.motion import random_walk
-from mapfilter.models.pseudorange import pseudoranges
+from mapfilter.models.ranging import pseudoranges, timing_advances
 from mapfilter.models.state import MOVING_3D, POSITION, POSITION_CLOCK_3D
 from mapfilter.models.street_motion import MapWeights, MotionErrors
-from mapfilter.models.timing_advance import timing_advances
-from mapfilter.positioning.bayes_model import BayesModel, Start
-from mapfilter.positioning.bayes_news import grain_of, name_of
-from mapfilter.positioning.bayes_track import BayesTrack
+from mapfilter.positioning.bayes.evidence import Memory
+from mapfilter.positioning.bayes.grid import StreetGrid
+from mapfilter.positioning.bayes.model import BayesModel, Start
+from mapfilter.positioning.bayes.state import BayesTrack, grain_of, name_of
 from mapfilter.positioning.epochs import GnssFix, Heard, headed
-from mapfilter.positioning.fix_evidence import FixEvidence, widened
-from mapfilter.positioning.gaussian_radii import gaussian_radii_m, share_within
-from mapfilter.positioning.grid_model import StreetGrid
-from mapfilter.positioning.least_squares import BAD_GEOMETRY, TOO_FEW, StaticFix, static_fix
+from mapfilter.positioning.gnss.readings import FixEvidence, widened
+from mapfilter.positioning.kalman.position_filter import filter_fixes
+from mapfilter.positioning.kalman.replay import gaussian_radii_m, share_within
+from mapfilter.positioning.kalman.static_fix import BAD_GEOMETRY, TOO_FEW, StaticFix, static_fix
 from mapfilter.positioning.matched_way import matched_way
-from mapfilter.positioning.memory import Memory
-from mapfilter.positioning.position_filter import filter_fixes
 
 
 def fix_at(dx, dy, **variances):

@@ -8,7 +8,8 @@ from scipy.integrate import quad
 
 from mapfilter.errors import ConfigError
 from mapfilter.models.street_motion import STATES
-from mapfilter.positioning.receiver import (
+from mapfilter.positioning.gnss.options import SkyOptions, TimingOptions
+from mapfilter.positioning.gnss.receiver import (
     Sky,
     begun,
     carried,
@@ -18,7 +19,6 @@ from mapfilter.positioning.receiver import (
     near_clock,
     weighed,
 )
-from mapfilter.positioning.sky_options import SkyOptions, TimingOptions
 
 OPTIONS = SkyOptions(height_sd_m=0.0)
 PLACES = np.array([[0.0, 40.0, -200.0, 350.0], [0.0, 90.0, 30.0, -80.0]], dtype=np.float32)

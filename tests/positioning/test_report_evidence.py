@@ -8,9 +8,9 @@ import scalar_oracle as oracle
 from small_area import BANDS, COLS, LEVEL_DBM, OPTIONS, PIXEL_M, ROWS, SOUTH_M, WEST_M, make_area
 
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.positioning.bayes_model import BayesModel
+from mapfilter.positioning.bayes.evidence import EvidenceOptions, Memory, reading_of
+from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.epochs import Epoch, GnssFix, Heard
-from mapfilter.positioning.evidence import EvidenceOptions, Memory, reading_of
 
 AREA = make_area()
 A, B, C, D = BANDS.values()

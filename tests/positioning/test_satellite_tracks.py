@@ -10,9 +10,9 @@ from cross_world import CRS, EAST, LATTICE, NORTH, SOUTH, make_database, walk_lo
 from sky_world import HEIGHTS, START_UTC_S, no_rows, off_m, sky_log, sky_table
 
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.filters.particle_options import ParticleOptions
-from mapfilter.positioning.bayes_options import BayesOptions, open_area
-from mapfilter.positioning.bayes_replay import estimate_of, position_by_bayes
+from mapfilter.filters.particle import ParticleOptions
+from mapfilter.positioning.bayes.options import BayesOptions, open_area
+from mapfilter.positioning.bayes.replay import estimate_of, position_by_bayes
 from mapfilter.positioning.epochs import Epoch, GnssFix, Heard, epochs
 from mapfilter.simulation.satellites import Spoofer
 from mapfilter.tracks.log import make_log

@@ -9,10 +9,9 @@ from cross_world import CRS
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.filters.run import Event
+from mapfilter.filters.contract import Event, MotionStep, Reason
+from mapfilter.positioning.epochs import serving_events
 from mapfilter.positioning.estimate import UnusedReading
-from mapfilter.positioning.events import serving_events
 from mapfilter.tracks.log import make_log
 
 

@@ -9,13 +9,13 @@ import pytest
 from cross_world import CRS, LATTICE, make_database, walk_log
 
 from mapfilter.filters.contract import Reason
-from mapfilter.filters.particle_options import ParticleOptions
-from mapfilter.positioning import bayes
-from mapfilter.positioning.bayes_options import BayesOptions, open_area
-from mapfilter.positioning.bayes_replay import position_by_bayes
+from mapfilter.filters.particle import ParticleOptions
+from mapfilter.positioning.bayes import filter as bayes
+from mapfilter.positioning.bayes.options import BayesOptions, open_area
+from mapfilter.positioning.bayes.replay import position_by_bayes
+from mapfilter.positioning.bayes.timing import NEVER, is_timed, with_timing
 from mapfilter.positioning.epochs import Difference, Epoch, Heard
-from mapfilter.positioning.sky_options import TimingOptions
-from mapfilter.positioning.timing import NEVER, is_timed, with_timing
+from mapfilter.positioning.gnss.options import TimingOptions
 from mapfilter.tracks.log import make_log
 
 LTE = TimingOptions(step_m=78.1, advance_sd_m=30.0, advance_memory_m=50.0)

@@ -10,9 +10,9 @@ import pytest
 
 from mapfilter.errors import ConfigError
 from mapfilter.geodesy import Lattice
-from mapfilter.radio import predict as module
+from mapfilter.propagation import predict as module
+from mapfilter.propagation.predict import PredictionModel, RealityErrors, predict, realise
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.radio.predict import PredictionModel, RealityErrors, predict, realise
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 120, 120)

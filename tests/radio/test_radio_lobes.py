@@ -3,13 +3,18 @@
 import numpy as np
 import pytest
 
+from mapfilter.check.lobes import (
+    azimuth_mistakes,
+    best_labels,
+    falls_with_distance,
+    find_lobe,
+    peak_m,
+)
+from mapfilter.check.plausibility import RasterSample, above_free_space_db, nodata_taken_as_level
 from mapfilter.geodesy import Lattice, heading_from_azimuth_rad
+from mapfilter.propagation.predict import PredictionModel, RealityErrors, realise
 from mapfilter.radio.antenna import sector_gain_db
-from mapfilter.radio.azimuths import azimuth_mistakes
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.radio.lobes import best_labels, falls_with_distance, find_lobe, peak_m
-from mapfilter.radio.plausibility import RasterSample, above_free_space_db, nodata_taken_as_level
-from mapfilter.radio.predict import PredictionModel, RealityErrors, realise
 
 # On the central meridian, so that grid north is true north.
 LATTICE = Lattice("EPSG:32635", 499_000.0, 6_670_000.0, 20.0, 80, 100)

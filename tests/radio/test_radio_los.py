@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
-from mapfilter.radio.los import line_of_sight, mean_roof_height, own_building
+from mapfilter.propagation.line_of_sight import line_of_sight, mean_roof_height, own_building
 
 Heights = NDArray[np.float32]
 

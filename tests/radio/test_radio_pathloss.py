@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapfilter.radio.pathloss import outside_published_range
-from mapfilter.radio.pathloss_hata import cost231_hata_db
-from mapfilter.radio.pathloss_walfisch import (
+from mapfilter.propagation.empirical import (
+    cost231_hata_db,
     cost231_walfisch_ikegami_db,
     free_space_db,
     multi_screen_db,
     roof_to_street_db,
 )
+from mapfilter.propagation.models import outside_published_range
 
 
 def test_hata_term_by_term() -> None:

@@ -7,14 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapfilter.radio.pathloss_free import friis_db, log_distance_db
-from mapfilter.radio.pathloss_hata import (
+from mapfilter.propagation.empirical import (
     cost231_hata_db,
+    free_space_db,
+    friis_db,
     large_city_mobile_db,
+    log_distance_db,
     mobile_height_db,
     okumura_hata_db,
 )
-from mapfilter.radio.pathloss_walfisch import free_space_db
 
 
 def test_friis_at_one_wavelength_per_metre() -> None:

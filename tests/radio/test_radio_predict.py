@@ -9,10 +9,8 @@ from pyproj import Geod
 
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import Lattice, project, unproject
-from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.radio.pathloss_hata import cost231_hata_db
-from mapfilter.radio.pathloss_walfisch import cost231_walfisch_ikegami_db
-from mapfilter.radio.predict import (
+from mapfilter.propagation.empirical import cost231_hata_db, cost231_walfisch_ikegami_db
+from mapfilter.propagation.predict import (
     PredictionModel,
     RealityErrors,
     outside_validity,
@@ -20,6 +18,7 @@ from mapfilter.radio.predict import (
     predict_cell,
     realise,
 )
+from mapfilter.radio.cells import Cell, CellPlan
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 10.0, 120, 110)

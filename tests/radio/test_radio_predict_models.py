@@ -9,12 +9,9 @@ from numpy.typing import NDArray
 
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import Lattice
-from mapfilter.radio.antenna import MeasuredAntenna
-from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.radio.los import line_of_sight
-from mapfilter.radio.pathloss_free import friis_db, log_distance_db
-from mapfilter.radio.pathloss_hata import okumura_hata_db
-from mapfilter.radio.predict import (
+from mapfilter.propagation.empirical import friis_db, log_distance_db, okumura_hata_db
+from mapfilter.propagation.line_of_sight import line_of_sight
+from mapfilter.propagation.predict import (
     PredictionModel,
     RealityErrors,
     off_frequency,
@@ -22,7 +19,9 @@ from mapfilter.radio.predict import (
     predict_cell,
     realise,
 )
-from mapfilter.radio.tr38901 import hidden_loss_db, seen_loss_db, sight_probability
+from mapfilter.propagation.tr38901 import hidden_loss_db, seen_loss_db, sight_probability
+from mapfilter.radio.antenna import MeasuredAntenna
+from mapfilter.radio.cells import Cell, CellPlan
 
 # On the central meridian of the zone, where grid north is true north.
 CRS = "EPSG:32635"

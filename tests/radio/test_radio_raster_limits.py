@@ -6,11 +6,10 @@ from raster_files import write_ascii, write_bil
 
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice
-from mapfilter.radio._grid_header import GridHeader, grid_lattice
-from mapfilter.radio._raster_checks import check_plausible
-from mapfilter.radio._raster_files import without_nodata
-from mapfilter.radio.esri_ascii import open_ascii_grid
-from mapfilter.radio.rasters import open_rasters
+from mapfilter.rasters.esri_ascii import open_ascii_grid
+from mapfilter.rasters.files import check_plausible, without_nodata
+from mapfilter.rasters.grid_header import GridHeader, grid_lattice
+from mapfilter.rasters.rxlev_rasters import open_rasters
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 6, 8)

@@ -8,9 +8,9 @@ import pytest
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
-from mapfilter.radio import _resampling
-from mapfilter.radio._resampling import common_lattice, read_on
-from mapfilter.radio.rasters import RxLevRasters
+from mapfilter.rasters import resampling as _resampling
+from mapfilter.rasters.resampling import common_lattice, read_on
+from mapfilter.rasters.rxlev_rasters import RxLevRasters
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 6, 8)

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from mapfilter.geodesy import Lattice
+from mapfilter.propagation.predict import PredictionModel, RealityErrors, predict, realise
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.radio.predict import PredictionModel, RealityErrors, predict, realise
 
 LATTICE = Lattice("EPSG:32635", 385000.0, 6673000.0, 10.0, 80, 80)
 PLAN = CellPlan(

@@ -5,8 +5,8 @@ import pytest
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
+from mapfilter.propagation.shadowing import correlated_field, site_shadowing
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.radio.shadowing import correlated_field, site_shadowing
 
 LATTICE = Lattice("EPSG:32635", 0.0, 240.0, 5.0, 48, 40)
 DRAWS = 400

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapfilter.radio.tr38901 import (
+from mapfilter.propagation.tr38901 import (
     breakpoint_distance_m,
     hidden_loss_db,
     seen_loss_db,

@@ -5,14 +5,19 @@ import pytest
 
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import Lattice
-from mapfilter.radio._survey_points import Points, points_by_cell
-from mapfilter.radio._survey_residuals import GaussianField, Shadowing, learn_shadowing
-from mapfilter.radio._survey_trend import DistanceLoss, Prior, fit_trend
+from mapfilter.propagation.shadowing import correlated_field
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.radio.measurements import Measurements
-from mapfilter.radio.shadowing import correlated_field
-from mapfilter.radio.survey import SurveyOptions, fit_survey
-from mapfilter.radio.survey_validation import cross_validate
+from mapfilter.survey.fit import SurveyOptions, fit_survey
+from mapfilter.survey.measurements import Measurements
+from mapfilter.survey.residuals import (
+    GaussianField,
+    Points,
+    Shadowing,
+    learn_shadowing,
+    points_by_cell,
+)
+from mapfilter.survey.trend import DistanceLoss, Prior, fit_trend
+from mapfilter.survey.validation import cross_validate
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385_000.0, 6_673_000.0, 5.0, 160, 160)

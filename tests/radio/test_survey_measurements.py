@@ -7,11 +7,10 @@ import pytest
 from fuzz import fuzz
 
 from mapfilter.errors import InputError
-from mapfilter.radio._measurement_rows import unix_seconds
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.radio.measurements import named_after, read_measurements
-from mapfilter.radio.measurements_antennas import read_antennas_log
-from mapfilter.radio.measurements_csv import DIALECTS, read_csv
+from mapfilter.survey.measurement_rows import unix_seconds
+from mapfilter.survey.measurements import named_after, read_antennas_log, read_measurements
+from mapfilter.survey.measurements_csv import DIALECTS, read_csv
 
 OPENCELLID = """\
 mcc,mnc,lac,cellid,lat,lon,signal,measured_at,rating,speed,direction,act,ta,psc,tac,pci,sid,nid,bid

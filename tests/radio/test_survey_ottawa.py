@@ -6,13 +6,13 @@ import shapely
 
 from mapfilter.database.build import build
 from mapfilter.geodesy import Lattice
-from mapfilter.radio.measurements import read_measurements
-from mapfilter.radio.rasters import open_rasters
-from mapfilter.radio.survey import SurveyOptions, fit_survey
-from mapfilter.radio.survey_rasters import surveyed_plan, write_survey
-from mapfilter.radio.survey_validation import cross_validate
+from mapfilter.rasters.rxlev_rasters import open_rasters
 from mapfilter.roads.routable import route_lattice
 from mapfilter.roads.ways import Ways
+from mapfilter.survey.fit import SurveyOptions, fit_survey
+from mapfilter.survey.measurements import read_measurements
+from mapfilter.survey.rasters import surveyed_plan, write_survey
+from mapfilter.survey.validation import cross_validate
 
 
 @pytest.fixture(scope="module")

@@ -10,12 +10,11 @@ from matplotlib.image import imread
 from mapfilter.errors import InputError
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, TrackEstimate, TrackEvidence
-from mapfilter.positioning.snapshot import Snapshot
+from mapfilter.positioning.estimate import Fix, Snapshot, TrackEstimate, TrackEvidence
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.belief import plot_belief
 from mapfilter.report.canvas import BLUE
-from mapfilter.report.error_curve import plot_error_over_distance
+from mapfilter.report.errors import plot_error_over_distance
 from mapfilter.report.evidence import plot_evidence
 from mapfilter.workflows.pictures import choose_snapshots
 

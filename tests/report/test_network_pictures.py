@@ -11,12 +11,12 @@ from mapfilter.database.build import build
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.radio.rasters import open_rasters, write_rasters
+from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
 from mapfilter.report.basemap import BaseMap, draw_base
 from mapfilter.report.canvas import BLUE, ORANGE
 from mapfilter.report.landuse import plot_landuse
 from mapfilter.report.layers import largest
-from mapfilter.report.margin import plot_margin
+from mapfilter.report.network import plot_margin
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.routable import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings

@@ -6,10 +6,9 @@ from matplotlib.axes import Axes
 
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.estimate import Fix, TrackEstimate
-from mapfilter.positioning.snapshot import Snapshot
+from mapfilter.positioning.estimate import Fix, Snapshot, TrackEstimate
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.candidates import plot_candidates
+from mapfilter.report.belief import plot_candidates
 from mapfilter.report.track import plot_track
 
 CRS = "EPSG:32635"

@@ -14,14 +14,13 @@ from mapfilter.errors import InputError, OutputError
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import Lattice, grid_convergence_rad, unproject
-from mapfilter.positioning.estimate import Fix, TrackEstimate
-from mapfilter.positioning.snapshot import Snapshot
+from mapfilter.positioning.estimate import Fix, Snapshot, TrackEstimate
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.report.basemap import BaseMap, draw_base
-from mapfilter.report.candidates import plot_candidates
+from mapfilter.report.belief import plot_candidates
 from mapfilter.report.canvas import BLUE, DPI, ORANGE, VERMILLION
 from mapfilter.report.coverage import plot_best_server, plot_level, plot_points_per_cell
-from mapfilter.report.error_curve import plot_error_over_distance
+from mapfilter.report.errors import plot_error_over_distance
 from mapfilter.report.network import draw_cells
 from mapfilter.report.track import plot_track
 

@@ -5,10 +5,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mapfilter.evaluation.success_cells import SuccessCell
-from mapfilter.report.run_distributions import plot_run_distributions
-from mapfilter.report.success_curves import Claim, plot_success_curves
-from mapfilter.report.success_map import plot_success_map
+from mapfilter.evaluation.success import SuccessCell
+from mapfilter.report.success import (
+    Claim,
+    plot_run_distributions,
+    plot_success_curves,
+    plot_success_map,
+)
 
 CLAIMS = (Claim(3.0, 0.8), Claim(6.0, 0.65))
 

@@ -5,13 +5,13 @@ import pytest
 
 from mapfilter.errors import InputError, OutputError
 from mapfilter.geodesy import Lattice
-from mapfilter.radio.measurements import Measurements
-from mapfilter.radio.rasters import open_rasters, write_rasters
-from mapfilter.radio.survey import SurveyOptions, fit_survey
-from mapfilter.radio.survey_rasters import write_survey
-from mapfilter.radio.survey_validation import LeftOut, cross_validate, leave_out
+from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
+from mapfilter.survey.fit import SurveyOptions, fit_survey
+from mapfilter.survey.measurements import Measurements
+from mapfilter.survey.rasters import write_survey
+from mapfilter.survey.validation import LeftOut, cross_validate, leave_out
 from mapfilter.workflows import served, survey_pictures
 from mapfilter.workflows.survey_pictures import SurveyEvidence, draw_survey
 

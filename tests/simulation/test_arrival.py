@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.simulation.arrival import ArrivalModel, arrival_errors_m, detour_m
+from mapfilter.simulation.lte_network import ArrivalModel, arrival_errors_m, detour_m
 
 C = 299_792_458.0
 

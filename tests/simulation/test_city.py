@@ -8,7 +8,7 @@ from mapfilter.errors import ConfigError
 from mapfilter.geodesy import Lattice
 from mapfilter.roads.network import street_network
 from mapfilter.roads.routable import route_lattice
-from mapfilter.simulation.city import manhattan, synthetic_city
+from mapfilter.simulation.synthetic_city import manhattan, synthetic_city
 
 
 def lattice(size_m, north_m=0.0):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.radio.tr38901 import hidden_loss_db, seen_loss_db
+from mapfilter.propagation.tr38901 import hidden_loss_db, seen_loss_db
 from mapfilter.simulation.lte_network import (
     LteRadio,
     hexagonal_sites,

@@ -7,7 +7,7 @@ import shapely
 
 from mapfilter.errors import ConfigError
 from mapfilter.geodesy import unproject
-from mapfilter.gnss.constellations import nominal_gps
+from mapfilter.gnss.almanac import nominal_gps
 from mapfilter.gnss.orbits import gps_time
 from mapfilter.gnss.sky import ecef_from_lonlat
 from mapfilter.gnss.visibility import Skyline

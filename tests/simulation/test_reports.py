@@ -9,10 +9,16 @@ from hypothesis.extra.numpy import arrays
 
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import Lattice
-from mapfilter.radio.rasters import open_rasters, write_rasters
 from mapfilter.radio.rxlev import resolve_neighbours
-from mapfilter.simulation.handover import running_mean_db, serving_cells
-from mapfilter.simulation.reports import ReportModel, array_sampler, level_sampler, reports
+from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.simulation.reports import (
+    ReportModel,
+    array_sampler,
+    level_sampler,
+    reports,
+    running_mean_db,
+    serving_cells,
+)
 from mapfilter.tracks.log import make_log
 
 CRS = "EPSG:32629"

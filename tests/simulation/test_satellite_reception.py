@@ -7,7 +7,7 @@ import shapely
 
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import unproject
-from mapfilter.gnss.constellations import nominal_gps
+from mapfilter.gnss.almanac import nominal_gps
 from mapfilter.gnss.grid_frame import GridFrame
 from mapfilter.gnss.orbits import gps_time, satellite_positions_m
 from mapfilter.gnss.sky import directions, ecef_from_lonlat

@@ -7,8 +7,7 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.gnss.almanac import Almanac
-from mapfilter.gnss.constellations import nominal_gps
+from mapfilter.gnss.almanac import Almanac, nominal_gps
 from mapfilter.gnss.orbits import EARTH_RATE_RAD_S, gps_time, satellite_positions_m
 from mapfilter.tracks.leave_out import leave_out
 from mapfilter.tracks.log import make_log

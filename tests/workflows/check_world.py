@@ -9,8 +9,8 @@ import rasterio
 from rasterio.transform import Affine
 
 from mapfilter.geodesy import Lattice, unproject
+from mapfilter.propagation.predict import PredictionModel, predict
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.radio.predict import PredictionModel, predict
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385_000.0, 6_673_600.0, 10.0, 150, 190)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mapfilter.database.store import open_database
-from mapfilter.positioning.bayes_options import BayesOptions, open_area
+from mapfilter.positioning.bayes.options import BayesOptions, open_area
 from mapfilter.tracks.store import read_log
 from mapfilter.workflows import bench_filter
 from mapfilter.workflows.bench_filter_peers import MAP, numpy_step, particles_step, stone_soup_step

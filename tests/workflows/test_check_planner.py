@@ -6,7 +6,7 @@ import pytest
 from check_world import base_levels, make_world, shifted
 from command_line import assert_done, assert_refused, mapfilter, settings
 
-from mapfilter.workflows.findings import Findings, paragraphs
+from mapfilter.check.findings import Findings, paragraphs
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from command_line import assert_done, assert_refused, contents, mapfilter, setti
 
 KILLED_WHILE_WRITING = """
 import os, signal, sys
-import mapfilter.database.assemble as assemble
+import mapfilter.database.parts as assemble
 def killed(plan, path):
     path.write_bytes(b"PAR1 half of")
     print(*sorted(p.name for p in path.parent.iterdir()), flush=True)
@@ -275,7 +275,7 @@ def test_interrupting_a_build_leaves_everything_as_it_was(own_world, monkeypatch
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("mapfilter.database.assemble.write_cells", interrupted)
+    monkeypatch.setattr("mapfilter.database.parts.write_cells", interrupted)
     before = contents(own_world.folder)
     outcome = mapfilter("build", "-c", own_world.toml)
     assert (outcome.code, outcome.out) == (130, "")

@@ -7,8 +7,8 @@ import pytest
 import rasterio
 from command_line import assert_done, assert_refused, mapfilter, settings
 
-from mapfilter.radio import _models
-from mapfilter.workflows.sections import Prediction
+from mapfilter.config.sections import Prediction
+from mapfilter.propagation import models as _models
 
 BOX = "[area]\nbbox = [24.9445, 60.1672, 24.9470, 60.1684]\n"
 MODELS = {

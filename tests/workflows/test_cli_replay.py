@@ -8,12 +8,12 @@ import pandas as pd
 import pytest
 from command_line import ONE, assert_done, change, contents, mapfilter, put
 
+from mapfilter.config.load import load_config
 from mapfilter.filters.contract import Reason
 from mapfilter.geodesy import unproject
+from mapfilter.positioning.candidate import position_by_candidates
 from mapfilter.positioning.estimate_store import read_estimate
-from mapfilter.positioning.global_positioning import position_by_candidates
 from mapfilter.tracks.store import read_log, write_log
-from mapfilter.workflows.config import load_config
 from mapfilter.workflows.replay import run_replay
 
 

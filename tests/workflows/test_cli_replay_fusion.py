@@ -12,9 +12,8 @@ from mapfilter.errors import ConfigError, InputError
 from mapfilter.filters.gaussian import EKF, METHODS
 from mapfilter.models.state import POSITION
 from mapfilter.positioning.estimate_store import read_estimate
-from mapfilter.positioning.fusion_models import FusionOptions, SiteModels
-from mapfilter.positioning.fusion_replay import position_by_fusion
-from mapfilter.positioning.gaussian_radii import gaussian_radii_m
+from mapfilter.positioning.kalman.models import FusionOptions, SiteModels
+from mapfilter.positioning.kalman.replay import gaussian_radii_m, position_by_fusion
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.store import write_log

@@ -8,7 +8,7 @@ from command_line import assert_refused, mapfilter
 from typer.testing import CliRunner
 
 from mapfilter.cli import app
-from mapfilter.experiments.papers import dlr
+from mapfilter.experiments.papers.dlr import experiment as dlr
 from mapfilter.workflows import reproduce_dlr
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from typer.testing import CliRunner
 
 from mapfilter.cli import app
-from mapfilter.experiments.papers import tesa
+from mapfilter.experiments.papers.tesa import experiment as tesa
 
 
 def test_tesa(tmp_path, monkeypatch):

@@ -7,14 +7,13 @@ from command_line import assert_done, assert_refused, mapfilter, settings
 from killed_worker import KillsOneWorker
 
 from mapfilter._parallel import SerialExecutor, cluster_executor, local_executor
+from mapfilter.config.load import load_config
 from mapfilter.errors import ConfigError, MapfilterError
 from mapfilter.experiments.sweep.run import sweep
 from mapfilter.experiments.sweep.table import read_runs
-from mapfilter.workflows.config import load_config
 from mapfilter.workflows.simulate import run_simulate
 from mapfilter.workflows.sweep import load_sweep, run_sweep
-from mapfilter.workflows.sweep_plan import sweep_plan
-from mapfilter.workflows.sweep_world import sweep_world
+from mapfilter.workflows.sweep_plan import sweep_plan, sweep_world
 
 GRID = settings(
     sweep__sigma_orient_deg="0,6",

@@ -6,17 +6,17 @@ from dataclasses import replace
 import pytest
 from pydantic import ValidationError
 
+from mapfilter.config.sections import Config, Journeys
 from mapfilter.errors import ConfigError
-from mapfilter.filters.candidate_options import CandidateOptions
+from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.positioning.locators import FilterChoice
-from mapfilter.radio.predict import PredictionModel, RealityErrors
+from mapfilter.propagation.predict import PredictionModel, RealityErrors
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.simulation.layout import lay_out_plan
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.simulate import SimulationSettings
 from mapfilter.workflows import predict, simulate
 from mapfilter.workflows.filters import filter_choice
-from mapfilter.workflows.sections import Config, Journeys
 
 CONFIG = Config()
 

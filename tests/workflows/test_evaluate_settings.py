@@ -21,6 +21,7 @@ from benchmark_settings import (
 from pydantic import BaseModel
 
 from mapfilter._io import sha256_file
+from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.global_positioning import informed
@@ -29,7 +30,6 @@ from mapfilter.simulation.imu import ImuErrors
 from mapfilter.workflows.evaluate import _world as prepare_world
 from mapfilter.workflows.evaluate_settings import _refused, load_benchmark
 from mapfilter.workflows.filters import filter_choice
-from mapfilter.workflows.sections import Config
 from mapfilter.workflows.world import World
 
 SMALL = {

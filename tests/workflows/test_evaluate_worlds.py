@@ -10,9 +10,10 @@ import pytest
 from command_line import assert_refused, mapfilter
 from pydantic import BaseModel
 
+from mapfilter.config.sections import Config
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError
-from mapfilter.radio.predict import PredictionModel, RealityErrors
+from mapfilter.propagation.predict import PredictionModel, RealityErrors
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
@@ -20,7 +21,6 @@ from mapfilter.workflows.evaluate import _world as prepare_world
 from mapfilter.workflows.evaluate_settings import WORLDS, load_benchmark
 from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.predict import ground_truth_errors, prediction_model
-from mapfilter.workflows.sections import Config
 from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.world import World
 

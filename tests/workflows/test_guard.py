@@ -5,8 +5,8 @@ import errno
 import pytest
 
 from mapfilter.errors import InputError, fail
-from mapfilter.workflows.guard import guarded
 from mapfilter.workflows.pipeline import run_pipeline
+from mapfilter.workflows.terminal import guarded
 
 RAISED = [
     (fail(InputError, "cells.csv", "a plan", "none"), "cells.csv: expected a plan, found none"),

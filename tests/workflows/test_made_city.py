@@ -3,8 +3,8 @@
 import pytest
 from command_line import assert_done, assert_refused, mapfilter
 
+from mapfilter.config.load import load_config
 from mapfilter.database.store import open_database
-from mapfilter.workflows.config import load_config
 from mapfilter.workflows.world import World
 
 SMALL = ["area.size_m=600,600", "cells.sites=1", "cells.indoor=1", "area.seed=2"]

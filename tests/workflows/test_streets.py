@@ -8,9 +8,9 @@ import pytest
 import shapely
 from command_line import assert_done, assert_refused, mapfilter
 
+from mapfilter.config.load import load_config
 from mapfilter.database.store import open_database
 from mapfilter.geodesy import unproject
-from mapfilter.workflows.config import load_config
 from mapfilter.workflows.world import World
 
 CRS = "EPSG:32635"

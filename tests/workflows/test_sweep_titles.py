@@ -3,8 +3,8 @@
 import pandas as pd
 import pytest
 
-from mapfilter.evaluation.success_cells import COORDINATES
-from mapfilter.workflows.sweep_pictures import groups_of
+from mapfilter.evaluation.success import COORDINATES
+from mapfilter.workflows.sweep import groups_of
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,8 @@
 """Results as people read them: a short table in place of a line for each cell of a grid."""
 
-from mapfilter.evaluation.success_cells import SuccessCell
+from mapfilter.evaluation.success import SuccessCell
 from mapfilter.workflows.facts import text_lines
-from mapfilter.workflows.sweep_brief import brief
+from mapfilter.workflows.sweep import brief
 
 
 def cell(**place):

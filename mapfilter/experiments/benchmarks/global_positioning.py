@@ -26,9 +26,9 @@ from mapfilter.experiments.benchmarks.scores import (
     summarise,
 )
 from mapfilter.experiments.benchmarks.world import BenchmarkWorld
-from mapfilter.positioning.bayes_options import BayesOptions
+from mapfilter.positioning.bayes.options import BayesOptions
 from mapfilter.positioning.locators import FilterChoice
-from mapfilter.radio.shadowing import named_rng
+from mapfilter.propagation.shadowing import named_rng
 from mapfilter.simulation.reports import Levels
 
 ROUTES_PER_BATCH = 2

@@ -10,7 +10,7 @@ import pandas as pd
 
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.sweep.world import SweepWorld
-from mapfilter.radio.shadowing import named_rng
+from mapfilter.propagation.shadowing import named_rng
 from mapfilter.simulation.imu import noisy_motion
 from mapfilter.simulation.journeys import JourneyPlan, journey
 from mapfilter.simulation.reports import Levels, reports

@@ -25,20 +25,20 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
     site_of,
 )
 from mapfilter.filters.contract import Status
-from mapfilter.filters.particle_options import ParticleOptions
+from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.cell_id import ServingWeights
 from mapfilter.models.fingerprint import LevelErrors
-from mapfilter.models.heard_maps import HeardMaps, HeardOptions, HeardRows
+from mapfilter.models.measured_map import HeardMaps, HeardOptions, HeardRows
 from mapfilter.models.street_motion import MapWeights, MotionErrors
-from mapfilter.positioning.area_map import AreaMap
-from mapfilter.positioning.bayes import BayesPositioner
-from mapfilter.positioning.bayes_options import BayesOptions, open_area
-from mapfilter.positioning.bayes_replay import position_by_bayes
+from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.evidence import EvidenceOptions
+from mapfilter.positioning.bayes.filter import BayesPositioner
+from mapfilter.positioning.bayes.model import HeardModel
+from mapfilter.positioning.bayes.options import BayesOptions, open_area
+from mapfilter.positioning.bayes.replay import position_by_bayes
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.positioning.evidence import EvidenceOptions
-from mapfilter.positioning.heard_model import HeardModel
-from mapfilter.radio.rasters import RxLevRasters
-from mapfilter.radio.shadowing import named_rng
+from mapfilter.propagation.shadowing import named_rng
+from mapfilter.rasters.rxlev_rasters import RxLevRasters
 from mapfilter.tracks.log import TrackLog
 
 PARTS = ("lacolyoc", "uottawa", "carling")

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from math import isfinite, nan
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from mapfilter._io import read_json, write_json
 from mapfilter._types import Bools, Floats
+from mapfilter.errors import StoreError, fail
 from mapfilter.evaluation.success import wilson_interval, wilson_interval_of_routes
 from mapfilter.experiments.benchmarks.ottawa import METHODS, FoundSession
 
@@ -196,3 +201,67 @@ def _median(values: Sequence[float] | Floats) -> float:
 def _share(covered: Sequence[Bools]) -> float:
     every = np.concatenate([np.empty(0, dtype=np.bool_), *covered])
     return float(np.mean(every)) if every.size else float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """One session, found several times.
+
+    Parameters
+    ----------
+    session : str
+    centroid_m : ndarray
+        Errors of the centroids of its serving cells.
+    found : tuple of FoundSession
+    """
+
+    session: str
+    centroid_m: Floats
+    found: tuple[FoundSession, ...]
+
+
+def write_left_out(left_out: LeftOut, file: Path) -> None:
+    """Write what came of a session.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    rows = [
+        {one.name: _plain(getattr(found, one.name)) for one in fields(FoundSession)}
+        for found in left_out.found
+    ]
+    centroid_m = left_out.centroid_m.tolist()
+    write_json(file, {"session": left_out.session, "centroid_m": centroid_m, "found": rows})
+
+
+def read_left_out(file: Path) -> LeftOut:
+    """Read what came of a session.
+
+    Raises
+    ------
+    StoreError
+        The file is missing or damaged.
+    """
+    told = read_json(file)
+    try:
+        found = tuple(
+            FoundSession(**{name: _read(name, value) for name, value in row.items()})
+            for row in told["found"]
+        )
+        return LeftOut(told["session"], np.array(told["centroid_m"], dtype=np.float64), found)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise fail(StoreError, str(file), "what came of a session", error, "cut off") from error
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return None if isinstance(value, float) and not isfinite(value) else value
+
+
+def _read(name: str, value: Any) -> Any:
+    if isinstance(value, list):
+        return np.array(value, dtype=np.bool_ if name == "covered" else np.float64)
+    return nan if value is None else value

@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import shapely
+from shapely import STRtree
 
 from mapfilter._io import atomic_file, sha256_file
 from mapfilter.database.store import open_database
@@ -19,9 +20,10 @@ from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.sweep.world import SweepWorld, open_world
 from mapfilter.gnss.visibility import Skyline
 from mapfilter.positioning.locators import FilterChoice, Locator, open_locator
+from mapfilter.propagation.predict import PredictionModel, RealityErrors, realise
 from mapfilter.radio.antenna import MeasuredAntenna
-from mapfilter.radio.predict import PredictionModel, RealityErrors, realise
-from mapfilter.roads.ways import Buildings
+from mapfilter.roads.lattice import RouteLattice
+from mapfilter.roads.ways import Buildings, Ways
 from mapfilter.simulation.reports import Levels, array_sampler
 from mapfilter.simulation.satellites import ReceptionModel
 from mapfilter.simulation.simulate import SimulationSettings
@@ -131,3 +133,48 @@ def _streets(folder: Path, sha256: str) -> SweepWorld:  # noqa: ARG001
 @lru_cache(maxsize=32)
 def _locator(database: Path, choice: FilterChoice, sha256: str) -> Locator:  # noqa: ARG001
     return open_locator(open_database(database), choice, ways=False)
+
+
+def without_ways(
+    routes: RouteLattice, ways: Ways, share: float, half_width_m: float, rng: np.random.Generator
+) -> RouteLattice:
+    """Return the points that are left when a share of the ways is not known.
+
+    A point of a way that is missing stays where it lies in a square or within the half width of
+    another way, of which it then is.
+
+    Parameters
+    ----------
+    routes : RouteLattice
+    ways : Ways
+        In the lattice's CRS.
+    share : float
+        Each way is missing with this probability; parts of one way go together.
+    half_width_m : float
+    rng : numpy.random.Generator
+    """
+    ids = np.unique(ways.way_id)
+    gone = ids[rng.random(ids.size) < share]
+    kept_way = ~np.isin(ways.way_id, gone)
+    kept = ~np.isin(routes.way_id, gone) | routes.on_square
+    way_id, distance_m = routes.way_id.copy(), routes.distance_to_way_m.copy()
+    lost = np.flatnonzero(np.isin(routes.way_id, gone))
+    if lost.size and kept_way.any():
+        places = shapely.points(*routes.lattice.east_north(routes.row[lost], routes.col[lost]))
+        (which, nearest), away_m = STRtree(ways.geometry[kept_way]).query_nearest(
+            places, return_distance=True, all_matches=False
+        )
+        near = away_m <= half_width_m
+        kept[lost[which]] |= near
+        distance_m[lost[which]] = away_m
+        way_id[lost[which]] = np.where(near, ways.way_id[kept_way][nearest], 0)
+    return RouteLattice(
+        routes.lattice,
+        routes.row[kept],
+        routes.col[kept],
+        way_id[kept],
+        routes.way_class[kept],
+        routes.class_names,
+        distance_m[kept],
+        routes.on_square[kept],
+    )

@@ -19,9 +19,8 @@ from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, OutputError, StoreError, fail
 from mapfilter.evaluation.accuracy import accuracy
 from mapfilter.experiments.sweep import table
-from mapfilter.experiments.sweep.journeys import heard, sensed, true_path, truth_of
+from mapfilter.experiments.sweep.journeys import filter_rng, heard, sensed, true_path, truth_of
 from mapfilter.experiments.sweep.plan import Radio, Run, SweepPlan
-from mapfilter.experiments.sweep.seeds import filter_rng
 from mapfilter.experiments.sweep.world import SweepWorld, open_world, write_world
 from mapfilter.positioning.locators import FilterChoice, Locator, open_locator
 from mapfilter.tracks.log import TrackLog

@@ -1,0 +1,1 @@
+"""Checks of inputs against each other: plausibility of levels, azimuths, positions."""

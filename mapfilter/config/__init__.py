@@ -1,0 +1,1 @@
+"""The configuration: sections, their fields, and reading them from TOML and ``--set``."""

@@ -1,0 +1,133 @@
+"""Best server and margin of a database as a cloud-optimised GeoTIFF."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+
+import geopandas as gpd
+import numpy as np
+import pandas as pd
+import pyogrio
+import rasterio
+from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, GeometryError
+from rasterio._err import CPLE_BaseError
+from rasterio.errors import RasterioError
+from rasterio.shutil import copy as copy_raster
+from rasterio.windows import Window as RasterWindow
+
+from mapfilter._io import atomic_file
+from mapfilter.database.columns import read_columns
+from mapfilter.database.manifest import POINTS, apart
+from mapfilter.database.radioroutes import Points, RadioRouteDatabase
+from mapfilter.database.tiles import tile_windows
+from mapfilter.database.windows import WindowReader
+from mapfilter.errors import OutputError, fail
+
+BANDS = (("best_server", ""), ("best_level_dbm", "dBm"), ("margin_db", "dB"))
+CELLS_TAG = "CELLS"
+
+_BLOCK_PX = 512
+
+
+def write_cog(database: RadioRouteDatabase, path: Path) -> None:
+    """Write a database; see :func:`mapfilter.database.store.export_cog`."""
+    if path.suffix.lower() not in (".tif", ".tiff"):
+        raise fail(OutputError, str(path), "a name that ends in .tif", path.suffix or "no suffix")
+    lattice = database.lattice
+    profile = {
+        "driver": "GTiff", "width": lattice.cols, "height": lattice.rows, "count": len(BANDS),
+        "dtype": "float32", "nodata": np.nan, "crs": lattice.crs, "interleave": "band",
+        "transform": rasterio.Affine.from_gdal(*lattice.gdal_transform), "sparse_ok": True,
+        "tiled": True, "blockxsize": _BLOCK_PX, "blockysize": _BLOCK_PX, "bigtiff": "if_safer",
+    }  # fmt: skip
+    columns = ("row", "col", *(name for name, _ in BANDS))
+    reader = WindowReader([database.path / POINTS], columns, lattice)
+    rank = {cell_id: number for number, cell_id in enumerate(database.cell_ids)}
+    with atomic_file(path) as temporary:
+        bands = temporary.with_name("bands.tif")
+        try:
+            with rasterio.open(bands, "w", **profile) as target:
+                tags = {CELLS_TAG: json.dumps(database.cell_ids, ensure_ascii=False)}
+                if database.attribution:
+                    tags["TIFFTAG_COPYRIGHT"] = database.attribution
+                target.update_tags(**tags)
+                for band, (name, unit) in enumerate(BANDS, start=1):
+                    target.set_band_description(band, name)
+                    target.set_band_unit(band, unit)
+                for window in tile_windows(lattice, _BLOCK_PX):
+                    found = reader.read(window)
+                    if not found or not len(found["row"]):
+                        continue
+                    row, col, rows, cols = window
+                    values = np.full((len(BANDS), rows, cols), np.nan, dtype=np.float32)
+                    at = np.asarray(found["row"]) - row, np.asarray(found["col"]) - col
+                    server = found["best_server"].to_pylist()
+                    values[0][at] = [rank[cell_id] for cell_id in server]
+                    values[1][at], values[2][at] = found["best_level_dbm"], found["margin_db"]
+                    target.write(values, window=RasterWindow(col, row, cols, rows))
+            # Overviews of numbers of cells must not average them.
+            copy_raster(
+                bands, temporary, driver="COG", compress="DEFLATE", predictor="YES",
+                blocksize=_BLOCK_PX, overview_resampling="nearest", bigtiff="if_safer",
+            )  # fmt: skip
+        except (RasterioError, CPLE_BaseError) as error:
+            raise fail(OutputError, str(path), "a place that can be written", error) from error
+
+
+# GeoPackages hold the time of writing; a fixed one gives equal bytes for equal databases.
+_WRITE_ERRORS = (DataSourceError, DataLayerError, FeatureError, GeometryError)
+_WRITTEN = "2000-01-01T00:00:00.000Z"
+
+
+def write_geopackage(database: RadioRouteDatabase, path: Path, cells: Sequence[str]) -> None:
+    """Write a database; see :func:`mapfilter.database.store.export_geopackage`."""
+    if path.suffix.lower() != ".gpkg":
+        raise fail(OutputError, str(path), "a name that ends in .gpkg", path.suffix or "no suffix")
+    crs = database.lattice.crs
+    layers = {"points": _points(database), "cells": _cells(database)}
+    # Layers of a GeoPackage are tables, whose names SQLite does not tell apart by case.
+    names = apart({cell_id: f"cell {cell_id}" for cell_id in cells})
+    for cell_id, name in names.items():
+        row, col, level_dbm = database.cell_points(cell_id)
+        east, north = database.lattice.east_north(row, col)
+        columns = {"row": row, "col": col, "level_dbm": level_dbm}
+        place = gpd.points_from_xy(east, north)
+        layers[name] = gpd.GeoDataFrame(columns, geometry=place, crs=crs)
+    with atomic_file(path) as temporary, _fixed_date():
+        try:
+            for name, layer in layers.items():
+                pyogrio.write_dataframe(layer, temporary, layer=name, driver="GPKG")
+        except _WRITE_ERRORS as error:
+            raise fail(OutputError, str(path), "a place that can be written", error) from error
+
+
+def _points(database: RadioRouteDatabase) -> gpd.GeoDataFrame:
+    columns = [*Points.__dataclass_fields__, "geometry"]
+    table = read_columns(database.path / POINTS, columns).to_pandas()
+    for name in ("way_class", "best_server"):
+        table[name] = table[name].astype(str)
+    place = gpd.GeoSeries.from_wkb(table["geometry"])
+    frame = gpd.GeoDataFrame(table, geometry=place, crs=database.lattice.crs)
+    return frame.sort_values("point", ignore_index=True)
+
+
+def _cells(database: RadioRouteDatabase) -> gpd.GeoDataFrame:
+    table = pd.DataFrame([asdict(cell) for cell in database.plan.cells])
+    # A column without any value has no type that a GeoPackage knows.
+    table = table.dropna(axis="columns", how="all")
+    place = gpd.points_from_xy(table["east_m"], table["north_m"])
+    return gpd.GeoDataFrame(table, geometry=place, crs=database.lattice.crs)
+
+
+@contextmanager
+def _fixed_date() -> Iterator[None]:
+    before = pyogrio.get_gdal_config_option("OGR_CURRENT_DATE")
+    pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": _WRITTEN})
+    try:
+        yield
+    finally:
+        pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": before})

@@ -1,0 +1,218 @@
+"""The scene of DLR's hybrid positioning: a street canyon, satellites, and LTE base stations.
+
+The paper's ray-traced city is not published. Here houses block satellites and stations by geometry
+alone, and echoes and detours are drawn; :mod:`.dlr_assumptions` lists all that is chosen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from mapfilter._types import Bools, Floats
+from mapfilter.geodesy import Lattice
+from mapfilter.gnss.almanac import joined, nominal_galileo, nominal_gps
+from mapfilter.gnss.noise import elevation_sigma_m, multipath_bias_m
+from mapfilter.gnss.orbits import satellite_positions_m
+from mapfilter.gnss.sky import LocalFrame, directions
+from mapfilter.gnss.visibility import Skyline
+from mapfilter.simulation.drives import clock_walk_m
+from mapfilter.simulation.lte_network import (
+    ArrivalModel,
+    LteRadio,
+    arrival_errors_m,
+    detour_m,
+    hexagonal_sites,
+    sector_levels_dbm,
+    site_sinr_db,
+    sites_along,
+    turned,
+)
+from mapfilter.simulation.pedestrians import GasGround, gas_walk
+from mapfilter.simulation.synthetic_city import manhattan
+
+Where = Literal["edge", "near"]
+
+EDGE: Where = "edge"
+NEAR: Where = "near"
+
+STEPS = 290
+CENTRE_LON_LAT_DEG = (11.58, 48.14)
+BLOCK_M, STREET_M, ROOF_M = 80.0, (22.0, 25.0), 26.0
+WALKED_M = (170.0, 165.0)
+"""Half of the part where pedestrians walk, east and north; one more block stands around it."""
+CELL_M, AREA_CELLS = 2.5, (212, 220)
+HEIGHT_M = 1.5
+SPEED_MPS = (0.8, 1.6)
+DAY_S = 86_164.0
+MASK_DEG = 5.0
+
+ZENITH_SIGMA_M = 1.2
+ECHO_M = 3.0
+CLOCK_M, CLOCK_FIRST_M = 2.0, 1000.0
+
+SPACING_M, RINGS = 1500.0, 2
+TURN_DEG = 17.0
+NEAR_M = 200.0
+BORESIGHTS_DEG = (30.0, 150.0, 270.0)
+SHADOW_DB, SHADOW_M = 6.0, 50.0
+DETOUR_M, ALONG_M = 15.0, 5.0
+SHARED = 0.5
+"""Correlation of shadowing, and of detours, between any two sites."""
+RADIO = LteRadio()
+ARRIVAL = ArrivalModel()
+
+THRESHOLD_DB = -17.0
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What all tracks share.
+
+    Parameters
+    ----------
+    houses : (B,) array of shapely.Polygon
+    skyline : Skyline
+    ground : GasGround
+        Where pedestrians walk.
+    stations_m : dict
+        By where the canyon lies in the network, (S, 3) in its own frame.
+    """
+
+    houses: NDArray[np.object_]
+    skyline: Skyline
+    ground: GasGround
+    stations_m: dict[Where, Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """A walk, the sky over it, and how base stations are heard on the way.
+
+    Parameters
+    ----------
+    place_m : (K, 3) array
+    travelled_m : (K,) array
+    satellites_m : (S, 3) array
+        Above the mask; they stay where they are during a track.
+    gps : (S,) array of bool
+        The others are Galileo's.
+    sigma_m : (S,) array
+        Deviation of the pseudoranges in the open.
+    seen : (K, S) array of bool
+        Not behind a house.
+    stations_seen, sinr_db : dict
+        By where the canyon lies, (K, B): line of sight, and SINR of the best sector.
+    """
+
+    place_m: Floats
+    travelled_m: Floats
+    satellites_m: Floats
+    gps: Bools
+    sigma_m: Floats
+    seen: Bools
+    stations_seen: dict[Where, Bools]
+    sinr_db: dict[Where, Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """One draw of all measurements of a track.
+
+    Parameters
+    ----------
+    ranges_m : (K, S) array
+        Pseudoranges in the canyon; NaN behind houses.
+    open_m : (K, S) array
+        The same without houses and echoes.
+    times_m : dict
+        By where the canyon lies, times of arrival as distances, (K, B).
+    """
+
+    ranges_m: Floats
+    open_m: Floats
+    times_m: dict[Where, Floats]
+
+
+def dlr_scene() -> Scene:
+    """Return canyon and network."""
+    rows, cols = AREA_CELLS
+    west, north = -cols * CELL_M / 2, rows * CELL_M / 2
+    lattice = Lattice("EPSG:32632", west, north, CELL_M, rows, cols)
+    city = manhattan(lattice, block_m=BLOCK_M, street_m=STREET_M, height_m=ROOF_M)
+    houses = city.buildings.footprints
+    row, col = np.mgrid[:rows, :cols]
+    e, n = lattice.east_north(row, col)
+    free = ~shapely.contains_xy(shapely.union_all(houses), e, n)
+    free &= (np.abs(e) < WALKED_M[0]) & (np.abs(n) < WALKED_M[1])
+    grid = hexagonal_sites(SPACING_M, RINGS)
+    corner = SPACING_M / np.sqrt(3) * np.array([np.cos(np.pi / 6), np.sin(np.pi / 6)])
+    beside = NEAR_M * np.array([np.cos(np.pi / 6), np.sin(np.pi / 6)])
+    heights = np.full((len(grid), 1), RADIO.height_m)
+    stations: dict[Where, Floats] = {
+        where: np.hstack([turned(grid - centre, TURN_DEG), heights])
+        for where, centre in ((EDGE, corner), (NEAR, beside))
+    }
+    return Scene(
+        houses, Skyline(list(houses), np.full(len(houses), ROOF_M)), GasGround(lattice, free),
+        stations,
+    )  # fmt: skip
+
+
+def draw_track(scene: Scene, rng: np.random.Generator, steps: int = STEPS) -> Track:
+    """Draw a pedestrian's walk, the time of day, and the shadowing of base stations."""
+    flat = gas_walk(scene.ground, steps, rng.uniform(*SPEED_MPS), rng)
+    place = np.column_stack([flat, np.full(steps, HEIGHT_M)])
+    strides = np.hypot(*np.diff(flat, axis=0).T)
+    travelled = np.concatenate([[0.0], np.cumsum(strides)])
+    satellites, gps = sky(rng.uniform(0.0, DAY_S))
+    toward = directions(satellites)
+    stations_seen: dict[Where, Bools] = {}
+    sinr: dict[Where, Floats] = {}
+    for where, stations in scene.stations_m.items():
+        # Stations stand above all roofs: what a ray meets behind them is lower.
+        own = directions(stations, place[:, None])
+        stations_seen[where] = scene.skyline.seen(place, own)
+        shadow = SHADOW_DB * sites_along(travelled, len(stations), SHADOW_M, SHARED, rng)
+        levels = sector_levels_dbm(
+            RADIO, stations[:, :2], np.array(BORESIGHTS_DEG) + TURN_DEG, flat,
+            stations_seen[where], shadow,
+        )  # fmt: skip
+        sinr[where] = site_sinr_db(levels, RADIO.noise_dbm)
+    return Track(
+        place, travelled, satellites, gps,
+        elevation_sigma_m(toward.elevation_rad, ZENITH_SIGMA_M),
+        scene.skyline.seen(place, toward), stations_seen, sinr,
+    )  # fmt: skip
+
+
+def sky(tow_s: float) -> tuple[Floats, Bools]:
+    """Return the satellites above the mask, (S, 3), and which of them are of GPS."""
+    almanac = joined(nominal_gps(), nominal_galileo())
+    frame = LocalFrame(*CENTRE_LON_LAT_DEG, 0.0)
+    found = frame.to_local(satellite_positions_m(almanac, tow_s))
+    high = directions(found).above(MASK_DEG)
+    gps = np.array([name.startswith("G") for name in almanac.names])
+    return found[high], gps[high]
+
+
+def draw_readings(scene: Scene, track: Track, rng: np.random.Generator) -> Readings:
+    """Draw clock, noise, echoes, detours and wrong peaks of a track."""
+    shape = track.seen.shape
+    away = np.linalg.norm(track.satellites_m - track.place_m[:, None], axis=2)
+    bias = clock_walk_m(shape[0], CLOCK_M, CLOCK_FIRST_M, rng)[:, None]
+    free = away + bias + track.sigma_m * rng.standard_normal(shape)
+    echo = multipath_bias_m(track.travelled_m, shape[1], rng, mean_m=ECHO_M)
+    times: dict[Where, Floats] = {}
+    for where, stations in scene.stations_m.items():
+        distance = np.linalg.norm(stations - track.place_m[:, None], axis=2)
+        hidden = ~track.stations_seen[where]
+        detour = detour_m(
+            track.travelled_m, hidden, rng, mean_m=DETOUR_M, correlation_m=ALONG_M, shared=SHARED
+        )  # fmt: skip
+        times[where] = distance + detour + arrival_errors_m(ARRIVAL, track.sinr_db[where], rng)
+    return Readings(np.where(track.seen, free + echo, np.nan), free, times)

@@ -1,0 +1,1 @@
+"""Fritsche and Klein (2009): GNSS with timing advances and levels of GSM."""

@@ -1,0 +1,1 @@
+"""Khalaf-Allah (2007): global positioning by the candidate filter."""

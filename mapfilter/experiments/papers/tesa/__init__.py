@@ -1,0 +1,1 @@
+"""A vehicle in a city: few satellites and the levels of GSM."""

@@ -1,0 +1,1 @@
+"""The Bayes map filter: evidence, belief, alternative hypothesis, smoothing."""

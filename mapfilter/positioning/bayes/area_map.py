@@ -1,0 +1,147 @@
+"""What a map filter looks up: levels, ways and distances of an area, ready for compiled kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from mapfilter._types import Bools, Floats32, Ints, Ints32
+from mapfilter.database.radioroutes import RadioField
+from mapfilter.geodesy import Lattice
+from mapfilter.models.street_motion import map_log_likelihood
+from mapfilter.radio.cells import CellPlan
+
+_BELOW_FLOOR_DB = 6.0
+
+
+@dataclass(frozen=True, eq=False)
+class AreaMap:
+    """An area in a local frame, whose origin is the lattice's south-western corner.
+
+    Single precision resolves only half a metre of a UTM northing, and micrometres of this.
+
+    Parameters
+    ----------
+    lattice : Lattice
+    cell_ids : tuple of str
+        Cells heard somewhere in the area: bands 0 to C - 1.
+    known_ids : frozenset of str
+        All cells of the database, also those not heard here.
+    level_dbm : ndarray of float32, shape (rows, cols, C + 2)
+        Levels, and the best and the second best of each pixel.
+    distance_m : ndarray of float32, shape (rows, cols)
+        To the nearest way.
+    way_id : ndarray of int64, shape (rows, cols)
+    on_way : ndarray of bool, shape (rows, cols)
+    carriers : mapping
+        Bands of the cells on each (ARFCN, BSIC); with BSIC -1 of all on the carrier.
+    floor_dbm : float
+        Weaker levels are not in the database.
+    sites : mapping of str to tuple of float
+        East, north and height of all cells of the database.
+    """
+
+    lattice: Lattice
+    cell_ids: tuple[str, ...]
+    known_ids: frozenset[str]
+    level_dbm: Floats32
+    distance_m: Floats32
+    way_id: Ints
+    on_way: Bools
+    carriers: dict[tuple[int, int], tuple[int, ...]]
+    floor_dbm: float
+    sites: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+
+    @classmethod
+    def of_field(cls, field: RadioField, plan: CellPlan, floor_dbm: float) -> AreaMap:
+        """Prepare a field of a database.
+
+        Where a cell is below the floor, a level a little below it is assumed.
+        """
+        rows, cols, count = field.level_dbm.shape
+        level = np.empty((rows, cols, count + 2), dtype=np.float32)
+        quiet_dbm = np.float32(floor_dbm - _BELOW_FLOOR_DB)
+        np.copyto(level[..., :count], field.level_dbm)
+        heard = level[..., :count]
+        heard[np.isnan(heard)] = quiet_dbm
+        level[..., count:] = quiet_dbm
+        if count > 1:
+            # One row at a time, as sorting all of them at once would double the memory.
+            for row in range(rows):
+                top = np.partition(heard[row], count - 2, axis=-1)
+                level[row, :, count], level[row, :, count + 1] = top[:, -1], top[:, -2]
+        elif count:
+            level[..., count] = heard[..., 0]
+        return cls(
+            field.lattice,
+            field.cell_ids,
+            frozenset(plan.ids),
+            level,
+            field.distance_to_way_m,
+            field.way_id,
+            field.on_way,
+            _carriers(plan, field.cell_ids),
+            floor_dbm,
+            {cell.id: (cell.east_m, cell.north_m, cell.height_m) for cell in plan.cells},
+        )
+
+    @cached_property
+    def origin_m(self) -> tuple[float, float]:
+        """East and north of the local frame's origin."""
+        west, south, _, _ = self.lattice.bounds_m
+        return west, south
+
+    @cached_property
+    def size_m(self) -> tuple[float, float]:
+        """East and north extent."""
+        west, south, east, north = self.lattice.bounds_m
+        return east - west, north - south
+
+    @cached_property
+    def flat_level_dbm(self) -> Floats32:
+        """Levels as one line of numbers, the bands of a pixel together."""
+        return self.level_dbm.reshape(-1)
+
+    @cached_property
+    def band_of(self) -> dict[str, int]:
+        """Band of each cell."""
+        return {cell: band for band, cell in enumerate(self.cell_ids)}
+
+    @cached_property
+    def way_ids(self) -> Ints:
+        """All ways of the area in ascending order; 0 stands for none."""
+        return np.unique(self.way_id)
+
+    @cached_property
+    def way_rank(self) -> Ints32:
+        """Index into ``way_ids`` of each pixel, shape (rows * cols,)."""
+        return np.searchsorted(self.way_ids, self.way_id).astype(np.int32).ravel()
+
+    @cached_property
+    def points(self) -> Floats32:
+        """East and north in the local frame of all points where one can be, shape (2, P)."""
+        row, col = np.nonzero(self.on_way)
+        step = self.lattice.resolution_m
+        return np.stack([(col + 0.5) * step, (self.lattice.rows - row - 0.5) * step]).astype(
+            np.float32
+        )
+
+    def log_map(self, sd_m: float) -> Floats32:
+        """Return the map's log-likelihood at every pixel."""
+        return map_log_likelihood(self.distance_m, sd_m)
+
+
+def _carriers(plan: CellPlan, cell_ids: Iterable[str]) -> dict[tuple[int, int], tuple[int, ...]]:
+    band_of = {cell: band for band, cell in enumerate(cell_ids)}
+    found: dict[tuple[int, int], tuple[int, ...]] = {}
+    for cell in plan.cells:
+        band = band_of.get(cell.id)
+        if band is None or cell.arfcn is None:
+            continue
+        keys = [(cell.arfcn, -1)] + ([(cell.arfcn, cell.bsic)] if cell.bsic is not None else [])
+        for key in keys:
+            found[key] = (*found.get(key, ()), band)
+    return found

@@ -1,0 +1,127 @@
+"""The map filter's model on a grid: the same likelihoods, at the pixels of the area's lattice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import ceil, exp, isfinite, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapfilter._types import Floats, Floats32
+from mapfilter.filters.contract import Reason
+from mapfilter.filters.grid import Transport
+from mapfilter.filters.hypotheses import Bins, Summary
+from mapfilter.geodesy import wrap_rad
+from mapfilter.models.street_motion import BIAS, EAST, NORTH, OFF, STATES
+from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.model import OFF_AT_START, BayesModel, Start
+
+_CIRCLE_BINS = 72
+
+
+@dataclass(frozen=True)
+class StreetGrid:
+    """Streets and radio of an area, on its lattice.
+
+    The step scale is no dimension of the grid: its deviation widens the motion.
+
+    Parameters
+    ----------
+    model : BayesModel
+    compass : bool
+        Without one the heading error may be any.
+    bin_rad : float
+        Width of a bin of the heading error.
+    """
+
+    model: BayesModel
+    compass: bool = True
+    bin_rad: float = 0.04
+
+    @property
+    def bins(self) -> Bins:
+        """The area, in bins of 25 m."""
+        return self.model.bins
+
+    @property
+    def circular(self) -> bool:
+        """Whether the bins go around the whole circle."""
+        return not self.compass
+
+    @cached_property
+    def bias_rad(self) -> Floats:
+        """Middles of the bins: three deviations to both sides, or the circle."""
+        if not self.compass:
+            return np.asarray(wrap_rad(2 * pi * np.arange(_CIRCLE_BINS) / _CIRCLE_BINS))
+        side = ceil(3 * self.model.motion.bias_sd_rad / self.bin_rad)
+        return np.asarray(self.bin_rad * np.arange(-side, side + 1), dtype=np.float64)
+
+    def start(self, prior: Start) -> tuple[Floats32, Floats32]:
+        """Return mass on the ways and off them by the first report, or about a place."""
+        area = self.model.area
+        row, col = np.indices(area.on_way.shape).reshape(2, -1)
+        state = self.states(row, col, np.zeros(row.size, dtype=np.float32))
+        log_weight = np.zeros(row.size)
+        on_map = area.on_way / max(area.on_way.sum(), 1)
+        if isfinite(prior.east_m):
+            west, south = area.origin_m
+            dx, dy = state[EAST] - (prior.east_m - west), state[NORTH] - (prior.north_m - south)
+            log_weight -= (dx**2 + dy**2) / (2 * prior.sd_m**2)
+            on_map = np.full(on_map.shape, 1 / row.size)
+        if prior.reading is not None:
+            self.model.weigh(state, log_weight, prior.reading)
+        likely = np.exp(log_weight - log_weight.max()).reshape(on_map.shape)
+        bias = np.ones(self.bias_rad.size)
+        if self.compass and self.model.motion.bias_sd_rad > 0:
+            bias = np.exp(-0.5 * (self.bias_rad / self.model.motion.bias_sd_rad) ** 2)
+        on = (1 - OFF_AT_START) * bias[:, None, None] * on_map * likely
+        off = OFF_AT_START * bias[:, None, None] * likely / row.size
+        total = on.sum() + off.sum()
+        return (on / total).astype(np.float32), (off / total).astype(np.float32)
+
+    def states(self, row: NDArray[np.intp], col: NDArray[np.intp], bias_rad: Floats32) -> Floats32:
+        """Return pixels as states of the particle model."""
+        lattice = self.model.area.lattice
+        state = np.zeros((STATES, row.size), dtype=np.float32)
+        state[EAST] = (col + 0.5) * lattice.resolution_m
+        state[NORTH] = (lattice.rows - row - 0.5) * lattice.resolution_m
+        state[BIAS] = bias_rad
+        state[OFF] = OFF_AT_START
+        return state
+
+    def transport(self, east_m: float, north_m: float, length_m: float) -> Transport:
+        """Return what a displacement by dead reckoning does to the mass of each bin."""
+        motion, weights = self.model.motion, self.model.weights
+        pixel_m = self.model.area.lattice.resolution_m
+        stretch = exp(0.5 * motion.heading_sd_rad**2)
+        cosine, sine = np.cos(self.bias_rad), np.sin(self.bias_rad)
+        right = stretch * (east_m * cosine - north_m * sine) / pixel_m
+        up = stretch * (east_m * sine + north_m * cosine) / pixel_m
+        steps = length_m / motion.typical_step_m
+        along_var = steps * motion.step_sd_m**2 + (motion.scale_sd * length_m) ** 2
+        across_var = steps * (motion.typical_step_m * motion.heading_sd_rad) ** 2
+        heading = np.arctan2(up, right)
+        east_var = along_var * np.cos(heading) ** 2 + across_var * np.sin(heading) ** 2
+        north_var = along_var * np.sin(heading) ** 2 + across_var * np.cos(heading) ** 2
+        width_rad = 2 * pi / _CIRCLE_BINS if self.circular else self.bin_rad
+        return Transport(
+            right,
+            -up,
+            np.sqrt(east_var) / pixel_m,
+            np.sqrt(north_var) / pixel_m,
+            motion.bias_drift_rad_per_sqrt_m * length_m**0.5 / width_rad,
+            np.exp(weights.weight_per_m * length_m * self.model.log_map),
+            exp(-weights.off_cost_per_m * length_m),
+            1 - exp(-weights.leave_per_m * length_m),
+            1 - exp(-weights.return_per_m * length_m),
+        )
+
+    def weigh(self, state: Floats32, log_weight: Floats, reading: RadioReading) -> Reason:
+        """Add the log-likelihood of a report and of a fix, in place."""
+        return self.model.weigh(state, log_weight, reading)
+
+    def credible(self, summary: Summary) -> bool:
+        """Tell whether the leading hypothesis is on the map rather than off it."""
+        return self.model.credible(summary)

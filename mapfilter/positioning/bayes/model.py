@@ -1,0 +1,321 @@
+"""The map filter's model: where models meet the filter.
+
+It moves hypotheses by dead reckoning, weighs them by the map, by the serving cell, by levels and by
+fixes, and draws the first ones.
+
+Serving cells and timing advances are weighed by what was heard before, levels by their map: more
+where the cell was measured, less where only its trend is known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import exp, isfinite, pi, sqrt
+
+import numpy as np
+
+from mapfilter._types import Floats, Floats32, Ints32
+from mapfilter.filters.contract import MotionStep, Reason
+from mapfilter.filters.hypotheses import Bins, Summary
+from mapfilter.filters.resampling import systematic
+from mapfilter.models import cell_id, fingerprint
+from mapfilter.models.fingerprint import LevelReading
+from mapfilter.models.measured_map import HeardMaps
+from mapfilter.models.street_motion import (
+    BIAS,
+    EAST,
+    LOG_SCALE,
+    NORTH,
+    OFF,
+    STATES,
+    MapWeights,
+    MotionErrors,
+    interpolate,
+    move,
+    weigh_by_map,
+)
+from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.evidence import EvidenceOptions, RadioReading
+from mapfilter.positioning.gnss.readings import FixEvidence
+
+_F = np.float32
+OFF_AT_START = 0.05
+_OFF_SHARE, _TRIES = 0.2, 2
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """What the first belief is made of.
+
+    Parameters
+    ----------
+    reading : RadioReading or None
+        The first report, for an unknown start.
+    compass : bool
+        Whether headings are those of a compass; else the lasting error is uniform.
+    east_m, north_m, sd_m : float
+        A known start, in the CRS of the database; NaN for an unknown one.
+    """
+
+    reading: RadioReading | None
+    compass: bool = True
+    east_m: float = float("nan")
+    north_m: float = float("nan")
+    sd_m: float = float("nan")
+
+
+@dataclass(frozen=True)
+class BayesModel:
+    """Streets and radio of an area, and the errors of what is measured there.
+
+    Parameters
+    ----------
+    area : AreaMap
+    motion : MotionErrors
+    weights : MapWeights
+    evidence : EvidenceOptions
+    """
+
+    area: AreaMap
+    motion: MotionErrors = field(default_factory=MotionErrors)
+    weights: MapWeights = field(default_factory=MapWeights)
+    evidence: EvidenceOptions = field(default_factory=EvidenceOptions)
+
+    @property
+    def timed_by_sites(self) -> bool:
+        """Whether timing advances are compared with the distances of sites."""
+        return True
+
+    @cached_property
+    def bins(self) -> Bins:
+        """The area, in bins of 25 m."""
+        return Bins.over((0.0, 0.0, *self.area.size_m))
+
+    @cached_property
+    def log_map(self) -> Floats32:
+        """Log-likelihood of the map at every pixel."""
+        return self.area.log_map(self.weights.sd_m)
+
+    @cached_property
+    def _serving_table(self) -> Floats32:
+        return cell_id.serving_table(self.evidence.serving)
+
+    @cached_property
+    def _bound_table(self) -> Floats32:
+        return fingerprint.bound_table()
+
+    def start(self, prior: Start, most: int, rng: np.random.Generator) -> tuple[Floats32, Floats]:
+        """Draw the first hypotheses: where the first report can be heard, or about a known start.
+
+        They are spread by their probability over all points where one can be, each anywhere in its
+        pixel.
+        """
+        state = np.zeros((STATES, most), dtype=np.float32)
+        log_weight = np.full(most, -np.log(most))
+        if isfinite(prior.east_m):
+            west, south = self.area.origin_m
+            place = np.array([[prior.east_m - west], [prior.north_m - south]])
+            state[EAST : NORTH + 1] = place + prior.sd_m * rng.standard_normal((2, most))
+            state[OFF] = OFF_AT_START
+        else:
+            self._spread(state, log_weight, prior.reading, rng)
+        bias = rng.standard_normal(most) * self.motion.bias_sd_rad
+        state[BIAS] = bias if prior.compass else pi * (2 * rng.random(most) - 1)
+        state[LOG_SCALE] = self.motion.scale_sd * rng.standard_normal(most)
+        if isfinite(prior.east_m) and prior.reading is not None:
+            self.weigh(state, log_weight, prior.reading)
+        return state, log_weight
+
+    def _spread(
+        self, state: Floats32, log_weight: Floats, reading: RadioReading | None,
+        rng: np.random.Generator,
+    ) -> None:  # fmt: skip
+        """Fill places on the map and off it, by the first report; more off it than are due."""
+        resolution_m, size_m = self.area.lattice.resolution_m, np.array(self.area.size_m)
+        count = state.shape[1]
+        middle = count - int(_OFF_SHARE * count)
+        anywhere = (size_m * rng.random((_TRIES * (count - middle), 2))).T.astype(np.float32)
+        for part, points, spread_m, off in (
+            (slice(0, middle), self.area.points, resolution_m, 0.0),
+            (slice(middle, count), anywhere, 0.0, 1.0),
+        ):
+            if not points.shape[1] or part.start == part.stop:
+                log_weight[part] = -np.inf
+                continue
+            chosen, log_mean = self._likely(points, reading, part.stop - part.start, rng)
+            beside = rng.random((2, chosen.size), dtype=np.float32) - _F(0.5)
+            state[EAST : NORTH + 1, part] = points[:, chosen] + _F(spread_m) * beside
+            state[OFF, part] = off
+            share = OFF_AT_START if off else 1 - OFF_AT_START
+            log_weight[part] = log_mean + np.log(share / chosen.size)
+
+    def _likely(
+        self, points: Floats32, reading: RadioReading | None, count: int, rng: np.random.Generator
+    ) -> tuple[Ints32, float]:
+        """Draw points by their likelihood; return them and the logarithm of its mean."""
+        state = np.zeros((STATES, points.shape[1]), dtype=np.float32)
+        state[EAST : NORTH + 1] = points
+        log_weight = np.zeros(points.shape[1])
+        if reading is not None:
+            self.weigh(state, log_weight, reading)
+        most = log_weight.max()
+        weight = np.exp(log_weight - most)
+        chosen = np.empty(count, dtype=np.int32)
+        systematic((weight / weight.sum()).astype(np.float32), rng.random(), chosen)
+        return chosen, float(most + np.log(weight.mean()))
+
+    def any_heading(self, state: Floats32, times: int, rng: np.random.Generator) -> Floats32:
+        """Return so many times as many hypotheses, which know nothing of their heading error.
+
+        Each is moved within its pixel, too.
+        """
+        turned = np.tile(state, times)
+        resolution_m = _F(self.area.lattice.resolution_m)
+        spread = rng.random((2, turned.shape[1]), dtype=np.float32) - _F(0.5)
+        turned[: NORTH + 1] += resolution_m * spread
+        turned[BIAS] = pi * (2 * rng.random(turned.shape[1]) - 1)
+        return turned
+
+    def move(
+        self, state: Floats32, log_weight: Floats, motion: MotionStep, key: np.uint64
+    ) -> tuple[Floats32, Floats]:
+        """Move by one step and weigh by the map, by the metre."""
+        length_m = abs(motion.step_m)
+        if isfinite(motion.heading_rad):
+            moved = move(state, motion.step_m, motion.heading_rad, self.motion, key)
+        else:
+            # Anywhere on a disc that a step of this length can reach.
+            sd_m = length_m / sqrt(2.0)
+            unknown = MotionErrors(step_sd_m=sd_m, typical_step_m=length_m, heading_sd_rad=0.0)
+            moved = move(state, 0.0, 0.0, self.motion, key)
+            noise = np.random.default_rng(int(key)).standard_normal((2, state.shape[1]))
+            moved[: NORTH + 1] += (unknown.step_sd_m * noise).astype(np.float32)
+        weighed = log_weight.copy()
+        found = np.empty(weighed.size, dtype=np.float32)
+        lattice, weights = self.area.lattice, self.weights
+        step = lattice.resolution_m
+        interpolate(
+            moved, self.log_map, _F(step / 2), _F((lattice.rows - 0.5) * step), _F(1 / step), found
+        )
+        weigh_by_map(
+            found, moved[OFF], _F(weights.weight_per_m * length_m),
+            _F(exp(-weights.off_cost_per_m * length_m)),
+            _F(1 - exp(-weights.leave_per_m * length_m)),
+            _F(1 - exp(-weights.return_per_m * length_m)), weighed,
+        )  # fmt: skip
+        return moved, weighed
+
+    def weigh(self, state: Floats32, log_weight: Floats, reading: RadioReading) -> Reason:
+        """Add the log-likelihood of a report and of a fix, in place."""
+        flat = self.area.flat_level_dbm
+        bands = len(self.area.cell_ids) + 2
+        used = False
+        if reading.serving >= 0 or reading.levels is not None or reading.bounds:
+            now = self._pixels(state, 0.0, 0.0)
+            used = True
+            if reading.serving >= 0 and reading.serving_weight > 0:
+                cell_id.weigh_by_serving(
+                    now, flat, bands, reading.serving, self._serving_table,
+                    reading.serving_weight, log_weight,
+                )  # fmt: skip
+            if reading.levels is not None:
+                levels = reading.levels
+                then = self._pixels(state, levels.back_east_m, levels.back_north_m)
+                fingerprint.weigh_by_levels(
+                    now, then, flat, bands, levels.cell, levels.offset_db, levels.rho,
+                    levels.scale, levels.common, levels.weight, levels.clip, log_weight,
+                )  # fmt: skip
+            for bound in reading.bounds:
+                fingerprint.weigh_by_bound(
+                    now, flat, bands, bound.cells, bound.level_dbm, bound.censored, bound.sd_db,
+                    bound.weight, self._bound_table, log_weight,
+                )  # fmt: skip
+        if reading.fix is not None:
+            log_weight += FixEvidence(reading.fix, self.area.origin_m).log_likelihood(state)
+            used = True
+        for evidence in reading.also:
+            log_weight += evidence.log_likelihood(state)
+            used = True
+        return Reason.USED if used else Reason.NO_READING
+
+    def credible(self, summary: Summary) -> bool:
+        """Tell whether the leading hypothesis is on the map rather than off it."""
+        return bool(summary.mean[OFF] < 0.5)
+
+    def _pixels(self, state: Floats32, back_east_m: float, back_north_m: float) -> Ints32:
+        lattice = self.area.lattice
+        pixel = np.empty(state.shape[1], dtype=np.int32)
+        step = lattice.resolution_m
+        fingerprint.pixels(
+            state, back_east_m, back_north_m, 0.0, lattice.rows * step, 1 / step, lattice.rows,
+            lattice.cols, pixel,
+        )  # fmt: skip
+        return pixel
+
+
+_LEAST_VARIANCE = 0.25
+"""Of an innovation, as a share of the usual one."""
+
+
+@dataclass(frozen=True)
+class HeardModel(BayesModel):
+    """Streets and radio of an area, with maps of what was heard.
+
+    Parameters
+    ----------
+    heard : HeardMaps
+        On the area's lattice.
+    level_sd_db : ndarray of float32, shape (C, P), optional
+        Of a new reading against the map of levels, on the area's lattice; without it that of the
+        evidence's options holds everywhere.
+    """
+
+    heard: HeardMaps | None = None
+
+    @property
+    def timed_by_sites(self) -> bool:
+        """Whether timing advances are compared with the distances of sites: with maps if any."""
+        return self.heard is None
+
+    level_sd_db: Floats32 | None = None
+
+    def weigh(self, state: Floats32, log_weight: Floats, reading: RadioReading) -> Reason:
+        """Add the log-likelihood of a report and of a fix, in place."""
+        heard = self.heard
+        if heard is None or reading.serving < 0:
+            return super().weigh(state, log_weight, reading)
+        pixel = self._pixels(state, 0.0, 0.0)
+        found = heard.log_serving(reading.serving, pixel)
+        if isfinite(reading.timing_advance):
+            found = found + heard.log_advance(reading.serving, pixel, reading.timing_advance)
+        log_weight += reading.serving_weight * found
+        levels = reading.levels
+        if levels is not None and self.level_sd_db is not None:
+            log_weight += self._log_levels(state, pixel, levels, self.level_sd_db)
+            reading = replace(reading, levels=None)
+        super().weigh(state, log_weight, replace(reading, serving_weight=0.0))
+        return Reason.USED
+
+    def _log_levels(
+        self, state: Floats32, now: Ints32, levels: LevelReading, sd_db: Floats32
+    ) -> Floats32:
+        """Return the log-likelihood of levels that are more certain at some places than at others.
+
+        As :func:`mapfilter.models.fingerprint.weigh_by_levels`, but with errors of different cells
+        that have nothing in common.
+        """
+        table = self.area.level_dbm
+        table = table.reshape(-1, table.shape[-1])
+        then = self._pixels(state, levels.back_east_m, levels.back_north_m)
+        usual = self.evidence.levels
+        found = np.zeros(now.size, dtype=np.float32)
+        for cell, offset_db, rho, scale in zip(
+            levels.cell, levels.offset_db, levels.rho, levels.scale, strict=True
+        ):
+            innovation_db = offset_db - table[now, cell] + rho * table[then, cell]
+            more_db2 = sd_db[cell][now] ** 2 - usual.measurement_db**2 - usual.sd_db**2
+            wider = 1 + np.maximum(more_db2 * (1 - rho**2) * scale**2, _LEAST_VARIANCE - 1)
+            square = np.minimum((innovation_db * scale) ** 2 / wider, levels.clip**2)
+            found -= np.float32(0.5 * levels.weight) * (square + np.log(wider))
+        return found

@@ -1,0 +1,253 @@
+"""The receiver's clock and height beside hypotheses of places.
+
+A pseudorange is the distance to a satellite, plus the clock's error, plus what the antenna's height
+adds. Given a hypothesis's path, clock and height are linear and Gaussian: each hypothesis carries
+their mean in three further rows of its state, and all share one covariance, by
+:mod:`mapfilter.filters.rao_blackwell`. So one satellite already weighs hypotheses, as soon as the
+clock is known better than they are apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mapfilter._types import Bools, Floats, Floats32
+from mapfilter.filters import rao_blackwell
+from mapfilter.filters.rao_blackwell import MixedBelief, SirOptions
+from mapfilter.models.motion import clock_noise
+from mapfilter.models.ranging import pseudoranges
+from mapfilter.models.state import StateLayout
+from mapfilter.models.street_motion import STATES
+from mapfilter.positioning.gnss.options import SkyOptions
+from mapfilter.positioning.kalman.models import compiled
+
+LAYOUT = StateLayout(5, 0, 1, clock=2)
+"""East and north from the frame's origin, the clock's error and rate, and the height."""
+LINEAR = 3
+_NO_RESAMPLING = SirOptions(resample_below=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Sky:
+    """What is received at one moment, in true east, north and up about a place.
+
+    Parameters
+    ----------
+    names : tuple of str
+    satellites_m : (m, 3) array
+    elevation_rad : (m,) array
+    range_m : (m,) array
+        Pseudoranges.
+    sigma_m : (m,) array
+        Deviations of their noise; NaN where not told.
+    origin_m : (float, float)
+        The place, in the frame of the hypotheses.
+    true_from_grid : (2, 2) array
+    """
+
+    names: tuple[str, ...]
+    satellites_m: Floats
+    elevation_rad: Floats
+    range_m: Floats
+    sigma_m: Floats
+    origin_m: tuple[float, float]
+    true_from_grid: Floats
+
+    def only(self, chosen: Bools) -> Sky:
+        """Return some of the satellites."""
+        return replace(
+            self,
+            names=tuple(np.array(self.names)[chosen].tolist()),
+            satellites_m=self.satellites_m[chosen],
+            elevation_rad=self.elevation_rad[chosen],
+            range_m=self.range_m[chosen],
+            sigma_m=self.sigma_m[chosen],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Receiver:
+    """Clock and height of a belief, beyond what its hypotheses carry.
+
+    Parameters
+    ----------
+    time_s, travelled_m : float
+        When satellites were last heard, and the distance travelled then.
+    mean : (3,) array
+        The clock's error (m) and rate (m/s), and the height over the frame's origin (m), to which
+        the rows of the hypotheses are added.
+    covariance : (3, 3) array
+        Shared by all hypotheses.
+    used_at_m : float
+        Distance travelled when satellites were last used.
+    """
+
+    time_s: float
+    travelled_m: float
+    mean: Floats
+    covariance: Floats
+    used_at_m: float = -np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """What pseudoranges make of a belief.
+
+    Parameters
+    ----------
+    gain : (N,) array
+        Log-likelihood of each hypothesis, such that the belief's total is 0.
+    score : float
+        Logarithm of how probable they were, against what is usual.
+    rows : (3, N) array
+        What hypotheses carry of clock and height afterwards.
+    covariance : (3, 3) array
+    """
+
+    gain: Floats
+    score: float
+    rows: Floats
+    covariance: Floats
+
+
+def begun(options: SkyOptions, time_s: float, travelled_m: float) -> Receiver:
+    """Return a receiver of which nothing is known."""
+    deviations = np.array([options.clock_sd_m, options.drift_sd_mps, options.height_sd_m])
+    return Receiver(time_s, travelled_m, np.zeros(LINEAR), np.diag(deviations**2))
+
+
+def moved(
+    options: SkyOptions, receiver: Receiver, rows: Floats, time_s: float, travelled_m: float
+) -> tuple[Receiver, Floats]:
+    """Let the clock run and the height change since the last time; rows have shape (3, N)."""
+    elapsed_s = max(time_s - receiver.time_s, 0.0)
+    gone_m = max(travelled_m - receiver.travelled_m, 0.0)
+    run = np.eye(LINEAR)
+    run[0, 1] = elapsed_s
+    noise = np.zeros((LINEAR, LINEAR))
+    # So much in a second, and in proportion: noise must not depend on how often one looks.
+    bias, rate = np.diag(clock_noise(1.0)).tolist()
+    noise[0, 0] = bias * elapsed_s + rate * elapsed_s**3 / 3
+    noise[0, 1] = noise[1, 0] = rate * elapsed_s**2 / 2
+    noise[1, 1] = rate * elapsed_s
+    noise[2, 2] = options.slope**2 * gone_m
+    rows = rows.copy()
+    rows[0] += elapsed_s * rows[1]
+    covariance = run @ receiver.covariance @ run.T + noise
+    after = replace(
+        receiver,
+        time_s=time_s,
+        travelled_m=travelled_m,
+        mean=run @ receiver.mean,
+        covariance=0.5 * (covariance + covariance.T),
+    )
+    return after, rows
+
+
+def clock_reset(options: SkyOptions, receiver: Receiver) -> Receiver:
+    """Return a receiver whose clock may have jumped anywhere; its rate and height stay known."""
+    covariance = receiver.covariance.copy()
+    covariance[0, :] = covariance[:, 0] = 0.0
+    covariance[0, 0] = options.clock_sd_m**2
+    return replace(receiver, covariance=covariance)
+
+
+def centred(receiver: Receiver, rows: Floats, state: Floats32) -> tuple[Receiver, Floats32]:
+    """Return a receiver, and hypotheses that carry what they differ from it by."""
+    middle = rows.mean(axis=1)
+    carrying = np.empty((STATES + LINEAR, state.shape[1]), dtype=np.float32)
+    carrying[:STATES] = state[:STATES]
+    carrying[STATES:] = rows - middle[:, None]
+    return replace(receiver, mean=receiver.mean + middle), carrying
+
+
+def carried(state: Floats32) -> Floats:
+    """Return what hypotheses carry of clock and height, shape (3, N); 0 before the first time."""
+    if state.shape[0] < STATES + LINEAR:
+        return np.zeros((LINEAR, state.shape[1]))
+    return state[STATES : STATES + LINEAR].astype(np.float64)
+
+
+def near_clock(sky: Sky, receiver: Receiver) -> Receiver:
+    """Return a receiver whose clock, of which nothing is known, is near what it must be."""
+    expected_m = np.linalg.norm(sky.satellites_m, axis=1)
+    mean = receiver.mean.copy()
+    mean[0] = float(np.median(sky.range_m - expected_m))
+    return replace(receiver, mean=mean)
+
+
+def weighed(
+    sky: Sky, sigma_m: Floats, receiver: Receiver, place: Floats32, log_weight: Floats,
+    rows: Floats, free: int = 0,
+) -> Weighed:  # fmt: skip
+    """Weigh hypotheses by pseudoranges, the clock and the height integrated out.
+
+    Parameters
+    ----------
+    sky : Sky
+    sigma_m : (m,) array
+    receiver : Receiver
+        Of the moment.
+    place : (2, N) array
+        East and north of the hypotheses in their frame.
+    log_weight : (N,) array
+    rows : (3, N) array
+        What they carry.
+    free : int
+        How many of the readings a clock that may be anywhere explains by itself.
+    """
+    origin = np.array(sky.origin_m)[:, None]
+    state = np.empty((LAYOUT.size, place.shape[1]))
+    state[:2] = sky.true_from_grid @ (place.astype(np.float64) - origin)
+    state[2:] = rows
+    covariance = np.zeros((LAYOUT.size, LAYOUT.size))
+    covariance[2:, 2:] = receiver.covariance
+    total = float(np.logaddexp.reduce(log_weight))
+    # Those of no weight at all count as of hardly any, so that differences stay finite.
+    weight = np.maximum(log_weight - total, -700.0)
+    before = MixedBelief(state, weight, covariance, np.array([0, 1]))
+    model = pseudoranges(LAYOUT, sky.satellites_m, sigma_m)
+    # Up, and away from the satellite.
+    loading = np.zeros((len(sky.names), LAYOUT.size))
+    loading[:, 4] = -np.sin(sky.elevation_rad)
+    known_m = receiver.mean[0] + loading[:, 4] * receiver.mean[2]
+    rng = np.random.default_rng(0)  # Nothing is drawn.
+    after, news = rao_blackwell.update(
+        before, compiled(model), sky.range_m - known_m, rng, _NO_RESAMPLING, loading
+    )
+    gain = after.log_weight - before.log_weight
+    best = -0.5 * news.nis if news.used else -np.inf
+    score = best - float(gain.max()) + 0.5 * max(len(sky.names) - free, 0)
+    return Weighed(gain, score, after.state[2:], after.covariance[2:, 2:])
+
+
+def agreement(
+    sky: Sky, sigma_m: Floats, receiver: Receiver, place: Floats32, weight: Floats32,
+    rows: Floats, free: int = 0,
+) -> float:  # fmt: skip
+    """Return how well pseudoranges agree with a belief as a whole, taken for one Gaussian.
+
+    Arguments are those of :func:`weighed`, but weights that sum to one.
+
+    Returns
+    -------
+    float
+        Half of the degrees of freedom less the normalised square of the innovation: about 0 where
+        all is well, far below where not.
+    """
+    origin = np.array(sky.origin_m)[:, None]
+    flat = sky.true_from_grid @ (place.astype(np.float64) - origin)
+    away = sky.satellites_m[:, :2, None] - flat
+    up = sky.satellites_m[:, 2, None]
+    expected = np.sqrt(away[:, 0] ** 2 + away[:, 1] ** 2 + up**2)
+    slope = np.zeros((len(sky.names), LINEAR))
+    slope[:, 0] = 1.0
+    slope[:, 2] = -np.sin(sky.elevation_rad)
+    off = sky.range_m[:, None] - expected - slope @ (rows + receiver.mean[:, None])
+    mean = off @ weight
+    apart = off - mean[:, None]
+    spread = (apart * weight) @ apart.T + slope @ receiver.covariance @ slope.T
+    square = float(mean @ np.linalg.solve(spread + np.diag(sigma_m**2), mean))
+    return 0.5 * (max(len(sky.names) - free, 0) - square)

@@ -1,0 +1,1 @@
+"""Kalman-type filters over GNSS, timing advances, levels and dead reckoning; no map."""

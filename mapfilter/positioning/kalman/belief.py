@@ -1,0 +1,205 @@
+"""A belief as a Gaussian sum whose parts are Kalman-type filters, step by step over a log.
+
+A start that is known to a kilometre is cut into narrow parts (:mod:`mapfilter.filters.gaussian_sum`
+tells why); a start from a fix has one. Parts without weight are dropped, and one that has come to
+lie on a heavier one is given to it, so that a settled belief is one Gaussian again.
+
+Parts never branch: each that is left at the end has one past, which the Rauch-Tung-Striebel
+smoother goes back over; the weights at the end say which past it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mapfilter._types import Floats, Ints
+from mapfilter.filters.gaussian import Gaussian, Method
+from mapfilter.filters.gaussian_sum import split
+from mapfilter.filters.kalman import Taken, smooth
+from mapfilter.filters.trials import CompiledMeasurement, run_trials
+
+_LEAST_WEIGHT = 1e-6
+_NEAR = 0.1
+"""Squared distance, in a heavier part's deviations, at which another is the same."""
+_ALIKE = 0.2
+"""Largest difference of the logarithms of their volumes then."""
+
+
+@dataclass(frozen=True, eq=False)
+class SumBelief:
+    """Weighted Gaussians of a state of n components.
+
+    Parameters
+    ----------
+    weights : (c,) array
+        They sum to one.
+    means : (c, n) array
+    covariances : (c, n, n) array
+    parts : (c,) integer array
+        Which of the first parts each of them is.
+    """
+
+    weights: Floats
+    means: Floats
+    covariances: Floats
+    parts: Ints
+
+    @classmethod
+    def start(
+        cls, mean: ArrayLike, covariance: ArrayLike, cut: Mapping[int, int] | None = None
+    ) -> SumBelief:
+        """Return a first belief, cut into parts along some components of the state.
+
+        Examples
+        --------
+        >>> belief = SumBelief.start([0.0, 0.0], np.diag([4.0, 4.0]), {0: 3, 1: 3})
+        >>> belief.weights.size, belief.moments.covariance.round(6).tolist()
+        (9, [[4.0, 0.0], [0.0, 4.0]])
+        """
+        mixture = split(mean, covariance, cut or {})
+        count = mixture.weights.size
+        covariances = np.tile(mixture.covariance, (count, 1, 1))
+        return cls(mixture.weights, mixture.means, covariances, np.arange(count))
+
+    @classmethod
+    def around(cls, mean: Floats, covariance: Floats, places: Mapping[int, Floats]) -> SumBelief:
+        """Return equal parts that differ from a mean in some components: where each has them."""
+        count = next(iter(places.values())).size
+        means = np.tile(mean, (count, 1))
+        for index, values in places.items():
+            means[:, index] = values
+        covariances = np.tile(covariance, (count, 1, 1))
+        return cls(np.full(count, 1 / count), means, covariances, np.arange(count))
+
+    @property
+    def moments(self) -> Gaussian:
+        """Mean and covariance of the whole."""
+        mean = self.weights @ self.means
+        off = self.means - mean
+        spread = self.covariances + off[:, :, None] * off[:, None, :]
+        return Gaussian(mean, np.einsum("c,cij->ij", self.weights, spread))
+
+    @property
+    def leading(self) -> Gaussian:
+        """The part of the largest weight."""
+        most = int(np.argmax(self.weights))
+        return Gaussian(self.means[most], self.covariances[most])
+
+    def predict(self, transition: Floats, process: Floats, shift: ArrayLike = 0.0) -> SumBelief:
+        """Return the belief after linear motion: ``Φ m + u``, ``Φ P Φᵀ + Q`` of each part."""
+        means = self.means @ transition.T + np.asarray(shift, dtype=np.float64)
+        covariances = transition @ self.covariances @ transition.T + process
+        return replace(
+            self, means=means, covariances=0.5 * (covariances + covariances.transpose(0, 2, 1))
+        )
+
+    def update(
+        self, measurement: CompiledMeasurement, reading: ArrayLike, method: Method
+    ) -> tuple[SumBelief, Taken]:
+        """Return the belief after a reading (NaN where absent), and the news.
+
+        Each part takes the reading in by the method and gains weight by its evidence; one that
+        cannot has none left. Where no part can, nothing changes and the news say so.
+
+        Raises
+        ------
+        InputError
+            Sizes do not fit or the reading is infinite.
+        """
+        count, n = self.means.shape
+        given = np.asarray(reading, dtype=np.float64)
+        run = run_trials(
+            measurement, np.eye(n), np.zeros((n, n)), method, self.means, self.covariances,
+            np.tile(given, (count, 1, 1)), covariances=True,
+        )  # fmt: skip
+        own = run.evidence[:, 0]
+        taken = np.isfinite(own)
+        if not taken.any():
+            return self, Taken(float("nan"), float("nan"))
+        most = own[taken].max()
+        gained = self.weights * np.where(taken, np.exp(np.where(taken, own - most, 0.0)), 0.0)
+        total = float(gained.sum())
+        if not total > 0:
+            return self, Taken(float("nan"), float("nan"))
+        weights = gained / total
+        nis = float(weights[taken] @ run.nis[taken, 0])
+        updated = SumBelief(weights, run.means[:, 0], run.covariances[:, 0], self.parts)
+        return updated._lessened(), Taken(float(most + np.log(total)), nis)
+
+    def _lessened(self) -> SumBelief:
+        """Drop parts without weight; give those on top of heavier ones to them."""
+        if self.weights.size == 1:
+            return self
+        order = np.argsort(-self.weights, kind="stable")
+        order = order[self.weights[order] >= min(_LEAST_WEIGHT, self.weights.max())]
+        weights, means, covariances = (
+            self.weights[order],
+            self.means[order],
+            self.covariances[order],
+        )
+        volume = np.linalg.slogdet(covariances)[1]
+        kept = np.ones(order.size, dtype=np.bool_)
+        for heavy in range(order.size):
+            if not kept[heavy]:
+                continue
+            off = means - means[heavy]
+            apart = np.einsum("ci,ci->c", off, np.linalg.solve(covariances[heavy], off.T).T)
+            same = kept & (apart < _NEAR) & (np.abs(volume - volume[heavy]) < _ALIKE)
+            same[: heavy + 1] = False
+            weights[heavy] += weights[same].sum()
+            kept &= ~same
+        return SumBelief(
+            weights[kept] / weights[kept].sum(), means[kept], covariances[kept],
+            self.parts[order][kept],
+        )  # fmt: skip
+
+
+@dataclass(eq=False)
+class FusionHistory:
+    """Beliefs after each epoch, and the motion that led to them; grows as the filter goes."""
+
+    beliefs: list[SumBelief] = field(default_factory=list)
+    transitions: list[Floats] = field(default_factory=list)
+    processes: list[Floats] = field(default_factory=list)
+    shifts: list[Floats] = field(default_factory=list)
+
+    def add(self, belief: SumBelief, transition: Floats, process: Floats, shift: Floats) -> None:
+        """Take in an epoch: how one moved to it, and what is known after its readings."""
+        self.beliefs.append(belief)
+        self.transitions.append(transition)
+        self.processes.append(process)
+        self.shifts.append(shift)
+
+    def smoothed(self) -> list[Gaussian]:
+        """Return mean and covariance of each epoch, given all readings."""
+        if not self.beliefs:
+            return []
+        last = self.beliefs[-1]
+        phi = np.array(self.transitions[1:]).reshape(-1, *self.transitions[0].shape)
+        noise = np.array(self.processes[1:]).reshape(phi.shape)
+        # Known shifts are taken off, so that what is left is linear.
+        moved = _moved(self.transitions, self.shifts)
+        means, covariances = [], []
+        for belief in self.beliefs:
+            at = [int(np.flatnonzero(belief.parts == part)[0]) for part in last.parts]
+            means.append(belief.means[at])
+            covariances.append(belief.covariances[at])
+        found = smooth(phi, noise, np.stack(means, axis=1) - moved, np.stack(covariances, axis=1))
+        return [
+            SumBelief(last.weights, found.means[:, k] + moved[k], found.covariances[:, k],
+                      last.parts).moments
+            for k in range(len(self.beliefs))
+        ]  # fmt: skip
+
+
+def _moved(transitions: list[Floats], shifts: list[Floats]) -> Floats:
+    """Return where shifts alone lead from 0, (K, n)."""
+    at, found = np.zeros_like(shifts[0]), []
+    for k, (phi, shift) in enumerate(zip(transitions, shifts, strict=True)):
+        at = phi @ at + shift if k else at
+        found.append(at)
+    return np.array(found)

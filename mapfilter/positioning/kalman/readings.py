@@ -1,0 +1,107 @@
+"""What of an epoch's report a Kalman-type filter can take, and why not of the rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+
+from mapfilter.filters.contract import Reason
+from mapfilter.positioning.epochs import Epoch, Heard
+from mapfilter.positioning.estimate import UnusedReading
+from mapfilter.positioning.kalman.models import SiteModels
+from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.schema import NEIGHBOUR, SERVING
+
+
+@dataclass(frozen=True, slots=True)
+class SiteReadings:
+    """Readings of cells whose sites are known.
+
+    Parameters
+    ----------
+    cells : tuple of str
+        Whose levels were heard.
+    levels_dbm : tuple of float
+    timed : tuple of str
+        Whose timing advances were told.
+    steps : tuple of int
+    unused : tuple of UnusedReading
+    """
+
+    cells: tuple[str, ...]
+    levels_dbm: tuple[float, ...]
+    timed: tuple[str, ...]
+    steps: tuple[int, ...]
+    unused: tuple[UnusedReading, ...]
+
+
+def site_readings(sites: SiteModels, epoch: Epoch, timed: dict[str, int]) -> SiteReadings:
+    """Sort an epoch's report.
+
+    A row without a cell is that cell of the plan whose carrier and BSIC it has, near the serving
+    one; where there are several, it is left out.
+
+    Parameters
+    ----------
+    sites : SiteModels
+    epoch : Epoch
+    timed : dict of str to int
+        Steps of timing advance by cell.
+    """
+    serving = next((row.cell for row in epoch.heard if row.role == SERVING and row.cell), None)
+    heard: list[tuple[str, float]] = []
+    unused: list[UnusedReading] = []
+    for row in epoch.heard:
+        name, reason = _cell(sites, row, serving)
+        level = isfinite(row.level_dbm) and row.censored == 0
+        if name is not None and level:
+            heard.append((name, row.level_dbm))
+        elif name is None or name not in timed:
+            kind = SERVING if row.role == SERVING else NEIGHBOUR
+            unused.append(UnusedReading(epoch.time_s, kind, _what(row), reason))
+    known = {name: steps for name, steps in timed.items() if name in sites.cells}
+    return SiteReadings(
+        tuple(name for name, _ in heard), tuple(level for _, level in heard), tuple(known),
+        tuple(known.values()), tuple(unused),
+    )  # fmt: skip
+
+
+def not_taken(log: TrackLog) -> list[UnusedReading]:
+    """Return what a log holds that these filters make no use of, each kind once."""
+    kinds = (("pseudorange", log.pseudoranges), ("tdoa", log.tdoa))
+    return [
+        UnusedReading(
+            float(rows["time_s"].iloc[0]), kind, f"{len(rows)} rows", Reason.NOT_USED_BY_FILTER
+        )
+        for kind, rows in kinds
+        if len(rows)
+    ]
+
+
+def timing_advances_of(log: TrackLog) -> dict[float, dict[str, int]]:
+    """Return the steps of timing advance by time and cell."""
+    table = log.radio[log.radio["timing_advance"].notna() & log.radio["cell"].notna()]
+    found: dict[float, dict[str, int]] = {}
+    columns = (table["time_s"], table["cell"], table["timing_advance"])
+    for time_s, cell, steps in zip(*(column.tolist() for column in columns), strict=True):
+        found.setdefault(float(time_s), {})[str(cell)] = int(steps)
+    return found
+
+
+def _cell(sites: SiteModels, row: Heard, serving: str | None) -> tuple[str | None, Reason]:
+    """Return the cell that a row is of, or None and why."""
+    if row.cell is not None:
+        known = row.cell in sites.cells
+        return (row.cell, Reason.NOT_USED_BY_FILTER) if known else (None, Reason.UNKNOWN_CELL)
+    if row.arfcn is None:
+        return None, Reason.NOT_USED_BY_FILTER
+    found = sites.neighbours(serving, row.arfcn, row.bsic)
+    if len(found) == 1:
+        return found[0], Reason.NOT_USED_BY_FILTER
+    return None, Reason.AMBIGUOUS_CELL if found else Reason.UNKNOWN_CELL
+
+
+def _what(row: Heard) -> str:
+    if row.cell is not None or row.arfcn is None:
+        return row.cell or ""
+    return f"ARFCN {row.arfcn}, BSIC {'unknown' if row.bsic is None else row.bsic}"

@@ -1,0 +1,275 @@
+"""Cell lists of others: which of their columns are the fields of a cell plan."""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import io
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from mapfilter.errors import Faults, InputError, fail
+
+_LARGEST_BYTES = 1 << 26
+_MOST_FIELDS = 5_000_000
+_SEPARATORS = (",", ";", "\t")
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A header and rows of texts; blank lines are left out.
+
+    Parameters
+    ----------
+    path : Path
+    separator : str
+        Comma, semicolon or tab.
+    header : tuple of str
+        Without blanks around the names.
+    rows : tuple of (int, list of str)
+        Line of the file, and its fields.
+    """
+
+    path: Path
+    separator: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[int, list[str]], ...]
+
+    def number(self, text: str) -> float | None:
+        """Return a finite number or None; decimal commas are read where they separate nothing."""
+        return number(text, decimal_comma=self.separator != ",")
+
+
+def number(text: str, *, decimal_comma: bool = False) -> float | None:
+    """Return a text as a finite number, or None.
+
+    Examples
+    --------
+    >>> number("60.5"), number("60,5"), number("60,5", decimal_comma=True), number("1_0")
+    (60.5, None, 60.5, None)
+    """
+    if decimal_comma and text.count(",") == 1 and "." not in text:
+        text = text.replace(",", ".")
+    try:
+        value = float("?" if "_" in text else text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def read_table(path: Path, what: str) -> Table:
+    """Read a table whose first line names its columns.
+
+    Parameters
+    ----------
+    path : Path
+        UTF-8; commas, semicolons or tabs.
+    what : str
+        What it should be, for messages, such as ``"a cell plan"``.
+
+    Raises
+    ------
+    InputError
+        The file is missing, empty, too large or no such text.
+    """
+    text = _text(path, what)
+    head = next((line for line in text.splitlines() if line.strip()), "")
+    separator = max(_SEPARATORS, key=head.count)
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
+    lines: list[tuple[int, list[str]]] = []
+    fields = 0
+    try:
+        for row in reader:
+            if any(field.strip() for field in row):
+                lines.append((reader.line_num, row))
+                fields += len(row)
+                if fields > _MOST_FIELDS:
+                    got = f"more in the first {reader.line_num} lines"
+                    raise fail(InputError, str(path), f"{what} of at most 5e6 fields", got)
+    except csv.Error as error:
+        raise fail(InputError, f"{path} row {reader.line_num}", "CSV", error) from error
+    if not lines:
+        raise fail(InputError, str(path), "a header line and rows", "nothing", "an empty file")
+    header = tuple(name.strip() for name in lines[0][1])
+    return Table(path, separator, header, tuple(lines[1:]))
+
+
+def _text(path: Path, what: str) -> str:
+    try:
+        if path.stat().st_size > _LARGEST_BYTES:
+            raise fail(InputError, str(path), f"{what} of at most 64 MiB", "a larger file")
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        got = f"other bytes at offset {error.start}"
+        hint = "saved in a Windows code page, or no text file"
+        raise fail(InputError, str(path), "text in UTF-8", got, hint) from error
+    except OSError as error:
+        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
+    if "\0" in text:
+        raise fail(InputError, str(path), "text in UTF-8", "NUL characters", "no text file")
+    return text
+
+
+Layout = Literal["plan", "atoll", "opencellid"]
+
+Columns = Mapping[str, tuple[str, ...]]
+"""By field, the names that its column may have; the first that is there counts."""
+
+COLUMNS = (
+    "cell", "site", "lat", "lon", "height_m", "azimuth_deg", "downtilt_deg",
+    "mechanical_downtilt_deg", "antenna", "beamwidth_deg", "max_attenuation_db",
+    "vertical_beamwidth_deg", "side_lobe_db", "eirp_dbm", "frequency_mhz", "indoor",
+    "penetration_loss_db", "mcc", "mnc", "lac", "ci", "arfcn", "bsic",
+)  # fmt: skip
+"""Columns of a file that mapfilter writes, in order."""
+ATOLL: Columns = {
+    "cell": ("TX_ID", "TX_NAME"),
+    "site": ("SITE_NAME", "SITE"),
+    "lat": ("LATITUDE",),
+    "lon": ("LONGITUDE",),
+    "east": ("X",),
+    "north": ("Y",),
+    "height_m": ("HEIGHT",),
+    "azimuth_deg": ("AZIMUT", "AZIMUTH"),
+    "downtilt_deg": ("ELECTRICAL_TILT",),
+    "mechanical_downtilt_deg": ("TILT", "MECHANICAL_TILT"),
+    "antenna": ("ANTENNA_NAME",),
+    "eirp_dbm": ("EIRP",),
+    "frequency_mhz": ("FREQUENCY",),
+    "mcc": ("MCC",),
+    "mnc": ("MNC",),
+    "lac": ("LAC",),
+    "ci": ("CELL_IDENTITY", "CI"),
+    "arfcn": ("CONTROL_CHANNEL", "BCCH"),
+    "bsic": ("BSIC",),
+}
+OPENCELLID: Columns = {
+    "lat": ("lat",),
+    "lon": ("lon",),
+    "mcc": ("mcc",),
+    "mnc": ("net", "mnc"),
+    "lac": ("area", "lac"),
+    "ci": ("cell", "cellid"),
+}
+OPENCELLID_HEADER = (
+    "radio", "mcc", "net", "area", "cell", "unit", "lon", "lat", "range", "samples", "changeable",
+    "created", "updated", "averageSignal",
+)  # fmt: skip
+"""Of the downloads of OpenCellID and of the Mozilla Location Service; the former leave it out."""
+_OWN: Columns = {name: (name,) for name in (*COLUMNS, "east", "north", "crs")}
+LAYOUTS: Mapping[Layout, Columns] = {
+    "plan": _OWN,
+    "atoll": {name: (*ATOLL.get(name, ()), name) for name in _OWN},
+    "opencellid": OPENCELLID,
+}
+
+_RADIOS = {"GSM", "UMTS", "LTE", "CDMA", "NR"}
+_IDENTITY = ("mcc", "mnc", "lac", "ci")
+
+
+@dataclass(frozen=True, slots=True)
+class Arranged:
+    """A table with the columns of a cell plan.
+
+    Parameters
+    ----------
+    header : tuple of str
+        Fields.
+    rows : tuple of (int, list of str)
+        Line of the file, and its fields.
+    shown : mapping of str to str
+        How messages name a field: with the file's own column.
+    notes : tuple of str
+        Which values were filled in.
+    """
+
+    header: tuple[str, ...]
+    rows: tuple[tuple[int, list[str]], ...]
+    shown: Mapping[str, str]
+    notes: tuple[str, ...]
+
+
+def arrange(
+    table: Table,
+    layout: Layout,
+    columns: Mapping[str, str],
+    defaults: Mapping[str, float],
+    faults: Faults,
+) -> Arranged:
+    """Pick the columns of a cell plan from a list of another layout.
+
+    Parameters
+    ----------
+    table : Table
+    layout : {"plan", "atoll", "opencellid"}
+        Names the columns that ``columns`` does not.
+    columns : mapping of str to str
+        Column of the file, by field.
+    defaults : mapping of str to float
+        For fields without a column, or empty ones.
+    faults : Faults
+        Rows of another length are added, and left out.
+
+    Raises
+    ------
+    InputError
+        A column of ``columns`` is not in the file.
+    """
+    header, rows = table.header, table.rows
+    if layout == "opencellid" and header and header[0].upper() in _RADIOS:
+        header, rows = OPENCELLID_HEADER, ((1, list(table.header)), *rows)
+    picked = _pick(table, header, layout, columns)
+    fields = [*picked, *(name for name in defaults if name not in picked)]
+    composed = "cell" not in picked and all(name in picked for name in _IDENTITY)
+    filled: Counter[str] = Counter()
+    found = []
+    for line, texts in rows:
+        if len(texts) != len(header):
+            more = len(texts) > len(header)
+            hint = "a decimal comma, or an unquoted separator" if more else "the line is cut off"
+            faults.add(f"{table.path} row {line}, fields", f"{len(header)}", f"{len(texts)}", hint)
+            continue
+        values = {name: texts[at].strip() for name, at in picked.items()}
+        for name, default in defaults.items():
+            if not values.get(name):
+                values[name] = repr(default)
+                filled[name] += 1
+        if composed:
+            values["cell"] = "-".join(values[name] for name in _IDENTITY)
+        found.append((line, list(values.values())))
+    notes = tuple(
+        f"{name} = {defaults[name]:g} for {count} of {len(found)} cells that tell none"
+        for name, count in sorted(filled.items())
+    )
+    shown = {name: f"{header[at]} ({name})" for name, at in picked.items() if header[at] != name}
+    return Arranged((*fields, "cell") if composed else tuple(fields), tuple(found), shown, notes)
+
+
+def _pick(
+    table: Table, header: tuple[str, ...], layout: Layout, columns: Mapping[str, str]
+) -> dict[str, int]:
+    """Return the place of each field's column."""
+    faults = Faults()
+    places = {name: at for at, name in reversed(list(enumerate(header)))}
+    folded = {name.casefold(): at for name, at in places.items()}
+    picked = {}
+    for field, name in columns.items():
+        if name in places:
+            picked[field] = places[name]
+        else:
+            near = difflib.get_close_matches(name, places, n=1, cutoff=0.5)
+            hint = f"{near[0]} meant" if near else ""
+            faults.add(f"{table.path} header", f"a column {name} ({field})", "none", hint)
+    faults.raise_if_any(InputError)
+    for field, names in LAYOUTS[layout].items():
+        at = next((folded[name.casefold()] for name in names if name.casefold() in folded), None)
+        if at is not None:
+            picked.setdefault(field, at)
+    if {"lat", "lon", "east", "north"} <= picked.keys():
+        surplus = ("lat", "lon") if {"east", "north"} & columns.keys() else ("east", "north")
+        picked = {field: at for field, at in picked.items() if field not in surplus}
+    return picked

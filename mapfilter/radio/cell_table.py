@@ -1,0 +1,272 @@
+"""Rows of a cell-plan CSV file as typed values; every fault is told by file, row and field."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from pyproj import CRS
+
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.geodesy import project, projected_crs, unproject
+from mapfilter.radio.cell_layouts import COLUMNS, Arranged, Layout, arrange, number, read_table
+from mapfilter.radio.cell_rules import ANTENNAS, OPTIONAL, RANGES, antenna_fault, id_fault
+
+_ALLOWED = {*COLUMNS, "east", "north", "crs"}
+_REQUIRED = ("cell", "height_m", "eirp_dbm", "frequency_mhz")
+_TRUE, _FALSE = {"1", "true", "yes", "y"}, {"0", "false", "no", "n"}
+_NEAR_DEG = 3.0
+_LONGEST_SHOWN = 80
+
+
+@dataclass(slots=True)
+class Row:
+    """One line of the file: its number, its values by field of a cell, and whether any is wrong."""
+
+    line: int
+    values: dict[str, Any]
+    faulty: bool = False
+
+
+def read_plan(
+    path: Path,
+    crs: str,
+    faults: Faults,
+    layout: Layout = "plan",
+    columns: Mapping[str, str] | None = None,
+    defaults: Mapping[str, float] | None = None,
+) -> tuple[list[Row], tuple[str, ...]]:
+    """Read and check every row of a cell plan, or of a list of another layout.
+
+    What is wrong is added to ``faults``; also returned is what was filled in.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read as a table, or its header is wrong.
+    """
+    table = read_table(path, "a cell plan")
+    if layout == "plan" and not columns:
+        _check_header(path, table.header, known_only=True)
+        arranged = Arranged(table.header, table.rows, {}, ())
+    else:
+        arranged = arrange(table, layout, columns or {}, defaults or {}, faults)
+        _check_header(path, arranged.header, known_only=False)
+    if not arranged.rows and not faults.found:
+        raise fail(InputError, str(path), "at least one cell", "a header without rows")
+    reader = _Reader(path, arranged, crs, table.separator != ",", faults)
+    rows = [reader.row(line, texts) for line, texts in arranged.rows]
+    systems = {row.values.get("crs", crs) for row in rows}
+    if len(systems) > 1:
+        faults.add(f"{path}, crs", "one CRS in all rows", ", ".join(sorted(systems)))
+    _place(path, rows, crs, faults)
+    return rows, arranged.notes
+
+
+def _check_header(path: Path, header: tuple[str, ...], *, known_only: bool) -> None:
+    faults = Faults()
+    where = f"{path} header"
+    for name in header:
+        if name not in _ALLOWED and known_only:
+            near = difflib.get_close_matches(name.lower(), sorted(_ALLOWED), n=1, cutoff=0.5)
+            faults.add(where, "known columns only", repr(name), f"{near[0]} meant" if near else "")
+    for name in sorted({name for name in header if header.count(name) > 1}):
+        faults.add(where, "each column once", f"{name} {header.count(name)} times")
+    wanted = list(_REQUIRED)
+    wanted += ["east", "north"] if {"east", "north"} & set(header) else ["lat", "lon"]
+    for name in wanted:
+        if name not in header:
+            faults.add(where, f"a column {name}", "none", "left out or misspelt")
+    if {"lat", "lon"} & set(header) and {"east", "north"} & set(header):
+        faults.add(where, "lat and lon, or east and north", "both")
+    faults.raise_if_any(InputError)
+
+
+class _Reader:
+    """Turns the texts of lines into values."""
+
+    def __init__(
+        self, path: Path, table: Arranged, crs: str, decimal_comma: bool, faults: Faults
+    ) -> None:
+        self._path, self._header, self._shown = path, table.header, table.shown
+        self._crs, self._decimal_comma, self._faults = crs, decimal_comma, faults
+        self._row = Row(0, {})
+
+    def row(self, line: int, texts: list[str]) -> Row:
+        self._row = Row(line, {})
+        if len(texts) != len(self._header):
+            hint = (
+                "a decimal comma, or an unquoted separator"
+                if len(texts) > len(self._header)
+                else "the line is cut off"
+            )
+            self._fault("fields", str(len(self._header)), str(len(texts)), hint)
+            return self._row
+        given = {name: text.strip() for name, text in zip(self._header, texts, strict=True)}
+        values = self._row.values
+        values["id"] = self._identifier("cell", given["cell"])
+        values["site"] = self._identifier("site", given.get("site") or given["cell"])
+        for name in RANGES:
+            if name not in ("east_m", "north_m"):
+                self._number(name, given.get(name, ""))
+        for name in ("lat", "lon", "east", "north"):
+            if name in given:
+                values[name] = self._parse(name, given[name], "a number")
+        values.setdefault("azimuth_deg", None)
+        values["indoor"] = self._truth("indoor", given.get("indoor", ""))
+        default = "omni" if not given.get("azimuth_deg") else "sector"
+        values["antenna"] = self._antenna(given.get("antenna", ""), default)
+        if given.get("crs"):
+            try:
+                values["crs"] = projected_crs(given["crs"], f"{self._path} row {line}, crs")
+            except InputError as error:
+                self._faults.found.extend(error.faults)
+                self._row.faulty = True
+        return self._row
+
+    def _fault(self, name: str, expected: str, got: str, hint: str = "") -> None:
+        shown = self._shown.get(name, name)
+        self._faults.add(f"{self._path} row {self._row.line}, {shown}", expected, got, hint)
+        self._row.faulty = True
+
+    def _identifier(self, name: str, text: str) -> str:
+        if wrong := id_fault(text):
+            self._fault(name, *wrong)
+        return text
+
+    def _antenna(self, text: str, default: str) -> str:
+        name = text or default
+        if name.lower() in ANTENNAS:
+            return name.lower()
+        if wrong := antenna_fault(name):
+            self._fault("antenna", *wrong)
+        return name
+
+    def _number(self, name: str, text: str) -> None:
+        allowed = RANGES[name]
+        if not text:
+            if name in _REQUIRED:
+                self._fault(name, allowed.expected, "nothing")
+            elif name in OPTIONAL:
+                self._row.values[name] = None
+            return
+        value = self._parse(name, text, allowed.expected)
+        if value is None:
+            return
+        if not allowed.holds(value):
+            self._fault(name, allowed.expected, text, allowed.hint(value))
+        else:
+            self._row.values[name] = int(value) if allowed.whole else value
+
+    def _parse(self, name: str, text: str, expected: str) -> float | None:
+        value = number(text, decimal_comma=self._decimal_comma)
+        if value is None:
+            comma = text.replace(",", "", 1).lstrip("-").isdigit()
+            self._fault(
+                name,
+                expected,
+                _shown(text),
+                "a decimal comma" if comma and "," in text else "",
+            )
+        return value
+
+    def _truth(self, name: str, text: str) -> bool:
+        if text.lower() not in _TRUE | _FALSE | {""}:
+            self._fault(name, "1 or 0, true or false, yes or no", repr(text))
+        return text.lower() in _TRUE
+
+
+def _shown(text: str) -> str:
+    if text.lower().lstrip("+-") in ("nan", "inf", "infinity"):
+        return text
+    return repr(text[:_LONGEST_SHOWN]) if text else "nothing"
+
+
+def _place(path: Path, rows: list[Row], crs: str, faults: Faults) -> None:
+    """Give every row its east and north in ``crs``, checking that they lie where the CRS is for."""
+    _project(rows, crs)
+    for row in rows:
+        if {"lat", "lon"} <= row.values.keys():
+            fields, wrong = "lat, lon", _from_degrees(row.values, crs)
+        elif {"east", "north"} <= row.values.keys():
+            fields, wrong = "east, north", _from_metres(row.values, crs)
+        else:
+            row.faulty = True
+            continue
+        if wrong is not None:
+            faults.add(f"{path} row {row.line}, {fields}", *wrong)
+            row.faulty = True
+
+
+def _project(rows: list[Row], crs: str) -> None:
+    """Give rows in degrees their metres, all at once."""
+    some = [row.values for row in rows]
+    some = [v for v in some if v.get("lat") is not None and v.get("lon") is not None]
+    east_m, north_m = project(crs, [v["lon"] for v in some], [v["lat"] for v in some])
+    for values, east, north in zip(some, east_m.tolist(), north_m.tolist(), strict=True):
+        values["east_m"], values["north_m"] = east, north
+
+
+def _from_degrees(values: dict[str, Any], crs: str) -> tuple[str, str, str] | None:
+    lat, lon = values["lat"], values["lon"]
+    return None if lat is None or lon is None else _degree_fault(lat, lon, crs)
+
+
+def _from_metres(values: dict[str, Any], crs: str) -> tuple[str, str, str] | None:
+    east, north, own = values["east"], values["north"], values.get("crs", crs)
+    if east is None or north is None:
+        return None
+    values["east_m"], values["north_m"] = east, north
+    if own != crs:
+        east_m, north_m = project(crs, *unproject(own, east, north))
+        values["east_m"], values["north_m"] = float(east_m), float(north_m)
+    return _metre_fault(east, north, own)
+
+
+def _metre_fault(east: float, north: float, crs: str) -> tuple[str, str, str] | None:
+    expected, got = f"metres where {crs} is used", f"{east:g}, {north:g}"
+    if max(abs(east), abs(north)) <= 180 and (_near(crs, east, north) or _near(crs, north, east)):
+        return expected, got, "degrees given for metres"
+    lon_deg, lat_deg = unproject(crs, east, north)
+    if _near(crs, float(lon_deg), float(lat_deg)):
+        return None
+    return expected, got, "east and north swapped, or another CRS"
+
+
+def _degree_fault(lat: float, lon: float, crs: str) -> tuple[str, str, str] | None:
+    got = f"{lat:g}, {lon:g}"
+    if abs(lat) > 180 or abs(lon) > 180:
+        return "degrees in -90..90 and -180..180", got, "metres given for degrees"
+    if abs(lat) > 90:
+        return "degrees in -90..90 and -180..180", got, "longitude and latitude swapped"
+    if _near(crs, lon, lat):
+        return None
+    swapped = abs(lon) <= 90 and _near(crs, lat, lon)
+    hint = (
+        "longitude and latitude swapped" if swapped else "a cell of another place, or another CRS"
+    )
+    return f"a place where {crs} is used", got, hint
+
+
+@lru_cache(maxsize=16)
+def _area_of_use(crs: str) -> Any:
+    return CRS.from_user_input(crs).area_of_use
+
+
+def _near(crs: str, lon_deg: float, lat_deg: float) -> bool:
+    """Tell whether a place lies in, or within a few degrees of, the area a CRS is made for."""
+    area = _area_of_use(crs)
+    if not (math.isfinite(lon_deg) and math.isfinite(lat_deg)):
+        return False
+    if area is None:
+        return True
+    middle = area.west + ((area.east - area.west) % 360) / 2
+    half = ((area.east - area.west) % 360) / 2 or 180.0
+    offset = (lon_deg - middle + 180) % 360 - 180
+    south, north = area.south - _NEAR_DEG, area.north + _NEAR_DEG
+    return bool(abs(offset) <= half + _NEAR_DEG and south <= lat_deg <= north)

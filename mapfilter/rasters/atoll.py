@@ -1,0 +1,233 @@
+"""Exports of a planning tool: one raw raster per transmitter, and a table that lists them.
+
+The table (``.csv`` or ``.txt``) has a column ``TX_NAME`` with the cell's id and ``FILE_NAME`` with
+the raster; ``RESOLUTION``, ``AREA_XMIN``, ``AREA_XMAX``, ``AREA_YMIN``, ``AREA_YMAX`` and ``NBITS``
+are compared with the raster's own header, and stand in for it where there is none. The area's
+limits are outer *edges* of pixels, ``ULXMAP`` and ``ULYMAP`` of a header are a pixel's *centre*:
+taking one for the other shifts everything by half a pixel, so both are compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.geodesy import Lattice
+from mapfilter.radio.cell_layouts import Table, read_table
+from mapfilter.radio.cell_rules import id_fault
+from mapfilter.rasters.grid_header import GridHeader
+
+INDEX_COLUMNS = ("TX_NAME", "FILE_NAME")
+"""Columns that make a table an index of rasters."""
+_AREA = ("AREA_XMIN", "AREA_XMAX", "AREA_YMIN", "AREA_YMAX")
+_NUMBERS = ("RESOLUTION", "NBITS", *_AREA)
+_SUFFIXES = (".csv", ".txt")
+_LONGEST_HEAD_BYTES = 1 << 16
+_SAME_PX = 0.01
+_HALF_PX = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class IndexRow:
+    """A raster as the index tells of it.
+
+    Parameters
+    ----------
+    where : str
+        Index file and row.
+    cell_id : str
+    path : Path
+        The raster, in the folder of the index or below.
+    resolution_m, bits : float or None
+    area_m : tuple of float or None
+        West, south, east, north edges.
+    """
+
+    where: str
+    cell_id: str
+    path: Path
+    resolution_m: float | None = None
+    bits: float | None = None
+    area_m: tuple[float, float, float, float] | None = None
+
+    def header(self) -> GridHeader | None:
+        """Return what stands in for a raster's own header, if the row tells enough."""
+        if self.area_m is None or self.resolution_m is None or self.bits is None:
+            return None
+        west, south, east, north = self.area_m
+        values = {
+            "NROWS": repr(round((north - south) / self.resolution_m, 6)),
+            "NCOLS": repr(round((east - west) / self.resolution_m, 6)),
+            "NBITS": repr(self.bits),
+            "XDIM": repr(self.resolution_m),
+            "YDIM": repr(self.resolution_m),
+            "ULXMAP": repr(west + self.resolution_m / 2),
+            "ULYMAP": repr(north - self.resolution_m / 2),
+        }
+        return GridHeader(self.where, values)
+
+    def check(self, lattice: Lattice, bits: int | None, faults: Faults) -> str:
+        """Compare the row with a raster's own header; return what is worth telling.
+
+        Raises nothing: what does not fit is added to ``faults``.
+        """
+        side_m = lattice.resolution_m
+        if self.resolution_m is not None and abs(self.resolution_m - side_m) > 1e-6 * side_m:
+            got, hint = f"{side_m:g} in {self.path.name}", "index and rasters of different runs"
+            faults.add(f"{self.where}, RESOLUTION", f"{self.resolution_m:g}", got, hint)
+            return ""
+        if self.bits is not None and bits is not None and self.bits != bits:
+            got = f"{bits} in the header of {self.path.name}"
+            faults.add(f"{self.where}, NBITS", f"{self.bits:g}", got, "one of them is wrong")
+        return self._check_area(lattice, faults) if self.area_m is not None else ""
+
+    def _check_area(self, lattice: Lattice, faults: Faults) -> str:
+        assert self.area_m is not None
+        pairs = zip(self.area_m, lattice.bounds_m, strict=True)
+        west, south, east, north = ((told - is_) / lattice.resolution_m for told, is_ in pairs)
+        if max(map(abs, (west, south, east, north))) <= _SAME_PX:
+            return ""
+        if _near(west, _HALF_PX, south, _HALF_PX, east, -_HALF_PX, north, -_HALF_PX):
+            return "area limits are centres of pixels in the index"
+        if _near(west, east, south, north):
+            got = f"{self.path.name} shifted by {_told(-west)} pixels east, {_told(-south)} north"
+            half = all(
+                min(abs(shift), abs(abs(shift) - _HALF_PX)) <= _SAME_PX for shift in (west, south)
+            )
+            hint = (
+                "half a pixel: a corner where the header has to hold the pixel's centre"
+                if half
+                else "index and rasters of different runs"
+            )
+            faults.add(f"{self.where}, area", "the area of the raster's header", got, hint)
+        elif min(west, south, -east, -north) < -_SAME_PX:
+            told = ", ".join(f"{value:g}" for value in self.area_m)
+            got = ", ".join(f"{value:g}" for value in lattice.bounds_m)
+            hint = "index and rasters of different runs"
+            faults.add(f"{self.where}, area", told, f"{got} in {self.path.name}", hint)
+        else:
+            return "rasters reach beyond their areas in the index"
+        return ""
+
+
+def find_index(folder: Path) -> Path | None:
+    """Return the index in a folder, or None.
+
+    Raises
+    ------
+    InputError
+        There are several.
+    """
+    found = [path for path in sorted(folder.iterdir()) if _is_index(path)]
+    if len(found) > 1:
+        names = ", ".join(path.name for path in found[:5])
+        raise fail(InputError, str(folder), "one index of rasters", names, "name one of them")
+    return found[0] if found else None
+
+
+def read_index(path: Path) -> tuple[IndexRow, ...]:
+    """Read an index of rasters.
+
+    Raises
+    ------
+    InputError
+        With every fault: columns missing, a name that leads out of the folder, a raster that is
+        not there, numbers that are none, an id given twice.
+    """
+    table = read_table(path, "an index of rasters")
+    header = [name.strip('" ').upper() for name in table.header]
+    faults = Faults()
+    for name in INDEX_COLUMNS:
+        if name not in header:
+            faults.add(f"{path} header", f"a column {name}", "none", "no index of rasters")
+    for name in sorted({name for name in header if name and header.count(name) > 1}):
+        faults.add(f"{path} header", "each column once", name)
+    faults.raise_if_any(InputError)
+    if not table.rows:
+        raise fail(InputError, str(path), "at least one raster", "a header without rows")
+    names = {file.name.lower(): file.name for file in path.parent.iterdir()}
+    rows = tuple(_rows(table, header, names, faults))
+    first: dict[str, str] = {}
+    for row in rows:
+        if row.cell_id in first:
+            hint = "rows of several runs; keep one"
+            got = f"{row.cell_id!r}, as in {first[row.cell_id]}"
+            faults.add(f"{row.where}, TX_NAME", "each cell once", got, hint)
+        first.setdefault(row.cell_id, row.where)
+    faults.raise_if_any(InputError)
+    return rows
+
+
+def _is_index(path: Path) -> bool:
+    if path.suffix.lower() not in _SUFFIXES or path.name.startswith(".") or not path.is_file():
+        return False
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(_LONGEST_HEAD_BYTES).upper()
+    except OSError:
+        return False
+    first = next((line for line in head.splitlines() if line.strip()), b"")
+    return all(name.encode() in first for name in INDEX_COLUMNS)
+
+
+def _rows(
+    table: Table, header: list[str], names: dict[str, str], faults: Faults
+) -> Iterator[IndexRow]:
+    for line, texts in table.rows:
+        where = f"{table.path} row {line}"
+        if len(texts) != len(header):
+            hint = "a decimal comma, or an unquoted separator"
+            faults.add(where, f"{len(header)} fields", str(len(texts)), hint)
+            continue
+        given = dict(zip(header, (text.strip() for text in texts), strict=True))
+        if wrong := id_fault(given["TX_NAME"]):
+            faults.add(f"{where}, TX_NAME", *wrong)
+            continue
+        path = _within(table.path.parent, given["FILE_NAME"], names)
+        if path is None or not path.is_file():
+            expected = f"the name of a file in {table.path.parent}"
+            hint = "rasters moved elsewhere, or exported to another folder"
+            faults.add(f"{where}, FILE_NAME", expected, repr(given["FILE_NAME"][:80]), hint)
+            continue
+        values: dict[str, float | None] = {}
+        for name in _NUMBERS:
+            values[name] = table.number(given[name]) if given.get(name) else None
+            if given.get(name) and values[name] is None:
+                faults.add(f"{where}, {name}", "a number", repr(given[name][:80]))
+        west, east, south, north = (values[name] for name in _AREA)
+        area = None
+        if west is not None and east is not None and south is not None and north is not None:
+            area = west, south, east, north
+            if west >= east or south >= north:
+                got = ", ".join(f"{value:g}" for value in (west, east, south, north))
+                faults.add(f"{where}, area", "XMIN < XMAX and YMIN < YMAX", got, "swapped")
+        side_m = values["RESOLUTION"]
+        if side_m is not None and side_m <= 0:
+            faults.add(f"{where}, RESOLUTION", "metres > 0", f"{side_m:g}")
+            continue
+        yield IndexRow(where, given["TX_NAME"], path, side_m, values["NBITS"], area)
+
+
+def _within(folder: Path, name: str, names: dict[str, str]) -> Path | None:
+    """Return a file of the folder or below it; None for names that lead out of it, or are none."""
+    place = PurePosixPath(name.replace("\\", "/"))
+    if not place.parts or place.is_absolute() or ".." in place.parts or ":" in name or "\0" in name:
+        return None
+    # Names from Windows do not tell capitals from small letters.
+    path = folder / (names.get(name.lower(), name) if len(place.parts) == 1 else place)
+    try:
+        inside = path.resolve().is_relative_to(folder.resolve())
+    except (OSError, ValueError):
+        return None
+    return path if inside and len(str(path)) < 4096 else None
+
+
+def _told(shift_px: float) -> str:
+    return f"{round(shift_px, 2) + 0.0:+.2f}"
+
+
+def _near(*pairs: float) -> bool:
+    values = list(pairs)
+    return all(abs(a - b) <= _SAME_PX for a, b in zip(values[::2], values[1::2], strict=True))

@@ -1,0 +1,228 @@
+"""Rasters of different resolutions and extents, read as if they lay on one lattice."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+
+from mapfilter._types import Floats, Floats32, Ints
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.rasters.files import RasterFile, Window
+
+Resampling = Literal["nearest", "bilinear"]
+
+_ALIGNED_PX = 1e-3
+_EDGE_PX = 1e-6
+_MOST_PX = 40_000_000_000
+_LARGEST_SOURCE_BYTES = 1 << 30
+
+
+def common_lattice(
+    files: Sequence[RasterFile], resolution_m: float | None, resampling: Resampling
+) -> tuple[Lattice, tuple[str, ...]]:
+    """Return one lattice for several files, and in words what is done to those that differ.
+
+    Its pixels are those of most files of the finest resolution, unless another resolution is
+    asked for; it covers all files.
+
+    Raises
+    ------
+    InputError
+        The files are in different systems, or far apart.
+    """
+    lattices = [file.lattice for file in files]
+    first = lattices[0]
+    _check_systems(files)
+    wanted_m = resolution_m or min(lattice.resolution_m for lattice in lattices)
+    if all(lattice.aligned_with(first) for lattice in lattices) and _alike(
+        wanted_m, first.resolution_m
+    ):
+        return first, ()
+    lattice = _covering(lattices, wanted_m, str(files[0].path.parent))
+    notes = []
+    if any(one.bounds_m != lattice.bounds_m for one in lattices):
+        size = f"{lattice.rows} x {lattice.cols} pixels of {lattice.resolution_m:g} m"
+        notes.append(f"rasters of different extents: put on {size} that cover all of them")
+    off = [file for file in files if _shift(file.lattice, lattice) is None]
+    alike = [file for file in off if _alike(file.lattice.resolution_m, lattice.resolution_m)]
+    others = [file for file in off if file not in alike]
+    if alike:
+        right, up = _off_step(alike[0].lattice, lattice)
+        notes.append(
+            f"{len(alike)} of {len(files)} rasters lie between the pixels of the lattice (by "
+            f"{right:+.2f} pixels east, {up:+.2f} north), resampled ({resampling}): "
+            f"{_names(alike)}"
+        )
+    if others:
+        sides = sorted({file.lattice.resolution_m for file in others})
+        listed = ", ".join(f"{side:g} m" for side in sides[:5])
+        notes.append(
+            f"{len(others)} of {len(files)} rasters resampled ({resampling}) from {listed} "
+            f"to {lattice.resolution_m:g} m: {_names(others)}"
+        )
+    return lattice, tuple(notes)
+
+
+def read_on(
+    file: RasterFile,
+    bands: Sequence[int],
+    lattice: Lattice,
+    window: Window,
+    resampling: Resampling,
+) -> Floats32:
+    """Read bands of a file in a window of another lattice; NaN beyond the file.
+
+    Where the pixels of both coincide, numbers are taken over as they are. Else *nearest* takes the
+    pixel that holds the centre of the one asked for; *bilinear* weighs the four nearest centres,
+    in dB, without those that have no data, and has data where nearest has.
+    """
+    if lattice is file.lattice or lattice == file.lattice:
+        return file.read(bands, window)
+    shift = _shift(file.lattice, lattice)
+    if shift is not None:
+        rows = np.arange(window[2]) + window[0] - shift[0]
+        cols = np.arange(window[3]) + window[1] - shift[1]
+        return _nearest(file, bands, rows, cols)
+    row = _places(window[0], window[2], lattice, file.lattice, vertical=True)
+    col = _places(window[1], window[3], lattice, file.lattice, vertical=False)
+    nearest = _nearest(file, bands, _holding(row), _holding(col))
+    return nearest if resampling == "nearest" else _bilinear(file, bands, row, col, nearest)
+
+
+def _check_systems(files: Sequence[RasterFile]) -> None:
+    faults, first = Faults(), files[0]
+    for file in files:
+        if not same_crs(file.lattice.crs, first.lattice.crs):
+            expected = f"{first.lattice.crs}, as in {first.path.name}"
+            faults.add(f"{file.path}, CRS", expected, file.lattice.crs, "two systems mixed up")
+    faults.raise_if_any(InputError)
+
+
+def _names(files: Sequence[RasterFile]) -> str:
+    return ", ".join(file.path.name for file in files[:3]) + (", …" if len(files) > 3 else "")
+
+
+def _off_step(source: Lattice, target: Lattice) -> tuple[float, float]:
+    """Return by which parts of a pixel, east and north, two lattices of one resolution differ."""
+    right = (source.west_m - target.west_m) / target.resolution_m
+    up = (source.north_m - target.north_m) / target.resolution_m
+    return right - round(right), up - round(up)
+
+
+def _alike(a_m: float, b_m: float) -> bool:
+    return abs(a_m - b_m) <= 1e-6 * max(a_m, b_m)
+
+
+def _covering(lattices: Sequence[Lattice], side_m: float, where: str) -> Lattice:
+    """Return the lattice over all others, in step with most of those of its resolution."""
+    phases = Counter(
+        (round(one.west_m / side_m % 1, 3) % 1, round(one.north_m / side_m % 1, 3) % 1)
+        for one in lattices
+        if _alike(one.resolution_m, side_m)
+    )
+    wanted = phases.most_common(1)[0][0] if phases else None
+    origin_m = (0.0, 0.0)
+    for one in lattices:
+        phase = round(one.west_m / side_m % 1, 3) % 1, round(one.north_m / side_m % 1, 3) % 1
+        if phase == wanted and _alike(one.resolution_m, side_m):
+            origin_m = one.west_m, one.north_m
+            break
+    bounds = np.array([one.bounds_m for one in lattices])
+    west, south = bounds[:, 0].min(), bounds[:, 1].min()
+    east, north = bounds[:, 2].max(), bounds[:, 3].max()
+    left = np.floor((west - origin_m[0]) / side_m + _ALIGNED_PX)
+    right = np.ceil((east - origin_m[0]) / side_m - _ALIGNED_PX)
+    top = np.floor((origin_m[1] - north) / side_m + _ALIGNED_PX)
+    bottom = np.ceil((origin_m[1] - south) / side_m - _ALIGNED_PX)
+    rows, cols = int(bottom - top), int(right - left)
+    if rows * cols > _MOST_PX:
+        expected = f"rasters that {_MOST_PX:.0e} pixels can cover"
+        got = f"{(east - west) / 1000:.0f} km x {(north - south) / 1000:.0f} km at {side_m:g} m"
+        hint = "a raster of another place, or a resolution in the wrong unit"
+        raise fail(InputError, where, expected, got, hint)
+    west_m, north_m = origin_m[0] + left * side_m, origin_m[1] - top * side_m
+    return Lattice(lattices[0].crs, float(west_m), float(north_m), side_m, rows, cols)
+
+
+def _shift(source: Lattice, target: Lattice) -> tuple[int, int] | None:
+    """Return row and column of the source's corner on the target, if their pixels coincide."""
+    longest = max(source.rows, source.cols)
+    if abs(source.resolution_m - target.resolution_m) * longest > _ALIGNED_PX * target.resolution_m:
+        return None
+    down = (target.north_m - source.north_m) / target.resolution_m
+    right = (source.west_m - target.west_m) / target.resolution_m
+    row, col = round(down), round(right)
+    return (row, col) if max(abs(down - row), abs(right - col)) <= _ALIGNED_PX else None
+
+
+def _places(first: int, count: int, target: Lattice, source: Lattice, *, vertical: bool) -> Floats:
+    """Return where the target's centres lie, in pixels from the source's north or west edge."""
+    centre = np.arange(first, first + count) + 0.5
+    if vertical:
+        north_m = target.north_m - centre * target.resolution_m
+        return np.asarray((source.north_m - north_m) / source.resolution_m)
+    east_m = target.west_m + centre * target.resolution_m
+    return np.asarray((east_m - source.west_m) / source.resolution_m)
+
+
+def _holding(place: Floats) -> Ints:
+    """Return the pixels that hold places; on an edge, whatever the rounding, the later one."""
+    return np.floor(place + _EDGE_PX).astype(np.int64)
+
+
+def _nearest(file: RasterFile, bands: Sequence[int], rows: Ints, cols: Ints) -> Floats32:
+    """Take pixels; rows and columns ascend, and those beyond the file are NaN."""
+    values = np.full((len(bands), rows.size, cols.size), np.nan, dtype=np.float32)
+    r = np.flatnonzero((rows >= 0) & (rows < file.lattice.rows))
+    c = np.flatnonzero((cols >= 0) & (cols < file.lattice.cols))
+    if r.size and c.size:
+        found = _taken(file, bands, rows[r], cols[c])
+        values[:, r[0] : r[-1] + 1, c[0] : c[-1] + 1] = found
+    return values
+
+
+def _taken(file: RasterFile, bands: Sequence[int], rows: Ints, cols: Ints) -> Floats32:
+    """Return the pixels at rows and columns of a file, in strips that fit into memory."""
+    width = int(cols.max()) - int(cols.min()) + 1
+    least, step = int(cols.min()), max(1, _LARGEST_SOURCE_BYTES // (4 * width * len(bands)))
+    values = np.empty((len(bands), rows.size, cols.size), dtype=np.float32)
+    done = 0
+    while done < rows.size:
+        top = int(rows[done:].min())
+        some = int(np.searchsorted(rows[done:], top + step)) or 1
+        part = rows[done : done + some]
+        strip = file.read(bands, (top, least, int(part.max()) - top + 1, width))
+        values[:, done : done + some] = strip[:, (part - top)[:, None], cols - least]
+        done += some
+    return values
+
+
+def _bilinear(
+    file: RasterFile,
+    bands: Sequence[int],
+    row: Floats,
+    col: Floats,
+    nearest: Floats32,
+) -> Floats32:
+    """Weigh the four nearest pixels; at the file's edge, those that are there."""
+    weighted = np.zeros(nearest.shape, dtype=np.float64)
+    weight = np.zeros(nearest.shape, dtype=np.float64)
+    above, left = np.floor(row - 0.5), np.floor(col - 0.5)
+    for down in (0, 1):
+        for right in (0, 1):
+            share = np.outer(
+                1 - np.abs(row - 0.5 - above - down), 1 - np.abs(col - 0.5 - left - right)
+            )
+            values = _nearest(
+                file, bands, (above + down).astype(np.int64), (left + right).astype(np.int64)
+            )
+            known = ~np.isnan(values)
+            weighted += np.where(known, values, 0.0) * share
+            weight += known * share
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = weighted / weight
+    return np.where(np.isnan(nearest), np.nan, mean).astype(np.float32)

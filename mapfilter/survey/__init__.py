@@ -1,0 +1,1 @@
+"""Drive tests: measured levels to rasters, cell positions and their validation."""

@@ -1,0 +1,285 @@
+"""Measured maps: levels with positions become mean and deviation at every place near them.
+
+Each cell's levels are a trend (path loss from its antenna, or a calibrated prediction) and what the
+survey found about it: a Gaussian process, or nearest neighbours. An antenna whose place nobody
+knows is located from the levels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.spatial import cKDTree
+from threadpoolctl import threadpool_limits
+
+from mapfilter._types import Floats
+from mapfilter.errors import ConfigError, Faults, InputError, fail
+from mapfilter.radio.cells import CellPlan
+from mapfilter.survey.measurements import Measurements
+from mapfilter.survey.residuals import (
+    GaussianField,
+    NeighbourField,
+    Points,
+    ResidualField,
+    Shadowing,
+    TrendField,
+    learn_shadowing,
+    points_by_cell,
+)
+from mapfilter.survey.trend import (
+    Covariate,
+    DistanceLoss,
+    Prior,
+    Trend,
+    fit_trend,
+    locate_antenna,
+)
+
+_ROUNDS = 2
+_LOCATED_FROM = 300
+_PHONE_HEIGHT_M = 1.5
+_CALIBRATION = {"slope": 1.0, "slope_deviation": 0.2}
+
+
+@dataclass(frozen=True)
+class SurveyOptions:
+    """How measurements become a map.
+
+    Parameters
+    ----------
+    method : {"gp", "knn", "trend"}
+        Gaussian process, nearest neighbours, or the trend alone.
+    trend : {"path_loss", "mean"}
+        Path loss from the antenna, or the cell's mean level. Not used where a prediction is
+        calibrated.
+    reach_m : float
+        Places farther than this from every reading of a cell count as not measured.
+    min_points : int
+        Cells heard in fewer squares are left out.
+    min_points_to_locate : int
+        An antenna of unknown place is located from at least so many; with fewer the trend is the
+        mean.
+    neighbours : int
+        For "knn".
+    square_m : float
+        Readings of one session in one such square count once.
+    most_points : int
+        Larger squares are taken for a cell until it has at most so many points.
+
+    Raises
+    ------
+    ConfigError
+        With every fault.
+    """
+
+    method: Literal["gp", "knn", "trend"] = "gp"
+    trend: Literal["path_loss", "mean"] = "path_loss"
+    reach_m: float = 100.0
+    min_points: int = 3
+    min_points_to_locate: int = 15
+    neighbours: int = 8
+    square_m: float = 10.0
+    most_points: int = 1500
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        if self.method not in ("gp", "knn", "trend"):
+            faults.add("survey, method", "gp, knn or trend", repr(self.method))
+        if self.trend not in ("path_loss", "mean"):
+            faults.add("survey, trend", "path_loss or mean", repr(self.trend))
+        for name, low in (("reach_m", 1.0), ("min_points", 1), ("min_points_to_locate", 3),
+                          ("neighbours", 1), ("square_m", 0.1), ("most_points", 10)):  # fmt: skip
+            value = getattr(self, name)
+            if not low <= value < np.inf:
+                faults.add(f"survey, {name}", f"a number ≥ {low:g}", value)
+        faults.raise_if_any(ConfigError)
+
+
+@dataclass(frozen=True, eq=False)
+class SurveyedCell:
+    """The map of one cell.
+
+    Parameters
+    ----------
+    points : Points
+        What it was made from.
+    trend : Trend
+    field : ResidualField
+        Trend and residuals.
+    antenna : (float, float) or None
+        Known or estimated place, east and north (m); None where it is not known.
+    estimated : bool
+        Whether the place was estimated from the levels.
+    """
+
+    points: Points
+    trend: Trend
+    field: ResidualField
+    antenna: tuple[float, float] | None
+    estimated: bool
+    heard: cKDTree
+
+    def distance_m(self, east_m: Floats, north_m: Floats, beyond_m: float = np.inf) -> Floats:
+        """Return how far places are from the nearest reading; infinite beyond ``beyond_m``."""
+        # The bound itself must still count.
+        bound_m = np.nextafter(beyond_m, np.inf)
+        places = np.column_stack([east_m, north_m])
+        return np.asarray(self.heard.query(places, distance_upper_bound=bound_m)[0])
+
+    def predict(self, east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
+        """Return the mean level (dBm) and the deviation (dB) of a new reading at places."""
+        # Threads make small matrices slower, and their sums depend on how many there are.
+        with threadpool_limits(1):
+            return self.field.predict(east_m, north_m)
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """The maps of all cells.
+
+    Parameters
+    ----------
+    crs : str
+    options : SurveyOptions
+    shadowing : Shadowing
+        Learnt from all cells together.
+    cells : mapping of str to SurveyedCell
+        In the order of their ids.
+    notes : tuple of str
+        What was left out or estimated.
+    """
+
+    crs: str
+    options: SurveyOptions
+    shadowing: Shadowing
+    cells: Mapping[str, SurveyedCell]
+    notes: tuple[str, ...]
+
+
+def fit_survey(
+    measurements: Measurements,
+    options: SurveyOptions,
+    *,
+    plan: CellPlan | None = None,
+    predicted: Mapping[str, Covariate] | None = None,
+) -> Survey:
+    """Make the maps of all cells that were heard often enough.
+
+    Parameters
+    ----------
+    measurements : Measurements
+    options : SurveyOptions
+    plan : CellPlan, optional
+        Where antennas are, for the cells it names; the others are located from their levels.
+    predicted : mapping of str to callable, optional
+        Calibrate predictions: for each cell a function from east and north (m) to the predicted
+        level (dBm, NaN where there is none). Offset, slope and residuals are fitted about it.
+        Cells that were not predicted are left out.
+
+    Raises
+    ------
+    InputError
+        No cell was heard often enough.
+    """
+    with threadpool_limits(1):
+        return _fit(measurements, options, plan, predicted)
+
+
+def _fit(
+    measurements: Measurements,
+    options: SurveyOptions,
+    plan: CellPlan | None,
+    predicted: Mapping[str, Covariate] | None,
+) -> Survey:
+    found = points_by_cell(measurements, options.square_m, options.most_points)
+    notes = []
+    if predicted is not None:
+        strange = [cell_id for cell_id in found if cell_id not in predicted]
+        if strange:
+            notes.append(f"{len(strange)} cells left out: not in the prediction")
+        found = {c: _predicted_only(p, predicted[c]) for c, p in found.items() if c in predicted}
+    points = [some for some in found.values() if len(some) >= options.min_points]
+    if len(points) < len(found):
+        few = len(found) - len(points)
+        notes.append(f"{few} cells left out: heard in fewer than {options.min_points} squares")
+    if not points:
+        hint = "cells named differently than in the prediction" if predicted else ""
+        expected = f"a cell heard in at least {options.min_points} squares"
+        raise fail(InputError, "measurements", expected, f"{len(found)} cells, none of them", hint)
+    level_dbm = float(np.mean([some.level_dbm.mean() for some in points]))
+    plan = plan.to_crs(measurements.crs) if plan is not None else None
+    shadowing = Shadowing()
+    for _ in range(_ROUNDS):
+        trends = [_trend(some, options, level_dbm, shadowing, plan, predicted) for some in points]
+        shadowing = learn_shadowing(points, trends, shadowing)
+    cells = {}
+    for some in points:
+        trend = _trend(some, options, level_dbm, shadowing, plan, predicted)
+        antenna = trend.covariate if isinstance(trend.covariate, DistanceLoss) else None
+        cells[some.cell_id] = SurveyedCell(
+            some,
+            trend,
+            _field(some, trend, shadowing, options),
+            (antenna.east_m, antenna.north_m) if antenna is not None else None,
+            antenna is not None and not (plan is not None and some.cell_id in plan),
+            cKDTree(some.heard_at),
+        )
+    located = sum(cell.estimated for cell in cells.values())
+    if located:
+        notes.append(f"{located} antennas located from their levels")
+    unknown = sum(cell.antenna is None for cell in cells.values())
+    if unknown and predicted is None and options.trend == "path_loss":
+        notes.append(
+            f"{unknown} antennas not located (fewer than {options.min_points_to_locate} squares): "
+            "the trend is their mean level"
+        )
+    return Survey(measurements.crs, options, shadowing, cells, tuple(notes))
+
+
+def _predicted_only(points: Points, covariate: Covariate) -> Points:
+    return points.some(np.isfinite(covariate(points.east_m, points.north_m)))
+
+
+def _trend(
+    points: Points,
+    options: SurveyOptions,
+    level_dbm: float,
+    shadowing: Shadowing,
+    plan: CellPlan | None,
+    predicted: Mapping[str, Covariate] | None,
+) -> Trend:
+    prior = Prior(level_dbm)
+    covariate: Covariate | None = None
+    if predicted is not None:
+        prior = Prior(level_dbm, **_CALIBRATION)
+        covariate = predicted[points.cell_id]
+    elif options.trend == "path_loss" and plan is not None and points.cell_id in plan:
+        cell = plan[points.cell_id]
+        above_m = max(cell.height_m - _PHONE_HEIGHT_M, 1.0)
+        covariate = DistanceLoss(cell.east_m, cell.north_m, above_m)
+    elif options.trend == "path_loss" and len(points) >= options.min_points_to_locate:
+        some = points.thinned(_LOCATED_FROM)
+        covariate = locate_antenna(
+            some.east_m, some.north_m, some.level_dbm, shadowing.covariance_db2(some), prior
+        )
+    return fit_trend(
+        covariate,
+        points.east_m,
+        points.north_m,
+        points.level_dbm,
+        shadowing.covariance_db2(points),
+        prior,
+    )
+
+
+def _field(
+    points: Points, trend: Trend, shadowing: Shadowing, options: SurveyOptions
+) -> ResidualField:
+    if options.method == "gp":
+        return GaussianField(points, trend, shadowing)
+    if options.method == "knn":
+        return NeighbourField(points, trend, shadowing, options.neighbours)
+    return TrendField(trend, shadowing)
