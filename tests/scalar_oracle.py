@@ -96,16 +96,16 @@ def serving_log_likelihood(level_dbm, cell, weights):
     return log_normal_cdf((margin_db + weights.hysteresis_db) / weights.sd_db)
 
 
-def beside_variance(errors, grain_m):
+def beside_variance(errors, particle_spacing_m):
     """Variance between two places of a prediction with exponential correlation (variogram)."""
     variance = errors.roughness_db**2
-    covariance = variance * exp(-grain_m / errors.correlation_m)
+    covariance = variance * exp(-particle_spacing_m / errors.correlation_m)
     return variance + variance - 2 * covariance
 
 
-def innovation_variance(errors, rho, grain_m):
+def innovation_variance(errors, rho, particle_spacing_m):
     """Variance of ``e - ρ e'``, with e a lasting error and a white one."""
-    white = errors.measurement_db**2 + beside_variance(errors, grain_m)
+    white = errors.measurement_db**2 + beside_variance(errors, particle_spacing_m)
     return errors.sd_db**2 * (1 - rho**2) + white * (1 + rho**2)
 
 
@@ -136,7 +136,7 @@ def bound_log_likelihood(level_dbm, candidates_dbm, censored, sd_db):
     return log(sum(likelihoods) / len(likelihoods))
 
 
-def report_log_likelihood(table, now, then, report, options, counted_m, grain_m):
+def report_log_likelihood(table, now, then, report, options, counted_m, particle_spacing_m):
     """Log-likelihood of a whole report for one hypothesis.
 
     Parameters
@@ -151,7 +151,7 @@ def report_log_likelihood(table, now, then, report, options, counted_m, grain_m)
     options : EvidenceOptions
     counted_m : float
         Metres that the report counts for.
-    grain_m : float
+    particle_spacing_m : float
     """
     errors, here, there = options.levels, table[now], table[then]
     total = 0.0
@@ -161,10 +161,10 @@ def report_log_likelihood(table, now, then, report, options, counted_m, grain_m)
     deviations = []
     for band, level, before, away_m in report["levels"]:
         correlation = exp(-away_m / errors.correlation_m)
-        # Heard in an earlier report only, a level is news as far as its error is a new one.
+        # ReportRow in an earlier report only, a level is news as far as its error is a new one.
         rho, news = (0.0, 1 - correlation**2) if before is None else (correlation, 1.0)
         v = innovation_db(level, here[band], rho, before or 0.0, there[band])
-        deviations.append(v * sqrt(news / innovation_variance(errors, rho, grain_m)))
+        deviations.append(v * sqrt(news / innovation_variance(errors, rho, particle_spacing_m)))
     if deviations:
         total += levels_log_likelihood(deviations, errors.common, errors.weight, errors.clip_sd)
     for bands, level, side in report["bounds"]:

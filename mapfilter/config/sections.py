@@ -13,8 +13,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from mapfilter.config.fields import (
     EMBEDDED_MAP,
-    MADE_MAPS,
     NO_MAP,
+    SYNTHETIC_MAPS,
     Beside,
     Box,
     FilePath,
@@ -34,7 +34,7 @@ from mapfilter.models.fingerprint import LevelErrors
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.positioning.bayes.evidence import EvidenceOptions
 from mapfilter.positioning.bayes.options import BayesOptions
-from mapfilter.positioning.gnss.options import SkyOptions, TimingOptions
+from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.propagation.models import Clutter, ModelName
 from mapfilter.simulation.imu import Turns
 from mapfilter.tracks.leave_out import Kind
@@ -266,7 +266,7 @@ class SweepSection(Section):
 
     sigma_trans_m: NotNegatives | None = None
     sigma_orient_deg: Degrees | None = None
-    bias_deg: Degrees | None = None
+    bias_sd_deg: Degrees | None = None
     drift_deg_per_sqrt_s: Degrees | None = None
     scale: Shares | None = None
     prediction_error_db: NotNegatives | None = None
@@ -291,7 +291,7 @@ class BayesSection(Section):
 
     step_sd_m: NotNegative = 0.3
     heading_sd_deg: NotNegative = 6.0
-    bias_deg: NotNegative = 3.0
+    bias_sd_deg: NotNegative = 3.0
     drift_deg_per_sqrt_m: NotNegative = 0.05
     scale: Annotated[float, Field(ge=0, lt=1)] = 0.02
     map_sd_m: Positive = 4.0
@@ -321,7 +321,7 @@ class BayesSection(Section):
             MotionErrors(
                 step_sd_m=self.step_sd_m,
                 heading_sd_rad=radians(self.heading_sd_deg),
-                bias_sd_rad=radians(self.bias_deg),
+                bias_sd_rad=radians(self.bias_sd_deg),
                 bias_drift_rad_per_sqrt_m=radians(self.drift_deg_per_sqrt_m),
                 scale_sd=self.scale,
             ),
@@ -342,7 +342,7 @@ class BayesSection(Section):
                 switch_mass=self.switch_mass,
                 switch_hold_m=self.switch_hold_m,
             ),
-            satellites=SkyOptions(
+            satellites=GnssOptions(
                 zenith_m=self.satellite_sd_m,
                 height_m=self.antenna_height_m,
                 height_sd_m=self.antenna_height_sd_m,
@@ -378,12 +378,12 @@ class Area(Section):
     @property
     def map_is_a_file(self) -> bool:
         """Whether the map is read, and not made or absent."""
-        return self.map not in (NO_MAP, *MADE_MAPS)
+        return self.map not in (NO_MAP, *SYNTHETIC_MAPS)
 
     @model_validator(mode="before")
     @classmethod
     def _place_of_a_made_city(cls, given: Any) -> Any:
-        if not isinstance(given, dict) or given.get("map") not in MADE_MAPS or "bbox" in given:
+        if not isinstance(given, dict) or given.get("map") not in SYNTHETIC_MAPS or "bbox" in given:
             return given
         return {"southwest": MADE_SOUTHWEST, "size_m": MADE_SIZE_M, **given}
 
@@ -520,7 +520,7 @@ class Imu(Section):
     period_s: Positive = 1.0
     sigma_trans_m: NotNegative = 0.2
     sigma_orient_deg: NotNegative = 3.0
-    bias_deg: NotNegative = 0.0
+    bias_sd_deg: NotNegative = 0.0
     drift_deg_per_sqrt_s: NotNegative = 0.0
     scale: Annotated[float, Field(ge=0, lt=1)] = 0.0
     translation_noise: Literal["zero_mean", "as_printed"] = "zero_mean"

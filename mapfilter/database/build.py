@@ -26,7 +26,7 @@ from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter.database.manifest import FORMAT, MANIFEST, InputFile
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.database.sources import LaidRoutes, Routes, check_aligned, overlap
+from mapfilter.database.sources import LatticeRoutes, Routes, check_aligned, overlap
 from mapfilter.database.store import open_database
 from mapfilter.database.tiles import (
     TileRows,
@@ -283,7 +283,7 @@ class BuildJob:
         InputError
             As :func:`build`.
         """
-        source = LaidRoutes(routes) if isinstance(routes, RouteLattice) else routes
+        source = LatticeRoutes(routes) if isinstance(routes, RouteLattice) else routes
         check_against_plan(rasters, plan)
         check_aligned(rasters.lattice, source.lattice, f"{rasters.path} and roads")
         job = cls(rasters, plan.to_crs(rasters.lattice.crs), source, floor_dbm, ())
@@ -332,7 +332,7 @@ class BuildJob:
 
     def off_rasters(self, points: int) -> int:
         """Return how many points lie beyond the rasters, of routes that are laid already."""
-        return len(self.routes.points) - points if isinstance(self.routes, LaidRoutes) else 0
+        return len(self.routes.points) - points if isinstance(self.routes, LatticeRoutes) else 0
 
     def _holds(self, window: Window) -> bool:
         inside = overlap(self.rasters.lattice, self.routes.lattice, window)

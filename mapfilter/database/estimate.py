@@ -21,7 +21,7 @@ from mapfilter.database.parts import (
     levels_table,
     points_table,
 )
-from mapfilter.database.sources import LaidRoutes, Routes
+from mapfilter.database.sources import LatticeRoutes, Routes
 from mapfilter.database.store import cells_table
 from mapfilter.database.tiles import read_tile
 from mapfilter.radio.cells import CellPlan
@@ -94,7 +94,7 @@ def dry_run(
     read_tile(job.task(int(drawn[0])))
     found = [_Sample.of(job, number) for number in drawn.tolist()]
     points = float(scale @ [tile.places for tile in found])
-    if isinstance(job.routes, LaidRoutes):
+    if isinstance(job.routes, LatticeRoutes):
         points = float(weight.sum())
     levels = float(scale @ [tile.levels for tile in found])
     began_s = time.perf_counter()

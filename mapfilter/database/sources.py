@@ -61,7 +61,7 @@ class Laid:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LaidRoutes:
+class LatticeRoutes:
     """A whole route lattice, cut by tile."""
 
     points: RouteLattice

@@ -168,7 +168,7 @@ COORDINATES = (
     "update_length_m",
     "sigma_trans_m",
     "sigma_orient_deg",
-    "bias_deg",
+    "bias_sd_deg",
     "drift_deg_per_sqrt_s",
     "scale",
 )
@@ -184,7 +184,7 @@ class SuccessCell:
     database, radio, filter, reading : str
         Names.
     prediction_error_db, report_period_s, imu_period_s, update_length_m, sigma_trans_m : float
-    sigma_orient_deg, bias_deg, drift_deg_per_sqrt_s, scale : float
+    sigma_orient_deg, bias_sd_deg, drift_deg_per_sqrt_s, scale : float
         Where in the grid; NaN where that is not known.
     runs, routes : int
         Counts.
@@ -210,7 +210,7 @@ class SuccessCell:
     update_length_m: float
     sigma_trans_m: float
     sigma_orient_deg: float
-    bias_deg: float
+    bias_sd_deg: float
     drift_deg_per_sqrt_s: float
     scale: float
     runs: int

@@ -98,7 +98,7 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True)
 class UpdateInfo:
-    """News of one update.
+    """StepOutput of one update.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ class Step(Generic[StepBeliefT, EventT]):
     motion_reason : Reason
         Whether the motion was used; ``USED`` when there was none.
     info : UpdateInfo or None
-        News of the update; None without a reading.
+        StepOutput of the update; None without a reading.
     """
 
     event: Event[EventT]

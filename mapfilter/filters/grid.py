@@ -18,7 +18,7 @@ from scipy.special import ndtr
 
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
-from mapfilter.filters.hypotheses import Bins, Summary, nothing, summarise
+from mapfilter.filters.hypotheses import BeliefSummary, Bins, nothing, summarise
 from mapfilter.filters.particle import ParticleOptions, switched
 
 _REACH_SD = 4.0
@@ -137,7 +137,7 @@ class GridModel(Protocol[PriorT, ReadingT]):
     def weigh(self, state: Floats32, log_weight: Floats, reading: ReadingT) -> Reason:
         """Add a reading's log-likelihood to the log weights, in place; say why if it has none."""
 
-    def credible(self, summary: Summary) -> bool:
+    def can_converge(self, summary: BeliefSummary) -> bool:
         """Tell whether a belief may count as having converged, if it agrees on a place."""
 
 
@@ -152,7 +152,7 @@ class GridBelief:
     model : GridModel
     waiting_m : (float, float, float)
         Displacement east and north, and its length, that mass has not been moved by yet.
-    travelled_m, log_evidence, status, agreed_at_m
+    travelled_m, log_evidence, status, agreement_start_m
         As of :class:`mapfilter.filters.particle.ParticleBelief`.
     """
 
@@ -163,7 +163,7 @@ class GridBelief:
     travelled_m: float = 0.0
     log_evidence: float = 0.0
     status: Status = Status.SEARCHING
-    agreed_at_m: float = nan
+    agreement_start_m: float = nan
 
     @property
     def bins(self) -> Bins:
@@ -202,7 +202,7 @@ class GridBelief:
         return np.log(self.weight.astype(np.float64))
 
     @cached_property
-    def summary(self) -> Summary:
+    def summary(self) -> BeliefSummary:
         """What the belief says."""
         if not self.weight.size:
             return nothing(self.state.shape[0])
@@ -281,15 +281,15 @@ class GridFilter(Generic[PriorT, ReadingT]):
             off=off / np.float32(total),
             log_evidence=before.log_evidence + highest + float(np.log(total)),
         )
-        status, agreed_at_m = switched(
+        status, agreement_start_m = switched(
             belief.status,
             belief.travelled_m,
-            belief.agreed_at_m,
+            belief.agreement_start_m,
             agrees=weighed.summary.mass_50m >= self.options.switch_mass
-            and self.model.credible(weighed.summary),
+            and self.model.can_converge(weighed.summary),
             hold_m=self.options.switch_hold_m,
         )
-        now = replace(weighed, status=status, agreed_at_m=agreed_at_m)
+        now = replace(weighed, status=status, agreement_start_m=agreement_start_m)
         return now, UpdateInfo(Reason.USED, status, int(bias.size))
 
     def locate(self, belief: GridBelief) -> Estimate:

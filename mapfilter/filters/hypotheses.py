@@ -49,7 +49,7 @@ class Bins:
 
 
 @dataclass(frozen=True, slots=True)
-class Summary:
+class BeliefSummary:
     """What a belief says.
 
     Parameters
@@ -81,7 +81,7 @@ class Summary:
         return float(2.0**self.entropy_bits)
 
 
-def summarise(state: Floats32, weight: Floats32, bins: Bins) -> Summary:
+def summarise(state: Floats32, weight: Floats32, bins: Bins) -> BeliefSummary:
     """Return what a cloud says.
 
     Parameters
@@ -99,7 +99,7 @@ def summarise(state: Floats32, weight: Floats32, bins: Bins) -> Summary:
     mean, rest = found[:rows], found[rows:]
     covariance = np.array([[rest[0], rest[2]], [rest[2], rest[1]]])
     others = rest[7:13].reshape(2, 3)
-    return Summary(
+    return BeliefSummary(
         mean, covariance, rest[3:6], float(rest[6]), others[others[:, 2] > 0], float(rest[13])
     )
 
@@ -140,10 +140,10 @@ def _flatten(
         flat[i] = weight[i] * mass[of_bin[i]] * per_share
 
 
-def nothing(rows: int) -> Summary:
+def nothing(rows: int) -> BeliefSummary:
     """Return the summary of a belief that holds nothing."""
     unknown = np.full((2, 2), nan)
-    return Summary(np.full(rows, nan), unknown, np.full(3, nan), 0.0, np.empty((0, 3)), nan)
+    return BeliefSummary(np.full(rows, nan), unknown, np.full(3, nan), 0.0, np.empty((0, 3)), nan)
 
 
 @njit(error_model="numpy", cache=True)

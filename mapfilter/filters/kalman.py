@@ -22,7 +22,7 @@ from mapfilter.filters.trials import CompiledMeasurement, run_trials
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """News of an update.
+    """StepOutput of an update.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ from mapfilter._kernels import draw_key
 from mapfilter._types import Floats, Floats32, Ints32
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
-from mapfilter.filters.hypotheses import Bins, Summary, flattened, nothing, summarise
+from mapfilter.filters.hypotheses import BeliefSummary, Bins, flattened, nothing, summarise
 from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
 
 
@@ -88,7 +88,7 @@ class ParticleOptions:
 
 
 def switched(
-    status: Status, travelled_m: float, agreed_at_m: float, *, agrees: bool, hold_m: float
+    status: Status, travelled_m: float, agreement_start_m: float, *, agrees: bool, hold_m: float
 ) -> tuple[Status, float]:
     """Return the status after an update, and since when the switch rule holds.
 
@@ -97,7 +97,7 @@ def switched(
     status : Status
         Before.
     travelled_m : float
-    agreed_at_m : float
+    agreement_start_m : float
         Distance travelled when the rule began to hold; NaN where it does not.
     agrees : bool
         Whether it holds now.
@@ -110,12 +110,12 @@ def switched(
     (<Status.CONVERGED: 'CONVERGED'>, 85.0)
     """
     if status is Status.CONVERGED:
-        return Status.TRACKING, agreed_at_m
+        return Status.TRACKING, agreement_start_m
     if status is not Status.SEARCHING:
-        return status, agreed_at_m
+        return status, agreement_start_m
     if not agrees:
         return Status.SEARCHING, nan
-    since_m = agreed_at_m if isfinite(agreed_at_m) else travelled_m
+    since_m = agreement_start_m if isfinite(agreement_start_m) else travelled_m
     if travelled_m - since_m >= hold_m:
         return Status.CONVERGED, since_m
     return Status.SEARCHING, since_m
@@ -143,7 +143,7 @@ class ParticleModel(Protocol[PriorT, ReadingT]):
     def weigh(self, state: Floats32, log_weight: Floats, reading: ReadingT) -> Reason:
         """Add a reading's log-likelihood to the log weights, in place; say why if it has none."""
 
-    def credible(self, summary: Summary) -> bool:
+    def can_converge(self, summary: BeliefSummary) -> bool:
         """Tell whether a belief may count as having converged, if it agrees on a place."""
 
 
@@ -163,7 +163,7 @@ class ParticleBelief:
     log_evidence : float
         Log probability of all readings so far.
     status : Status
-    agreed_at_m : float
+    agreement_start_m : float
         Distance travelled when the switch rule began to hold; NaN where it does not.
     """
 
@@ -173,7 +173,7 @@ class ParticleBelief:
     travelled_m: float = 0.0
     log_evidence: float = 0.0
     status: Status = Status.SEARCHING
-    agreed_at_m: float = nan
+    agreement_start_m: float = nan
 
     @cached_property
     def weight(self) -> Floats32:
@@ -183,7 +183,7 @@ class ParticleBelief:
         return weight
 
     @cached_property
-    def summary(self) -> Summary:
+    def summary(self) -> BeliefSummary:
         """What the belief says."""
         if not self.log_weight.size:
             return nothing(self.state.shape[0])
@@ -236,7 +236,7 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             belief.travelled_m + abs(motion.step_m),
             belief.log_evidence,
             belief.status,
-            belief.agreed_at_m,
+            belief.agreement_start_m,
         )
         return moved, reason
 
@@ -263,11 +263,11 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         )
         weighed.__dict__["weight"] = weight
         said = weighed.summary
-        status, agreed_at_m = switched(
+        status, agreement_start_m = switched(
             belief.status,
             belief.travelled_m,
-            belief.agreed_at_m,
-            agrees=said.mass_50m >= self.options.switch_mass and self.model.credible(said),
+            belief.agreement_start_m,
+            agrees=said.mass_50m >= self.options.switch_mass and self.model.can_converge(said),
             hold_m=self.options.switch_hold_m,
         )
         wanted = self._wanted(said, status)
@@ -287,7 +287,7 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             belief.travelled_m,
             weighed.log_evidence,
             status,
-            agreed_at_m,
+            agreement_start_m,
         )
         # The summary before resampling is the better one of the same belief.
         now.__dict__["summary"] = said
@@ -298,7 +298,7 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         said = belief.summary
         return Estimate(float(said.mean[0]), float(said.mean[1]), said.covariance_m2, said.radii_m)
 
-    def _wanted(self, summary: Summary, status: Status) -> int:
+    def _wanted(self, summary: BeliefSummary, status: Status) -> int:
         options = self.options
         least = options.searching if status is Status.SEARCHING else options.least
         return int(min(max(options.per_bin * summary.effective_bins, least), options.most))

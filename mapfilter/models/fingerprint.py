@@ -57,9 +57,9 @@ class LevelErrors:
     clip_sd: float = 3.0
     weight: float = 0.7
 
-    def beside_db2(self, grain_m: float) -> float:
+    def offset_variance_db2(self, particle_spacing_m: float) -> float:
         """Return the variance of a prediction so far beside the truth."""
-        return 2 * self.roughness_db**2 * (1 - exp(-grain_m / self.correlation_m))
+        return 2 * self.roughness_db**2 * (1 - exp(-particle_spacing_m / self.correlation_m))
 
 
 @dataclass(frozen=True, slots=True)

@@ -68,7 +68,7 @@ class HeardRows:
 
 
 @dataclass(frozen=True, eq=False)
-class HeardMaps:
+class ServingStatistics:
     """Maps on a lattice of P pixels, of C cells.
 
     Parameters
@@ -86,7 +86,7 @@ class HeardMaps:
     @classmethod
     def of_rows(
         cls, rows: HeardRows, lattice: Lattice, site: Ints, options: HeardOptions
-    ) -> HeardMaps:
+    ) -> ServingStatistics:
         """Count rows on a lattice.
 
         Parameters

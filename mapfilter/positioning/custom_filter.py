@@ -50,7 +50,7 @@ _FUNCTIONS = ("init", "predict", "update", "locate")
 
 
 @dataclass(frozen=True, slots=True)
-class OwnFilter:
+class CustomFilter:
     """A filter by its name; it is imported anew by every process.
 
     Parameters
@@ -65,7 +65,7 @@ class OwnFilter:
     source_sha256: str = ""
 
 
-def own_filter(name: str) -> OwnFilter:
+def custom_filter(name: str) -> CustomFilter:
     """Import a filter to see that it is there, and return its options.
 
     Raises
@@ -75,7 +75,7 @@ def own_filter(name: str) -> OwnFilter:
 
     Examples
     --------
-    >>> own_filter("math:pi")
+    >>> custom_filter("math:pi")
     Traceback (most recent call last):
         ...
     mapfilter.errors.ConfigError: filter math:pi: expected a class, or a function that makes a \
@@ -86,18 +86,18 @@ filter of a database, found float
         _check_functions(name, found)
     file = _file(inspect.getmodule(found) or _module(name))
     text = file.read_bytes() if file is not None and file.is_file() else b""
-    return OwnFilter(name, hashlib.sha256(text).hexdigest())
+    return CustomFilter(name, hashlib.sha256(text).hexdigest())
 
 
-def make_filter(own: OwnFilter, database: RadioRouteDatabase) -> MapFilter:
+def make_filter(own: CustomFilter, database: RadioRouteDatabase) -> MapFilter:
     """Make the filter over a database.
 
     Raises
     ------
     ConfigError
-        As :func:`own_filter`, or the filter does not take a database.
+        As :func:`custom_filter`, or the filter does not take a database.
     """
-    with told_by_name(own.name):
+    with wrap_user_errors(own.name):
         made: MapFilter = _imported(own.name)(database)
     _check_functions(own.name, made)
     return made
@@ -133,7 +133,7 @@ def _check_functions(name: str, found: object) -> None:
 
 
 @contextmanager
-def told_by_name(name: str) -> Iterator[None]:
+def wrap_user_errors(name: str) -> Iterator[None]:
     """Tell what goes wrong in a filter's code with its place; the cause keeps the traceback.
 
     Raises
@@ -216,7 +216,7 @@ def position_by_own(
     fixes: list[Fix] = []
     unused: list[UnusedReading] = []
     began_s = time.process_time()
-    with told_by_name(name):
+    with wrap_user_errors(name):
         for fix, told in _follow(filter_, epochs(log), known, rng):
             fixes.append(fix)
             unused += told

@@ -17,7 +17,7 @@ from mapfilter.tracks.schema import SERVING
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class ReportRow:
     """One row of a radio report.
 
     Parameters
@@ -111,7 +111,7 @@ class Epoch:
     time_s : float
     motion : tuple of MotionStep
         Intervals that end now.
-    heard : tuple of Heard
+    heard : tuple of ReportRow
         The report, of all its rows.
     fix : GnssFix or None
     ranges : tuple of Pseudorange
@@ -120,7 +120,7 @@ class Epoch:
 
     time_s: float
     motion: tuple[MotionStep, ...] = ()
-    heard: tuple[Heard, ...] = ()
+    heard: tuple[ReportRow, ...] = ()
     fix: GnssFix | None = None
     ranges: tuple[Pseudorange, ...] = ()
     differences: tuple[Difference, ...] = ()
@@ -131,12 +131,12 @@ def epochs(log: TrackLog) -> list[Epoch]:
     motion: dict[float, list[MotionStep]] = {}
     for time_s, *step in _rows(log.motion, ("time_s", "step_m", "heading_rad", "turn_rad")):
         motion.setdefault(time_s, []).append(MotionStep(*step))
-    heard: dict[float, list[Heard]] = {}
+    heard: dict[float, list[ReportRow]] = {}
     names = ("time_s", "role", "cell", "arfcn", "bsic", "level_dbm", "censored", "timing_advance")
     for time_s, role, cell, arfcn, bsic, level_dbm, censored, steps in _rows(log.radio, names):
         level = float(level_dbm) if level_dbm is not None else nan
         advance = float(steps) if steps is not None else nan
-        row = Heard(role, cell, arfcn, bsic, level, censored or 0, advance)
+        row = ReportRow(role, cell, arfcn, bsic, level, censored or 0, advance)
         heard.setdefault(time_s, []).append(row)
     fixes = {
         time_s: GnssFix(*place)

@@ -16,7 +16,7 @@ from mapfilter.positioning.candidate import (
     cell_points,
     position_by_candidates,
 )
-from mapfilter.positioning.custom_filter import OwnFilter, make_filter, position_by_own
+from mapfilter.positioning.custom_filter import CustomFilter, make_filter, position_by_own
 from mapfilter.tracks.log import TrackLog
 
 Locator = Callable[[TrackLog, np.random.Generator], PositionedTrack]
@@ -29,13 +29,15 @@ class FilterChoice:
 
     Parameters
     ----------
-    options : CandidateOptions, BayesOptions or OwnFilter
+    options : CandidateOptions, BayesOptions or CustomFilter
     margin_db : float, optional
         A point belongs to every cell within this margin of its best server; None takes the
         margin that the database was built with.
     """
 
-    options: CandidateOptions | BayesOptions | OwnFilter = field(default_factory=CandidateOptions)
+    options: CandidateOptions | BayesOptions | CustomFilter = field(
+        default_factory=CandidateOptions
+    )
     margin_db: float | None = None
 
     @property
@@ -46,7 +48,7 @@ class FilterChoice:
                 return "candidate"
             case BayesOptions() as options:
                 return "grid" if options.grid else "bayes"
-            case OwnFilter() as own:
+            case CustomFilter() as own:
                 return own.name
 
 
@@ -83,7 +85,7 @@ def open_locator(
                 return position_by_bayes(positioner, log, rng, smooth=bayes.smooth, pictures=ways)
 
             return locate_by_bayes
-        case OwnFilter() as own:
+        case CustomFilter() as own:
             made = make_filter(own, database)
 
             def locate_by_own(log: TrackLog, rng: np.random.Generator) -> PositionedTrack:

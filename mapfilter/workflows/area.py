@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from mapfilter.config.fields import MADE_MAPS, SYNTHETIC_MAP
+from mapfilter.config.fields import SYNTHETIC_MAP, SYNTHETIC_MAPS
 from mapfilter.config.sections import Area
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.geodesy import Lattice, check_bbox, project, projected_crs, unproject, utm_crs
@@ -117,7 +117,7 @@ def check_scale(crs: str, bounds_m: tuple[float, float, float, float], where: st
         raise fail(InputError, where, expected, got, "a CRS of another region, or Web Mercator")
 
 
-def made_city(area: Area, crs: str) -> SyntheticCity | None:
+def city_of(area: Area, crs: str) -> SyntheticCity | None:
     """Return the city that is made for an area, in a CRS; None where a map or nothing is named.
 
     It fills the area as configured, whatever part of it rasters cover.
@@ -127,7 +127,7 @@ def made_city(area: Area, crs: str) -> SyntheticCity | None:
     ConfigError
         The area is too small or too large for one.
     """
-    if area.map not in MADE_MAPS:
+    if area.map not in SYNTHETIC_MAPS:
         return None
     return _made(area.model_copy(update={"crs": crs}))
 

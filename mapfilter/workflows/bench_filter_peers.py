@@ -198,7 +198,7 @@ def stone_soup_step(model: NumpyModel, rng: np.random.Generator) -> Step | None:
         def pdf(self, *_: Any, **__: Any) -> Any:
             raise NotImplementedError
 
-    class Heard(MeasurementModel):  # type: ignore[misc]
+    class ReportRow(MeasurementModel):  # type: ignore[misc]
         ndim_state = MAP + 1
         ndim_meas = 1
         mapping = (0,)
@@ -218,7 +218,7 @@ def stone_soup_step(model: NumpyModel, rng: np.random.Generator) -> Step | None:
     began = datetime(2000, 1, 1)
     later = began + timedelta(seconds=1)
     predictor = ParticlePredictor(Walk())
-    updater = ParticleUpdater(measurement_model=Heard(), resampler=SystematicResampler())
+    updater = ParticleUpdater(measurement_model=ReportRow(), resampler=SystematicResampler())
     heard = Detection(np.zeros((1, 1)), timestamp=later)
 
     def step(state: Floats) -> Floats:

@@ -11,7 +11,7 @@ from mapfilter._io import ensure_writable_folder, write_json
 from mapfilter._parallel import Progress, local_executor
 from mapfilter.config.sections import Config
 from mapfilter.database.build import build
-from mapfilter.database.sources import LaidRoutes
+from mapfilter.database.sources import LatticeRoutes
 from mapfilter.errors import ConfigError, Faults, fail
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.global_positioning import benchmark
@@ -32,8 +32,8 @@ from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.reflections import NlosModel
 from mapfilter.simulation.satellites import ReceptionModel
-from mapfilter.workflows.facts import facts
 from mapfilter.workflows.filters import filter_choice
+from mapfilter.workflows.jsonable import to_jsonable
 from mapfilter.workflows.predict import ground_truth_errors, prediction_model
 from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.world import World
@@ -169,7 +169,7 @@ def run_global_positioning(
     result = EvaluateResult(
         Path(config.area.map).name, seed, points, tuple(found), time.perf_counter() - began_s, out
     )
-    write_json(out / TABLE, facts(result))
+    write_json(out / TABLE, to_jsonable(result))
     return result
 
 
@@ -189,7 +189,7 @@ def _world(world: World, folder: Path, seed: int) -> tuple[BenchmarkWorld, int]:
         database = build(
             rasters,
             world.plan,
-            LaidRoutes(routes),
+            LatticeRoutes(routes),
             folder / name,
             margin_db=config.database.margin_db,
             floor_dbm=config.database.floor_dbm,

@@ -13,7 +13,7 @@ from mapfilter.errors import ConfigError, Faults
 from mapfilter.experiments.benchmarks.scores import CaseResult
 from mapfilter.workflows.evaluate import TABLE, run_global_positioning
 from mapfilter.workflows.evaluate_settings import load_benchmark
-from mapfilter.workflows.facts import facts
+from mapfilter.workflows.jsonable import to_jsonable
 
 _GYRO = {
     "imu.turns": "gyro",
@@ -215,5 +215,5 @@ def run_audit(
             )
         )
     audit = AuditResult(map_name, seed, tuple(rows), time.perf_counter() - began_s, out)
-    write_json(out / TABLE, facts(audit))
+    write_json(out / TABLE, to_jsonable(audit))
     return audit

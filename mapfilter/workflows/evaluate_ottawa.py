@@ -42,7 +42,7 @@ from mapfilter.rasters.rxlev_rasters import open_rasters
 from mapfilter.report.canvas import BLUE, GREEN, GREY
 from mapfilter.report.cumulative import Distribution, plot_cumulative
 from mapfilter.workflows.build import run_build
-from mapfilter.workflows.facts import facts
+from mapfilter.workflows.jsonable import to_jsonable
 from mapfilter.workflows.survey import run_survey
 
 HEAD, TABLE, FOUND, PICTURE = "benchmark.json", "table.json", "found.json", "errors.png"
@@ -190,7 +190,7 @@ def run_ottawa(
         plot_cumulative(_curves(every), picture, title=title, most_m=_MOST_M, share=0.95)
     seconds = time.perf_counter() - began_s
     result = OttawaResult(seed, runs, tuple(rows), tuple(told), seconds, out)
-    write_json(out / TABLE, facts(result))
+    write_json(out / TABLE, to_jsonable(result))
     return result
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from mapfilter.config.sections import FilterSection
 from mapfilter.errors import ConfigError, fail
 from mapfilter.filters.candidate import CandidateOptions
-from mapfilter.positioning.custom_filter import own_filter
+from mapfilter.positioning.custom_filter import custom_filter
 from mapfilter.positioning.locators import FilterChoice
 
 
@@ -36,6 +36,6 @@ def filter_choice(section: FilterSection, resolution_m: float) -> FilterChoice:
         case "bayes" | "grid":
             return FilterChoice(replace(section.bayes.options, grid=section.name == "grid"))
         case name if ":" in name:
-            return FilterChoice(own_filter(name))
+            return FilterChoice(custom_filter(name))
         case name:
             raise fail(ConfigError, "filter.name", "a filter that takes a database", repr(name))

@@ -10,7 +10,7 @@ from typing import Any
 
 from mapfilter.config.load import load_config
 from mapfilter.config.sections import Config
-from mapfilter.workflows.facts import facts
+from mapfilter.workflows.jsonable import to_jsonable
 from mapfilter.workflows.terminal import guarded, print_result
 
 Stage = Callable[[Config], Any]
@@ -43,7 +43,7 @@ def _run(stages: Mapping[str, Stage], given: argparse.Namespace) -> int:
     config = load_config(given.config, given.set, out=given.out)
     for name, stage in stages.items():
         began_s = time.perf_counter()
-        found[name] = facts(stage(config))
+        found[name] = to_jsonable(stage(config))
         found[name]["seconds"] = round(time.perf_counter() - began_s, 3)
         if not given.json:
             print_result({name: found[name]}, as_json=False)

@@ -33,8 +33,8 @@ from mapfilter.report.errors import plot_error_over_distance
 from mapfilter.tracks.leave_out import leave_out
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.store import list_logs, read_log
-from mapfilter.workflows.facts import facts
 from mapfilter.workflows.filters import filter_choice
+from mapfilter.workflows.jsonable import to_jsonable
 from mapfilter.workflows.log_checks import check_logs, lacking
 from mapfilter.workflows.pictures import draw_track
 from mapfilter.workflows.results import ESTIMATES, FIGURES, SUMMARY, clear_results
@@ -250,13 +250,13 @@ def run_replay_fusion(
             (*files, into / FIGURES, *pictures), route_of(log),
         )  # fmt: skip
         head = {"log": folder.name, "filter": method.name}
-        write_json(into / FIGURES, {**head, **facts(replayed.figures)})
+        write_json(into / FIGURES, {**head, **to_jsonable(replayed.figures)})
         logs.append(replayed)
         if progress is not None:
             progress(index + 1, len(folders))
     result = ReplayResult(method.name, tuple(logs), summary_of(logs), out)
     if len(folders) > 1:
-        write_json(out / SUMMARY, facts(summary_figures(result)))
+        write_json(out / SUMMARY, to_jsonable(summary_figures(result)))
     return result
 
 
@@ -311,7 +311,7 @@ def run_replay(
             progress(index + 1, len(folders))
     result = ReplayResult(choice.name, tuple(logs), summary_of(logs), out)
     if len(folders) > 1:
-        write_json(out / SUMMARY, facts(summary_figures(result)))
+        write_json(out / SUMMARY, to_jsonable(summary_figures(result)))
     return result
 
 
@@ -334,5 +334,5 @@ def _write(
         route_of(log),
     )
     head = {"log": name, "filter": track.estimate.filter}
-    write_json(out / FIGURES, {**head, **facts(replayed.figures)})
+    write_json(out / FIGURES, {**head, **to_jsonable(replayed.figures)})
     return replayed

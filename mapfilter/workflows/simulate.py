@@ -114,7 +114,7 @@ def simulation_settings(config: Config) -> SimulationSettings:
         imu=ImuErrors(
             sigma_trans_m=imu.sigma_trans_m,
             sigma_orient_rad=float(np.radians(imu.sigma_orient_deg)),
-            heading_bias_sd_rad=float(np.radians(imu.bias_deg)),
+            heading_bias_sd_rad=float(np.radians(imu.bias_sd_deg)),
             heading_drift_rad_per_sqrt_s=float(np.radians(imu.drift_deg_per_sqrt_s)),
             step_scale_sd=imu.scale,
             translation_noise=imu.translation_noise,

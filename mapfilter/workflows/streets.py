@@ -27,7 +27,7 @@ from mapfilter.roads.water import read_layer_water, read_water
 from mapfilter.roads.ways import Bounds, Buildings, Squares, Water, Ways
 from mapfilter.simulation.synthetic_city import SyntheticCity
 from mapfilter.survey.measurements import Measurements, read_measurements
-from mapfilter.workflows.area import made_city
+from mapfilter.workflows.area import city_of
 
 OSM_ATTRIBUTION = "© OpenStreetMap contributors (ODbL)"
 
@@ -168,7 +168,7 @@ class Streets:
 
     @property
     def _city(self) -> SyntheticCity | None:
-        return made_city(self.config.area, self.lattice.crs)
+        return city_of(self.config.area, self.lattice.crs)
 
     @cached_property
     def _roads(self) -> _Roads:

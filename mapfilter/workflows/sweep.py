@@ -29,7 +29,7 @@ _UNITS = {
     "report_period_s": "reports every {:g} s",
     "imu_period_s": "dead reckoning every {:g} s",
     "update_length_m": "updates of {:g} m",
-    "bias_deg": "bias {:g}°",
+    "bias_sd_deg": "bias {:g}°",
     "drift_deg_per_sqrt_s": "drift {:g}°/√s",
     "scale": "scale {:g}",
 }

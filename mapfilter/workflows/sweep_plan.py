@@ -97,7 +97,7 @@ def _plan(config: Config, databases: tuple[str, ...], resolution_m: float) -> Sw
         noises=noise_grid(
             _axis(section.sigma_trans_m, imu.sigma_trans_m),
             _axis(section.sigma_orient_deg, imu.sigma_orient_deg),
-            _axis(section.bias_deg, imu.bias_deg),
+            _axis(section.bias_sd_deg, imu.bias_sd_deg),
             _axis(section.drift_deg_per_sqrt_s, imu.drift_deg_per_sqrt_s),
             _axis(section.scale, imu.scale),
         ),

@@ -24,9 +24,9 @@ def say(text: str, kind: str = "") -> None:
 
 def print_result(result: Any, as_json: bool) -> None:
     """Print a result on stdout: one JSON line, or one line for each figure."""
-    from mapfilter.workflows.facts import facts, text_lines
+    from mapfilter.workflows.jsonable import text_lines, to_jsonable
 
-    found = facts(result)
+    found = to_jsonable(result)
     if as_json:
         sys.stdout.write(json.dumps(found, ensure_ascii=False, allow_nan=False) + "\n")
         return

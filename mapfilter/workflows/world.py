@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mapfilter.config.sections import Config, Rasters
-from mapfilter.database.sources import LaidRoutes, LayerRoutes, Routes
+from mapfilter.database.sources import LatticeRoutes, LayerRoutes, Routes
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.antenna import MeasuredAntenna
@@ -167,7 +167,7 @@ class World:
     def route_tiles(self) -> Routes:
         """The same points, laid tile by tile when they are wanted."""
         if self.landuse is not None:
-            return LaidRoutes(self.routes)
+            return LatticeRoutes(self.routes)
         return LayerRoutes(self.streets.source, self.lattice)
 
     @cached_property

@@ -12,7 +12,7 @@ from small_world import CRS, FLOOR_DBM, LATTICE, levels_of, make_plan, make_rout
 from mapfilter._parallel import SerialExecutor
 from mapfilter.database import build as finished
 from mapfilter.database.build import FinishedTiles, build, work_key
-from mapfilter.database.sources import LaidRoutes, LayerRoutes
+from mapfilter.database.sources import LatticeRoutes, LayerRoutes
 from mapfilter.errors import InputError, OutputError
 from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
 from mapfilter.roads.buildings import Buildings
@@ -166,10 +166,10 @@ def test_the_digest_of_laid_points_tells_every_column_apart(inputs, name):
         field: getattr(routes, field)
         for field in (*LAID_CHANGES, "lattice", "class_names", "on_square")
     })  # fmt: skip
-    before = LaidRoutes(changed).digest()
-    assert before == LaidRoutes(routes).digest()
+    before = LatticeRoutes(changed).digest()
+    assert before == LatticeRoutes(routes).digest()
     setattr(changed, name, column)
-    assert LaidRoutes(changed).digest() != before
+    assert LatticeRoutes(changed).digest() != before
 
 
 WEST_M, _, _, NORTH_M = LATTICE.bounds_m

@@ -45,16 +45,16 @@ def test_a_compass_has_its_stated_noise_and_the_filter_its_own_defaults(name, de
 
 
 @pytest.mark.parametrize(
-    ("names", "bias_deg", "drift_deg", "scale"),
+    ("names", "bias_sd_deg", "drift_deg", "scale"),
     [(BIASED, 10.0, 0.2, 0.05), (["levels-bias20"], 20.0, 0.4, 0.1)],
 )
-def test_a_biased_unit_is_stated_to_be_one(names, bias_deg, drift_deg, scale):
+def test_a_biased_unit_is_stated_to_be_one(names, bias_sd_deg, drift_deg, scale):
     for name in names:
         errors = CASES[name].errors_in(ImuErrors())
         assert errors == replace(
             ImuErrors(),
             sigma_orient_rad=radians(6),
-            heading_bias_sd_rad=radians(bias_deg),
+            heading_bias_sd_rad=radians(bias_sd_deg),
             heading_drift_rad_per_sqrt_s=radians(drift_deg),
             step_scale_sd=scale,
         )
@@ -65,7 +65,7 @@ def test_a_biased_unit_is_stated_to_be_one(names, bias_deg, drift_deg, scale):
         assert motion == replace(
             DEFAULTS,
             heading_sd_rad=radians(6),
-            bias_sd_rad=radians(bias_deg),
+            bias_sd_rad=radians(bias_sd_deg),
             bias_drift_rad_per_sqrt_m=motion.bias_drift_rad_per_sqrt_m,
             scale_sd=scale,
         )

@@ -112,7 +112,7 @@ def test_dead_reckoning_is_noisy_in_every_case_by_its_size(town, name):
 
 
 @pytest.mark.parametrize(
-    ("name", "bias_deg", "scale", "drift_deg"),
+    ("name", "bias_sd_deg", "scale", "drift_deg"),
     [
         ("levels-6", 0.0, 0.0, 0.0),
         ("levels-bias10", 10.0, 0.05, 0.2),
@@ -121,7 +121,9 @@ def test_dead_reckoning_is_noisy_in_every_case_by_its_size(town, name):
         ("levels-bias20", 20.0, 0.1, 0.4),
     ],
 )
-def test_lasting_errors_are_those_of_the_case(town, short_walks, name, bias_deg, scale, drift_deg):
+def test_lasting_errors_are_those_of_the_case(
+    town, short_walks, name, bias_sd_deg, scale, drift_deg
+):
     biases, scales, count = [], [], len(short_walks)
     for number, walked in enumerate(short_walks):
         _, log = made(
@@ -133,7 +135,7 @@ def test_lasting_errors_are_those_of_the_case(town, short_walks, name, bias_deg,
         scales.append(np.log(log.motion["step_m"].sum() / step_m.sum()))
     off = 4 / np.sqrt(2 * count)
     first, drift = np.degrees(np.array(biases)[:, 0]), np.degrees(np.ptp(biases, axis=1))
-    assert abs(first.std() - np.hypot(bias_deg, drift_deg)) <= off * bias_deg + 1e-9
+    assert abs(first.std() - np.hypot(bias_sd_deg, drift_deg)) <= off * bias_sd_deg + 1e-9
     assert abs(np.sqrt(np.mean(drift**2)) - drift_deg * np.sqrt(99)) <= off * 10 * drift_deg + 1e-9
     assert abs(np.std(scales) - scale) <= off * scale + 1e-9
 

@@ -8,7 +8,7 @@ import shapely
 from grid_town import CRS, SOUTH_M, WEST_M, network, plan
 
 from mapfilter.database.build import build
-from mapfilter.database.sources import LaidRoutes
+from mapfilter.database.sources import LatticeRoutes
 from mapfilter.experiments.benchmarks import world as module
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.world import BenchmarkWorld, write_buildings
@@ -108,7 +108,7 @@ def lay_out(folder, *, height_m=10.0, tile_px=64):
             LATTICE, row.ravel(), col.ravel(), np.ones(count, np.int64), np.zeros(count, np.int16),
             ("residential",), np.zeros(count, np.float32), np.zeros(count, bool),
         )  # fmt: skip
-        build(open_rasters(rasters), PLAN, LaidRoutes(routes), folder / name, tile_px=tile_px)
+        build(open_rasters(rasters), PLAN, LatticeRoutes(routes), folder / name, tile_px=tile_px)
     box = shapely.box(WEST_M + 10, SOUTH_M + 10, WEST_M + 50, SOUTH_M + 50)
     shapes = np.array([box], dtype=object)
     write_buildings(

@@ -27,7 +27,7 @@ from mapfilter.experiments.benchmarks.ottawa_table import read_left_out
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.geodesy import Lattice, unproject
 from mapfilter.models.fingerprint import LevelReading
-from mapfilter.models.measured_map import HeardMaps, HeardOptions, HeardRows
+from mapfilter.models.measured_map import HeardOptions, HeardRows, ServingStatistics
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.rasters.rxlev_rasters import open_rasters
@@ -283,13 +283,13 @@ def test_another_cell_of_the_site_may_serve():
         np.array([2.0] * 9 + [7.0]),
     )
     options = HeardOptions(reach_m=20.0, prior_rows=1.0, site_part=0.2)
-    maps = HeardMaps.of_rows(rows, lattice, np.array([0, 0, 1]), options)
+    maps = ServingStatistics.of_rows(rows, lattice, np.array([0, 0, 1]), options)
     row, col = lattice.row_col([WEST + 55.0, WEST + 155.0], [SOUTH + 55.0] * 2)
     at = np.asarray(row) * lattice.cols + np.asarray(col)
     share = np.exp(maps.log_share[:, at])
     assert share.sum(axis=0) == pytest.approx([1.0, 1.0], abs=1e-5)
     assert share[0, 0] > 0.8 > share[2, 1] > share[0, 1]
-    alone = HeardMaps.of_rows(rows, lattice, np.arange(3), options)
+    alone = ServingStatistics.of_rows(rows, lattice, np.arange(3), options)
     assert share[1, 0] > 1.5 * np.exp(alone.log_share[1, at[0]])
     assert maps.advance_steps[1, at] == pytest.approx([2.0, 2.0])
     told = maps.log_advance(0, at.astype(np.int32), 2.0)

@@ -173,7 +173,7 @@ def test_which_rows_make_maps_of_what_was_heard(tmp_path, monkeypatch):
     given = []
     monkeypatch.setattr(ottawa, "open_area", lambda _: area)
     monkeypatch.setattr(
-        ottawa, "HeardMaps", SimpleNamespace(of_rows=lambda *rows: given.append(rows))
+        ottawa, "ServingStatistics", SimpleNamespace(of_rows=lambda *rows: given.append(rows))
     )
     options = ottawa.OttawaOptions()
     made = ottawa.surveyed_positioner(SimpleNamespace(lattice=area.lattice), [one, other], options)

@@ -12,7 +12,7 @@ BINS = Bins(0.0, 0.0, 25.0, 40, 30)
 
 
 def say(*points, bins=BINS):
-    """Summary of (east, north, weight, more of the state...)."""
+    """BeliefSummary of (east, north, weight, more of the state...)."""
     table = np.array([[east, north, *more] for east, north, _, *more in points]).T
     return summarise(table.astype("f4"), np.array([p[2] for p in points], "f4"), bins)
 

@@ -52,7 +52,7 @@ class Chain:
         log_weight += np.log(LIKELIHOOD[reading][self.place(state)])
         return Reason.USED
 
-    def credible(self, summary):  # noqa: ARG002
+    def can_converge(self, summary):  # noqa: ARG002
         return self.believable
 
     @staticmethod

@@ -119,8 +119,8 @@ def test_a_split_keeps_mean_and_variance():
 
 
 def test_what_switches():
-    def told(status, travelled_m, agreed_at_m, agrees=True):
-        return switched(status, travelled_m, agreed_at_m, agrees=agrees, hold_m=14.0)
+    def told(status, travelled_m, agreement_start_m, agrees=True):
+        return switched(status, travelled_m, agreement_start_m, agrees=agrees, hold_m=14.0)
 
     assert told(Status.SEARCHING, 100.0, 86.0) == (Status.CONVERGED, 86.0)
     assert told(Status.SEARCHING, 100.0, 86.1) == (Status.SEARCHING, 86.1)

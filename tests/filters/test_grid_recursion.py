@@ -66,7 +66,7 @@ class Tiny:
             log_weight[i] += log(LIKELIHOOD[reading][b, row, col])
         return Reason.USED
 
-    def credible(self, summary):  # noqa: ARG002
+    def can_converge(self, summary):  # noqa: ARG002
         return True
 
 

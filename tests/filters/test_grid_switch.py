@@ -56,7 +56,7 @@ class Places:
         log_weight += reading
         return Reason.USED
 
-    def credible(self, summary):  # noqa: ARG002
+    def can_converge(self, summary):  # noqa: ARG002
         return self.believable
 
 
@@ -80,7 +80,7 @@ def test_a_grid_switches_after_the_metres_that_it_must_hold():
     assert statuses == [Status.SEARCHING, Status.SEARCHING, Status.CONVERGED, Status.TRACKING,
                         Status.TRACKING]  # fmt: skip
     assert {info.hypotheses for info in news} == {1}
-    assert belief.agreed_at_m == 7.0
+    assert belief.agreement_start_m == 7.0
     assert belief.travelled_m == 35.0
     assert belief.log_evidence == pytest.approx(5 * LOG_GAIN, abs=1e-5)
     found = GridFilter(Places()).locate(belief)
@@ -130,7 +130,7 @@ def test_motion_of_a_grid_that_is_absent_or_nothing():
         assert filter_.predict(start, motion, rng) == (start, why)
     assert start.moved is start
     assert (start.travelled_m, start.log_evidence, start.status) == (0.0, 0.0, Status.SEARCHING)
-    assert np.isnan(start.agreed_at_m)
+    assert np.isnan(start.agreement_start_m)
     assert start.waiting_m == (0.0, 0.0, 0.0)
     np.testing.assert_allclose(np.exp(start.log_weight), start.weight)
     assert start.state[-1].tolist() == [0.25]

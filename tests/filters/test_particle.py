@@ -43,7 +43,7 @@ class LinearModel:
         log_weight -= 0.5 * (off**2).sum(axis=0) / FIX_SD**2
         return Reason.USED
 
-    def credible(self, summary):
+    def can_converge(self, summary):
         return self.believable and np.isfinite(summary.mean).all()
 
 

@@ -36,7 +36,7 @@ class Two:
         log_weight[state[0] < 150.0] += reading
         return Reason.USED
 
-    def credible(self, summary):  # noqa: ARG002
+    def can_converge(self, summary):  # noqa: ARG002
         return self.believable
 
 
@@ -75,7 +75,7 @@ def test_the_number_of_particles_follows_the_bins_that_are_covered():
     after, info = updated(0.0, **options)
     assert (info.status, info.hypotheses) == (Status.CONVERGED, 4)
     assert after.status is Status.CONVERGED
-    assert after.agreed_at_m == 0.0
+    assert after.agreement_start_m == 0.0
     # What it says is said before it is drawn anew.
     assert after.summary.mass_50m == pytest.approx(0.5)
 

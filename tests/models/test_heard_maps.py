@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mapfilter.geodesy import Lattice
-from mapfilter.models.measured_map import HeardMaps, HeardOptions, HeardRows
+from mapfilter.models.measured_map import HeardOptions, HeardRows, ServingStatistics
 
 NAN = float("nan")
 ROWS, COLS, SIDE_M = 12, 15, 10.0
@@ -83,7 +83,7 @@ PIXELS = ((4, 3), (5, 3), (0, 0), (11, 14), (8, 9), (6, 7), (9, 12))
     ids=("usual", "other", "narrow"),
 )
 def test_maps_are_sums_over_rows(options):
-    maps = HeardMaps.of_rows(rows(), LATTICE, SITE, options)
+    maps = ServingStatistics.of_rows(rows(), LATTICE, SITE, options)
     for found in (maps.log_share, maps.advance_steps, maps.deviation_steps):
         assert found.shape == (4, ROWS * COLS)
         assert found.dtype == np.float32
@@ -96,7 +96,7 @@ def test_maps_are_sums_over_rows(options):
 
 
 def test_shares_of_all_cells_and_of_foreign_ones_sum_to_at_most_one():
-    maps = HeardMaps.of_rows(rows(), LATTICE, SITE, HeardOptions())
+    maps = ServingStatistics.of_rows(rows(), LATTICE, SITE, HeardOptions())
     total = np.exp(maps.log_share.astype(float)).sum(axis=0)
     assert total.max() <= 1 + 1e-6
     # A row of a foreign cell lies at (5, 5); where nothing was heard all goes by the prior.
@@ -105,7 +105,7 @@ def test_shares_of_all_cells_and_of_foreign_ones_sum_to_at_most_one():
 
 def test_rows_beyond_the_lattice_do_not_count():
     outside = ((0, -1, 4, 9.0), (1, 3, -1, 9.0), (2, COLS, 4, 9.0), (3, 3, ROWS, 9.0))
-    maps = [HeardMaps.of_rows(rows(told), LATTICE, SITE, HeardOptions())
+    maps = [ServingStatistics.of_rows(rows(told), LATTICE, SITE, HeardOptions())
             for told in (TOLD, TOLD + outside)]  # fmt: skip
     np.testing.assert_array_equal(maps[0].log_share, maps[1].log_share)
     np.testing.assert_array_equal(maps[0].advance_steps, maps[1].advance_steps)
@@ -117,7 +117,7 @@ def test_the_usual_options():
 
 
 def made():
-    return HeardMaps(
+    return ServingStatistics(
         np.array([[-1.0, -2.0, -3.0], [-4.0, -5.0, -6.0]], dtype=np.float32),
         np.array([[4.0, 5.0, NAN], [1.0, 2.0, 3.0]], dtype=np.float32),
         np.array([[0.5, 2.0, NAN], [1.0, 1.0, 0.25]], dtype=np.float32),

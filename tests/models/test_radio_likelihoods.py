@@ -226,6 +226,6 @@ def test_one_who_went_east_was_farther_west_before():
 
 def test_a_prediction_beside_the_truth_varies_by_the_variogram():
     errors = LevelErrors(roughness_db=5.0, correlation_m=40.0)
-    for grain_m in (0.0, 1.5, 5.0, 40.0, 1e4):
-        expected = oracle.beside_variance(errors, grain_m)
-        assert errors.beside_db2(grain_m) == pytest.approx(expected, abs=1e-12)
+    for particle_spacing_m in (0.0, 1.5, 5.0, 40.0, 1e4):
+        expected = oracle.beside_variance(errors, particle_spacing_m)
+        assert errors.offset_variance_db2(particle_spacing_m) == pytest.approx(expected, abs=1e-12)

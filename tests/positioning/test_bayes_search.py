@@ -10,7 +10,7 @@ from cross_world import make_database, walk_log
 from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Status
 from mapfilter.filters.particle import ParticleOptions
-from mapfilter.positioning.bayes.alternative import ChallengeRules
+from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.options import BayesOptions, open_area
 from mapfilter.positioning.bayes.replay import position_by_bayes
 from mapfilter.positioning.epochs import epochs
@@ -39,7 +39,9 @@ def test_a_search_without_the_true_place_is_taken_over(area, seed):
         if number == 30:
             state = track.belief.state.copy()
             state[:2] = state[:2, :1] + np.array([[200.0], [0.0]], dtype=np.float32)
-            astray = replace(track.belief, state=state, status=Status.SEARCHING, agreed_at_m=nan)
+            astray = replace(
+                track.belief, state=state, status=Status.SEARCHING, agreement_start_m=nan
+            )
             track = replace(track, belief=astray, status=Status.SEARCHING)
         track, news = positioner.advance(track, epoch, rng)
         if news.fix.status is Status.CONVERGED:
@@ -51,7 +53,7 @@ def test_a_search_without_the_true_place_is_taken_over(area, seed):
 
 
 def test_a_belief_in_doubt_does_not_converge(area):
-    never = ChallengeRules(doubt=1e9, doubt_of_cells=1e9, converge_below=-1.0)
+    never = AlternativeRules(doubt=1e9, doubt_of_cells=1e9, converge_below=-1.0)
     positioner = replace(BayesOptions(particles=FEW).over(area), rules=never)
     estimate = position_by_bayes(positioner, walk_log(), np.random.default_rng(0)).estimate
     assert set(estimate.status) == {Status.SEARCHING}

@@ -7,17 +7,22 @@ import numpy as np
 import pytest
 
 from mapfilter.filters.contract import Status
-from mapfilter.filters.hypotheses import Summary
-from mapfilter.positioning.bayes.alternative import Challenger, ChallengeRules, Doubt, settle
+from mapfilter.filters.hypotheses import BeliefSummary
+from mapfilter.positioning.bayes.alternative import (
+    AlternativeHypothesis,
+    AlternativeRules,
+    EvidenceCusum,
+    resolve_alternative,
+)
 
-RULES = ChallengeRules(ahead=4.0, lost=10.0, lost_of_cells=6.0)
+RULES = AlternativeRules(ahead=4.0, lost=10.0, lost_of_cells=6.0)
 SEARCHING, CONVERGED = Status.SEARCHING, Status.CONVERGED
 TRACKING, LOST = Status.TRACKING, Status.LOST
 
 
 def at(east_m, mass_50m):
     mean = np.array([east_m, 0.0, 0.0, 0.0, 0.0])
-    return Summary(mean, np.eye(2), np.ones(3), mass_50m, np.empty((0, 3)), 0.0)
+    return BeliefSummary(mean, np.eye(2), np.ones(3), mass_50m, np.empty((0, 3)), 0.0)
 
 
 @dataclass(frozen=True)
@@ -26,18 +31,20 @@ class Belief:
 
     status: Status
     log_evidence: float = 0.0
-    agreed_at_m: float = nan
-    summary: Summary = field(default_factory=lambda: at(0.0, 1.0))
+    agreement_start_m: float = nan
+    summary: BeliefSummary = field(default_factory=lambda: at(0.0, 1.0))
 
 
 def rival(ahead, *, status=SEARCHING, mass=0.5, east_m=500.0, doubt=0.0):
     belief = Belief(status, ahead, summary=at(east_m, mass))
-    return Challenger(belief, 100.0, 0.0, doubt=Doubt(doubt))
+    return AlternativeHypothesis(belief, 100.0, 0.0, doubt=EvidenceCusum(doubt))
 
 
 def after(main, challenger=None, *, before=None, doubt=0.0, cells_only=False, travelled_m=200.0):
     told = main.status if before is None else before
-    return settle(RULES, told, main, Doubt(doubt), challenger, travelled_m, cells_only=cells_only)
+    return resolve_alternative(
+        RULES, told, main, EvidenceCusum(doubt), challenger, travelled_m, cells_only=cells_only
+    )
 
 
 def test_a_belief_alone_says_how_it_stands():

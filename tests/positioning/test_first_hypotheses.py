@@ -33,10 +33,10 @@ from mapfilter.models.street_motion import (
     MapWeights,
     MotionErrors,
 )
-from mapfilter.positioning.bayes.evidence import Memory, reading_of
+from mapfilter.positioning.bayes.evidence import RadioHistory, reading_of
 from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel, Start
-from mapfilter.positioning.epochs import Epoch, Heard
+from mapfilter.positioning.epochs import Epoch, ReportRow
 
 AREA = make_area()
 ERRORS = MotionErrors(
@@ -56,11 +56,11 @@ BAND = BANDS["B"]
 
 def first_reading():
     heard = (
-        Heard("serving", "B", None, None, -75.0, 0),
-        Heard("neighbour", "D", None, None, -90, 0),
+        ReportRow("serving", "B", None, None, -75.0, 0),
+        ReportRow("neighbour", "D", None, None, -90, 0),
     )
     _, reading, _, _ = reading_of(
-        AREA, OPTIONS, Memory.empty(len(BANDS)), Epoch(0.0, heard=heard), 5.0
+        AREA, OPTIONS, RadioHistory.empty(len(BANDS)), Epoch(0.0, heard=heard), 5.0
     )
     return reading
 

@@ -10,7 +10,7 @@ from mapfilter.errors import InputError
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.gaussian import EKF
 from mapfilter.models.state import POSITION
-from mapfilter.positioning.epochs import Epoch, GnssFix, Heard
+from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.kalman.belief import FusionHistory, SumBelief
 from mapfilter.positioning.kalman.models import FusionOptions, SiteModels
 from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
@@ -120,7 +120,7 @@ def test_before_the_start_nothing_moves():
     assert (fix.status, fix.hypotheses, fix.reason) == (Status.SEARCHING, 0, Reason.NO_READING)
     assert (fix.way_id, np.isnan(fix.east_m), np.isnan(fix.mass_50m)) == (0, True, True)
     assert made.time_s == 3.0
-    heard = (Heard("serving", "Z", None, None, -70.0, 0),)
+    heard = (ReportRow("serving", "Z", None, None, -70.0, 0),)
     assert made.take(Epoch(4.0, heard=heard), {}).reason is Reason.UNKNOWN_CELL
     assert made.take(Epoch(5.0, fix=GnssFix(nan, 1.0)), {}).reason is Reason.NO_READING
     assert made.unused[-1].kind == "gnss"
@@ -216,7 +216,7 @@ def test_statuses():
 def test_an_epoch_is_moved_and_then_measured():
     history = FusionHistory()
     made = walk(history=history)
-    heard = (Heard("serving", "A", None, None, -70.0, 0),)
+    heard = (ReportRow("serving", "A", None, None, -70.0, 0),)
     first = made.take(Epoch(0.0, heard=heard), {"A": 1})
     assert (first.reason, made.moved_m, len(history.beliefs)) == (Reason.USED, 0.0, 1)
     assert first.hypotheses == made.belief.weights.size > 1
@@ -233,11 +233,15 @@ def test_an_epoch_is_moved_and_then_measured():
 
 def test_which_rows_are_taken():
     rows = (
-        Heard("serving", "A", None, None, -70.0, 0), Heard("neighbour", None, 601, 2, -80.0, 0),
-        Heard("neighbour", None, 601, None, -81.0, 0), Heard("neighbour", None, 700, 1, -82.0, 0),
-        Heard("neighbour", "C", None, None, -110.0, -1), Heard("neighbour", "Z", 1, 1, -83.0, 0),
-        Heard("neighbour", None, None, None, -84.0, 0), Heard("serving", "B", None, None, nan, 0),
-    )  # fmt: skip
+        ReportRow("serving", "A", None, None, -70.0, 0),
+        ReportRow("neighbour", None, 601, 2, -80.0, 0),
+        ReportRow("neighbour", None, 601, None, -81.0, 0),
+        ReportRow("neighbour", None, 700, 1, -82.0, 0),
+        ReportRow("neighbour", "C", None, None, -110.0, -1),
+        ReportRow("neighbour", "Z", 1, 1, -83.0, 0),
+        ReportRow("neighbour", None, None, None, -84.0, 0),
+        ReportRow("serving", "B", None, None, nan, 0),
+    )
     found = site_readings(SITES, Epoch(3.0, heard=rows), {"B": 4, "Z": 5})
     assert (found.cells, found.levels_dbm) == (("A", "B"), (-70.0, -80.0))
     assert (found.timed, found.steps) == (("B",), (4,))

@@ -12,7 +12,12 @@ from sky_world import sky_log
 
 from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
-from mapfilter.positioning.custom_filter import OwnFilter, make_filter, own_filter, position_by_own
+from mapfilter.positioning.custom_filter import (
+    CustomFilter,
+    custom_filter,
+    make_filter,
+    position_by_own,
+)
 from mapfilter.positioning.locators import FilterChoice, open_locator
 from mapfilter.tracks.log import make_log
 
@@ -79,7 +84,7 @@ def test_a_filter_follows_a_log_from_its_first_known_cell(tmp_path):
     log = walk_log()
     radio = log.radio.assign(cell=log.radio["cell"].where(log.radio["time_s"] > 3, "elsewhere"))
     log = make_log(log.crs, motion=log.motion, radio=radio, truth=log.truth)
-    choice = FilterChoice(own_filter(f"{HERE}:Counting"))
+    choice = FilterChoice(custom_filter(f"{HERE}:Counting"))
     found = open_locator(database, choice)(log, np.random.default_rng(0)).estimate
     assert found.filter == choice.name == f"{HERE}:Counting"
     assert [isnan(east) for east in found.east_m[:6]] == [True] * 4 + [False] * 2
@@ -119,7 +124,7 @@ def test_it_may_start_from_a_fix(tmp_path):
 )
 def test_what_is_no_filter_is_refused_at_the_door(name, told):
     with pytest.raises(ConfigError, match=told):
-        own_filter(name)
+        custom_filter(name)
 
 
 @pytest.mark.parametrize("text", ["raise RuntimeError('no')", "import sys; sys.exit(3)", "def f(:"])
@@ -128,12 +133,12 @@ def test_a_module_that_cannot_be_imported_is_told(text, tmp_path, monkeypatch):
     (tmp_path / f"{name}.py").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(ConfigError, match=r"imported as package\.module:Name") as caught:
-        own_filter(f"{name}:F")
+        custom_filter(f"{name}:F")
     assert len(str(caught.value).splitlines()) == 1
 
 
 def test_what_a_function_makes_is_looked_at_too(tmp_path):
-    made = own_filter(f"{HERE}:half_made")
+    made = custom_filter(f"{HERE}:half_made")
     with pytest.raises(ConfigError, match="found no update, locate"):
         make_filter(made, make_database(tmp_path))
 
@@ -147,7 +152,7 @@ def test_what_a_function_makes_is_looked_at_too(tmp_path):
     ],
 )
 def test_what_goes_wrong_in_it_is_told_with_its_place(name, told, tmp_path):
-    locate = open_locator(make_database(tmp_path), FilterChoice(OwnFilter(f"{HERE}:{name}")))
+    locate = open_locator(make_database(tmp_path), FilterChoice(CustomFilter(f"{HERE}:{name}")))
     with pytest.raises(ConfigError, match=told) as caught:
         locate(walk_log(), np.random.default_rng(0))
     assert isinstance(caught.value.__cause__, ValueError | TypeError)
@@ -159,7 +164,7 @@ def test_a_changed_text_is_another_filter(tmp_path, monkeypatch):
     found = []
     for bound in (1, 2):
         file.write_text(f"from {HERE} import Counting\nclass F(Counting):\n    bound = {bound}\n")
-        found.append(own_filter("changing_filter:F"))
+        found.append(custom_filter("changing_filter:F"))
         del sys.modules["changing_filter"]
     assert found[0].name == found[1].name
     assert found[0] != found[1]

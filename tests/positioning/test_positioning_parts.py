@@ -15,11 +15,11 @@ from mapfilter.models.motion import random_walk
 from mapfilter.models.ranging import pseudoranges, timing_advances
 from mapfilter.models.state import MOVING_3D, POSITION, POSITION_CLOCK_3D
 from mapfilter.models.street_motion import MapWeights, MotionErrors
-from mapfilter.positioning.bayes.evidence import Memory
+from mapfilter.positioning.bayes.evidence import RadioHistory
 from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel, Start
-from mapfilter.positioning.bayes.state import BayesTrack, grain_of, name_of
-from mapfilter.positioning.epochs import GnssFix, Heard, headed
+from mapfilter.positioning.bayes.state import BayesTrack, name_of, particle_spacing_of
+from mapfilter.positioning.epochs import GnssFix, ReportRow, headed
 from mapfilter.positioning.gnss.readings import FixEvidence, widened
 from mapfilter.positioning.kalman.position_filter import filter_fixes
 from mapfilter.positioning.kalman.replay import gaussian_radii_m, share_within
@@ -101,7 +101,7 @@ def test_headings_of_a_phone_without_a_compass():
 
 
 def test_the_memory_of_dead_reckoning():
-    memory = Memory(np.zeros(2), np.ones(2), 10.0, 1.0, 2.0, 4.0, 5.0, 6.0)
+    memory = RadioHistory(np.zeros(2), np.ones(2), 10.0, 1.0, 2.0, 4.0, 5.0, 6.0)
     assert memory.moved(MotionStep(nan, 0.0)) is memory
     moved = memory.moved(MotionStep(-2.0, pi / 2))
     assert moved.travelled_m == 12.0
@@ -134,11 +134,11 @@ def test_the_way_that_holds_the_largest_share():
 
 
 def test_names_of_rows_and_the_grain_before_the_start():
-    assert name_of(Heard("serving", "A", 60, 1, -70.0, 0)) == "A"
-    assert name_of(Heard("neighbour", None, 60, 1, -70.0, 0)) == "ARFCN 60, BSIC 1"
-    assert name_of(Heard("neighbour", None, 60, None, -70.0, 0)) == "ARFCN 60, BSIC unknown"
-    assert name_of(Heard("neighbour", None, None, None, -70.0, 0)) == ""
-    assert grain_of(BayesTrack(Memory.empty(0))) == 5.0
+    assert name_of(ReportRow("serving", "A", 60, 1, -70.0, 0)) == "A"
+    assert name_of(ReportRow("neighbour", None, 60, 1, -70.0, 0)) == "ARFCN 60, BSIC 1"
+    assert name_of(ReportRow("neighbour", None, 60, None, -70.0, 0)) == "ARFCN 60, BSIC unknown"
+    assert name_of(ReportRow("neighbour", None, None, None, -70.0, 0)) == ""
+    assert particle_spacing_of(BayesTrack(RadioHistory.empty(0))) == 5.0
 
 
 SITES = np.array([[0.0, 0.0], [1000.0, 0.0], [0.0, 1000.0]])

@@ -8,7 +8,7 @@ from scipy.integrate import quad
 
 from mapfilter.errors import ConfigError
 from mapfilter.models.street_motion import STATES
-from mapfilter.positioning.gnss.options import SkyOptions, TimingOptions
+from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.receiver import (
     Sky,
     begun,
@@ -20,7 +20,7 @@ from mapfilter.positioning.gnss.receiver import (
     weighed,
 )
 
-OPTIONS = SkyOptions(height_sd_m=0.0)
+OPTIONS = GnssOptions(height_sd_m=0.0)
 PLACES = np.array([[0.0, 40.0, -200.0, 350.0], [0.0, 90.0, 30.0, -80.0]], dtype=np.float32)
 AXES = np.array([[0.3, 0.5, 0.9], [-0.8, 0.1, 0.7], [0.6, -0.6, 0.5]])
 
@@ -123,7 +123,7 @@ def test_two_satellites_at_once_are_their_difference():
 
 def test_an_unknown_height_is_integrated_out_too():
     sky, sigma, sd_m = truth_ranges(3), np.array([30.0, 45.0, 60.0]), 25.0
-    receiver = begun(SkyOptions(height_sd_m=sd_m), 0.0, 0.0)
+    receiver = begun(GnssOptions(height_sd_m=sd_m), 0.0, 0.0)
     covariance = np.diag([50.0**2, 0.0, sd_m**2])
     receiver = replace(receiver, covariance=covariance)
     found = weighed(sky, sigma, receiver, PLACES, np.zeros(4), np.zeros((3, 4)))
@@ -180,6 +180,6 @@ def test_hypotheses_carry_small_numbers_only():
 )  # fmt: skip
 def test_options_that_make_no_sense(wrong, told):
     with pytest.raises(ConfigError, match=told):
-        SkyOptions(**wrong)
+        GnssOptions(**wrong)
     with pytest.raises(ConfigError, match="step_m"):
         TimingOptions(step_m=0.0)

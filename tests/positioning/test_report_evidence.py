@@ -8,9 +8,9 @@ import scalar_oracle as oracle
 from small_area import BANDS, COLS, LEVEL_DBM, OPTIONS, PIXEL_M, ROWS, SOUTH_M, WEST_M, make_area
 
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.positioning.bayes.evidence import EvidenceOptions, Memory, reading_of
+from mapfilter.positioning.bayes.evidence import EvidenceOptions, RadioHistory, reading_of
 from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.epochs import Epoch, GnssFix, Heard
+from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 
 AREA = make_area()
 A, B, C, D = BANDS.values()
@@ -18,19 +18,19 @@ GRAIN_M = 3.0
 
 
 def serving(cell, level_dbm=nan, censored=0, timing_advance=nan):
-    return Heard("serving", cell, None, None, level_dbm, censored, timing_advance)
+    return ReportRow("serving", cell, None, None, level_dbm, censored, timing_advance)
 
 
 def named(cell, level_dbm, censored=0):
-    return Heard("neighbour", cell, None, None, level_dbm, censored)
+    return ReportRow("neighbour", cell, None, None, level_dbm, censored)
 
 
 def carrier(arfcn, bsic, level_dbm, censored=0):
-    return Heard("neighbour", None, arfcn, bsic, level_dbm, censored)
+    return ReportRow("neighbour", None, arfcn, bsic, level_dbm, censored)
 
 
 def read(*rows, memory=None, options=OPTIONS, fix=None):
-    memory = Memory.empty(len(BANDS)) if memory is None else memory
+    memory = RadioHistory.empty(len(BANDS)) if memory is None else memory
     return reading_of(AREA, options, memory, Epoch(0.0, heard=rows, fix=fix), GRAIN_M)
 
 
@@ -145,7 +145,7 @@ def three_reports():
 
     Bounds lie within the eight deviations that their table holds.
     """
-    memory, found = Memory.empty(len(BANDS)), []
+    memory, found = RadioHistory.empty(len(BANDS)), []
     ways = [(), (MotionStep(9.0, 0.2), MotionStep(7.0, 1.9)), (MotionStep(8.0, -2.8),)]
     rows = [
         (serving("A", -70.25), carrier(61, 4, -80.5), carrier(61, 2, -85.0),

@@ -13,7 +13,7 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.positioning.bayes.options import BayesOptions, open_area
 from mapfilter.positioning.bayes.replay import estimate_of, position_by_bayes
-from mapfilter.positioning.epochs import Epoch, GnssFix, Heard, epochs
+from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow, epochs
 from mapfilter.simulation.satellites import Spoofer
 from mapfilter.tracks.log import make_log
 
@@ -231,7 +231,7 @@ def test_the_exact_filter_takes_fixes_and_rejects_lies(area):
 @pytest.mark.parametrize("grid", [False, True])
 def test_a_fix_of_no_place_is_no_fix_before_a_start_neither(area, grid):
     positioner = BayesOptions(particles=FEW, satellites=HEIGHTS, grid=grid).over(area)
-    row = Heard("serving", "W", None, None, np.nan, 0)
+    row = ReportRow("serving", "W", None, None, np.nan, 0)
     blank, report = Epoch(0.0, fix=GnssFix(np.nan, 1.0)), Epoch(1.0, heard=(row,))
     rng, other = np.random.default_rng(0), np.random.default_rng(0)
     nothing, news = positioner.advance(positioner.begin(), blank, rng)

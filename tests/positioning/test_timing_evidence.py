@@ -14,7 +14,7 @@ from mapfilter.positioning.bayes import filter as bayes
 from mapfilter.positioning.bayes.options import BayesOptions, open_area
 from mapfilter.positioning.bayes.replay import position_by_bayes
 from mapfilter.positioning.bayes.timing import NEVER, is_timed, with_timing
-from mapfilter.positioning.epochs import Difference, Epoch, Heard
+from mapfilter.positioning.epochs import Difference, Epoch, ReportRow
 from mapfilter.positioning.gnss.options import TimingOptions
 from mapfilter.tracks.log import make_log
 
@@ -38,7 +38,7 @@ def told(area, epoch, timed=NEVER, travelled_m=0.0, options=LTE):
 
 
 def test_a_timing_advance_is_a_ring(area):
-    epoch = Epoch(0.0, heard=(Heard("serving", "W", None, None, nan, 0, 1.0),))
+    epoch = Epoch(0.0, heard=(ReportRow("serving", "W", None, None, nan, 0, 1.0),))
     reading, timed, unused = told(area, epoch)
     assert (timed, unused) == ((0.0, -inf), [])
     # Cell W stands at (0, 150) and 28.5 m above the phone: 1.5 steps are 117.15 m.
@@ -52,7 +52,7 @@ def test_a_timing_advance_is_a_ring(area):
 
 
 def test_errors_that_last_count_once(area):
-    epoch = Epoch(0.0, heard=(Heard("serving", "W", None, None, nan, 0, 1.0),))
+    epoch = Epoch(0.0, heard=(ReportRow("serving", "W", None, None, nan, 0, 1.0),))
     soon, _, _ = told(area, epoch, (0.0, -inf), 5.0)
     place = state((300.0, 150.0))
     whole = told(area, epoch)[0].also[0].log_likelihood(place)
@@ -81,7 +81,7 @@ def test_what_nobody_can_place_is_told(area):
         Difference("E", "??", 10.0), Difference("E", "W", nan), Difference("E", "W", 3.0),
         Difference("E", "W", 4.0), Difference("W", "W", 0.0),
     )  # fmt: skip
-    heard = (Heard("serving", "??", None, None, nan, 0, 2.0),)
+    heard = (ReportRow("serving", "??", None, None, nan, 0, 2.0),)
     reading, _, unused = told(area, Epoch(0.0, heard=heard, differences=rows))
     assert len(reading.also) == 1
     assert [(u.kind, u.what, u.reason) for u in unused] == [
@@ -89,7 +89,7 @@ def test_what_nobody_can_place_is_told(area):
         ("tdoa", "??", Reason.UNKNOWN_CELL),
         ("tdoa", "E", Reason.SECOND_READING),
     ]
-    assert not is_timed(Epoch(0.0, heard=(Heard("serving", "W", None, None, nan, 0),)))
+    assert not is_timed(Epoch(0.0, heard=(ReportRow("serving", "W", None, None, nan, 0),)))
 
 
 def test_times_of_arrival_shorten_the_search(area):
@@ -122,13 +122,13 @@ def test_times_of_arrival_shorten_the_search(area):
 def test_differences_between_reports_of_levels_do_not_make_it_a_log_of_cells(
     area, level_dbm, monkeypatch
 ):
-    seen, settle = set(), bayes.settle
+    seen, resolve_alternative = set(), bayes.resolve_alternative
 
     def watched(*given, cells_only):
         seen.add(cells_only)
-        return settle(*given, cells_only=cells_only)
+        return resolve_alternative(*given, cells_only=cells_only)
 
-    monkeypatch.setattr(bayes, "settle", watched)
+    monkeypatch.setattr(bayes, "resolve_alternative", watched)
     log = walk_log(((0.0, 40.0),))
     rows = pd.DataFrame({"time_s": log.truth["time_s"], "cell": "E", "reference": "W"})
     radio = log.radio.assign(level_dbm=level_dbm)

@@ -38,7 +38,7 @@ OF_THE_CANDIDATE = {
 OF_BAYES = {
     "step_sd_m": (0.7, "motion.step_sd_m"),
     "heading_sd_deg": (7.0, "motion.heading_sd_rad", radians(7)),
-    "bias_deg": (8.0, "motion.bias_sd_rad", radians(8)),
+    "bias_sd_deg": (8.0, "motion.bias_sd_rad", radians(8)),
     "drift_deg_per_sqrt_m": (0.3, "motion.bias_drift_rad_per_sqrt_m", radians(0.3)),
     "scale": (0.07, "motion.scale_sd"),
     "map_sd_m": (5.0, "map.sd_m"),
@@ -77,7 +77,7 @@ OF_JOURNEYS = {
     "imu.period_s": (0.5, "imu_period_s"),
     "imu.sigma_trans_m": (0.4, "imu.sigma_trans_m"),
     "imu.sigma_orient_deg": (9.0, "imu.sigma_orient_rad", radians(9)),
-    "imu.bias_deg": (4.0, "imu.heading_bias_sd_rad", radians(4)),
+    "imu.bias_sd_deg": (4.0, "imu.heading_bias_sd_rad", radians(4)),
     "imu.drift_deg_per_sqrt_s": (0.3, "imu.heading_drift_rad_per_sqrt_s", radians(0.3)),
     "imu.scale": (0.06, "imu.step_scale_sd"),
     "imu.translation_noise": ("as_printed", "imu.translation_noise"),

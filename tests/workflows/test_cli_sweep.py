@@ -166,7 +166,7 @@ def test_axes_of_everything_else(world, tmp_path):
 prediction_error_db = [0, 7]
 report_period_s = [2.0, 8.0]
 imu_period_s = 2
-bias_deg = 20
+bias_sd_deg = 20
 sigma_orient_deg = [0.0, 6.0]
 routes = 2
 draws = 1

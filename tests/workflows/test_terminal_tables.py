@@ -1,7 +1,7 @@
 """Results as people read them: a short table in place of a line for each cell of a grid."""
 
 from mapfilter.evaluation.success import SuccessCell
-from mapfilter.workflows.facts import text_lines
+from mapfilter.workflows.jsonable import text_lines
 from mapfilter.workflows.sweep import brief
 
 

@@ -95,7 +95,7 @@ def _compass(sd_deg: float) -> tuple[Mapping[str, float], Mapping[str, float]]:
 
 
 def _biased(
-    bias_deg: float, drift_deg_per_sqrt_s: float, scale: float
+    bias_sd_deg: float, drift_deg_per_sqrt_s: float, scale: float
 ) -> tuple[Mapping[str, float], Mapping[str, float]]:
     """Return errors and data sheet of a unit with a lasting heading error and step scale."""
     errors, sheet = _compass(6.0)
@@ -103,13 +103,13 @@ def _biased(
     return (
         {
             **errors,
-            "heading_bias_sd_rad": radians(bias_deg),
+            "heading_bias_sd_rad": radians(bias_sd_deg),
             "heading_drift_rad_per_sqrt_s": drift,
             "step_scale_sd": scale,
         },
         {
             **sheet,
-            "bias_sd_rad": radians(bias_deg),
+            "bias_sd_rad": radians(bias_sd_deg),
             "bias_drift_rad_per_sqrt_m": drift / _WALKING_MPS**0.5,
             "scale_sd": scale,
         },

@@ -28,12 +28,12 @@ from mapfilter.filters.contract import Status
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.cell_id import ServingWeights
 from mapfilter.models.fingerprint import LevelErrors
-from mapfilter.models.measured_map import HeardMaps, HeardOptions, HeardRows
+from mapfilter.models.measured_map import HeardOptions, HeardRows, ServingStatistics
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import EvidenceOptions
 from mapfilter.positioning.bayes.filter import BayesPositioner
-from mapfilter.positioning.bayes.model import HeardModel
+from mapfilter.positioning.bayes.model import MeasuredMapModel
 from mapfilter.positioning.bayes.options import BayesOptions, open_area
 from mapfilter.positioning.bayes.replay import position_by_bayes
 from mapfilter.positioning.estimate import TrackEstimate
@@ -162,8 +162,8 @@ def surveyed_positioner(
     steps = np.concatenate([other.timing_advance for other in others])
     rows = HeardRows(cell[good], places[good, 0], places[good, 1], steps[good])
     sites = np.unique([site_of(name) for name in area.cell_ids], return_inverse=True)[1]
-    heard = HeardMaps.of_rows(rows, area.lattice, sites, options.heard)
-    model = HeardModel(
+    heard = ServingStatistics.of_rows(rows, area.lattice, sites, options.heard)
+    model = MeasuredMapModel(
         area, chosen.motion, chosen.map, chosen.evidence, heard=heard, level_sd_db=level_sd_db
     )
     return replace(chosen.over(area), model=model)

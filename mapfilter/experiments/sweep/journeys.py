@@ -56,7 +56,7 @@ def imu_rng(seed: int, run: Run) -> np.random.Generator:
     values = (
         noise.sigma_trans_m,
         noise.sigma_orient_deg,
-        noise.bias_deg,
+        noise.bias_sd_deg,
         noise.drift_deg_per_sqrt_s,
         noise.scale,
         run.imu_period_s,
@@ -79,7 +79,7 @@ def filter_rng(seed: int, run: Run) -> np.random.Generator:
             (
                 noise.sigma_trans_m,
                 noise.sigma_orient_deg,
-                noise.bias_deg,
+                noise.bias_sd_deg,
                 noise.drift_deg_per_sqrt_s,
                 noise.scale,
             ),

@@ -37,7 +37,7 @@ class Noise:
     ----------
     sigma_trans_m, sigma_orient_deg : float
         White noise of each step and heading.
-    bias_deg : float
+    bias_sd_deg : float
         Deviation of a journey's constant heading error.
     drift_deg_per_sqrt_s : float
         Of the heading error's random walk.
@@ -47,7 +47,7 @@ class Noise:
 
     sigma_trans_m: float = 0.2
     sigma_orient_deg: float = 3.0
-    bias_deg: float = 0.0
+    bias_sd_deg: float = 0.0
     drift_deg_per_sqrt_s: float = 0.0
     scale: float = 0.0
 
@@ -57,7 +57,7 @@ class Noise:
             others,
             sigma_trans_m=self.sigma_trans_m,
             sigma_orient_rad=radians(self.sigma_orient_deg),
-            heading_bias_sd_rad=radians(self.bias_deg),
+            heading_bias_sd_rad=radians(self.bias_sd_deg),
             heading_drift_rad_per_sqrt_s=radians(self.drift_deg_per_sqrt_s),
             step_scale_sd=self.scale,
         )
@@ -278,7 +278,7 @@ class SweepPlan:
 def noise_grid(
     sigma_trans_m: Sequence[float] = (0.2,),
     sigma_orient_deg: Sequence[float] = (3.0,),
-    bias_deg: Sequence[float] = (0.0,),
+    bias_sd_deg: Sequence[float] = (0.0,),
     drift_deg_per_sqrt_s: Sequence[float] = (0.0,),
     scale: Sequence[float] = (0.0,),
 ) -> tuple[Noise, ...]:
@@ -289,7 +289,7 @@ def noise_grid(
     >>> [noise.sigma_orient_deg for noise in noise_grid((0.0, 0.2), (0, 3))]
     [0.0, 3.0, 0.0, 3.0]
     """
-    axes = sigma_trans_m, sigma_orient_deg, bias_deg, drift_deg_per_sqrt_s, scale
+    axes = sigma_trans_m, sigma_orient_deg, bias_sd_deg, drift_deg_per_sqrt_s, scale
     return tuple(Noise(*map(float, values)) for values in itertools.product(*axes))
 
 

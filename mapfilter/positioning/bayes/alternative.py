@@ -22,7 +22,7 @@ from mapfilter.filters.contract import Status
 from mapfilter.filters.grid import GridBelief
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.positioning.gnss.state import NO_SKY, SkyMemory
+from mapfilter.positioning.gnss.state import NO_GNSS_STATE, GnssState
 
 MapBelief = ParticleBelief | GridBelief
 
@@ -32,7 +32,7 @@ _LEARNT_OVER_M = 300.0
 
 
 @dataclass(frozen=True, slots=True)
-class ChallengeRules:
+class AlternativeRules:
     """When a challenger starts, wins and gives up.
 
     Parameters
@@ -47,9 +47,9 @@ class ChallengeRules:
     confirmed_mass : float
         The belief is confirmed when so much of the challenger lies within 50 m of a place that is
         at most 50 m away.
-    give_up : float
+    abandon_threshold : float
         A challenger that is so far behind gives up,
-    give_up_m : float
+    abandon_after_m : float
         or one that has neither won nor lost after so many metres.
     converge_below : float
         No belief converges while the doubt of it is larger,
@@ -63,14 +63,14 @@ class ChallengeRules:
     lost: float = 10.0
     lost_of_cells: float = 6.0
     confirmed_mass: float = 0.9
-    give_up: float = -25.0
-    give_up_m: float = 800.0
+    abandon_threshold: float = -25.0
+    abandon_after_m: float = 800.0
     converge_below: float = 2.5
     converge_behind: float = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Doubt:
+class EvidenceCusum:
     """How much less probable readings were than they should have been.
 
     Parameters
@@ -85,7 +85,7 @@ class Doubt:
     sum: float = 0.0
     usual: float = _USUAL
 
-    def after(self, expected: float, gained: float, length_m: float) -> Doubt:
+    def after(self, expected: float, gained: float, length_m: float) -> EvidenceCusum:
         """Take one reading in.
 
         Parameters
@@ -101,15 +101,15 @@ class Doubt:
         # What is learnt while in doubt would make a wrong belief usual.
         share = 0.0 if total > 0 else 1.0 - exp(-length_m / _LEARNT_OVER_M)
         ratio = min(max(gained / expected, _LEAST_USUAL), _MOST_USUAL)
-        return Doubt(total, self.usual + share * (ratio - self.usual))
+        return EvidenceCusum(total, self.usual + share * (ratio - self.usual))
 
-    def none(self) -> Doubt:
+    def none(self) -> EvidenceCusum:
         """Return no doubt, with what was learnt."""
         return replace(self, sum=0.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Challenger:
+class AlternativeHypothesis:
     """A second belief, from scratch.
 
     Parameters
@@ -121,11 +121,11 @@ class Challenger:
         Log evidence of the first belief then.
     began_s : float
         Time when it started.
-    sky : SkyMemory
+    sky : GnssState
     by_satellites : float
         What satellites add to the logarithm of the Bayes factor; bounded, as all of them may be
         faulty.
-    doubt : Doubt
+    doubt : EvidenceCusum
         Of itself.
     """
 
@@ -133,9 +133,9 @@ class Challenger:
     began_at_m: float
     against: float
     began_s: float = nan
-    sky: SkyMemory = NO_SKY
+    sky: GnssState = NO_GNSS_STATE
     by_satellites: float = 0.0
-    doubt: Doubt = field(default_factory=Doubt)
+    doubt: EvidenceCusum = field(default_factory=EvidenceCusum)
 
     def ahead(self, main: MapBelief) -> float:
         """Return the logarithm of the Bayes factor in its favour."""
@@ -154,7 +154,7 @@ class Verdict(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Settlement:
+class Resolution:
     """What became of a belief and its challenger by one reading.
 
     Parameters
@@ -162,39 +162,39 @@ class Settlement:
     belief : MapBelief
     status : Status
         For the user: LOST until something is found again.
-    doubt : Doubt
-    challenger : Challenger or None
+    doubt : EvidenceCusum
+    challenger : AlternativeHypothesis or None
     taken_over : bool
         Whether the belief is the challenger's.
     """
 
     belief: MapBelief
     status: Status
-    doubt: Doubt
-    challenger: Challenger | None = None
+    doubt: EvidenceCusum
+    challenger: AlternativeHypothesis | None = None
     taken_over: bool = False
 
 
-def settle(
-    rules: ChallengeRules,
+def resolve_alternative(
+    rules: AlternativeRules,
     before: Status,
     main: MapBelief,
-    doubt: Doubt,
-    challenger: Challenger | None,
+    doubt: EvidenceCusum,
+    challenger: AlternativeHypothesis | None,
     travelled_m: float,
     *,
     cells_only: bool,
-) -> Settlement:
+) -> Resolution:
     """Decide after a belief and its challenger have seen the same reading.
 
     Parameters
     ----------
-    rules : ChallengeRules
+    rules : AlternativeRules
     before : Status
         What the user was told last.
     main : MapBelief
-    doubt : Doubt
-    challenger : Challenger or None
+    doubt : EvidenceCusum
+    challenger : AlternativeHypothesis or None
     travelled_m : float
     cells_only : bool
         Whether only serving cells are told.
@@ -203,15 +203,15 @@ def settle(
         # All agree, and what is heard does not: the truth may have died out.
         main = replace(main, status=Status.SEARCHING)
     if challenger is None:
-        return _told(before, Settlement(main, main.status, doubt))
+        return _told(before, Resolution(main, main.status, doubt))
     verdict = judge(rules, main, challenger, travelled_m, cells_only=cells_only)
     if verdict in (Verdict.CONFIRMED, Verdict.GAVE_UP):
-        return _told(before, Settlement(main, main.status, doubt.none()))
+        return _told(before, Resolution(main, main.status, doubt.none()))
     searching, other = main.status is Status.SEARCHING, challenger.belief
     if verdict is Verdict.WON:
         found = Status.CONVERGED if searching else Status.TRACKING
         return _told(
-            before, Settlement(replace(other, status=found), found, doubt.none(), None, True)
+            before, Resolution(replace(other, status=found), found, doubt.none(), None, True)
         )
     doubted = challenger.doubt.sum >= (rules.doubt_of_cells if cells_only else rules.doubt)
     if verdict is Verdict.AHEAD and (searching or doubted):
@@ -219,13 +219,13 @@ def settle(
         # does in doubt of itself, and is challenged in its turn.
         status = Status.SEARCHING if searching else Status.LOST
         left = challenger.doubt if doubted else doubt.none()
-        other = replace(other, status=Status.SEARCHING, agreed_at_m=nan)
-        return _told(before, Settlement(other, status, left, None, True))
+        other = replace(other, status=Status.SEARCHING, agreement_start_m=nan)
+        return _told(before, Resolution(other, status, left, None, True))
     lost = verdict is Verdict.AHEAD and not searching
-    return _told(before, Settlement(main, Status.LOST if lost else main.status, doubt, challenger))
+    return _told(before, Resolution(main, Status.LOST if lost else main.status, doubt, challenger))
 
 
-def _told(before: Status, now: Settlement) -> Settlement:
+def _told(before: Status, now: Resolution) -> Resolution:
     """Return what the user is told: once lost, one is LOST until found, and then TRACKING."""
     if before is not Status.LOST or now.status in (Status.LOST, Status.TRACKING):
         return now
@@ -236,16 +236,19 @@ def _told(before: Status, now: Settlement) -> Settlement:
 
 
 def _may_converge(
-    rules: ChallengeRules, main: MapBelief, doubt: Doubt, challenger: Challenger | None
+    rules: AlternativeRules,
+    main: MapBelief,
+    doubt: EvidenceCusum,
+    challenger: AlternativeHypothesis | None,
 ) -> bool:
     rivalled = challenger is not None and challenger.ahead(main) > -rules.converge_behind
     return doubt.sum <= rules.converge_below and not rivalled
 
 
 def judge(
-    rules: ChallengeRules,
+    rules: AlternativeRules,
     main: MapBelief,
-    challenger: Challenger,
+    challenger: AlternativeHypothesis,
     travelled_m: float,
     *,
     cells_only: bool,
@@ -262,6 +265,6 @@ def judge(
         sure = agreed and challenger.doubt.sum <= rules.converge_below
         return Verdict.WON if sure else Verdict.AHEAD
     gone_m = travelled_m - challenger.began_at_m
-    if ahead <= rules.give_up or gone_m >= rules.give_up_m:
+    if ahead <= rules.abandon_threshold or gone_m >= rules.abandon_after_m:
         return Verdict.GAVE_UP
     return Verdict.OPEN

@@ -19,12 +19,12 @@ from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.models.cell_id import ServingWeights
 from mapfilter.models.fingerprint import BoundReading, LevelErrors, LevelReading
 from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.epochs import Epoch, GnssFix, Heard
+from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.tracks.schema import SERVING
 
 
 @dataclass(frozen=True, eq=False)
-class Memory:
+class RadioHistory:
     """What is kept from one report to the next.
 
     Parameters
@@ -49,17 +49,17 @@ class Memory:
     back_north_m: float = 0.0
 
     @classmethod
-    def empty(cls, cells: int) -> Memory:
+    def empty(cls, cells: int) -> RadioHistory:
         """Return the memory of one who has heard nothing."""
         return cls(np.full(cells, nan), np.full(cells, -inf))
 
-    def moved(self, step: MotionStep) -> Memory:
+    def moved(self, step: MotionStep) -> RadioHistory:
         """Return the memory after a step."""
         if not isfinite(step.step_m):
             return self
         heading = step.heading_rad if isfinite(step.heading_rad) else 0.0
         east_m, north_m = step.step_m * cos(heading), step.step_m * sin(heading)
-        return Memory(
+        return RadioHistory(
             self.level_dbm,
             self.heard_at_m,
             self.travelled_m + abs(step.step_m),
@@ -159,35 +159,35 @@ class RadioReading:
     also: tuple[PlaceEvidence, ...] = ()
 
 
-Unplaced = tuple[Heard, Reason]
+Unplaced = tuple[ReportRow, Reason]
 
 
 def reading_of(
     area: AreaMap,
     options: EvidenceOptions,
-    memory: Memory,
+    memory: RadioHistory,
     epoch: Epoch,
-    grain_m: float = _FIRST_GRAIN_M,
-) -> tuple[Memory, RadioReading | None, Reason, list[Unplaced]]:
+    particle_spacing_m: float = _FIRST_GRAIN_M,
+) -> tuple[RadioHistory, RadioReading | None, Reason, list[Unplaced]]:
     """Make one report ready.
 
     Parameters
     ----------
     area : AreaMap
     options : EvidenceOptions
-    memory : Memory
+    memory : RadioHistory
     epoch : Epoch
-    grain_m : float
+    particle_spacing_m : float
         How far the hypotheses nearest to the truth may lie beside it.
 
     Returns
     -------
-    memory : Memory
+    memory : RadioHistory
     reading : RadioReading or None
         None where nothing in the report counts.
     reason : Reason
         Whether the serving cell was used, or why not.
-    unplaced : list of (Heard, Reason)
+    unplaced : list of (ReportRow, Reason)
         Rows that nobody can place; told, and kept out.
     """
     since_m = min(memory.travelled_m - memory.used_at_m, 1e9)
@@ -208,7 +208,7 @@ def reading_of(
         unplaced += unknown
         bounds = tuple(_bound(options, band, row, counted_m) for band, row in others)
         if inside:
-            levels = _levels(options, memory, inside, grain_m)
+            levels = _levels(options, memory, inside, particle_spacing_m)
             level_dbm, heard_at_m = level_dbm.copy(), heard_at_m.copy()
             bands = list(inside)
             level_dbm[bands] = list(inside.values())
@@ -261,10 +261,10 @@ def _timing_advance(epoch: Epoch) -> float:
 
 def _placed(
     area: AreaMap, epoch: Epoch, serving: int
-) -> tuple[dict[int, float], list[tuple[tuple[int, ...], Heard]], list[Unplaced]]:
+) -> tuple[dict[int, float], list[tuple[tuple[int, ...], ReportRow]], list[Unplaced]]:
     """Sort a report's levels: those of one cell inside the scale, others, and those of nobody."""
     inside: dict[int, float] = {}
-    others: list[tuple[tuple[int, ...], Heard]] = []
+    others: list[tuple[tuple[int, ...], ReportRow]] = []
     unplaced: list[Unplaced] = []
     served = False
     for row in epoch.heard:
@@ -294,7 +294,10 @@ def _placed(
 
 
 def _levels(
-    options: EvidenceOptions, memory: Memory, inside: dict[int, float], grain_m: float
+    options: EvidenceOptions,
+    memory: RadioHistory,
+    inside: dict[int, float],
+    particle_spacing_m: float,
 ) -> LevelReading:
     errors = options.levels
     count = len(inside)
@@ -308,7 +311,7 @@ def _levels(
     # A level that was missing from the last report alone is no news of a whole new error.
     news = np.where(together, 1.0, 1.0 - correlation**2)
     lasting = errors.sd_db**2
-    white = errors.measurement_db**2 + errors.beside_db2(grain_m)
+    white = errors.measurement_db**2 + errors.offset_variance_db2(particle_spacing_m)
     variance = lasting * (1 - rho**2) + white * (1 + rho**2)
     return LevelReading(
         cell,
@@ -323,7 +326,7 @@ def _levels(
     )
 
 
-def _news(options: EvidenceOptions, memory: Memory, cell: Ints32) -> Floats:
+def _news(options: EvidenceOptions, memory: RadioHistory, cell: Ints32) -> Floats:
     """Return how much of each level is new: 1 where it was in the last report, or never heard."""
     together = memory.heard_at_m[cell] == memory.used_at_m
     away_m = memory.travelled_m - memory.heard_at_m[cell]
@@ -332,7 +335,7 @@ def _news(options: EvidenceOptions, memory: Memory, cell: Ints32) -> Floats:
 
 
 def _bound(
-    options: EvidenceOptions, bands: tuple[int, ...], row: Heard, counted_m: float
+    options: EvidenceOptions, bands: tuple[int, ...], row: ReportRow, counted_m: float
 ) -> BoundReading:
     errors = options.levels
     weight = errors.weight * (1.0 - exp(-2.0 * counted_m / errors.correlation_m))

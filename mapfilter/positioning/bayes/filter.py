@@ -18,25 +18,25 @@ from mapfilter.filters.contract import Filter, Reason, Status
 from mapfilter.filters.grid import GridBelief, GridFilter
 from mapfilter.filters.particle import ParticleFilter, ParticleOptions
 from mapfilter.positioning.bayes.alternative import (
-    Challenger,
-    ChallengeRules,
+    AlternativeHypothesis,
+    AlternativeRules,
     MapBelief,
-    settle,
+    resolve_alternative,
 )
 from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.evidence import Memory, RadioReading, reading_of
+from mapfilter.positioning.bayes.evidence import RadioHistory, RadioReading, reading_of
 from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel, Start
 from mapfilter.positioning.bayes.state import BayesTrack as BayesTrack
-from mapfilter.positioning.bayes.state import News as News
-from mapfilter.positioning.bayes.state import grain_of, name_of, news_of
+from mapfilter.positioning.bayes.state import StepOutput as StepOutput
+from mapfilter.positioning.bayes.state import name_of, news_of, particle_spacing_of
 from mapfilter.positioning.bayes.timing import NEVER, is_timed, with_timing
 from mapfilter.positioning.epochs import Epoch, headed
 from mapfilter.positioning.estimate import UnusedReading
-from mapfilter.positioning.gnss.gate import Listener
-from mapfilter.positioning.gnss.options import SkyOptions, TimingOptions
-from mapfilter.positioning.gnss.satellites import Satellites, SkyNews
-from mapfilter.positioning.gnss.state import SkyMemory
+from mapfilter.positioning.gnss.gate import GnssGate
+from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
+from mapfilter.positioning.gnss.satellites import GnssUpdate, Satellites
+from mapfilter.positioning.gnss.state import GnssState
 
 _MOST_TIMES, _SEARCHING_TIMES = 12, 8
 
@@ -49,18 +49,18 @@ class BayesPositioner:
     ----------
     model : BayesModel
     options : ParticleOptions
-    rules : ChallengeRules
+    rules : AlternativeRules
     grid : bool
         The exact filter on a grid in place of particles.
-    satellites : SkyOptions
+    satellites : GnssOptions
     timing : TimingOptions
     """
 
     model: BayesModel
     options: ParticleOptions = field(default_factory=ParticleOptions)
-    rules: ChallengeRules = field(default_factory=ChallengeRules)
+    rules: AlternativeRules = field(default_factory=AlternativeRules)
     grid: bool = False
-    satellites: SkyOptions = field(default_factory=SkyOptions)
+    satellites: GnssOptions = field(default_factory=GnssOptions)
     timing: TimingOptions = field(default_factory=TimingOptions)
 
     @property
@@ -95,12 +95,12 @@ class BayesPositioner:
     @cached_property
     def _sky(self) -> Satellites:
         area, (width_m, height_m) = self.area, self.area.size_m
-        listener = Listener(self.satellites, area.lattice.crs, area.origin_m)
+        listener = GnssGate(self.satellites, area.lattice.crs, area.origin_m)
         return Satellites(listener, (width_m / 2, height_m / 2), not self.grid)
 
     def begin(self) -> BayesTrack:
         """Return what is known before the first epoch: nothing."""
-        return BayesTrack(Memory.empty(len(self.area.cell_ids)))
+        return BayesTrack(RadioHistory.empty(len(self.area.cell_ids)))
 
     def begin_at(
         self, east_m: float, north_m: float, sd_m: float, rng: np.random.Generator
@@ -112,18 +112,18 @@ class BayesPositioner:
 
     def advance(
         self, track: BayesTrack, epoch: Epoch, rng: np.random.Generator
-    ) -> tuple[BayesTrack, News]:
+    ) -> tuple[BayesTrack, StepOutput]:
         """Take one epoch in."""
         fix = epoch.fix
         if fix is not None and not (isfinite(fix.east_m) and isfinite(fix.north_m)):
             epoch = replace(epoch, fix=None)
-        grain_m, converged = grain_of(track), track.status is Status.CONVERGED
+        particle_spacing_m, converged = particle_spacing_of(track), track.status is Status.CONVERGED
         track, unused = self._move(track, epoch, rng)
-        track, sky = self._sky.hear(track, epoch, grain_m, self.model.evidence.spacing_m)
+        track, sky = self._sky.hear(track, epoch, particle_spacing_m, self.model.evidence.spacing_m)
         known = track.belief is not None and epoch.fix is not None
         report = replace(epoch, fix=None) if known else epoch
         memory, reading, reason, unplaced = reading_of(
-            self.area, self.model.evidence, track.memory, report, grain_m
+            self.area, self.model.evidence, track.memory, report, particle_spacing_m
         )
         track, reading, untimed = self._timed(track, epoch, reading)
         unused += [*sky.unused, *untimed]
@@ -154,7 +154,7 @@ class BayesPositioner:
         track: BayesTrack,
         before: MapBelief,
         reading: RadioReading,
-        sky: SkyNews,
+        sky: GnssUpdate,
         epoch: Epoch,
         rng: np.random.Generator,
     ) -> tuple[BayesTrack, Reason]:
@@ -176,7 +176,7 @@ class BayesPositioner:
             gained = other.log_evidence - challenger.belief.log_evidence
             own = challenger.doubt.after(reading.expected, gained, reading.length_m)
             challenger = replace(challenger, belief=other, doubt=own)
-        now = settle(
+        now = resolve_alternative(
             self.rules, track.status, belief, doubt, challenger, track.memory.travelled_m,
             cells_only=cells_only,
         )  # fmt: skip
@@ -198,9 +198,9 @@ class BayesPositioner:
 
     def _challenger(
         self, track: BayesTrack, main: MapBelief, epoch: Epoch, rng: np.random.Generator
-    ) -> Challenger | None:
+    ) -> AlternativeHypothesis | None:
         """Start from scratch: from the report alone, as if it were the first."""
-        empty = Memory.empty(len(self.area.cell_ids))
+        empty = RadioHistory.empty(len(self.area.cell_ids))
         _, reading, _, _ = reading_of(self.area, self.model.evidence, empty, epoch)
         _, reading, _ = self._timed(replace(track, timed_at_m=NEVER), epoch, reading)
         reading = self._sky.first(reading, epoch)
@@ -208,13 +208,13 @@ class BayesPositioner:
             return None
         belief, heard = self._start(track, reading, epoch, rng)
         travelled_m = track.memory.travelled_m
-        return Challenger(
+        return AlternativeHypothesis(
             belief, travelled_m, main.log_evidence, epoch.time_s, heard, doubt=track.doubt.none()
         )
 
     def _start(
         self, track: BayesTrack, reading: RadioReading, epoch: Epoch, rng: np.random.Generator
-    ) -> tuple[MapBelief, SkyMemory]:
+    ) -> tuple[MapBelief, GnssState]:
         belief = self.filter_for(track.compass).init(Start(reading, track.compass), rng)
         return self._sky.begin(belief, epoch, track.memory.travelled_m)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Reason
 from mapfilter.filters.grid import Transport
-from mapfilter.filters.hypotheses import Bins, Summary
+from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.geodesy import wrap_rad
 from mapfilter.models.street_motion import BIAS, EAST, NORTH, OFF, STATES
 from mapfilter.positioning.bayes.evidence import RadioReading
@@ -122,6 +122,6 @@ class StreetGrid:
         """Add the log-likelihood of a report and of a fix, in place."""
         return self.model.weigh(state, log_weight, reading)
 
-    def credible(self, summary: Summary) -> bool:
+    def can_converge(self, summary: BeliefSummary) -> bool:
         """Tell whether the leading hypothesis is on the map rather than off it."""
-        return self.model.credible(summary)
+        return self.model.can_converge(summary)

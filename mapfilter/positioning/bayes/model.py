@@ -17,11 +17,11 @@ import numpy as np
 
 from mapfilter._types import Floats, Floats32, Ints32
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.filters.hypotheses import Bins, Summary
+from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.filters.resampling import systematic
 from mapfilter.models import cell_id, fingerprint
 from mapfilter.models.fingerprint import LevelReading
-from mapfilter.models.measured_map import HeardMaps
+from mapfilter.models.measured_map import ServingStatistics
 from mapfilter.models.street_motion import (
     BIAS,
     EAST,
@@ -239,7 +239,7 @@ class BayesModel:
             used = True
         return Reason.USED if used else Reason.NO_READING
 
-    def credible(self, summary: Summary) -> bool:
+    def can_converge(self, summary: BeliefSummary) -> bool:
         """Tell whether the leading hypothesis is on the map rather than off it."""
         return bool(summary.mean[OFF] < 0.5)
 
@@ -259,19 +259,19 @@ _LEAST_VARIANCE = 0.25
 
 
 @dataclass(frozen=True)
-class HeardModel(BayesModel):
+class MeasuredMapModel(BayesModel):
     """Streets and radio of an area, with maps of what was heard.
 
     Parameters
     ----------
-    heard : HeardMaps
+    heard : ServingStatistics
         On the area's lattice.
     level_sd_db : ndarray of float32, shape (C, P), optional
         Of a new reading against the map of levels, on the area's lattice; without it that of the
         evidence's options holds everywhere.
     """
 
-    heard: HeardMaps | None = None
+    heard: ServingStatistics | None = None
 
     @property
     def timed_by_sites(self) -> bool:

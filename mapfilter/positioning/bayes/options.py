@@ -8,12 +8,12 @@ from math import radians
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.street_motion import MapWeights, MotionErrors
-from mapfilter.positioning.bayes.alternative import ChallengeRules
+from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import EvidenceOptions
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.gnss.options import SkyOptions, TimingOptions
+from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 
 _NARROW_BIAS_RAD, _NARROW_SCALE = radians(1.5), 0.015
 _MOST_TIMES = 5.0
@@ -34,9 +34,9 @@ class BayesOptions:
     particles : ParticleOptions
         Numbers of particles, and the switch rule. The numbers are those for a compass and a step
         length that are nearly right; wide errors get up to five times as many.
-    challenge : ChallengeRules
+    challenge : AlternativeRules
         When a belief in doubt is challenged, and when it is replaced.
-    satellites : SkyOptions
+    satellites : GnssOptions
         How far pseudoranges and fixes are trusted.
     timing : TimingOptions
         How far timing advances and time differences are trusted.
@@ -50,8 +50,8 @@ class BayesOptions:
     map: MapWeights = field(default_factory=MapWeights)
     evidence: EvidenceOptions = field(default_factory=EvidenceOptions)
     particles: ParticleOptions = field(default_factory=ParticleOptions)
-    challenge: ChallengeRules = field(default_factory=ChallengeRules)
-    satellites: SkyOptions = field(default_factory=SkyOptions)
+    challenge: AlternativeRules = field(default_factory=AlternativeRules)
+    satellites: GnssOptions = field(default_factory=GnssOptions)
     timing: TimingOptions = field(default_factory=TimingOptions)
     smooth: bool = False
     grid: bool = False

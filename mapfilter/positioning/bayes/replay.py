@@ -14,7 +14,7 @@ from mapfilter.geodesy import same_crs
 from mapfilter.models.fingerprint import BoundReading, LevelReading
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.filter import BayesPositioner, BayesTrack, News
+from mapfilter.positioning.bayes.filter import BayesPositioner, BayesTrack, StepOutput
 from mapfilter.positioning.bayes.smoothing import History, settled, smoothed
 from mapfilter.positioning.epochs import Epoch, epochs
 from mapfilter.positioning.estimate import PositionedTrack, Snapshot, TrackEstimate, TrackEvidence
@@ -58,7 +58,7 @@ def position_by_bayes(
     merged = epochs(log)
     _warm_up(positioner)
     began_s = time.process_time()
-    track, told = positioner.begin(), list[News]()
+    track, told = positioner.begin(), list[StepOutput]()
     snapshots: list[Snapshot] = []
     history = History()
     for epoch in merged:
@@ -79,7 +79,7 @@ def position_by_bayes(
 
 
 def estimate_of(
-    crs: str, filter_name: str, told: list[News], start_utc_s: float = nan
+    crs: str, filter_name: str, told: list[StepOutput], start_utc_s: float = nan
 ) -> TrackEstimate:
     """Put the news of a track's epochs together."""
     unused = [reading for news in told for reading in news.unused]
@@ -108,7 +108,7 @@ def _worth_a_picture(track: BayesTrack, snapshots: list[Snapshot]) -> bool:
     return track.memory.travelled_m - snapshots[-1].travelled_m >= _SNAPSHOT_EVERY_M
 
 
-def _snapshot(track: BayesTrack, news: News, area: AreaMap) -> Snapshot:
+def _snapshot(track: BayesTrack, news: StepOutput, area: AreaMap) -> Snapshot:
     belief, (west, south), fix = track.leading, area.origin_m, news.fix
     if belief is None:
         raise AssertionError("only beliefs are drawn")

@@ -51,7 +51,7 @@ class Kept:
 
     @property
     def bytes(self) -> int:
-        """Memory that it takes."""
+        """RadioHistory that it takes."""
         return int(self.state.nbytes + self.log_weight.nbytes)
 
 

@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 from math import inf, isfinite, nan, sqrt
 
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.filters.hypotheses import Summary, nothing
+from mapfilter.filters.hypotheses import BeliefSummary, nothing
 from mapfilter.models.street_motion import STATES
-from mapfilter.positioning.bayes.alternative import Challenger, Doubt, MapBelief
+from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, EvidenceCusum, MapBelief
 from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.evidence import Memory
-from mapfilter.positioning.epochs import Heard
+from mapfilter.positioning.bayes.evidence import RadioHistory
+from mapfilter.positioning.epochs import ReportRow
 from mapfilter.positioning.estimate import Fix, UnusedReading
-from mapfilter.positioning.gnss.state import NO_SKY, SkyMemory
+from mapfilter.positioning.gnss.state import NO_GNSS_STATE, GnssState
 from mapfilter.positioning.matched_way import matched_way
 
 
@@ -23,7 +23,7 @@ class BayesTrack:
 
     Parameters
     ----------
-    memory : Memory
+    memory : RadioHistory
         Of dead reckoning and levels.
     belief : MapBelief or None
         None before the first report that can be placed.
@@ -32,26 +32,26 @@ class BayesTrack:
     compass : bool
         Whether headings are a compass's.
     status : Status
-    doubt : Doubt
-    challenger : Challenger or None
+    doubt : EvidenceCusum
+    challenger : AlternativeHypothesis or None
         Beside a belief in doubt.
     wins : int
         How many challengers have taken over.
-    sky : SkyMemory
+    sky : GnssState
         Of the belief.
     timed_at_m : (float, float)
         Distance travelled when timing advances and time differences were last used.
     """
 
-    memory: Memory
+    memory: RadioHistory
     belief: MapBelief | None = None
     heading_rad: float = nan
     compass: bool = True
     status: Status = Status.SEARCHING
-    doubt: Doubt = field(default_factory=Doubt)
-    challenger: Challenger | None = None
+    doubt: EvidenceCusum = field(default_factory=EvidenceCusum)
+    challenger: AlternativeHypothesis | None = None
     wins: int = 0
-    sky: SkyMemory = NO_SKY
+    sky: GnssState = NO_GNSS_STATE
     timed_at_m: tuple[float, float] = (-inf, -inf)
 
     @property
@@ -62,7 +62,7 @@ class BayesTrack:
 
 
 @dataclass(frozen=True, slots=True)
-class News:
+class StepOutput:
     """What one epoch brought.
 
     Parameters
@@ -88,7 +88,7 @@ def news_of(
     time_s: float,
     reason: Reason,
     unused: tuple[UnusedReading, ...],
-) -> News:
+) -> StepOutput:
     """Return what a track says after an epoch.
 
     Parameters
@@ -120,10 +120,10 @@ def news_of(
         reason,
     )
     evidence = _evidence(said, west, south, belief.log_evidence if belief else nan)
-    return News(fix, evidence, unused)
+    return StepOutput(fix, evidence, unused)
 
 
-def grain_of(track: BayesTrack) -> float:
+def particle_spacing_of(track: BayesTrack) -> float:
     """Return how far hypotheses lie apart where the belief is, and no less than they are good."""
     belief = track.belief
     if belief is None or not belief.log_weight.size:
@@ -132,7 +132,7 @@ def grain_of(track: BayesTrack) -> float:
     return max(sqrt(area_m2 / belief.log_weight.size), _LEAST_GRAIN_M)
 
 
-def name_of(row: Heard) -> str:
+def name_of(row: ReportRow) -> str:
     """Return what messages call the cell of a report's row."""
     if row.cell is not None:
         return row.cell
@@ -141,7 +141,7 @@ def name_of(row: Heard) -> str:
 
 
 def _evidence(
-    said: Summary, west: float, south: float, log_evidence: float
+    said: BeliefSummary, west: float, south: float, log_evidence: float
 ) -> tuple[float, float, float, float, float]:
     east_m = north_m = nan
     mass = 0.0 if isfinite(said.entropy_bits) else nan

@@ -20,7 +20,7 @@ from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.alternative import MapBelief
 from mapfilter.positioning.bayes.evidence import Given, PlaceEvidence
 from mapfilter.positioning.epochs import Epoch, GnssFix
-from mapfilter.positioning.gnss.options import SkyOptions
+from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.readings import (
     LEAST_MOVED_M,
     FixEvidence,
@@ -43,7 +43,7 @@ from mapfilter.positioning.gnss.receiver import (
     near_clock,
     weighed,
 )
-from mapfilter.positioning.gnss.state import SkyMemory
+from mapfilter.positioning.gnss.state import GnssState
 
 _RESET_GATE = 0.5
 
@@ -56,7 +56,7 @@ class Listened:
     ----------
     belief : MapBelief
         Its hypotheses carry clock and height.
-    memory : SkyMemory
+    memory : GnssState
     also : tuple of PlaceEvidence
         To weigh it by.
     heard : bool
@@ -66,41 +66,46 @@ class Listened:
     """
 
     belief: MapBelief
-    memory: SkyMemory
+    memory: GnssState
     also: tuple[PlaceEvidence, ...] = ()
     heard: bool = False
     told: tuple[Told, ...] = ()
 
 
 @dataclass(frozen=True)
-class Listener:
+class GnssGate:
     """Compares satellites with beliefs.
 
     Parameters
     ----------
-    options : SkyOptions
+    options : GnssOptions
     crs : str
         Of the map.
     origin_m : (float, float)
         Of the frame of the hypotheses.
     """
 
-    options: SkyOptions
+    options: GnssOptions
     crs: str
     origin_m: tuple[float, float]
 
     def listen(
-        self, belief: MapBelief, memory: SkyMemory, epoch: Epoch, travelled_m: float, grain_m: float
+        self,
+        belief: MapBelief,
+        memory: GnssState,
+        epoch: Epoch,
+        travelled_m: float,
+        particle_spacing_m: float,
     ) -> Listened:
         """Compare an epoch's satellites and fix with a belief.
 
         Parameters
         ----------
         belief : MapBelief
-        memory : SkyMemory
+        memory : GnssState
         epoch : Epoch
         travelled_m : float
-        grain_m : float
+        particle_spacing_m : float
             How far the hypotheses nearest to the truth may lie beside it.
         """
         memory = replace(memory, heard_at_s=epoch.time_s, heard_at_m=travelled_m)
@@ -108,7 +113,7 @@ class Listener:
         if epoch.fix is not None:
             found = self._hear_fix(found, epoch, epoch.fix, travelled_m)
         if epoch.ranges:
-            found = self._hear_ranges(found, epoch, travelled_m, grain_m)
+            found = self._hear_ranges(found, epoch, travelled_m, particle_spacing_m)
         if found.memory.until_s > epoch.time_s:
             # Where one is rejected, the other does not count alone.
             found = replace(found, also=(Given(np.zeros(1)),))
@@ -119,7 +124,7 @@ class Listener:
         return self.options.search_gate if searching else self.options.gate
 
     def _hear_ranges(
-        self, found: Listened, epoch: Epoch, travelled_m: float, grain_m: float
+        self, found: Listened, epoch: Epoch, travelled_m: float, particle_spacing_m: float
     ) -> Listened:
         belief, memory, options = found.belief, found.memory, self.options
         if not isinstance(belief, ParticleBelief):
@@ -138,7 +143,7 @@ class Listener:
             rows = np.zeros((LINEAR, belief.log_weight.size))
         receiver, rows = moved(options, receiver, rows, epoch.time_s, travelled_m)
         gone_m = travelled_m - receiver.used_at_m
-        sigma = range_sigma_m(options, sky, gone_m, grain_m)
+        sigma = range_sigma_m(options, sky, gone_m, particle_spacing_m)
         waits = epoch.time_s < memory.until_s
         used: tuple[Sky, Weighed] | None = None
         if not waits:
@@ -212,7 +217,7 @@ class Listener:
             return gain
         return np.asarray(np.logaddexp(np.log1p(-share) + gain, np.log(share)))
 
-    def _rejected(self, memory: SkyMemory, time_s: float) -> SkyMemory:
+    def _rejected(self, memory: GnssState, time_s: float) -> GnssState:
         since_s = memory.since_s if isfinite(memory.since_s) else time_s
         return replace(memory, until_s=time_s + self.options.probation_s, since_s=since_s)
 

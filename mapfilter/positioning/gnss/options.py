@@ -11,7 +11,7 @@ from mapfilter.models.ranging import GSM_STEP_M
 
 
 @dataclass(frozen=True, slots=True)
-class SkyOptions:
+class GnssOptions:
     """Noise, clock, height and doubt of what satellites tell.
 
     Parameters

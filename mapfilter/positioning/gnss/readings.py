@@ -13,7 +13,7 @@ from mapfilter.gnss.grid_frame import GridFrame
 from mapfilter.gnss.sky import directions
 from mapfilter.models.street_motion import EAST, NORTH
 from mapfilter.positioning.epochs import Epoch, GnssFix, Pseudorange
-from mapfilter.positioning.gnss.options import SkyOptions
+from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.receiver import Sky
 
 Told = tuple[str, str, Reason]
@@ -23,7 +23,7 @@ LEAST_MOVED_M = 0.1
 
 
 def sky_over(
-    options: SkyOptions,
+    options: GnssOptions,
     crs: str,
     origin_m: tuple[float, float],
     epoch: Epoch,
@@ -33,7 +33,7 @@ def sky_over(
 
     Parameters
     ----------
-    options : SkyOptions
+    options : GnssOptions
     crs : str
         Of the map.
     origin_m : (float, float)
@@ -74,7 +74,9 @@ def sky_over(
     return (sky.only(up) if up.any() else None), tuple(told)
 
 
-def range_sigma_m(options: SkyOptions, sky: Sky, gone_m: float, grain_m: float) -> Floats:
+def range_sigma_m(
+    options: GnssOptions, sky: Sky, gone_m: float, particle_spacing_m: float
+) -> Floats:
     """Return deviations of pseudoranges that follow others after some metres.
 
     White noise is new each time. Echoes last for metres: readings in a row count as one in so
@@ -82,17 +84,17 @@ def range_sigma_m(options: SkyOptions, sky: Sky, gone_m: float, grain_m: float) 
 
     Parameters
     ----------
-    options : SkyOptions
+    options : GnssOptions
     sky : Sky
     gone_m : float
         Since the last ones that were used.
-    grain_m : float
+    particle_spacing_m : float
         How far the hypotheses nearest to the truth may lie beside it.
     """
     by_elevation = options.zenith_m / np.sin(sky.elevation_rad)
     white = np.where(np.isfinite(sky.sigma_m), sky.sigma_m, by_elevation)
     lasts = max(options.echo_memory_m / max(gone_m, LEAST_MOVED_M), 1.0)
-    beside = grain_m * np.cos(sky.elevation_rad)
+    beside = particle_spacing_m * np.cos(sky.elevation_rad)
     return np.asarray(np.sqrt(white**2 + options.echo_m**2 * lasts + beside**2))
 
 

@@ -20,7 +20,7 @@ from mapfilter.models.motion import clock_noise
 from mapfilter.models.ranging import pseudoranges
 from mapfilter.models.state import StateLayout
 from mapfilter.models.street_motion import STATES
-from mapfilter.positioning.gnss.options import SkyOptions
+from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.kalman.models import compiled
 
 LAYOUT = StateLayout(5, 0, 1, clock=2)
@@ -112,14 +112,14 @@ class Weighed:
     covariance: Floats
 
 
-def begun(options: SkyOptions, time_s: float, travelled_m: float) -> Receiver:
+def begun(options: GnssOptions, time_s: float, travelled_m: float) -> Receiver:
     """Return a receiver of which nothing is known."""
     deviations = np.array([options.clock_sd_m, options.drift_sd_mps, options.height_sd_m])
     return Receiver(time_s, travelled_m, np.zeros(LINEAR), np.diag(deviations**2))
 
 
 def moved(
-    options: SkyOptions, receiver: Receiver, rows: Floats, time_s: float, travelled_m: float
+    options: GnssOptions, receiver: Receiver, rows: Floats, time_s: float, travelled_m: float
 ) -> tuple[Receiver, Floats]:
     """Let the clock run and the height change since the last time; rows have shape (3, N)."""
     elapsed_s = max(time_s - receiver.time_s, 0.0)
@@ -146,7 +146,7 @@ def moved(
     return after, rows
 
 
-def clock_reset(options: SkyOptions, receiver: Receiver) -> Receiver:
+def clock_reset(options: GnssOptions, receiver: Receiver) -> Receiver:
     """Return a receiver whose clock may have jumped anywhere; its rate and height stay known."""
     covariance = receiver.covariance.copy()
     covariance[0, :] = covariance[:, 0] = 0.0

@@ -7,16 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapfilter._types import Floats, Floats32
-from mapfilter.positioning.bayes.alternative import Challenger, MapBelief
+from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.state import BayesTrack
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import UnusedReading
-from mapfilter.positioning.gnss.gate import Listened, Listener
-from mapfilter.positioning.gnss.options import SkyOptions
+from mapfilter.positioning.gnss.gate import GnssGate, Listened
+from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.readings import range_sigma_m, sky_over
 from mapfilter.positioning.gnss.receiver import LINEAR, Sky, begun, near_clock, weighed
-from mapfilter.positioning.gnss.state import NO_SKY, SkyMemory
+from mapfilter.positioning.gnss.state import NO_GNSS_STATE, GnssState
 
 _FIRST_GRAIN_M = 10.0
 _BLIND_START = 0.1
@@ -31,12 +31,12 @@ class FirstRanges:
     ----------
     sky : Sky
     sigma_m : (m,) array
-    options : SkyOptions
+    options : GnssOptions
     """
 
     sky: Sky
     sigma_m: Floats
-    options: SkyOptions
+    options: GnssOptions
 
     def log_likelihood(self, state: Floats32) -> Floats:
         """Return it for each place, their mean being 1."""
@@ -50,7 +50,7 @@ class FirstRanges:
 
 
 @dataclass(frozen=True, eq=False)
-class SkyNews:
+class GnssUpdate:
     """What satellites and fixes of an epoch are to a track's beliefs.
 
     Parameters
@@ -81,7 +81,7 @@ class SkyNews:
         return _with(reading, self.other)
 
 
-NO_NEWS = SkyNews()
+NO_NEWS = GnssUpdate()
 
 
 @dataclass(frozen=True)
@@ -90,20 +90,20 @@ class Satellites:
 
     Parameters
     ----------
-    listener : Listener
+    listener : GnssGate
     middle_m : (float, float)
         Of the area, in the frame of the hypotheses.
     ranges : bool
         Whether the filter's hypotheses can carry a clock.
     """
 
-    listener: Listener
+    listener: GnssGate
     middle_m: tuple[float, float]
     ranges: bool = True
 
     def hear(
-        self, track: BayesTrack, epoch: Epoch, grain_m: float, spacing_m: float
-    ) -> tuple[BayesTrack, SkyNews]:
+        self, track: BayesTrack, epoch: Epoch, particle_spacing_m: float, spacing_m: float
+    ) -> tuple[BayesTrack, GnssUpdate]:
         """Compare an epoch's satellites with a track's beliefs, which then carry their clocks.
 
         They are listened to when a report counts, ``spacing_m`` after the last one, or by
@@ -116,11 +116,13 @@ class Satellites:
         if not reported and not track.sky.due(self.options, epoch.time_s, travelled_m):
             return track, NO_NEWS
         listen = self.listener.listen
-        main = listen(track.belief, track.sky, epoch, travelled_m, grain_m)
+        main = listen(track.belief, track.sky, epoch, travelled_m, particle_spacing_m)
         track = replace(track, belief=main.belief, sky=main.memory)
         other, challenger = None, track.challenger
         if challenger is not None:
-            other = listen(challenger.belief, challenger.sky, epoch, travelled_m, grain_m)
+            other = listen(
+                challenger.belief, challenger.sky, epoch, travelled_m, particle_spacing_m
+            )
             challenger = replace(challenger, belief=other.belief, sky=other.memory)
             if main.heard or other.heard:
                 challenger = self._sided(challenger, main.memory, epoch.time_s)
@@ -128,14 +130,16 @@ class Satellites:
         since_s = main.memory.since_s
         disputed = main.memory.rejects and epoch.time_s - since_s >= self.options.dispute_s
         unused = tuple(UnusedReading(epoch.time_s, *told) for told in main.told)
-        return track, SkyNews(main, other, disputed, unused)
+        return track, GnssUpdate(main, other, disputed, unused)
 
     @property
-    def options(self) -> SkyOptions:
+    def options(self) -> GnssOptions:
         """How far satellites are trusted."""
         return self.listener.options
 
-    def _sided(self, challenger: Challenger, main: SkyMemory, time_s: float) -> Challenger:
+    def _sided(
+        self, challenger: AlternativeHypothesis, main: GnssState, time_s: float
+    ) -> AlternativeHypothesis:
         """Count for whom satellites speak; but no further than they may be faulty as a whole."""
         most = self.options.trust
         most += max(time_s - challenger.began_s, 0.0) / self.options.trust_grows_s
@@ -157,11 +161,11 @@ class Satellites:
 
     def begin(
         self, belief: MapBelief, epoch: Epoch, travelled_m: float
-    ) -> tuple[MapBelief, SkyMemory]:
+    ) -> tuple[MapBelief, GnssState]:
         """Return a first belief whose hypotheses carry the clock that they must have."""
         if not epoch.ranges and epoch.fix is None:
-            return belief, NO_SKY
-        found = self.listener.listen(belief, NO_SKY, epoch, travelled_m, _FIRST_GRAIN_M)
+            return belief, NO_GNSS_STATE
+        found = self.listener.listen(belief, NO_GNSS_STATE, epoch, travelled_m, _FIRST_GRAIN_M)
         return found.belief, found.memory
 
 

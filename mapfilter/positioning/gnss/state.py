@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf, isfinite, nan
 
-from mapfilter.positioning.gnss.options import SkyOptions
+from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.receiver import Receiver
 
 
 @dataclass(frozen=True, eq=False)
-class SkyMemory:
+class GnssState:
     """What a belief keeps of satellites.
 
     Parameters
@@ -34,7 +34,7 @@ class SkyMemory:
     until_s: float = -inf
     since_s: float = nan
 
-    def due(self, options: SkyOptions, time_s: float, travelled_m: float) -> bool:
+    def due(self, options: GnssOptions, time_s: float, travelled_m: float) -> bool:
         """Tell whether it is time to listen again, if nothing else is heard."""
         gone_m = travelled_m - self.heard_at_m
         return gone_m >= options.spacing_m or time_s - self.heard_at_s >= options.pause_s
@@ -45,5 +45,5 @@ class SkyMemory:
         return isfinite(self.since_s)
 
 
-NO_SKY = SkyMemory()
+NO_GNSS_STATE = GnssState()
 """Nothing heard yet."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import isfinite
 
 from mapfilter.filters.contract import Reason
-from mapfilter.positioning.epochs import Epoch, Heard
+from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.kalman.models import SiteModels
 from mapfilter.tracks.log import TrackLog
@@ -88,7 +88,7 @@ def timing_advances_of(log: TrackLog) -> dict[float, dict[str, int]]:
     return found
 
 
-def _cell(sites: SiteModels, row: Heard, serving: str | None) -> tuple[str | None, Reason]:
+def _cell(sites: SiteModels, row: ReportRow, serving: str | None) -> tuple[str | None, Reason]:
     """Return the cell that a row is of, or None and why."""
     if row.cell is not None:
         known = row.cell in sites.cells
@@ -101,7 +101,7 @@ def _cell(sites: SiteModels, row: Heard, serving: str | None) -> tuple[str | Non
     return None, Reason.AMBIGUOUS_CELL if found else Reason.UNKNOWN_CELL
 
 
-def _what(row: Heard) -> str:
+def _what(row: ReportRow) -> str:
     if row.cell is not None or row.arfcn is None:
         return row.cell or ""
     return f"ARFCN {row.arfcn}, BSIC {'unknown' if row.bsic is None else row.bsic}"

@@ -14,7 +14,7 @@ from mapfilter.models.state import GaussianMeasurement
 
 TOO_FEW = "not enough measurements"
 BAD_GEOMETRY = "bad geometry"
-UNSETTLED = "steps that do not settle"
+UNSETTLED = "steps that do not resolve_alternative"
 
 _ITERATIONS = 50
 _SETTLED_M = 1e-9

@@ -1,4 +1,4 @@
-"""Results as plain facts: what JSON and the terminal show."""
+"""Results as plain values: what JSON and the terminal show."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from typing import Any
 _WIDEST = 200
 
 
-def facts(value: Any) -> Any:
+def to_jsonable(value: Any) -> Any:
     """Turn a result into what JSON knows: paths become text; NaN and infinity become None.
 
     Examples
     --------
-    >>> facts({"error_m": float("nan"), "outputs": (Path("a.png"),)})
+    >>> to_jsonable({"error_m": float("nan"), "outputs": (Path("a.png"),)})
     {'error_m': None, 'outputs': ['a.png']}
     """
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {f.name: facts(getattr(value, f.name)) for f in dataclasses.fields(value)}
+        return {f.name: to_jsonable(getattr(value, f.name)) for f in dataclasses.fields(value)}
     if isinstance(value, Mapping):
-        return {str(key): facts(item) for key, item in value.items()}
+        return {str(key): to_jsonable(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [facts(item) for item in value]
+        return [to_jsonable(item) for item in value]
     if isinstance(value, Path):
         return str(value)
     if isinstance(value, float) and not math.isfinite(value):
