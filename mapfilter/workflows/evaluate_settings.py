@@ -47,7 +47,7 @@ _OF_WALKERS = frozenset(
 )
 
 _OF_PARTICLES = frozenset(
-    f"filter.bayes.{name}_particles" for name in ("most", "searching", "least")
+    f"filter.bayes.{name}_particles" for name in ("max", "min_search", "min")
 )
 
 _OF_THE_CASES: Mapping[str, str] = {

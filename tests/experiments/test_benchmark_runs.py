@@ -11,14 +11,13 @@ from mapfilter.experiments.benchmarks.global_positioning import Batch, informed,
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.options import BayesOptions
 from mapfilter.positioning.estimate import Fix, PositionedTrack, TrackEstimate
-from mapfilter.positioning.locators import FilterChoice
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.satellites import ReceptionModel
 from mapfilter.simulation.simulate import SimulationSettings
 
-CHOICE = FilterChoice(BayesOptions())
+CHOICE = BayesOptions()
 WORLD = SimulationSettings(journey=JourneyPlan(length_m=70.0))
 
 
@@ -135,7 +134,7 @@ def test_errors_of_the_world_never_reach_the_filter():
 
 def test_options_of_the_filter_never_reach_the_world():
     motion = replace(BayesOptions().motion, step_sd_m=3.0, bias_sd_rad=1.0)
-    other = FilterChoice(replace(BayesOptions(), motion=motion))
+    other = replace(BayesOptions(), motion=motion)
     first, _ = run("levels-6", "levels-nocompass")
     second, _ = run("levels-6", "levels-nocompass", choice=other)
     assert first.opened != second.opened
