@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from grid_town import CRS, levels, streets
 
+from mapfilter.experiments.benchmarks import global_positioning
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.global_positioning import Batch, informed, run_batch
 from mapfilter.filters.contract import Reason, Status
@@ -41,7 +42,7 @@ class RecordedWorld:
     def skyline(self, _case):
         return None
 
-    def locator(self, choice, *, thinned):
+    def filter(self, choice, *, thinned):
         self.opened.append((choice, thinned))
 
         def locate(log, rng):
@@ -58,6 +59,14 @@ class RecordedWorld:
             return PositionedTrack(TrackEstimate.of_fixes(CRS, "bayes", fixes), (), 0.1)
 
         return locate
+
+
+@pytest.fixture(autouse=True)
+def located_by_the_world(monkeypatch):
+    def locate(log, perfect, rng):
+        return perfect(log, rng)
+
+    monkeypatch.setattr(global_positioning, "locate", locate)
 
 
 def run(*cases, world=None, first=0, end=1, choice=CHOICE, seed=3, fixed=frozenset()):
