@@ -17,7 +17,7 @@ from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cell_layouts import Table, read_table
 from mapfilter.radio.cell_rules import id_fault
-from mapfilter.rasters.grid_header import GridHeader
+from mapfilter.rasters.plain_grids import GridHeader
 
 INDEX_COLUMNS = ("TX_NAME", "FILE_NAME")
 """Columns that make a table an index of rasters."""

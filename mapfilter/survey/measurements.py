@@ -15,8 +15,16 @@ from mapfilter._types import Bools, Floats, Ints, Ints32
 from mapfilter.errors import Fault, InputError, fail
 from mapfilter.geodesy import project, projected_crs, utm_crs
 from mapfilter.radio.cells import CellPlan
-from mapfilter.survey.measurement_rows import Identity, Rows, open_text, whole
-from mapfilter.survey.measurements_csv import DIALECTS, header_of, mapped, read_csv
+from mapfilter.survey.measurement_files import (
+    DIALECTS,
+    Identity,
+    Rows,
+    header_of,
+    mapped,
+    open_text,
+    read_csv,
+    whole,
+)
 
 FIRST_WORD = "BEGIN"
 """How a log begins."""
@@ -214,7 +222,7 @@ def read_measurements(
     format : {"auto", "csv", "opencellid", "towercollector", "antennas"}
         ``auto`` tells each file by its first line.
     columns : mapping of str to str, optional
-        For "csv": which column holds which of :data:`~mapfilter.survey.measurements_csv.FIELDS`.
+        For "csv": which column holds which of :data:`~mapfilter.survey.measurement_files.FIELDS`.
     session_gap_s : float
 
     Raises

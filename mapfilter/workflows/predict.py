@@ -22,7 +22,7 @@ from mapfilter.propagation.predict import (
     realise,
 )
 from mapfilter.radio.cells import write_cell_plan
-from mapfilter.rasters.rxlev_rasters import write_rasters
+from mapfilter.rasters.raster_set import write_rasters
 from mapfilter.workflows.cover import check_cells_near, map_cover
 from mapfilter.workflows.world import World
 

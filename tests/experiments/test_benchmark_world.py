@@ -18,7 +18,7 @@ from mapfilter.positioning.locators import FilterChoice
 from mapfilter.propagation.predict import PredictionModel, RealityErrors, predict
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.raster_set import open_rasters, write_rasters
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.ways import Buildings
 from mapfilter.simulation.imu import ImuErrors

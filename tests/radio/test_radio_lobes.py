@@ -10,7 +10,7 @@ from mapfilter.check.lobes import (
     find_lobe,
     peak_m,
 )
-from mapfilter.check.plausibility import RasterSample, above_free_space_db, nodata_taken_as_level
+from mapfilter.check.raster_checks import RasterSample, above_free_space_db, nodata_taken_as_level
 from mapfilter.geodesy import Lattice, heading_from_azimuth_rad
 from mapfilter.propagation.predict import PredictionModel, RealityErrors, realise
 from mapfilter.radio.antenna import sector_gain_db

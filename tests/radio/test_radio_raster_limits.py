@@ -6,10 +6,9 @@ from raster_files import write_ascii, write_bil
 
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice
-from mapfilter.rasters.esri_ascii import open_ascii_grid
 from mapfilter.rasters.files import check_plausible, without_nodata
-from mapfilter.rasters.grid_header import GridHeader, grid_lattice
-from mapfilter.rasters.rxlev_rasters import open_rasters
+from mapfilter.rasters.plain_grids import GridHeader, grid_lattice, open_ascii_grid
+from mapfilter.rasters.raster_set import open_rasters
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 6, 8)

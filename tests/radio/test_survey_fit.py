@@ -7,7 +7,7 @@ from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.propagation.shadowing import correlated_field
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.survey.fit import SurveyOptions, fit_survey
+from mapfilter.survey.measured_map import SurveyOptions, cross_validate, fit_survey
 from mapfilter.survey.measurements import Measurements
 from mapfilter.survey.residuals import (
     GaussianField,
@@ -17,7 +17,6 @@ from mapfilter.survey.residuals import (
     points_by_cell,
 )
 from mapfilter.survey.trend import DistanceLoss, Prior, fit_trend
-from mapfilter.survey.validation import cross_validate
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385_000.0, 6_673_000.0, 5.0, 160, 160)

@@ -6,13 +6,12 @@ import shapely
 
 from mapfilter.database.build import build
 from mapfilter.geodesy import Lattice
-from mapfilter.rasters.rxlev_rasters import open_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.routable import route_lattice
 from mapfilter.roads.ways import Ways
-from mapfilter.survey.fit import SurveyOptions, fit_survey
+from mapfilter.survey.measured_map import SurveyOptions, cross_validate, fit_survey
 from mapfilter.survey.measurements import read_measurements
-from mapfilter.survey.rasters import surveyed_plan, write_survey
-from mapfilter.survey.validation import cross_validate
+from mapfilter.survey.survey_rasters import surveyed_plan, write_survey
 
 
 @pytest.fixture(scope="module")

@@ -5,13 +5,18 @@ import pytest
 
 from mapfilter.errors import InputError, OutputError
 from mapfilter.geodesy import Lattice
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.raster_set import open_rasters, write_rasters
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
-from mapfilter.survey.fit import SurveyOptions, fit_survey
+from mapfilter.survey.measured_map import (
+    LeftOut,
+    SurveyOptions,
+    cross_validate,
+    fit_survey,
+    leave_out,
+)
 from mapfilter.survey.measurements import Measurements
-from mapfilter.survey.rasters import write_survey
-from mapfilter.survey.validation import LeftOut, cross_validate, leave_out
+from mapfilter.survey.survey_rasters import write_survey
 from mapfilter.workflows import served, survey_pictures
 from mapfilter.workflows.survey_pictures import SurveyEvidence, draw_survey
 

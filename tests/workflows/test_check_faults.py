@@ -7,8 +7,8 @@ from check_world import base_levels, box_deg, make_world, shifted
 from command_line import mapfilter
 from rasterio.transform import Affine
 
-from mapfilter.check import lobe_findings as check_peaks
-from mapfilter.check.site_positions import place_fit
+from mapfilter.check import site_checks as check_peaks
+from mapfilter.check.site_checks import place_fit
 from mapfilter.geodesy import Lattice
 
 

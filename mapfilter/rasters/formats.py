@@ -10,10 +10,9 @@ from pathlib import Path
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio.cell_rules import id_fault
 from mapfilter.rasters.atoll import IndexRow, find_index, read_index
-from mapfilter.rasters.bil import Bil, open_bil
-from mapfilter.rasters.esri_ascii import open_ascii_grid
 from mapfilter.rasters.files import Quantity, RasterFile, check_file
 from mapfilter.rasters.geotiff import GeoTiff, open_geotiff
+from mapfilter.rasters.plain_grids import Bil, open_ascii_grid, open_bil
 
 SUFFIXES = (".tif", ".tiff", ".asc", ".bil", ".flt")
 """Of the files that are taken from a folder."""

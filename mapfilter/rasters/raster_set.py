@@ -34,8 +34,8 @@ from mapfilter.rasters.files import (
     check_plausible,
     reason,
 )
-from mapfilter.rasters.index import Declared, open_files
-from mapfilter.rasters.index import is_raster_folder as is_raster_folder
+from mapfilter.rasters.formats import Declared, open_files
+from mapfilter.rasters.formats import is_raster_folder as is_raster_folder
 from mapfilter.rasters.resampling import Resampling, common_lattice, read_on
 
 _BLOCK_PX = 256

@@ -16,9 +16,9 @@ from mapfilter._types import Floats, Ints
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, write_rasters
-from mapfilter.survey.fit import Survey, SurveyedCell
-from mapfilter.survey.measurement_rows import Identity
+from mapfilter.rasters.raster_set import RxLevRasters, write_rasters
+from mapfilter.survey.measured_map import Survey, SurveyedCell
+from mapfilter.survey.measurement_files import Identity
 from mapfilter.survey.trend import Covariate
 
 _FIELD_LENGTHS = 4.0
