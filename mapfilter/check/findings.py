@@ -93,7 +93,7 @@ _BY_HINT = {
     "a CRS of another region": "crs-mixed",
     "a CRS of another region, or Web Mercator": "crs-mixed",
     "a raster upside down or mirrored": "raster-upside-down",
-    "say quantity = level or loss": "quantity-unknown",
+    "set quantity = level or loss": "quantity-unknown",
     "misspelt, or no folder of antennas": "antenna-missing",
     "a class left out, or colours blended by compression or resampling": "landuse-classes",
     "wrong table": "landuse-classes",

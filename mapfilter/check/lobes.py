@@ -110,30 +110,6 @@ def find_lobe(
     return Lobe(sample.cell_id, best * STEP_DEG, slope * _FRONT_TO_BACK_DB, scores)
 
 
-def falls_with_distance(sample: RasterSample, east_m: float, north_m: float) -> float:
-    """Return the correlation of levels with minus the logarithm of the distance from a place.
-
-    1 is a raster that falls off evenly around it; 0 where nothing is known.
-    """
-    east, north = sample.positions_m()
-    known = ~np.isnan(sample.values)
-    value = sample.values[known].astype(np.float64)
-    least_m = sample.lattice.resolution_m
-    far = -np.log10(np.maximum(np.hypot(east - east_m, north - north_m)[known], least_m))
-    if value.size < 2 or np.ptp(value) == 0 or np.ptp(far) == 0:
-        return 0.0
-    return float(np.corrcoef(value, far)[0, 1])
-
-
-def peak_m(sample: RasterSample) -> tuple[float, float]:
-    """Return east and north of the strongest pixels' middle (the strongest 0.2 %, at least 9)."""
-    value = np.where(np.isnan(sample.values), -np.inf, sample.values).ravel()
-    count = min(max(9, value.size // 500), int(np.isfinite(value).sum()))
-    strongest = np.argpartition(value, -count)[-count:]
-    east, north = sample.positions_m()
-    return float(np.median(east.ravel()[strongest])), float(np.median(north.ravel()[strongest]))
-
-
 def best_labels(lobes: Mapping[str, Lobe], azimuths_deg: Mapping[str, float]) -> dict[str, str]:
     """Return which cell of a site each raster fits best, every cell taken once.
 

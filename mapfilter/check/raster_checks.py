@@ -13,7 +13,6 @@ from rasterio.errors import RasterioError
 
 from mapfilter._types import Floats, Floats32
 from mapfilter.check.findings import Findings, listed
-from mapfilter.check.lobes import falls_with_distance
 from mapfilter.errors import InputError
 from mapfilter.geodesy import (
     Lattice,
@@ -170,6 +169,21 @@ def nodata_taken_as_level(values: Floats32) -> tuple[float, float] | None:
     near = int((np.abs(others) < _NEAR_ZERO).sum())
     apart = bool((others < 0).all() or (others >= _LEAST_LOSS_DB).all())
     return (0.0, zero / known.size) if apart and zero > _MANY_TIMES * near else None
+
+
+def falls_with_distance(sample: RasterSample, east_m: float, north_m: float) -> float:
+    """Return the correlation of levels with minus the logarithm of the distance from a place.
+
+    1 is a raster that falls off evenly around it; 0 where nothing is known.
+    """
+    east, north = sample.positions_m()
+    known = ~np.isnan(sample.values)
+    value = sample.values[known].astype(np.float64)
+    least_m = sample.lattice.resolution_m
+    far = -np.log10(np.maximum(np.hypot(east - east_m, north - north_m)[known], least_m))
+    if value.size < 2 or np.ptp(value) == 0 or np.ptp(far) == 0:
+        return 0.0
+    return float(np.corrcoef(value, far)[0, 1])
 
 
 def above_free_space_db(sample: RasterSample, cell: Cell) -> float:

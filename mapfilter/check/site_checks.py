@@ -20,11 +20,9 @@ from mapfilter.check.lobes import (
     AzimuthMistake,
     Lobe,
     azimuth_mistakes,
-    falls_with_distance,
     find_lobe,
-    peak_m,
 )
-from mapfilter.check.raster_checks import RasterSample, above_free_space_db
+from mapfilter.check.raster_checks import RasterSample, above_free_space_db, falls_with_distance
 from mapfilter.radio.cells import Cell, CellPlan
 
 _SIDE = 40
@@ -91,6 +89,15 @@ def place_fit(squares: MeanLevels, east_m: float, north_m: float) -> float:
         factors = np.linalg.lstsq(causes, level_db, rcond=None)[0]
     explained = causes @ factors
     return float(np.sqrt((explained @ explained) / (level_db @ level_db)))
+
+
+def peak_m(sample: RasterSample) -> tuple[float, float]:
+    """Return east and north of the strongest pixels' middle (the strongest 0.2 %, at least 9)."""
+    value = np.where(np.isnan(sample.values), -np.inf, sample.values).ravel()
+    count = min(max(9, value.size // 500), int(np.isfinite(value).sum()))
+    strongest = np.argpartition(value, -count)[-count:]
+    east, north = sample.positions_m()
+    return float(np.median(east.ravel()[strongest])), float(np.median(north.ravel()[strongest]))
 
 
 def best_place(

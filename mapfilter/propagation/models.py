@@ -122,7 +122,7 @@ class PredictionModel:
 
 
 @dataclass(frozen=True)
-class RealityErrors:
+class GroundTruthErrors:
     """How the simulated ground truth differs from its prediction.
 
     Parameters

@@ -17,13 +17,13 @@ from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cell_layouts import Table, read_table
 from mapfilter.radio.cell_rules import id_fault
-from mapfilter.rasters.plain_grids import GridHeader
+from mapfilter.rasters.grid_header import GridHeader
 
 INDEX_COLUMNS = ("TX_NAME", "FILE_NAME")
 """Columns that make a table an index of rasters."""
 _AREA = ("AREA_XMIN", "AREA_XMAX", "AREA_YMIN", "AREA_YMAX")
 _NUMBERS = ("RESOLUTION", "NBITS", *_AREA)
-_SUFFIXES = (".csv", ".txt")
+INDEX_SUFFIXES = (".csv", ".txt")
 _LONGEST_HEAD_BYTES = 1 << 16
 _SAME_PX = 0.01
 _HALF_PX = 0.5
@@ -161,7 +161,7 @@ def read_index(path: Path) -> tuple[IndexRow, ...]:
 
 
 def _is_index(path: Path) -> bool:
-    if path.suffix.lower() not in _SUFFIXES or path.name.startswith(".") or not path.is_file():
+    if path.suffix.lower() not in INDEX_SUFFIXES or path.name.startswith(".") or not path.is_file():
         return False
     try:
         with path.open("rb") as stream:

@@ -1,61 +1,42 @@
-"""Which files make a set of rasters, and what each of them is."""
+"""Which files make a set of rasters, and how each format is opened."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio.cell_rules import id_fault
-from mapfilter.rasters.atoll import IndexRow, find_index, read_index
-from mapfilter.rasters.files import Quantity, RasterFile, check_file
-from mapfilter.rasters.geotiff import GeoTiff, open_geotiff
-from mapfilter.rasters.plain_grids import Bil, open_ascii_grid, open_bil
+from mapfilter.rasters.atoll import INDEX_SUFFIXES, IndexRow, find_index, read_index
+from mapfilter.rasters.files import Declared, Quantity, RasterFile, check_file
+from mapfilter.rasters.geotiff import open_geotiff
+from mapfilter.rasters.grid_header import GridHeader
+from mapfilter.rasters.plain_grids import open_ascii_grid, open_raw_grid
 
-SUFFIXES = (".tif", ".tiff", ".asc", ".bil", ".flt")
-"""Of the files that are taken from a folder."""
-_INDEX_SUFFIXES = (".csv", ".txt")
+Opener = Callable[[Path, str, Declared, GridHeader | None], RasterFile]
+"""From a file, the cell's id if the file names none, what the user declares, and the header that an
+index holds, to the opened file; pixels are not read."""
+
+FORMATS: Mapping[str, Opener] = {
+    ".tif": open_geotiff,
+    ".tiff": open_geotiff,
+    ".asc": open_ascii_grid,
+    ".bil": open_raw_grid,
+    ".flt": open_raw_grid,
+}
+"""Formats of raster files by suffix. A new one needs its module and a line here."""
 _MOST_FILES = 100_000
 
-Opened = tuple[RasterFile, Quantity | None]
 
-
-@dataclass(frozen=True, slots=True)
-class Declared:
-    """What a user says of files that do not say it themselves.
-
-    Parameters
-    ----------
-    quantity : {"level", "loss", "deviation"} or None
-    crs : str or None
-        Projected CRS.
-    nodata : float or None
-        A number that means no data, besides those that the files tell.
-    """
-
-    quantity: Quantity | None = None
-    crs: str | None = None
-    nodata: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class FoundRasters:
-    """The files of a set, what they hold, and what is worth telling of them.
-
-    Parameters
-    ----------
-    files : tuple of RasterFile
-    quantity : {"level", "loss", "deviation"}
-    index : Path or None
-        The table that lists them.
-    notes : tuple of str
-    """
+class FoundRasters(NamedTuple):
+    """The files of a set, the quantity they hold, the index that lists them, and remarks."""
 
     files: tuple[RasterFile, ...]
     quantity: Quantity
-    index: Path | None
+    index_file: Path | None
     notes: tuple[str, ...]
 
 
@@ -73,100 +54,71 @@ def open_files(path: Path, declared: Declared) -> FoundRasters:
         With every fault of every file.
     """
     index = find_index(path) if path.is_dir() else None
-    if path.suffix.lower() in _INDEX_SUFFIXES and not path.is_dir():
+    if path.suffix.lower() in INDEX_SUFFIXES and not path.is_dir():
         check_file(path)
         index = path
     notes: list[str] = []
+    faults = Faults()
+    files: list[RasterFile] = []
+    sources: list[tuple[Path, IndexRow | None]] = [(path, None)]
     if index is not None:
-        opened = _open_all(
-            [_indexed(row, declared, notes) for row in read_index(index)],
-        )
+        sources = [(row.path, row) for row in read_index(index)]
     elif path.is_dir():
-        opened = _open_all([_alone(file, declared) for file in _listed(path)])
-    else:
-        opened = [_open(path, path.stem, declared)]
-    opened = _named_by_file(opened, notes)
-    files = tuple(file for file, _ in opened)
+        sources = [(file, None) for file in _listed(path)]
+    for file, row in sources:
+        try:
+            files.append(_open(file, declared, row, notes))
+        except InputError as error:
+            faults.found.extend(error.faults)
+    faults.raise_if_any(InputError)
+    files = _named_by_file(files, notes)
     _check_ids(path, files)
-    quantity = _one_quantity(path, opened, declared.quantity)
-    told = tuple(
+    counted = tuple(
         note if count == 1 else f"{note} ({count} rasters)"
         for note, count in Counter(notes).items()
     )
-    return FoundRasters(files, quantity, index, told)
+    return FoundRasters(tuple(files), _one_quantity(path, files, declared.quantity), index, counted)
 
 
 def _is_raster(path: Path) -> bool:
     hidden = path.name.startswith(".")
-    return not hidden and path.suffix.lower() in SUFFIXES and path.is_file()
+    return not hidden and path.suffix.lower() in FORMATS and path.is_file()
 
 
 def _listed(folder: Path) -> list[Path]:
     found = sorted(path for path in folder.iterdir() if _is_raster(path))
     if not found:
-        expected = f"raster files ({', '.join(SUFFIXES)}) or an index of them"
+        expected = f"raster files ({', '.join(FORMATS)}) or an index of them"
         raise fail(InputError, str(folder), expected, "none in this folder")
     if len(found) > _MOST_FILES:
         raise fail(InputError, str(folder), f"at most {_MOST_FILES} rasters", len(found))
     return found
 
 
-def _open(path: Path, cell_id: str, declared: Declared, index: IndexRow | None = None) -> Opened:
-    if path.suffix.lower() == ".asc":
-        check_file(path)
-        return open_ascii_grid(path, cell_id, declared.crs, declared.nodata), None
-    if path.suffix.lower() in (".bil", ".flt") or (index and path.suffix.lower() not in SUFFIXES):
-        check_file(path)
-        instead = index.header() if index else None
-        return open_bil(path, cell_id, declared.crs, declared.nodata, instead=instead), None
-    return open_geotiff(path, declared.crs, declared.nodata)
-
-
-def _alone(path: Path, declared: Declared) -> Callable[[], Opened]:
-    return lambda: _open(path, path.stem, declared)
-
-
-def _indexed(row: IndexRow, declared: Declared, notes: list[str]) -> Callable[[], Opened]:
-    def opened() -> Opened:
-        file, quantity = _open(row.path, row.cell_id, declared, row)
-        if isinstance(file, GeoTiff):
-            if len(file.cell_ids) > 1:
-                got = f"{len(file.cell_ids)} bands"
-                raise fail(InputError, str(row.path), "one band per file of an index", got)
-            file = replace(file, cell_ids=(row.cell_id,))
-        faults = Faults()
-        note = row.check(file.lattice, file.bits if isinstance(file, Bil) else None, faults)
-        faults.raise_if_any(InputError)
-        if note:
-            notes.append(note)
-        return file, quantity
-
-    return opened
-
-
-def _open_all(openers: Sequence[Callable[[], Opened]]) -> list[Opened]:
-    opened, faults = [], Faults()
-    for opener in openers:
-        try:
-            opened.append(opener())
-        except InputError as error:
-            faults.found.extend(error.faults)
+def _open(path: Path, declared: Declared, row: IndexRow | None, notes: list[str]) -> RasterFile:
+    """Open one file, and compare it with its row of an index."""
+    check_file(path)
+    opener = FORMATS.get(path.suffix.lower(), open_geotiff if row is None else open_raw_grid)
+    if row is None:
+        return opener(path, path.stem, declared, None)
+    file = opener(path, row.cell_id, declared, row.header())
+    if len(file.cell_ids) > 1:
+        got = f"{len(file.cell_ids)} bands"
+        raise fail(InputError, str(path), "one band per file of an index", got)
+    faults = Faults()
+    if note := row.check(file.lattice, file.bits, faults):
+        notes.append(note)
     faults.raise_if_any(InputError)
-    return opened
+    return replace(file, cell_ids=(row.cell_id,), described=False)
 
 
-def _named_by_file(opened: list[Opened], notes: list[str]) -> list[Opened]:
+def _named_by_file(files: list[RasterFile], notes: list[str]) -> list[RasterFile]:
     """Name cells by their files where all descriptions are the same, such as "Band 1"."""
-    single = [file for file, _ in opened if isinstance(file, GeoTiff) and len(file.cell_ids) == 1]
+    single = [file for file in files if file.described and len(file.cell_ids) == 1]
     if len(single) < 2 or len({file.cell_ids for file in single}) > 1:
-        return opened
+        return files
     notes.append(f"cells are named by their files: all bands are called {single[0].cell_ids[0]!r}")
-    return [
-        (replace(file, cell_ids=(file.path.stem,)), quantity)
-        if isinstance(file, GeoTiff) and len(file.cell_ids) == 1
-        else (file, quantity)
-        for file, quantity in opened
-    ]
+    return [replace(file, cell_ids=(file.path.stem,)) if file in single else file for file in files]
 
 
 def _check_ids(path: Path, files: Sequence[RasterFile]) -> None:
@@ -182,21 +134,22 @@ def _check_ids(path: Path, files: Sequence[RasterFile]) -> None:
     faults.raise_if_any(InputError)
 
 
-def _one_quantity(path: Path, opened: Sequence[Opened], declared: Quantity | None) -> Quantity:
-    told = {quantity for _, quantity in opened}
+def _one_quantity(path: Path, files: Sequence[RasterFile], declared: Quantity | None) -> Quantity:
     if declared is not None:
-        for file, quantity in opened:
-            if isinstance(file, GeoTiff) and file.tagged and quantity != declared:
+        for file in files:
+            if file.tagged and file.quantity != declared:
+                expected, got = f"{declared}, as declared", file.quantity
                 hint = "quantity in [rasters] is of other rasters"
-                raise fail(InputError, str(file.path), f"{declared}, as declared", quantity, hint)
+                raise fail(InputError, str(file.path), expected, got, hint)
         return declared
-    known = told - {None}
+    stated = {file.quantity for file in files}
+    known = stated - {None}
     if len(known) > 1:
-        got = " and ".join(sorted(str(quantity) for quantity in known))
-        raise fail(InputError, str(path), "levels or losses in all files", got)
-    found = known.pop() if known and None not in told else None
+        both = " and ".join(sorted(str(quantity) for quantity in known))
+        raise fail(InputError, str(path), "levels or losses in all files", both)
+    found = known.pop() if known and None not in stated else None
     if found is None:
         expected = "to know whether the bands are levels (dBm) or losses (dB)"
-        hint = "say quantity = level or loss"
+        hint = "set quantity = level or loss"
         raise fail(InputError, str(path), expected, "neither tag nor unit", hint)
     return found

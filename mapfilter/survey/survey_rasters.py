@@ -16,7 +16,8 @@ from mapfilter._types import Floats, Ints
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.raster_set import RxLevRasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.survey.measured_map import Survey, SurveyedCell
 from mapfilter.survey.measurement_files import Identity
 from mapfilter.survey.trend import Covariate

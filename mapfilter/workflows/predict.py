@@ -14,15 +14,15 @@ from mapfilter._parallel import Progress, part_of
 from mapfilter.config.sections import Config, Prediction
 from mapfilter.errors import InputError, fail
 from mapfilter.propagation.predict import (
+    GroundTruthErrors,
     PredictionModel,
-    RealityErrors,
     off_frequency,
     outside_validity,
     predict,
-    realise,
+    simulate_ground_truth,
 )
 from mapfilter.radio.cells import write_cell_plan
-from mapfilter.rasters.raster_set import write_rasters
+from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.workflows.cover import check_cells_near, map_cover
 from mapfilter.workflows.world import World
 
@@ -147,7 +147,7 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     write_rasters(target, lattice, levels, plan.ids, tags)
     if wanted == 2:
         errors = ground_truth_errors(config.prediction)
-        real = realise(
+        real = simulate_ground_truth(
             plan, lattice, heights_m, model, errors, part_of(progress, 1, wanted), antennas=antennas
         )
         write_rasters(reality, lattice, real, plan.ids, {**tags, **reality_tags(target)})
@@ -169,6 +169,6 @@ def prediction_model(section: Prediction) -> PredictionModel:
     return PredictionModel(**section.model_dump(exclude={"reality", "survey"}))
 
 
-def ground_truth_errors(section: Prediction) -> RealityErrors:
+def ground_truth_errors(section: Prediction) -> GroundTruthErrors:
     """Return how a configuration's ground truth differs from its prediction."""
-    return RealityErrors(**section.reality.model_dump(exclude={"write"}))
+    return GroundTruthErrors(**section.reality.model_dump(exclude={"write"}))

@@ -142,7 +142,7 @@ def test_the_crs_lies_beside_the_grid(tmp_path: Path) -> None:
         (("-82", "1e39"), ""),
         (("ncols", "what"), "no ASCII grid"),
         (("-79", "120"), "path losses, or raw RXLEV, given for levels"),
-        (("-79", "-999"), "-999 means no data, and the file does not say so"),
+        (("-79", "-999"), "-999 means no data, and the file does not state it"),
     ],
 )
 def test_ascii_grids_that_are_wrong(tmp_path: Path, change: tuple[str, str], said: str) -> None:

@@ -10,7 +10,8 @@ from test_survey_fit import ANTENNA, CRS, LATTICE, law, measured, shadowed, some
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.raster_set import check_against_plan, open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import check_against_plan, open_rasters
 from mapfilter.survey.measured_map import SurveyOptions, fit_survey
 from mapfilter.survey.survey_rasters import predicted_levels, surveyed_plan, write_survey
 

@@ -5,7 +5,8 @@ import pytest
 
 from mapfilter.errors import InputError, OutputError
 from mapfilter.geodesy import Lattice
-from mapfilter.rasters.raster_set import open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
 from mapfilter.survey.measured_map import (
