@@ -45,7 +45,7 @@ class RxLevRasters:
     files : tuple of RasterFile
         Where the values are.
     parts : tuple of Path
-        All files that the set is made of: with the headers, the files that tell the CRS, the index.
+        All files that the set is made of, with headers, CRS files and the index.
     factor : float
         dB (dBm) per unit stored in the files.
     resampling : {"nearest", "bilinear"}
@@ -84,12 +84,9 @@ class RxLevRasters:
         return np.asarray(bounds_m + pad_m[:, None] * [-1, -1, 1, 1])
 
     def reaching(self, window: Window) -> RxLevRasters:
-        """Return the set of those files that lie over some of a window; others say nothing there.
-
-        It may be a set of no files.
-        """
+        """Return the set of the files, possibly none, that have pixels in a window."""
         west, south, east, north = self.lattice.window(*window).bounds_m
-        low, high = self._reach_m[:, :2], self._reach_m[:, 2:]
+        low, high = np.split(self._reach_m, 2, axis=1)
         there = (low < (east, north)).all(axis=1) & (high > (west, south)).all(axis=1)
         if there.all():
             return self
@@ -111,24 +108,38 @@ class RxLevRasters:
         Returns
         -------
         ndarray of float32, shape (cells, rows, cols)
-            dBm or dB, as ``quantity`` says; NaN where there is no data.
+            dBm or dB, by ``quantity``; NaN where there is no data.
 
         Raises
         ------
         InputError
-            The window or a cell is not in the set, a file is cut off, or the values cannot be
-            what ``quantity`` says.
+            The window or a cell is not in the set, a file is cut off, or the values are not
+            plausible for ``quantity``.
         """
         window = window or (0, 0, self.lattice.rows, self.lattice.cols)
         ids = self.cell_ids if cells is None else tuple(cells)
         self._check_request(window, ids)
-        wanted = self._by_file(ids)
-        if len(wanted) == 1:
-            ((file, (_, bands)),) = wanted
-            return self._read_file(self.files[file], bands, window)
+        of_cell = {
+            cell_id: (file, band)
+            for file in self.files
+            for band, cell_id in enumerate(file.cell_ids)
+        }
+        # By file: the places of its cells among those wanted, and their bands.
+        wanted: dict[Path, tuple[RasterFile, list[int], list[int]]] = {}
+        for place, cell_id in enumerate(ids):
+            file, band = of_cell[cell_id]
+            _, places, bands = wanted.setdefault(file.path, (file, [], []))
+            places.append(place)
+            bands.append(band)
         values = np.empty((len(ids), *window[2:]), dtype=np.float32)
-        for file, (places, bands) in wanted:
-            values[places] = self._read_file(self.files[file], bands, window)
+        for file, places, bands in wanted.values():
+            found = read_on(file, bands, self.lattice, window, self.resampling)
+            if self.factor != 1.0:
+                found = found * np.float32(self.factor)
+            check_plausible(found, self.quantity, file.path)
+            if len(wanted) == 1:
+                return found
+            values[places] = found
         return values
 
     def read_levels_dbm(
@@ -153,28 +164,6 @@ class RxLevRasters:
         ids = self.cell_ids if cells is None else cells
         eirp_dbm = np.array([plan[cell_id].eirp_dbm for cell_id in ids], dtype=np.float32)
         return eirp_dbm[:, None, None] - values
-
-    def _by_file(self, ids: Sequence[str]) -> list[tuple[int, tuple[list[int], list[int]]]]:
-        """Return, for each file needed, the places of its cells among ``ids`` and their bands."""
-        of_cell = {
-            cell_id: (number, band)
-            for number, file in enumerate(self.files)
-            for band, cell_id in enumerate(file.cell_ids)
-        }
-        found: dict[int, tuple[list[int], list[int]]] = {}
-        for place, cell_id in enumerate(ids):
-            number, band = of_cell[cell_id]
-            places, bands = found.setdefault(number, ([], []))
-            places.append(place)
-            bands.append(band)
-        return list(found.items())
-
-    def _read_file(self, file: RasterFile, bands: Sequence[int], window: Window) -> Floats32:
-        values = read_on(file, bands, self.lattice, window, self.resampling)
-        if self.factor != 1.0:
-            values = values * np.float32(self.factor)
-        check_plausible(values, self.quantity, file.path)
-        return values
 
     def _check_request(self, window: Window, ids: tuple[str, ...]) -> None:
         row, col, rows, cols = window
@@ -212,13 +201,13 @@ def open_rasters(
         pixels with a header (``.bil``, ``.flt`` with ``.hdr``), named by the cell id; a folder of
         such files; or an index of raw pixels (see :mod:`mapfilter.rasters.atoll`), or its folder.
     quantity : {"level", "loss", "deviation"}, optional
-        What the files hold, where they do not say so by mapfilter's tag or by their unit.
+        What the files hold, where neither mapfilter's tag nor their unit states it.
     crs : str, optional
         Projected CRS, where the files have none.
     factor : float
         dB (dBm) per unit stored, such as 0.0625 for sixteenths.
     nodata : float, optional
-        A stored number that means no data, besides those that the files tell.
+        A stored number that means no data, besides the files' own.
     resolution_m : float, optional
         Of the lattice that all files are read on; the finest of them when left out.
     resampling : {"nearest", "bilinear"}
@@ -251,13 +240,7 @@ def open_rasters(
 
 
 def check_against_plan(rasters: RxLevRasters, plan: CellPlan) -> None:
-    """See that rasters and plan hold the same cells.
-
-    Raises
-    ------
-    InputError
-        With the cells in the rasters and not in the plan, and the reverse.
-    """
+    """Check that rasters and plan hold the same cells."""
     faults, held = Faults(), set(rasters.cell_ids)
     unknown = [cell_id for cell_id in rasters.cell_ids if cell_id not in plan]
     missing = [cell_id for cell_id in plan.ids if cell_id not in held]
