@@ -152,12 +152,8 @@ def _is_index(path: Path) -> bool:
 def _rows(
     table: Table, header: list[str], names: dict[str, str], faults: Faults
 ) -> Iterator[IndexRow]:
-    for line, texts in table.rows:
+    for line, texts in table.whole_rows(len(header), faults):
         where = f"{table.path} row {line}"
-        if len(texts) != len(header):
-            hint = "a decimal comma, or an unquoted separator"
-            faults.add(where, f"{len(header)} fields", str(len(texts)), hint)
-            continue
         given = dict(zip(header, (text.strip() for text in texts), strict=True))
         if wrong := id_fault(given["TX_NAME"]):
             faults.add(f"{where}, TX_NAME", *wrong)

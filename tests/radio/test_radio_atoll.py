@@ -107,8 +107,8 @@ def test_a_raster_may_reach_beyond_its_area(tmp_path: Path) -> None:
         ("A;C:\\a.bil;5;385000;385040;6672970;6673000;16", "FILE_NAME: expected the name"),
         ("A;;5;385000;385040;6672970;6673000;16", "FILE_NAME: expected the name"),
         ("../A;a.bil;5;385000;385040;6672970;6673000;16", "TX_NAME: expected an id"),
-        ("A;a.bil;5;385000", "expected 8 fields, found 4"),
-        ("A;a.bil;;;;;\nA;a.bil;;;;;", "expected 8 fields, found 7"),
+        ("A;a.bil;5;385000", "fields: expected 8, found 4"),
+        ("A;a.bil;;;;;\nA;a.bil;;;;;", "fields: expected 8, found 7"),
         ("A;a.bil;;;;;;\nA;a.bil;;;;;;", "row 3, TX_NAME: expected each cell once"),
     ],
 )

@@ -51,8 +51,8 @@ def test_transmitters_of_a_planning_tool(tmp_path: Path) -> None:
     assert (first.eirp_dbm, first.arfcn, first.bsic) == (50.3, 612, 17)
     assert (second.antenna, second.eirp_dbm, second.bsic) == ("sector", 52.0, None)
     assert plan.notes == (
-        "eirp_dbm = 52 for 1 of 2 cells that tell none",
-        "frequency_mhz = 1800 for 2 of 2 cells that tell none",
+        "eirp_dbm = 52 for 1 of 2 cells without one",
+        "frequency_mhz = 1800 for 2 of 2 cells without one",
     )
 
 
