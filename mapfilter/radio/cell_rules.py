@@ -18,7 +18,7 @@ _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """An interval that a number must lie in, and intervals that suggest a mistake; NaN is in none."""
+    """An interval that a number must lie in, and others that suggest a mistake; NaN is in none."""
 
     low: float
     high: float
@@ -52,10 +52,8 @@ RANGES: dict[str, Range] = {
     "north_m": Range(-1e8, 1e8, "finite metres"),
     "height_m": Range(0, 1000, "metres", above_low=True, mistakes=((0, 0, "height left out"),)),
     "azimuth_deg": Range(
-        0,
-        360,
-        "degrees clockwise from true north",
-        hint=_hint("counted from -180; add 360", lambda deg: -180 <= deg < 0),
+        *(0, 360, "degrees clockwise from true north"),
+        mistakes=((-180, 0, "counted from -180; add 360"),),
     ),
     "downtilt_deg": Range(-90, 90, "degrees"),
     "mechanical_downtilt_deg": Range(-90, 90, "degrees"),

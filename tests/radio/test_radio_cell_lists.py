@@ -116,7 +116,7 @@ def test_bad_rows_of_public_lists_are_told_and_lose_nothing_else(tmp_path: Path)
     plan = _read(tmp_path, MLS + bad + again, layout="opencellid")
     assert plan.ids == ("244-91-801-1001", "244-5-33-70657")
     assert "3 faulty rows left out, such as" in plan.notes[-2]
-    assert plan.notes[-1] == "1 rows of cells told already left out"
+    assert plan.notes[-1] == "1 rows left out: cells listed already"
     said = _complaint(tmp_path, MLS.splitlines()[0] + "\n" + bad, layout="opencellid")
     assert "cell (ci): expected a whole number" in said
 
