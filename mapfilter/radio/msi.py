@@ -109,8 +109,9 @@ def read_msi(path: Path | str) -> MeasuredAntenna:
         vertical = _sorted_cut(-vertical[0], vertical[1])
         notes = (f"{path}: the vertical cut counts upwards and was turned over",)
     name = header.get("NAME") or path.stem
-    rest = downtilt_deg, gain_dbi, frequency_mhz, notes
-    return MeasuredAntenna(name, *horizontal, *vertical, *rest)
+    return MeasuredAntenna(
+        name, *horizontal, *vertical, downtilt_deg, gain_dbi, frequency_mhz, notes=notes
+    )
 
 
 Row = tuple[int, list[str]]

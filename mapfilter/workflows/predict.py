@@ -13,9 +13,8 @@ from mapfilter._io import ensure_writable_folder, sha256_file
 from mapfilter._parallel import Progress, part_of
 from mapfilter.config.sections import Config, Prediction
 from mapfilter.errors import InputError, fail
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import (
-    GroundTruthErrors,
-    PredictionModel,
     off_frequency,
     outside_validity,
     predict,

@@ -15,7 +15,8 @@ from mapfilter.experiments.benchmarks.world import BenchmarkWorld, write_buildin
 from mapfilter.experiments.sweep.world import SweepWorld, write_world
 from mapfilter.geodesy import Lattice
 from mapfilter.positioning.locators import FilterChoice
-from mapfilter.propagation.predict import GroundTruthErrors, PredictionModel, predict
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
+from mapfilter.propagation.predict import predict
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.geotiff import write_rasters

@@ -11,12 +11,8 @@ import pytest
 from mapfilter.errors import ConfigError
 from mapfilter.geodesy import Lattice
 from mapfilter.propagation import predict as module
-from mapfilter.propagation.predict import (
-    GroundTruthErrors,
-    PredictionModel,
-    predict,
-    simulate_ground_truth,
-)
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
+from mapfilter.propagation.predict import predict, simulate_ground_truth
 from mapfilter.radio.cells import Cell, CellPlan
 
 CRS = "EPSG:32635"

@@ -16,7 +16,8 @@ from mapfilter.check.raster_checks import (
 )
 from mapfilter.check.site_checks import peak_m
 from mapfilter.geodesy import Lattice, heading_from_azimuth_rad
-from mapfilter.propagation.predict import GroundTruthErrors, PredictionModel, simulate_ground_truth
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
+from mapfilter.propagation.predict import simulate_ground_truth
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.cells import Cell, CellPlan
 

@@ -5,19 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from one_cell import predict_cell, predict_steep_cell
 from pyproj import Geod
 
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import Lattice, project, unproject
 from mapfilter.propagation.empirical import cost231_hata_db, cost231_walfisch_ikegami_db
-from mapfilter.propagation.predict import (
-    GroundTruthErrors,
-    PredictionModel,
-    outside_validity,
-    predict,
-    predict_cell,
-    simulate_ground_truth,
-)
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
+from mapfilter.propagation.predict import outside_validity, predict, simulate_ground_truth
 from mapfilter.radio.cells import Cell, CellPlan
 
 CRS = "EPSG:32635"
@@ -114,7 +109,7 @@ def test_an_indoor_cell_loses_its_penetration_outdoors_only() -> None:
 
 def test_slope_stretches_the_loss_about_100_m() -> None:
     plain = predict_cell(OMNI, LATTICE, None, PLAIN)
-    steep = predict_cell(OMNI, LATTICE, None, PLAIN, slope_factor=1.05)
+    steep = predict_steep_cell(OMNI, LATTICE, None, PLAIN, 1.05)
     # The stretched distance, too, counts as 20 m when it is shorter.
     far = _distance_m(OMNI) > 25.0
     expected = 0.05 * 38.0 * np.log10(_distance_m(OMNI)[far] / 100.0)

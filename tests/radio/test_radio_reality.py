@@ -7,12 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from mapfilter.geodesy import Lattice
-from mapfilter.propagation.predict import (
-    GroundTruthErrors,
-    PredictionModel,
-    predict,
-    simulate_ground_truth,
-)
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
+from mapfilter.propagation.predict import predict, simulate_ground_truth
 from mapfilter.radio.cells import Cell, CellPlan
 
 LATTICE = Lattice("EPSG:32635", 385000.0, 6673000.0, 10.0, 80, 80)

@@ -10,7 +10,7 @@ from mapfilter.config.sections import Config, Journeys
 from mapfilter.errors import ConfigError
 from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.positioning.locators import FilterChoice
-from mapfilter.propagation.predict import GroundTruthErrors, PredictionModel
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.simulation.layout import lay_out_plan
 from mapfilter.simulation.reports import ReportModel

@@ -20,7 +20,8 @@ from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.sweep.world import SweepWorld, open_world
 from mapfilter.gnss.visibility import Skyline
 from mapfilter.positioning.locators import FilterChoice, Locator, open_locator
-from mapfilter.propagation.predict import GroundTruthErrors, PredictionModel, simulate_ground_truth
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
+from mapfilter.propagation.predict import simulate_ground_truth
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.ways import Buildings, Ways
