@@ -1,8 +1,8 @@
 """Measured maps: levels with positions become mean and deviation at every place near them.
 
-Each cell's levels are a trend (path loss from its antenna, or a calibrated prediction) and what the
-survey found about it: a Gaussian process, or nearest neighbours. An antenna whose place nobody
-knows is located from the levels.
+Each cell's levels are a trend (path loss from its antenna, or a calibrated prediction) and
+residuals about it: a Gaussian process, or nearest neighbours. An antenna of unknown place is
+located from the levels. Maps are validated where sessions were left out.
 """
 
 from __future__ import annotations
@@ -19,25 +19,21 @@ from mapfilter._parallel import Progress
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.radio.cells import CellPlan
-from mapfilter.survey.measurements import Measurements
-from mapfilter.survey.residuals import (
-    GaussianField,
-    NeighbourField,
-    Points,
-    ResidualField,
-    Shadowing,
-    TrendField,
-    learn_shadowing,
-    points_by_cell,
-)
-from mapfilter.survey.trend import (
+from mapfilter.survey.cell_model import (
     Covariate,
     DistanceLoss,
+    GaussianField,
+    NeighbourField,
     Prior,
+    ResidualField,
+    Shadowing,
     Trend,
+    TrendField,
     fit_trend,
+    learn_shadowing,
     locate_antenna,
 )
+from mapfilter.survey.measurements import Measurements, Points, points_by_cell
 
 _ROUNDS = 2
 _LOCATED_FROM = 300
@@ -59,7 +55,7 @@ class SurveyOptions:
     reach_m : float
         Places farther than this from every reading of a cell count as not measured.
     min_points : int
-        Cells heard in fewer squares are left out.
+        Cells received in fewer squares are left out.
     min_points_to_locate : int
         An antenna of unknown place is located from at least so many; with fewer the trend is the
         mean.
@@ -69,11 +65,6 @@ class SurveyOptions:
         Readings of one session in one such square count once.
     most_points : int
         Larger squares are taken for a cell until it has at most so many points.
-
-    Raises
-    ------
-    ConfigError
-        With every fault.
     """
 
     method: Literal["gp", "knn", "trend"] = "gp"
@@ -91,8 +82,9 @@ class SurveyOptions:
             faults.add("survey, method", "gp, knn or trend", repr(self.method))
         if self.trend not in ("path_loss", "mean"):
             faults.add("survey, trend", "path_loss or mean", repr(self.trend))
-        for name, low in (("reach_m", 1.0), ("min_points", 1), ("min_points_to_locate", 3),
-                          ("neighbours", 1), ("square_m", 0.1), ("most_points", 10)):  # fmt: skip
+        least = {"reach_m": 1.0, "min_points": 1, "min_points_to_locate": 3}
+        least |= {"neighbours": 1, "square_m": 0.1, "most_points": 10}
+        for name, low in least.items():
             value = getattr(self, name)
             if not low <= value < np.inf:
                 faults.add(f"survey, {name}", f"a number ≥ {low:g}", value)
@@ -105,15 +97,14 @@ class SurveyedCell:
 
     Parameters
     ----------
-    points : Points
-        What it was made from.
-    trend : Trend
     field : ResidualField
         Trend and residuals.
     antenna : (float, float) or None
-        Known or estimated place, east and north (m); None where it is not known.
+        Known or estimated place, east and north (m).
     estimated : bool
         Whether the place was estimated from the levels.
+    heard : scipy.spatial.cKDTree
+        Places of all readings.
     """
 
     points: Points
@@ -143,8 +134,6 @@ class Survey:
 
     Parameters
     ----------
-    crs : str
-    options : SurveyOptions
     shadowing : Shadowing
         Learnt from all cells together.
     cells : mapping of str to SurveyedCell
@@ -167,7 +156,7 @@ def fit_survey(
     plan: CellPlan | None = None,
     predicted: Mapping[str, Covariate] | None = None,
 ) -> Survey:
-    """Make the maps of all cells that were heard often enough.
+    """Make the maps of all cells that were received often enough.
 
     Parameters
     ----------
@@ -183,51 +172,47 @@ def fit_survey(
     Raises
     ------
     InputError
-        No cell was heard often enough.
+        No cell was received often enough.
     """
-    with threadpool_limits(1):
-        return _fit(measurements, options, plan, predicted)
-
-
-def _fit(
-    measurements: Measurements,
-    options: SurveyOptions,
-    plan: CellPlan | None,
-    predicted: Mapping[str, Covariate] | None,
-) -> Survey:
     found = points_by_cell(measurements, options.square_m, options.most_points)
     notes = []
     if predicted is not None:
         strange = [cell_id for cell_id in found if cell_id not in predicted]
         if strange:
             notes.append(f"{len(strange)} cells left out: not in the prediction")
-        found = {c: _predicted_only(p, predicted[c]) for c, p in found.items() if c in predicted}
+        found = {
+            cell_id: some.some(np.isfinite(predicted[cell_id](some.east_m, some.north_m)))
+            for cell_id, some in found.items()
+            if cell_id in predicted
+        }
     points = [some for some in found.values() if len(some) >= options.min_points]
     if len(points) < len(found):
         few = len(found) - len(points)
-        notes.append(f"{few} cells left out: heard in fewer than {options.min_points} squares")
+        notes.append(f"{few} cells left out: received in fewer than {options.min_points} squares")
     if not points:
         hint = "cells named differently than in the prediction" if predicted else ""
-        expected = f"a cell heard in at least {options.min_points} squares"
+        expected = f"a cell received in at least {options.min_points} squares"
         raise fail(InputError, "measurements", expected, f"{len(found)} cells, none of them", hint)
     level_dbm = float(np.mean([some.level_dbm.mean() for some in points]))
     plan = plan.to_crs(measurements.crs) if plan is not None else None
     shadowing = Shadowing()
-    for _ in range(_ROUNDS):
-        trends = [_trend(some, options, level_dbm, shadowing, plan, predicted) for some in points]
-        shadowing = learn_shadowing(points, trends, shadowing)
     cells = {}
-    for some in points:
-        trend = _trend(some, options, level_dbm, shadowing, plan, predicted)
-        antenna = trend.covariate if isinstance(trend.covariate, DistanceLoss) else None
-        cells[some.cell_id] = SurveyedCell(
-            some,
-            trend,
-            _field(some, trend, shadowing, options),
-            (antenna.east_m, antenna.north_m) if antenna is not None else None,
-            antenna is not None and not (plan is not None and some.cell_id in plan),
-            cKDTree(some.heard_at),
-        )
+    # Threads make small matrices slower, and their sums depend on how many there are.
+    with threadpool_limits(1):
+        for _ in range(_ROUNDS):
+            trends = [_trend(p, options, level_dbm, shadowing, plan, predicted) for p in points]
+            shadowing = learn_shadowing(points, trends, shadowing)
+        for some in points:
+            trend = _trend(some, options, level_dbm, shadowing, plan, predicted)
+            antenna = trend.covariate if isinstance(trend.covariate, DistanceLoss) else None
+            cells[some.cell_id] = SurveyedCell(
+                some,
+                trend,
+                _field(some, trend, shadowing, options),
+                (antenna.east_m, antenna.north_m) if antenna is not None else None,
+                antenna is not None and not (plan is not None and some.cell_id in plan),
+                cKDTree(some.heard_at),
+            )
     located = sum(cell.estimated for cell in cells.values())
     if located:
         notes.append(f"{located} antennas located from their levels")
@@ -238,10 +223,6 @@ def _fit(
             "the trend is their mean level"
         )
     return Survey(measurements.crs, options, shadowing, cells, tuple(notes))
-
-
-def _predicted_only(points: Points, covariate: Covariate) -> Points:
-    return points.some(np.isfinite(covariate(points.east_m, points.north_m)))
 
 
 def _trend(
@@ -263,17 +244,8 @@ def _trend(
         covariate = DistanceLoss(cell.east_m, cell.north_m, above_m)
     elif options.trend == "path_loss" and len(points) >= options.min_points_to_locate:
         some = points.thinned(_LOCATED_FROM)
-        covariate = locate_antenna(
-            some.east_m, some.north_m, some.level_dbm, shadowing.covariance_db2(some), prior
-        )
-    return fit_trend(
-        covariate,
-        points.east_m,
-        points.north_m,
-        points.level_dbm,
-        shadowing.covariance_db2(points),
-        prior,
-    )
+        covariate = locate_antenna(some, shadowing.covariance_db2(some), prior)
+    return fit_trend(covariate, points, shadowing.covariance_db2(points), prior)
 
 
 def _field(
@@ -300,10 +272,9 @@ class Validation:
     folds : int
         Times that the map was made anew.
     by_session : bool
-        Whether whole sessions were left out; otherwise there is one session, and its parts in time
-        were.
+        Whether whole sessions were left out, or parts in time of the only one.
     measurements, predicted : int
-        Left out in all, and how many of them the map could tell: cell known, within reach.
+        Left out in all, and how many of them the map predicts: cell known, within reach.
     rmse_db, trend_rmse_db, mean_rmse_db : float
         Root mean square error of the map, of its trend alone, and of each cell's mean level.
     bias_db : float
@@ -311,8 +282,8 @@ class Validation:
     within_1_deviation, within_2_deviations : float
         Share of the errors within so many predicted deviations; 0.68 and 0.95 when they are right.
     deviation_factor : float
-        What to multiply the predicted deviations by so that 68 % of the errors are within one; 1
-        where nothing was told.
+        By which the predicted deviations are to be multiplied so that 68 % of the errors are within
+        one; 1 where nothing was predicted.
     """
 
     folds: int
@@ -330,18 +301,14 @@ class Validation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LeftOut:
-    """Levels measured in what was left out, and what the map of the rest tells of them.
+    """Levels measured in what was left out, and their predictions by the map of the rest.
 
     Parameters
     ----------
-    folds : int
-        Times that the map was made anew.
-    sessions : int
-        Of the measurements; of one alone, parts in time were left out.
-    measurements : int
-        Left out in all.
+    folds, sessions, measurements : int
+        Maps that were made, sessions of the measurements, and measurements left out in all.
     measured_dbm : numpy.ndarray, shape (N,)
-        Of those that the map could tell: cell known, within reach.
+        Of the measurements that the map predicts: cell known, within reach.
     predicted_dbm, deviation_db : numpy.ndarray, shape (N,)
         By the map of the rest.
     trend_dbm, mean_dbm : numpy.ndarray, shape (N,)
@@ -388,17 +355,11 @@ def leave_out(
     predicted: Mapping[str, Covariate] | None = None,
     progress: Progress | None = None,
 ) -> LeftOut:
-    """Leave each session out, make the map of the others, and tell what they say of it.
+    """Leave each session out, make the map of the others, and predict the levels left out.
 
     Everything is learnt anew for each fold, the shadowing and the antennas' places too. With more
-    than 20 sessions several are left out together.
-
-    Parameters
-    ----------
-    measurements, options, plan, predicted
-        As for :func:`~mapfilter.survey.measured_map.fit_survey`.
-    progress : callable, optional
-        Called with (folds done, folds in all).
+    than 20 sessions several are left out together. ``progress`` is called with (folds done, folds
+    in all), the other arguments are those of :func:`fit_survey`.
     """
     fold, sessions = _folds(measurements)
     count = int(fold.max()) + 1 if len(fold) else 0
@@ -411,26 +372,12 @@ def leave_out(
             # The other sessions alone are too little for any cell.
             pass
         else:
-            found.extend(_told(others, measurements.where(out)))
+            found.extend(_predictions(others, measurements.where(out)))
         if progress is not None:
             progress(number + 1, count)
     table = np.concatenate(found)
     table = table[np.isfinite(table).all(axis=1)]
     return LeftOut(count, sessions, len(measurements), *table.T)
-
-
-def cross_validate(
-    measurements: Measurements,
-    options: SurveyOptions,
-    *,
-    plan: CellPlan | None = None,
-    predicted: Mapping[str, Covariate] | None = None,
-    progress: Progress | None = None,
-) -> Validation:
-    """Return the errors of what :func:`leave_out` finds, in a few figures."""
-    return leave_out(
-        measurements, options, plan=plan, predicted=predicted, progress=progress
-    ).validation
 
 
 def _folds(measurements: Measurements) -> tuple[Ints, int]:
@@ -444,7 +391,7 @@ def _folds(measurements: Measurements) -> tuple[Ints, int]:
     return fold, len(sessions)
 
 
-def _told(survey: Survey, left_out: Measurements) -> list[Floats]:
+def _predictions(survey: Survey, left_out: Measurements) -> list[Floats]:
     """Return for each cell the columns of :class:`LeftOut`, a row per measurement in reach."""
     reach_m, found = survey.options.reach_m, []
     for index in np.unique(left_out.cell):
@@ -455,8 +402,8 @@ def _told(survey: Survey, left_out: Measurements) -> list[Floats]:
         near = cell.distance_m(some.east_m, some.north_m, reach_m) <= reach_m
         place = some.east_m[near], some.north_m[near]
         mean_dbm = np.full(len(place[0]), cell.points.level_dbm.mean())
-        told = some.level_dbm[near], *cell.predict(*place), cell.trend.level_dbm(*place), mean_dbm
-        found.append(np.column_stack(told))
+        predicted = *cell.predict(*place), cell.trend.level_dbm(*place), mean_dbm
+        found.append(np.column_stack((some.level_dbm[near], *predicted)))
     return found
 
 

@@ -12,7 +12,6 @@ from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed
 from mapfilter.survey.measured_map import (
     LeftOut,
     SurveyOptions,
-    cross_validate,
     fit_survey,
     leave_out,
 )
@@ -98,7 +97,7 @@ def test_a_survey_gets_its_pictures(sessions, folds, tmp_path):
     paths = tmp_path / "mean.tif", tmp_path / "deviation.tif"
     write_survey(survey, LATTICE, *paths)
     left_out = leave_out(measured, options)
-    told = cross_validate(measured, options)
+    told = leave_out(measured, options).validation
     assert told == left_out.validation
     assert (len(left_out), left_out.folds) == (told.predicted, folds)
     error_db = left_out.measured_dbm - left_out.predicted_dbm
