@@ -48,7 +48,6 @@ class RasterSample:
 
     Parameters
     ----------
-    cell_id : str
     lattice : Lattice
         Where the sampled pixels lie; its pixels are the sampled ones grown to the step.
     values : ndarray of float32, shape (rows, cols) of the lattice
@@ -84,22 +83,7 @@ class RasterSample:
 
 
 def sample_raster(rasters: RxLevRasters, cell_id: str, cell: Cell | None) -> RasterSample:
-    """Read a sample of one cell's raster, without judging the numbers.
-
-    Parameters
-    ----------
-    rasters : RxLevRasters
-    cell_id : str
-        A cell of the rasters.
-    cell : Cell or None
-        Where it stands, in the CRS of the rasters; a large raster is looked at about it, or about
-        its middle.
-
-    Raises
-    ------
-    InputError
-        The file is cut off or damaged.
-    """
+    """Read a sample of one cell's raster, of a large one about its site or else its middle."""
     file = next(file for file in rasters.files if cell_id in file.cell_ids)
     band = file.cell_ids.index(cell_id)
     window = _window(rasters.lattice, cell)
@@ -119,7 +103,7 @@ def sample_raster(rasters: RxLevRasters, cell_id: str, cell: Cell | None) -> Ras
 
 
 def kind_of(values: Floats32) -> Kind:
-    """Tell what numbers most likely are; NaN is passed over.
+    """Return what numbers most likely are; NaN is ignored.
 
     Levels (dBm) are mostly below 0, path losses (dB) mostly above 20, and raw RXLEV are whole
     numbers in 0..63 (3GPP TS 45.008, 8.1.4).
@@ -144,7 +128,7 @@ def kind_of(values: Floats32) -> Kind:
 
 
 def nodata_taken_as_level(values: Floats32) -> tuple[float, float] | None:
-    """Return the number that means no data though the file does not say so, and its share.
+    """Return the number that means no data though the file does not state it, and its share.
 
     That is one and the same number, beyond all levels (such as -9999), or exactly 0 among levels
     that are below it.
@@ -249,7 +233,7 @@ def is_surveyed(rasters: RxLevRasters) -> bool:
 
 
 def check_ids(rasters: RxLevRasters, plan: CellPlan, where: str, findings: Findings) -> None:
-    """See that rasters and plan hold the same cells."""
+    """Check that rasters and plan hold the same cells."""
     held = set(rasters.cell_ids)
     missing = [cell_id for cell_id in plan.ids if cell_id not in held]
     unknown = [cell_id for cell_id in rasters.cell_ids if cell_id not in plan]
@@ -262,7 +246,7 @@ def check_ids(rasters: RxLevRasters, plan: CellPlan, where: str, findings: Findi
 
 
 def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) -> list[RasterSample]:
-    """Read a sample of each raster, and see that its numbers are what they are said to be.
+    """Read a sample of each raster, and check that its numbers are of the declared kind.
 
     Returns
     -------
@@ -300,42 +284,35 @@ def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) ->
         evidence = f"{worst[1]:g} stands in up to {worst[2]:.1%} of the pixels, as a number."
         findings.add("nodata-as-level", f"{where}, cells {ids}", evidence)
     if empty:
-        findings.add(
-            "raster-empty", f"{where}, cells {listed(empty)}", "No pixel has data.", "warning"
-        )
+        cells = f"{where}, cells {listed(empty)}"
+        findings.add("raster-empty", cells, "No pixel has data.", "warning")
     if constant:
         evidence = f"One number in all pixels: {listed(constant)}."
         findings.add("raster-constant", where, evidence)
     useful: list[RasterSample] = []
     for kind, samples in kinds.items():
-        _check_identical(samples, where, findings)
+        by_sum: dict[tuple[str, Lattice], list[str]] = {}
+        for sample in samples:
+            by_sum.setdefault((sample.checksum, sample.lattice), []).append(sample.cell_id)
+        for same in by_sum.values():
+            if len(same) > 1:
+                evidence = f"The same numbers in all pixels of {len(same)} rasters."
+                findings.add("identical-rasters", f"{where}, cells {listed(same)}", evidence)
         falls = kind == "loss" and _falls_away(samples, plan)
-        _check_kind(rasters, kind, samples, findings, falls=falls)
+        code = "field-strength" if falls else _MISREAD.get((rasters.quantity, kind))
+        if code is not None:
+            numbers = np.concatenate([sample.known for sample in samples])
+            low, middle, high = np.percentile(numbers, [1, 50, 99])
+            evidence = (
+                f"Declared {rasters.quantity}; {len(samples)} of {len(rasters.cell_ids)} rasters "
+                f"hold {low:.5g}..{high:.5g}, median {middle:.5g}"
+            )
+            evidence += ", which become less away from the sites." if falls else "."
+            ids = listed([sample.cell_id for sample in samples])
+            findings.add(code, f"{where}, cells {ids}", evidence)
         negative = kind == "loss" and not falls
         useful += [replace(s, values=-s.values) for s in samples] if negative else samples
     return useful
-
-
-def _check_kind(
-    rasters: RxLevRasters,
-    kind: Kind,
-    samples: Sequence[RasterSample],
-    findings: Findings,
-    *,
-    falls: bool,
-) -> None:
-    code = "field-strength" if falls else _MISREAD.get((rasters.quantity, kind))
-    if code is None:
-        return
-    numbers = np.concatenate([sample.known for sample in samples])
-    low, middle, high = np.percentile(numbers, [1, 50, 99])
-    evidence = (
-        f"Declared {rasters.quantity}; {len(samples)} of {len(rasters.cell_ids)} rasters hold "
-        f"{low:.5g}..{high:.5g}, median {middle:.5g}"
-    )
-    evidence += ", which become less away from the sites." if falls else "."
-    ids = listed([sample.cell_id for sample in samples])
-    findings.add(code, f"{rasters.path}, cells {ids}", evidence)
 
 
 def _falls_away(samples: Sequence[RasterSample], plan: CellPlan | None) -> bool:
@@ -345,13 +322,3 @@ def _falls_away(samples: Sequence[RasterSample], plan: CellPlan | None) -> bool:
     known = [(s, plan[s.cell_id]) for s in samples if s.cell_id in plan]
     falls = [falls_with_distance(s, cell.east_m, cell.north_m) for s, cell in known]
     return bool(falls) and float(np.median(falls)) > _FALLS
-
-
-def _check_identical(samples: Sequence[RasterSample], where: str, findings: Findings) -> None:
-    by_sum: dict[str, list[str]] = {}
-    for sample in samples:
-        by_sum.setdefault(f"{sample.checksum} {sample.lattice}", []).append(sample.cell_id)
-    for ids in by_sum.values():
-        if len(ids) > 1:
-            evidence = f"The same numbers in all pixels of {len(ids)} rasters."
-            findings.add("identical-rasters", f"{where}, cells {listed(ids)}", evidence)
