@@ -1,4 +1,4 @@
-"""``mapfilter predict``: cell plan and buildings to RxLev rasters, and a set that plays reality."""
+"""``mapfilter predict``: cell plan and buildings to RxLev rasters, and simulated ground truth."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import rasterio
+from rasterio.errors import RasterioError
 
 from mapfilter import __version__
 from mapfilter._io import ensure_writable_folder, sha256_file
 from mapfilter._parallel import Progress, part_of
 from mapfilter.config.sections import Config, Prediction
-from mapfilter.errors import InputError, fail
+from mapfilter.errors import Faults, InputError, OutputError, fail
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import (
     off_frequency,
@@ -76,6 +77,31 @@ def check_reality(config: Config) -> None:
         )
 
 
+def check_only_own_replaced(*paths: Path) -> None:
+    """Check that no rasters are replaced that another program made.
+
+    Raises
+    ------
+    OutputError
+        With every path at which there is something else than rasters that mapfilter predicted.
+    """
+    faults = Faults()
+    for path in paths:
+        if not path.exists():
+            continue
+        try:
+            with rasterio.open(path) as source:
+                software = str(source.tags().get("SOFTWARE", ""))
+        except RasterioError:
+            software = ""
+        if not software.startswith("mapfilter"):
+            expected = "nothing yet, or rasters that mapfilter predicted"
+            got = "a folder" if path.is_dir() else f"a file of {software or 'another program'}"
+            hint = "[rasters] names your own export; give the prediction another path, or none"
+            faults.add(str(path), expected, got, hint)
+    faults.raise_if_any(OutputError)
+
+
 if TYPE_CHECKING:
     from mapfilter.workflows.survey import SurveyResult
 
@@ -117,13 +143,16 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     MapfilterError
         The area, map or plan is wrong, or the output cannot be written.
     """
-    name = config.prediction.model
-    if name == "survey":
+    target, reality = config.rasters_path, config.reality_path
+    surveyed, both = config.prediction.model == "survey", config.prediction.reality.write
+    check_only_own_replaced(
+        target, *([config.deviation_path] if surveyed else [reality] if both else [])
+    )
+    if surveyed:
         from mapfilter.workflows.survey import run_survey
 
         return run_survey(config, progress)
     world = World.of(config)
-    target, reality = config.rasters_path, config.reality_path
     for folder in (target.parent, reality.parent, config.output.dir):
         ensure_writable_folder(folder)
     plan, lattice, model = world.plan, world.lattice, prediction_model(config.prediction)
