@@ -124,7 +124,6 @@ class Finding:
         File, cells or fields.
     evidence : str
         What was found, in numbers.
-    remedy : str
     """
 
     code: str

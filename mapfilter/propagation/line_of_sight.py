@@ -64,7 +64,6 @@ def mean_roof_height(
     ----------
     heights_m : ndarray of float32, shape (rows, cols)
         0 where there is no building; such pixels do not count.
-    lattice : Lattice
     radius_m : float
         Half the side of the square.
     default_m : float

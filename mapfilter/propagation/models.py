@@ -226,10 +226,8 @@ def path_loss_db(
 
     Parameters
     ----------
-    model : PredictionModel
     distance_m : array_like
         Horizontal distance.
-    frequency_mhz, base_height_m : float
     roof_height_m : array_like
         Mean height of the roofs around the mobile; of use to Walfisch-Ikegami only.
     sight : array_like

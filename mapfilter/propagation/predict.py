@@ -68,12 +68,10 @@ def predict(
     ----------
     plan : CellPlan
         Brought into the lattice's CRS where it is in another.
-    lattice : Lattice
     heights_m : ndarray of float32, shape (rows, cols), or None
         Heights of buildings above ground, 0 where there is none. Without them every roof has the
         model's default height, and there is no line of sight or, with TR 38.901, the probability of
         its table.
-    model : PredictionModel
     progress : callable, optional
         Called with (cells done, cells in all).
     antennas : mapping of str to MeasuredAntenna, optional
@@ -117,7 +115,6 @@ def simulate_ground_truth(
     ----------
     plan, lattice, heights_m, model, progress, antennas
         As for :func:`predict`, and the same as the prediction was made with.
-    errors : GroundTruthErrors
 
     Yields
     ------
@@ -255,7 +252,6 @@ class Surroundings:
 
         Parameters
         ----------
-        cell : Cell
         slope_factor : float
             Multiplies the path loss per decade of distance; the loss at 100 m stays.
         sight : ndarray of float32, shape (rows, cols)

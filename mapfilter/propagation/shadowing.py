@@ -34,7 +34,6 @@ def correlated_field(
 
     Parameters
     ----------
-    lattice : Lattice
     deviation_db : float
         Standard deviation at every point.
     correlation_m : float

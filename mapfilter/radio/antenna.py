@@ -104,7 +104,6 @@ def leaning(
 
     Parameters
     ----------
-    offset_rad, depression_rad : array_like
     mechanical_downtilt_rad : float
         β of the report.
 
@@ -137,7 +136,6 @@ class MeasuredAntenna:
 
     Parameters
     ----------
-    name : str
     horizontal_deg, horizontal_loss_db : ndarray, shape (N,)
         Angles clockwise from boresight seen from above, rising within [0, 360), and losses against
         the strongest direction, 0 or more.

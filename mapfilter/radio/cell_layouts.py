@@ -66,7 +66,6 @@ def read_table(path: Path, what: str) -> Table:
 
     Parameters
     ----------
-    path : Path
     what : str
         For messages, such as ``"a cell plan"``.
 
@@ -190,7 +189,6 @@ def arrange(
 
     Parameters
     ----------
-    table : Table
     layout : {"plan", "atoll", "opencellid"}
         Names the columns that ``columns`` does not.
     columns : mapping of str to str

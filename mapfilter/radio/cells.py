@@ -243,7 +243,6 @@ def read_cell_plan(
 
     Parameters
     ----------
-    path : Path or str
     crs : str
         Projected CRS of the plan.
     layout : {"plan", "atoll", "opencellid"}

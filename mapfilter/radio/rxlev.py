@@ -46,7 +46,6 @@ def resolve_neighbours(plan: CellPlan, arfcn: int | None, bsic: int | None) -> t
 
     Parameters
     ----------
-    plan : CellPlan
     arfcn : int or None
         BCCH carrier; without it nothing can be resolved.
     bsic : int or None

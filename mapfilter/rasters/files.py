@@ -33,7 +33,6 @@ class Declared:
 
     Parameters
     ----------
-    quantity : {"level", "loss", "deviation"} or None
     crs : str or None
         Projected CRS.
     nodata : float or None
@@ -51,10 +50,8 @@ class RasterFile(ABC):
 
     Parameters
     ----------
-    path : Path
     cell_ids : tuple of str
         One per band.
-    lattice : Lattice
     nodata : tuple of float
         Stored numbers that mean no data, besides those that the driver masks.
     parts : tuple of Path

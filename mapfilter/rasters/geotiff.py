@@ -60,10 +60,8 @@ def new_geotiff(
     ----------
     path : Path
         Ends in .tif or .tiff.
-    lattice : Lattice
     bands : sequence of (str, str)
         Description and unit of each band.
-    tags : mapping of str to str
     overviews : {"average", "nearest"}
         How coarser levels are made; numbers that stand for names must not be averaged.
 
@@ -129,14 +127,12 @@ def write_rasters(
     ----------
     path : Path or str
         Ends in .tif or .tiff.
-    lattice : Lattice
     items : iterable of (cell id, array of shape (rows, cols))
         In the order of ``cell_ids``.
     cell_ids : sequence of str
         The band descriptions.
     tags : mapping of str to str, optional
         Free text kept in the file, such as how it was predicted.
-    quantity : {"level", "loss", "deviation"}
 
     Raises
     ------

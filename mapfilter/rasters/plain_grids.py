@@ -78,7 +78,6 @@ def open_raw_grid(
     ----------
     path : Path
         The ``.bil`` or ``.flt`` file; its header lies beside it.
-    cell_id : str
     declared : Declared
         CRS of files without a ``.prj`` beside them; a number that means no data.
     instead : GridHeader, optional

@@ -160,8 +160,6 @@ def fit_survey(
 
     Parameters
     ----------
-    measurements : Measurements
-    options : SurveyOptions
     plan : CellPlan, optional
         Where antennas are, for the cells it names; the others are located from their levels.
     predicted : mapping of str to callable, optional

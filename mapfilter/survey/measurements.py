@@ -43,7 +43,6 @@ class Measurements:
         Cells received, sorted.
     identities : mapping of str to (mcc, mnc, lac, ci)
         Of the cells whose identity is in the files; lac is the tac in LTE.
-    sessions : tuple of str
     cell, session : numpy.ndarray of int32, shape (N,)
         Indices into ``cell_ids`` and ``sessions``.
     time_s : numpy.ndarray, shape (N,)
