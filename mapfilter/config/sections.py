@@ -37,7 +37,7 @@ from mapfilter.positioning.bayes.options import BayesOptions
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.propagation.models import Clutter, ModelName
 from mapfilter.simulation.imu import Turns
-from mapfilter.tracks.leave_out import Kind
+from mapfilter.tracks.log import Kind
 
 
 class CellColumns(Section):

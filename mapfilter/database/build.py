@@ -20,6 +20,7 @@ from mapfilter._io import atomic_dir, check_replaceable
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter._resume import FinishedParts
 from mapfilter.database.manifest import FORMAT, MANIFEST, InputFile
+from mapfilter.database.parquet import Window
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.sources import LatticeRoutes, Routes, check_aligned, overlap
@@ -30,7 +31,6 @@ from mapfilter.database.tiles import (
     read_tiles,
     tile_windows,
 )
-from mapfilter.database.windows import Window
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan

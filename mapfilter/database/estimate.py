@@ -13,7 +13,7 @@ import pyarrow as pa
 
 from mapfilter._types import Floats
 from mapfilter.database.build import FLOOR_DBM, MARGIN_DB, TILE_PX, BuildJob, check_parameters
-from mapfilter.database.columns import write_columns
+from mapfilter.database.parquet import geo_metadata, write_columns
 from mapfilter.database.parts import (
     ROWS_IN_MEMORY,
     LevelsRows,
@@ -26,7 +26,6 @@ from mapfilter.database.store import cells_table
 from mapfilter.database.tiles import read_tile
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.rxlev_rasters import RxLevRasters
-from mapfilter.roads.geoparquet import geo_metadata
 from mapfilter.roads.lattice import RouteLattice
 
 _SAMPLED_TILES = 16

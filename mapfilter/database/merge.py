@@ -15,6 +15,7 @@ from mapfilter._io import atomic_dir, check_replaceable, sha256_file
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats, Ints
 from mapfilter.database.manifest import FORMAT, MANIFEST, POINTS, InputFile
+from mapfilter.database.parquet import Window, WindowReader, point_geometry
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.sources import overlap, pixels_between
@@ -26,11 +27,9 @@ from mapfilter.database.tiles import (
     tile_windows,
     z_order,
 )
-from mapfilter.database.windows import Window, WindowReader
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.roads.geoparquet import point_geometry
 
 _PLACE = ("row", "col", "way_id", "way_class", "on_square", "distance_to_way_m")
 

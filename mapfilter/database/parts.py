@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from mapfilter._io import write_json
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats
-from mapfilter.database.columns import open_writer, write_columns
 from mapfilter.database.manifest import (
     CELLS,
     FORMAT,
@@ -29,11 +28,17 @@ from mapfilter.database.manifest import (
     describe_part,
     levels_folders,
 )
+from mapfilter.database.parquet import (
+    dictionary,
+    geo_metadata,
+    open_writer,
+    point_coordinates,
+    write_columns,
+)
 from mapfilter.database.store import write_cells
 from mapfilter.database.tiles import TileLevels, TileRows
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.roads.geoparquet import dictionary, geo_metadata, point_coordinates
 
 LevelsRows = dict[str, NDArray[Any]]
 

@@ -14,9 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import distance_transform_edt
 
 from mapfilter._types import Bools, Floats32, Ints, Ints32
-from mapfilter.database.columns import read_columns
 from mapfilter.database.manifest import POINTS
-from mapfilter.database.windows import WindowReader
+from mapfilter.database.parquet import WindowReader, read_columns
 from mapfilter.errors import InputError, StoreError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan

@@ -17,7 +17,7 @@ from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.near import WayIndex
-from mapfilter.roads.routable import AreaIndex, RouteSource
+from mapfilter.roads.routes import AreaIndex, RouteSource
 
 _ALIGNED_PX = 1e-3
 

@@ -15,8 +15,8 @@ from typing import Any, Literal
 import pyarrow as pa
 
 from mapfilter._io import left_aside, sha256_file
-from mapfilter.database.columns import count_rows, read_columns, write_columns
 from mapfilter.database.manifest import CELLS, MANIFEST, read_manifest
+from mapfilter.database.parquet import count_rows, read_columns, write_columns
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, MapfilterError, StoreError, fail
 from mapfilter.geodesy import Lattice

@@ -10,12 +10,11 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from mapfilter._types import Floats, Floats32, Ints, Ints32
+from mapfilter.database.parquet import Window, dictionary, point_geometry
 from mapfilter.database.sources import RoutePart
-from mapfilter.database.windows import Window
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.rxlev_rasters import RxLevRasters
-from mapfilter.roads.geoparquet import dictionary, point_geometry
 from mapfilter.roads.lattice import RouteLattice
 
 _CELLS_AT_A_TIME = 128

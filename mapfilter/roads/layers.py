@@ -21,9 +21,16 @@ from mapfilter.roads.buildings import (
     check_heights,
     made_buildings,
 )
-from mapfilter.roads.clip import lines_inside, polygons_inside
 from mapfilter.roads.vector import read_layer
-from mapfilter.roads.ways import Bounds, Buildings, Squares, Ways
+from mapfilter.roads.ways import (
+    Bounds,
+    Buildings,
+    Squares,
+    Water,
+    Ways,
+    lines_inside,
+    polygons_inside,
+)
 
 ROAD_CLASS = "road"
 """The class of ways that have none."""
@@ -161,6 +168,34 @@ def read_layer_buildings(
         kinds = ", ".join(sorted({shape.geom_type for shape in found.geometry}))
         raise fail(InputError, str(path), "polygons in the area", kinds, "another layer")
     return buildings
+
+
+def read_layer_water(
+    path: Path | str, crs: str, bounds_m: Bounds, *, layer_name: str | None = None
+) -> Water:
+    """Read the polygons of a vector file as water, cut to an area; there may be none in it.
+
+    Parameters
+    ----------
+    path : Path or str
+        Whatever geopandas reads.
+    crs, bounds_m
+        As for :func:`read_water`; the layer may have any CRS.
+    layer_name : str, optional
+        Needed where the file has several layers.
+
+    Raises
+    ------
+    InputError
+        The file, its layer or its CRS is missing or damaged, or it holds other things than
+        polygons.
+    """
+    found = read_layer(Path(path), crs, bounds_m, layer_name, may_be_empty=True)
+    geometry, _ = polygons_inside(found.geometry, bounds_m, cut=True)
+    if found.geometry.size and not geometry.size:
+        kinds = ", ".join(sorted({shape.geom_type for shape in found.geometry}))
+        raise fail(InputError, str(path), "polygons", kinds, "another layer")
+    return Water(crs, geometry)
 
 
 def _classes(values: NDArray[np.object_] | None, count: int) -> NDArray[np.object_]:

@@ -14,6 +14,9 @@ squares    ``place=square``, and ``area=yes`` or multipolygon areas of the class
            :data:`SQUARE_CLASSES`, with the access rules of walking. A closed way without
            ``area=yes`` is a loop to walk along, not an area.
 ========== =============================================================================
+
+An OpenStreetMap extract holds no sea: the coast is a line there. Polygons of the sea come from
+elsewhere, such as osmdata.openstreetmap.de, as a layer.
 """
 
 from __future__ import annotations
@@ -27,10 +30,8 @@ from geopandas import GeoDataFrame
 from numpy.typing import NDArray
 
 from mapfilter._types import Bools
-from mapfilter.roads.clip import lines_inside, polygons_inside
-from mapfilter.roads.maps import nothing_there, read_elements
-from mapfilter.roads.osm_readers import Query
-from mapfilter.roads.ways import Bounds, Squares, Ways
+from mapfilter.roads.maps import Query, nothing_there, read_elements
+from mapfilter.roads.ways import Bounds, Squares, Water, Ways, lines_inside, polygons_inside
 
 Profile = Literal["walking", "driving"]
 
@@ -155,3 +156,38 @@ def _oneway(found: GeoDataFrame) -> NDArray[np.int8]:
     forward = found["oneway"].isin(["yes", "true", "1"]) | (implied & (found["oneway"] == ""))
     backward = found["oneway"].isin(["-1", "reverse"])
     return np.where(backward, -1, np.where(forward, 1, 0)).astype(np.int8)
+
+
+_WATER = Query(
+    {"natural": ("water",), "waterway": ("riverbank", "dock"), "landuse": ("reservoir",)},
+    ("natural", "waterway", "landuse", "tunnel", "covered", "location", "intermittent"),
+)
+_NOT_OPEN = frozenset(("yes", "culvert", "flooded", "building_passage"))
+_BURIED = frozenset(("underground", "indoor"))
+
+
+def read_water(path: str | Path, crs: str, bounds_m: Bounds) -> Water:
+    """Read the waters of a map, cut to an area; there may be none.
+
+    Waters are ``natural=water``, ``waterway=riverbank`` and ``dock``, ``landuse=reservoir``; not
+    those in tunnels, below ground, or dry for a part of the year (``intermittent=yes``).
+
+    Parameters
+    ----------
+    path : str or Path
+        An ``.osm.pbf``, ``.osm`` or ``.osm.gz`` file, or the name of an embedded map ("helsinki").
+    crs : str
+        Projected CRS of the result, in metres.
+    bounds_m : tuple of float
+        West, south, east, north of the area in ``crs``.
+
+    Raises
+    ------
+    InputError
+        The map is missing or damaged.
+    """
+    found = read_elements(path, crs, bounds_m, _WATER)
+    hidden = found["tunnel"].isin(_NOT_OPEN) | found["covered"].isin(_NOT_OPEN)
+    hidden |= found["location"].isin(_BURIED) | (found["intermittent"] == "yes")
+    geometry, _ = polygons_inside(found.geometry[~hidden].to_numpy(), bounds_m, cut=True)
+    return Water(crs, geometry)

@@ -24,9 +24,8 @@ from shapely.errors import GEOSException
 
 from mapfilter._types import Ints
 from mapfilter.errors import InputError, MapfilterError, fail
-from mapfilter.roads.clip import on_earth
 from mapfilter.roads.maps import box_deg
-from mapfilter.roads.ways import Bounds, Geometries
+from mapfilter.roads.ways import Bounds, Geometries, on_earth
 
 T = TypeVar("T")
 

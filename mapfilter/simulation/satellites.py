@@ -16,12 +16,9 @@ import pandas as pd
 from mapfilter._types import Bools, Floats
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.geodesy import unproject
-from mapfilter.gnss.almanac import Almanac
-from mapfilter.gnss.grid_frame import GridFrame
 from mapfilter.gnss.noise import correlated_along, multipath_bias_m
-from mapfilter.gnss.orbits import gps_time, satellite_positions_m
-from mapfilter.gnss.sky import Directions, directions, ecef_from_lonlat
-from mapfilter.gnss.visibility import Skyline
+from mapfilter.gnss.orbits import Almanac, gps_time, satellite_positions_m
+from mapfilter.gnss.sky import Directions, GridFrame, Skyline, directions, ecef_from_lonlat
 from mapfilter.models.motion import clock_noise
 from mapfilter.simulation.reflections import NlosModel, draw_reflections
 from mapfilter.tracks.satellites import sent_from_m

@@ -30,7 +30,7 @@ from mapfilter._io import (
 )
 from mapfilter._types import Ints
 from mapfilter.errors import Faults, InputError, MapfilterError, StoreError, fail
-from mapfilter.gnss.almanac import read_yuma
+from mapfilter.gnss.orbits import read_yuma
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.schema import OPTIONAL, SCHEMA, TABLES
 

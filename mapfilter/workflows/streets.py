@@ -16,15 +16,13 @@ from mapfilter.database.manifest import InputRole
 from mapfilter.errors import ConfigError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.roads.buildings import read_buildings
-from mapfilter.roads.clip import clip_ways
 from mapfilter.roads.corridors import Positions, corridors
 from mapfilter.roads.landuse import LandUse, read_landuse
-from mapfilter.roads.layers import read_layer_buildings, read_layer_roads
+from mapfilter.roads.layers import read_layer_buildings, read_layer_roads, read_layer_water
 from mapfilter.roads.maps import resolve_map
-from mapfilter.roads.osm import read_squares, read_ways
-from mapfilter.roads.routable import RouteSource
-from mapfilter.roads.water import read_layer_water, read_water
-from mapfilter.roads.ways import Bounds, Buildings, Squares, Water, Ways
+from mapfilter.roads.osm import read_squares, read_water, read_ways
+from mapfilter.roads.routes import RouteSource
+from mapfilter.roads.ways import Bounds, Buildings, Squares, Water, Ways, clip_ways
 from mapfilter.simulation.synthetic_city import SyntheticCity
 from mapfilter.survey.measurements import Measurements, read_measurements
 from mapfilter.workflows.area import city_of

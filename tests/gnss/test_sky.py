@@ -11,17 +11,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapfilter.errors import InputError
-from mapfilter.gnss.almanac import Almanac, nominal_gps
 from mapfilter.gnss.noise import correlated_along, elevation_sigma_m, multipath_bias_m
-from mapfilter.gnss.orbits import gps_time, satellite_positions_m
+from mapfilter.gnss.orbits import Almanac, gps_time, nominal_gps, satellite_positions_m
 from mapfilter.gnss.sky import (
     Directions,
     LocalFrame,
+    Skyline,
     directions,
     ecef_from_lonlat,
     lonlat_from_ecef,
 )
-from mapfilter.gnss.visibility import Skyline
 
 CASES = json.loads((Path(__file__).parents[1] / "fusion_cases.json").read_text(encoding="utf-8"))
 ELEMENTS = CASES["yuma"]["alm"]

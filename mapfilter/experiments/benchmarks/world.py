@@ -18,7 +18,7 @@ from mapfilter._io import atomic_file, sha256_file
 from mapfilter.database.store import open_database
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.sweep.world import SweepWorld, open_world
-from mapfilter.gnss.visibility import Skyline
+from mapfilter.gnss.sky import Skyline
 from mapfilter.positioning.locators import FilterChoice, Locator, open_locator
 from mapfilter.propagation.predict import PredictionModel, RealityErrors, realise
 from mapfilter.radio.antenna import MeasuredAntenna

@@ -9,8 +9,7 @@ import numpy as np
 
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Reason
-from mapfilter.gnss.grid_frame import GridFrame
-from mapfilter.gnss.sky import directions
+from mapfilter.gnss.sky import GridFrame, directions
 from mapfilter.models.street_motion import EAST, NORTH
 from mapfilter.positioning.epochs import Epoch, GnssFix, Pseudorange
 from mapfilter.positioning.gnss.options import GnssOptions
