@@ -15,9 +15,8 @@ from shapely import STRtree
 from mapfilter._types import Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.roads.index import AreaIndex, RouteSource, WayIndex
 from mapfilter.roads.lattice import RouteLattice
-from mapfilter.roads.near import WayIndex
-from mapfilter.roads.routes import AreaIndex, RouteSource
 
 _ALIGNED_PX = 1e-3
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Container
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ from mapfilter.roads.buildings import (
     check_heights,
     made_buildings,
 )
-from mapfilter.roads.vector import read_layer
+from mapfilter.roads.vector import Layer, read_layer
 from mapfilter.roads.ways import (
     Bounds,
     Buildings,
@@ -62,7 +61,7 @@ class LayerRoads:
 
 
 def read_layer_roads(
-    path: Path | str,
+    source: Layer,
     crs: str,
     bounds_m: Bounds,
     *,
@@ -74,8 +73,8 @@ def read_layer_roads(
 
     Parameters
     ----------
-    path : Path or str
-        Whatever geopandas reads.
+    source : path or GeoDataFrame
+        A vector file that geopandas reads, or a table in memory.
     crs : str
         Projected CRS of the result, in metres; the layer may have any.
     bounds_m : tuple of float
@@ -94,10 +93,10 @@ def read_layer_roads(
         The file, its layer, its CRS or a column is missing or damaged, or no road is in the area.
     """
     columns = [name for name in (class_column, id_column) if name is not None]
-    found = read_layer(Path(path), crs, bounds_m, layer_name, columns)
+    found = read_layer(source, crs, bounds_m, layer_name, columns)
     number = found.number
     if id_column is not None:
-        number = _ids(found.columns[id_column], f"{path}, column {id_column}")
+        number = _ids(found.columns[id_column], f"{found.name}, column {id_column}")
     lines, origin = lines_inside(found.geometry, bounds_m)
     order = np.argsort(number[origin], kind="stable")
     lines, origin = lines[order], origin[order]
@@ -106,7 +105,7 @@ def read_layer_roads(
     areas, of_area = polygons_inside(found.geometry, bounds_m, cut=True)
     if not (origin.size or of_area.size):
         kinds = sorted({shape.geom_type for shape in found.geometry})
-        raise fail(InputError, str(path), "lines or polygons in the area", ", ".join(kinds))
+        raise fail(InputError, found.name, "lines or polygons in the area", ", ".join(kinds))
     none = np.zeros(origin.size, dtype=np.int8)
     ways = Ways(
         crs,
@@ -122,7 +121,7 @@ def read_layer_roads(
 
 
 def read_layer_buildings(
-    path: Path | str,
+    source: Layer,
     crs: str,
     bounds_m: Bounds,
     *,
@@ -136,7 +135,7 @@ def read_layer_buildings(
 
     Parameters
     ----------
-    path, crs, bounds_m, layer_name
+    source, crs, bounds_m, layer_name
         As for :func:`read_layer_roads`.
     height_column : str, optional
         Column that holds the height above ground, in metres, or as a text with its unit.
@@ -153,7 +152,7 @@ def read_layer_buildings(
     """
     check_heights(default_height_m, storey_height_m)
     columns = [name for name in (height_column, levels_column) if name is not None]
-    found = read_layer(Path(path), crs, bounds_m, layer_name, columns)
+    found = read_layer(source, crs, bounds_m, layer_name, columns)
     unknown = np.full(found.number.size, None, dtype=object)
     buildings = made_buildings(
         crs,
@@ -166,19 +165,19 @@ def read_layer_buildings(
     )
     if not len(buildings):
         kinds = ", ".join(sorted({shape.geom_type for shape in found.geometry}))
-        raise fail(InputError, str(path), "polygons in the area", kinds, "another layer")
+        raise fail(InputError, found.name, "polygons in the area", kinds, "another layer")
     return buildings
 
 
 def read_layer_water(
-    path: Path | str, crs: str, bounds_m: Bounds, *, layer_name: str | None = None
+    source: Layer, crs: str, bounds_m: Bounds, *, layer_name: str | None = None
 ) -> Water:
     """Read the polygons of a vector file as water, cut to an area; there may be none in it.
 
     Parameters
     ----------
-    path : Path or str
-        Whatever geopandas reads.
+    source : path or GeoDataFrame
+        A vector file that geopandas reads, or a table in memory.
     crs, bounds_m
         As for :func:`read_water`; the layer may have any CRS.
     layer_name : str, optional
@@ -190,11 +189,11 @@ def read_layer_water(
         The file, its layer or its CRS is missing or damaged, or it holds other things than
         polygons.
     """
-    found = read_layer(Path(path), crs, bounds_m, layer_name, may_be_empty=True)
+    found = read_layer(source, crs, bounds_m, layer_name, may_be_empty=True)
     geometry, _ = polygons_inside(found.geometry, bounds_m, cut=True)
     if found.geometry.size and not geometry.size:
         kinds = ", ".join(sorted({shape.geom_type for shape in found.geometry}))
-        raise fail(InputError, str(path), "polygons", kinds, "another layer")
+        raise fail(InputError, found.name, "polygons", kinds, "another layer")
     return Water(crs, geometry)
 
 

@@ -136,7 +136,7 @@ def _checked(path: Path, folder: Path) -> Path:
             size_bytes += len(chunk)
             if packed and size_bytes > allowed_bytes:
                 expected = f"at most {allowed_bytes >> 20} MB when unpacked"
-                raise fail(InputError, str(path), expected, "more", "no map but a bomb")
+                raise fail(InputError, str(path), expected, "more", "possible decompression bomb")
             parser.Parse(chunk)
             if copy is not None:
                 copy.write(chunk)
@@ -283,6 +283,12 @@ SUFFIXES = (".osm.pbf", ".pbf", ".osm", ".osm.gz")
 # Readers take elements that have a node in the box; a long way may cross an area without one.
 _READ_PAD_M = 2000.0
 _ANY_WAY = Query({"highway": ()}, ("highway",))
+
+
+def is_map(name_or_path: str | Path) -> bool:
+    """Return whether a name is that of an embedded map, or of an OpenStreetMap file."""
+    name = str(name_or_path)
+    return name in EMBEDDED_MAPS or name.lower().endswith(SUFFIXES)
 
 
 def resolve_map(name_or_path: str | Path) -> Path:

@@ -11,7 +11,7 @@ from mapfilter.database.store import info
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
-from mapfilter.roads.routes import RouteSource
+from mapfilter.roads.index import RouteSource
 from mapfilter.roads.ways import Squares, Ways
 
 CRS = "EPSG:32629"

@@ -17,8 +17,8 @@ from mapfilter.database.sources import LatticeRoutes, LayerRoutes
 from mapfilter.errors import InputError, OutputError
 from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
 from mapfilter.roads.buildings import Buildings
+from mapfilter.roads.index import RouteSource
 from mapfilter.roads.osm import Water
-from mapfilter.roads.routes import RouteSource
 from mapfilter.roads.ways import Squares, Ways
 
 FINISHED = 3

@@ -235,7 +235,7 @@ def test_what_is_no_vector_file(tmp_path):
         ("points.csv", "a layer with geometry"),
         ("a.vrt", "leads to other places"),
         ("folder", "a folder"),
-        ("bomb.zip", "a bomb"),
+        ("bomb.zip", "decompression bomb"),
     ):
         with pytest.raises(InputError, match=message):
             read_layer_roads(tmp_path / name, *AREA)
