@@ -20,6 +20,8 @@ from pyproj.exceptions import CRSError, ProjError
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 
+_SHORT = 20
+
 
 def wrap_rad(angle_rad: ArrayLike) -> Floats:
     """Wrap angles into [-π, π).
@@ -106,6 +108,11 @@ def projected_crs(spec: Any, where: str = "crs") -> str:
     return f"{authority[0]}:{authority[1]}" if authority else str(crs.to_wkt())
 
 
+def short_crs(crs: str) -> str:
+    """Return a CRS as people call it: its code, or the name in its WKT."""
+    return crs if len(crs) <= _SHORT else str(CRS.from_user_input(crs).name)
+
+
 def same_crs(a: str, b: str) -> bool:
     """Tell whether two CRS texts mean the same system."""
     return a == b or bool(CRS.from_user_input(a).equals(CRS.from_user_input(b)))
@@ -180,6 +187,8 @@ class Lattice:
     (500002.5, 4500007.5)
     >>> lattice.row_col(500002.5, 4500007.5)
     (0, 0)
+    >>> print(lattice)
+    2 x 3 pixels of 5 m (0.015 x 0.01 km), EPSG:32629
     """
 
     crs: str
@@ -198,6 +207,12 @@ class Lattice:
         if self.rows < 1 or self.cols < 1:
             faults.add("lattice size", "at least one pixel", f"{self.rows} x {self.cols}")
         faults.raise_if_any(InputError)
+
+    def __str__(self) -> str:
+        """Return size, resolution and CRS in a few words."""
+        width_km, height_km = (n * self.resolution_m / 1000 for n in (self.cols, self.rows))
+        size = f"{self.rows} x {self.cols} pixels of {self.resolution_m:g} m"
+        return f"{size} ({width_km:.3g} x {height_km:.3g} km), {short_crs(self.crs)}"
 
     @classmethod
     def covering(

@@ -146,7 +146,7 @@ def _falls_away(samples: Sequence[RasterSample], plan: CellPlan | None) -> bool:
 def _check_identical(samples: Sequence[RasterSample], where: str, findings: Findings) -> None:
     by_sum: dict[str, list[str]] = {}
     for sample in samples:
-        by_sum.setdefault(f"{sample.checksum} {sample.lattice}", []).append(sample.cell_id)
+        by_sum.setdefault(f"{sample.checksum} {sample.lattice!r}", []).append(sample.cell_id)
     for ids in by_sum.values():
         if len(ids) > 1:
             evidence = f"The same numbers in all pixels of {len(ids)} rasters."

@@ -21,7 +21,7 @@ from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class RadioField:
     """What would be heard at every pixel of an area.
 
@@ -50,6 +50,10 @@ class RadioField:
     distance_to_way_m: Floats32
     way_id: Ints
     on_way: Bools
+
+    def __repr__(self) -> str:
+        points = int(self.on_way.sum())
+        return f"RadioField({len(self.cell_ids)} cells, {points} points; {self.lattice})"
 
     def levels_at(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats32:
         """Return the levels at positions, shape (N, cells); NaN below the floor or off the area.
@@ -109,7 +113,7 @@ def fill_field(
 Rows = Ints32
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Points:
     """All points of a database in row-major order, as columns of length N.
 
@@ -145,8 +149,11 @@ class Points:
     def __len__(self) -> int:
         return int(self.point.size)
 
+    def __repr__(self) -> str:
+        return f"Points({len(self)} of {', '.join(self.__dataclass_fields__)})"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class RadioRouteDatabase:
     """A database folder, read when asked and only as far as asked.
 
@@ -174,6 +181,13 @@ class RadioRouteDatabase:
     margin_db: float
     floor_dbm: float
     manifest: Mapping[str, Any]
+
+    def __repr__(self) -> str:
+        points = self.manifest.get("counts", {}).get("points", "unknown number of")
+        return (
+            f"RadioRouteDatabase({str(self.path)!r}, {len(self.plan)} cells, {points} points;\n"
+            f"  {self.lattice}; margin {self.margin_db:g} dB, floor {self.floor_dbm:g} dBm)"
+        )
 
     @property
     def cell_ids(self) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError
+from mapfilter.geodesy import short_crs
 
 Bounds = tuple[float, float, float, float]
 """West, south, east, north in metres."""
@@ -18,8 +19,21 @@ Bounds = tuple[float, float, float, float]
 Geometries = NDArray[np.object_]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Ways:
+class _Layer:
+    """Shows the number of features and the CRS."""
+
+    __slots__ = ()
+    crs: str
+
+    def __len__(self) -> int:
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({len(self)} in {short_crs(self.crs)})"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Ways(_Layer):
     """The ways that a profile may use.
 
     A way that leaves the area and comes back is several rows with the same ``way_id``.
@@ -86,8 +100,8 @@ class Ways:
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Squares:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Squares(_Layer):
     """Areas where one may walk in any direction.
 
     Parameters
@@ -114,8 +128,8 @@ class Squares:
         return int(self.area_id.size)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Buildings:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Buildings(_Layer):
     """Building footprints and heights.
 
     Parameters
@@ -157,8 +171,8 @@ class Buildings:
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Water:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Water(_Layer):
     """Where one cannot be without a boat.
 
     Parameters

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import projected_crs
+from mapfilter.geodesy import projected_crs, short_crs
 from mapfilter.gnss.orbits import Almanac
 from mapfilter.tracks.satellites import place_satellites
 from mapfilter.tracks.schema import NEIGHBOUR, PLACE, TABLES, tidy_table
@@ -237,7 +237,7 @@ class TrackLog:
         rows = [f"{table} {n}" for table in TABLES if (n := len(getattr(self, table)))]
         held = f"rows: {', '.join(rows) or 'none'}"
         notes = f"; {len(self.notes)} notes" if self.notes else ""
-        crs = self.crs.partition(",")[0]
+        crs = short_crs(self.crs)
         return f"TrackLog({crs}, {self.duration_s:.1f} s{began}; {held}{notes})"
 
     @property

@@ -191,3 +191,10 @@ def test_porto_has_the_expected_number_of_points(shared_data):
     )
     routes = route_lattice(*layers, Lattice.covering(CRS, bounds, 5.0))
     assert 55_000 <= len(routes) <= 75_000
+
+
+def test_layers_and_points_show_themselves_in_a_line():
+    ways = ways_of([(0, 52.5), (120, 52.5)])
+    assert repr(ways) == f"Ways(1 in {CRS})"
+    routes = route_lattice(ways, squares_of((20, 60, 40, 80)), None, LATTICE)
+    assert repr(routes) == f"RouteLattice({len(routes)} points, 3 classes; {LATTICE})"
