@@ -117,7 +117,6 @@ def check_replaceable(folder: Path, head: str, what: str) -> None:
         May be absent.
     head : str
         Name of the JSON file in it that holds ``format``, which is ``what``, and lists ``parts``.
-    what : str
 
     Raises
     ------

@@ -67,13 +67,7 @@ def read_columns(path: Path, columns: Sequence[str]) -> pa.Table:
 
 
 def count_rows(path: Path) -> int:
-    """Return the number of rows that a part's footer tells.
-
-    Raises
-    ------
-    StoreError
-        The part is missing or damaged.
-    """
+    """Return the number of rows in a part's footer; raise StoreError where it is damaged."""
     try:
         return int(pq.read_metadata(path).num_rows)
     except DAMAGE as error:
@@ -81,7 +75,7 @@ def count_rows(path: Path) -> int:
 
 
 def damaged(path: Path, error: Exception) -> MapfilterError:
-    """Return what to tell of a part that cannot be read."""
+    """Return the error for a part that cannot be read."""
     if isinstance(error, FileNotFoundError):
         return fail(StoreError, str(path), "a part of the database", "no such file")
     said = (str(error).splitlines() or [type(error).__name__])[0]
@@ -157,7 +151,6 @@ class WindowReader:
 
     Parameters
     ----------
-    parts : sequence of Path
     columns : sequence of str
         Among them ``row`` and ``col``.
     lattice : Lattice

@@ -81,7 +81,6 @@ def fill_field(
 
     Parameters
     ----------
-    window : Lattice
     pixels : tuple of numpy.ndarray, shape (N,) each
         Rows and columns of the points in the window, at least one.
     way_id, distance_m : numpy.ndarray, shape (N,)
@@ -121,16 +120,12 @@ class Points:
     ----------
     point : numpy.ndarray of int64
         ``row * lattice.cols + col``: the same in every rebuild on the same lattice.
-    row, col : numpy.ndarray of int32
     way_id : numpy.ndarray of int64
         0 where the point belongs to no way.
     way_class : tuple of (numpy.ndarray of int32, tuple of str)
         Codes and the names that they stand for.
-    on_square : numpy.ndarray of bool
-    distance_to_way_m : numpy.ndarray of float32
     best_server : numpy.ndarray of int32
         Index into the database's ``cell_ids``.
-    best_level_dbm : numpy.ndarray of float32
     margin_db : numpy.ndarray of float32
         Best level above the second best, NaN where only one cell is predicted.
     """
@@ -244,7 +239,6 @@ class RadioRouteDatabase:
 
         Parameters
         ----------
-        cell_id : str
         margin_db : float or None
             A point belongs to the cell when the cell is at most this much weaker than the point's
             best server; infinity gives all points above the floor, None takes the database's own.

@@ -1,4 +1,4 @@
-"""Almanacs: the coarse orbits of a constellation, and files of them in the YUMA format.
+"""Almanacs, satellite positions by IS-GPS-200, and GPS time.
 
 GPS has 24 slots in six planes (*GPS Standard Positioning Service Performance Standard*, 4th ed.
 2008, Tables A.2-1 and A.2-2, for 0 h UTC on 1 July 1993). Galileo has 27 satellites in three planes
@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,12 +24,31 @@ WEEK_S = 604_800.0
 _LARGEST_BYTES = 1 << 22
 _ROLLOVER_WEEKS = 1024
 _KEYS = {
-    "id": "prn", "health": "health", "eccentricity": "eccentricity",
-    "time of applicability": "toa_s", "orbital inclination": "inclination_rad",
-    "rate of right ascen": "node_rate_rad_s", "sqrt": "sqrt_a", "right ascen at": "node_rad",
-    "argument of perigee": "perigee_rad", "mean anom": "anomaly_rad", "af0": "af0", "af1": "af1",
+    "id": "prn",
+    "health": "health",
+    "eccentricity": "eccentricity",
+    "time of applicability": "toa_s",
+    "orbital inclination": "inclination_rad",
+    "rate of right ascen": "node_rate_rad_s",
+    "sqrt": "sqrt_a",
+    "right ascen at": "node_rad",
+    "argument of perigee": "perigee_rad",
+    "mean anom": "anomaly_rad",
+    "af0": "af0",
+    "af1": "af1",
     "week": "week",
-}  # fmt: skip
+}
+_RANGES = {
+    "week": (0.0, 1e5, "a week number"),
+    "toa_s": (0.0, WEEK_S, "seconds of the week, 0..604800"),
+    "sqrt_a": (2500.0, 7000.0, "m^½ within 2500..7000"),
+    "eccentricity": (0.0, 0.9, "a number within 0..0.9"),
+    "inclination_rad": (0.0, np.pi, "radians within 0..π"),
+    "node_rad": (-7.0, 7.0, "radians"),
+    "node_rate_rad_s": (-1e-6, 1e-6, "radians per second"),
+    "perigee_rad": (-7.0, 7.0, "radians"),
+    "anomaly_rad": (-7.0, 7.0, "radians"),
+}
 _HINT = "a file cut off, or an almanac of another kind (SEM, RINEX)"
 
 
@@ -46,13 +66,10 @@ class Almanac:
         Time of applicability, seconds of the week.
     sqrt_a : (S,) array
         Root of the semi-major axis, m^½.
-    eccentricity, inclination_rad : (S,) arrays
     node_rad : (S,) array
         Longitude of the ascending node at the beginning of the week.
-    node_rate_rad_s : (S,) array
     perigee_rad, anomaly_rad : (S,) arrays
         Argument of the perigee; mean anomaly at ``toa_s``.
-    healthy : (S,) array of bool
     """
 
     names: tuple[str, ...]
@@ -68,31 +85,23 @@ class Almanac:
     healthy: Bools
 
     def __post_init__(self) -> None:
-        faults = Faults()
-        count = len(self.names)
-        for name in (field.name for field in fields(self) if field.name != "names"):
-            value = getattr(self, name)
+        faults, count = Faults(), len(self.names)
+        for name, value in self.columns().items():
             if value.shape != (count,):
                 faults.add(f"almanac, {name}", f"shape ({count},)", value.shape)
         faults.raise_if_any(InputError)
         if len(set(self.names)) < count:
             twice = sorted({name for name in self.names if self.names.count(name) > 1})
             faults.add("almanac", "each satellite once", f"{', '.join(twice)} more often")
-        for name, least, most, unit in (
-            ("week", 0.0, 1e5, "a week number"),
-            ("toa_s", 0.0, WEEK_S, "seconds of the week, 0..604800"),
-            ("sqrt_a", 2500.0, 7000.0, "m^½ within 2500..7000"),
-            ("eccentricity", 0.0, 0.9, "a number within 0..0.9"),
-            ("inclination_rad", 0.0, np.pi, "radians within 0..π"),
-            ("node_rad", -7.0, 7.0, "radians"),
-            ("node_rate_rad_s", -1e-6, 1e-6, "radians per second"),
-            ("perigee_rad", -7.0, 7.0, "radians"),
-            ("anomaly_rad", -7.0, 7.0, "radians"),
-        ):
+        for name, (least, most, unit) in _RANGES.items():
             value = getattr(self, name)
             for index in np.flatnonzero(~((value >= least) & (value <= most))):
                 faults.add(f"almanac, {self.names[index]}, {name}", unit, value[index])
         faults.raise_if_any(InputError)
+
+    def columns(self) -> dict[str, Any]:
+        """Return all arrays by their names."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "names"}
 
     def usable(self) -> Almanac:
         """Return the healthy satellites."""
@@ -100,7 +109,7 @@ class Almanac:
 
     def only(self, index: Ints) -> Almanac:
         """Return some of the satellites, by their indices."""
-        kept = {f.name: getattr(self, f.name)[index] for f in fields(self) if f.name != "names"}
+        kept = {name: value[index] for name, value in self.columns().items()}
         return replace(self, names=tuple(self.names[i] for i in index), **kept)
 
     def in_era(self, near_week: int) -> Almanac:
@@ -123,18 +132,9 @@ class Almanac:
 
 
 def joined(first: Almanac, second: Almanac) -> Almanac:
-    """Return the satellites of two almanacs together.
-
-    Raises
-    ------
-    InputError
-        A satellite is in both.
-    """
-    both = {
-        field.name: np.concatenate([getattr(first, field.name), getattr(second, field.name)])
-        for field in fields(first)
-        if field.name != "names"
-    }
+    """Return the satellites of two almanacs together; raise InputError for one in both."""
+    other = second.columns()
+    both = {name: np.concatenate([value, other[name]]) for name, value in first.columns().items()}
     return replace(first, names=first.names + second.names, **both)
 
 
@@ -143,10 +143,6 @@ def read_yuma(path: str | Path) -> Almanac:
 
     Satellites whose health is not 0 are kept and marked; see :meth:`Almanac.usable`. The clock
     terms are not kept: they are known to users of broadcast messages, and cancel in simulations.
-
-    Parameters
-    ----------
-    path : str or Path
 
     Raises
     ------
@@ -173,11 +169,7 @@ def read_yuma(path: str | Path) -> Almanac:
         elif not (block["prn"].is_integer() and 1 <= block["prn"] <= 63):
             faults.add(f"{path}, line {line}, ID", "a whole number in 1..63", block["prn"])
     faults.raise_if_any(InputError)
-    columns = {
-        name: np.array([block[name] for _, block in blocks])
-        for name in (field.name for field in fields(Almanac))
-        if name not in ("names", "healthy")
-    }
+    columns = {name: np.array([block[name] for _, block in blocks]) for name in _RANGES}
     names = tuple(f"G{int(block['prn']):02d}" for _, block in blocks)
     healthy = np.array([block["health"] == 0 for _, block in blocks])
     try:
@@ -200,11 +192,15 @@ def _blocks(text: str, path: Path, faults: Faults) -> list[tuple[int, dict[str, 
         name = next((name for key, name in _KEYS.items() if told.startswith(key)), None)
         if not colon or name is None or not blocks:
             if line.strip():
-                faults.add(f"{path}, line {number}", "a line of a YUMA almanac", repr(line)[:60],
-                           _HINT)  # fmt: skip
+                where, got = f"{path}, line {number}", repr(line)[:60]
+                faults.add(where, "a line of a YUMA almanac", got, _HINT)
             continue
-        value = _number(given)
-        if value is None:
+        try:
+            # Some writers have Fortran's exponent.
+            value = float("?" if "_" in given else given.strip().replace("D", "E"))
+        except ValueError:
+            value = np.nan
+        if not np.isfinite(value):
             faults.add(f"{path}, line {number}, {label.strip()}", "a finite number", repr(given))
         elif name in blocks[-1][1]:
             faults.add(f"{path}, line {number}, {label.strip()}", "one line of it", "a second one")
@@ -213,15 +209,6 @@ def _blocks(text: str, path: Path, faults: Faults) -> list[tuple[int, dict[str, 
             continue
         blocks[-1][1].setdefault(name, np.nan)
     return blocks
-
-
-def _number(text: str) -> float | None:
-    try:
-        # Some writers have Fortran's exponent.
-        value = float("?" if "_" in text else text.strip().replace("D", "E"))
-    except ValueError:
-        return None
-    return value if np.isfinite(value) else None
 
 
 _GPS_AXIS_M = 26_559_700.0
@@ -284,13 +271,19 @@ def _circular(
 ) -> Almanac:
     count = latitude_deg.size
     zero = np.zeros(count)
-    wrapped = np.radians(np.mod(node_deg + 180.0, 360.0) - 180.0)
     return Almanac(
-        tuple(f"{system}{index:02d}" for index in range(1, count + 1)),
-        zero + week, zero, np.full(count, np.sqrt(axis_m)), zero,
-        np.full(count, np.radians(tilt_deg)), wrapped, zero, zero, np.radians(latitude_deg),
-        np.ones(count, dtype=np.bool_),
-    )  # fmt: skip
+        names=tuple(f"{system}{index:02d}" for index in range(1, count + 1)),
+        week=zero + week,
+        toa_s=zero,
+        sqrt_a=np.full(count, np.sqrt(axis_m)),
+        eccentricity=zero,
+        inclination_rad=np.full(count, np.radians(tilt_deg)),
+        node_rad=np.radians(np.mod(node_deg + 180.0, 360.0) - 180.0),
+        node_rate_rad_s=zero,
+        perigee_rad=zero,
+        anomaly_rad=np.radians(latitude_deg),
+        healthy=np.ones(count, dtype=np.bool_),
+    )
 
 
 EARTH_GRAVITY_M3_S2 = 3.986005e14
@@ -298,18 +291,18 @@ EARTH_GRAVITY_M3_S2 = 3.986005e14
 EARTH_RATE_RAD_S = 7.2921151467e-5
 
 OLDEST_DAYS = 180.0
-"""Farther from its time of applicability an almanac tells too little."""
+"""Farther from its time of applicability an almanac is too inaccurate."""
 
 _GPS_EPOCH_S = datetime(1980, 1, 6, tzinfo=UTC).timestamp()
 # UTC dates from which on GPS time is ahead by one second more.
 _LEAPS = tuple(
     datetime(year, month, 1, tzinfo=UTC).timestamp()
-    for year, month in (
-        (1981, 7), (1982, 7), (1983, 7), (1985, 7), (1988, 1), (1990, 1), (1991, 1), (1992, 7),
-        (1993, 7), (1994, 7), (1996, 1), (1997, 7), (1999, 1), (2006, 1), (2009, 1), (2012, 7),
-        (2015, 7), (2017, 1),
+    for month, years in (
+        (1, (1988, 1990, 1991, 1996, 1999, 2006, 2009, 2017)),
+        (7, (1981, 1982, 1983, 1985, 1992, 1993, 1994, 1997, 2012, 2015)),
     )
-)  # fmt: skip
+    for year in years
+)
 
 
 def gps_time(utc_s: float) -> tuple[int, float]:
@@ -317,15 +310,7 @@ def gps_time(utc_s: float) -> tuple[int, float]:
 
     Leap seconds are those announced until 2026; the last was at the end of 2016.
 
-    Parameters
-    ----------
-    utc_s : float
-        Unix time.
-
-    Raises
-    ------
-    InputError
-        The time is not finite or before GPS.
+    ``utc_s`` is Unix time; InputError is raised where it is not finite or before GPS.
 
     Examples
     --------
@@ -351,7 +336,6 @@ def satellite_positions_m(
 
     Parameters
     ----------
-    almanac : Almanac
     tow_s : float or (K,) array_like
         Seconds of the week.
     week : int, optional
@@ -380,10 +364,9 @@ def satellite_positions_m(
         since = since + WEEK_S * (week - almanac.week)
         off_days = float(np.abs(since).max(initial=0.0)) / 86_400.0
         if off_days > oldest_days:
-            raise fail(
-                InputError, "almanac", f"one within {oldest_days:g} days of week {week}",
-                f"one {off_days:.0f} days off", "weeks counted modulo 1024: see Almanac.in_era",
-            )  # fmt: skip
+            expected = f"one within {oldest_days:g} days of week {week}"
+            hint = "weeks counted modulo 1024: see Almanac.in_era"
+            raise fail(InputError, "almanac", expected, f"one {off_days:.0f} days off", hint)
     axis = almanac.sqrt_a**2
     mean = almanac.anomaly_rad + np.sqrt(EARTH_GRAVITY_M3_S2 / axis**3) * since
     eccentric = _kepler(mean, almanac.eccentricity)

@@ -1,9 +1,8 @@
-"""The sky over a place: local east, north and up, elevation and azimuth.
+"""The sky over a place: local frames, elevation and azimuth, and what buildings hide.
 
-Local coordinates have their origin on or over the ellipsoid WGS 84; up is its normal.
-
-A map's grid is neither true to scale nor turned to the north: metres on it are up to 0.1 % too long
-or short, and grid north is off by up to a few degrees.
+Local coordinates have their origin on or over the ellipsoid WGS 84; up is its normal. A map's grid
+is neither true to scale nor aligned with the north: metres on it are up to 0.1 % too long or short,
+and grid north is off by up to a few degrees.
 """
 
 from __future__ import annotations
@@ -41,27 +40,12 @@ def ecef_from_lonlat(lon_deg: ArrayLike, lat_deg: ArrayLike, height_m: ArrayLike
     return np.stack([x, y, z], axis=-1).astype(np.float64)
 
 
-def lonlat_from_ecef(ecef_m: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    """Return longitude and latitude in degrees and height over the ellipsoid in metres.
-
-    Examples
-    --------
-    >>> [round(v.item(), 6) for v in lonlat_from_ecef(ecef_from_lonlat(4.86, 43.52, 20.0))]
-    [4.86, 43.52, 20.0]
-    """
-    given = np.asarray(ecef_m, dtype=np.float64)
-    x, y, z = (np.array(given[..., axis]) for axis in range(3))
-    lon, lat, height = _geocentric().transform(x, y, z, direction="INVERSE")
-    return np.asarray(lon), np.asarray(lat), np.asarray(height)
-
-
 @dataclass(frozen=True)
 class LocalFrame:
     """East, north and up at a place.
 
     Parameters
     ----------
-    lon_deg, lat_deg : float
     height_m : float
         Over the ellipsoid.
 
@@ -96,11 +80,10 @@ class LocalFrame:
     def axes(self) -> Floats:
         """Directions east, north and up as rows, in the earth-centred frame."""
         lon, lat = np.radians(self.lon_deg), np.radians(self.lat_deg)
-        return np.array([
-            [-np.sin(lon), np.cos(lon), 0.0],
-            [-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)],
-            [np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)],
-        ])  # fmt: skip
+        east = [-np.sin(lon), np.cos(lon), 0.0]
+        north = [-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)]
+        up = [np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)]
+        return np.array([east, north, up])
 
     def to_local(self, ecef_m: ArrayLike) -> Floats:
         """Turn earth-centred coordinates (..., 3) into east, north and up."""
@@ -127,13 +110,7 @@ class Directions:
     azimuth_rad: Floats
 
     def above(self, mask_deg: float) -> Bools:
-        """Tell which are higher than a mask; satellites below the horizon never are.
-
-        Raises
-        ------
-        InputError
-            The mask is not within 0..90 degrees.
-        """
+        """Return which are higher than a mask of 0..90 degrees."""
         if not 0 <= mask_deg < 90:
             raise fail(InputError, "mask_deg", "degrees in 0..90", mask_deg)
         return np.asarray(self.elevation_rad > np.radians(mask_deg))
@@ -174,7 +151,6 @@ class GridFrame:
 
     Parameters
     ----------
-    crs : str
     east_m, north_m : float
         Of the place.
     height_m : float
@@ -210,10 +186,6 @@ class GridFrame:
         lon, lat = self._lonlat
         there = self.local.to_local(ecef_from_lonlat(lon, lat, self.height_m))
         return np.asarray((there[1:, :2] - there[0, :2]).T / _ARM_M)
-
-    def satellites_m(self, ecef_m: ArrayLike) -> Floats:
-        """Return true east, north and up of earth-centred places, shape (..., 3)."""
-        return self.local.to_local(ecef_m)
 
 
 _MOST_PAIRS = 2_000_000
@@ -281,10 +253,9 @@ class Skyline:
         lowest = np.where(open_sky, elevation, np.pi / 2).min(axis=1)
         place, near, away_m = self._near(places, np.tan(lowest))
         begin = np.searchsorted(place, np.arange(len(places) + 1))
-        _block(
-            places, elevation, azimuth, begin.astype(np.int64), near.astype(np.int64), away_m,
-            self._walls, self._first, self._heights, open_sky,
-        )  # fmt: skip
+        pairs = begin.astype(np.int64), near.astype(np.int64), away_m
+        buildings = self._walls, self._first, self._heights
+        _block(places, elevation, azimuth, pairs, buildings, open_sky)
         points = shapely.points(places[:, 0], places[:, 1])
         inside, own = self._tree.query(points, predicate="within")
         under = inside[self._heights[own] > places[inside, 2]]
@@ -310,10 +281,8 @@ class Skyline:
 
 def _walls(shapes: NDArray[np.object_]) -> tuple[Floats, Ints]:
     """Return all walls as (e, n, e, n), building by building, and where each begins."""
-    rings, owner = shapely.get_rings(
-        np.asarray(shapely.get_parts(shapes, return_index=True)[0]), return_index=True
-    )
-    part_owner = shapely.get_parts(shapes, return_index=True)[1]
+    parts, part_owner = shapely.get_parts(shapes, return_index=True)
+    rings, owner = shapely.get_rings(np.asarray(parts), return_index=True)
     points, ring = shapely.get_coordinates(rings, return_index=True)
     joins = ring[1:] == ring[:-1]
     walls = np.hstack([points[:-1][joins], points[1:][joins]])
@@ -325,10 +294,16 @@ def _walls(shapes: NDArray[np.object_]) -> tuple[Floats, Ints]:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _block(
-    places: Floats, elevation: Floats, azimuth: Floats, begin: Ints, near: Ints, away_m: Floats,
-    walls: Floats, first: Ints, heights: Floats, open_sky: Bools,
-) -> None:  # pragma: no cover  # fmt: skip
+    places: Floats,
+    elevation: Floats,
+    azimuth: Floats,
+    pairs: tuple[Ints, Ints, Floats],
+    buildings: tuple[Floats, Ints, Floats],
+    open_sky: Bools,
+) -> None:  # pragma: no cover
     """Close directions whose ray meets a wall lower than the building's roof."""
+    begin, near, away_m = pairs
+    walls, first, heights = buildings
     for k in range(places.shape[0]):
         east, north, up = places[k, 0], places[k, 1], places[k, 2]
         for s in range(elevation.shape[1]):

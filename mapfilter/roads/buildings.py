@@ -103,7 +103,6 @@ def made_buildings(
 
     Parameters
     ----------
-    crs : str
     geometry : numpy.ndarray of shapely geometries, shape (N,)
         Other than polygons are left out.
     bounds_m : tuple of float

@@ -175,7 +175,6 @@ class Positions:
 
     Parameters
     ----------
-    east_m, north_m : numpy.ndarray, shape (N,)
     accuracy_m : numpy.ndarray, shape (N,), or None
         As the receiver tells it; NaN where unknown.
     """
@@ -222,7 +221,6 @@ def corridors(
     ----------
     crs : str
         Projected CRS of the positions, in metres.
-    sessions : sequence of Positions
     half_width_m : float
         Tracks nearer to each other than this are of one way. It should not be below the
         accuracy of the positions, nor above half the distance between parallel streets.

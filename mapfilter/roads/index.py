@@ -61,7 +61,6 @@ class WayIndex:
 
         Parameters
         ----------
-        ways : Ways
         half_width_m : float
             How far from its centre line a point still belongs to a way.
         by_class_m : mapping of str to float
@@ -93,6 +92,13 @@ class WayIndex:
         half_width_m = by_code[ways.way_class[of_way]] if of_way.size else np.empty(0)
         return cls(ways, STRtree(shapely.linestrings(ends_m)), of_way, ends_m, half_width_m)
 
+    def segments_near(self, window: Lattice, least_m: float = 0.0) -> Ints:
+        """Return the segments that reach a window, or are at most ``least_m`` away from it."""
+        west, south, east, north = window.bounds_m
+        reach_m = max(float(self.half_width_m.max(initial=0.0)), least_m)
+        box = shapely.box(west - reach_m, south - reach_m, east + reach_m, north + reach_m)
+        return np.sort(self.tree.query(box))
+
     def inside(self, areas: Geometries) -> WayIndex:
         """Return the index of the parts of the ways that lie in polygons."""
         segments = shapely.linestrings(self.ends_m)
@@ -119,10 +125,7 @@ class WayIndex:
         size = (window.rows, window.cols)
         segment, distance_m = np.full(size, -1, dtype=np.int64), np.full(size, np.inf)
         if self.way.size:
-            west, south, east, north = window.bounds_m
-            reach_m = self.half_width_m.max()
-            box = shapely.box(west - reach_m, south - reach_m, east + reach_m, north + reach_m)
-            near = np.sort(self.tree.query(box))
+            near = self.segments_near(window)
             _burn(
                 self.ends_m[near],
                 self.half_width_m[near],
@@ -178,6 +181,11 @@ class AreaIndex:
     def of(cls, geometry: Geometries) -> AreaIndex:
         """Index polygons."""
         return cls(geometry, STRtree(geometry))
+
+    def near(self, window: Lattice) -> AreaIndex:
+        """Return the polygons about a window, in their order."""
+        near = np.sort(self.tree.query(shapely.box(*window.bounds_m)))
+        return AreaIndex.of(self.geometry[near])
 
     def mask(self, window: Lattice) -> Bools:
         """Return which pixel centres of a window lie in a polygon, shape (rows, cols)."""

@@ -91,7 +91,6 @@ def read_landuse(path: Path | str, table_path: Path | str, lattice: Lattice) -> 
         band is taken for transparency: 0 is no data), in the lattice's CRS, north up.
     table_path : Path or str
         What values or colours mean.
-    lattice : Lattice
 
     Returns
     -------

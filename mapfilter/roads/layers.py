@@ -41,8 +41,6 @@ class LayerRoads:
 
     Parameters
     ----------
-    ways : Ways
-    areas : Squares
     area_class : tuple of str
         Kind of each area.
     notes : tuple of str

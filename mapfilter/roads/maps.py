@@ -368,7 +368,6 @@ def read_elements(
         Projected CRS of the result, in metres.
     bounds_m : tuple of float
         West, south, east, north in ``crs``.
-    query : Query
 
     Returns
     -------

@@ -250,7 +250,6 @@ def polygons_inside(
 
     Parameters
     ----------
-    geometry : numpy.ndarray of shapely geometries
     bounds_m : tuple of float
         West, south, east, north.
     cut : bool

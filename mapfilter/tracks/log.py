@@ -398,7 +398,6 @@ def leave_out(log: TrackLog, kinds: Collection[Kind]) -> TrackLog:
 
     Parameters
     ----------
-    log : TrackLog
     kinds : collection of str
         ``gnss`` (``fixes`` and ``pseudoranges``), ``ta`` (timing advances; their reports stay),
         ``tdoa``, ``neighbours`` (all cells but the serving one) and ``radio`` (all reports).

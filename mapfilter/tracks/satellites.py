@@ -87,7 +87,6 @@ def sent_from_m(almanac: Almanac, week: int, second: Floats, range_m: Floats) ->
     ----------
     almanac : Almanac
         Of that satellite alone, its weeks counted on.
-    week : int
     second : (K,) array
         Of the week, at reception; may run over its end.
     range_m : (K,) array

@@ -151,7 +151,6 @@ def read_table(table: str, path: Path) -> ReadTable:
     ----------
     table : str
         Out of :data:`mapfilter.tracks.schema.TABLES`.
-    path : Path
 
     Raises
     ------
@@ -236,7 +235,6 @@ def write_log(
 
     Parameters
     ----------
-    log : TrackLog
     folder : str or Path
         Replaced when it is there; must be absent, empty or a log that mapfilter wrote.
     format : {"parquet", "csv"}
