@@ -1,4 +1,4 @@
-"""Dead reckoning and the noise of inertial measurements: Khalaf-Allah 2007, equations (3)-(10)."""
+"""Dead reckoning, and noise of inertial measurements: Khalaf-Allah 2007, equations (3)-(10)."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def dead_reckon(
 
 
 def steps_between(east_m: ArrayLike, north_m: ArrayLike) -> tuple[Floats, Floats]:
-    """Return length and direction of the chords between positions; undoes :func:`dead_reckon`.
+    """Return length and direction of the chords between positions, inverse of :func:`dead_reckon`.
 
     Standing still has no direction: such a step takes the last one before it, else the first one
     after it, and NaN when nothing ever moves.

@@ -1,8 +1,8 @@
-"""The track log: what one journey recorded, as tables of events.
+"""The track log: the recording of one journey, as tables of events.
 
 Missing values stay missing: nothing is dropped because one of its fields is unknown. Rows out of
-order are sorted and exact duplicates dropped, and the log's notes tell of both. Rows of equal time
-are processed in the order motion, gnss and pseudoranges, radio and tdoa: first move, then measure.
+order are sorted and exact duplicates dropped, with a note in the log. Rows of equal time are
+processed in the order motion, gnss and pseudoranges, radio and tdoa: first move, then measure.
 """
 
 from __future__ import annotations
@@ -143,7 +143,11 @@ def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) 
     moving = step_m[step_m != 0]
     extent_m = _extent_m(tables, float(time_s[0]), float(time_s[-1]))
     column = f"{where}, step_m"
-    if _grows(step_m, lasted_s):
+    growth_m = np.diff(step_m)
+    long = len(step_m) >= _MANY_ROWS and lasted_s >= _LONG_S / 3
+    low, high = _KILO
+    if long and np.all(growth_m >= 0) and np.mean(growth_m > 0) > 0.5:
+        # A car that speeds up does not do so for long.
         got = f"steps that only grow, from {step_m[0]:g} to {step_m[-1]:g}"
         faults.add(column, _EXPECTED, got, "distance since the start; give its differences")
     elif typical_mps > _FASTEST_MPS:
@@ -152,26 +156,17 @@ def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) 
     elif moving.size >= _FEW_ROWS and np.mean(moving < 0) > _MOSTLY:
         got = f"{int(np.sum(moving < 0))} negative steps of {moving.size}"
         faults.add(column, f"{_EXPECTED} along its heading", got, "a sign the other way round")
-    elif typical_mps < _FASTEST_KMPS and _in_kilometres(moved_m, extent_m):
+    elif (
+        typical_mps < _FASTEST_KMPS
+        and extent_m > _SOMEWHERE_M
+        and low * moved_m < extent_m <= high * moved_m
+    ):
         got = f"{moved_m:.3g} m in all, while positions lie {extent_m:.0f} m apart"
         faults.add(column, _EXPECTED, got, "kilometres given for metres")
     elif lasted_s >= _LONG_S and 0 < moved_m < _SLOWEST_MPS * lasted_s:
-        return (
-            f"motion, step_m: only {moved_m:.3g} m in {lasted_s:.0f} s; kilometres for metres?",
-        )
+        note = f"motion, step_m: only {moved_m:.3g} m in {lasted_s:.0f} s; kilometres for metres?"
+        return (note,)
     return ()
-
-
-def _in_kilometres(moved_m: float, extent_m: float) -> bool:
-    low, high = _KILO
-    return extent_m > _SOMEWHERE_M and low * moved_m < extent_m <= high * moved_m
-
-
-def _grows(step_m: Floats, lasted_s: float) -> bool:
-    """Tell whether steps never shrink and mostly grow: a car that speeds up for long does not."""
-    growth_m = np.diff(step_m)
-    long = len(step_m) >= _MANY_ROWS and lasted_s >= _LONG_S / 3
-    return bool(long and np.all(growth_m >= 0) and np.mean(growth_m > 0) > 0.5)
 
 
 def _extent_m(tables: Mapping[str, pd.DataFrame], first_s: float, last_s: float) -> float:
@@ -187,7 +182,7 @@ def _extent_m(tables: Mapping[str, pd.DataFrame], first_s: float, last_s: float)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TrackLog:
-    """What one journey recorded; made by :func:`make_log`, which checks everything.
+    """The recording of one journey; made by :func:`make_log`, which checks everything.
 
     Parameters
     ----------
@@ -202,7 +197,7 @@ class TrackLog:
     radio : pandas.DataFrame
         time_s, role ("serving" or "neighbour"), cell (str or None), arfcn, bsic (nullable
         integers), level_dbm, censored (-1 below the scale, 0 inside, 1 above), timing_advance
-        (nullable): one row for each cell heard.
+        (nullable): one row for each cell received.
     gnss : pandas.DataFrame
         time_s, east_m, north_m, var_east_m2, var_north_m2, cov_east_north_m2.
     pseudoranges : pandas.DataFrame
@@ -394,7 +389,7 @@ Kind = Literal["gnss", "fixes", "pseudoranges", "ta", "tdoa", "neighbours", "rad
 
 
 def leave_out(log: TrackLog, kinds: Collection[Kind]) -> TrackLog:
-    """Return a log without some kinds of readings; its notes tell how many went.
+    """Return a log without some kinds of measurements; its notes count them.
 
     Parameters
     ----------

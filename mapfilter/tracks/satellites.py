@@ -1,4 +1,4 @@
-"""Satellites of a log: whether their rows make sense, and where an almanac says that they were.
+"""Places of a log's satellites by an almanac.
 
 Positions are earth-centred (ECEF, WGS 84): where a satellite was when it sent, in the frame of the
 moment of reception, since the earth turns on while a signal is under way.
@@ -21,24 +21,24 @@ _USUAL_M = 2.25e7
 def place_satellites(
     rows: pd.DataFrame, almanac: Almanac, start_utc_s: float, where: str = "pseudoranges"
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    """Give satellites the places that an almanac tells, where their rows tell none.
+    """Give satellites their places by an almanac, where their rows have none.
 
     Parameters
     ----------
     rows : pandas.DataFrame
-        Of the table of pseudoranges, checked.
+        Checked table of pseudoranges.
     almanac : Almanac
         Weeks may be counted modulo 1024. Satellites that are not healthy get no place.
     start_utc_s : float
         UTC seconds at ``time_s`` = 0.
     where : str
-        What messages call the table.
+        Name of the table in messages.
 
     Returns
     -------
     rows : pandas.DataFrame
     notes : tuple of str
-        Satellites that the almanac does not know, or that are not healthy.
+        Satellites that are not in the almanac, or not healthy.
 
     Raises
     ------
