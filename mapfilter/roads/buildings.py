@@ -51,7 +51,7 @@ def read_buildings(
     bounds_m : tuple of float
         West, south, east, north of the area in ``crs``. Footprints are not cut at its edge.
     default_height_m, storey_height_m : float
-        Heights for buildings that tell none.
+        Heights (m) of buildings without their own.
 
     Raises
     ------
@@ -74,18 +74,12 @@ def read_buildings(
 
 
 def check_heights(default_height_m: float, storey_height_m: float) -> None:
-    """See that the heights for buildings that tell none are heights.
-
-    Raises
-    ------
-    InputError
-        One is not > 0.
-    """
+    """Check that the heights of buildings without their own are > 0."""
     faults = Faults()
-    if not (np.isfinite(default_height_m) and default_height_m > 0):
-        faults.add("default_height_m", "metres > 0", default_height_m)
-    if not (np.isfinite(storey_height_m) and storey_height_m > 0):
-        faults.add("storey_height_m", "metres > 0", storey_height_m)
+    heights = {"default_height_m": default_height_m, "storey_height_m": storey_height_m}
+    for name, height_m in heights.items():
+        if not (np.isfinite(height_m) and height_m > 0):
+            faults.add(name, "metres > 0", height_m)
     faults.raise_if_any(InputError)
 
 
@@ -99,18 +93,10 @@ def made_buildings(
     default_height_m: float,
     storey_height_m: float,
 ) -> Buildings:
-    """Return the buildings that touch an area.
+    """Return the polygons that touch an area, uncut, as buildings.
 
-    Parameters
-    ----------
-    geometry : numpy.ndarray of shapely geometries, shape (N,)
-        Other than polygons are left out.
-    bounds_m : tuple of float
-        West, south, east, north. Footprints are not cut at its edge.
-    heights, levels : numpy.ndarray of object, shape (N,)
-        As a map writes them: texts such as ``12``, ``12.5 m`` or ``40 ft``, numbers, or nothing.
-    default_height_m, storey_height_m : float
-        Checked by :func:`check_heights`.
+    ``heights`` and ``levels`` are as in maps: texts such as ``12``, ``12.5 m`` or ``40 ft``,
+    numbers, or nothing. The default heights are checked by :func:`check_heights`.
     """
     footprints, origin = polygons_inside(geometry, bounds_m, cut=False)
     by_height = _numbers(heights)[origin]

@@ -1,7 +1,7 @@
-"""Roads and buildings from any vector file, such as a shapefile, a GeoPackage or GeoJSON.
+"""Roads, buildings and water from any vector file, such as a shapefile, GeoPackage or GeoJSON.
 
 Lines are ways; polygons in a layer of roads are areas where one can be, as squares are. A layer
-has no access rules: what one must not use is left out by its class, with a half width of 0.
+has no access rules: classes that must not be used are left out by a half width of 0.
 """
 
 from __future__ import annotations
@@ -37,15 +37,7 @@ ROAD_CLASS = "road"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LayerRoads:
-    """The roads of a layer: its lines, and its polygons.
-
-    Parameters
-    ----------
-    area_class : tuple of str
-        Kind of each area.
-    notes : tuple of str
-        What was left out.
-    """
+    """Lines and polygons of a layer of roads, and the class of each polygon."""
 
     ways: Ways
     areas: Squares
@@ -136,11 +128,11 @@ def read_layer_buildings(
     source, crs, bounds_m, layer_name
         As for :func:`read_layer_roads`.
     height_column : str, optional
-        Column that holds the height above ground, in metres, or as a text with its unit.
+        Column with the height above ground, in metres, or as a text with its unit.
     levels_column : str, optional
-        Column that holds the number of storeys, used where there is no height.
+        Column with the number of storeys, used where there is no height.
     default_height_m, storey_height_m : float
-        Heights for buildings that tell none; how often they were used is told.
+        Heights (m) of buildings without their own; the result counts how often they were used.
 
     Raises
     ------
@@ -172,20 +164,12 @@ def read_layer_water(
 ) -> Water:
     """Read the polygons of a vector file as water, cut to an area; there may be none in it.
 
-    Parameters
-    ----------
-    source : path or GeoDataFrame
-        A vector file that geopandas reads, or a table in memory.
-    crs, bounds_m
-        As for :func:`read_water`; the layer may have any CRS.
-    layer_name : str, optional
-        Needed where the file has several layers.
+    Parameters are those of :func:`read_layer_roads`.
 
     Raises
     ------
     InputError
-        The file, its layer or its CRS is missing or damaged, or it holds other things than
-        polygons.
+        The file, its layer or its CRS is missing or damaged, or it holds no polygons.
     """
     found = read_layer(source, crs, bounds_m, layer_name, may_be_empty=True)
     geometry, _ = polygons_inside(found.geometry, bounds_m, cut=True)

@@ -1,6 +1,6 @@
-"""OpenStreetMap files: where they are, what they cover, and what they hold.
+"""OpenStreetMap files: where they are, what they cover, and their elements.
 
-GDAL ends quietly where a file is cut off, so the whole file goes through a strict parser before.
+GDAL ends without an error where a file is cut off, so the whole XML is parsed before.
 """
 
 from __future__ import annotations
@@ -37,14 +37,9 @@ BoxDeg = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """Which elements of a map are wanted, and which of their tags.
+    """Elements of a map, and the tags to read of them.
 
-    Parameters
-    ----------
-    wanted : mapping of str to tuple of str
-        Elements that have one of these tags, with one of these values; no values: with any.
-    tags : tuple of str
-        Tags to be told.
+    Elements have one of the keys in ``wanted``, with one of its values (without values: any).
     """
 
     wanted: Mapping[str, tuple[str, ...]]
@@ -60,11 +55,11 @@ _AREA_KEYS = "building,landuse,natural,place,water,waterway"
 
 
 class _NotOsmError(Exception):
-    """The XML is fine, but it is no map."""
+    """Well-formed XML that is no map."""
 
 
 def read_xml(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | None:
-    """Return the ways and areas of a map that touch a box, in degrees; None if there are none.
+    """Return the ways and areas of an XML map that touch a box, in degrees; None without any.
 
     Raises
     ------
@@ -81,13 +76,7 @@ def read_xml(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | Non
 
 
 def xml_bounds_deg(path: Path) -> BoxDeg | None:
-    """Return the box that a map tells of itself at its beginning; None when it tells none.
-
-    Raises
-    ------
-    InputError
-        The beginning is no OpenStreetMap XML.
-    """
+    """Return the box in the ``bounds`` of an XML map; None without."""
     head = _Head()
     with _faults_of(path), _opened(path) as stream:
         while head.parser.StartElementHandler is not None and (chunk := stream.read(1 << 16)):
@@ -96,7 +85,7 @@ def xml_bounds_deg(path: Path) -> BoxDeg | None:
 
 
 class _Head:
-    """Looks at the first elements of a map, and then no more."""
+    """Parser that looks at the first elements of a map only."""
 
     def __init__(self) -> None:
         self.bounds: BoxDeg | None = None
@@ -211,24 +200,16 @@ def _where(query: Query) -> str:
     return " OR ".join(condition(key, values) for key, values in query.wanted.items())
 
 
-# Elements cut by the box and empty layers are expected here; anything else is still shown.
+# Elements cut by the box and empty layers are expected here; other warnings are shown.
 _EXPECTED_WARNINGS = (r".*extend beyond the bounding box", r"Could not find any")
 _WHOLE_WORLD_DEG = 90.0
-# What decoding trips over when numbers in a file are not what they were.
-_DAMAGES = (
-    PBFException, DecodeError, EOFError, OSError, ValueError, TypeError, LookupError,
-    ArithmeticError, MemoryError, GEOSException,
-)  # fmt: skip
+# Raised in decoding where numbers in a file are damaged.
+_OF_PYTHON = (EOFError, OSError, ValueError, TypeError, LookupError, ArithmeticError, MemoryError)
+_DAMAGES = (*_OF_PYTHON, PBFException, DecodeError, GEOSException)
 
 
 def read_pbf(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | None:
-    """Return the elements of a map that have a node in a box, in degrees; None if there are none.
-
-    Raises
-    ------
-    InputError
-        The map is cut off or damaged.
-    """
+    """Return the elements of a PBF map with a node in a box, in degrees; None without any."""
 
     def read() -> Any:
         osm = pyrosm.OSM(
@@ -248,13 +229,7 @@ def read_pbf(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | Non
 
 
 def pbf_bounds_deg(path: Path) -> BoxDeg | None:
-    """Return the box in a map's header; None when there is none, or when it says nothing.
-
-    Raises
-    ------
-    InputError
-        The map is cut off or damaged.
-    """
+    """Return the box in the header of a PBF map; None without, or of the whole world."""
     header = _guarded(path, lambda: get_bounding_box(str(path)))
     if header is None:
         return None
@@ -356,24 +331,10 @@ def box_deg(crs: str, bounds_m: Bounds) -> BoxDeg:
 def read_elements(
     name_or_path: str | Path, crs: str, bounds_m: Bounds, query: Query
 ) -> GeoDataFrame:
-    """Return the elements of a map in and about a box, sorted by id.
+    """Return the elements of a map in and about a box (m), sorted by id; the caller clips them.
 
-    They reach beyond the box; the caller clips them.
-
-    Parameters
-    ----------
-    name_or_path : str or Path
-        As :func:`resolve_map` takes it.
-    crs : str
-        Projected CRS of the result, in metres.
-    bounds_m : tuple of float
-        West, south, east, north in ``crs``.
-
-    Returns
-    -------
-    GeoDataFrame
-        With the columns ``id``, ``osm_type`` ("way" or "relation") and each tag of the query, an
-        empty text where an element has no such tag.
+    Columns are ``id``, ``osm_type`` ("way" or "relation") and each tag of the query, an empty text
+    where an element has no such tag.
 
     Raises
     ------
@@ -396,7 +357,7 @@ def read_elements(
 
 
 def check_on_map(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> None:
-    """See that a box in metres overlaps what the map's header says that it covers.
+    """Check that a box in metres overlaps the box in the map's header, if there is one.
 
     Raises
     ------

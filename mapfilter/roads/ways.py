@@ -1,4 +1,4 @@
-"""The ways, squares, buildings and waters of an area, in metres, whatever map they come from."""
+"""Ways, squares, buildings and water of an area, in metres; cutting them at its edge."""
 
 from __future__ import annotations
 
@@ -87,14 +87,14 @@ class Ways(_Layer):
     def __len__(self) -> int:
         return int(self.way_id.size)
 
-    def select(self, which: Any) -> Ways:
-        """Return the ways chosen by a mask or by indices."""
+    def select(self, which: Any, geometry: Geometries | None = None) -> Ways:
+        """Return the ways chosen by a mask or by indices, with other lines where given."""
         return Ways(
             self.crs,
             self.way_id[which],
             self.way_class[which],
             self.class_names,
-            self.geometry[which],
+            self.geometry[which] if geometry is None else geometry,
             self.covered[which],
             self.oneway[which],
         )
@@ -164,7 +164,7 @@ class Buildings(_Layer):
 
     @property
     def told(self) -> str:
-        """One sentence on where the heights come from."""
+        """One sentence on the sources of the heights."""
         return (
             f"{len(self)} buildings: height from the map for {self.from_height}, "
             f"from storeys for {self.from_levels}, the default for {self.from_default}"
@@ -173,7 +173,7 @@ class Buildings(_Layer):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Water(_Layer):
-    """Where one cannot be without a boat.
+    """Water, where nobody walks or drives except on bridges.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def _check_geometry(what: str, geometry: Geometries, kind: str, faults: Faults) 
 _LINE, _RING, _POLYGON = 1, 2, 3
 
 _FARTHEST_M = 1e8
-"""No map's coordinates are larger, and much larger ones overflow in products."""
+"""Larger than the coordinates of any map; much larger ones overflow in products."""
 
 
 def on_earth(geometry: Geometries) -> Bools:
@@ -270,12 +270,4 @@ def polygons_inside(
 def clip_ways(ways: Ways, bounds_m: Bounds) -> Ways:
     """Return the ways cut at a box; there may be none left."""
     lines, origin = lines_inside(ways.geometry, bounds_m)
-    return Ways(
-        ways.crs,
-        ways.way_id[origin],
-        ways.way_class[origin],
-        ways.class_names,
-        lines,
-        ways.covered[origin],
-        ways.oneway[origin],
-    )
+    return ways.select(origin, lines)
