@@ -336,9 +336,9 @@ class BayesSection(Section):
                 use_levels=self.levels,
             ),
             ParticleOptions(
-                most=self.most_particles,
-                searching=self.searching_particles,
-                least=self.least_particles,
+                max_particles=self.most_particles,
+                min_search_particles=self.searching_particles,
+                min_particles=self.least_particles,
                 switch_mass=self.switch_mass,
                 switch_hold_m=self.switch_hold_m,
             ),

@@ -18,7 +18,7 @@ from scipy.special import ndtr
 
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
-from mapfilter.filters.hypotheses import BeliefSummary, Bins, nothing, summarise
+from mapfilter.filters.hypotheses import BeliefSummary, Bins, empty_summary, summarise
 from mapfilter.filters.particle import ParticleOptions, switched
 
 _REACH_SD = 4.0
@@ -205,7 +205,7 @@ class GridBelief:
     def summary(self) -> BeliefSummary:
         """What the belief says."""
         if not self.weight.size:
-            return nothing(self.state.shape[0])
+            return empty_summary(self.state.shape[0])
         return summarise(self.state, self.weight, self.bins)
 
     def __getstate__(self) -> dict[str, object]:

@@ -140,8 +140,8 @@ def _flatten(
         flat[i] = weight[i] * mass[of_bin[i]] * per_share
 
 
-def nothing(rows: int) -> BeliefSummary:
-    """Return the summary of a belief that holds nothing."""
+def empty_summary(rows: int) -> BeliefSummary:
+    """Return the summary of an empty belief."""
     unknown = np.full((2, 2), nan)
     return BeliefSummary(np.full(rows, nan), unknown, np.full(3, nan), 0.0, np.empty((0, 3)), nan)
 

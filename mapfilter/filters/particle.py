@@ -19,7 +19,7 @@ from mapfilter._kernels import draw_key
 from mapfilter._types import Floats, Floats32, Ints32
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
-from mapfilter.filters.hypotheses import BeliefSummary, Bins, flattened, nothing, summarise
+from mapfilter.filters.hypotheses import BeliefSummary, Bins, empty_summary, flattened, summarise
 from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
 
 
@@ -29,21 +29,21 @@ class ParticleOptions:
 
     Parameters
     ----------
-    most, least : int
+    max_particles, min_particles : int
         Limits of the number of particles.
-    searching : int
-        Least number until the filter has converged: a place that is improbable at first must keep
+    min_search_particles : int
+        Lower limit until the filter has converged: a place that is improbable at first must keep
         enough of them to be followed.
-    per_bin : float
+    particles_per_bin : float
         Particles for each bin of 25 m that the belief covers (two to the power of its entropy).
     resample_below : float
         Share of the particles that the effective sample size must not fall below.
-    flatten : float
+    mass_exponent : float
         Until the filter has converged, each bin of 25 m gets particles by its mass to this power,
         which keep the rest of it as weights: improbable places stay well covered. 1 for plain
         resampling.
     jitter : tuple of float
-        Standard deviation of the noise that parts copies, for each row of the state.
+        Standard deviation of the noise added to resampled copies, for each row of the state.
     searching_jitter : tuple of float
         The same until the filter has converged: few copies stand for each place then, and must
         cover all headings and step lengths that are possible there.
@@ -54,12 +54,12 @@ class ParticleOptions:
         and has done so for so many metres travelled.
     """
 
-    most: int = 20_000
-    searching: int = 12_000
-    least: int = 1000
-    per_bin: float = 60.0
+    max_particles: int = 20_000
+    min_search_particles: int = 12_000
+    min_particles: int = 1000
+    particles_per_bin: float = 60.0
     resample_below: float = 0.5
-    flatten: float = 0.5
+    mass_exponent: float = 0.5
     jitter: tuple[float, ...] = (0.2, 0.2, 0.005, 0.003, 0.0)
     searching_jitter: tuple[float, ...] = (1.5, 1.5, 0.015, 0.009, 0.0)
     switch_mass: float = 0.99
@@ -67,15 +67,21 @@ class ParticleOptions:
 
     def __post_init__(self) -> None:
         faults = Faults()
-        if not 1 <= self.least <= self.most:
-            got = f"{self.least} and {self.most}"
-            faults.add("particles, least and most", "1 <= least <= most", got)
-        if self.searching < 1:
-            faults.add("particles, searching", ">= 1", self.searching)
-        if not (isfinite(self.per_bin) and self.per_bin > 0):
-            faults.add("particles, per_bin", "a finite number > 0", self.per_bin)
-        if not 0 < self.flatten <= 1:
-            faults.add("particles, flatten", "a power in (0, 1]", self.flatten)
+        if not 1 <= self.min_particles <= self.max_particles:
+            got = f"{self.min_particles} and {self.max_particles}"
+            faults.add(
+                "particles, min_particles and max_particles",
+                "1 <= min_particles <= max_particles",
+                got,
+            )
+        if self.min_search_particles < 1:
+            faults.add("particles, min_search_particles", ">= 1", self.min_search_particles)
+        if not (isfinite(self.particles_per_bin) and self.particles_per_bin > 0):
+            faults.add(
+                "particles, particles_per_bin", "a finite number > 0", self.particles_per_bin
+            )
+        if not 0 < self.mass_exponent <= 1:
+            faults.add("particles, mass_exponent", "a power in (0, 1]", self.mass_exponent)
         for name in ("resample_below", "switch_mass"):
             if not 0 < getattr(self, name) < 1:
                 faults.add(f"particles, {name}", "a share between 0 and 1", getattr(self, name))
@@ -186,7 +192,7 @@ class ParticleBelief:
     def summary(self) -> BeliefSummary:
         """What the belief says."""
         if not self.log_weight.size:
-            return nothing(self.state.shape[0])
+            return empty_summary(self.state.shape[0])
         return summarise(self.state, self.weight, self.bins)
 
     def __getstate__(self) -> dict[str, object]:
@@ -208,7 +214,7 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
 
     def init(self, prior: PriorT, rng: np.random.Generator) -> ParticleBelief:
         """Draw the first particles."""
-        state, log_weight = self.model.start(prior, self.options.most, rng)
+        state, log_weight = self.model.start(prior, self.options.max_particles, rng)
         weight = np.empty(log_weight.size, dtype=np.float32)
         log_total, _ = normalise(log_weight, weight)
         if not isfinite(log_total):
@@ -274,8 +280,8 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         state = weighed.state
         searching = status is Status.SEARCHING
         flat = weight
-        if searching and self.options.flatten < 1:
-            flat = flattened(state, weight, belief.bins, self.options.flatten)
+        if searching and self.options.mass_exponent < 1:
+            flat = flattened(state, weight, belief.bins, self.options.mass_exponent)
             effective = 1.0 / float(np.dot(flat, flat))
         if effective < self.options.resample_below * weight.size or 2 * wanted < weight.size:
             state, chosen = self._resampled(state, flat, wanted, status, rng)
@@ -300,8 +306,15 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
 
     def _wanted(self, summary: BeliefSummary, status: Status) -> int:
         options = self.options
-        least = options.searching if status is Status.SEARCHING else options.least
-        return int(min(max(options.per_bin * summary.effective_bins, least), options.most))
+        least = (
+            options.min_search_particles if status is Status.SEARCHING else options.min_particles
+        )
+        return int(
+            min(
+                max(options.particles_per_bin * summary.effective_bins, least),
+                options.max_particles,
+            )
+        )
 
     def _resampled(
         self,

@@ -82,7 +82,7 @@ class OttawaOptions:
                 scale_drift_per_sqrt_m=0.005,
             ),
             map=MapWeights(sd_m=16.0),
-            particles=ParticleOptions(most=10_000, searching=7_000),
+            particles=ParticleOptions(max_particles=10_000, min_search_particles=7_000),
             evidence=EvidenceOptions(
                 serving=ServingWeights(weight_per_m=1 / 150),
                 levels=LevelErrors(sd_db=5.0, correlation_m=100.0, measurement_db=3.0),

@@ -83,7 +83,9 @@ class BayesPositioner:
             known = self.options
             # Every place times every heading: most of them are gone after a few steps.
             unknown = replace(
-                known, most=_MOST_TIMES * known.most, searching=_SEARCHING_TIMES * known.searching
+                known,
+                max_particles=_MOST_TIMES * known.max_particles,
+                min_search_particles=_SEARCHING_TIMES * known.min_search_particles,
             )
             return {
                 True: ParticleFilter(self.model, known),

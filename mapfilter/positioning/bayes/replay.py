@@ -130,7 +130,9 @@ def _warm_up(positioner: BayesPositioner) -> None:
         return
     model, rng = positioner.model, np.random.default_rng(0)
     west, south = model.area.origin_m
-    small = replace(positioner, options=replace(positioner.options, most=64, least=32))
+    small = replace(
+        positioner, options=replace(positioner.options, max_particles=64, min_particles=32)
+    )
     track = small.begin_at(west, south, 1.0, rng)
     epoch = Epoch(0.0, (MotionStep(1.0, 0.0),))
     track, _ = small.advance(track, epoch, rng)
