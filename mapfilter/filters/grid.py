@@ -135,7 +135,7 @@ class GridModel(Protocol[PriorT, ReadingT]):
         """Return what a displacement by dead reckoning, of some length, does."""
 
     def weigh(self, state: Floats32, log_weight: Floats, reading: ReadingT) -> Reason:
-        """Add a reading's log-likelihood to the log weights, in place; say why if it has none."""
+        """Add a reading's log-likelihood to the log weights, in place; return why not, if so."""
 
     def can_converge(self, summary: BeliefSummary) -> bool:
         """Tell whether a belief may count as having converged, if it agrees on a place."""
