@@ -29,6 +29,7 @@ from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.msi import read_antennas
+from mapfilter.report.canvas import save
 from mapfilter.report.errors import plot_error_over_distance
 from mapfilter.tracks.leave_out import leave_out
 from mapfilter.tracks.log import TrackLog
@@ -242,7 +243,7 @@ def run_replay_fusion(
         wanted = config.output.pictures
         if truth is not None and (wanted == "all" or (wanted == "first" and not index)):
             pictures = (into / "error.png",)
-            plot_error_over_distance(track.estimate, truth, pictures[0])
+            save(plot_error_over_distance(track.estimate, truth), pictures[0])
         score = accuracy(track.estimate, truth) if truth is not None else None
         lack = "" if track.estimate.converged_at is not None else "too little was measured"
         replayed = ReplayedLog(
