@@ -73,6 +73,9 @@ _STYLE: dict[Any, Any] = {
     "ytick.labelsize": 9,
 }
 
+Drawn = Axes | Figure
+"""What a ``plot_*`` function returns."""
+
 Look = dict[str, Any]
 """Keywords of artists: ``Look(color=BLUE, linewidth=1.5)``."""
 
@@ -102,7 +105,7 @@ def figure_of(axes: Axes) -> Figure:
 
 
 @styled
-def save(drawn: Axes | Figure, path: Path) -> Path:
+def save(drawn: Drawn, path: Path) -> Path:
     """Write a picture as PNG, SVG or PDF, by the suffix of the path, in one step.
 
     Parameters

@@ -9,15 +9,14 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from mapfilter._parallel import Progress
 from mapfilter.experiments.sweep.plan import SweepPlan
+from mapfilter.report.canvas import Drawn
 
 Run = TypeVar("Run")
 
-Picture = tuple[str, Axes | Figure]
+Picture = tuple[str, Drawn]
 """Name of the file, without a suffix, and what is drawn."""
 
 

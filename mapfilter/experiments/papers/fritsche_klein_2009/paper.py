@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 
 from mapfilter._types import Floats
 from mapfilter.experiments.papers.fritsche_klein_2009.experiment import (
@@ -20,7 +19,7 @@ from mapfilter.experiments.papers.fritsche_klein_2009.experiment import (
 )
 from mapfilter.experiments.papers.fritsche_klein_2009.scene import COMBINATIONS, Layout
 from mapfilter.experiments.papers.paper import Paper, Picture
-from mapfilter.report.canvas import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
+from mapfilter.report.canvas import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, Drawn
 from mapfilter.report.curves import Curve, Panel, curves_of, plot_error_panels, plot_scene
 
 MOST_TRIALS = 20_000
@@ -138,7 +137,7 @@ def pictures(run: PaperRun) -> Iterator[Picture]:
     yield "hard", plot_error_panels([hard], title=f"Hard layout, GSM, {run.trials} trials")
 
 
-def _scene(layout: Layout, track_m: Floats, title: str) -> Axes:
+def _scene(layout: Layout, track_m: Floats, title: str) -> Drawn:
     network = layout.sites_m, layout.boresights_deg, layout.serving
     return plot_scene(*network, layout.satellite_azimuths_deg, track_m, title=title)
 
