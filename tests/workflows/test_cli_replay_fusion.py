@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
+from mapfilter.positioning.kalman.replay import gaussian_radii_m, position_by_fusion
 from typer.testing import CliRunner
 
 from mapfilter.cli import app
@@ -13,7 +14,6 @@ from mapfilter.filters.gaussian import EKF, METHODS
 from mapfilter.models.state import POSITION
 from mapfilter.positioning.estimate_store import read_estimate
 from mapfilter.positioning.kalman.models import FusionOptions, SiteModels
-from mapfilter.positioning.kalman.replay import gaussian_radii_m, position_by_fusion
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.store import write_log

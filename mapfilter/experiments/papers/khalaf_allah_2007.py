@@ -18,8 +18,7 @@ import pandas as pd
 from mapfilter.evaluation.success import SuccessCell, success_cells
 from mapfilter.experiments.papers.paper import Paper, PaperSettings, Picture
 from mapfilter.experiments.sweep.plan import Radio, Reading, SweepPlan, noise_grid
-from mapfilter.filters.candidate import CandidateOptions
-from mapfilter.positioning.locators import FilterChoice
+from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.report.success import (
     plot_run_distributions,
     plot_success_curves,
@@ -90,8 +89,7 @@ def plans(trials: int, seed: int) -> tuple[SweepPlan, ...]:
         Runs in each cell of the grid, at least.
     seed : int
     """
-    step_m = RESOLUTION_M
-    best, at_22_m = CandidateOptions(step_m, step_m), CandidateOptions(step_m, UPDATE_LENGTH_M)
+    best, at_22_m = CandidateFilter(RESOLUTION_M), CandidateFilter(UPDATE_LENGTH_M)
     as_list = replace(best, duplicates="list", threshold=10)
     next_call = replace(best, switch_check="next_call")
     projected = replace(at_22_m, prediction="last_heading")
@@ -135,8 +133,8 @@ def plans(trials: int, seed: int) -> tuple[SweepPlan, ...]:
     )
 
 
-def _reading(name: str, options: CandidateOptions, margin_db: float = 0.0) -> Reading:
-    return Reading(name, FilterChoice(options, margin_db), options.update_length_m)
+def _reading(name: str, options: CandidateFilter, margin_db: float = 0.0) -> Reading:
+    return Reading(name, replace(options, margin_db=margin_db), options.update_length_m)
 
 
 def fits(cells: Iterable[SuccessCell]) -> tuple[Fit, ...]:
