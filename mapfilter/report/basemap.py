@@ -140,20 +140,8 @@ def draw_base(
 ) -> LocalFrame:
     """Draw streets and points, set extent and labels, and add scale bar and north arrow.
 
-    Parameters
-    ----------
-    axes : Axes
-        Empty axes.
-    base : BaseMap
-    streets : str
-        Colour of the streets.
-    scale_bar : bool
-        Whether to draw the scale bar and the north arrow.
-
-    Returns
-    -------
-    LocalFrame
-        By which data are put onto the axes.
+    ``streets`` is their colour; ``scale_bar`` whether to draw the bar and the arrow. By the frame
+    that is returned data are put onto the axes.
     """
     frame = local_frame(base)
     if base.points_m is not None and len(base.points_m):
@@ -187,15 +175,7 @@ def draw_raster(
 ) -> AxesImage:
     """Draw a raster over the map, pixel by pixel; masked pixels and NaN are left out.
 
-    Parameters
-    ----------
-    axes, base
-        As drawn by :func:`draw_base`.
-    lattice : Lattice
-        Where the pixels lie.
-    values : (rows, cols) array
-    image
-        As of :meth:`matplotlib.axes.Axes.imshow`.
+    The map is drawn already by :func:`draw_base`; ``image`` is as of ``axes.imshow``.
     """
     frame = local_frame(base)
     shown = np.ma.masked_invalid(values)
@@ -300,16 +280,7 @@ def side_legend(
 ) -> None:
     """Put a legend to the right of the map: the largest groups that it has room for, and marks.
 
-    Parameters
-    ----------
-    axes : Axes
-    heading : str
-    groups : sequence of Line2D
-        Labelled, one per group.
-    counts : sequence of int
-        Size of each group.
-    marks : sequence of Line2D
-        Labelled; always shown.
+    Both are labelled; ``counts`` are the sizes of the groups. Marks are always shown.
     """
     figure = figure_of(axes)
     room = int((figure.get_figheight() - _HEADING_IN) / _ROW_IN) - len(marks)

@@ -8,7 +8,7 @@ state that outlives a call. Equal data give equal bytes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
 from mapfilter._io import atomic_file
+from mapfilter._types import Bools
 from mapfilter.errors import OutputError, fail
 
 DPI = 150
@@ -142,22 +143,14 @@ def tidy(axes: Axes, *, grid: bool = True) -> None:
         axes.set_axisbelow(True)
 
 
-def draw_shares(axes: Axes, values: ArrayLike, total: int | None = None, **line: Any) -> None:
-    """Draw a cumulative distribution in percent; with NaN or a larger total it ends below 100 %.
+def draw_shares(axes: Axes, values: ArrayLike, **line: Any) -> None:
+    """Draw a cumulative distribution in percent, with a line as of ``axes.step``.
 
-    Parameters
-    ----------
-    axes : Axes
-    values : array
-        NaN and infinity count as larger than any value.
-    total : int, optional
-        How many are 100 %; all values by default.
-    line
-        As of :meth:`matplotlib.axes.Axes.step`.
+    NaN and infinity count as larger than any value: the line then ends below 100 %.
     """
     given = np.ravel(np.asarray(values, dtype=np.float64))
     known = np.sort(given[np.isfinite(given)])
-    share = 100 * np.arange(known.size + 1) / max(given.size if total is None else total, 1)
+    share = 100 * np.arange(known.size + 1) / max(given.size, 1)
     axes.step(np.concatenate([[0.0], known]), share, where="post", **line)
     axes.set_ylim(0, 101)
 
@@ -167,17 +160,24 @@ def mark(label: str, marker: Any, size: float, **style: Any) -> Line2D:
     return Line2D([], [], linestyle="", marker=marker, markersize=size, label=label, **style)
 
 
+def stretches(where: Bools) -> Iterator[tuple[int, int]]:
+    """Yield the first index of each stretch that is true, and the one after its last.
+
+    Examples
+    --------
+    >>> list(stretches(np.array([True, False, True, True])))
+    [(0, 1), (2, 4)]
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], where, [0]]).astype(np.int8)))
+    yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+
+
 def bottom_legend(
     figure: Figure, most_columns: int, handles: Sequence[Artist] | None = None
 ) -> None:
     """Put a legend under the axes, in as many columns as there is room for.
 
-    Parameters
-    ----------
-    figure : Figure
-    most_columns : int
-    handles : sequence of Artist, optional
-        What is in it; without, all that is labelled, if anything is.
+    It shows the handles, or without any all that is labelled, if anything is.
     """
     if handles is None and not any(ax.get_legend_handles_labels()[0] for ax in figure.axes):
         return

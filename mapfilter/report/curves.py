@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -28,29 +27,19 @@ from mapfilter.report.canvas import (
     draw_shares,
     legend,
     new_figure,
+    stretches,
     styled,
     tidy,
 )
 
 _SIZE_IN = (7.6, 5.2)
+_SHADE, _NONE = "#f3ddd0", np.zeros(0, dtype=np.bool_)
 _HOUSE = "#d9d9d9"
 _PUBLISHED = Look(markersize=8, markerfacecolor="white", markeredgewidth=1.8)
 
 
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """One line of a panel.
-
-    Parameters
-    ----------
-    name : str
-        In the legend.
-    values : (K,) array
-        At k = 1 ... K.
-    colour : str
-    style : str
-        Solid for filters, dashed for bounds.
-    """
+class Curve(NamedTuple):
+    """A named line of a panel: values at k = 1 ... K; solid for filters, dashed for bounds."""
 
     name: str
     values: Floats
@@ -58,19 +47,8 @@ class Curve:
     style: str = "-"
 
 
-@dataclass(frozen=True, eq=False)
-class Panel:
-    """One pair of axes.
-
-    Parameters
-    ----------
-    title, label : str
-        Label of the upright axis.
-    curves : sequence of Curve
-    logarithmic : bool
-    top, bottom : float or None
-        Ends of the upright axis.
-    """
+class Panel(NamedTuple):
+    """One pair of axes; ``label``, ``top`` and ``bottom`` are of the upright axis."""
 
     title: str
     label: str
@@ -87,20 +65,11 @@ def plot_error_panels(
     title: str,
     columns: int = 2,
     across: str = "time index k",
-    shaded: tuple[str, Bools] | None = None,
+    shaded: tuple[str, Bools] = ("", _NONE),
 ) -> Figure:
-    """Draw errors over the time index in panels side by side.
+    """Draw errors over the time index, at most so many panels side by side.
 
-    Parameters
-    ----------
-    panels : sequence of Panel
-    title : str
-    columns : int
-        Panels side by side, at most.
-    across : str
-        Label of the level axis.
-    shaded : (str, (K,) array of bool), optional
-        Name and place of the indices to shade.
+    ``across`` is the label of the level axis; ``shaded`` names indices, (K,), to shade.
     """
     columns = min(columns, len(panels))
     rows = -(-len(panels) // columns)
@@ -108,8 +77,9 @@ def plot_error_panels(
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for one, panel in zip(axes, panels, strict=False):
         _draw_panel(one, panel, across)
-        if shaded is not None:
-            _shade(one, *shaded)
+        name, where = shaded
+        for first, end in stretches(where):
+            one.axvspan(first + 0.5, end + 0.5, color=_SHADE, linewidth=0, zorder=0, label=name)
     for spare in axes[len(panels) :]:
         spare.remove()
     figure.suptitle(title, fontsize=12)
@@ -140,12 +110,6 @@ def _draw_panel(axes: Axes, panel: Panel, across: str) -> None:
     tidy(axes)
 
 
-def _shade(axes: Axes, name: str, where: Bools) -> None:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], where, [0]]).astype(np.int8)))
-    for first, end in zip(edges[::2], edges[1::2], strict=True):
-        axes.axvspan(first + 0.5, end + 0.5, color="#f3ddd0", linewidth=0, zorder=0, label=name)
-
-
 def _minor_label(value: float, _: object) -> str:
     """Label twos and fives of each decade."""
     return f"{value:g}" if f"{value:e}"[0] in "25" else ""
@@ -162,18 +126,10 @@ def curves_of(
     ]
 
 
-@dataclass(frozen=True, eq=False)
-class Distribution:
-    """The errors of one filter.
+class Distribution(NamedTuple):
+    """The errors of one filter: NaN where it has no position; the curve then ends below 100 %.
 
-    Parameters
-    ----------
-    name : str
-    errors_m : array
-        NaN where it has no position: the curve then ends below 100 %.
-    colour, style : str
-    claim_m : float or None
-        What is published for the share that is marked.
+    ``claim_m`` is what is published for the share that is marked.
     """
 
     name: str
@@ -200,6 +156,7 @@ def plot_cumulative(
     ax : Axes, optional
         Drawn on; a figure of its own by default.
     title : str
+        Above the curves.
     most_m : float
         End of the axis of errors.
     share : float
@@ -224,19 +181,10 @@ def plot_cumulative(
     return axes
 
 
-@dataclass(frozen=True, eq=False)
-class OverThreshold:
-    """Percentiles of errors by a threshold.
+class OverThreshold(NamedTuple):
+    """Percentiles of errors by a threshold in dB, their intervals drawn as bands.
 
-    Parameters
-    ----------
-    name : str
-    threshold_db : (N,) sequence of float
-    found : (N,) sequence of Percentile
-        The intervals are drawn as bands.
-    without : Percentile
-        A figure that does not depend on it, drawn dashed.
-    without_name, colour : str
+    ``without`` is a figure that does not depend on the threshold, drawn dashed.
     """
 
     name: str
@@ -258,15 +206,8 @@ def plot_over_threshold(
 ) -> Axes:
     """Draw percentiles over a threshold of the SINR, with the one that was chosen.
 
-    Parameters
-    ----------
-    lines : sequence of OverThreshold
-    ax : Axes, optional
-        Drawn on; a figure of its own by default.
-    title : str
-    chosen_db : float
-    bound : (str, float), optional
-        A figure for comparison, and its name.
+    ``bound`` is the name and value of a figure for comparison; ``ax`` as in
+    :func:`plot_cumulative`.
     """
     axes = new_figure(*_SIZE_IN).subplots() if ax is None else ax
     for line in lines:
@@ -303,20 +244,8 @@ def plot_scene(
 ) -> Axes:
     """Draw base stations with their directions, the satellites' directions and a track.
 
-    Parameters
-    ----------
-    sites_m : sequence of (east, north)
-    boresights_deg : sequence of float
-        Counter-clockwise from east.
-    serving : int
-        Index of the serving site.
-    satellite_azimuths_deg : sequence of float
-        Clockwise from north.
-    track_m : (K, 2) array
-        East and north.
-    ax : Axes, optional
-        Drawn on; a figure of its own by default.
-    title : str
+    Sites and track are east and north in metres, boresights degrees counter-clockwise from east,
+    azimuths clockwise from north; ``serving`` is the index of a site.
     """
     sites, angles = np.array(sites_m), np.radians(boresights_deg)
     axes = new_figure(6.4, 6.4).subplots() if ax is None else ax
@@ -343,21 +272,14 @@ def plot_scene(
     return axes
 
 
-@dataclass(frozen=True, eq=False)
-class SeenMap:
-    """Counts of satellites on a grid.
+class SeenMap(NamedTuple):
+    """Counts of satellites on a grid, (rows, cols), from the north; NaN where nobody can be.
 
-    Parameters
-    ----------
-    title : str
-    count : (rows, cols) array
-        Row 0 is the northern edge; NaN where nobody can be.
-    extent_m : (float, float, float, float)
-        West, east, south, north.
+    ``extent_m`` is west, east, south, north.
     """
 
     title: str
-    count: Floats
+    seen: Floats
     extent_m: tuple[float, float, float, float]
 
 
@@ -370,14 +292,14 @@ def plot_seen_satellites(
     title: str,
 ) -> Figure:
     """Draw how many satellites are seen on maps side by side, houses and tracks over them."""
-    most = int(max(np.nanmax(one.count) for one in maps))
+    most = int(max(np.nanmax(one.seen) for one in maps))
     colours = ListedColormap(colormaps["viridis"](np.linspace(0.05, 1.0, most + 1)))
     norm = BoundaryNorm(np.arange(-0.5, most + 1), most + 1)
     figure = new_figure(5.4 * len(maps) + 0.8, 5.6)
     axes = figure.subplots(1, len(maps), squeeze=False).ravel()
     for one, drawn in zip(axes, maps, strict=True):
         look = Look(cmap=colours, norm=norm, interpolation="nearest")
-        image = one.imshow(drawn.count, extent=drawn.extent_m, **look)
+        image = one.imshow(drawn.seen, extent=drawn.extent_m, **look)
         for house in houses:
             corners = shapely.get_coordinates(house.exterior)
             one.add_patch(Polygon(corners, facecolor=_HOUSE, edgecolor="white", linewidth=0.6))

@@ -26,6 +26,7 @@ from mapfilter.report.canvas import (
     bottom_legend,
     legend,
     new_figure,
+    stretches,
     styled,
     tidy,
 )
@@ -120,12 +121,10 @@ def plot_errors_over_time(
     ----------
     estimates : mapping of str to TrackEstimate
         By their names in the legend; up to six.
-    truth : Truth
     ax : Axes, optional
         Drawn on; a figure of its own by default.
     spans : sequence of (str, float, float)
         Stretches of time to shade: name, begin and end in seconds.
-    title : str
     """
     axes = new_figure(*_SIZE_IN).subplots() if ax is None else ax
     for (name, begin_s, end_s), shade in zip(spans, _SPANS, strict=False):
@@ -192,9 +191,8 @@ def _shade(axes: Axes, estimate: TrackEstimate, along: Floats, *, named: bool = 
     """Shade the stretches of a track during which the filter was searching or lost."""
     for status, colour in _SHADES.items():
         has = np.array([s is status for s in estimate.status], dtype=bool)
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], has, [False]]).astype(np.int8)))
         name = status.lower() if named else None
-        for first, end in zip(edges[::2], edges[1::2], strict=True):
-            ends = float(along[first]), float(along[min(int(end), along.size - 1)])
+        for first, end in stretches(has):
+            ends = float(along[first]), float(along[min(end, along.size - 1)])
             axes.axvspan(*ends, color=colour, linewidth=0, zorder=0, label=name)
             name = None

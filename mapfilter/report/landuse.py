@@ -46,7 +46,6 @@ def plot_landuse(
 
     Parameters
     ----------
-    landuse : LandUse
     lattice : Lattice
         Where the pixels lie.
     base : BaseMap

@@ -165,7 +165,6 @@ def plot_best_server(
     ----------
     best_server : (rows, cols) integer array
         Index into ``cell_ids``; negative where no cell is received.
-    cell_ids : sequence of str
     lattice, plan, base, ax, title
         As in :func:`plot_level`.
 

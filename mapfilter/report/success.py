@@ -48,7 +48,6 @@ def plot_success_curves(
         A name and the cells along the curve; bars are Wilson intervals.
     ax : Axes, optional
         Drawn on; a figure of its own by default.
-    title : str
     claims : sequence of (float, float)
         Published: more than this share of success (0 to 1), the second, up to a deviation of
         headings in degrees, the first. Drawn as steps; what lies above them agrees.
@@ -94,7 +93,6 @@ def plot_success_map(cells: Sequence[SuccessCell], ax: Axes | None = None, *, ti
         One for each pair of deviations.
     ax : Axes, optional
         Drawn on; a figure of its own by default.
-    title : str
     """
     orient = sorted({cell.sigma_orient_deg for cell in cells})
     trans = sorted({cell.sigma_trans_m for cell in cells})
@@ -130,7 +128,6 @@ def plot_run_distributions(groups: Sequence[tuple[str, pd.DataFrame]], *, title:
     ----------
     groups : sequence of (str, pandas.DataFrame)
         A name and the rows of a sweep's table.
-    title : str
     """
     figure = new_figure(*_RUNS_SIZE_IN)
     at_switch, after, distance = figure.subplots(1, 3)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -51,19 +51,11 @@ _BIN_DB = 1.5
 _RIM_DB = 2.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SurveyedLevels:
-    """The map of one cell and what it was made from.
+class SurveyedLevels(NamedTuple):
+    """The map of one cell and its measurements.
 
-    Parameters
-    ----------
-    cell_id : str
-    lattice : Lattice
-        Where the pixels lie.
-    level_dbm, deviation_db : (rows, cols) arrays
-        Mean level, and its standard deviation; NaN where nothing was measured.
-    east_m, north_m, measured_dbm : arrays of equal length
-        The measurements.
+    Mean level and its standard deviation, (rows, cols) on the lattice, NaN where nothing was
+    measured; the measurements are arrays of equal length.
     """
 
     cell_id: str

@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 
@@ -60,7 +60,6 @@ class Fit:
 
     Parameters
     ----------
-    reading : str
     misfit : float
         0 where all claims hold: the mean of two, by how much success falls short (as a share, the
         mean of up to 3° and up to 6°), and by how much of itself a figure of Table 4 is missed, too
@@ -83,11 +82,7 @@ class Fit:
 def plans(trials: int, seed: int) -> tuple[SweepPlan, ...]:
     """Return the sweeps that together are the reproduction.
 
-    Parameters
-    ----------
-    trials : int
-        Runs in each cell of the grid, at least.
-    seed : int
+    Each cell of the grid gets at least so many runs, ``trials``.
     """
     best, at_22_m = CandidateFilter(RESOLUTION_M), CandidateFilter(UPDATE_LENGTH_M)
     as_list = replace(best, duplicates="list", threshold=10)
@@ -174,20 +169,8 @@ def _fit(name: str, cells: Sequence[SuccessCell]) -> Fit:
     return Fit(name, misfit, *least.values(), **errors_m)
 
 
-@dataclass(frozen=True, eq=False)
-class PaperRun:
-    """All runs of all sweeps.
-
-    Parameters
-    ----------
-    area_map : str
-        Name or file of the map.
-    runs : pandas.DataFrame
-        One row for each run.
-    cells : tuple of SuccessCell
-        For every reading and every pair of noises.
-    fits : tuple of Fit
-    """
+class PaperRun(NamedTuple):
+    """The map's name or file, a row for each run, and success by reading and noises."""
 
     area_map: str
     runs: pd.DataFrame

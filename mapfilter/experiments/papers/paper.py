@@ -28,7 +28,6 @@ class PaperSettings:
     ----------
     trials : int
         Trials, or runs in each cell of a grid.
-    seed : int
     executor : concurrent.futures.Executor
         Does the independent parts of the work.
     sweep : callable

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -110,8 +110,7 @@ def bounds(states: Floats, combination: Combination, sigma_db: float) -> Floats:
     return posterior_bound(model.transition, model.noise, prior_covariance(), information)
 
 
-@dataclass(frozen=True, eq=False)
-class Started:
+class Started(NamedTuple):
     """Where filters begin: means (T, 4), and a covariance of each trial (T, 4, 4) or of all."""
 
     means: Floats

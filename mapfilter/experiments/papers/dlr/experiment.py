@@ -51,21 +51,12 @@ PUBLISHED: dict[str, dict[str, float | None]] = {
 THRESHOLDS_DB = (-8.0, -11.0, -14.0, -17.0, -20.0, -23.0, -26.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
+class Run(NamedTuple):
     """One filter on one kind of measurements.
 
-    Parameters
-    ----------
-    filter : {"static", "pkf", "ekf", "pf"}
-    satellites : {"none", "gps", "gps+galileo"}
-    where : {"edge", "near"} or None
-        Where in the network time differences are measured; None without them.
-    above_db : float or None
-        SINR below which stations are dropped; None for the three best ones.
-    open_sky : bool
-        Without houses and echoes.
-    mobility : {"diagonal", "discretised"}
+    Time differences are measured ``where`` in the network (None: they are not), of the stations
+    with a SINR above ``above_db`` (None: of the three best ones). Under the open sky there are
+    neither houses nor echoes.
     """
 
     filter: Name
@@ -99,14 +90,9 @@ OVER_TIME = (EKF, AT_NEAR, AT_EDGE)
 
 
 class TrackErrors(NamedTuple):
-    """The errors of all filters on one track.
+    """The errors of all filters on one track, (runs, K); NaN where there is no static fix.
 
-    Parameters
-    ----------
-    errors_m : (runs, K) array
-        East and north; NaN where there is no static fix.
-    satellites, gps : (K,) integer arrays
-        Seen at each epoch: of both systems, and of GPS.
+    Satellites seen at each epoch, (K,), are those of both systems, and those of GPS.
     """
 
     errors_m: Floats

@@ -7,7 +7,7 @@ alone, and echoes and detours are drawn; :data:`ASSUMPTIONS` lists all that is c
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import shapely
@@ -109,18 +109,10 @@ ASSUMPTIONS = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """What all tracks share.
+class Scene(NamedTuple):
+    """What all tracks share: houses, the ground where pedestrians walk, and stations (S, 3).
 
-    Parameters
-    ----------
-    houses : (B,) array of shapely.Polygon
-    skyline : Skyline
-    ground : GasGround
-        Where pedestrians walk.
-    stations_m : dict
-        By where the canyon lies in the network, (S, 3) in its own frame.
+    Stations are in the canyon's frame, by where it lies in the network.
     """
 
     houses: NDArray[np.object_]
@@ -159,18 +151,11 @@ class Track:
     sinr_db: dict[Where, Floats]
 
 
-@dataclass(frozen=True, eq=False)
-class Readings:
+class Readings(NamedTuple):
     """One draw of all measurements of a track.
 
-    Parameters
-    ----------
-    ranges_m : (K, S) array
-        Pseudoranges in the canyon; NaN behind houses.
-    open_m : (K, S) array
-        The same without houses and echoes.
-    times_m : dict
-        By where the canyon lies, times of arrival as distances, (K, B).
+    Pseudoranges (K, S) in the canyon, NaN behind houses; the same without houses and echoes; times
+    of arrival as distances (K, B), by where the canyon lies.
     """
 
     ranges_m: Floats

@@ -6,8 +6,8 @@ Beyond the paper are the smoothed GSM track and a layout in which linearised fil
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -73,17 +73,10 @@ ASSUMPTIONS = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class CombinationRun:
-    """What filters and the bound make of one combination of measurements.
+class CombinationRun(NamedTuple):
+    """Root mean square errors by filter or bound and quantity, (K,), and how many went astray.
 
-    Parameters
-    ----------
-    curves : dict
-        By ``rbukf``, ``ekf``, ``pcrlb``, ... the root mean square error of each quantity at each
-        step.
-    astray : dict
-        By filter the share of trials more than 500 m off at the end.
+    ``astray`` is the share of trials more than 500 m off at the end.
     """
 
     curves: dict[str, Curves]
@@ -98,21 +91,8 @@ class CombinationRun:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class PaperRun:
-    """Everything that is drawn and tabulated.
-
-    Parameters
-    ----------
-    trials : int
-    layout, hard_layout : Layout
-    nominal : dict
-        By combination.
-    hard : CombinationRun
-        The hard layout, GSM.
-    track : (K, 2) array
-        True positions of one trial.
-    """
+class PaperRun(NamedTuple):
+    """Filters by combination and in the hard layout (GSM), and true positions (K, 2) of a trial."""
 
     trials: int
     layout: Layout

@@ -9,7 +9,7 @@ from __future__ import annotations
 import tomllib
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -159,22 +159,12 @@ def hard_layout(distance_m: float = 1000.0) -> Layout:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """A method's state, motion and measurements.
+class Scene(NamedTuple):
+    """State, motion and measurements of a combination.
 
-    Parameters
-    ----------
-    layout : StateLayout
-        4 components for GSM, 6 with satellites.
-    truth : LinearMotion
-        How the car and its clock really move.
-    assumed : LinearMotion
-        What filters assume, with 100 and 5 times the noise.
-    measurement : GaussianTerms
-        Pseudoranges, timing advance, levels, in this order.
-    first_covariance : (n, n) array
-        P(0|0).
+    ``truth`` is how the car and its clock really move, ``assumed`` what filters assume, with 100
+    and 5 times the noise; measured are pseudoranges, timing advance and levels, in this order; the
+    covariance is P(0|0).
     """
 
     layout: StateLayout
@@ -223,17 +213,10 @@ def measurements(state: StateLayout, layout: Layout, satellites: int) -> Gaussia
     return stack(parts)
 
 
-@dataclass(frozen=True, eq=False)
-class Trials:
-    """Drawn trials of one method.
+class Trials(NamedTuple):
+    """Drawn trials: true states (T, K, n) and readings (T, K, m) at k = 1 ... K, and first guesses.
 
-    Parameters
-    ----------
-    states : (T, K, n) array
-        True states at k = 1 ... K.
-    readings : (T, K, m) array
-    first_means : (T, n) array
-        The filters' first guesses.
+    Guesses, (T, n), are where filters begin.
     """
 
     states: Floats

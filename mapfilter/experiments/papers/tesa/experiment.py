@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import NamedTuple
 
@@ -30,17 +29,10 @@ PARTICLES = 10_000
 AVAILABLE_M = 100.0
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
-    """One filter over one scenario.
+class Run(NamedTuple):
+    """One filter over one scenario; ``beta_db``, the shadowing, is None for satellites alone.
 
-    Parameters
-    ----------
-    scenario : int
-        1: satellites all the way; 2: none during the outage; 3: as 2, with a halt in the outage.
-    motion : {"velocity", "identity", "known-bearing"}
-    beta_db : float or None
-        Shadowing; None for satellites alone.
+    Scenario 1: satellites all the way; 2: none during the outage; 3: as 2, with a halt in it.
     """
 
     scenario: int
@@ -107,16 +99,8 @@ def trial_errors_m(
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class PaperRun:
-    """Errors of all trials.
-
-    Parameters
-    ----------
-    scene : Scene
-    errors_m : dict
-        By run, shape (T, K).
-    """
+class PaperRun(NamedTuple):
+    """Errors of all trials: by run, (T, K)."""
 
     scene: Scene
     errors_m: dict[Run, Floats]

@@ -54,15 +54,8 @@ RECEIVER_SIGMA_DB = 0.29
 class Assumed:
     """State, motion and initial uncertainty that a filter assumes.
 
-    Parameters
-    ----------
-    layout : StateLayout
-    motion : LinearMotion
-    first_covariance : (n, n) array
-    sampled : tuple of int
-        Components with particles: east, north, up.
-    shadowing : tuple of int
-        Components that are the shadowing of the stations in dB; empty where it is taken as white.
+    ``sampled`` are the components with particles (east, north, up), ``shadowing`` those that are
+    the shadowing of the stations in dB; none where it is taken as white.
     """
 
     layout: StateLayout
