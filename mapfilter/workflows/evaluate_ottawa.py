@@ -40,6 +40,7 @@ from mapfilter.experiments.benchmarks.ottawa_table import (
 )
 from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.report.canvas import BLUE, GREEN, GREY, save
+from mapfilter.report.curves import Distribution, plot_cumulative
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.jsonable import to_jsonable
 from mapfilter.workflows.survey import run_survey
