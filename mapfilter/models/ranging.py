@@ -27,10 +27,9 @@ from mapfilter.models.gaussian import (
     places,
     terms,
 )
+from mapfilter.models.motion import SPEED_OF_LIGHT_MPS
 from mapfilter.models.state import StateLayout
 from mapfilter.models.terms import COMPONENT, DIFFERENCE, RANGE
-
-SPEED_OF_LIGHT_MPS = 299_792_458.0
 
 GSM_STEP_M = SPEED_OF_LIGHT_MPS * 48 / 13 * 1e-6 / 2
 """About 553 m."""
