@@ -143,8 +143,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 def levels_folders(cell_ids: Iterable[str]) -> dict[str, str]:
     """Return each cell's folder within the database; no id leads out of it.
 
-    Ids that differ only in case get folders that differ in more, as not every disk tells cases
-    apart.
+    Ids that differ only in case get folders that differ in more, as not every file
+    system distinguishes them.
 
     Examples
     --------
@@ -200,7 +200,7 @@ def _fault(file: Path, detail: Mapping[str, Any]) -> Fault:
 
 
 def _check_together(manifest: _Manifest, where: str, faults: Faults) -> None:
-    """Note what fields say against each other."""
+    """Note fields that contradict each other."""
     if manifest.crs != manifest.lattice.crs:
         faults.add(f"{where}, crs", "the lattice's CRS", manifest.crs, _DAMAGED)
     folders = levels_folders(manifest.cells)

@@ -188,8 +188,8 @@ def _blocks(text: str, path: Path, faults: Faults) -> list[tuple[int, dict[str, 
             blocks.append((number, {}))
             continue
         label, colon, given = line.partition(":")
-        told = label.strip().lower()
-        name = next((name for key, name in _KEYS.items() if told.startswith(key)), None)
+        start = label.strip().lower()
+        name = next((name for key, name in _KEYS.items() if start.startswith(key)), None)
         if not colon or name is None or not blocks:
             if line.strip():
                 where, got = f"{path}, line {number}", repr(line)[:60]

@@ -170,7 +170,7 @@ def _read_layer(
 ) -> GeoDataFrame:
     try:
         with warnings.catch_warnings():
-            # GDAL tells of each area that does not close; what cannot be built is left out.
+            # GDAL warns of each area that does not close; what cannot be built is left out.
             warnings.filterwarnings("ignore", category=RuntimeWarning)
             found = pyogrio.read_dataframe(
                 plain,
@@ -298,17 +298,11 @@ def resolve_map(name_or_path: str | Path) -> Path:
 
 
 def map_bounds_deg(name_or_path: str | Path) -> BoxDeg:
-    """Return west, south, east, north (degrees) of a map, from its header, else from its ways.
-
-    Raises
-    ------
-    InputError
-        The map is missing, damaged or holds no way.
-    """
+    """Return west, south, east, north (degrees) of a map, from its header, else from its ways."""
     path = resolve_map(name_or_path)
-    told = _told_bounds_deg(path)
-    if told is not None:
-        return told
+    header = _header_bounds_deg(path)
+    if header is not None:
+        return header
     found = _read(path, None, _ANY_WAY)
     if found is None or not len(found):
         raise fail(InputError, str(path), "a map with ways", "none")
@@ -357,15 +351,9 @@ def read_elements(
 
 
 def check_on_map(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> None:
-    """Check that a box in metres overlaps the box in the map's header, if there is one.
-
-    Raises
-    ------
-    InputError
-        It does not, with the likely mistake; or the map is missing or damaged.
-    """
-    told = _told_bounds_deg(resolve_map(name_or_path))
-    if told is not None and not _overlap(box_deg(crs, bounds_m), told):
+    """Raise InputError where a box in metres does not overlap the box in the map's header."""
+    header = _header_bounds_deg(resolve_map(name_or_path))
+    if header is not None and not _overlap(box_deg(crs, bounds_m), header):
         raise nothing_there(name_or_path, crs, bounds_m)
 
 
@@ -383,7 +371,7 @@ def nothing_there(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> Mapfi
     return fail(InputError, where, f"ways; the map covers {extent}", "none", hint)
 
 
-def _told_bounds_deg(path: Path) -> BoxDeg | None:
+def _header_bounds_deg(path: Path) -> BoxDeg | None:
     return pbf_bounds_deg(path) if _is_pbf(path) else xml_bounds_deg(path)
 
 

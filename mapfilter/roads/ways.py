@@ -163,7 +163,7 @@ class Buildings(_Layer):
         return int(self.footprints.size)
 
     @property
-    def told(self) -> str:
+    def height_sources(self) -> str:
         """One sentence on the sources of the heights."""
         return (
             f"{len(self)} buildings: height from the map for {self.from_height}, "

@@ -2,7 +2,7 @@
 
 ``log.json`` holds the format, its version, the CRS, the start and the checksums of the tables. A
 folder made by hand needs only ``{"crs": "EPSG:…"}`` in it; a table that is absent is empty. An
-almanac beside it (``almanac.txt``, YUMA) tells where satellites were whose rows do not.
+almanac beside it (``almanac.txt``, YUMA) gives the places of satellites whose rows have none.
 """
 
 from __future__ import annotations
@@ -285,13 +285,7 @@ def check_log_replaceable(folder: Path) -> None:
 
 
 def list_logs(path: str | Path) -> list[Path]:
-    """Return the log that ``path`` is, or the logs that lie in it, by name.
-
-    Raises
-    ------
-    InputError
-        There is none, or a folder in it holds tables without a head.
-    """
+    """Return the log that ``path`` is, or the logs in it, by name; InputError without any."""
     path = Path(path)
     if is_log(path):
         return [path]
