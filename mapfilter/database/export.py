@@ -31,8 +31,8 @@ BANDS = (("best_server", ""), ("best_level_dbm", "dBm"), ("margin_db", "dB"))
 CELLS_TAG = "CELLS"
 
 _BLOCK_PX = 512
-# GeoPackages hold the time of writing; a fixed one gives equal bytes for equal databases.
 _WRITE_ERRORS = (DataSourceError, DataLayerError, FeatureError, GeometryError)
+# GeoPackages hold the time of writing; a fixed one gives equal bytes for equal databases.
 _WRITTEN = "2000-01-01T00:00:00.000Z"
 
 

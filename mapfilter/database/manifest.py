@@ -38,6 +38,8 @@ InputRole = (
 
 _LONGEST_NAME = 200
 _DAMAGED = "edited or damaged"
+_Count = Annotated[int, Field(ge=0)]
+_Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,10 +61,6 @@ def _within(path: str) -> str:
     if place.is_absolute() or ".." in place.parts or "\0" in path:
         raise ValueError("a path within the folder")
     return path
-
-
-_Count = Annotated[int, Field(ge=0)]
-_Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 
 
 class _Strict(BaseModel):

@@ -19,6 +19,11 @@ from mapfilter.geodesy import Lattice
 
 # A damaged footer or page header can ask for absurd amounts of memory or name other columns.
 DAMAGE = (OSError, pa.ArrowException, ValueError, KeyError, MemoryError)
+_WKB_POINT = np.dtype([("order", "u1"), ("kind", "<u4"), ("east", "<f8"), ("north", "<f8")])
+Window = tuple[int, int, int, int]
+"""Row, column, rows and columns on a lattice."""
+
+_EVERYWHERE = (-(2**62), 2**62)
 
 
 def write_columns(
@@ -85,9 +90,6 @@ def damaged(path: Path, error: Exception) -> MapfilterError:
     return fail(StoreError, str(path), "a whole Parquet file", reason, "damaged")
 
 
-_WKB_POINT = np.dtype([("order", "u1"), ("kind", "<u4"), ("east", "<f8"), ("north", "<f8")])
-
-
 def point_geometry(east_m: Floats, north_m: Floats) -> pa.Array:
     """Return points as well-known binary, shape (N,).
 
@@ -138,12 +140,6 @@ def dictionary(codes: NDArray[Any], names: tuple[str, ...]) -> pa.Array:
     return pa.DictionaryArray.from_arrays(
         pa.array(np.asarray(codes, dtype=np.int32)), pa.array(names, type=pa.string())
     )
-
-
-Window = tuple[int, int, int, int]
-"""Row, column, rows and columns on a lattice."""
-
-_EVERYWHERE = (-(2**62), 2**62)
 
 
 class WindowReader:

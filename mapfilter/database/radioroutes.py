@@ -20,6 +20,8 @@ from mapfilter.errors import InputError, StoreError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
 
+Rows = Ints32
+
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class RadioField:
@@ -107,9 +109,6 @@ def fill_field(
         ways[row, col],
         on_way,
     )
-
-
-Rows = Ints32
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

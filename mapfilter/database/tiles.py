@@ -18,6 +18,8 @@ from mapfilter.rasters.rxlev_rasters import RxLevRasters
 from mapfilter.roads.lattice import RouteLattice
 
 _CELLS_AT_A_TIME = 128
+_AT_POINTS = ("best", "best_level_dbm", "margin_db")
+_AT_LEVELS = ("cell", "which", "level_dbm", "below_best_db")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,10 +98,6 @@ class TileRows:
         columns = {name: points[name].to_numpy() for name in _AT_POINTS}
         columns |= {name: rows[name].to_numpy() for name in _AT_LEVELS}
         return cls(points.drop_columns(list(_AT_POINTS)), TileLevels(**columns))
-
-
-_AT_POINTS = ("best", "best_level_dbm", "margin_db")
-_AT_LEVELS = ("cell", "which", "level_dbm", "below_best_db")
 
 
 def read_tiles(tasks: Sequence[TileTask]) -> list[bytes]:

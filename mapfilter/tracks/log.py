@@ -23,6 +23,8 @@ from mapfilter.gnss.orbits import Almanac
 from mapfilter.tracks.satellites import place_satellites
 from mapfilter.tracks.schema import NEIGHBOUR, PLACE, TABLES, tidy_table
 
+Kind = Literal["gnss", "fixes", "pseudoranges", "ta", "tdoa", "neighbours", "radio"]
+
 _APART_S = 600.0
 """Tables may begin this long after another ends."""
 _TIMES_MS = (300.0, 3000.0)
@@ -32,6 +34,19 @@ _EARLY_S = 30.0
 _EARLY_SHARE = 0.1
 _EARLIEST_UTC_S = datetime(1, 1, 1, tzinfo=UTC).timestamp()
 _MOST_S = 1e11
+
+_FEW_ROWS = 10
+_MANY_ROWS = 20
+_FASTEST_MPS = 100.0
+_SLOWEST_MPS = 0.02
+_LONG_S = 60.0
+_MOSTLY = 2 / 3
+_SOMEWHERE_M = 100.0
+_KILO = (100.0, 1200.0)
+"""Between these, positions lie apart by the kilometres of the steps, or a part of them."""
+_FASTEST_KMPS = 0.1
+
+_EXPECTED = "metres moved in each interval"
 
 
 def check_clocks(
@@ -109,20 +124,6 @@ def _milliseconds(times: Mapping[str, Floats]) -> str:
             if low <= longer <= high and low <= seldomer <= high:
                 return f"milliseconds for s in {name}"
     return ""
-
-
-_FEW_ROWS = 10
-_MANY_ROWS = 20
-_FASTEST_MPS = 100.0
-_SLOWEST_MPS = 0.02
-_LONG_S = 60.0
-_MOSTLY = 2 / 3
-_SOMEWHERE_M = 100.0
-_KILO = (100.0, 1200.0)
-"""Between these, positions lie apart by the kilometres of the steps, or a part of them."""
-_FASTEST_KMPS = 0.1
-
-_EXPECTED = "metres moved in each interval"
 
 
 def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) -> tuple[str, ...]:
@@ -383,9 +384,6 @@ def make_log(
         tables["pseudoranges"] = placed
         every_note += more
     return TrackLog(str(crs), start_utc_s, **tables, notes=tuple(dict.fromkeys(every_note)))
-
-
-Kind = Literal["gnss", "fixes", "pseudoranges", "ta", "tdoa", "neighbours", "radio"]
 
 
 def leave_out(log: TrackLog, kinds: Collection[Kind]) -> TrackLog:

@@ -37,6 +37,13 @@ HEAD = "log.json"
 ALMANAC = "almanac.txt"
 
 _SUFFIXES = (".parquet", ".csv")
+_SEPARATORS = (",", ";", "\t")
+_LONGEST_ROW_BYTES = 1 << 16
+_DECIMAL_COMMA = r"^\s*([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)\s*$"
+FORMAT = "mapfilter track log"
+VERSION = 1
+_KEYS = ("format", "version", "crs", "start_utc_s", "notes", "parts")
+_ARROW = {"number": pa.float64(), "integer": pa.int64(), "text": pa.string()}
 
 
 def checked_parts(folder: Path, head: dict[str, Any]) -> dict[str, Path]:
@@ -98,11 +105,6 @@ def _others(folder: Path, used: Collection[Path]) -> list[Path]:
         for path in sorted(folder.iterdir())
         if path.name not in known and not path.name.startswith(".") and path.is_file()
     ]
-
-
-_SEPARATORS = (",", ";", "\t")
-_LONGEST_ROW_BYTES = 1 << 16
-_DECIMAL_COMMA = r"^\s*([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)\s*$"
 
 
 class ReadTable(NamedTuple):
@@ -187,13 +189,6 @@ def _cut_off(path: Path, separator: str, header: str) -> tuple[str, ...]:
     if last.endswith(("\n", "\r")) or last.count(separator) >= header.count(separator):
         return ()
     return (f"{path}: ends within a row, as if cut off",)
-
-
-FORMAT = "mapfilter track log"
-VERSION = 1
-
-_KEYS = ("format", "version", "crs", "start_utc_s", "notes", "parts")
-_ARROW = {"number": pa.float64(), "integer": pa.int64(), "text": pa.string()}
 
 
 def write_log(
