@@ -159,7 +159,7 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     antennas = world.antennas
     notes = (
         *map_cover(world),
-        world.buildings.told,
+        world.buildings.height_sources,
         *plan.notes,
         *(note for antenna in antennas.values() for note in antenna.notes),
         *outside_validity(plan, lattice, model),
