@@ -32,8 +32,8 @@ from mapfilter.config.fields import (
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.fingerprint import LevelErrors
 from mapfilter.models.street_motion import MapWeights, MotionErrors
-from mapfilter.positioning.bayes.evidence import EvidenceOptions
 from mapfilter.positioning.bayes.options import BayesOptions
+from mapfilter.positioning.bayes.radio import EvidenceOptions
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.propagation.models import Clutter, ModelName
 from mapfilter.simulation.imu import Turns

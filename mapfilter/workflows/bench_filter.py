@@ -258,9 +258,9 @@ def _track(positioner: BayesPositioner, log: TrackLog) -> tuple[float, int]:
     track, challenges = positioner.begin(), 0
     began_s = time.process_time()
     for epoch in merged:
-        before = track.challenger
-        track, _ = positioner.advance(track, epoch, rng)
-        challenges += before is None and track.challenger is not None
+        before = track.alternative
+        track, _ = positioner.step(track, epoch, rng)
+        challenges += before is None and track.alternative is not None
     return time.process_time() - began_s, challenges
 
 

@@ -71,7 +71,7 @@ def test_live_gives_the_bytes_of_the_replay(positioner):
     for epoch in epochs(log):
         # What is known survives a stop of the program.
         track, rng = pickle.loads(pickle.dumps((track, rng)))
-        track, news = positioner.advance(track, epoch, rng)
+        track, news = positioner.step(track, epoch, rng)
         told.append(news)
     live, replayed = estimate_of(CRS, "bayes", told), found(positioner, log, 3)
     for name in ("east_m", "north_m", "radii_m", "covariance_m2", "mass_50m", "way_id"):

@@ -43,17 +43,17 @@ def test_a_search_without_the_true_place_is_taken_over(area, seed):
                 track.belief, state=state, status=Status.SEARCHING, agreement_start_m=nan
             )
             track = replace(track, belief=astray, status=Status.SEARCHING)
-        track, news = positioner.advance(track, epoch, rng)
+        track, news = positioner.step(track, epoch, rng)
         if news.fix.status is Status.CONVERGED:
             switches.append(off_m(log, news.fix))
         assert news.fix.status is not Status.LOST
-    assert track.wins >= 1
+    assert track.takeovers >= 1
     assert len(switches) == 1
     assert switches[0] < 20
 
 
 def test_a_belief_in_doubt_does_not_converge(area):
-    never = AlternativeRules(doubt=1e9, doubt_of_cells=1e9, converge_below=-1.0)
+    never = AlternativeRules(start_cusum=1e9, start_cusum_cells=1e9, converge_cusum=-1.0)
     positioner = replace(BayesOptions(particles=FEW).over(area), rules=never)
     estimate = position_by_bayes(positioner, walk_log(), np.random.default_rng(0)).estimate
     assert set(estimate.status) == {Status.SEARCHING}

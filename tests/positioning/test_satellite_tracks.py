@@ -71,7 +71,7 @@ def test_live_satellites_give_the_bytes_of_the_replay(positioner):
     track, told = positioner.begin(), []
     for epoch in epochs(log):
         track, rng = pickle.loads(pickle.dumps((track, rng)))
-        track, news = positioner.advance(track, epoch, rng)
+        track, news = positioner.step(track, epoch, rng)
         told.append(news)
     live, replayed = estimate_of(CRS, "bayes", told), found(positioner, log, 5)
     for name in ("east_m", "north_m", "radii_m", "covariance_m2", "mass_50m"):
@@ -122,10 +122,10 @@ def test_honest_satellites_find_a_filter_that_is_lost(positioner):
     track = positioner.begin_at(west + 128.0, north - 40.0, 3.0, rng)
     told = []
     for epoch in merged:
-        track, news = positioner.advance(track, epoch, rng)
+        track, news = positioner.step(track, epoch, rng)
         told.append(news)
     estimate = estimate_of(CRS, "bayes", told)
-    assert track.wins >= 1
+    assert track.takeovers >= 1
     assert off_m(log, estimate)[-60:].mean() < 8
     assert south < estimate.north_m[-1] < north
 
@@ -234,9 +234,9 @@ def test_a_fix_of_no_place_is_no_fix_before_a_start_neither(area, grid):
     row = ReportRow("serving", "W", None, None, np.nan, 0)
     blank, report = Epoch(0.0, fix=GnssFix(np.nan, 1.0)), Epoch(1.0, heard=(row,))
     rng, other = np.random.default_rng(0), np.random.default_rng(0)
-    nothing, news = positioner.advance(positioner.begin(), blank, rng)
+    nothing, news = positioner.step(positioner.begin(), blank, rng)
     assert (nothing.belief, news.fix.hypotheses) == (None, 0)
-    _, told = positioner.advance(nothing, replace(report, fix=blank.fix), rng)
-    _, plain = positioner.advance(positioner.begin(), report, other)
+    _, told = positioner.step(nothing, replace(report, fix=blank.fix), rng)
+    _, plain = positioner.step(positioner.begin(), report, other)
     assert told.fix.east_m == plain.fix.east_m
     np.testing.assert_array_equal(told.fix.radii_m, plain.fix.radii_m)

@@ -14,8 +14,9 @@ from mapfilter.geodesy import same_crs
 from mapfilter.models.fingerprint import BoundReading, LevelReading
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.filter import BayesPositioner, BayesTrack, StepOutput
+from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.smoothing import History, settled, smoothed
+from mapfilter.positioning.bayes.state import BayesState, StepOutput
 from mapfilter.positioning.epochs import Epoch, epochs
 from mapfilter.positioning.estimate import PositionedTrack, Snapshot, TrackEstimate, TrackEvidence
 from mapfilter.tracks.log import TrackLog
@@ -63,7 +64,7 @@ def position_by_bayes(
     history = History()
     for epoch in merged:
         before = track
-        track, news = positioner.advance(before, epoch, rng)
+        track, news = positioner.step(before, epoch, rng)
         told.append(news)
         if smooth:
             history.add(before, track)
@@ -99,22 +100,22 @@ def estimate_of(
     return replace(estimate, evidence=evidence)
 
 
-def _worth_a_picture(track: BayesTrack, snapshots: list[Snapshot]) -> bool:
+def _worth_a_picture(track: BayesState, snapshots: list[Snapshot]) -> bool:
     """Tell whether a belief on its way to converging has changed since the last picture."""
     if track.belief is None or track.status is Status.TRACKING:
         return False
     if not snapshots or track.status is not snapshots[-1].status:
         return True
-    return track.memory.travelled_m - snapshots[-1].travelled_m >= _SNAPSHOT_EVERY_M
+    return track.reckoning.travelled_m - snapshots[-1].travelled_m >= _SNAPSHOT_EVERY_M
 
 
-def _snapshot(track: BayesTrack, news: StepOutput, area: AreaMap) -> Snapshot:
+def _snapshot(track: BayesState, news: StepOutput, area: AreaMap) -> Snapshot:
     belief, (west, south), fix = track.leading, area.origin_m, news.fix
     if belief is None:
         raise AssertionError("only beliefs are drawn")
     return Snapshot(
         fix.time_s,
-        track.memory.travelled_m,
+        track.reckoning.travelled_m,
         belief.state[0].astype(np.float64) + west,
         belief.state[1].astype(np.float64) + south,
         belief.weight.astype(np.float64),
@@ -133,7 +134,7 @@ def _warm_up(positioner: BayesPositioner) -> None:
     small = replace(positioner, options=replace(positioner.options, most=64, least=32))
     track = small.begin_at(west, south, 1.0, rng)
     epoch = Epoch(0.0, (MotionStep(1.0, 0.0),))
-    track, _ = small.advance(track, epoch, rng)
+    track, _ = small.step(track, epoch, rng)
     if track.belief is not None and model.area.cell_ids:
         small.filter_for(True).update(track.belief, _every_kind(), rng)
 
