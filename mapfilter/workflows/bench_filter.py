@@ -87,9 +87,9 @@ class FilterBench:
     track_s : float
         A walk from an unknown start; median over walks and repetitions.
     challenged : int
-        Walks with 300 m that nobody measured in their middle, and a challenger because of it.
+        Walks with 300 m that nobody measured in their middle, and an alternative because of it.
     challenged_track_s : float or None
-        These walks; None where no challenger came.
+        These walks; None where none did.
     loaded_memory_bytes, peak_memory_bytes, smoothing_peak_memory_bytes : int
         Of a process that opens the database and locates a walk: its libraries alone, and in all.
     """
@@ -139,7 +139,7 @@ def bench_filter(
         database, folders = make_world(Path(name), given)
         logs = [read_log(folder) for folder in folders]
         area = open_area(open_database(database))
-        positioner = BayesOptions().over(area)
+        positioner = BayesOptions().over_area(area)
         steps = [_step(positioner.model, logs[0], count, runs) for count in particles]
         # The first loads what is compiled.
         timed = [_track(positioner, log) for _ in range(runs + 1) for log in logs][len(logs) :]
@@ -253,7 +253,7 @@ def whole_step(
 
 
 def _track(positioner: BayesPositioner, log: TrackLog) -> tuple[float, int]:
-    """Return the seconds that a walk takes, and how many challengers it had."""
+    """Return the seconds that a walk takes, and how many alternatives were started."""
     rng, merged = np.random.default_rng(2), epochs(log)
     track, challenges = positioner.begin(), 0
     began_s = time.process_time()

@@ -8,7 +8,6 @@ import pytest
 import small_area
 
 from mapfilter.errors import ConfigError
-from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.filters.contract import Status
 from mapfilter.filters.hypotheses import BeliefSummary
 from mapfilter.filters.particle import ParticleOptions
@@ -26,13 +25,13 @@ from mapfilter.positioning.bayes.alternative import (
     resolve_alternative,
 )
 from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.options import BayesOptions
+from mapfilter.positioning.bayes.options import BayesFilter, BayesOptions, GridFilter
 from mapfilter.positioning.bayes.radio import EvidenceOptions, RadioHistory
 from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
 from mapfilter.positioning.bayes.timing import TimingState
+from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
-from mapfilter.positioning.locators import FilterChoice
 
 
 def test_the_usual_options():
@@ -98,7 +97,7 @@ def test_the_state_before_the_first_epoch():
 
 
 def test_each_source_of_evidence_begins_with_its_own_state():
-    positioner = BayesOptions().over(small_area.make_area())
+    positioner = BayesOptions().over_area(small_area.make_area())
     assert [source.name for source in positioner.sources] == [
         "gnss",
         "timing",
@@ -134,11 +133,13 @@ def test_wide_errors_get_more_particles():
 
 
 def test_the_names_of_filters():
-    assert FilterChoice().name == "candidate"
-    assert FilterChoice().options == CandidateOptions()
-    assert FilterChoice().margin_db is None
-    assert FilterChoice(BayesOptions()).name == "bayes"
-    assert FilterChoice(BayesOptions(grid=True)).name == "grid"
+    assert CandidateFilter().name == "candidate"
+    assert CandidateFilter().margin_db is None
+    assert (BayesOptions().name, BayesFilter().name) == ("bayes", "bayes")
+    assert (BayesOptions(grid=True).name, GridFilter().name) == ("grid", "grid")
+    timing = TimingOptions(step_m=553.5)
+    assert BayesFilter().options == BayesOptions(timing=timing)
+    assert GridFilter().options == BayesOptions(timing=timing, grid=True)
 
 
 POSITIVE = ("zenith_m", "echo_memory_m", "fix_memory_m", "clock_sd_m", "trust_grows_s")

@@ -21,8 +21,8 @@ from mapfilter.positioning.bayes.radio import name_of
 from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
 from mapfilter.positioning.epochs import GnssFix, ReportRow, headed
 from mapfilter.positioning.gnss.gate import FixTerm, widened
+from mapfilter.positioning.kalman.filter import gaussian_radii_m, share_within
 from mapfilter.positioning.kalman.position_filter import filter_fixes
-from mapfilter.positioning.kalman.replay import gaussian_radii_m, share_within
 from mapfilter.positioning.kalman.static_fix import BAD_GEOMETRY, TOO_FEW, StaticFix, static_fix
 from mapfilter.positioning.matched_way import matched_way
 

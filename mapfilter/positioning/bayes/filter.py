@@ -7,6 +7,7 @@ or weighs it with them, and reports. Equal epochs and seeds give equal bytes.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isfinite
@@ -14,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from mapfilter.filters.contract import Filter, Reason, Status
+from mapfilter.filters.contract import BeliefFilter, MotionStep, Reason, Status
 from mapfilter.filters.grid import GridBelief, GridFilter
 from mapfilter.filters.particle import ParticleFilter, ParticleOptions
+from mapfilter.models.fingerprint import BoundReading, LevelReading
 from mapfilter.positioning.bayes.alternative import (
     AlternativeHypothesis,
     AlternativeRules,
@@ -35,10 +37,12 @@ from mapfilter.positioning.bayes.evidence import (
 from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel, Start
 from mapfilter.positioning.bayes.radio import RadioSource
-from mapfilter.positioning.bayes.state import BayesState, StepOutput, step_output
+from mapfilter.positioning.bayes.smoothing import BayesSmoother
+from mapfilter.positioning.bayes.state import BayesState, step_output
 from mapfilter.positioning.bayes.timing import TimingSource
 from mapfilter.positioning.epochs import Epoch, headed
-from mapfilter.positioning.estimate import UnusedReading
+from mapfilter.positioning.estimate import StepOutput, UnusedReading
+from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.source import FirstFix, GnssSource
 
@@ -47,7 +51,7 @@ _MORE_PARTICLES, _MORE_SEARCHING = 12, 8
 
 
 @dataclass(frozen=True)
-class BayesPositioner:
+class BayesPositioner(Filter[BayesState]):
     """The map filter over an area.
 
     Parameters
@@ -59,6 +63,8 @@ class BayesPositioner:
         Exact filter on a grid in place of particles.
     satellites : GnssOptions
     timing : TimingOptions
+    smooth : bool
+        Smooth positions by the whole log.
     """
 
     model: BayesModel
@@ -67,6 +73,12 @@ class BayesPositioner:
     grid: bool = False
     satellites: GnssOptions = field(default_factory=GnssOptions)
     timing: TimingOptions = field(default_factory=TimingOptions)
+    smooth: bool = False
+
+    @property
+    def crs(self) -> str:
+        """CRS of the area."""
+        return self.area.lattice.crs
 
     @property
     def area(self) -> AreaMap:
@@ -93,12 +105,12 @@ class BayesPositioner:
     def _radio(self) -> RadioSource:
         return RadioSource(self.area, self.model.evidence)
 
-    def filter_for(self, compass: bool) -> Filter[Start, MapBelief, RadioReading]:
+    def filter_for(self, compass: bool) -> BeliefFilter[Start, MapBelief, RadioReading]:
         """Return the filter of a single belief, for headings with or without a compass."""
         return self._filters[compass]
 
     @cached_property
-    def _filters(self) -> dict[bool, Filter[Start, Any, RadioReading]]:
+    def _filters(self) -> dict[bool, BeliefFilter[Start, Any, RadioReading]]:
         known = self.options
         if self.grid:
             grids = {compass: StreetGrid(self.model, compass) for compass in (True, False)}
@@ -111,8 +123,8 @@ class BayesPositioner:
             False: ParticleFilter(self.model, unknown),
         }
 
-    def begin(self) -> BayesState:
-        """Return the state before the first epoch, with an unknown position."""
+    def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> BayesState:  # noqa: ARG002
+        """Return the state before the first epoch."""
         return BayesState(sources={source.name: source.begin() for source in self.sources})
 
     def begin_at(
@@ -149,6 +161,33 @@ class BayesPositioner:
             cell = next((str(row.cell) for row in epoch.heard if row.cell is not None), "")
             unused.append(UnusedReading(epoch.time_s, "serving", cell, reason))
         return state, step_output(self.area, state, epoch.time_s, reason, tuple(unused))
+
+    def warm_up(self, merged: Sequence[Epoch]) -> None:  # noqa: ARG002
+        """Load the compiled kernels, and prepare the area."""
+        if self.grid:
+            return
+        model, rng = self.model, np.random.default_rng(0)
+        west, south = model.area.origin_m
+        small = replace(self, options=replace(self.options, most=64, least=32))
+        state = small.begin_at(west, south, 1.0, rng)
+        state, _ = small.step(state, Epoch(0.0, (MotionStep(1.0, 0.0),)), rng)
+        if state.belief is not None and model.area.cell_ids:
+            small.filter_for(True).update(state.belief, _every_kind(), rng)
+
+    def smoother(self) -> BayesSmoother | None:
+        """Return a new smoother if positions are to be smoothed."""
+        return BayesSmoother(self.area, self.model.motion) if self.smooth else None
+
+    def hypotheses(self, state: BayesState) -> Hypotheses | None:
+        """Return the hypotheses of the leading belief."""
+        belief, (west, south) = state.leading, self.area.origin_m
+        if belief is None:
+            return None
+        return Hypotheses(
+            belief.state[0].astype(np.float64) + west,
+            belief.state[1].astype(np.float64) + south,
+            belief.weight.astype(np.float64),
+        )
 
     def _moved(
         self, state: BayesState, epoch: Epoch, rng: np.random.Generator
@@ -305,3 +344,9 @@ class BayesPositioner:
         state = self.model.any_heading(belief.state, _MORE_PARTICLES, rng)
         log_weight = np.tile(belief.log_weight, _MORE_PARTICLES) - np.log(_MORE_PARTICLES)
         return replace(belief, state=state, log_weight=log_weight)
+
+
+def _every_kind() -> RadioReading:
+    one, none = np.ones(1, dtype=np.float32), np.zeros(1, dtype=np.int32)
+    levels = LevelReading(none, one, one, one, 0.3, 1.0, 3.0, 0.0, 0.0)
+    return RadioReading(0, 1.0, levels, (BoundReading(none, -60.0, 1, 8.0, 1.0),))

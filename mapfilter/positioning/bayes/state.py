@@ -12,7 +12,7 @@ from mapfilter.filters.hypotheses import nothing
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, EvidenceCusum, MapBelief
 from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.estimate import Fix, UnusedReading
+from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
 from mapfilter.positioning.matched_way import matched_way
 
 FIRST_SPACING_M = 5.0
@@ -92,23 +92,6 @@ class BayesState:
             return FIRST_SPACING_M
         area_m2 = _STREET_SHARE * belief.bins.size_m**2 * belief.summary.effective_bins
         return max(sqrt(area_m2 / belief.log_weight.size), _MIN_SPACING_M)
-
-
-@dataclass(frozen=True, slots=True)
-class StepOutput:
-    """Output of one step.
-
-    Parameters
-    ----------
-    fix : Fix
-    evidence : tuple of float
-        Runner-up's east, north and mass, entropy in bits, log evidence.
-    unused : tuple of UnusedReading
-    """
-
-    fix: Fix
-    evidence: tuple[float, float, float, float, float]
-    unused: tuple[UnusedReading, ...]
 
 
 def step_output(
