@@ -401,8 +401,8 @@ class Area(Section):
         return self.map != NO_MAP or self.bbox is not None or self.southwest is not None
 
 
-class Reality(Section):
-    """``[prediction.reality]``: how the simulated ground truth differs from the prediction."""
+class GroundTruthSection(Section):
+    """``[prediction.ground_truth]``: how the simulated ground truth differs from the prediction."""
 
     write: bool = True
     level_error_db: NotNegative = 7.0
@@ -451,7 +451,7 @@ class Prediction(Section):
     shadowing_correlation_m: Positive = 50.0
     site_share: Share = 0.5
     seed: Seed = 0
-    reality: Reality = Reality()
+    ground_truth: GroundTruthSection = GroundTruthSection()
     survey: SurveySection = SurveySection()
 
 
@@ -464,7 +464,7 @@ class Rasters(Section):
     """
 
     path: FilePath | None = None
-    reality: FilePath | None = None
+    ground_truth: FilePath | None = None
     quantity: Literal["level", "loss"] | None = None
     crs: str | None = None
     factor: Finite = 1.0
@@ -499,7 +499,7 @@ class Journeys(Section):
     length_m: Positive = 1940.0
     speed_mps: Positive = 1.4
     report_period_s: Positive = 1.0
-    radio: Literal["as_predicted", "reality"] = "reality"
+    radio: Literal["as_predicted", "ground_truth"] = "ground_truth"
     hysteresis_db: NotNegative = 4.0
     averaging_s: NotNegative = 1.92
     fading_db: NotNegative = 1.0
@@ -592,9 +592,9 @@ class Config(Section):
         return self.rasters.path or self.output.dir / "rxlev.tif"
 
     @property
-    def reality_path(self) -> Path:
-        """Where the rasters that play reality are."""
-        return self.rasters.reality or self.output.dir / "rxlev-reality.tif"
+    def ground_truth_path(self) -> Path:
+        """Where the rasters of the simulated ground truth are."""
+        return self.rasters.ground_truth or self.output.dir / "rxlev-ground-truth.tif"
 
     @property
     def surveyed_plan(self) -> Path | None:

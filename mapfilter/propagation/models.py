@@ -1,4 +1,4 @@
-"""The parameters of a prediction, and of the errors that reality adds to it."""
+"""The parameters of a prediction, and of the errors that the simulated ground truth adds to it."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ class PredictionModel:
 
 
 @dataclass(frozen=True)
-class RealityErrors:
+class GroundTruthErrors:
     """How the simulated ground truth differs from its prediction.
 
     Parameters
@@ -176,15 +176,15 @@ class RealityErrors:
 
     def __post_init__(self) -> None:
         faults = Faults()
-        _check(self, "reality", ["level_error_db", "eirp_error_db"], 0, 50, faults)
-        _check(self, "reality", ["correlation_m", "local_correlation_m"], 0, 1e5, faults)
-        _check(self, "reality", ["azimuth_error_deg"], 0, 180, faults)
-        _check(self, "reality", ["site_share", "local_share", "slope_error"], 0, 1, faults)
-        _check(self, "reality", ["roof_error"], 0, 1, faults)
-        _check(self, "reality", ["offset_db"], -50, 50, faults)
-        _check(self, "reality", ["seed"], 0, np.inf, faults)
+        _check(self, "ground_truth", ["level_error_db", "eirp_error_db"], 0, 50, faults)
+        _check(self, "ground_truth", ["correlation_m", "local_correlation_m"], 0, 1e5, faults)
+        _check(self, "ground_truth", ["azimuth_error_deg"], 0, 180, faults)
+        _check(self, "ground_truth", ["site_share", "local_share", "slope_error"], 0, 1, faults)
+        _check(self, "ground_truth", ["roof_error"], 0, 1, faults)
+        _check(self, "ground_truth", ["offset_db"], -50, 50, faults)
+        _check(self, "ground_truth", ["seed"], 0, np.inf, faults)
         if self.clutter not in get_args(Clutter):
-            faults.add("reality, clutter", "own or shared", repr(self.clutter))
+            faults.add("ground_truth, clutter", "own or shared", repr(self.clutter))
         faults.raise_if_any(ConfigError)
 
     def truth_of(self, prediction: PredictionModel) -> PredictionModel:

@@ -18,8 +18,8 @@ from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.propagation.line_of_sight import Surroundings, views_of
 from mapfilter.propagation.models import (
+    GroundTruthErrors,
     PredictionModel,
-    RealityErrors,
     outside_published_range,
     shortest_distance_m,
 )
@@ -29,8 +29,8 @@ from mapfilter.radio.cell_rules import ANTENNAS
 from mapfilter.radio.cells import Cell, CellPlan
 
 __all__ = [
+    "GroundTruthErrors",
     "PredictionModel",
-    "RealityErrors",
     "off_frequency",
     "outside_validity",
     "predict",
@@ -142,7 +142,7 @@ def realise(
     lattice: Lattice,
     heights_m: Floats32 | None,
     model: PredictionModel,
-    errors: RealityErrors,
+    errors: GroundTruthErrors,
     progress: Progress | None = None,
     *,
     antennas: Antennas | None = None,
@@ -158,7 +158,7 @@ def realise(
     ----------
     plan, lattice, heights_m, model, progress, antennas
         As for :func:`predict`, and the same as the prediction was made with.
-    errors : RealityErrors
+    errors : GroundTruthErrors
 
     Yields
     ------
@@ -193,7 +193,7 @@ def realise(
         yield cell_id, np.asarray(level_dbm + clutter_db + error_db, dtype=np.float32)
 
 
-def _shadowing(plan: CellPlan, lattice: Lattice, errors: RealityErrors) -> Iterator[Floats32]:
+def _shadowing(plan: CellPlan, lattice: Lattice, errors: GroundTruthErrors) -> Iterator[Floats32]:
     """Draw the ground truth's shadowing of each cell: a part that lasts, and a local one."""
     parts = (
         (1.0 - errors.local_share, errors.correlation_m, "reality"),
@@ -212,7 +212,7 @@ def _shadowing(plan: CellPlan, lattice: Lattice, errors: RealityErrors) -> Itera
 
 
 def _true_heights_m(
-    heights_m: Floats32 | None, lattice: Lattice, errors: RealityErrors
+    heights_m: Floats32 | None, lattice: Lattice, errors: GroundTruthErrors
 ) -> Floats32 | None:
     if heights_m is None or errors.roof_error == 0:
         return heights_m
@@ -290,7 +290,7 @@ def _check_antennas(plan: CellPlan, antennas: Antennas | None) -> None:
     faults.raise_if_any(InputError)
 
 
-def _perturbed(cell: Cell, errors: RealityErrors) -> tuple[Cell, float]:
+def _perturbed(cell: Cell, errors: GroundTruthErrors) -> tuple[Cell, float]:
     eirp, azimuth, slope = named_rng(errors.seed, "reality", "offsets", cell.id).uniform(-1, 1, 3)
     azimuth_deg = cell.azimuth_deg
     if azimuth_deg is not None:

@@ -104,7 +104,7 @@ class ReportModel:
         Whether levels are RXLEV bin centres, censored at both ends of the scale.
     sensitivity_dbm : float
         Weaker cells are not heard.
-    radio : {"reality", "as_predicted"}
+    radio : {"ground_truth", "as_predicted"}
         With "as_predicted" the serving cell is the strongest at each place: no noise, no
         averaging, no hysteresis. The levels must then be the predicted ones.
     phone_offset_sd_db : float
@@ -124,7 +124,7 @@ class ReportModel:
     max_neighbours: int = 6
     quantise: bool = True
     sensitivity_dbm: float = -104.0
-    radio: Literal["reality", "as_predicted"] = "reality"
+    radio: Literal["ground_truth", "as_predicted"] = "ground_truth"
     phone_offset_sd_db: float = 0.0
 
     def __post_init__(self) -> None:
@@ -146,8 +146,8 @@ class ReportModel:
             faults.add("reports, averaging_s", longest, self.averaging_s, "a wrong unit")
         if not -150 <= self.sensitivity_dbm <= 0:
             faults.add("reports, sensitivity_dbm", "dBm in -150..0", self.sensitivity_dbm)
-        if self.radio not in ("reality", "as_predicted"):
-            faults.add("reports, radio", "reality or as_predicted", repr(self.radio))
+        if self.radio not in ("ground_truth", "as_predicted"):
+            faults.add("reports, radio", "ground_truth or as_predicted", repr(self.radio))
         faults.raise_if_any(ConfigError)
 
 
@@ -203,10 +203,10 @@ def reports(
         raise fail(InputError, "levels", expected, level.shape, "another plan's cells")
     noise_db = model.fading_db * rng.standard_normal(level.shape)
     noise_db += model.phone_offset_sd_db * rng.standard_normal()
-    if model.radio == "reality":
+    if model.radio == "ground_truth":
         level = level + noise_db
     heard = np.where(level >= model.sensitivity_dbm, level, -np.inf)
-    if model.radio == "reality":
+    if model.radio == "ground_truth":
         averaged = max(1, round(model.averaging_s / model.period_s))
         mean = running_mean_db(np.where(np.isnan(level), _SILENT_DBM, level), averaged)
         serving = serving_cells(mean, np.isfinite(heard), model.hysteresis_db)

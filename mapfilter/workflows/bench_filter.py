@@ -165,7 +165,7 @@ def bench_filter(
 
 
 def make_world(folder: Path, settings: Sequence[str]) -> tuple[Path, Sequence[Path]]:
-    """Return a database of the embedded map, and the folders of walks in a perturbed reality."""
+    """Return a database of the embedded map, and the folders of walks in a ground truth."""
     config = load_config(None, ["output.pictures=none", *settings], out=folder)
     run_predict(config)
     run_build(config)

@@ -131,7 +131,7 @@ def run_global_positioning(
     runs : int
         Routes for each case.
     seed : int
-        Of routes, reality and noise.
+        Of routes, ground truth and noise.
     cases : sequence of str
         All without satellites if there is none.
     workers : int
@@ -201,6 +201,6 @@ def _world(world: World, folder: Path, seed: int) -> tuple[BenchmarkWorld, int]:
     streets = SweepWorld(network, world.plan, world.lattice, {}, world.heights_m)
     write_world(streets, folder / STREETS)
     errors, settings = ground_truth_errors(config.prediction), simulation_settings(config)
-    settings = replace(settings, reports=replace(settings.reports, radio="reality"))
+    settings = replace(settings, reports=replace(settings.reports, radio="ground_truth"))
     reception = ReceptionModel(nlos=NlosModel() if config.journeys.nlos_satellites else None)
     return BenchmarkWorld(folder, model, errors, settings, antennas, reception), count

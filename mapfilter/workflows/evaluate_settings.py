@@ -22,8 +22,8 @@ _RUNS = "use --runs"
 _NO_TIMING = "no timing advances are simulated"
 _PICTURES = "no pictures are drawn here"
 REFUSED: Mapping[str, str] = {
-    "prediction.reality.write": _PREDICTS,
-    "prediction.reality.seed": _DRAWN,
+    "prediction.ground_truth.write": _PREDICTS,
+    "prediction.ground_truth.seed": _DRAWN,
     "prediction.survey": _PREDICTS,
     "rasters": _PREDICTS,
     "database.path": "the database is built here",
@@ -51,7 +51,7 @@ _OF_PARTICLES = frozenset(
 )
 
 _OF_THE_CASES: Mapping[str, str] = {
-    "prediction.reality.level_error_db": "level_error_db",
+    "prediction.ground_truth.level_error_db": "level_error_db",
     "journeys.length_m": "length_m",
     "imu.sigma_orient_deg": "sigma_orient_rad",
     "imu.bias_sd_deg": "heading_bias_sd_rad",

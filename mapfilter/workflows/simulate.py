@@ -12,7 +12,7 @@ from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, OutputError, fail
 from mapfilter.geodesy import same_crs
-from mapfilter.rasters.rxlev_rasters import check_against_plan, open_rasters
+from mapfilter.rasters.rxlev_rasters import check_against_plan
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.journeys import JourneyPlan
@@ -21,7 +21,7 @@ from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
 from mapfilter.simulation.walking import WalkerModel, inside_buildings
 from mapfilter.tracks.store import check_log_replaceable, is_log, write_log
 from mapfilter.workflows.cover import check_cells_near
-from mapfilter.workflows.predict import check_reality, check_reality_there
+from mapfilter.workflows.predict import open_ground_truth
 from mapfilter.workflows.world import World, planned_rasters
 
 
@@ -55,11 +55,7 @@ def run_simulate(config: Config, progress: Progress | None = None) -> SimulateRe
     world = World.of(config)
     section = config.journeys
     as_predicted = section.radio == "as_predicted"
-    if not as_predicted:
-        check_reality_there(config)
-    rasters = planned_rasters(config) if as_predicted else open_rasters(config.reality_path)
-    if not as_predicted:
-        check_reality(config)
+    rasters = planned_rasters(config) if as_predicted else open_ground_truth(config)
     check_against_plan(rasters, world.plan)
     check_cells_near(world.plan, world.lattice, str(config.cells.plan or "cells"))
     if not same_crs(rasters.lattice.crs, world.lattice.crs):

@@ -26,16 +26,16 @@ from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.propagation.shadowing import site_shadowing
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, check_against_plan, open_rasters
+from mapfilter.rasters.rxlev_rasters import RxLevRasters, check_against_plan
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.network import street_network
 from mapfilter.workflows.cover import check_cells_near
 from mapfilter.workflows.filters import filter_choice
-from mapfilter.workflows.predict import check_reality, check_reality_there
+from mapfilter.workflows.predict import open_ground_truth
 from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.world import World, planned_rasters
 
-REALITY = "reality"
+GROUND_TRUTH = "ground truth"
 
 
 def sweep_databases(config: Config) -> dict[str, Path]:
@@ -123,10 +123,12 @@ def _axis(values: Sequence[float] | None, otherwise: float) -> tuple[float, ...]
 def _radios(config: Config) -> tuple[Radio, ...]:
     errors_db = config.sweep.prediction_error_db
     if errors_db is not None:
-        return tuple(Radio(f"{REALITY} {error_db:g} dB", float(error_db)) for error_db in errors_db)
+        return tuple(
+            Radio(f"{GROUND_TRUTH} {error_db:g} dB", float(error_db)) for error_db in errors_db
+        )
     if config.journeys.radio == AS_PREDICTED:
         return (Radio(),)
-    return (Radio(REALITY, math.nan),)
+    return (Radio(GROUND_TRUTH, math.nan),)
 
 
 def _readings(config: Config, resolution_m: float) -> tuple[Reading, ...]:
@@ -153,21 +155,18 @@ def sweep_world(config: Config, radios: Sequence[Radio]) -> SweepWorld:
     """Read streets, cells and levels, as ``simulate`` takes them.
 
     A prediction error adds a correlated field of that deviation, with the correlation,
-    the share of sites and the seed of ``[prediction.reality]``, to the predicted levels.
+    the share of sites and the seed of ``[prediction.ground_truth]``, to the predicted levels.
 
     Raises
     ------
     MapfilterError
-        The area, map, plan or rasters are wrong, or reality is wanted and not predicted yet.
+        The area, map, plan or rasters are wrong, or the ground truth is not predicted yet.
     """
     names = {radio.name for radio in radios}
-    if REALITY in names:
-        check_reality_there(config)
-        check_reality(config)
     world = World.of(config)
     opened = {
-        real: open_rasters(config.reality_path) if real else planned_rasters(config)
-        for real in sorted({name == REALITY for name in names})
+        real: open_ground_truth(config) if real else planned_rasters(config)
+        for real in sorted({name == GROUND_TRUTH for name in names})
     }
     for rasters in opened.values():
         check_against_plan(rasters, world.plan)
@@ -177,13 +176,13 @@ def sweep_world(config: Config, radios: Sequence[Radio]) -> SweepWorld:
             raise fail(InputError, where, expected, found, "another zone: set area.crs")
     lattices = [rasters.lattice for rasters in opened.values()]
     if len(set(lattices)) > 1:
-        expected = "rasters that play reality on the lattice of the predicted ones"
-        raise fail(InputError, str(config.reality_path), expected, "another")
+        expected = "ground truth rasters on the lattice of the predicted ones"
+        raise fail(InputError, str(config.ground_truth_path), expected, "another")
     check_cells_near(world.plan, world.lattice, str(config.cells.plan or "cells"))
     levels_dbm = {real: _levels(rasters, world.plan) for real, rasters in opened.items()}
     heard = {
         radio.name: _heard(
-            config, radio, levels_dbm[radio.name == REALITY], lattices[0], world.plan
+            config, radio, levels_dbm[radio.name == GROUND_TRUTH], lattices[0], world.plan
         )
         for radio in radios
     }
@@ -204,16 +203,16 @@ def _heard(
     lattice: Lattice,
     plan: CellPlan,
 ) -> Floats32:
-    if radio.name in (AS_PREDICTED, REALITY):
+    if radio.name in (AS_PREDICTED, GROUND_TRUTH):
         return predicted_dbm
-    reality = config.prediction.reality
+    truth = config.prediction.ground_truth
     fields = site_shadowing(
         plan,
         lattice,
         radio.prediction_error_db,
-        reality.correlation_m,
-        reality.site_share,
-        reality.seed,
+        truth.correlation_m,
+        truth.site_share,
+        truth.seed,
         stream="reality",
     )
     wrong_db = np.stack([field_db for _, field_db in fields])

@@ -33,7 +33,7 @@ def plan(**changed):
         "readings": (SET, LIST),
         "databases": ("a", "b"),
         "noises": noise_grid((0.0, 0.2), (0.0, 3.0, 6.0)),
-        "radios": (Radio(), Radio("reality 7 dB", 7.0)),
+        "radios": (Radio(), Radio("ground truth 7 dB", 7.0)),
         "report_periods_s": (1.0, 16.0),
         "routes": 3,
         "draws": 2,
@@ -47,7 +47,7 @@ def test_a_grid_holds_every_combination_once():
     assert whole.runs == len(runs) == len(set(runs)) == 2 * 2 * 3 * 6 * 2 * 2 * 2
     assert {run.noise for run in runs} == set(whole.noises)
     assert {(run.radio.name, run.report_period_s) for run in runs} == {
-        (radio, period) for radio in ("as_predicted", "reality 7 dB") for period in (1.0, 16.0)
+        (radio, period) for radio in ("as_predicted", "ground truth 7 dB") for period in (1.0, 16.0)
     }
     assert all(run.imu_period_s == run.report_period_s for run in runs)
     # A route's runs lie together, so that it is made once.
@@ -98,7 +98,7 @@ def seeds_of(some):
         {"databases": ("c", "b", "a")},
         {"readings": (LIST, replace(SET, name="other"), SET)},
         {"report_periods_s": (16.0, 2.0, 1.0)},
-        {"radios": (Radio("reality 3 dB", 3.0), Radio("reality 7 dB", 7.0), Radio())},
+        {"radios": (Radio("ground truth 3 dB", 3.0), Radio("ground truth 7 dB", 7.0), Radio())},
     ],
     ids=str,
 )

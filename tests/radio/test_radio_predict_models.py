@@ -12,8 +12,8 @@ from mapfilter.geodesy import Lattice
 from mapfilter.propagation.empirical import friis_db, log_distance_db, okumura_hata_db
 from mapfilter.propagation.line_of_sight import line_of_sight
 from mapfilter.propagation.predict import (
+    GroundTruthErrors,
     PredictionModel,
-    RealityErrors,
     off_frequency,
     predict,
     predict_cell,
@@ -182,7 +182,7 @@ def test_antennas_that_are_not_there_are_told_together() -> None:
     text = str(caught.value)
     assert all(part in text for part in ("'x.msi'", "'sectr'", "'c', azimuth_deg", "misspelt"))
     with pytest.raises(InputError, match="no folder of antennas"):
-        next(iter(realise(plan, LATTICE, None, PLAIN, RealityErrors())))
+        next(iter(realise(plan, LATTICE, None, PLAIN, GroundTruthErrors())))
 
 
 def test_a_measured_omni_needs_no_azimuth() -> None:
@@ -195,9 +195,9 @@ def test_a_measured_omni_needs_no_azimuth() -> None:
     )
 
 
-def test_reality_turns_measured_antennas_too() -> None:
+def test_the_ground_truth_turns_measured_antennas_too() -> None:
     plan, antennas = CellPlan(CRS, (replace(NORTH, antenna="p"),)), {"p": _panel()}
-    errors = RealityErrors(0.0, 50.0, 0.5, 0.0, 5.0, 0.0)
+    errors = GroundTruthErrors(0.0, 50.0, 0.5, 0.0, 5.0, 0.0)
     ((_, real),) = realise(plan, LATTICE, None, PLAIN, errors, antennas=antennas)
     ((_, predicted),) = predict(plan, LATTICE, None, PLAIN, antennas=antennas)
     assert 0.1 < np.abs(real - predicted).max() < 5

@@ -8,8 +8,8 @@ from math import radians
 
 REFUSED_SECTIONS = ("prediction.survey.", "rasters.", "track.", "sweep.")
 REFUSED = {
-    "prediction.reality.write",
-    "prediction.reality.seed",
+    "prediction.ground_truth.write",
+    "prediction.ground_truth.seed",
     "database.path",
     "journeys.count",
     "journeys.draws",
@@ -111,8 +111,8 @@ OF_THE_GROUND_TRUTH = {
 # The plain world's model has no streets; Walfisch-Ikegami does.
 GROUND_TRUTH_BESIDE = {
     "clutter": _CLUTTER,
-    "street_width_m": {"prediction.reality.model": "cost231_walfisch_ikegami"},
-    "building_separation_m": {"prediction.reality.model": "cost231_walfisch_ikegami"},
+    "street_width_m": {"prediction.ground_truth.model": "cost231_walfisch_ikegami"},
+    "building_separation_m": {"prediction.ground_truth.model": "cost231_walfisch_ikegami"},
 }
 
 OF_THE_MAP = {
@@ -176,7 +176,7 @@ OTHERWISE = {
     "output.dir",
     "journeys.nlos_satellites",
     "prediction.default_roof_height_m",
-    "prediction.reality.default_roof_height_m",
+    "prediction.ground_truth.default_roof_height_m",
 }
 """Settings with a test of their own."""
 

@@ -34,7 +34,7 @@ def small(tmp_path):
         file = tmp_path / "small.toml"
         file.write_text(
             f'{BOX}[cells]\nplan = "cells.csv"\n{folder}[prediction]\nshadowing_db = 0.0\n'
-            '[prediction.reality]\nwrite = false\n[output]\ndir = "out"\n',
+            '[prediction.ground_truth]\nwrite = false\n[output]\ndir = "out"\n',
             encoding="utf-8",
         )
         return file

@@ -184,7 +184,7 @@ update_length_m = 5.0
     found = run_sweep(load_sweep(toml, ["output.pictures=first"]))
     assert found.runs == 2 * 2 * 2 * 2 * 2
     runs = read_runs(found.table)
-    assert set(runs["radio"]) == {"reality 0 dB", "reality 7 dB"}
+    assert set(runs["radio"]) == {"ground truth 0 dB", "ground truth 7 dB"}
     assert set(runs["prediction_error_db"]) == {0.0, 7.0}
     lengths = dict(zip(runs["reading"], runs["update_length_m"], strict=True))
     assert lengths == {"printed": 10.0, "list": 5.0}
@@ -192,11 +192,13 @@ update_length_m = 5.0
     assert all(picture.stat().st_size > 10_000 for picture in found.pictures)
 
 
-def test_reality_must_have_been_predicted(own_world):
-    (own_world.out / "rxlev-reality.tif").unlink()
-    reality = settings(journeys__radio="reality")
+def test_ground_truth_must_have_been_predicted(own_world):
+    (own_world.out / "rxlev-ground-truth.tif").unlink()
+    ground_truth = settings(journeys__radio="ground_truth")
     assert_refused(
-        mapfilter("sweep", "-c", own_world.toml, *GRID, *reality), "rxlev-reality.tif", "reality"
+        mapfilter("sweep", "-c", own_world.toml, *GRID, *ground_truth),
+        "rxlev-ground-truth.tif",
+        "rasters of the ground truth",
     )
 
 

@@ -9,7 +9,7 @@ from command_line import assert_done, assert_refused, mapfilter, settings
 
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.scores import CaseResult
-from mapfilter.propagation.predict import PredictionModel, RealityErrors
+from mapfilter.propagation.predict import GroundTruthErrors, PredictionModel
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
@@ -23,7 +23,7 @@ from mapfilter.workflows.world import World
 
 EASY = (
     PredictionModel(shadowing_db=6.0),
-    RealityErrors(level_error_db=7.0, correlation_m=50.0, clutter="shared"),
+    GroundTruthErrors(level_error_db=7.0, correlation_m=50.0, clutter="shared"),
     ImuErrors(sigma_trans_m=0.2),
     ReportModel(fading_db=1.0),
     WalkerModel(),
@@ -135,7 +135,7 @@ def test_the_rows_of_the_plain_world():
         "plain-clutter",
         "plain-noisy-truth",
     }
-    noisy, _ = load_benchmark("plain", None, ["prediction.reality.level_error_db=7.81"])
+    noisy, _ = load_benchmark("plain", None, ["prediction.ground_truth.level_error_db=7.81"])
     assert simulated(load("plain-noisy-truth")[0]) == simulated(noisy)
     assert set(CHANGES) == {*EXPECTED, "plain", "plain-clutter", "plain-noisy-truth"}
     assert all(name == change.name for name, change in CHANGES.items())

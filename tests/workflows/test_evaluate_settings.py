@@ -91,7 +91,7 @@ def test_every_setting_is_known_to_be_honoured_or_refused():
         *OF_THE_MAP,
         *OF_JOURNEYS,
         *OTHERWISE,
-        *(f"prediction.reality.{name}" for name in OF_THE_GROUND_TRUTH),
+        *(f"prediction.ground_truth.{name}" for name in OF_THE_GROUND_TRUTH),
         *(f"filter.{name}" for name in OF_THE_CANDIDATE),
         *(f"filter.bayes.{name}" for name in OF_BAYES),
     }
@@ -121,9 +121,9 @@ def test_what_has_no_meaning_is_refused_by_name(key, world, tmp_path):
     [
         ("journeys.count=3", "--runs"),
         ("journeys.seed=3", "--seed"),
-        ('journeys.radio="reality"', "ground truth"),
-        ("prediction.reality.write=true", "ground truth"),
-        ("prediction.reality.seed=2", "--seed"),
+        ('journeys.radio="ground_truth"', "ground truth"),
+        ("prediction.ground_truth.write=true", "ground truth"),
+        ("prediction.ground_truth.seed=2", "--seed"),
         ('rasters.path="there.tif"', "predicted here"),
         ('prediction.model="survey"', "predicted here"),
         ('track.path="there"', "simulated here"),
@@ -224,7 +224,7 @@ def test_drivers_are_no_walkers(key):
 def test_settings_of_the_ground_truth(name, world_of):
     value, beside = OF_THE_GROUND_TRUTH[name], GROUND_TRUTH_BESIDE.get(name, {})
     given = {**SMALL, "cells.sectors": 3, **beside}
-    usual, other = world_of(given), world_of({**given, f"prediction.reality.{name}": value})
+    usual, other = world_of(given), world_of({**given, f"prediction.ground_truth.{name}": value})
     assert getattr(other.errors, name) == value
     assert other.sha256 != usual.sha256
     lattice = usual.streets.lattice
@@ -256,10 +256,10 @@ def test_roofs_where_no_building_is_near(world_of, tmp_path):
     file.write_text(json.dumps({"type": "FeatureCollection", "features": [shape]}))
     given = {**SMALL, "area.size_m": [600.0, 600.0], "buildings.layer": str(file)}
     given["buildings.default_height_m"] = 60.0
-    given["prediction.reality.model"] = "cost231_walfisch_ikegami"
+    given["prediction.ground_truth.model"] = "cost231_walfisch_ikegami"
     usual = world_of(given)
     predicted = world_of({**given, "prediction.default_roof_height_m": 20.0})
-    real = world_of({**given, "prediction.reality.default_roof_height_m": 20.0})
+    real = world_of({**given, "prediction.ground_truth.default_roof_height_m": 20.0})
     usual_map, other_map, real_map = (
         sha256_file(made.folder / "database" / "manifest.json") for made in (usual, predicted, real)
     )

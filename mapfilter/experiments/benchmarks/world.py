@@ -20,7 +20,7 @@ from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.sweep.world import SweepWorld, open_world
 from mapfilter.gnss.visibility import Skyline
 from mapfilter.positioning.locators import FilterChoice, Locator, open_locator
-from mapfilter.propagation.predict import PredictionModel, RealityErrors, realise
+from mapfilter.propagation.predict import GroundTruthErrors, PredictionModel, realise
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.ways import Buildings, Ways
@@ -43,7 +43,7 @@ class BenchmarkWorld:
         that lacks some.
     model : PredictionModel
         That the databases were predicted with.
-    errors : RealityErrors
+    errors : GroundTruthErrors
         How the ground truth differs; its seed is drawn anew for each ground truth.
     settings : SimulationSettings
         How one walks, what is reported, and the errors of dead reckoning.
@@ -55,7 +55,7 @@ class BenchmarkWorld:
 
     folder: Path
     model: PredictionModel
-    errors: RealityErrors = field(default_factory=RealityErrors)
+    errors: GroundTruthErrors = field(default_factory=GroundTruthErrors)
     settings: SimulationSettings = field(default_factory=SimulationSettings)
     antennas: Mapping[str, MeasuredAntenna] = field(default_factory=dict)
     reception: ReceptionModel = field(default_factory=ReceptionModel)

@@ -36,7 +36,7 @@ def walker_rng(seed: int, route: int) -> np.random.Generator:
 
 def radio_rng(seed: int, route: int, radio: Radio, report_period_s: float) -> np.random.Generator:
     """Return the generator of what a phone measures along a route: once, as one measures once."""
-    return named_rng(seed, "radio", str(route), radio.name, _value(report_period_s))
+    return named_rng(seed, "radio", str(route), radio.stream, _value(report_period_s))
 
 
 def imu_rng(seed: int, run: Run) -> np.random.Generator:
@@ -68,7 +68,7 @@ def filter_rng(seed: int, run: Run) -> np.random.Generator:
     """Return the generator of a run's filter."""
     noise = run.noise
     names = (
-        run.radio.name,
+        run.radio.stream,
         run.database,
         run.reading.name,
         _value(run.reading.update_length_m),
@@ -119,7 +119,7 @@ def heard(
     model = replace(
         plan.reports,
         period_s=report_period_s,
-        radio="as_predicted" if radio.name == AS_PREDICTED else "reality",
+        radio="as_predicted" if radio.name == AS_PREDICTED else "ground_truth",
     )
     levels = array_sampler(world.levels_dbm[radio.name], world.lattice)
     rng = radio_rng(plan.seed, number, radio, report_period_s)

@@ -70,13 +70,18 @@ class Radio:
     Parameters
     ----------
     name : str
-        ``as_predicted``, or that of a set of levels that plays reality.
+        ``as_predicted``, or that of a set of simulated ground truth levels.
     prediction_error_db : float
-        Deviation of reality from the prediction; NaN where it is not known.
+        Deviation of the ground truth from the prediction; NaN where it is not known.
     """
 
     name: str = AS_PREDICTED
     prediction_error_db: float = 0.0
+
+    @property
+    def stream(self) -> str:
+        """Part of the names of random streams: that of the first release, so that results stay."""
+        return self.name.replace("ground truth", "reality")
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,7 +40,7 @@ CLAIMS = ((3.0, 0.80), (6.0, 0.65))
 TABLE_4_M = {"error_mean_m": (15.0, 20.0), "error_67_m": (14.0, 20.0), "error_95_m": (52.0, 56.0)}
 """Table 4: ranges over the cases that succeed."""
 
-REALITY = Radio("reality", math.nan)
+GROUND_TRUTH = Radio("ground truth", math.nan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +111,7 @@ def plans(trials: int, seed: int) -> tuple[SweepPlan, ...]:
                 _reading("set, realistic cell, 6 dB", best, 6.0),
                 _reading("list, α = 10, realistic cell, 6 dB", as_list, 6.0),
             ),
-            some, REALITY, row, routes, draws, seed,
+            some, GROUND_TRUTH, row, routes, draws, seed,
         ),
         _plan(
             (
@@ -123,7 +123,7 @@ def plans(trials: int, seed: int) -> tuple[SweepPlan, ...]:
         ),
         _plan(
             (_reading("set, 1 Hz, realistic cell, 6 dB", at_22_m, 6.0),),
-            some, REALITY, second, routes, draws, seed,
+            some, GROUND_TRUTH, second, routes, draws, seed,
         ),
     )  # fmt: skip
 

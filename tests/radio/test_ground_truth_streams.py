@@ -1,4 +1,4 @@
-"""Reality is drawn apart from the prediction, even when both have the same seed."""
+"""The ground truth is drawn apart from the prediction, even when both have the same seed."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mapfilter.geodesy import Lattice
-from mapfilter.propagation.predict import PredictionModel, RealityErrors, predict, realise
+from mapfilter.propagation.predict import GroundTruthErrors, PredictionModel, predict, realise
 from mapfilter.radio.cells import Cell, CellPlan
 
 LATTICE = Lattice("EPSG:32635", 385000.0, 6673000.0, 10.0, 80, 80)
@@ -21,7 +21,7 @@ PLAN = CellPlan(
 )
 SEEDS = range(25)
 MODEL = PredictionModel(model="cost231_hata", shadowing_db=6.0, shadowing_correlation_m=50.0)
-ERRORS = RealityErrors(
+ERRORS = GroundTruthErrors(
     level_error_db=7.0,
     eirp_error_db=0.0,
     azimuth_error_deg=0.0,
@@ -34,7 +34,7 @@ Fields = NDArray[np.float64]
 
 @pytest.fixture(scope="module")
 def fields() -> tuple[Fields, Fields]:
-    """Clutter of the prediction and error of reality, shape (seeds, cells, rows, cols)."""
+    """Clutter of the prediction and error of the ground truth, shape (seeds, cells, rows, cols)."""
     plain = dict(predict(PLAN, LATTICE, None, replace(MODEL, shadowing_db=0.0)))
     clutter, error = [], []
     for seed in SEEDS:
