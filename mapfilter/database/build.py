@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
-import os
-import shutil
-import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
-from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from threading import Thread
@@ -21,8 +16,9 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from mapfilter._io import atomic_dir, check_replaceable, ensure_writable_folder
+from mapfilter._io import atomic_dir, check_replaceable
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
+from mapfilter._resume import FinishedParts
 from mapfilter.database.manifest import FORMAT, MANIFEST, InputFile
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -35,13 +31,15 @@ from mapfilter.database.tiles import (
     tile_windows,
 )
 from mapfilter.database.windows import Window
-from mapfilter.errors import Faults, InputError, OutputError, fail
+from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.rxlev_rasters import RxLevRasters, check_against_plan
 from mapfilter.roads.lattice import RouteLattice
 
-_CHECKSUM_BYTES = 4
+MARGIN_DB = 6.0
+FLOOR_DBM = -104.0
+TILE_PX = 256
 
 
 def work_key(
@@ -59,88 +57,6 @@ def work_key(
         {name: value for name, value in parameters.items() if name != "margin_db"},
     )  # fmt: skip
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
-
-
-class FinishedTiles:
-    """A hidden folder beside a database, with one file per finished tile.
-
-    It is left when the build is killed or interrupted or a worker dies, and removed when the build
-    is done, its inputs are wrong, or it cannot be written.
-
-    Parameters
-    ----------
-    database : Path
-        The folder that is being built.
-    key : callable
-        Gives a checksum of the inputs, when it is first needed: tiles of others are never taken.
-    keep : bool
-        Take tiles that are there already.
-    """
-
-    def __init__(self, database: Path, key: Callable[[], str], *, keep: bool = False) -> None:
-        self._database, self._key = database, key
-        self.keep = keep
-
-    @cached_property
-    def folder(self) -> Path:
-        """Where the tiles lie; emptied at first, unless they are kept."""
-        folder = self._database.parent / f".{self._database.name}.tiles-{self._key()[:16]}"
-        if not self.keep:
-            shutil.rmtree(folder, ignore_errors=True)
-        return folder
-
-    def __enter__(self) -> FinishedTiles:
-        ensure_writable_folder(self._database.parent)
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        # Where nobody asked for the folder there is none, and its name may take long to be known.
-        asked = "folder" in vars(self)
-        if asked and (kind is None or issubclass(kind, InputError | OutputError)):
-            shutil.rmtree(self.folder, ignore_errors=True)
-
-    def missing(self, total: int) -> list[int]:
-        """Return the tiles, of so many, that are still to be made."""
-        return [n for n in range(total) if not self.keep or self.load(n) is None]
-
-    def load(self, number: int) -> TileRows | None:
-        """Return a finished tile, or None when there is none or its file is damaged."""
-        try:
-            data = self._file(number).read_bytes()
-        except OSError:
-            return None
-        checksum, rows = data[:_CHECKSUM_BYTES], data[_CHECKSUM_BYTES:]
-        if zlib.crc32(rows).to_bytes(_CHECKSUM_BYTES, "big") != checksum:
-            return None
-        return TileRows.from_bytes(rows)
-
-    def save(self, number: int, rows: bytes) -> None:
-        """Put a finished tile on disk.
-
-        Raises
-        ------
-        OutputError
-            It cannot be written.
-        """
-        file = self._file(number)
-        temporary = file.with_name(f"{file.name}.{os.getpid()}")
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            temporary.write_bytes(zlib.crc32(rows).to_bytes(_CHECKSUM_BYTES, "big") + rows)
-            temporary.replace(file)
-        except OSError as error:
-            with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
-            got = error.strerror or error
-            raise fail(OutputError, str(file), "a place that can be written", got) from error
-
-    def _file(self, number: int) -> Path:
-        return self.folder / f"tile-{number}.arrow"
-
-
-MARGIN_DB = 6.0
-FLOOR_DBM = -104.0
-TILE_PX = 256
 
 
 def build(
@@ -222,7 +138,7 @@ def build(
             laid = job.routes.digest()
             return work_key(digest.result(), rasters, job.plan, laid, parameters)
 
-        finished = stack.enter_context(FinishedTiles(out, key, keep=resume))
+        finished = stack.enter_context(FinishedParts(out, key, keep=resume, name="tile"))
         folder = stack.enter_context(atomic_dir(out))
         made = job.made(executor or SerialExecutor(), finished, in_flight, tiles_a_task)
         crs, ids = rasters.lattice.crs, job.plan.ids
@@ -312,23 +228,23 @@ class BuildJob:
         return self.rasters.lattice.window(*inside)
 
     def made(
-        self, executor: Executor, finished: FinishedTiles, in_flight: int, tiles_a_task: int
+        self, executor: Executor, finished: FinishedParts, in_flight: int, tiles_a_task: int
     ) -> Iterator[TileRows]:
         """Yield the tiles in order: those that are finished already, and the others as made."""
-        missing = finished.missing(len(self.windows))
+        every = range(len(self.windows))
+        missing = [n for n in every if not finished.keep or finished.load(n) is None]
         groups = [missing[n : n + tiles_a_task] for n in range(0, len(missing), tiles_a_task)]
         tasks = ([self.task(number) for number in group] for group in groups)
         results = ordered_results(executor, read_tiles, tasks, in_flight=in_flight)
         made = (rows for group in results for rows in group)
-        for number in range(len(self.windows)):
+        for number in every:
             if missing and number == missing[0]:
                 rows = next(made)
                 finished.save(missing.pop(0), rows)
-                yield TileRows.from_bytes(rows)
-            elif (tile := finished.load(number)) is not None:
-                yield tile
             else:
-                yield TileRows.from_bytes(read_tiles([self.task(number)])[0])
+                # A file that was removed or damaged meanwhile is made again.
+                rows = finished.load(number) or read_tiles([self.task(number)])[0]
+            yield TileRows.from_bytes(rows)
 
     def off_rasters(self, points: int) -> int:
         """Return how many points lie beyond the rasters, of routes that are laid already."""
