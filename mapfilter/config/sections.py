@@ -15,7 +15,6 @@ from mapfilter.config.fields import (
     EMBEDDED_MAP,
     NO_MAP,
     SYNTHETIC_MAPS,
-    Beside,
     Box,
     FilePath,
     FilterName,
@@ -28,6 +27,7 @@ from mapfilter.config.fields import (
     Seed,
     Share,
     Size,
+    with_options,
 )
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.fingerprint import LevelErrors
@@ -36,7 +36,9 @@ from mapfilter.positioning.bayes.evidence import EvidenceOptions
 from mapfilter.positioning.bayes.options import BayesOptions
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.propagation.models import Clutter, ModelName
-from mapfilter.simulation.imu import Turns
+from mapfilter.simulation.imu import ImuNoise
+from mapfilter.simulation.reports import ReportModel
+from mapfilter.simulation.walking import WalkerModel
 from mapfilter.tracks.leave_out import Kind
 
 
@@ -491,6 +493,7 @@ class Database(Section):
     tile_px: Annotated[int, Field(ge=16, le=8192)] = 256
 
 
+@with_options(ReportModel, WalkerModel)
 class Journeys(Section):
     """``[journeys]``: routes along the streets and what the phone reports on them."""
 
@@ -498,38 +501,13 @@ class Journeys(Section):
     draws: Annotated[int, Field(ge=1, le=1_000_000)] = 1
     length_m: Positive = 1940.0
     speed_mps: Positive = 1.4
-    report_period_s: Positive = 1.0
-    radio: Literal["as_predicted", "ground_truth"] = "ground_truth"
-    hysteresis_db: NotNegative = 4.0
-    averaging_s: NotNegative = 1.92
-    fading_db: NotNegative = 1.0
-    max_neighbours: Annotated[int, Field(ge=0, le=32)] = 6
-    sensitivity_dbm: Annotated[float, Field(ge=-150, le=0)] = -104.0
-    phone_offset_sd_db: NotNegative = 0.0
-    beside: Beside = "centre"
-    change_side_m: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 150.0
-    stop_every_m: NotNegative = 0.0
-    stop_s: NotNegative = 20.0
     nlos_satellites: bool = False
     seed: Seed = 0
 
 
+@with_options(ImuNoise)
 class Imu(Section):
-    """``[imu]``: simulated dead reckoning: eqs. (5)-(8) of Khalaf-Allah (2007), lasting errors."""
-
-    period_s: Positive = 1.0
-    sigma_trans_m: NotNegative = 0.2
-    sigma_orient_deg: NotNegative = 3.0
-    bias_sd_deg: NotNegative = 0.0
-    drift_deg_per_sqrt_s: NotNegative = 0.0
-    scale: Annotated[float, Field(ge=0, lt=1)] = 0.0
-    translation_noise: Literal["zero_mean", "as_printed"] = "zero_mean"
-    heading_correlation_s: NotNegative = 0.0
-    step_scale_wander: Annotated[float, Field(ge=0, lt=1)] = 0.0
-    step_scale_correlation_s: NotNegative = 15.0
-    turns: Turns = "headings"
-    gyro_noise_deg_per_sqrt_s: NotNegative = 0.0
-    gyro_bias_deg_per_s: NotNegative = 0.0
+    """``[imu]``: errors of simulated dead reckoning."""
 
 
 class Track(Section):

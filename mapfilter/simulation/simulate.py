@@ -12,7 +12,7 @@ from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.geodesy import same_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.network import StreetNetwork
-from mapfilter.simulation.imu import ImuErrors, noisy_motion
+from mapfilter.simulation.imu import ImuNoise, noisy_motion
 from mapfilter.simulation.journeys import JourneyPlan, journey
 from mapfilter.simulation.reports import Levels, ReportModel, reports
 from mapfilter.simulation.routes import route
@@ -34,9 +34,7 @@ class SimulationSettings:
     draws : int
         Logs for each route, which differ in noise only.
     journey : JourneyPlan
-    imu : ImuErrors
-    imu_period_s : float
-        Length of an interval of dead reckoning; noise is drawn once for each.
+    imu : ImuNoise
     reports : ReportModel
     start_utc_s : float
         When every journey starts, UTC seconds; NaN, the default, where that does not matter.
@@ -44,15 +42,13 @@ class SimulationSettings:
     Raises
     ------
     ConfigError
-        There are no journeys or no draws, the period is not > 0, or a journey would have more than
-        ten million ticks.
+        There are no journeys or no draws, or a journey would have more than ten million ticks.
     """
 
     journeys: int = 1
     draws: int = 1
     journey: JourneyPlan = field(default_factory=JourneyPlan)
-    imu: ImuErrors = field(default_factory=ImuErrors)
-    imu_period_s: float = 1.0
+    imu: ImuNoise = field(default_factory=ImuNoise)
     reports: ReportModel = field(default_factory=ReportModel)
     start_utc_s: float = float("nan")
 
@@ -60,8 +56,6 @@ class SimulationSettings:
         for name in ("journeys", "draws"):
             if getattr(self, name) < 1:
                 raise fail(ConfigError, f"journeys, {name}", "at least 1", getattr(self, name))
-        if not (np.isfinite(self.imu_period_s) and self.imu_period_s > 0):
-            raise fail(ConfigError, "imu, period_s", "seconds > 0", self.imu_period_s)
         self._check_ticks()
 
     def _check_ticks(self) -> None:
@@ -70,8 +64,8 @@ class SimulationSettings:
         speed_mps = journey.speed_mps if journey.profile == "walking" else 1.0
         for name, period_s in (
             ("journeys, period_s", journey.period_s),
-            ("imu, period_s", self.imu_period_s),
-            ("journeys, report_period_s", self.reports.period_s),
+            ("imu, period_s", self.imu.period_s),
+            ("journeys, report_period_s", self.reports.report_period_s),
         ):
             ticks = journey.length_m / speed_mps / period_s
             if ticks > _MOST_TICKS:
@@ -151,7 +145,7 @@ def simulate_log(
     """Make the log of one journey; arguments as of :func:`simulate_journeys`."""
     return make_log(
         crs,
-        motion=noisy_motion(at_ticks(truth, settings.imu_period_s), settings.imu, imu_rng),
+        motion=noisy_motion(at_ticks(truth, settings.imu.period_s), settings.imu, imu_rng),
         radio=reports(truth, levels, plan, settings.reports, radio_rng),
         truth=truth,
         start_utc_s=settings.start_utc_s,

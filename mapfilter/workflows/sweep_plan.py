@@ -1,9 +1,10 @@
-"""The plan of a sweep from a configuration; everything that is wrong with it is told together."""
+"""Plans and world of a sweep from a configuration; all faults are reported together."""
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from mapfilter._types import Floats32
+from mapfilter.config.axes import vary
 from mapfilter.config.sections import Config, FilterSection, ReadingSection
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
@@ -29,6 +31,8 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.rxlev_rasters import RxLevRasters, check_against_plan
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.network import street_network
+from mapfilter.simulation.reports import ReportModel
+from mapfilter.simulation.walking import WalkerModel
 from mapfilter.workflows.cover import check_cells_near
 from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.predict import open_ground_truth
@@ -36,6 +40,7 @@ from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.world import World, planned_rasters
 
 GROUND_TRUTH = "ground truth"
+_NOISE = ("sigma_trans_m", "sigma_orient_deg", "bias_sd_deg", "drift_deg_per_sqrt_s", "scale")
 
 
 def sweep_databases(config: Config) -> dict[str, Path]:
@@ -45,14 +50,23 @@ def sweep_databases(config: Config) -> dict[str, Path]:
     return {str(path) if names.count(path.name) > 1 else path.name: path for path in paths}
 
 
-def sweep_plan(config: Config) -> tuple[SweepPlan, dict[str, RadioRouteDatabase]]:
-    """Return the plan of a configuration's sweep, and its databases by name, checked.
+def sweep_plans(
+    config: Config, axes: Mapping[str, Sequence[float]] | None = None
+) -> tuple[tuple[SweepPlan, ...], dict[str, RadioRouteDatabase]]:
+    """Return the plans of a sweep, one for each point of the varied options, and its databases.
+
+    Parameters
+    ----------
+    config : Config
+    axes : mapping of str to sequence of float, optional
+        Values of numeric options by dotted key, as :func:`mapfilter.config.axes.parse_axis` returns
+        them; without any there is one plan.
 
     Raises
     ------
     ConfigError, InputError
         With every fault: databases that are missing or damaged, of different resolutions or CRS,
-        readings with one name, axes that hold a value twice.
+        readings with one name, axes that hold a value twice or change nothing.
     """
     faults = Faults()
     databases: dict[str, RadioRouteDatabase] = {}
@@ -65,15 +79,40 @@ def sweep_plan(config: Config) -> tuple[SweepPlan, dict[str, RadioRouteDatabase]
         except MapfilterError as error:
             faults.found.extend(error.faults)
     resolution_m = _one_resolution(databases, faults)
-    plan = None
+    broken = bool(faults.found)
+    plans: list[SweepPlan] = []
     try:
-        plan = _plan(config, tuple(paths), resolution_m)
+        for values in itertools.product(*(axes or {}).values()):
+            point = dict(zip(axes or {}, values, strict=True))
+            plan = _plan(_varied(config, point), tuple(paths), resolution_m)
+            plans.append(replace(plan, varied=tuple(point.items())))
+        _check_effect(plans, axes or {}, faults)
     except ConfigError as error:
         faults.found.extend(error.faults)
-    if plan is None or faults.found:
-        faults.raise_if_any(ConfigError if plan is None else InputError)
-        raise AssertionError
-    return plan, databases
+        broken = False
+    faults.raise_if_any(InputError if broken else ConfigError)
+    return tuple(plans), databases
+
+
+def _varied(config: Config, point: Mapping[str, float]) -> Config:
+    """Return the configuration of a point; the margin of a database is read as the filter's."""
+    changes = dict(point)
+    if "database.margin_db" in changes:
+        changes["filter.margin_db"] = changes["database.margin_db"]
+    return vary(config, changes)
+
+
+def _check_effect(plans: Sequence[SweepPlan], axes: Iterable[str], faults: Faults) -> None:
+    """Refuse an option that none of the sweep's simulations and filters uses."""
+    for key in axes:
+        others = {
+            replace(plan, varied=tuple(pair for pair in plan.varied if pair[0] != key))
+            for plan in plans
+        }
+        if len(others) < len(plans):
+            expected = "an option that the journeys, the unit or the filters of the sweep use"
+            hint = "an option of another filter, or one that [sweep] sets"
+            faults.add(f"--vary {key}", expected, "one without effect", hint)
 
 
 def _one_resolution(databases: Mapping[str, RadioRouteDatabase], faults: Faults) -> float:
@@ -84,34 +123,23 @@ def _one_resolution(databases: Mapping[str, RadioRouteDatabase], faults: Faults)
 
 
 def _plan(config: Config, databases: tuple[str, ...], resolution_m: float) -> SweepPlan:
-    section, imu, settings = config.sweep, config.imu, simulation_settings(config)
-    readings = _readings(config, resolution_m)
-    # No candidate filter uses neighbours, and what serves does not depend on them.
-    neighbours = 0 if all(one.choice.name == "candidate" for one in readings) else None
-    reports = settings.reports
-    if neighbours is not None:
-        reports = replace(reports, max_neighbours=neighbours)
+    section, settings = config.sweep, simulation_settings(config)
+    readings, reports = _readings(config, resolution_m), settings.reports
+    # No candidate filter uses neighbours, and the serving cell does not depend on them.
+    if all(one.choice.name == "candidate" for one in readings):
+        reports = replace(reports, max_neighbours=0)
+    noise = {name: _axis(getattr(section, name), getattr(settings.imu, name)) for name in _NOISE}
     return SweepPlan(
         readings=readings,
         databases=databases,
-        noises=noise_grid(
-            _axis(section.sigma_trans_m, imu.sigma_trans_m),
-            _axis(section.sigma_orient_deg, imu.sigma_orient_deg),
-            _axis(section.bias_sd_deg, imu.bias_sd_deg),
-            _axis(section.drift_deg_per_sqrt_s, imu.drift_deg_per_sqrt_s),
-            _axis(section.scale, imu.scale),
-        ),
+        noises=noise_grid(**noise, others=settings.imu),
         radios=_radios(config),
-        report_periods_s=_axis(section.report_period_s, config.journeys.report_period_s),
-        imu_periods_s=_axis(section.imu_period_s, imu.period_s),
+        report_periods_s=_axis(section.report_period_s, reports.report_period_s),
+        imu_periods_s=_axis(section.imu_period_s, settings.imu.period_s),
         routes=section.routes,
         draws=section.draws,
-        length_m=settings.journey.length_m,
-        profile=settings.journey.profile,
-        speed_mps=settings.journey.speed_mps,
+        journey=settings.journey,
         reports=reports,
-        imu=settings.imu,
-        walker=settings.journey.walker,
         seed=section.seed,
     )
 
@@ -126,7 +154,7 @@ def _radios(config: Config) -> tuple[Radio, ...]:
         return tuple(
             Radio(f"{GROUND_TRUTH} {error_db:g} dB", float(error_db)) for error_db in errors_db
         )
-    if config.journeys.radio == AS_PREDICTED:
+    if config.journeys.of(ReportModel).radio == AS_PREDICTED:
         return (Radio(),)
     return (Radio(GROUND_TRUTH, math.nan),)
 
@@ -186,7 +214,7 @@ def sweep_world(config: Config, radios: Sequence[Radio]) -> SweepWorld:
         )
         for radio in radios
     }
-    on_pavement = config.journeys.beside != "centre"
+    on_pavement = config.journeys.of(WalkerModel).beside != "centre"
     heights_m = rasterise_heights(world.buildings, lattices[0]) if on_pavement else None
     network = street_network(world.ways, world.routes)
     return SweepWorld(network, world.plan, lattices[0], heard, heights_m)

@@ -3,7 +3,7 @@
 import pickle
 from dataclasses import replace
 from itertools import pairwise
-from math import inf, nan
+from math import inf
 
 import pytest
 from hypothesis import given
@@ -13,7 +13,6 @@ from mapfilter.errors import ConfigError
 from mapfilter.experiments.sweep.journeys import filter_rng, imu_rng, radio_rng, route_rng
 from mapfilter.experiments.sweep.plan import (
     LONGEST_BATCH,
-    Noise,
     Radio,
     Reading,
     SweepPlan,
@@ -21,7 +20,8 @@ from mapfilter.experiments.sweep.plan import (
 )
 from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.positioning.locators import FilterChoice
-from mapfilter.simulation.imu import ImuErrors
+from mapfilter.simulation.imu import ImuNoise
+from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.walking import WalkerModel
 
 SET = Reading("set", FilterChoice(CandidateOptions(), 0.0), 22.0)
@@ -132,18 +132,22 @@ def test_every_fault_of_a_plan_in_one_message():
         plan(
             readings=(SET, SET),
             databases=(),
-            noises=(Noise(-1.0, nan), Noise(0.0, 0.0), Noise(0.0, 0.0)),
+            noises=(ImuNoise(), ImuNoise()),
             report_periods_s=(inf,),
             routes=0,
             draws=0,
-            length_m=-5.0,
             seed=-1,
         )
     text = str(caught.value)
     for told in (
-        "readings", "databases", "noise: expected every value once", "sigma_trans_m",
-        "sigma_orient_rad", "period", "routes", "draws", "length_m", "seed",
-    ):  # fmt: skip
+        "readings",
+        "databases",
+        "noise: expected every value once",
+        "period",
+        "routes",
+        "draws",
+        "seed",
+    ):
         assert told in text
 
 
@@ -157,13 +161,13 @@ def test_digest_changes_with_everything_that_changes_runs():
         {},
         {"seed": 1},
         {"draws": 3},
-        {"length_m": 900.0},
+        {"journey": JourneyPlan(length_m=900.0)},
         {"readings": (SET,)},
         {"readings": (replace(SET, choice=FilterChoice(CandidateOptions(threshold=2), 0.0)), LIST)},
-        {"imu": ImuErrors(translation_noise="as_printed")},
-        {"imu": ImuErrors(turns="gyro")},
-        {"walker": WalkerModel(beside="pavement")},
-        {"walker": WalkerModel(stop_every_m=300.0)},
+        {"noises": (ImuNoise(translation_noise="as_printed"),)},
+        {"noises": (ImuNoise(turns="gyro"),)},
+        {"journey": JourneyPlan(walker=WalkerModel(beside="pavement"))},
+        {"journey": JourneyPlan(walker=WalkerModel(stop_every_m=300.0))},
         {"imu_periods_s": (1.0,)},
     )
     assert len({plan(**change).digest for change in changes}) == len(changes)

@@ -26,7 +26,7 @@ from mapfilter.errors import ConfigError
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.global_positioning import informed
 from mapfilter.positioning.locators import FilterChoice
-from mapfilter.simulation.imu import ImuErrors
+from mapfilter.simulation.imu import ImuNoise
 from mapfilter.workflows.evaluate import _world as prepare_world
 from mapfilter.workflows.evaluate_settings import _refused, load_benchmark
 from mapfilter.workflows.filters import filter_choice
@@ -291,9 +291,9 @@ def test_settings_without_a_name_of_their_own_are_not_fixed():
     _, fixed = load({"imu.sigma_trans_m": 0.4, "filter.bayes.map_sd_m": 5.0})
     assert fixed == frozenset()
     _, fixed = load({"imu.sigma_orient_deg": 4.0, "filter.bayes.scale": 0.1})
-    assert fixed == {"sigma_orient_rad", "scale_sd"}
+    assert fixed == {"imu.sigma_orient_deg", "scale_sd"}
     # What a world's own file says holds only where the cases say nothing.
     config, _ = load({})
     assert config.imu.turns == "gyro"
-    world = ImuErrors(sigma_orient_rad=0.5)
-    assert CASES["levels-3"].errors_in(world).sigma_orient_rad == pytest.approx(np.radians(3))
+    world = ImuNoise(sigma_orient_deg=30.0)
+    assert CASES["levels-3"].errors_in(world).sigma_orient_deg == 3

@@ -112,7 +112,7 @@ def log_of(
         serving = radio[radio["role"] == "serving"]
         radio = serving.assign(level_dbm=np.nan, censored=np.int8(0)).reset_index(drop=True)
     errors = case.errors_in(settings.imu, fixed)
-    ticks = at_ticks(_as_walked(walked), settings.imu_period_s)
+    ticks = at_ticks(_as_walked(walked), settings.imu.period_s)
     motion = noisy_motion(ticks, errors, named_rng(seed, "imu", str(number)))
     # Whoever is carried makes no steps, not even noisy ones.
     ends_s = ticks["time_s"].to_numpy()[1:]

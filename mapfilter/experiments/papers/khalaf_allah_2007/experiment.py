@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 from mapfilter.evaluation.success import SuccessCell
 from mapfilter.experiments.sweep.plan import (
-    Noise,
     Radio,
     Reading,
     SweepPlan,
@@ -21,6 +20,7 @@ from mapfilter.experiments.sweep.plan import (
 )
 from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.positioning.locators import FilterChoice
+from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.reports import ReportModel
 
 SIGMA_ORIENT_DEG = (0.0, 3.0, 6.0, 10.0, 15.0, 20.0)
@@ -171,7 +171,7 @@ def _reading(name: str, options: CandidateOptions, margin_db: float = 0.0) -> Re
 
 def _plan(
     readings: tuple[Reading, ...],
-    noises: tuple[Noise, ...],
+    noises: tuple[ImuNoise, ...],
     radio: Radio,
     period_s: float,
     routes: int,
