@@ -62,8 +62,6 @@ def score_claims(estimate: TrackEstimate, truth: Truth, *, until_s: float = inf)
 
     Parameters
     ----------
-    estimate : TrackEstimate
-    truth : Truth
     until_s : float
         Later epochs do not count.
     """

@@ -115,16 +115,7 @@ BANDS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapBound:
-    """What a radio map is good for.
-
-    Parameters
-    ----------
-    radio : RadioMap
-    options : FirstFixOptions
-    position : PositionBound
-    distinct : Distinctness
-    fix : FirstFix
-    """
+    """What a radio map is good for."""
 
     radio: RadioMap
     options: FirstFixOptions

@@ -78,7 +78,6 @@ class RadioMap:
 
     Parameters
     ----------
-    lattice : Lattice
     cell_ids : tuple of str
         Those that are heard, C of them.
     site : numpy.ndarray of int64, shape (C,)

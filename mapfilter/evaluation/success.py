@@ -123,7 +123,6 @@ def summarise(
 
     Parameters
     ----------
-    scores : sequence of Accuracy
     routes : sequence, optional
         The route of each run, as anything that is equal for runs on one route; without it each run
         has its own.
@@ -188,7 +187,6 @@ class SuccessCell:
     ----------
     database, radio, filter, reading : str
         Names.
-    prediction_error_db, report_period_s, imu_period_s, update_length_m, sigma_trans_m : float
     sigma_orient_deg, bias_sd_deg, drift_deg_per_sqrt_s, scale : float
         Where in the grid; NaN where that is not known.
     runs, routes : int

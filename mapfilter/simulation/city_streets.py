@@ -309,7 +309,6 @@ def bend(at: Floats, old_town_m: float, phases: Floats) -> Floats:
     ----------
     at : numpy.ndarray, shape (N, 2)
         Metres from the centre.
-    old_town_m : float
     phases : numpy.ndarray, shape (2, 3)
         Of the waves, radians.
     """

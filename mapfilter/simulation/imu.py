@@ -80,7 +80,6 @@ def noisy_motion(truth: pd.DataFrame, noise: ImuNoise, rng: np.random.Generator)
     ----------
     truth : pandas.DataFrame
         time_s, east_m, north_m at the unit's ticks.
-    noise : ImuNoise
     rng : numpy.random.Generator
         The draws do not depend on ``noise``.
 

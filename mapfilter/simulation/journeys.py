@@ -105,8 +105,6 @@ def journey(
 
     Parameters
     ----------
-    along : Route
-    plan : JourneyPlan
     rng : numpy.random.Generator, optional
         Draws on which side a walker goes, and the stops.
     inside : callable, optional

@@ -37,10 +37,8 @@ class LteRadio:
         Of its antenna, at boresight.
     beamwidth_deg, front_to_back_db : float
         Of its horizontal pattern.
-    frequency_mhz, bandwidth_mhz : float
     noise_figure_db : float
         Of receivers.
-    height_m, mobile_height_m : float
     """
 
     power_dbm: float = 43.0
@@ -111,12 +109,10 @@ def sites_along(
     Parameters
     ----------
     travelled_m : (K,) array_like
-    sites : int
     correlation_m : float
         The correlation along the way is ``exp(-d / correlation_m)``.
     shared : float
         Correlation of any two sites.
-    rng : numpy.random.Generator
 
     Returns
     -------
@@ -147,7 +143,6 @@ def sector_levels_dbm(
 
     Parameters
     ----------
-    radio : LteRadio
     sites_m : (S, 2) array
     boresights_deg : (3,) array_like
         Of the sectors of each site, anticlockwise from east.
@@ -181,7 +176,6 @@ def site_sinr_db(levels_dbm: Floats, noise_dbm: float) -> Floats:
     Parameters
     ----------
     levels_dbm : (..., S, 3) array
-    noise_dbm : float
 
     Raises
     ------
@@ -291,8 +285,6 @@ def detour_m(
     travelled_m : (K,) array_like
     hidden : (K, S) array of bool
         Where it is not 0.
-    rng : numpy.random.Generator
-    mean_m, correlation_m : float
     shared : float
         Correlation of the normal processes of any two stations, from which the excess is drawn.
 

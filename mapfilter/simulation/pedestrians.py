@@ -31,7 +31,6 @@ class GasGround:
 
     Parameters
     ----------
-    lattice : Lattice
     free : (rows, cols) array of bool
         Where one can walk; what its largest connected part does not hold is left out.
     reach_m : float
@@ -153,12 +152,8 @@ def gas_walk(
 
     Parameters
     ----------
-    ground : GasGround
     steps : int
         Epochs; the first one is one interval after the start.
-    speed_mps : float
-    rng : numpy.random.Generator
-    interval_s : float
 
     Returns
     -------

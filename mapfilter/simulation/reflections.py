@@ -100,11 +100,9 @@ def draw_reflections(
 
     Parameters
     ----------
-    model : NlosModel
     travelled_m : (K,) array
         Distance travelled at each epoch, never decreasing.
     elevation_rad : (K, S) array
-    rng : numpy.random.Generator
     """
     satellites = elevation_rad.shape[1]
     level = held_along(travelled_m, satellites, model.memory_m, rng)
@@ -129,8 +127,6 @@ def held_along(
         Distance travelled at each epoch, never decreasing.
     columns : int
         Independent processes.
-    memory_m : float
-    rng : numpy.random.Generator
 
     Returns
     -------

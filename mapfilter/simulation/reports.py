@@ -27,7 +27,6 @@ def running_mean_db(level_dbm: Floats, count: int) -> Floats:
     Parameters
     ----------
     level_dbm : ndarray, shape (N, cells)
-    count : int
 
     Examples
     --------
@@ -50,7 +49,6 @@ def serving_cells(mean_dbm: Floats, heard: Bools, hysteresis_db: float) -> Ints:
     ----------
     mean_dbm : ndarray, shape (N, cells)
     heard : ndarray of bool, shape (N, cells)
-    hysteresis_db : float
 
     Returns
     -------
@@ -153,7 +151,6 @@ def reports(
         From positions to levels, one column for each cell in the plan's order.
     plan : CellPlan
         Tells the carriers and BSICs by which neighbours are known.
-    model : ReportModel
     rng : numpy.random.Generator
         The draws do not depend on ``model``.
 

@@ -40,7 +40,6 @@ class ReceptionModel:
     choice : {"random", "highest"}
         Which of those that can be, reflections alike; with "random" the order is drawn anew every
         ``hold_s``.
-    hold_s : float
     mask_deg : float
         Lower satellites are not received.
     zenith_m : float
@@ -48,7 +47,6 @@ class ReceptionModel:
     echo_m : float
         Mean of the echoes where half of the satellites over the mask are hidden, or more; in the
         open there are none.
-    echo_memory_m : float
     clock_m, drift_mps : float
         First error of the clock, uniform to both sides; deviation of its first rate.
     antenna_m : float
@@ -104,7 +102,6 @@ class Spoofer:
 
     Parameters
     ----------
-    from_s, lasts_s : float
     east_m, north_m : float
         How far off it seems to be.
     clock_m : float
@@ -145,9 +142,6 @@ def receive(
         Its weeks as those of the start.
     start_utc_s : float
         UTC seconds at ``time_s`` = 0.
-    model : ReceptionModel
-    rng : numpy.random.Generator
-    spoofer : Spoofer, optional
 
     Raises
     ------

@@ -33,9 +33,6 @@ class SimulationSettings:
         Different routes.
     draws : int
         Logs for each route, which differ in noise only.
-    journey : JourneyPlan
-    imu : ImuNoise
-    reports : ReportModel
     start_utc_s : float
         When every journey starts, UTC seconds; NaN, the default, where that does not matter.
 
@@ -93,13 +90,11 @@ def simulate_journeys(
 
     Parameters
     ----------
-    network : StreetNetwork
     levels : callable
         From positions to levels in the plan's order, as
         :func:`mapfilter.simulation.reports.level_sampler` makes them.
     plan : CellPlan
         In the network's CRS.
-    settings : SimulationSettings
     seed : int
         Not negative.
     inside : callable, optional

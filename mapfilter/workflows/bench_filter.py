@@ -48,7 +48,6 @@ class StepBench:
 
     Parameters
     ----------
-    particles : int
     step_ns : float
         The kernels alone.
     filter_ns : float
@@ -122,8 +121,6 @@ def bench_filter(
         Repetitions that the medians are of.
     particles : sequence of int
         Numbers of particles of the single step.
-    tracks : int
-    length_m : float
     settings : sequence of str
         ``section.key=value`` of the world.
 

@@ -52,13 +52,10 @@ class EvaluateResult:
     ----------
     map : str
         Name of the map's file.
-    seed : int
     points : int
         Of the database.
-    cases : tuple of CaseResult
     seconds : float
         Wall time.
-    out : Path
     """
 
     map: str

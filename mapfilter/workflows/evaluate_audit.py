@@ -46,7 +46,6 @@ class Change:
 
     Parameters
     ----------
-    name : str
     what : str
         The change in words.
     settings : mapping of str to str
@@ -109,14 +108,7 @@ CHANGES = {
 
 @dataclass(frozen=True)
 class AuditRow:
-    """One row of the table.
-
-    Parameters
-    ----------
-    name, change, world, case : str
-    settings : dict
-    result : CaseResult
-    """
+    """One row of the table."""
 
     name: str
     change: str
@@ -134,11 +126,8 @@ class AuditResult:
     ----------
     map : str
         Name of the map's file.
-    seed : int
-    rows : tuple of AuditRow
     seconds : float
         Wall time.
-    out : Path
     """
 
     map: str

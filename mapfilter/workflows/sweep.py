@@ -108,14 +108,12 @@ class SweepResult:
 
     Parameters
     ----------
-    runs : int
     cells : tuple of SuccessCell
         One for each cell of the grid.
     table : Path
         One row for each run.
     tables : tuple of Path
         One row for each cell of the grid, as CSV and as LaTeX.
-    pictures : tuple of Path
     seconds : float
         Wall time.
     """
@@ -178,7 +176,6 @@ class SweepForecast:
 
     Parameters
     ----------
-    runs : int
     points : int
         Combinations of varied options.
     seconds_per_run : float
@@ -229,7 +226,6 @@ def run_sweep(
 
     Parameters
     ----------
-    config : Config
     axes : mapping of str to sequence of float, optional
         Values of any numeric options of ``[imu]``, ``[journeys]``, ``[filter]`` and of
         ``database.margin_db``, by dotted key: the sweep is run for each combination.

@@ -57,7 +57,6 @@ def sweep_plans(
 
     Parameters
     ----------
-    config : Config
     axes : mapping of str to sequence of float, optional
         Values of numeric options by dotted key, as :func:`mapfilter.config.axes.parse_axis` returns
         them; without any there is one plan.

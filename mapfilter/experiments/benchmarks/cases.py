@@ -26,7 +26,6 @@ class Case:
 
     Parameters
     ----------
-    name : str
     imu : mapping of str to float
         Errors of dead reckoning in which the case differs from the simulated world, by their names
         in :class:`mapfilter.simulation.imu.ImuNoise`.
@@ -69,7 +68,6 @@ class Case:
 
         Parameters
         ----------
-        world : ImuNoise
         fixed : frozenset of str
             Names that were set for all cases.
         """

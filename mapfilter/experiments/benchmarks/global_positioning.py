@@ -42,10 +42,6 @@ class Batch:
 
     Parameters
     ----------
-    world : BenchmarkWorld
-    choice : FilterChoice
-    cases : tuple of str
-    seed : int
     first, end : int
         Numbers of the routes.
     fixed : frozenset of str
@@ -98,8 +94,6 @@ def informed(choice: FilterChoice, case: Case, fixed: frozenset[str] = frozenset
 
     Parameters
     ----------
-    choice : FilterChoice
-    case : Case
     fixed : frozenset of str
         Options that were set for all cases.
     """
@@ -133,17 +127,12 @@ def benchmark(
 
     Parameters
     ----------
-    world : BenchmarkWorld
-    choice : FilterChoice
     cases : sequence of str
         Names out of :data:`mapfilter.experiments.benchmarks.cases.CASES`.
     runs : int
         Routes for each case, each with a ground truth of its own.
-    seed : int
     out : Path
         Folder in which finished batches are kept.
-    executor : Executor, optional
-    in_flight : int
     resume : bool
         Keep what the same benchmark has finished.
     progress : callable, optional

@@ -94,11 +94,8 @@ def log_of(
 
     Parameters
     ----------
-    case : Case
-    walked : Walk
     levels : callable
         The ground truth's.
-    streets : SweepWorld
     settings : SimulationSettings
         Of the world: reports, and errors of dead reckoning.
     seed, number : int

@@ -55,8 +55,6 @@ class Session:
 
     Parameters
     ----------
-    name : str
-    path : Path
     time_s : ndarray of float64, shape (N,)
         Unix seconds.
     lon_deg, lat_deg, accuracy_m : ndarray
@@ -142,11 +140,8 @@ def session_log(
 
     Parameters
     ----------
-    session : Session
     crs : str
         Of the log.
-    errors : ReckoningErrors
-    rng : numpy.random.Generator
     step_factor : float
         That all steps are multiplied by, as :func:`step_factor_of` learns it of other sessions.
     """
@@ -182,7 +177,6 @@ def step_factor_of(others: Sequence[Session], crs: str) -> float:
     ----------
     others : sequence of Session
         Of the same receiver, but not the one that is to be found.
-    crs : str
     """
     ratios = []
     for other in others:

@@ -62,9 +62,6 @@ def with_satellites(
     ----------
     case : Case
         Its number of satellites replaces the model's.
-    log : TrackLog
-    walked : Walk
-    skyline : Skyline or None
     seed, number : int
         Of the benchmark, of the route.
     model : ReceptionModel, optional

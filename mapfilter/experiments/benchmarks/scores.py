@@ -37,8 +37,6 @@ class CaseResult:
 
     Parameters
     ----------
-    name, filter : str
-    runs : int
     success, success_low, success_high : float
         Share of the runs that were at most 50 m off when they converged; in the cases of a
         displacement, within 50 m again, and for 10 s, soon enough.
@@ -59,7 +57,6 @@ class CaseResult:
         Share of the claimed epochs that were at most 50 m off.
     coverage_50, coverage_67, coverage_95 : float
         Share of the claimed epochs whose radius held the truth.
-    coverage_95_low, coverage_95_high : float
     false_converged_per_journey, false_converged_per_km : float
         How often a claim began more than 50 m off, also after LOST.
     false_lost_per_journey, false_lost_per_km : float

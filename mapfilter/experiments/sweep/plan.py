@@ -54,8 +54,6 @@ class Reading:
 
     Parameters
     ----------
-    name : str
-    choice : FilterChoice
     update_length_m : float
         Of the filter; NaN where it knows none.
     """
@@ -91,16 +89,12 @@ class SweepPlan:
         Names of the radio-route databases.
     noises : tuple of ImuNoise
         Their ``period_s`` is replaced by that of ``imu_periods_s``.
-    radios : tuple of Radio
-    report_periods_s : tuple of float
     imu_periods_s : tuple of float
         None takes each report period.
     routes, draws : int
         Routes, and runs on each of them with every setting; they differ in noise only.
-    journey : JourneyPlan
     reports : ReportModel
         Its period and ``radio`` are replaced by the grid's.
-    seed : int
     varied : tuple of (str, float)
         Options in which this plan differs from others of the same sweep, by dotted key; they become
         columns of the table.

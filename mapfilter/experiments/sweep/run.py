@@ -49,7 +49,6 @@ class Batch:
 
     Parameters
     ----------
-    plan : SweepPlan
     world : Path
         Folder of the world.
     world_sha256 : str

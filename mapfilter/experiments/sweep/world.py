@@ -33,7 +33,6 @@ class SweepWorld:
     ----------
     network : StreetNetwork
         In the lattice's CRS.
-    plan : CellPlan
     lattice : Lattice
         Of the levels.
     levels_dbm : mapping of str to ndarray, shape (cells, rows, cols)
