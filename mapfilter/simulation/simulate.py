@@ -11,10 +11,11 @@ import pandas as pd
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.geodesy import same_crs
 from mapfilter.radio.cells import CellPlan
+from mapfilter.rasters.rxlev_rasters import RxLevRasters
 from mapfilter.roads.network import StreetNetwork
 from mapfilter.simulation.imu import ImuNoise, noisy_motion
 from mapfilter.simulation.journeys import JourneyPlan, journey
-from mapfilter.simulation.reports import Levels, ReportModel, reports
+from mapfilter.simulation.reports import Levels, ReportModel, level_sampler, reports
 from mapfilter.simulation.routes import route
 from mapfilter.simulation.walking import Inside
 from mapfilter.tracks.log import TrackLog, make_log
@@ -77,52 +78,56 @@ class SimulationSettings:
 
 def simulate_journeys(
     network: StreetNetwork,
-    levels: Levels,
+    levels: Levels | RxLevRasters,
     plan: CellPlan,
-    settings: SimulationSettings,
-    seed: int,
+    settings: SimulationSettings | None = None,
+    seed: int = 0,
     inside: Inside | None = None,
 ) -> Iterator[tuple[str, TrackLog]]:
-    """Make journeys one after another.
+    """Simulate journeys one after another.
 
     The randomness of route, inertial unit and radio comes from (seed, journey, draw) apart from
     each other: more journeys or draws, or another noise, change no other journey.
 
     Parameters
     ----------
-    levels : callable
-        From positions to levels in the plan's order, as
-        :func:`mapfilter.simulation.reports.level_sampler` makes them.
+    network : StreetNetwork
+    levels : RxLevRasters or callable
+        The true levels: rasters, or a function from positions to levels in the plan's order, as
+        :func:`mapfilter.simulation.reports.level_sampler` returns it.
     plan : CellPlan
         In the network's CRS.
+    settings : SimulationSettings, optional
+        Journeys, dead reckoning and reports.
     seed : int
         Not negative.
     inside : callable, optional
-        Where buildings keep walkers off the pavement.
+        Where buildings keep walkers off the pavement, see
+        :func:`mapfilter.simulation.walking.inside_buildings`.
 
     Yields
     ------
     name : str
         Such as ``journey-0003-draw-000``; names sort in the order of the journeys.
     log : TrackLog
+        With its truth.
 
     Raises
     ------
     InputError
-        Plan and network differ in their CRS, or one cannot go as far as wanted.
+        Plan and network differ in their CRS, or no route is as long as wanted.
     """
+    settings = settings or SimulationSettings()
     if not same_crs(plan.crs, network.crs):
         raise fail(InputError, "cell plan, crs", f"the streets' {network.crs}", plan.crs)
+    if isinstance(levels, RxLevRasters):
+        levels = level_sampler(levels, plan.ids, plan=plan)
+    walk, leg_m = settings.journey, settings.journey.leg_m
     for j in range(settings.journeys):
-        along = route(
-            network,
-            settings.journey.length_m,
-            _rng(seed, _ROUTE, j),
-            leg_m=settings.journey.leg_m,
-        )
+        along = route(network, walk.length_m, _rng(seed, _ROUTE, j), leg_m=leg_m)
         for d in range(settings.draws):
             # All draws of a route are the same walk.
-            truth = journey(along, settings.journey, _rng(seed, _WALKER, j), inside)
+            truth = journey(along, walk, _rng(seed, _WALKER, j), inside)
             rngs = _rng(seed, _IMU, j, d), _rng(seed, _RADIO, j, d)
             log = simulate_log(network.crs, truth, levels, plan, settings, *rngs)
             yield f"journey-{j:04d}-draw-{d:03d}", log

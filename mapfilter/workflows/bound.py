@@ -14,8 +14,8 @@ from mapfilter._parallel import Progress
 from mapfilter._types import Floats
 from mapfilter.database.store import open_database
 from mapfilter.evaluation.first_fix import FirstFixOptions
-from mapfilter.evaluation.map_bound import TWIN_ERROR, MapBound, map_bound, on_lattice, write_bound
-from mapfilter.evaluation.radio_map import ErrorModel, radio_map
+from mapfilter.evaluation.map_bound import TWIN_ERROR, MapBound, bound, on_lattice, write_bound
+from mapfilter.evaluation.radio_map import ErrorModel
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.bound import plot_metres_to_fix, plot_position_bound, plot_twins
 
@@ -99,11 +99,10 @@ def run_bound(
         cannot be written.
     """
     began_s = time.perf_counter()
-    errors, options = errors or ErrorModel(), options or FirstFixOptions()
     database = open_database(path)
-    radio = radio_map(database)
     ensure_writable_folder(out)
-    found = map_bound(radio, errors, options, np.random.default_rng(seed), progress)
+    found = bound(database, errors=errors, options=options, seed=seed, progress=progress)
+    radio = found.radio
     columns = found.at_points()
     rasters = {name: on_lattice(radio, values) for name, values in columns.items()}
     write_bound(rasters, radio.lattice, out / "bound.tif", database.attribution)

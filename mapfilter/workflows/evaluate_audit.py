@@ -11,8 +11,7 @@ from mapfilter._io import write_json
 from mapfilter._parallel import Progress, part_of
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.experiments.benchmarks.scores import CaseResult
-from mapfilter.workflows.evaluate import TABLE, run_global_positioning
-from mapfilter.workflows.evaluate_settings import load_benchmark
+from mapfilter.workflows.evaluate import TABLE, load_benchmark, run_global_positioning
 from mapfilter.workflows.jsonable import to_jsonable
 
 _GYRO = {
@@ -154,7 +153,7 @@ def run_audit(
     Parameters
     ----------
     config, settings
-        As for :func:`mapfilter.workflows.evaluate_settings.load_benchmark`; each row's change comes
+        As for :func:`mapfilter.workflows.evaluate.load_benchmark`; each row's change comes
         after them.
     out : Path
         Gets a folder for each row, and ``table.json``.

@@ -5,7 +5,7 @@ from math import erfc
 import numpy as np
 import pytest
 
-from mapfilter.evaluation.ideal_filter import (
+from mapfilter.evaluation.first_fix import (
     _entropy_bits,
     _mass_near,
     _serves,

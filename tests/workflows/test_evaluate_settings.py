@@ -27,8 +27,8 @@ from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.global_positioning import informed
 from mapfilter.positioning.locators import FilterChoice
 from mapfilter.simulation.imu import ImuNoise
+from mapfilter.workflows.evaluate import _refused, load_benchmark
 from mapfilter.workflows.evaluate import _world as prepare_world
-from mapfilter.workflows.evaluate_settings import _refused, load_benchmark
 from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.world import World
 

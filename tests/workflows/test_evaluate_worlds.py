@@ -16,8 +16,8 @@ from mapfilter.propagation.predict import GroundTruthErrors, PredictionModel
 from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
+from mapfilter.workflows.evaluate import WORLDS, load_benchmark
 from mapfilter.workflows.evaluate import _world as prepare_world
-from mapfilter.workflows.evaluate_settings import WORLDS, load_benchmark
 from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.predict import ground_truth_errors, prediction_model
 from mapfilter.workflows.simulate import simulation_settings

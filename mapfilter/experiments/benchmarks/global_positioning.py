@@ -16,8 +16,14 @@ from mapfilter._io import read_json, write_json
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter._resume import start_or_resume
 from mapfilter.experiments.benchmarks.cases import CASES, Case
-from mapfilter.experiments.benchmarks.journeys import displaced_walk, log_of, walk
-from mapfilter.experiments.benchmarks.satellites import TOWN_HEIGHT, spoofer_of, with_satellites
+from mapfilter.experiments.benchmarks.journeys import (
+    TOWN_HEIGHT,
+    displaced_walk,
+    log_of,
+    spoofer_of,
+    walk,
+    with_satellites,
+)
 from mapfilter.experiments.benchmarks.scores import (
     CaseResult,
     Row,

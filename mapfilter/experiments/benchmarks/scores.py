@@ -10,13 +10,14 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.evaluation.accuracy import (
+    RADII,
     SUCCESS_RADIUS_M,
     Truth,
     accuracy,
     percentile_m,
     position_errors_m,
+    score_claims,
 )
-from mapfilter.evaluation.claims import RADII, score_claims
 from mapfilter.evaluation.success import wilson_interval_of_routes
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.benchmarks.journeys import Walk

@@ -18,6 +18,7 @@ import pyarrow as pa
 from mapfilter._io import ensure_writable_folder, sha256_file
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter._resume import start_or_resume
+from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.errors import StoreError, fail
 from mapfilter.evaluation.accuracy import accuracy
@@ -185,6 +186,35 @@ def sweep(
     table.join_parts(parts, out / RUNS, schema)
     shutil.rmtree(unfinished, ignore_errors=True)
     return out / RUNS
+
+
+def sweep_runs(
+    plans: SweepPlan | Sequence[SweepPlan],
+    world: SweepWorld,
+    databases: Mapping[str, RadioRouteDatabase],
+    *,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> pd.DataFrame:
+    """Do all runs of a sweep and return one row for each run; nothing is kept on disk.
+
+    Parameters
+    ----------
+    plans, world, executor, progress
+        As for :func:`sweep`; see :meth:`SweepWorld.of` for a world of your own objects.
+    databases : mapping of str to RadioRouteDatabase
+        Each of the plans' databases.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The columns of :data:`mapfilter.experiments.sweep.table.SCHEMA` and those of varied options.
+        :func:`mapfilter.evaluation.success.success_cells` gives success rates with intervals.
+    """
+    folders = {name: database.path for name, database in databases.items()}
+    with tempfile.TemporaryDirectory(prefix="mapfilter-sweep-") as name:
+        done = sweep(plans, world, folders, Path(name), executor=executor, progress=progress)
+        return table.read_runs(done)
 
 
 def seconds_per_run(plan: SweepPlan, world: SweepWorld, databases: Mapping[str, Path]) -> float:
