@@ -14,7 +14,6 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats
-from mapfilter.errors import InputError, fail
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import unproject
 from mapfilter.positioning.estimate import TrackEstimate
@@ -109,35 +108,8 @@ def percentile_m(errors_m: Floats, share: float) -> float:
     return float(np.sort(errors_m)[max(rank, 1) - 1])
 
 
-def score(estimate: TrackEstimate, truth: Truth | pd.DataFrame) -> Accuracy:
-    """Score an estimated track against the truth.
-
-    Parameters
-    ----------
-    estimate : TrackEstimate
-    truth : Truth or pandas.DataFrame
-        time_s, east_m, north_m in the CRS of the estimate, such as ``log.truth``.
-
-    Returns
-    -------
-    Accuracy
-        Convergence, error at convergence, mean and percentiles of the error from there on.
-
-    Raises
-    ------
-    InputError
-        The truth has fewer than two positions.
-    """
-    if isinstance(truth, Truth):
-        return accuracy(estimate, truth)
-    known = Truth.of_table(truth)
-    if known is None:
-        raise fail(InputError, "truth", "at least two positions", len(truth))
-    return accuracy(estimate, known)
-
-
 def accuracy(estimate: TrackEstimate, truth: Truth) -> Accuracy:
-    """Score one track; see :func:`score`."""
+    """Score one track."""
     nan = float("nan")
     switch = estimate.converged_at
     if switch is None:

@@ -27,7 +27,7 @@ from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel, Start
 from mapfilter.positioning.bayes.options import BayesOptions, open_area
-from mapfilter.positioning.bayes.replay import position_by_bayes
+from mapfilter.positioning.filter import locate
 from mapfilter.positioning.epochs import epochs
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.store import list_logs, read_log
@@ -134,7 +134,7 @@ def bench_filter(
         database, folders = make_world(Path(name), given)
         logs = [read_log(folder) for folder in folders]
         area = open_area(open_database(database))
-        positioner = BayesOptions().over(area)
+        positioner = BayesOptions().over_area(area)
         steps = [_step(positioner.model, logs[0], count, runs) for count in particles]
         # The first loads what is compiled.
         timed = [_track(positioner, log) for _ in range(runs + 1) for log in logs][len(logs) :]
@@ -235,7 +235,7 @@ def _track(positioner: BayesPositioner, log: TrackLog) -> tuple[float, int]:
     began_s = time.process_time()
     for epoch in merged:
         before = track.challenger
-        track, _ = positioner.advance(track, epoch, rng)
+        track, _ = positioner.step(track, epoch, rng)
         challenges += before is None and track.challenger is not None
     return time.process_time() - began_s, challenges
 
@@ -270,6 +270,6 @@ def locating_memory_bytes(database: Path, log: Path, *, smooth: bool) -> tuple[i
 def locate_once(database: Path, log: Path, *, smooth: bool) -> tuple[int, int]:
     """Open, locate, and return this process's peak memory (bytes) before and after."""
     loaded = peak_memory_bytes()
-    positioner = BayesOptions(smooth=smooth).over(open_area(open_database(database)))
-    position_by_bayes(positioner, read_log(log), np.random.default_rng(0), smooth=smooth)
+    positioner = BayesOptions(smooth=smooth).over(open_database(database))
+    locate(read_log(log), positioner, np.random.default_rng(0))
     return loaded, peak_memory_bytes()

@@ -9,8 +9,7 @@ import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.evaluation.accuracy import Truth
-from mapfilter.positioning.candidate import PositionedTrack
-from mapfilter.positioning.estimate import Snapshot
+from mapfilter.positioning.estimate import PositionedTrack, Snapshot
 from mapfilter.report.belief import plot_belief, plot_candidates
 from mapfilter.report.errors import plot_error_over_distance
 from mapfilter.report.evidence import plot_evidence

@@ -77,13 +77,13 @@ def sweep_plans(
             databases[name] = open_database(path, verify="full")
         except MapfilterError as error:
             faults.found.extend(error.faults)
-    resolution_m = _one_resolution(databases, faults)
+    _check_resolutions(databases, faults)
     broken = bool(faults.found)
     plans: list[SweepPlan] = []
     try:
         for values in itertools.product(*(axes or {}).values()):
             point = dict(zip(axes or {}, values, strict=True))
-            plan = _plan(_varied(config, point), tuple(paths), resolution_m)
+            plan = _plan(_varied(config, point), tuple(paths))
             plans.append(replace(plan, varied=tuple(point.items())))
         _check_effect(plans, axes or {}, faults)
     except ConfigError as error:
@@ -114,16 +114,15 @@ def _check_effect(plans: Sequence[SweepPlan], axes: Iterable[str], faults: Fault
             faults.add(f"--vary {key}", expected, "one without effect", hint)
 
 
-def _one_resolution(databases: Mapping[str, RadioRouteDatabase], faults: Faults) -> float:
+def _check_resolutions(databases: Mapping[str, RadioRouteDatabase], faults: Faults) -> None:
     found = {name: database.lattice.resolution_m for name, database in databases.items()}
     if len(set(found.values())) > 1:
         faults.add("sweep.databases", "databases of one resolution", found)
-    return next(iter(found.values()), 5.0)
 
 
-def _plan(config: Config, databases: tuple[str, ...], resolution_m: float) -> SweepPlan:
+def _plan(config: Config, databases: tuple[str, ...]) -> SweepPlan:
     section, settings = config.sweep, simulation_settings(config)
-    readings, reports = _readings(config, resolution_m), settings.reports
+    readings, reports = _readings(config), settings.reports
     # No candidate filter uses neighbours, and the serving cell does not depend on them.
     if all(one.choice.name == "candidate" for one in readings):
         reports = replace(reports, max_neighbours=0)
@@ -158,7 +157,7 @@ def _radios(config: Config) -> tuple[Radio, ...]:
     return (Radio(GROUND_TRUTH, math.nan),)
 
 
-def _readings(config: Config, resolution_m: float) -> tuple[Reading, ...]:
+def _readings(config: Config) -> tuple[Reading, ...]:
     named = config.sweep.readings or (ReadingSection(name=config.filter.name),)
     readings = []
     for one in named:
@@ -167,14 +166,14 @@ def _readings(config: Config, resolution_m: float) -> tuple[Reading, ...]:
             given["name"] = one.filter
         section = FilterSection(**{**config.filter.model_dump(), **given})
         if section.name != "candidate":
-            readings.append(Reading(one.name, filter_choice(section, resolution_m)))
+            readings.append(Reading(one.name, filter_choice(section)))
             continue
         lengths_m = config.sweep.update_length_m
         if lengths_m is None or one.update_length_m is not None:
             lengths_m = (section.update_length_m,)
         for length_m in map(float, lengths_m):
             chosen = section.model_copy(update={"update_length_m": length_m})
-            readings.append(Reading(one.name, filter_choice(chosen, resolution_m), length_m))
+            readings.append(Reading(one.name, filter_choice(chosen), length_m))
     return tuple(readings)
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, fields, replace
 from math import ceil, isfinite, prod
 
 from mapfilter.errors import ConfigError, Faults
-from mapfilter.positioning.locators import FilterChoice
+from mapfilter.positioning.filter import FilterOptions
 from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
@@ -59,7 +59,7 @@ class Reading:
     """
 
     name: str
-    choice: FilterChoice
+    choice: FilterOptions
     update_length_m: float = float("nan")
 
 
