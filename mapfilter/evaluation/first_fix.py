@@ -22,14 +22,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import erfc
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, Lt
 from numba import njit
 
 from mapfilter._parallel import Progress
-from mapfilter._types import Bools, Floats, Ints
+from mapfilter._types import Bools, Floats, Floats32, Ints
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
 from mapfilter.evaluation.radio_map import (
     MOST_HEARD,
@@ -106,12 +106,33 @@ def _serves(level_dbm, best_dbm, floor_dbm, margin_db):  # type: ignore[no-untyp
     return level_dbm > floor_dbm and level_dbm >= best_dbm - margin_db
 
 
+class Levels(NamedTuple):
+    """Levels of all pixels and cells, and where hypotheses may be, for the kernels."""
+
+    near_way: Bools
+    level_dbm: Floats32
+    best_dbm: Floats32
+    site: Ints
+    floor_dbm: float
+    margin_db: float
+
+
+class Judgement(NamedTuple):
+    """Errors of levels, and when a journey counts as clear, for the kernels."""
+
+    deviation_db: float
+    correlation_m: float
+    share: float
+    near_px: float
+    path_m: float
+    apart_px: float
+    mass: float
+
+
 @njit(cache=True)
-def judged_by_cells(  # type: ignore[no-untyped-def]
-    rows, cols, gone_m, row, col, near_way, level_dbm, best_dbm, floor_dbm, margin_db, near_px,
-    path_m,
-):  # fmt: skip
+def judged_by_cells(rows, cols, gone_m, row, col, levels, near_px, path_m):  # type: ignore[no-untyped-def]
     """Return metres until all hypotheses are near the truth, and bits after ``path_m``."""
+    near_way, level_dbm, best_dbm, _, floor_dbm, margin_db = levels
     clear_m, bits = np.inf, -1.0
     from_row, from_col = row.copy(), col.copy()
     left = from_row.size
@@ -143,10 +164,11 @@ def judged_by_cells(  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def judged_by_levels(  # type: ignore[no-untyped-def]
-    rng, rows, cols, gone_m, row, col, point, near_way, level_dbm, site, floor_dbm, deviation_db,
-    correlation_m, share, near_px, path_m, apart_px, mass,
-):  # fmt: skip
+    rng, rows, cols, gone_m, row, col, point, levels, judgement
+):
     """Return metres until levels decide, whether rightly, bits, twin, and the twin's error."""
+    near_way, level_dbm, _, site, floor_dbm, _ = levels
+    deviation_db, correlation_m, share, near_px, path_m, apart_px, mass = judgement
     clear_m, right, bits, twin, twin_error = np.inf, 0.0, -1.0, -1.0, 0.0
     cell_count = level_dbm.shape[2]
     own_db, site_db = rng.standard_normal(cell_count), rng.standard_normal(site.max() + 1)
@@ -353,15 +375,24 @@ def first_fix(
     first, point = radio.points_by_cell()
     best_dbm = radio.level_dbm.max(axis=2)
     found = np.full((*shape, 7), np.nan)
+    levels = Levels(
+        radio.near_way, radio.level_dbm, best_dbm, radio.site, radio.floor_dbm, radio.margin_db
+    )
+    resolution_m = radio.lattice.resolution_m
+    judgement = Judgement(
+        errors.deviation_db,
+        errors.correlation_m,
+        errors.site_share,
+        SUCCESS_RADIUS_M / resolution_m,
+        options.path_m,
+        options.apart_m / resolution_m,
+        options.mass,
+    )
+    own = radio.row, radio.col, radio.server, first, point
+    walked = radio.on_way, resolution_m, options.most_m
     for begin in range(0, start.size, _AT_A_TIME):
         part = slice(begin, begin + _AT_A_TIME)
-        found[part] = _try_all(
-            rng, start[part], options.journeys, radio.row, radio.col, radio.server, first, point,
-            radio.on_way, radio.near_way, radio.level_dbm, best_dbm, radio.site,
-            radio.floor_dbm, radio.margin_db, radio.lattice.resolution_m, errors.deviation_db,
-            errors.correlation_m, errors.site_share, options.most_m, options.path_m,
-            options.apart_m, options.mass, SUCCESS_RADIUS_M,
-        )  # fmt: skip
+        found[part] = _try_all(rng, start[part], options.journeys, own, walked, levels, judgement)
         if progress is not None:
             progress(min(begin + _AT_A_TIME, start.size), start.size)
     return FirstFix(
@@ -377,24 +408,21 @@ def first_fix(
 
 
 @njit(cache=True)
-def _try_all(  # type: ignore[no-untyped-def]
-    rng, start, journeys, row, col, server, first, point, on_way, near_way, level_dbm, best_dbm,
-    site, floor_dbm, margin_db, resolution_m, deviation_db, correlation_m, share, most_m, path_m,
-    apart_m, mass, success_m,
-):  # fmt: skip
+def _try_all(rng, start, journeys, points, walked, levels, judgement):  # type: ignore[no-untyped-def]
+    row, col, server, first, point = points
+    on_way, resolution_m, most_m = walked
+    near_px, path_m = judgement.near_px, judgement.path_m
     found = np.empty((start.size, journeys, 7))
     for i in range(start.size):
         here = start[i]
         own = point[first[server[here]] : first[server[here] + 1]]
+        rows_own, cols_own = row[own], col[own]
         for j in range(journeys):
             rows, cols, gone_m = walk(rng, on_way, row[here], col[here], resolution_m, most_m)
             found[i, j, 0:2] = judged_by_cells(
-                rows, cols, gone_m, row[own], col[own], near_way, level_dbm, best_dbm, floor_dbm,
-                margin_db, success_m / resolution_m, path_m,
-            )  # fmt: skip
+                rows, cols, gone_m, rows_own, cols_own, levels, near_px, path_m
+            )
             found[i, j, 2:7] = judged_by_levels(
-                rng, rows, cols, gone_m, row[own], col[own], own, near_way, level_dbm, site,
-                floor_dbm, deviation_db, correlation_m, share, success_m / resolution_m, path_m,
-                apart_m / resolution_m, mass,
-            )  # fmt: skip
+                rng, rows, cols, gone_m, rows_own, cols_own, own, levels, judgement
+            )
     return found

@@ -109,9 +109,14 @@ TWIN_ERROR = 0.3
 """Two places count as twins when they are mistaken for each other with at least this chance."""
 
 BANDS = (
-    ("plane_bound_m", "m"), ("along_bound_m", "m"), ("cell_bits", "bit"), ("level_bits", "bit"),
-    ("cells_to_fix_m", "m"), ("levels_to_fix_m", "m"), ("twin_error", ""),
-)  # fmt: skip
+    ("plane_bound_m", "m"),
+    ("along_bound_m", "m"),
+    ("cell_bits", "bit"),
+    ("level_bits", "bit"),
+    ("cells_to_fix_m", "m"),
+    ("levels_to_fix_m", "m"),
+    ("twin_error", ""),
+)
 """What the raster holds, in the order of its bands, with units."""
 
 
@@ -291,11 +296,20 @@ def write_bound(
         The file cannot be written.
     """
     profile = {
-        "driver": "GTiff", "width": lattice.cols, "height": lattice.rows, "count": len(BANDS),
-        "dtype": "float32", "nodata": np.nan, "crs": lattice.crs, "interleave": "band",
-        "transform": rasterio.Affine.from_gdal(*lattice.gdal_transform), "tiled": True,
-        "blockxsize": _BLOCK_PX, "blockysize": _BLOCK_PX, "bigtiff": "if_safer",
-    }  # fmt: skip
+        "driver": "GTiff",
+        "width": lattice.cols,
+        "height": lattice.rows,
+        "count": len(BANDS),
+        "dtype": "float32",
+        "nodata": np.nan,
+        "crs": lattice.crs,
+        "interleave": "band",
+        "transform": rasterio.Affine.from_gdal(*lattice.gdal_transform),
+        "tiled": True,
+        "blockxsize": _BLOCK_PX,
+        "blockysize": _BLOCK_PX,
+        "bigtiff": "if_safer",
+    }
     with atomic_file(path) as temporary:
         bands = temporary.with_name("bands.tif")
         try:
@@ -307,8 +321,14 @@ def write_bound(
                     target.set_band_description(band, name)
                     target.set_band_unit(band, unit)
             copy_raster(
-                bands, temporary, driver="COG", compress="DEFLATE", predictor="YES",
-                blocksize=_BLOCK_PX, overview_resampling="nearest", bigtiff="if_safer",
-            )  # fmt: skip
+                bands,
+                temporary,
+                driver="COG",
+                compress="DEFLATE",
+                predictor="YES",
+                blocksize=_BLOCK_PX,
+                overview_resampling="nearest",
+                bigtiff="if_safer",
+            )
         except (RasterioError, CPLE_BaseError) as error:
             raise fail(OutputError, str(path), "a place that can be written", error) from error

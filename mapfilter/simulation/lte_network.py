@@ -101,9 +101,12 @@ def turned(places_m: Floats, angle_deg: float) -> Floats:
 
 
 def sites_along(
-    travelled_m: ArrayLike, sites: int, correlation_m: float, shared: float,
+    travelled_m: ArrayLike,
+    sites: int,
+    correlation_m: float,
+    shared: float,
     rng: np.random.Generator,
-) -> Floats:  # fmt: skip
+) -> Floats:
     """Draw standard normal numbers for sites, part of which is common: what is near the receiver.
 
     Parameters
@@ -164,8 +167,9 @@ def sector_levels_dbm(
     bearing = np.arctan2(away[..., 1], away[..., 0])[..., None]
     gain = sector_gain_db(
         bearing - np.radians(np.asarray(boresights_deg, dtype=np.float64)),
-        np.radians(radio.beamwidth_deg), radio.front_to_back_db,
-    )  # fmt: skip
+        np.radians(radio.beamwidth_deg),
+        radio.front_to_back_db,
+    )
     level = radio.power_dbm + radio.gain_dbi - loss + np.asarray(shadowing_db)
     return np.asarray(level[..., None] + gain)
 
@@ -272,9 +276,14 @@ class ArrivalModel:
 
 
 def detour_m(
-    travelled_m: ArrayLike, hidden: Bools, rng: np.random.Generator, *,
-    mean_m: float = 15.0, correlation_m: float = 10.0, shared: float = 0.5,
-) -> Floats:  # fmt: skip
+    travelled_m: ArrayLike,
+    hidden: Bools,
+    rng: np.random.Generator,
+    *,
+    mean_m: float = 15.0,
+    correlation_m: float = 10.0,
+    shared: float = 0.5,
+) -> Floats:
     """Draw the excess of ways without line of sight: exponential, correlated along the way.
 
     Part of a detour is near the receiver and common to all stations; differences of times are free

@@ -350,9 +350,12 @@ def _clock_m(count: int, model: ReceptionModel, rng: np.random.Generator) -> Flo
 
 
 def _sky(
-    seen: Directions, place: Floats, skyline: Skyline | None, frame: GridFrame,
+    seen: Directions,
+    place: Floats,
+    skyline: Skyline | None,
+    frame: GridFrame,
     model: ReceptionModel,
-) -> tuple[Bools, Floats]:  # fmt: skip
+) -> tuple[Bools, Floats]:
     """Return who is seen at each epoch, (K, S), and how large echoes are, (K,)."""
     above = seen.above(model.mask_deg)
     if skyline is None:

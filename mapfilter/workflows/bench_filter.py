@@ -27,8 +27,8 @@ from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel, Start
 from mapfilter.positioning.bayes.options import BayesOptions, open_area
-from mapfilter.positioning.filter import locate
 from mapfilter.positioning.epochs import epochs
+from mapfilter.positioning.filter import locate
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.store import list_logs, read_log
 from mapfilter.workflows.build import run_build
@@ -180,9 +180,16 @@ def step_inputs(model: BayesModel, log: TrackLog, count: int) -> tuple[StepInput
     size = cell.size
     rho = np.full(size, 0.7, dtype=np.float32)
     levels = LevelReading(
-        cell, (0.3 * level[cell]).astype(np.float32), rho,
-        np.full(size, 0.1, dtype=np.float32), 0.3, 0.7, 3.0, 4.0, 3.0,
-    )  # fmt: skip
+        cell,
+        (0.3 * level[cell]).astype(np.float32),
+        rho,
+        np.full(size, 0.1, dtype=np.float32),
+        0.3,
+        0.7,
+        3.0,
+        4.0,
+        3.0,
+    )
     reading = RadioReading(int(cell[0]), 5 / 40, levels, length_m=5.0)
     return StepInputs(model, MotionStep(1.4, radians(37.0)), reading, levels), belief
 

@@ -146,12 +146,17 @@ def run_ottawa(
     files = {part: _session_files(data, part) for part in parts}
     tasks = [
         Task(
-            part, file, tuple(other for other in every if other != file),
-            out / part / file.stem, chosen, runs, seed,
+            part,
+            file,
+            tuple(other for other in every if other != file),
+            out / part / file.stem,
+            chosen,
+            runs,
+            seed,
         )
         for part, every in files.items()
         for file in every
-    ]  # fmt: skip
+    ]
     ensure_writable_folder(out)
     head = {"version": _VERSION, "seed": seed, "runs": runs, "options": repr(chosen)}
     start_or_resume(out / HEAD, head, [task.result for task in tasks], resume=resume)

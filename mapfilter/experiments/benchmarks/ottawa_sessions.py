@@ -24,10 +24,9 @@ LONGEST_GAP_S = 30.0
 """Nothing is known of the way over a longer silence."""
 _MOST_STEPS = 1282
 _GOOD_M, _MOVED_M = 20.0, 4.0
-_COLUMNS = (
-    "mcc", "mnc", "lac", "cellid", "lat", "lon", "signal", "measured_at", "rating", "speed",
-    "direction", "ta",
-)  # fmt: skip
+_IDENTITY = ("mcc", "mnc", "lac", "cellid")
+_GNSS = ("lat", "lon", "measured_at", "rating", "speed", "direction")
+_COLUMNS = (*_IDENTITY, *_GNSS, "signal", "ta")
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +108,7 @@ def read_session(path: Path) -> Session:
         raise fail(InputError, str(path), "two rows or more", len(numbers))
     steps = _column(numbers, "ta")
     told = (steps >= 0) & (steps <= _MOST_STEPS)
-    identity = numbers[["mcc", "mnc", "lac", "cellid"]].astype(np.int64)
+    identity = numbers[list(_IDENTITY)].astype(np.int64)
     return Session(
         path.stem,
         path,
