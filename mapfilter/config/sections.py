@@ -33,7 +33,7 @@ from mapfilter.propagation.models import Clutter, ModelName
 from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
-from mapfilter.tracks.leave_out import Kind
+from mapfilter.tracks.log import Kind
 
 
 class CellColumns(Section):

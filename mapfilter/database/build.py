@@ -1,4 +1,4 @@
-"""Roads times rasters: building a radio-route database tile by tile."""
+"""Build a radio-route database from rasters and roads, tile by tile."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from mapfilter._io import atomic_dir, check_replaceable
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter._resume import FinishedParts
 from mapfilter.database.manifest import FORMAT, MANIFEST, InputFile
+from mapfilter.database.parquet import Window
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.sources import LatticeRoutes, Routes, check_aligned, overlap
@@ -30,11 +31,10 @@ from mapfilter.database.tiles import (
     read_tiles,
     tile_windows,
 )
-from mapfilter.database.windows import Window
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, check_against_plan
+from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan
 from mapfilter.roads.lattice import RouteLattice
 
 MARGIN_DB = 6.0
@@ -49,13 +49,12 @@ def work_key(
     routes_digest: str,
     parameters: Mapping[str, Any],
 ) -> str:
-    """Return a checksum of all that the tiles of a build depend on."""
+    """Return a checksum of everything that the tiles of a build depend on."""
     read_as = (rasters.cell_ids, asdict(rasters.lattice), rasters.quantity, rasters.factor)
-    parts = (
-        version("mapfilter"), pa.__version__, rasters_sha256, read_as, rasters.resampling,
-        [asdict(cell) for cell in plan.cells], routes_digest,
-        {name: value for name, value in parameters.items() if name != "margin_db"},
-    )  # fmt: skip
+    versions = version("mapfilter"), pa.__version__
+    cells = [asdict(cell) for cell in plan.cells]
+    of_tiles = {name: value for name, value in parameters.items() if name != "margin_db"}
+    parts = (*versions, rasters_sha256, read_as, rasters.resampling, cells, routes_digest, of_tiles)
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
@@ -80,40 +79,41 @@ def build(
     """Build a database folder and open it.
 
     A point belongs to its best server and to every cell at most ``margin_db`` weaker. All levels
-    above the floor are kept, so the margin can be chosen anew when the database is read; a point
-    that hears no cell above the floor is left out and counted. Levels are kept to 0.01 dB.
+    above the floor are kept, so the margin can be changed when the database is read; points with
+    no cell above the floor are left out and counted. Levels are kept to 0.01 dB.
 
     Parameters
     ----------
     rasters : RxLevRasters
-        Levels, or losses that are taken from the plan's EIRP. Their lattice is the database's.
+        Levels, or losses that are subtracted from the plan's EIRP. Their lattice is the database's.
     plan : CellPlan
         The same cells as in the rasters.
     routes : RouteLattice or Routes
-        Aligned with the rasters' lattice; points beyond it are left out and counted. Given as
-        layers (:class:`mapfilter.database.sources.LayerRoutes`), points are laid by the workers,
-        tile by tile.
+        Aligned with the rasters' lattice; points beyond it are left out and counted. Of layers
+        (:class:`mapfilter.database.sources.LayerRoutes`) the workers lay the points of each tile.
     out : Path or str
-        The folder; an older one is replaced once the new one is whole.
-    margin_db, floor_dbm : float
+        The folder; an older database is replaced once the new one is complete.
+    margin_db : float
+        Default margin of readers (dB, >= 0).
+    floor_dbm : float
+        Weakest level that is kept (dBm).
     tile_px : int
-        Side of the tiles that the work is done by. Points are stored tile by tile along the
+        Side of the tiles that are processed at a time. Points are stored tile by tile along the
         Z-order curve, and along it within each tile.
     inputs : sequence of InputFile
-        What the roads and the rasters were made from, for the record; the rasters are added.
+        Files that roads and rasters were made from, for the record; the rasters are added.
     attribution : str
-        Whose map the roads come from, as its licence wants it shown.
+        Attribution that the licence of the map demands.
     executor : Executor, optional
         Where tiles are read; the result does not depend on it.
     in_flight : int
-        Tasks handed to it at a time; four for each worker keep all of them busy.
+        Tasks submitted at a time; four per worker keep all of them busy.
     tiles_a_task : int
-        Tiles in a task: many where handing one over takes long.
+        Tiles per task: many where submitting one takes long.
     writers : int
         Cells whose parts are written at a time.
     resume : bool
-        Go on where a build of the same inputs stopped. Finished tiles lie beside the folder until
-        the build is done.
+        Take over the tiles that an interrupted build of the same inputs has finished.
     progress : callable, optional
         Called with tiles done and tiles in all.
 
@@ -121,7 +121,7 @@ def build(
     ------
     InputError
         Rasters and plan hold different cells, rasters and roads do not align or overlap, a
-        parameter is out of range, or no point hears any cell.
+        parameter is out of range, or no point has a level above the floor.
     OutputError
         The folder cannot be written, or holds other files than a database.
     """
@@ -168,11 +168,8 @@ class BuildJob:
 
     Parameters
     ----------
-    rasters : RxLevRasters
     plan : CellPlan
         In the rasters' CRS.
-    routes : Routes
-    floor_dbm : float
     windows : tuple of (row, col, rows, cols)
         Tiles on the rasters' lattice that may hold points, along the Z-order curve.
     """
@@ -192,25 +189,22 @@ class BuildJob:
         floor_dbm: float,
         tile_px: int,
     ) -> BuildJob:
-        """Check that the inputs fit each other, and cut them.
-
-        Raises
-        ------
-        InputError
-            As :func:`build`.
-        """
+        """Check that the inputs fit each other, and cut them; errors as of :func:`build`."""
         source = LatticeRoutes(routes) if isinstance(routes, RouteLattice) else routes
         check_against_plan(rasters, plan)
         check_aligned(rasters.lattice, source.lattice, f"{rasters.path} and roads")
-        job = cls(rasters, plan.to_crs(rasters.lattice.crs), source, floor_dbm, ())
-        windows = tuple(w for w in tile_windows(rasters.lattice, tile_px) if job._holds(w))
+        lattice, windows = rasters.lattice, []
+        for window in tile_windows(lattice, tile_px):
+            inside = overlap(lattice, source.lattice, window)
+            if inside is not None and source.holds(lattice.window(*inside)):
+                windows.append(window)
         if not windows:
             hint = "files of different areas"
             raise fail(InputError, str(rasters.path), "points of the roads", "none", hint)
-        return cls(rasters, job.plan, source, floor_dbm, windows)
+        return cls(rasters, plan.to_crs(lattice.crs), source, floor_dbm, tuple(windows))
 
     def task(self, number: int) -> TileTask:
-        """Return what a worker needs to make a tile."""
+        """Return the task that makes a tile."""
         window = self.windows[number]
         part = self.routes.part(self.covered(window))
         rasters, plan = self.rasters.reaching(window), self.plan
@@ -230,7 +224,7 @@ class BuildJob:
     def made(
         self, executor: Executor, finished: FinishedParts, in_flight: int, tiles_a_task: int
     ) -> Iterator[TileRows]:
-        """Yield the tiles in order: those that are finished already, and the others as made."""
+        """Yield the tiles in order, finished ones from disk."""
         every = range(len(self.windows))
         missing = [n for n in every if not finished.keep or finished.load(n) is None]
         groups = [missing[n : n + tiles_a_task] for n in range(0, len(missing), tiles_a_task)]
@@ -247,16 +241,12 @@ class BuildJob:
             yield TileRows.from_bytes(rows)
 
     def off_rasters(self, points: int) -> int:
-        """Return how many points lie beyond the rasters, of routes that are laid already."""
+        """Return how many points of a route lattice lie beyond the rasters."""
         return len(self.routes.points) - points if isinstance(self.routes, LatticeRoutes) else 0
-
-    def _holds(self, window: Window) -> bool:
-        inside = overlap(self.rasters.lattice, self.routes.lattice, window)
-        return inside is not None and self.routes.holds(self.rasters.lattice.window(*inside))
 
 
 def _aside(function: Callable[[], str]) -> Future[str]:
-    """Run a function in a thread of its own; who stops before it has ended does not wait for it."""
+    """Run a function in a daemon thread, which an interrupted build does not wait for."""
     future: Future[str] = Future()
 
     def run() -> None:
@@ -270,7 +260,7 @@ def _aside(function: Callable[[], str]) -> Future[str]:
 
 
 def check_parameters(margin_db: float, floor_dbm: float, tile_px: int) -> None:
-    """Note every parameter that is out of range."""
+    """Check the ranges of the parameters."""
     faults = Faults()
     if not (np.isfinite(margin_db) and margin_db >= 0):
         faults.add("margin_db", "dB >= 0", margin_db)

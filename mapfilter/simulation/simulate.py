@@ -11,7 +11,7 @@ import pandas as pd
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.geodesy import same_crs
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.network import StreetNetwork
 from mapfilter.simulation.imu import ImuNoise, noisy_motion
 from mapfilter.simulation.journeys import JourneyPlan, journey

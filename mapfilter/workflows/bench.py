@@ -34,7 +34,8 @@ from mapfilter.filters.trials import run_trials
 from mapfilter.geodesy import Lattice
 from mapfilter.positioning.kalman.models import compiled
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.roads.lattice import RouteLattice
 
 if TYPE_CHECKING:

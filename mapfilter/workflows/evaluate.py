@@ -31,7 +31,8 @@ from mapfilter.experiments.benchmarks.world import (
 from mapfilter.experiments.sweep.world import SweepWorld, write_world
 from mapfilter.propagation.predict import predict
 from mapfilter.propagation.shadowing import named_rng
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.satellites import NlosModel, ReceptionModel
 from mapfilter.workflows.filters import filter_choice
@@ -240,9 +241,7 @@ _OF_WALKERS = frozenset(
     for name in ("speed_mps", "beside", "change_side_m", "stop_every_m", "stop_s")
 )
 
-_OF_PARTICLES = frozenset(
-    f"filter.bayes.{name}_particles" for name in ("most", "searching", "least")
-)
+_OF_PARTICLES = frozenset(f"filter.bayes.{name}_particles" for name in ("max", "min_search", "min"))
 
 _OF_THE_CASES: Mapping[str, str] = {
     "prediction.ground_truth.level_error_db": "level_error_db",

@@ -38,7 +38,7 @@ from mapfilter.experiments.benchmarks.ottawa_table import (
     session_rows,
     write_left_out,
 )
-from mapfilter.rasters.rxlev_rasters import open_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.report.canvas import BLUE, GREEN, GREY
 from mapfilter.report.cumulative import Distribution, plot_cumulative
 from mapfilter.workflows.build import run_build

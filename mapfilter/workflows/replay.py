@@ -29,8 +29,7 @@ from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.msi import read_antennas
 from mapfilter.report.errors import plot_error_over_distance
-from mapfilter.tracks.leave_out import leave_out
-from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.log import TrackLog, leave_out
 from mapfilter.tracks.store import list_logs, read_log
 from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.jsonable import to_jsonable
@@ -279,9 +278,8 @@ class _Sites:
         """Accept logs in any CRS: the plan is projected to theirs."""
 
     def filter_for(self, log: TrackLog) -> Filter[Any]:
-        options = filter_choice(self.config.filter)
-        if not isinstance(options, KalmanFilter):
-            raise TypeError(options.name)
+        section = self.config.filter
+        options = KalmanFilter(method=section.name, smooth=section.smooth)  # type: ignore[arg-type]
         plan = planned_cells(self.config, log.crs)
         return options.over_sites(plan, _antennas(self.config, plan))
 

@@ -9,7 +9,7 @@ from mapfilter.errors import ConfigError
 from mapfilter.experiments.benchmarks import journeys as satellites
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.journeys import SPOOFED_S, Walk, spoofer_of, with_satellites
-from mapfilter.gnss.visibility import Skyline
+from mapfilter.gnss.sky import Skyline
 from mapfilter.simulation.satellites import NlosModel, ReceptionModel
 from mapfilter.tracks.log import make_log
 from mapfilter.workflows.evaluate import check_cases

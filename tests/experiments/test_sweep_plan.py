@@ -18,14 +18,13 @@ from mapfilter.experiments.sweep.plan import (
     SweepPlan,
     noise_grid,
 )
-from mapfilter.filters.candidate import CandidateOptions
-from mapfilter.positioning.locators import FilterChoice
+from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.walking import WalkerModel
 
-SET = Reading("set", FilterChoice(CandidateOptions(), 0.0), 22.0)
-LIST = Reading("list", FilterChoice(CandidateOptions(duplicates="list", threshold=10)), 22.0)
+SET = Reading("set", CandidateFilter(margin_db=0.0), 22.0)
+LIST = Reading("list", CandidateFilter(duplicates="list", threshold=10), 22.0)
 
 
 def plan(**changed):
@@ -163,7 +162,7 @@ def test_digest_changes_with_everything_that_changes_runs():
         {"draws": 3},
         {"journey": JourneyPlan(length_m=900.0)},
         {"readings": (SET,)},
-        {"readings": (replace(SET, choice=FilterChoice(CandidateOptions(threshold=2), 0.0)), LIST)},
+        {"readings": (replace(SET, choice=CandidateFilter(threshold=2, margin_db=0.0)), LIST)},
         {"noises": (ImuNoise(translation_noise="as_printed"),)},
         {"noises": (ImuNoise(turns="gyro"),)},
         {"journey": JourneyPlan(walker=WalkerModel(beside="pavement"))},

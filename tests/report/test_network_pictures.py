@@ -11,14 +11,15 @@ from mapfilter.database.build import build
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.report.basemap import BaseMap, draw_base
 from mapfilter.report.canvas import BLUE, ORANGE
 from mapfilter.report.landuse import plot_landuse
 from mapfilter.report.layers import largest
 from mapfilter.report.network import plot_margin
 from mapfilter.roads.landuse import LandUse
-from mapfilter.roads.routable import route_lattice_from_landuse
+from mapfilter.roads.routes import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings
 from mapfilter.workflows import network_pictures, served
 from mapfilter.workflows.network_pictures import draw_network, land_use_of_map

@@ -15,7 +15,7 @@ from mapfilter.database.store import read_cells, write_cells
 from mapfilter.errors import InputError, StoreError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.network import StreetNetwork
 from mapfilter.simulation.walking import Inside, inside_buildings
 
