@@ -38,7 +38,7 @@ def write_table(table: pd.DataFrame, path: Path, *, digits: int | None = 4) -> P
     """
     if path.suffix not in (".csv", ".tex"):
         raise fail(OutputError, str(path), "a name that ends in .csv or .tex", path.name)
-    shown = rounded(table, digits)
+    shown = _rounded(table, digits)
     if path.suffix == ".csv":
         text = shown.to_csv(index=False, lineterminator="\n")
     else:
@@ -64,7 +64,7 @@ def latex_table(table: pd.DataFrame, *, digits: int | None = 4) -> str:
     <BLANKLINE>
     """
     columns = "".join("r" if _is_numeric(table[name]) else "l" for name in table)
-    shown = rounded(table, digits)
+    shown = _rounded(table, digits)
     return str(shown.to_latex(index=False, escape=True, column_format=columns))
 
 
@@ -86,15 +86,16 @@ def text_table(table: pd.DataFrame, *, digits: int | None = 4) -> str:
     for name in table:
         side: Literal["left", "right"] = "right" if _is_numeric(table[name]) else "left"
         drawn.add_column(str(name), justify=side, no_wrap=True)
-    for row in rounded(table, digits).itertuples(index=False):
+    for row in _rounded(table, digits).itertuples(index=False):
         drawn.add_row(*row)
-    console = Console(file=io.StringIO(), width=_MOST_CHARACTERS, color_system=None)
+    plain: dict[str, Any] = {"markup": False, "emoji": False, "highlight": False}
+    console = Console(file=io.StringIO(), width=_MOST_CHARACTERS, color_system=None, **plain)
     with console.capture() as captured:
         console.print(drawn)
     return "\n".join(line.rstrip() for line in captured.get().splitlines())
 
 
-def rounded(table: pd.DataFrame, digits: int | None = 4) -> pd.DataFrame:
+def _rounded(table: pd.DataFrame, digits: int | None = 4) -> pd.DataFrame:
     """Return a table of texts: numbers to so many significant digits, None as nothing."""
 
     def text(value: Any) -> str:
