@@ -38,7 +38,7 @@ from mapfilter.database.windows import Window
 from mapfilter.errors import Faults, InputError, OutputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, check_against_plan
+from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan
 from mapfilter.roads.lattice import RouteLattice
 
 _CHECKSUM_BYTES = 4

@@ -14,7 +14,7 @@ from mapfilter.database.sources import RoutePart
 from mapfilter.database.windows import Window
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.geoparquet import dictionary, point_geometry
 from mapfilter.roads.lattice import RouteLattice
 

@@ -38,7 +38,7 @@ from mapfilter.experiments.benchmarks.ottawa_table import (
     write_left_out,
 )
 from mapfilter.experiments.benchmarks.resuming import begin
-from mapfilter.rasters.rxlev_rasters import open_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.report.canvas import BLUE, GREEN, GREY, save
 from mapfilter.report.curves import Distribution, plot_cumulative
 from mapfilter.workflows.build import run_build

@@ -13,7 +13,7 @@ from mapfilter._io import ensure_writable_folder
 from mapfilter._types import Floats32
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.geodesy import Lattice
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import BLUE, ORANGE, save
 from mapfilter.report.landuse import plot_landuse

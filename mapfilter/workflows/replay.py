@@ -280,9 +280,8 @@ class _Sites:
         """Accept logs in any CRS: the plan is projected to theirs."""
 
     def filter_for(self, log: TrackLog) -> Filter[Any]:
-        options = filter_choice(self.config.filter)
-        if not isinstance(options, KalmanFilter):
-            raise TypeError(options.name)
+        section = self.config.filter
+        options = KalmanFilter(method=section.name, smooth=section.smooth)  # type: ignore[arg-type]
         plan = planned_cells(self.config, log.crs)
         return options.over_sites(plan, _antennas(self.config, plan))
 

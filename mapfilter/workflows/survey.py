@@ -15,12 +15,11 @@ from mapfilter.config.sections import Config, SurveySection
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs
 from mapfilter.radio.cells import CellPlan, write_cell_plan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, open_rasters
-from mapfilter.survey.fit import Survey, SurveyOptions, fit_survey
+from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
+from mapfilter.survey.cell_model import Covariate
+from mapfilter.survey.measured_map import Survey, SurveyOptions, Validation, fit_survey, leave_out
 from mapfilter.survey.measurements import Measurements, named_after, read_measurements
-from mapfilter.survey.rasters import predicted_levels, surveyed_plan, write_survey
-from mapfilter.survey.trend import Covariate
-from mapfilter.survey.validation import Validation, leave_out
+from mapfilter.survey.survey_rasters import predicted_levels, surveyed_plan, write_survey
 from mapfilter.workflows.cover import check_cells_near
 from mapfilter.workflows.results import clear_pictures
 from mapfilter.workflows.survey_pictures import SURVEY_PICTURES, SurveyEvidence, draw_survey

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from mapfilter.errors import InputError, fail
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import save
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
+from mapfilter.survey.measured_map import LeftOut
 from mapfilter.survey.measurements import Measurements
-from mapfilter.survey.validation import LeftOut
 from mapfilter.workflows.cover import outside_m
 from mapfilter.workflows.served import thinned_lattice
 

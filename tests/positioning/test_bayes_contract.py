@@ -63,8 +63,9 @@ def test_a_filter_that_breaks_the_contract_is_found(area):
         )
 
 
-def found(positioner, log, seed=0, **options):
-    return locate(log, positioner, np.random.default_rng(seed), **options).estimate
+def found(positioner, log, seed=0, *, smooth=False):
+    bound = replace(positioner, smooth=smooth)
+    return locate(log, bound, np.random.default_rng(seed)).estimate
 
 
 def test_live_gives_the_bytes_of_the_replay(positioner):

@@ -214,7 +214,7 @@ def test_hindsight_and_turns_alone_take_satellites_too(positioner):
     motion = log.motion.assign(heading_rad=np.nan, turn_rad=(turn + np.pi) % (2 * np.pi) - np.pi)
     for one, smooth in ((log, True), (replace(log, motion=motion), False)):
         rng = np.random.default_rng(1)
-        estimate = locate(one, positioner, rng, smooth=smooth).estimate
+        estimate = locate(one, replace(positioner, smooth=smooth), rng).estimate
         assert off_m(log, estimate)[-30:].mean() < 12
 
 

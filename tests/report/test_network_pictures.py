@@ -11,7 +11,8 @@ from mapfilter.database.build import build
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.report.basemap import BaseMap, draw_base, largest
 from mapfilter.report.canvas import BLUE, ORANGE, save
 from mapfilter.report.landuse import plot_landuse

@@ -6,14 +6,19 @@ from matplotlib.figure import Figure
 
 from mapfilter.errors import InputError, OutputError
 from mapfilter.geodesy import Lattice
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import save
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
-from mapfilter.survey.fit import SurveyOptions, fit_survey
+from mapfilter.survey.measured_map import (
+    LeftOut,
+    SurveyOptions,
+    fit_survey,
+    leave_out,
+)
 from mapfilter.survey.measurements import Measurements
-from mapfilter.survey.rasters import write_survey
-from mapfilter.survey.validation import LeftOut, cross_validate, leave_out
+from mapfilter.survey.survey_rasters import write_survey
 from mapfilter.workflows import served, survey_pictures
 from mapfilter.workflows.survey_pictures import SurveyEvidence, draw_survey
 
@@ -110,7 +115,7 @@ def test_a_survey_gets_its_pictures(sessions, folds, tmp_path):
     paths = tmp_path / "mean.tif", tmp_path / "deviation.tif"
     write_survey(survey, LATTICE, *paths)
     left_out = leave_out(measured, options)
-    told = cross_validate(measured, options)
+    told = leave_out(measured, options).validation
     assert told == left_out.validation
     assert (len(left_out), left_out.folds) == (told.predicted, folds)
     error_db = left_out.measured_dbm - left_out.predicted_dbm

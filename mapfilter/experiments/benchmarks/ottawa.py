@@ -38,7 +38,7 @@ from mapfilter.positioning.bayes.options import BayesOptions, open_area
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.filter import locate
 from mapfilter.propagation.shadowing import named_rng
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.tracks.log import TrackLog
 
 PARTS = ("lacolyoc", "uottawa", "carling")

@@ -8,118 +8,21 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import rasterio
-from numpy.typing import NDArray
-from rasterio._err import CPLE_BaseError
-from rasterio.errors import RasterioError
-from rasterio.shutil import copy as copy_raster
 
-from mapfilter._io import atomic_file, sha256_file
+from mapfilter._io import sha256_file
 from mapfilter._types import Floats, Floats32
-from mapfilter.errors import Faults, InputError, OutputError, fail
+from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.files import (
-    QUANTITY_TAG,
-    Quantity,
-    RasterFile,
-    Window,
-    check_plausible,
-    reason,
-)
-from mapfilter.rasters.index import Declared, open_files
-from mapfilter.rasters.index import is_raster_folder as is_raster_folder
+from mapfilter.rasters.files import Declared, Quantity, RasterFile, Window, check_plausible
+from mapfilter.rasters.formats import open_files
 from mapfilter.rasters.resampling import Resampling, common_lattice, read_on
-
-_BLOCK_PX = 256
-
-
-def write_rasters(
-    path: Path | str,
-    lattice: Lattice,
-    items: Iterable[tuple[str, NDArray[Any]]],
-    cell_ids: Sequence[str],
-    tags: Mapping[str, str] | None = None,
-    *,
-    quantity: Quantity = "level",
-) -> None:
-    """Write one band per cell as a cloud-optimised GeoTIFF, holding one band in memory at a time.
-
-    Values are rounded to 0.01 dB; NaN is nodata. Equal values give equal bytes.
-
-    Parameters
-    ----------
-    path : Path or str
-        Ends in .tif or .tiff.
-    lattice : Lattice
-    items : iterable of (cell id, array of shape (rows, cols))
-        In the order of ``cell_ids``.
-    cell_ids : sequence of str
-        The band descriptions.
-    tags : mapping of str to str, optional
-        Free text kept in the file, such as how it was predicted.
-    quantity : {"level", "loss", "deviation"}
-
-    Raises
-    ------
-    InputError
-        An item is not the cell that is next, or has another shape.
-    OutputError
-        The file cannot be written.
-    """
-    path = Path(path)
-    if path.suffix.lower() not in (".tif", ".tiff"):
-        raise fail(OutputError, str(path), "a name that ends in .tif", path.suffix or "no suffix")
-    unit = "dBm" if quantity == "level" else "dB"
-    profile = {
-        "driver": "GTiff", "width": lattice.cols, "height": lattice.rows, "count": len(cell_ids),
-        "dtype": "float32", "nodata": np.nan, "crs": lattice.crs, "interleave": "band",
-        "transform": rasterio.Affine.from_gdal(*lattice.gdal_transform),
-        "tiled": True, "blockxsize": _BLOCK_PX, "blockysize": _BLOCK_PX, "bigtiff": "if_safer",
-    }  # fmt: skip
-    with atomic_file(path) as temporary:
-        bands = temporary.with_name("bands.tif")
-        try:
-            with rasterio.open(bands, "w", **profile) as target:
-                target.update_tags(**{**(tags or {}), QUANTITY_TAG: quantity})
-                for band, cell_id, values in _in_order(items, cell_ids, lattice):
-                    target.write(values, band)
-                    target.set_band_description(band, cell_id)
-                    target.set_band_unit(band, unit)
-            copy_raster(
-                bands, temporary, driver="COG", compress="DEFLATE", predictor="YES",
-                blocksize=_BLOCK_PX, overview_resampling="average", bigtiff="if_safer",
-            )  # fmt: skip
-        except (RasterioError, CPLE_BaseError) as error:
-            raise fail(
-                OutputError, str(path), "a raster that can be written", reason(error)
-            ) from error
-
-
-def _in_order(
-    items: Iterable[tuple[str, NDArray[Any]]], cell_ids: Sequence[str], lattice: Lattice
-) -> Iterable[tuple[int, str, Floats32]]:
-    count = 0
-    for count, (cell_id, values) in enumerate(items, start=1):
-        expected = cell_ids[count - 1] if count <= len(cell_ids) else "no more cells"
-        if cell_id != expected:
-            raise fail(InputError, f"band {count}", repr(expected), repr(cell_id))
-        if values.shape != (lattice.rows, lattice.cols):
-            shape = f"{lattice.rows} x {lattice.cols} pixels"
-            raise fail(InputError, f"band {count} ({cell_id})", shape, values.shape)
-        rounded = np.round(np.asarray(values, dtype=np.float64), 2).astype(np.float32)
-        rounded[~np.isfinite(rounded)] = np.nan
-        yield count, cell_id, rounded
-    if count < len(cell_ids):
-        raise fail(InputError, "bands", f"{len(cell_ids)} cells", f"{count}")
-
 
 _LARGEST_READ_BYTES = 4 << 30
 
@@ -142,7 +45,7 @@ class RxLevRasters:
     files : tuple of RasterFile
         Where the values are.
     parts : tuple of Path
-        All files that the set is made of: with the headers, the files that tell the CRS, the index.
+        All files that the set is made of, with headers, CRS files and the index.
     factor : float
         dB (dBm) per unit stored in the files.
     resampling : {"nearest", "bilinear"}
@@ -181,12 +84,9 @@ class RxLevRasters:
         return np.asarray(bounds_m + pad_m[:, None] * [-1, -1, 1, 1])
 
     def reaching(self, window: Window) -> RxLevRasters:
-        """Return the set of those files that lie over some of a window; others say nothing there.
-
-        It may be a set of no files.
-        """
+        """Return the set of the files, possibly none, that have pixels in a window."""
         west, south, east, north = self.lattice.window(*window).bounds_m
-        low, high = self._reach_m[:, :2], self._reach_m[:, 2:]
+        low, high = np.split(self._reach_m, 2, axis=1)
         there = (low < (east, north)).all(axis=1) & (high > (west, south)).all(axis=1)
         if there.all():
             return self
@@ -208,24 +108,38 @@ class RxLevRasters:
         Returns
         -------
         ndarray of float32, shape (cells, rows, cols)
-            dBm or dB, as ``quantity`` says; NaN where there is no data.
+            dBm or dB, by ``quantity``; NaN where there is no data.
 
         Raises
         ------
         InputError
-            The window or a cell is not in the set, a file is cut off, or the values cannot be
-            what ``quantity`` says.
+            The window or a cell is not in the set, a file is cut off, or the values are not
+            plausible for ``quantity``.
         """
         window = window or (0, 0, self.lattice.rows, self.lattice.cols)
         ids = self.cell_ids if cells is None else tuple(cells)
         self._check_request(window, ids)
-        wanted = self._by_file(ids)
-        if len(wanted) == 1:
-            ((file, (_, bands)),) = wanted
-            return self._read_file(self.files[file], bands, window)
+        of_cell = {
+            cell_id: (file, band)
+            for file in self.files
+            for band, cell_id in enumerate(file.cell_ids)
+        }
+        # By file: the places of its cells among those wanted, and their bands.
+        wanted: dict[Path, tuple[RasterFile, list[int], list[int]]] = {}
+        for place, cell_id in enumerate(ids):
+            file, band = of_cell[cell_id]
+            _, places, bands = wanted.setdefault(file.path, (file, [], []))
+            places.append(place)
+            bands.append(band)
         values = np.empty((len(ids), *window[2:]), dtype=np.float32)
-        for file, (places, bands) in wanted:
-            values[places] = self._read_file(self.files[file], bands, window)
+        for file, places, bands in wanted.values():
+            found = read_on(file, bands, self.lattice, window, self.resampling)
+            if self.factor != 1.0:
+                found = found * np.float32(self.factor)
+            check_plausible(found, self.quantity, file.path)
+            if len(wanted) == 1:
+                return found
+            values[places] = found
         return values
 
     def read_levels_dbm(
@@ -250,28 +164,6 @@ class RxLevRasters:
         ids = self.cell_ids if cells is None else cells
         eirp_dbm = np.array([plan[cell_id].eirp_dbm for cell_id in ids], dtype=np.float32)
         return eirp_dbm[:, None, None] - values
-
-    def _by_file(self, ids: Sequence[str]) -> list[tuple[int, tuple[list[int], list[int]]]]:
-        """Return, for each file needed, the places of its cells among ``ids`` and their bands."""
-        of_cell = {
-            cell_id: (number, band)
-            for number, file in enumerate(self.files)
-            for band, cell_id in enumerate(file.cell_ids)
-        }
-        found: dict[int, tuple[list[int], list[int]]] = {}
-        for place, cell_id in enumerate(ids):
-            number, band = of_cell[cell_id]
-            places, bands = found.setdefault(number, ([], []))
-            places.append(place)
-            bands.append(band)
-        return list(found.items())
-
-    def _read_file(self, file: RasterFile, bands: Sequence[int], window: Window) -> Floats32:
-        values = read_on(file, bands, self.lattice, window, self.resampling)
-        if self.factor != 1.0:
-            values = values * np.float32(self.factor)
-        check_plausible(values, self.quantity, file.path)
-        return values
 
     def _check_request(self, window: Window, ids: tuple[str, ...]) -> None:
         row, col, rows, cols = window
@@ -309,13 +201,13 @@ def open_rasters(
         pixels with a header (``.bil``, ``.flt`` with ``.hdr``), named by the cell id; a folder of
         such files; or an index of raw pixels (see :mod:`mapfilter.rasters.atoll`), or its folder.
     quantity : {"level", "loss", "deviation"}, optional
-        What the files hold, where they do not say so by mapfilter's tag or by their unit.
+        What the files hold, where neither mapfilter's tag nor their unit states it.
     crs : str, optional
         Projected CRS, where the files have none.
     factor : float
         dB (dBm) per unit stored, such as 0.0625 for sixteenths.
     nodata : float, optional
-        A stored number that means no data, besides those that the files tell.
+        A stored number that means no data, besides the files' own.
     resolution_m : float, optional
         Of the lattice that all files are read on; the finest of them when left out.
     resampling : {"nearest", "bilinear"}
@@ -333,7 +225,7 @@ def open_rasters(
     system = projected_crs(crs) if crs is not None else None
     found = open_files(path, Declared(quantity, system, nodata))
     lattice, notes = common_lattice(found.files, resolution_m, resampling)
-    index = () if found.index is None else (found.index,)
+    index = () if found.index_file is None else (found.index_file,)
     return RxLevRasters(
         path,
         tuple(cell_id for file in found.files for cell_id in file.cell_ids),
@@ -348,13 +240,7 @@ def open_rasters(
 
 
 def check_against_plan(rasters: RxLevRasters, plan: CellPlan) -> None:
-    """See that rasters and plan hold the same cells.
-
-    Raises
-    ------
-    InputError
-        With the cells in the rasters and not in the plan, and the reverse.
-    """
+    """Check that rasters and plan hold the same cells."""
     faults, held = Faults(), set(rasters.cell_ids)
     unknown = [cell_id for cell_id in rasters.cell_ids if cell_id not in plan]
     missing = [cell_id for cell_id in plan.ids if cell_id not in held]

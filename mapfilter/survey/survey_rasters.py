@@ -16,10 +16,11 @@ from mapfilter._types import Floats, Ints
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, write_rasters
-from mapfilter.survey.fit import Survey, SurveyedCell
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.survey.cell_model import Covariate
+from mapfilter.survey.measured_map import Survey, SurveyedCell
 from mapfilter.survey.measurement_rows import Identity
-from mapfilter.survey.trend import Covariate
 
 _FIELD_LENGTHS = 4.0
 _LARGEST_WINDOW_PX = 1_000_000
@@ -39,29 +40,15 @@ def write_survey(
 ) -> tuple[str, ...]:
     """Write the mean levels and their deviations, one band per cell, and return the cells' ids.
 
-    Pixels that nobody measured, farther from every reading of a cell than the survey's reach, are
-    NaN in both files; with ``fill`` the first has the trend (the calibrated prediction) there, and
-    the NaN of the second still marks them. Cells not measured on the lattice are left out.
-
-    Parameters
-    ----------
-    survey : Survey
-    lattice : Lattice
-        In the survey's CRS.
-    mean_path, deviation_path : Path
-    fill : bool
-    deviation_factor : float
-        Multiplies the deviations.
-    tags : mapping of str to str, optional
-    progress : callable, optional
-        Called with (cells done, cells in all).
+    Pixels farther from every reading of a cell than the survey's reach are NaN in both files; with
+    ``fill`` the first has the trend (the calibrated prediction) there, and the NaN of the second
+    still marks them. Cells not measured on the lattice, in the survey's CRS, are left out.
+    ``deviation_factor`` multiplies the deviations.
 
     Raises
     ------
     InputError
         No cell was measured on the lattice.
-    OutputError
-        A file cannot be written.
     """
     ids: list[str] = []
     with tempfile.TemporaryFile() as spool:
@@ -96,8 +83,7 @@ def surveyed_plan(
 ) -> CellPlan:
     """Return a plan of surveyed cells: as given, else with the antenna where it was located.
 
-    An antenna that could not be located is put amid the strongest quarter of its readings. Height,
-    EIRP and frequency of cells without a plan are those given.
+    An antenna that could not be located is put amid the strongest quarter of its readings.
     """
     known = plan.to_crs(survey.crs) if plan is not None else None
     cells = []
@@ -157,16 +143,16 @@ def _on_lattice(
         grid = np.mgrid[row : row + rows, col : col + cols].reshape(2, -1)
         east_m, north_m = lattice.east_north(grid[0], grid[1])
         distance_m = cell.distance_m(east_m, north_m, field_m)
-        told = np.full((2, len(east_m)), np.nan)
+        level = np.full((2, len(east_m)), np.nan)
         near = distance_m <= field_m
-        told[:, near] = cell.predict(east_m[near], north_m[near])
+        level[:, near] = cell.predict(east_m[near], north_m[near])
         if fill:
-            told[0, ~near] = cell.trend.level_dbm(east_m[~near], north_m[~near])
-        told[1, distance_m > reach_m] = np.nan
-        some = np.isfinite(told[0])
-        measured = measured or bool(np.isfinite(told[1]).any())
+            level[0, ~near] = cell.trend.level_dbm(east_m[~near], north_m[~near])
+        level[1, distance_m > reach_m] = np.nan
+        some = np.isfinite(level[0])
+        measured = measured or bool(np.isfinite(level[1]).any())
         pixels.append((grid[0] * lattice.cols + grid[1])[some])
-        levels.append(told[:, some])
+        levels.append(level[:, some])
     if not measured:
         return None
     return np.concatenate(pixels), np.concatenate(levels, axis=1)
@@ -180,9 +166,8 @@ def _windows(
     if not fill:
         west, south = cell.points.heard_at.min(axis=0) - reach_m
         east, north = cell.points.heard_at.max(axis=0) + reach_m
-        (first_row, first_col), (last_row, last_col) = (
-            lattice.row_col(west, north), lattice.row_col(east, south)
-        )  # fmt: skip
+        first_row, first_col = lattice.row_col(west, north)
+        last_row, last_col = lattice.row_col(east, south)
         top, left = max(top, first_row), max(left, first_col)
         bottom, right = min(bottom, last_row), min(right, last_col)
     cols = right - left + 1

@@ -1,109 +1,158 @@
-"""What a survey finds at each spot about the trend: Gaussian process or nearest neighbours."""
+"""How the level of one cell depends on the place: a trend and residuals about it.
+
+A trend is ``offset + slope * covariate``: the covariate is the loss over distance, a prediction, or
+nothing. It is fitted by generalised least squares, because neighbouring levels err together, with
+normal priors, because a cell may have been received along one street only. Residuals are those of a
+Gaussian process, or of nearest neighbours.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import minimize
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 from sklearn.neighbors import NearestNeighbors
 
-from mapfilter._types import Bools, Floats, Ints
-from mapfilter.survey.measurements import Measurements
-from mapfilter.survey.trend import Trend
+from mapfilter._types import Floats, Ints
+from mapfilter.survey.measurements import Points
+
+Covariate = Callable[[Floats, Floats], Floats]
+"""From east and north (m) to a value for each place."""
+
+EXPONENT, EXPONENT_DEVIATION = 3.5, 0.7
+"""Prior of the path-loss exponent: between free space and a dense city."""
+OFFSET_DEVIATION_DB = 12.0
+"""Prior deviation of a cell's mean level from that of all cells."""
+
+_SEARCH_BEYOND_M = 800.0
+_GRID = 25
+_ROUNDS = 4
+_ANTENNA_ABOVE_PHONE_M = 25.0
+
+
+@dataclass(frozen=True)
+class DistanceLoss:
+    """``-10 log10 d``, d the slant distance from an antenna: its factor is the exponent."""
+
+    east_m: float
+    north_m: float
+    above_phone_m: float = _ANTENNA_ABOVE_PHONE_M
+
+    def __call__(self, east_m: Floats, north_m: Floats) -> Floats:
+        """Return the covariate at places."""
+        return _distance_loss(east_m - self.east_m, north_m - self.north_m, self.above_phone_m)
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
-    """Mean level and position of a cell's readings in each square and session.
+class Trend:
+    """A fitted trend: ``offset_dbm + slope * (covariate - centre)``.
 
-    Who stands still does not learn more than who walks on, so readings of one session in one
-    square count once.
-
-    Parameters
-    ----------
-    cell_id : str
-    east_m, north_m, level_dbm : numpy.ndarray, shape (N,)
-    session : numpy.ndarray of int, shape (N,)
-    heard_at : numpy.ndarray, shape (M, 2)
-        East and north of every reading behind them.
+    Without a covariate it is a mean level alone. ``covariance`` (2, 2) is that of offset and slope,
+    ``cost`` minus twice the log marginal likelihood, up to a constant.
     """
 
-    cell_id: str
-    east_m: Floats
-    north_m: Floats
-    level_dbm: Floats
-    session: Ints
-    heard_at: Floats
+    covariate: Covariate | None
+    offset_dbm: float
+    slope: float
+    centre: float
+    covariance: Floats
+    cost: float
 
-    def __len__(self) -> int:
-        return len(self.level_dbm)
-
-    @property
-    def places(self) -> Floats:
-        """Positions, shape (N, 2)."""
-        return np.column_stack([self.east_m, self.north_m])
-
-    def thinned(self, most: int) -> Points:
-        """Return at most so many of the points, evenly taken."""
-        if len(self) <= most:
-            return self
-        return self.some(np.linspace(0, len(self) - 1, most).astype(np.int64))
-
-    def some(self, kept: Ints | Bools) -> Points:
-        """Return some of the points."""
-        return Points(
-            self.cell_id,
-            self.east_m[kept],
-            self.north_m[kept],
-            self.level_dbm[kept],
-            self.session[kept],
-            self.heard_at,
+    def design(self, east_m: Floats, north_m: Floats) -> Floats:
+        """Return the factors of offset and slope at places, shape (N, 2)."""
+        if self.covariate is None:
+            return np.column_stack([np.ones_like(east_m), np.zeros_like(east_m)])
+        return np.column_stack(
+            [np.ones_like(east_m), self.covariate(east_m, north_m) - self.centre]
         )
 
+    def level_dbm(self, east_m: Floats, north_m: Floats) -> Floats:
+        """Return the trend's level at places."""
+        return np.asarray(self.design(east_m, north_m) @ np.array([self.offset_dbm, self.slope]))
 
-def points_by_cell(measurements: Measurements, square_m: float, most: int) -> dict[str, Points]:
-    """Return the points of each cell that was heard.
 
-    Parameters
-    ----------
-    measurements : Measurements
-    square_m : float
-        Side of the squares; doubled for a cell until it has at most ``most`` points.
-    most : int
+@dataclass(frozen=True)
+class Prior:
+    """Normal prior of offset and slope."""
+
+    offset_dbm: float
+    slope: float = EXPONENT
+    slope_deviation: float = EXPONENT_DEVIATION
+    offset_deviation_db: float = OFFSET_DEVIATION_DB
+
+
+def fit_trend(
+    covariate: Covariate | None, points: Points, covariance_db2: Floats, prior: Prior
+) -> Trend:
+    """Fit offset and slope of a covariate to levels with a covariance of errors (N, N)."""
+    east_m, level_dbm = points.east_m, points.level_dbm
+    values = np.zeros_like(east_m) if covariate is None else covariate(east_m, points.north_m)
+    centre = float(values.mean())
+    root = cholesky(covariance_db2, lower=True)
+    offset, slope, spread, cost = _profile(root, level_dbm, (values - centre)[:, None], prior)
+    return Trend(
+        covariate, float(offset[0]), float(slope[0]), centre, spread[:, :, 0], float(cost[0])
+    )
+
+
+def locate_antenna(points: Points, covariance_db2: Floats, prior: Prior) -> DistanceLoss:
+    """Estimate where a cell's antenna is from levels with a covariance of errors (N, N).
+
+    The place with the largest marginal likelihood of the levels under the path-loss trend, offset
+    and exponent integrated out, on a grid that is refined about the best point of each round.
     """
-    order = np.argsort(measurements.cell, kind="stable")
-    edges = np.searchsorted(measurements.cell[order], np.arange(len(measurements.cell_ids) + 1))
-    found = {}
-    for i, cell_id in enumerate(measurements.cell_ids):
-        own = order[edges[i] : edges[i + 1]]
-        if not own.size:
-            continue
-        east_m, north_m = measurements.east_m[own], measurements.north_m[own]
-        level_dbm, session = measurements.level_dbm[own], measurements.session[own]
-        side_m = square_m
-        while True:
-            keys = np.column_stack(
-                [session, np.floor(north_m / side_m), np.floor(east_m / side_m)]
-            ).astype(np.int64)
-            squares, which = np.unique(keys, axis=0, return_inverse=True)
-            if len(squares) <= most:
-                break
-            side_m *= 2
-        count = np.bincount(which)
-        heard_at = np.column_stack([east_m, north_m])
-        found[cell_id] = Points(
-            cell_id,
-            np.bincount(which, east_m) / count,
-            np.bincount(which, north_m) / count,
-            np.bincount(which, level_dbm) / count,
-            squares[:, 0],
-            heard_at,
+    east_m, north_m, level_dbm = points.east_m, points.north_m, points.level_dbm
+    root = cholesky(covariance_db2, lower=True)
+    centre = np.array([(east_m.min() + east_m.max()) / 2, (north_m.min() + north_m.max()) / 2])
+    half_m = max(np.ptp(east_m), np.ptp(north_m)) / 2 + _SEARCH_BEYOND_M
+    for _ in range(_ROUNDS):
+        steps = np.linspace(-half_m, half_m, _GRID)
+        grid = np.stack(np.meshgrid(centre[0] + steps, centre[1] + steps), axis=-1).reshape(-1, 2)
+        values = _distance_loss(
+            east_m[:, None] - grid[:, 0], north_m[:, None] - grid[:, 1], _ANTENNA_ABOVE_PHONE_M
         )
-    return found
+        cost = _profile(root, level_dbm, values - values.mean(axis=0), prior)[3]
+        centre = grid[cost.argmin()]
+        half_m *= 4.0 / _GRID
+    return DistanceLoss(float(centre[0]), float(centre[1]))
+
+
+def _distance_loss(east_m: Floats, north_m: Floats, above_m: float) -> Floats:
+    return np.asarray(-5.0 * np.log10(east_m**2 + north_m**2 + above_m**2))
+
+
+def _profile(
+    root: Floats, level_dbm: Floats, values: Floats, prior: Prior
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Fit many covariates at once, ``values`` (N, M): offset, slope, their covariance, cost (M)."""
+    white = solve_triangular(
+        root, np.column_stack([np.ones(len(values)), level_dbm - prior.offset_dbm]), lower=True
+    )
+    ones, level = white[:, :1], white[:, 1:]
+    values = solve_triangular(root, values, lower=True)
+    weight = 1 / prior.offset_deviation_db**2, 1 / prior.slope_deviation**2
+    a = (ones**2).sum(axis=0) + weight[0]
+    b = (ones * values).sum(axis=0)
+    c = (values**2).sum(axis=0) + weight[1]
+    right_a = (ones * level).sum(axis=0)
+    right_c = (values * level).sum(axis=0) + weight[1] * prior.slope
+    determinant = a * c - b**2
+    offset = (c * right_a - b * right_c) / determinant
+    slope = (a * right_c - b * right_a) / determinant
+    cost = (
+        (level**2).sum()
+        + weight[1] * prior.slope**2
+        - offset * right_a
+        - slope * right_c
+        + np.log(determinant)
+    )
+    spread = np.array([[c, -b], [-b, np.broadcast_to(a, c.shape)]]) / determinant
+    return offset + prior.offset_dbm, slope, spread, cost
 
 
 _CHUNK = 4096
@@ -128,7 +177,7 @@ class Shadowing:
 
     @property
     def kernel(self) -> object:
-        """The same as scikit-learn writes it."""
+        """As a kernel of scikit-learn."""
         shadow = ConstantKernel(self.variance_db2) * Matern(self.correlation_m, nu=0.5)
         return shadow + WhiteKernel(self.noise_db2)
 
@@ -142,12 +191,8 @@ def learn_shadowing(
 ) -> Shadowing:
     """Return the shadowing under which the levels of all cells together are likeliest.
 
-    Parameters
-    ----------
-    points, trends : sequences of equal length
-        One of each per cell. The 40 cells with the most points are taken.
-    start : Shadowing
-        Also the answer when no cell has two points.
+    There are one of ``points`` and ``trends`` per cell; the 40 cells with the most points are
+    taken. ``start`` is also returned where no cell has two points.
     """
     processes = []
     pairs = [pair for pair in zip(points, trends, strict=True) if len(pair[0]) > 1]
@@ -206,7 +251,7 @@ class GaussianField:
 class NeighbourField:
     """The distance-weighted mean of the nearest points' residuals about a trend.
 
-    The deviation comes from how well each of those points is told by its neighbours of other
+    The deviation is the error with which those points are predicted by their neighbours of other
     sessions, drawn towards that of all points where there are few.
     """
 
@@ -214,16 +259,14 @@ class NeighbourField:
         self._trend = trend
         self._residual_db = points.level_dbm - trend.level_dbm(points.east_m, points.north_m)
         self._near = _Nearest(points.places, self._residual_db, neighbours)
-        self._squared_db2 = np.full(
-            len(points), shadowing.variance_db2 + shadowing.noise_db2, dtype=np.float64
-        )
+        overall_db2 = shadowing.variance_db2 + shadowing.noise_db2
+        self._squared_db2 = np.full(len(points), overall_db2, dtype=np.float64)
         sessions = np.unique(points.session)
         for session in sessions if len(sessions) > 1 else ():
             out = points.session == session
             others = _Nearest(points.places[~out], self._residual_db[~out], neighbours)
-            self._squared_db2[out] = (
-                self._residual_db[out] - others.mean(points.places[out])[0]
-            ) ** 2
+            error_db = self._residual_db[out] - others.mean(points.places[out])[0]
+            self._squared_db2[out] = error_db**2
         if len(sessions) == 1 and len(points) > 1:
             self._squared_db2 = (self._residual_db - self._near.mean(None)[0]) ** 2
         self._overall_db2 = float(self._squared_db2.mean())
@@ -233,13 +276,11 @@ class NeighbourField:
         mean_dbm = self._trend.level_dbm(east_m, north_m)
         if not len(east_m):
             return mean_dbm, mean_dbm
-        told_db, index, weights = self._near.mean(np.column_stack([east_m, north_m]))
+        near_db, index, weights = self._near.mean(np.column_stack([east_m, north_m]))
         own_db2 = np.average(self._squared_db2[index], axis=1, weights=weights)
         count = index.shape[1]
-        variance_db2 = (count * own_db2 + _PRIOR_WEIGHT * self._overall_db2) / (
-            count + _PRIOR_WEIGHT
-        )
-        return mean_dbm + told_db, np.sqrt(variance_db2)
+        total_db2 = count * own_db2 + _PRIOR_WEIGHT * self._overall_db2
+        return mean_dbm + near_db, np.sqrt(total_db2 / (count + _PRIOR_WEIGHT))
 
 
 class _Nearest:

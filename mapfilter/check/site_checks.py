@@ -1,26 +1,112 @@
-"""Whether each raster is strong about its own site, into its own direction, as its EIRP allows."""
+"""Checks that each raster is strong about its site, in its direction, and as its EIRP allows.
+
+A level is explained by a constant, the logarithm of the distance from the place, and two harmonics
+of the direction, which draw any lobe: no azimuth has to be right. The share of the levels' variance
+that is explained compares places over the same pixels.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence, Set
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from mapfilter._types import Floats32
+from mapfilter._types import Floats, Floats32
 from mapfilter.check.findings import Findings, listed
 from mapfilter.check.lobes import (
     AzimuthMistake,
     Lobe,
     azimuth_mistakes,
-    falls_with_distance,
     find_lobe,
 )
-from mapfilter.check.plausibility import RasterSample, above_free_space_db
-from mapfilter.check.site_positions import best_place, in_squares, place_fit
+from mapfilter.check.raster_checks import RasterSample, above_free_space_db, falls_with_distance
 from mapfilter.radio.cells import Cell, CellPlan
+
+_SIDE = 40
+_LEAST_SQUARES = 60
+_HARMONICS = 2
+_PLACES = 10
+
+
+class MeanLevels(NamedTuple):
+    """Mean levels of a raster in coarse squares with data, and the squares' middles, (n,) each."""
+
+    east_m: Floats
+    north_m: Floats
+    level_db: Floats
+    side_m: float
+
+
+def in_squares(sample: RasterSample) -> MeanLevels | None:
+    """Average a raster in at most 40 x 40 squares; None where there is too little data."""
+    values = sample.values.astype(np.float64)
+    step = max(1, -(-max(values.shape) // _SIDE))
+    rows, cols = values.shape[0] // step, values.shape[1] // step
+    whole = values[: rows * step, : cols * step].reshape(rows, step, cols, step)
+    count = (~np.isnan(whole)).sum(axis=(1, 3))
+    known = count > 0
+    if known.sum() < _LEAST_SQUARES:
+        return None
+    level_db = np.nansum(whole, axis=(1, 3))[known] / count[known]
+    if np.ptp(level_db) == 0:
+        return None
+    middle = np.arange(max(rows, cols)) * step + (step - 1) / 2
+    row, col = np.nonzero(known)
+    east_m, north_m = sample.lattice.east_north(middle[row], middle[col])
+    return MeanLevels(east_m, north_m, level_db, step * sample.lattice.resolution_m)
+
+
+def place_fit(squares: MeanLevels, east_m: float, north_m: float) -> float:
+    """Return how well a place explains levels: the multiple correlation, 0..1.
+
+    Levels that become stronger with the distance count as not depending on it.
+    """
+    east, north = squares.east_m - east_m, squares.north_m - north_m
+    distance_m = np.hypot(east, north)
+    direction_rad = np.arctan2(north, east)
+    # What lies in the place's own square has no direction.
+    near = np.minimum(distance_m / squares.side_m, 1.0)
+    columns = [np.log10(np.maximum(distance_m, squares.side_m / 2))]
+    for order in range(1, _HARMONICS + 1):
+        columns += [near * np.cos(order * direction_rad), near * np.sin(order * direction_rad)]
+    causes = np.column_stack(columns)
+    causes -= causes.mean(axis=0)
+    level_db = squares.level_db - squares.level_db.mean()
+    factors = np.linalg.lstsq(causes, level_db, rcond=None)[0]
+    if factors[0] > 0:
+        causes = causes[:, 1:]
+        factors = np.linalg.lstsq(causes, level_db, rcond=None)[0]
+    explained = causes @ factors
+    return float(np.sqrt((explained @ explained) / (level_db @ level_db)))
+
+
+def peak_m(sample: RasterSample) -> tuple[float, float]:
+    """Return east and north of the strongest pixels' middle (the strongest 0.2 %, at least 9)."""
+    value = np.where(np.isnan(sample.values), -np.inf, sample.values).ravel()
+    count = min(max(9, value.size // 500), int(np.isfinite(value).sum()))
+    strongest = np.argpartition(value, -count)[-count:]
+    east, north = sample.positions_m()
+    return float(np.median(east.ravel()[strongest])), float(np.median(north.ravel()[strongest]))
+
+
+def best_place(squares: MeanLevels, sample: RasterSample) -> tuple[float, tuple[float, float]]:
+    """Return the best fit and its place, among a grid over the raster and its peak."""
+    west, south, east, north = sample.lattice.bounds_m
+    along = (np.arange(_PLACES) + 0.5) / _PLACES
+    places = [
+        (float(x), float(y))
+        for x in west + along * (east - west)
+        for y in south + along * (north - south)
+    ]
+    places.append(peak_m(sample))
+    fits = [place_fit(squares, *place) for place in places]
+    best = int(np.argmax(fits))
+    return fits[best], places[best]
+
 
 _FAR_PX, _FAR_M = 10.0, 150.0
 _SITES = 16
@@ -30,21 +116,14 @@ _MILDLY_BETTER = 0.02
 _FITS = 0.65
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Fit:
-    """How well sites and the best place explain one raster."""
+class _Fit(NamedTuple):
+    """How well a raster is explained by its site, by those about the best place, and by that."""
 
     own: float
-    # Of the cell's own site and of those about the best place.
     by_site: Mapping[str, float]
     best: float
     away_m: float
     far: bool
-
-    @property
-    def explained(self) -> bool:
-        """Whether a place far from the site is where the antenna may well stand."""
-        return self.far and self.best > _FITS
 
     def gain(self, site: str) -> float:
         return self.by_site.get(site, 0.0) - self.own
@@ -56,28 +135,15 @@ def check_peaks(
     """Find rasters that another place than their site explains better.
 
     Labels of rasters count as exchanged between sites only where rasters went both ways; else it
-    is the site that is wrong.
-
-    Parameters
-    ----------
-    seen : sequence of RasterSample
-        Levels of cells of the plan.
-    plan : CellPlan
-    where : str
-        The rasters.
-    findings : Findings
-
-    Returns
-    -------
-    frozenset of str
-        All cells of the sites concerned: where a site is wrong its azimuths cannot be judged.
+    is the site that is wrong. Returned are all cells of the sites concerned: where a site is wrong
+    its azimuths cannot be judged.
     """
     fits = _fits(seen, plan)
     site_of = {cell_id: plan[cell_id].site for cell_id in fits}
     moved = _exchanged(fits, site_of)
     if moved:
-        told = ", ".join(f"{cell_id} about {site}" for cell_id, site in list(moved.items())[:8])
-        evidence = f"These rasters are strong about the site of another cell: {told}."
+        pairs = ", ".join(f"{cell_id} about {site}" for cell_id, site in list(moved.items())[:8])
+        evidence = f"These rasters are strong about the site of another cell: {pairs}."
         findings.add("site-labels-swapped", f"{where}, cells {listed(list(moved))}", evidence)
     off = _off(fits, site_of, moved)
     if off:
@@ -168,7 +234,7 @@ def _off(
     better = {
         cell_id: fit.best - fit.own
         for cell_id, fit in fits.items()
-        if cell_id not in moved and fit.explained and fit.best - fit.own > _BETTER
+        if cell_id not in moved and fit.far and fit.best > _FITS and fit.best - fit.own > _BETTER
     }
     # Two rasters of a site are as good as one that is clear.
     count = Counter(site_of[cell_id] for cell_id in better)
@@ -203,24 +269,10 @@ def check_against_sites(
     where: str,
     findings: Findings,
 ) -> list[RasterSample]:
-    """See that each raster is strong about its own site, and into its own direction.
+    """Check that each raster is strong about its own site, and in its own direction.
 
-    Parameters
-    ----------
-    samples : sequence of RasterSample
-        From :func:`sampled`.
-    plan : CellPlan
-        In the CRS of the rasters.
-    outside : frozenset of str
-        Cells whose site is not on the rasters; they are passed over.
-    where : str
-        The rasters.
-    findings : Findings
-
-    Returns
-    -------
-    list of RasterSample
-        Those that are strong about their own site.
+    Cells in ``outside`` have their site off the rasters and are skipped; the plan is in the CRS of
+    the rasters. Returned are the samples that are strong about their own site.
     """
     seen = [s for s in samples if s.cell_id in plan and s.cell_id not in outside]
     if not seen or _check_turned(seen, plan, where, findings):
@@ -231,15 +283,19 @@ def check_against_sites(
     held = {sample.cell_id for sample in in_place}
     cells = [cell for cell in plan.cells if cell.id in held]
     for mistake in azimuth_mistakes(cells, lobes):
-        findings.add(mistake.mistake, f"{where}, cells {listed(mistake.cells)}", _told(mistake))
+        findings.add(mistake.mistake, f"{where}, cells {listed(mistake.cells)}", _evidence(mistake))
     return in_place
 
 
 def check_power(
     samples: Sequence[RasterSample], plan: CellPlan, where: str, findings: Findings
 ) -> None:
-    """See that levels are possible with the EIRP of the plan, and the EIRP with a mast."""
-    cells = [cell for cell in plan.cells if _on_mast(cell)]
+    """Check that levels are possible with the EIRP of the plan, and the EIRP with a mast."""
+    cells = [
+        cell
+        for cell in plan.cells
+        if cell.azimuth_deg is not None and not cell.indoor and cell.height_m >= _MAST_M
+    ]
     small = [cell for cell in cells if 0 < cell.eirp_dbm <= _SMALL_EIRP_DBM]
     above_db = {
         s.cell_id: above_free_space_db(s, plan[s.cell_id])
@@ -272,7 +328,7 @@ def check_power(
         findings.add("eirp-watts", f"{where}, cells {listed(ids)}", evidence, "warning")
 
 
-def _told(mistake: AzimuthMistake) -> str:
+def _evidence(mistake: AzimuthMistake) -> str:
     seen = f"Azimuths and lobes of the rasters differ by {mistake.offset_deg:.0f}° (median)"
     if mistake.mistake == "azimuth-off-lobe":
         return f"{seen}: {mistake.reading}."
@@ -283,11 +339,15 @@ def _told(mistake: AzimuthMistake) -> str:
 def _check_turned(
     seen: Sequence[RasterSample], plan: CellPlan, where: str, findings: Findings
 ) -> bool:
-    """Tell whether rasters fit their sites much better when they are turned."""
+    """Find rasters that fit their sites much better when they are turned."""
     given = _mean_fall(seen, plan)
     best: tuple[float, str] | None = None
     for words, turn in _TURNS:
-        turned = [_turned(sample, turn(sample.values)) for sample in seen]
+        turned = []
+        for sample in seen:
+            values = turn(sample.values)
+            lattice = replace(sample.lattice, rows=values.shape[0], cols=values.shape[1])
+            turned.append(replace(sample, values=values, lattice=lattice))
         fit = _mean_fall(turned, plan)
         if fit < _TURNED_FITS or fit - given < _TURNED_SLIGHTLY or (best and fit < best[0]):
             continue
@@ -318,11 +378,6 @@ def _mean_score(samples: Sequence[RasterSample], plan: CellPlan) -> float:
     return float(np.mean(scores)) if scores else 0.0
 
 
-def _turned(sample: RasterSample, values: Floats32) -> RasterSample:
-    rows, cols = values.shape
-    return replace(sample, values=values, lattice=replace(sample.lattice, rows=rows, cols=cols))
-
-
 def _lobes(samples: Sequence[RasterSample], plan: CellPlan) -> dict[str, Lobe]:
     found = {}
     for sample in samples:
@@ -333,10 +388,6 @@ def _lobes(samples: Sequence[RasterSample], plan: CellPlan) -> dict[str, Lobe]:
         if lobe is not None:
             found[cell.id] = lobe
     return found
-
-
-def _on_mast(cell: Cell) -> bool:
-    return cell.azimuth_deg is not None and not cell.indoor and cell.height_m >= _MAST_M
 
 
 def _as_watts(cell: Cell) -> str:

@@ -1,23 +1,28 @@
-"""What the numbers in rasters look like, whatever they are said to be: samples and their kinds."""
+"""Whether rasters hold what they should: levels or losses of the cells of the plan."""
 
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+import rasterio
+from rasterio.errors import RasterioError
 
 from mapfilter._types import Floats, Floats32
+from mapfilter.check.findings import Findings, listed
+from mapfilter.errors import InputError
 from mapfilter.geodesy import (
     Lattice,
     azimuth_from_heading_deg,
     grid_convergence_rad,
     unproject,
 )
-from mapfilter.radio.cells import Cell
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.rasters.resampling import read_on
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
 
 Kind = Literal["level", "loss", "rxlev", "empty", "unclear"]
 
@@ -43,7 +48,6 @@ class RasterSample:
 
     Parameters
     ----------
-    cell_id : str
     lattice : Lattice
         Where the sampled pixels lie; its pixels are the sampled ones grown to the step.
     values : ndarray of float32, shape (rows, cols) of the lattice
@@ -79,22 +83,7 @@ class RasterSample:
 
 
 def sample_raster(rasters: RxLevRasters, cell_id: str, cell: Cell | None) -> RasterSample:
-    """Read a sample of one cell's raster, without judging the numbers.
-
-    Parameters
-    ----------
-    rasters : RxLevRasters
-    cell_id : str
-        A cell of the rasters.
-    cell : Cell or None
-        Where it stands, in the CRS of the rasters; a large raster is looked at about it, or about
-        its middle.
-
-    Raises
-    ------
-    InputError
-        The file is cut off or damaged.
-    """
+    """Read a sample of one cell's raster, of a large one about its site or else its middle."""
     file = next(file for file in rasters.files if cell_id in file.cell_ids)
     band = file.cell_ids.index(cell_id)
     window = _window(rasters.lattice, cell)
@@ -114,7 +103,7 @@ def sample_raster(rasters: RxLevRasters, cell_id: str, cell: Cell | None) -> Ras
 
 
 def kind_of(values: Floats32) -> Kind:
-    """Tell what numbers most likely are; NaN is passed over.
+    """Return what numbers most likely are; NaN is ignored.
 
     Levels (dBm) are mostly below 0, path losses (dB) mostly above 20, and raw RXLEV are whole
     numbers in 0..63 (3GPP TS 45.008, 8.1.4).
@@ -139,7 +128,7 @@ def kind_of(values: Floats32) -> Kind:
 
 
 def nodata_taken_as_level(values: Floats32) -> tuple[float, float] | None:
-    """Return the number that means no data though the file does not say so, and its share.
+    """Return the number that means no data though the file does not state it, and its share.
 
     That is one and the same number, beyond all levels (such as -9999), or exactly 0 among levels
     that are below it.
@@ -164,6 +153,21 @@ def nodata_taken_as_level(values: Floats32) -> tuple[float, float] | None:
     near = int((np.abs(others) < _NEAR_ZERO).sum())
     apart = bool((others < 0).all() or (others >= _LEAST_LOSS_DB).all())
     return (0.0, zero / known.size) if apart and zero > _MANY_TIMES * near else None
+
+
+def falls_with_distance(sample: RasterSample, east_m: float, north_m: float) -> float:
+    """Return the correlation of levels with minus the logarithm of the distance from a place.
+
+    1 is a raster that falls off evenly around it; 0 where nothing is known.
+    """
+    east, north = sample.positions_m()
+    known = ~np.isnan(sample.values)
+    value = sample.values[known].astype(np.float64)
+    least_m = sample.lattice.resolution_m
+    far = -np.log10(np.maximum(np.hypot(east - east_m, north - north_m)[known], least_m))
+    if value.size < 2 or np.ptp(value) == 0 or np.ptp(far) == 0:
+        return 0.0
+    return float(np.corrcoef(value, far)[0, 1])
 
 
 def above_free_space_db(sample: RasterSample, cell: Cell) -> float:
@@ -204,3 +208,117 @@ def _window(lattice: Lattice, cell: Cell | None) -> tuple[int, int, int, int]:
     top = int(np.clip(row - high // 2, 0, rows - high))
     left = int(np.clip(col - wide // 2, 0, cols - wide))
     return top, left, high, wide
+
+
+_MISREAD: dict[tuple[str, Kind], str] = {
+    ("level", "loss"): "loss-as-level",
+    ("level", "rxlev"): "rxlev-as-level",
+    ("loss", "level"): "level-as-loss",
+    ("loss", "rxlev"): "rxlev-as-loss",
+    ("level", "unclear"): "values-implausible",
+    ("loss", "unclear"): "values-implausible",
+}
+_FALLS = 0.3
+
+
+def is_surveyed(rasters: RxLevRasters) -> bool:
+    """Tell whether rasters were made of measurements, not predicted."""
+    if not rasters.path.is_file():
+        return False
+    try:
+        with rasterio.open(rasters.path) as source:
+            return str(source.tags().get("MODEL", "")).startswith("survey")
+    except RasterioError:
+        return False
+
+
+def check_ids(rasters: RxLevRasters, plan: CellPlan, where: str, findings: Findings) -> None:
+    """Check that rasters and plan hold the same cells."""
+    held = set(rasters.cell_ids)
+    missing = [cell_id for cell_id in plan.ids if cell_id not in held]
+    unknown = [cell_id for cell_id in rasters.cell_ids if cell_id not in plan]
+    if missing:
+        evidence = f"{len(missing)} of {len(plan)} cells have no raster: {listed(missing)}."
+        findings.add("cell-without-raster", f"{where} and {rasters.path}", evidence)
+    if unknown:
+        evidence = f"{len(unknown)} of {len(held)} rasters have no cell: {listed(unknown)}."
+        findings.add("raster-without-cell", f"{rasters.path} and {where}", evidence)
+
+
+def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) -> list[RasterSample]:
+    """Read a sample of each raster, and check that its numbers are of the declared kind.
+
+    Returns
+    -------
+    list of RasterSample
+        Levels, or losses with a minus sign, without what stands for no data; those of rasters
+        without anything to look at are left out.
+    """
+    kinds: dict[Kind, list[RasterSample]] = {}
+    nodata: list[tuple[str, float, float]] = []
+    constant, empty = [], []
+    for cell_id in rasters.cell_ids:
+        cell = plan[cell_id] if plan is not None and cell_id in plan else None
+        try:
+            sample = sample_raster(rasters, cell_id, cell)
+        except InputError as error:
+            findings.add_faults(error, "rasters-invalid")
+            continue
+        if (taken := nodata_taken_as_level(sample.values)) is not None:
+            nodata.append((cell_id, *taken))
+            kept = np.where(sample.values == np.float32(taken[0]), np.nan, sample.values)
+            sample = replace(sample, values=kept.astype(np.float32))
+            if not sample.known.size:
+                continue
+        kind = kind_of(sample.values)
+        if not sample.known.size:
+            empty.append(cell_id)
+        elif np.ptp(sample.known) == 0:
+            constant.append(f"{cell_id} {sample.known[0]:g}")
+        else:
+            kinds.setdefault(kind, []).append(sample)
+    where = str(rasters.path)
+    if nodata:
+        worst = max(nodata, key=lambda one: one[2])
+        ids = listed([one[0] for one in nodata])
+        evidence = f"{worst[1]:g} stands in up to {worst[2]:.1%} of the pixels, as a number."
+        findings.add("nodata-as-level", f"{where}, cells {ids}", evidence)
+    if empty:
+        cells = f"{where}, cells {listed(empty)}"
+        findings.add("raster-empty", cells, "No pixel has data.", "warning")
+    if constant:
+        evidence = f"One number in all pixels: {listed(constant)}."
+        findings.add("raster-constant", where, evidence)
+    useful: list[RasterSample] = []
+    for kind, samples in kinds.items():
+        by_sum: dict[tuple[str, Lattice], list[str]] = {}
+        for sample in samples:
+            by_sum.setdefault((sample.checksum, sample.lattice), []).append(sample.cell_id)
+        for same in by_sum.values():
+            if len(same) > 1:
+                evidence = f"The same numbers in all pixels of {len(same)} rasters."
+                findings.add("identical-rasters", f"{where}, cells {listed(same)}", evidence)
+        falls = kind == "loss" and _falls_away(samples, plan)
+        code = "field-strength" if falls else _MISREAD.get((rasters.quantity, kind))
+        if code is not None:
+            numbers = np.concatenate([sample.known for sample in samples])
+            low, middle, high = np.percentile(numbers, [1, 50, 99])
+            evidence = (
+                f"Declared {rasters.quantity}; {len(samples)} of {len(rasters.cell_ids)} rasters "
+                f"hold {low:.5g}..{high:.5g}, median {middle:.5g}"
+            )
+            evidence += ", which become less away from the sites." if falls else "."
+            ids = listed([sample.cell_id for sample in samples])
+            findings.add(code, f"{where}, cells {ids}", evidence)
+        negative = kind == "loss" and not falls
+        useful += [replace(s, values=-s.values) for s in samples] if negative else samples
+    return useful
+
+
+def _falls_away(samples: Sequence[RasterSample], plan: CellPlan | None) -> bool:
+    """Tell whether numbers above 0 fall with the distance, as no path loss does."""
+    if plan is None:
+        return False
+    known = [(s, plan[s.cell_id]) for s in samples if s.cell_id in plan]
+    falls = [falls_with_distance(s, cell.east_m, cell.north_m) for s, cell in known]
+    return bool(falls) and float(np.median(falls)) > _FALLS
