@@ -30,8 +30,7 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.msi import read_antennas
 from mapfilter.report.canvas import save
 from mapfilter.report.errors import plot_error_over_distance
-from mapfilter.tracks.leave_out import leave_out
-from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.log import TrackLog, leave_out
 from mapfilter.tracks.store import list_logs, read_log
 from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.jsonable import to_jsonable

@@ -18,7 +18,7 @@ from mapfilter.report.canvas import BLUE, ORANGE, save
 from mapfilter.report.landuse import plot_landuse
 from mapfilter.report.network import plot_margin
 from mapfilter.roads.landuse import LandUse
-from mapfilter.roads.routable import route_lattice_from_landuse
+from mapfilter.roads.routes import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings
 from mapfilter.workflows import network_pictures, served
 from mapfilter.workflows.network_pictures import draw_network, land_use_of_map

@@ -19,7 +19,7 @@ from mapfilter._io import atomic_file, sha256_file
 from mapfilter.database.store import open_database
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.sweep.world import SweepWorld, open_world
-from mapfilter.gnss.visibility import Skyline
+from mapfilter.gnss.sky import Skyline
 from mapfilter.positioning.filter import Filter, FilterOptions
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import (

@@ -17,8 +17,7 @@ from mapfilter.models.motion import LinearMotion, constant_velocity, random_walk
 from mapfilter.models.ranging import pseudoranges, range_differences
 from mapfilter.models.state import StateLayout
 from mapfilter.positioning.kalman.models import compiled
-from mapfilter.positioning.kalman.position_filter import filter_fixes
-from mapfilter.positioning.kalman.static_fix import TOO_FEW, StaticFix, static_fix
+from mapfilter.positioning.kalman.static_fix import TOO_FEW, StaticFix, filter_fixes, static_fix
 
 Mobility = Literal["diagonal", "discretised"]
 

@@ -7,12 +7,12 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_routable import CRS, LATTICE, boxes, lines, same, ways_of
+from test_route_lattice import CRS, LATTICE, boxes, lines, same, ways_of
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
-from mapfilter.roads.near import WayIndex
-from mapfilter.roads.routable import RouteSource, route_lattice
+from mapfilter.roads.index import RouteSource, WayIndex
+from mapfilter.roads.routes import route_lattice
 from mapfilter.roads.ways import Water
 
 ROW, COL = np.divmod(np.arange(LATTICE.rows * LATTICE.cols), LATTICE.cols)

@@ -1,21 +1,29 @@
-"""Which way is near: exact distances from points to the straight segments of ways."""
+"""Indexed ways and areas, from which the points of any tile are made.
+
+Distances from points to the straight segments of ways are exact.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import shapely
 from numba import njit
 from shapely import STRtree
 
-from mapfilter._types import Floats, Ints
-from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import Lattice
-from mapfilter.roads.ways import Geometries, Ways
+from mapfilter._types import Bools, Floats, Ints
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.roads.buildings import burn
+from mapfilter.roads.lattice import RouteLattice
+from mapfilter.roads.ways import Buildings, Geometries, Squares, Water, Ways
 
 HALF_WIDTH_M = 6.0
+TILE_PX = 512
+SQUARE_CLASS = "square"
 _NO_WIDTHS: Mapping[str, float] = {}
 
 
@@ -53,7 +61,6 @@ class WayIndex:
 
         Parameters
         ----------
-        ways : Ways
         half_width_m : float
             How far from its centre line a point still belongs to a way.
         by_class_m : mapping of str to float
@@ -85,6 +92,13 @@ class WayIndex:
         half_width_m = by_code[ways.way_class[of_way]] if of_way.size else np.empty(0)
         return cls(ways, STRtree(shapely.linestrings(ends_m)), of_way, ends_m, half_width_m)
 
+    def segments_near(self, window: Lattice, least_m: float = 0.0) -> Ints:
+        """Return the segments that reach a window, or are at most ``least_m`` away from it."""
+        west, south, east, north = window.bounds_m
+        reach_m = max(float(self.half_width_m.max(initial=0.0)), least_m)
+        box = shapely.box(west - reach_m, south - reach_m, east + reach_m, north + reach_m)
+        return np.sort(self.tree.query(box))
+
     def inside(self, areas: Geometries) -> WayIndex:
         """Return the index of the parts of the ways that lie in polygons."""
         segments = shapely.linestrings(self.ends_m)
@@ -111,10 +125,7 @@ class WayIndex:
         size = (window.rows, window.cols)
         segment, distance_m = np.full(size, -1, dtype=np.int64), np.full(size, np.inf)
         if self.way.size:
-            west, south, east, north = window.bounds_m
-            reach_m = self.half_width_m.max()
-            box = shapely.box(west - reach_m, south - reach_m, east + reach_m, north + reach_m)
-            near = np.sort(self.tree.query(box))
+            near = self.segments_near(window)
             _burn(
                 self.ends_m[near],
                 self.half_width_m[near],
@@ -159,9 +170,168 @@ def note_half_widths(faults: Faults, half_width_m: float, by_class_m: Mapping[st
             faults.add(f"half_width_by_class_m, {name}", "metres >= 0", width_m)
 
 
-@njit(cache=True)
-def _clipped(place: float, size: int) -> int:  # pragma: no cover
-    return int(min(max(place, 0.0), float(size)))
+@dataclass(frozen=True, slots=True, eq=False)
+class AreaIndex:
+    """Polygons in a search tree, to burn those of a tile."""
+
+    geometry: Geometries
+    tree: STRtree
+
+    @classmethod
+    def of(cls, geometry: Geometries) -> AreaIndex:
+        """Index polygons."""
+        return cls(geometry, STRtree(geometry))
+
+    def near(self, window: Lattice) -> AreaIndex:
+        """Return the polygons about a window, in their order."""
+        near = np.sort(self.tree.query(shapely.box(*window.bounds_m)))
+        return AreaIndex.of(self.geometry[near])
+
+    def mask(self, window: Lattice) -> Bools:
+        """Return which pixel centres of a window lie in a polygon, shape (rows, cols)."""
+        near = np.sort(self.tree.query(shapely.box(*window.bounds_m)))
+        return burn(((shape, 1) for shape in self.geometry[near]), window, "uint8").astype(bool)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RouteSource:
+    """What any tile of a route lattice is made from; it can be sent to other processes.
+
+    Parameters
+    ----------
+    crs : str
+        Projected CRS of everything, in metres.
+    bridges : WayIndex or None
+        The parts of the ways that lie in the water, which stay.
+    """
+
+    crs: str
+    ways: WayIndex
+    squares: AreaIndex | None
+    buildings: AreaIndex | None
+    water: AreaIndex | None
+    bridges: WayIndex | None
+
+    @classmethod
+    def of(
+        cls,
+        ways: Ways,
+        squares: Squares | None = None,
+        buildings: Buildings | None = None,
+        half_width_m: float = HALF_WIDTH_M,
+        *,
+        half_width_by_class_m: Mapping[str, float] | None = None,
+        water: Water | None = None,
+    ) -> RouteSource:
+        """Index the layers of an area; the parameters are those of :func:`route_lattice`.
+
+        Raises
+        ------
+        InputError
+            The CRS differ, or a half width is no length.
+        """
+        faults = Faults()
+        note_crs(faults, ways.crs, {"squares": squares, "buildings": buildings, "water": water})
+        faults.raise_if_any(InputError)
+        index = WayIndex.of(ways, half_width_m, half_width_by_class_m or {})
+        return cls(
+            ways.crs,
+            index,
+            AreaIndex.of(squares.geometry) if squares else None,
+            AreaIndex.of(buildings.footprints) if buildings else None,
+            AreaIndex.of(water.geometry) if water else None,
+            index.inside(water.geometry) if water else None,
+        )
+
+    def tile(self, window: Lattice) -> RouteLattice:
+        """Return the route lattice of a window; the same points as on the whole lattice."""
+        on_square = _mask(self.squares, window)
+        way, distance_m = self.ways.reaching(window)
+        allowed = ((way >= 0) | on_square) & ~_mask(self.buildings, window)
+        if self.water is not None and self.bridges is not None:
+            wet = self.water.mask(window)
+            if np.any(wet & allowed):
+                allowed &= ~wet | (self.bridges.reaching(window)[0] >= 0)
+        return described(allowed, window, on_square, self.ways, (way, distance_m), SQUARE_CLASS)
+
+    def over(self, lattice: Lattice, tile_px: int = TILE_PX) -> RouteLattice:
+        """Return the route lattice of a whole area, made tile by tile.
+
+        Raises
+        ------
+        InputError
+            No point is left.
+        """
+        tiles = [
+            (row, col, self.tile(lattice.window(row, col, rows, cols)))
+            for row, col, rows, cols in lattice.tiles(tile_px)
+        ]
+        rows = np.concatenate([tile.row + np.int32(top) for top, _, tile in tiles])
+        cols = np.concatenate([tile.col + np.int32(left) for _, left, tile in tiles])
+        order = np.lexsort((cols, rows))
+
+        def joined(column: str) -> Any:
+            return np.concatenate([getattr(tile, column) for _, _, tile in tiles])[order]
+
+        if not order.size:
+            expected = "a point near a way or in a square"
+            hint = "roads and rasters of different areas"
+            raise fail(InputError, "route lattice", expected, "none", hint)
+        return RouteLattice(
+            lattice,
+            rows[order],
+            cols[order],
+            joined("way_id"),
+            joined("way_class"),
+            tiles[0][2].class_names,
+            joined("distance_to_way_m"),
+            joined("on_square"),
+        )
+
+
+def described(
+    allowed: Bools,
+    window: Lattice,
+    on_square: Bools,
+    ways: WayIndex,
+    nearest: tuple[Ints, Floats],
+    other_class: str,
+) -> RouteLattice:
+    """Return the allowed pixels with their ways, or the distance of the nearest that is."""
+    row, col = np.nonzero(allowed)
+    way, distance_m = nearest[0][row, col], nearest[1][row, col]
+    alone = way < 0
+    distance_m[alone] = ways.nearest(*window.east_north(row[alone], col[alone]))[1]
+    names = (*ways.ways.class_names, other_class)
+    way_id = np.zeros(row.size, dtype=np.int64)
+    way_id[~alone] = ways.ways.way_id[way[~alone]]
+    way_class = np.full(row.size, len(names) - 1, dtype=np.int16)
+    way_class[~alone] = ways.ways.way_class[way[~alone]]
+    return RouteLattice(
+        window,
+        row.astype(np.int32),
+        col.astype(np.int32),
+        way_id,
+        way_class,
+        names,
+        distance_m.astype(np.float32),
+        on_square[row, col],
+    )
+
+
+def note_crs(
+    faults: Faults, crs: str, layers: Mapping[str, Ways | Squares | Buildings | Water | None]
+) -> None:
+    """Note layers of another CRS."""
+    for name, layer in layers.items():
+        if layer is not None and not same_crs(layer.crs, crs):
+            faults.add(f"{name}, crs", crs, layer.crs, "layers of different CRS")
+
+
+def _mask(areas: AreaIndex | None, window: Lattice) -> Bools:
+    if areas is None:
+        return np.zeros((window.rows, window.cols), dtype=np.bool_)
+    return areas.mask(window)
 
 
 @njit(cache=True)

@@ -6,13 +6,12 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mapfilter.errors import InputError, StoreError
+from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice, project
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.osm import read_squares, read_ways
-from mapfilter.roads.routable import route_lattice, route_lattice_from_landuse
-from mapfilter.roads.store import read_route_lattice, write_route_lattice
+from mapfilter.roads.routes import route_lattice, route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings, Squares, Ways
 
 CRS = "EPSG:32629"
@@ -161,52 +160,6 @@ def test_landuse_points_name_the_way_near_them():
         route_lattice_from_landuse(mask & False, LATTICE)
 
 
-def test_round_trip_and_geopandas(tmp_path):
-    import geopandas
-
-    routes = route_lattice(
-        ways_of([(0, 52.5), (120, 52.5)]), squares_of((20, 60, 40, 80)), None, LATTICE
-    )
-    path = tmp_path / "routes.parquet"
-    write_route_lattice(routes, path)
-    same(read_route_lattice(path), routes)
-    first = path.read_bytes()
-    write_route_lattice(routes, path)
-    assert path.read_bytes() == first
-    frame = geopandas.read_parquet(path)
-    assert frame.crs == CRS
-    east, north = routes.east_north_m
-    np.testing.assert_array_equal(frame.geometry.x, east)
-    np.testing.assert_array_equal(frame.geometry.y, north)
-
-
-def test_broken_files_are_refused(tmp_path):
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    routes = route_lattice(ways_of([(0, 52.5), (120, 52.5)]), None, None, LATTICE)
-    path = tmp_path / "routes.parquet"
-    write_route_lattice(routes, path)
-    whole = path.read_bytes()
-    table = pq.read_table(path)
-    newer = {
-        key: value.replace(b'"version": 1,', b'"version": 7,')
-        for key, value in table.schema.metadata.items()
-    }
-    for content in (whole[:-30], b"", whole[30:]):
-        path.write_bytes(content)
-        with pytest.raises(StoreError, match=r"routes\.parquet"):
-            read_route_lattice(path)
-    pq.write_table(table.replace_schema_metadata(newer), path)
-    with pytest.raises(StoreError, match="newer"):
-        read_route_lattice(path)
-    pq.write_table(pa.table({"a": [1]}), path)
-    with pytest.raises(StoreError, match="another Parquet file"):
-        read_route_lattice(path)
-    with pytest.raises(StoreError, match="no such file"):
-        read_route_lattice(tmp_path / "none.parquet")
-
-
 def test_types_refuse_what_does_not_fit():
     with pytest.raises(InputError, match="LineString"):
         Ways(
@@ -238,3 +191,10 @@ def test_porto_has_the_expected_number_of_points(shared_data):
     )
     routes = route_lattice(*layers, Lattice.covering(CRS, bounds, 5.0))
     assert 55_000 <= len(routes) <= 75_000
+
+
+def test_layers_and_points_show_themselves_in_a_line():
+    ways = ways_of([(0, 52.5), (120, 52.5)])
+    assert repr(ways) == f"Ways(1 in {CRS})"
+    routes = route_lattice(ways, squares_of((20, 60, 40, 80)), None, LATTICE)
+    assert repr(routes) == f"RouteLattice({len(routes)} points, 3 classes; {LATTICE})"
