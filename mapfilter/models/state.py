@@ -1,6 +1,6 @@
 """Meaning of the components of a state vector, and protocols of measurements.
 
-A :class:`Likelihood` says how probable a reading is in a state and draws one. Cell identities,
+A :class:`Likelihood` gives the probability of a reading in a state and draws one. Cell identities,
 censored levels and ambiguous neighbours are only this. A :class:`GaussianMeasurement` is a function
 of the state with additive Gaussian noise; one such object serves five uses: a simulator samples
 it, an extended Kalman filter linearises it, sigma points go through it, particle filters weigh
