@@ -5,7 +5,6 @@ Each section is a noun. Lengths, angles and levels carry their unit in the name.
 
 from __future__ import annotations
 
-from math import radians
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -15,7 +14,6 @@ from mapfilter.config.fields import (
     EMBEDDED_MAP,
     NO_MAP,
     SYNTHETIC_MAPS,
-    Beside,
     Box,
     FilePath,
     FilterName,
@@ -28,16 +26,14 @@ from mapfilter.config.fields import (
     Seed,
     Share,
     Size,
+    with_options,
 )
-from mapfilter.filters.particle import ParticleOptions
-from mapfilter.models.fingerprint import LevelErrors
-from mapfilter.models.street_motion import MapWeights, MotionErrors
-from mapfilter.positioning.bayes.evidence import EvidenceOptions
-from mapfilter.positioning.bayes.options import BayesOptions
-from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.propagation.models import Clutter, ModelName
-from mapfilter.simulation.imu import Turns
-from mapfilter.tracks.leave_out import Kind
+from mapfilter.simulation.imu import ImuNoise
+from mapfilter.simulation.reports import ReportModel
+from mapfilter.simulation.walking import WalkerModel
+from mapfilter.tracks.log import Kind
 
 
 class CellColumns(Section):
@@ -282,74 +278,9 @@ class SweepSection(Section):
     seed: Seed = 0
 
 
+@with_options(BayesFilter)
 class BayesSection(Section):
-    """``[filter.bayes]``: errors of dead reckoning and of the prediction, weights, particles.
-
-    Angles are degrees. A noise that is taken too large costs some metres until the filter has
-    converged, one taken too small costs wrong positions.
-    """
-
-    step_sd_m: NotNegative = 0.3
-    heading_sd_deg: NotNegative = 6.0
-    bias_sd_deg: NotNegative = 3.0
-    drift_deg_per_sqrt_m: NotNegative = 0.05
-    scale: Annotated[float, Field(ge=0, lt=1)] = 0.02
-    map_sd_m: Positive = 4.0
-    map_weight_per_m: NotNegative = 1 / 18
-    off_cost_per_m: NotNegative = 0.1
-    levels: bool = True
-    level_error_db: Positive = 10.0
-    level_correlation_m: Positive = 50.0
-    level_weight: Annotated[float, Field(gt=0, le=1)] = 0.7
-    report_spacing_m: NotNegative = 5.0
-    most_particles: Annotated[int, Field(ge=100, le=10_000_000)] = 20_000
-    searching_particles: Annotated[int, Field(ge=10, le=10_000_000)] = 12_000
-    least_particles: Annotated[int, Field(ge=10, le=10_000_000)] = 1000
-    switch_mass: Annotated[float, Field(gt=0, lt=1)] = 0.99
-    switch_hold_m: NotNegative = 14.0
-    smooth: bool = False
-    satellite_sd_m: Positive = 2.0
-    antenna_height_m: Finite = 100.0
-    antenna_height_sd_m: NotNegative = 200.0
-    timing_step_m: Positive = 553.5
-    timing_sd_m: Positive = 200.0
-
-    @property
-    def options(self) -> BayesOptions:
-        """The options that these settings mean."""
-        return BayesOptions(
-            MotionErrors(
-                step_sd_m=self.step_sd_m,
-                heading_sd_rad=radians(self.heading_sd_deg),
-                bias_sd_rad=radians(self.bias_sd_deg),
-                bias_drift_rad_per_sqrt_m=radians(self.drift_deg_per_sqrt_m),
-                scale_sd=self.scale,
-            ),
-            MapWeights(self.map_sd_m, self.map_weight_per_m, self.off_cost_per_m),
-            EvidenceOptions(
-                levels=LevelErrors(
-                    sd_db=self.level_error_db,
-                    correlation_m=self.level_correlation_m,
-                    weight=self.level_weight,
-                ),
-                spacing_m=self.report_spacing_m,
-                use_levels=self.levels,
-            ),
-            ParticleOptions(
-                max_particles=self.most_particles,
-                min_search_particles=self.searching_particles,
-                min_particles=self.least_particles,
-                switch_mass=self.switch_mass,
-                switch_hold_m=self.switch_hold_m,
-            ),
-            satellites=GnssOptions(
-                zenith_m=self.satellite_sd_m,
-                height_m=self.antenna_height_m,
-                height_sd_m=self.antenna_height_sd_m,
-            ),
-            timing=TimingOptions(step_m=self.timing_step_m, advance_sd_m=self.timing_sd_m),
-            smooth=self.smooth,
-        )
+    """``[filter.bayes]``: errors of dead reckoning and of the prediction, weights, particles."""
 
 
 MADE_SOUTHWEST = (3.0, 0.0)
@@ -401,8 +332,8 @@ class Area(Section):
         return self.map != NO_MAP or self.bbox is not None or self.southwest is not None
 
 
-class Reality(Section):
-    """``[prediction.reality]``: how the simulated ground truth differs from the prediction."""
+class GroundTruthSection(Section):
+    """``[prediction.ground_truth]``: how the simulated ground truth differs from the prediction."""
 
     write: bool = True
     level_error_db: NotNegative = 7.0
@@ -451,7 +382,7 @@ class Prediction(Section):
     shadowing_correlation_m: Positive = 50.0
     site_share: Share = 0.5
     seed: Seed = 0
-    reality: Reality = Reality()
+    ground_truth: GroundTruthSection = GroundTruthSection()
     survey: SurveySection = SurveySection()
 
 
@@ -464,7 +395,7 @@ class Rasters(Section):
     """
 
     path: FilePath | None = None
-    reality: FilePath | None = None
+    ground_truth: FilePath | None = None
     quantity: Literal["level", "loss"] | None = None
     crs: str | None = None
     factor: Finite = 1.0
@@ -491,6 +422,7 @@ class Database(Section):
     tile_px: Annotated[int, Field(ge=16, le=8192)] = 256
 
 
+@with_options(ReportModel, WalkerModel)
 class Journeys(Section):
     """``[journeys]``: routes along the streets and what the phone reports on them."""
 
@@ -498,38 +430,13 @@ class Journeys(Section):
     draws: Annotated[int, Field(ge=1, le=1_000_000)] = 1
     length_m: Positive = 1940.0
     speed_mps: Positive = 1.4
-    report_period_s: Positive = 1.0
-    radio: Literal["as_predicted", "reality"] = "reality"
-    hysteresis_db: NotNegative = 4.0
-    averaging_s: NotNegative = 1.92
-    fading_db: NotNegative = 1.0
-    max_neighbours: Annotated[int, Field(ge=0, le=32)] = 6
-    sensitivity_dbm: Annotated[float, Field(ge=-150, le=0)] = -104.0
-    phone_offset_sd_db: NotNegative = 0.0
-    beside: Beside = "centre"
-    change_side_m: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 150.0
-    stop_every_m: NotNegative = 0.0
-    stop_s: NotNegative = 20.0
     nlos_satellites: bool = False
     seed: Seed = 0
 
 
+@with_options(ImuNoise)
 class Imu(Section):
-    """``[imu]``: simulated dead reckoning: eqs. (5)-(8) of Khalaf-Allah (2007), lasting errors."""
-
-    period_s: Positive = 1.0
-    sigma_trans_m: NotNegative = 0.2
-    sigma_orient_deg: NotNegative = 3.0
-    bias_sd_deg: NotNegative = 0.0
-    drift_deg_per_sqrt_s: NotNegative = 0.0
-    scale: Annotated[float, Field(ge=0, lt=1)] = 0.0
-    translation_noise: Literal["zero_mean", "as_printed"] = "zero_mean"
-    heading_correlation_s: NotNegative = 0.0
-    step_scale_wander: Annotated[float, Field(ge=0, lt=1)] = 0.0
-    step_scale_correlation_s: NotNegative = 15.0
-    turns: Turns = "headings"
-    gyro_noise_deg_per_sqrt_s: NotNegative = 0.0
-    gyro_bias_deg_per_s: NotNegative = 0.0
+    """``[imu]``: errors of simulated dead reckoning."""
 
 
 class Track(Section):
@@ -592,9 +499,9 @@ class Config(Section):
         return self.rasters.path or self.output.dir / "rxlev.tif"
 
     @property
-    def reality_path(self) -> Path:
-        """Where the rasters that play reality are."""
-        return self.rasters.reality or self.output.dir / "rxlev-reality.tif"
+    def ground_truth_path(self) -> Path:
+        """Where the rasters of the simulated ground truth are."""
+        return self.rasters.ground_truth or self.output.dir / "rxlev-ground-truth.tif"
 
     @property
     def surveyed_plan(self) -> Path | None:

@@ -16,17 +16,12 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import rasterio
 from numba import njit
-from rasterio._err import CPLE_BaseError
-from rasterio.errors import RasterioError
-from rasterio.shutil import copy as copy_raster
 from scipy.spatial import cKDTree
 
-from mapfilter._io import atomic_file
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats, Floats32
-from mapfilter.errors import OutputError, fail
+from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.evaluation.first_fix import FirstFix, FirstFixOptions, first_fix
 from mapfilter.evaluation.position_bound import PositionBound, position_bound
 from mapfilter.evaluation.radio_map import (
@@ -35,8 +30,10 @@ from mapfilter.evaluation.radio_map import (
     RadioMap,
     distance_squared,
     heard_cells,
+    radio_map,
 )
 from mapfilter.geodesy import Lattice
+from mapfilter.rasters.geotiff import new_geotiff
 
 COMPARED = 500
 
@@ -107,24 +104,20 @@ TWIN_ERROR = 0.3
 """Two places count as twins when they are mistaken for each other with at least this chance."""
 
 BANDS = (
-    ("plane_bound_m", "m"), ("along_bound_m", "m"), ("cell_bits", "bit"), ("level_bits", "bit"),
-    ("cells_to_fix_m", "m"), ("levels_to_fix_m", "m"), ("twin_error", ""),
-)  # fmt: skip
+    ("plane_bound_m", "m"),
+    ("along_bound_m", "m"),
+    ("cell_bits", "bit"),
+    ("level_bits", "bit"),
+    ("cells_to_fix_m", "m"),
+    ("levels_to_fix_m", "m"),
+    ("twin_error", ""),
+)
 """What the raster holds, in the order of its bands, with units."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapBound:
-    """What a radio map is good for.
-
-    Parameters
-    ----------
-    radio : RadioMap
-    options : FirstFixOptions
-    position : PositionBound
-    distinct : Distinctness
-    fix : FirstFix
-    """
+    """What a radio map is good for."""
 
     radio: RadioMap
     options: FirstFixOptions
@@ -149,6 +142,13 @@ class MapBound:
             "levels_to_fix_m": np.minimum(fix.levels_m, most_m).mean(axis=1)[nearest],
             "twin_error": fix.twin_error.mean(axis=1)[nearest],
         }
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return one row for each point: way_id, east_m, north_m, and the columns of the bands."""
+        radio = self.radio
+        east_m, north_m = radio.lattice.east_north(radio.row, radio.col)
+        place = {"way_id": radio.way_id, "east_m": east_m, "north_m": north_m}
+        return pd.DataFrame(place | self.at_points())
 
     def by_way(self) -> pd.DataFrame:
         """Return one row for each way: its points' medians, and the means of its starts.
@@ -211,6 +211,44 @@ class MapBound:
         )
 
 
+def bound(
+    database: RadioRouteDatabase,
+    *,
+    errors: ErrorModel | None = None,
+    options: FirstFixOptions | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> MapBound:
+    """Bound the positioning accuracy of a radio-route database, before any drive.
+
+    Parameters
+    ----------
+    database : RadioRouteDatabase
+    errors : ErrorModel, optional
+        Assumed errors of the predicted levels: 7 dB, correlated over 50 m.
+    options : FirstFixOptions, optional
+        Simulated journeys of the ideal filter.
+    seed : int
+        Of these journeys.
+    progress : callable, optional
+        Called with starts done and starts in all.
+
+    Returns
+    -------
+    MapBound
+        :meth:`~MapBound.to_dataframe` by point, :meth:`~MapBound.by_way`, and
+        :meth:`~MapBound.twins`: places that look alike.
+
+    Raises
+    ------
+    InputError
+        The database is too large for the memory.
+    """
+    radio = radio_map(database)
+    rng = np.random.default_rng(seed)
+    return map_bound(radio, errors or ErrorModel(), options or FirstFixOptions(), rng, progress)
+
+
 def map_bound(
     radio: RadioMap,
     errors: ErrorModel,
@@ -239,9 +277,6 @@ def _known(values: Floats) -> Floats:
     return np.where(np.isfinite(values), values, np.nan)
 
 
-_BLOCK_PX = 512
-
-
 def write_bound(
     rasters: Mapping[str, Floats32], lattice: Lattice, path: Path, attribution: str = ""
 ) -> None:
@@ -252,25 +287,7 @@ def write_bound(
     OutputError
         The file cannot be written.
     """
-    profile = {
-        "driver": "GTiff", "width": lattice.cols, "height": lattice.rows, "count": len(BANDS),
-        "dtype": "float32", "nodata": np.nan, "crs": lattice.crs, "interleave": "band",
-        "transform": rasterio.Affine.from_gdal(*lattice.gdal_transform), "tiled": True,
-        "blockxsize": _BLOCK_PX, "blockysize": _BLOCK_PX, "bigtiff": "if_safer",
-    }  # fmt: skip
-    with atomic_file(path) as temporary:
-        bands = temporary.with_name("bands.tif")
-        try:
-            with rasterio.open(bands, "w", **profile) as target:
-                if attribution:
-                    target.update_tags(TIFFTAG_COPYRIGHT=attribution)
-                for band, (name, unit) in enumerate(BANDS, start=1):
-                    target.write(rasters[name], band)
-                    target.set_band_description(band, name)
-                    target.set_band_unit(band, unit)
-            copy_raster(
-                bands, temporary, driver="COG", compress="DEFLATE", predictor="YES",
-                blocksize=_BLOCK_PX, overview_resampling="nearest", bigtiff="if_safer",
-            )  # fmt: skip
-        except (RasterioError, CPLE_BaseError) as error:
-            raise fail(OutputError, str(path), "a place that can be written", error) from error
+    tags = {"TIFFTAG_COPYRIGHT": attribution} if attribution else {}
+    with new_geotiff(path, lattice, BANDS, tags) as target:
+        for band, (name, _) in enumerate(BANDS, start=1):
+            target.write(rasters[name], band)

@@ -11,6 +11,7 @@ import numpy as np
 
 from mapfilter._io import ensure_writable_folder, write_json
 from mapfilter._parallel import Progress, local_executor, ordered_results
+from mapfilter._resume import start_or_resume
 from mapfilter.config.sections import Config
 from mapfilter.database.store import open_database
 from mapfilter.errors import InputError, fail
@@ -37,10 +38,9 @@ from mapfilter.experiments.benchmarks.ottawa_table import (
     session_rows,
     write_left_out,
 )
-from mapfilter.experiments.benchmarks.resuming import begin
-from mapfilter.rasters.rxlev_rasters import open_rasters
-from mapfilter.report.canvas import BLUE, GREEN, GREY
-from mapfilter.report.cumulative import Distribution, plot_cumulative
+from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.report.canvas import BLUE, GREEN, GREY, save
+from mapfilter.report.curves import Distribution, plot_cumulative
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.jsonable import to_jsonable
 from mapfilter.workflows.survey import run_survey
@@ -62,11 +62,8 @@ class OttawaResult:
     ----------
     seed, runs : int
         Of the noise; draws of it for each session.
-    rows : tuple of PartRow
-    sessions : tuple of SessionRow
     seconds : float
         Wall time.
-    out : Path
     """
 
     seed: int
@@ -83,15 +80,12 @@ class Task:
 
     Parameters
     ----------
-    part : str
     session : Path
         Its file.
     others : tuple of Path
         Of those that make the map.
     folder : Path
         Gets survey, database and what came out.
-    options : OttawaOptions
-    runs, seed : int
     """
 
     part: str
@@ -131,9 +125,6 @@ def run_ottawa(
         ``errors.png``.
     runs : int
         Draws of the noise for each session.
-    seed : int
-    parts : sequence of str
-    options : OttawaOptions, optional
     workers : int
         Local processes.
     resume : bool
@@ -155,15 +146,20 @@ def run_ottawa(
     files = {part: _session_files(data, part) for part in parts}
     tasks = [
         Task(
-            part, file, tuple(other for other in every if other != file),
-            out / part / file.stem, chosen, runs, seed,
+            part,
+            file,
+            tuple(other for other in every if other != file),
+            out / part / file.stem,
+            chosen,
+            runs,
+            seed,
         )
         for part, every in files.items()
         for file in every
-    ]  # fmt: skip
+    ]
     ensure_writable_folder(out)
     head = {"version": _VERSION, "seed": seed, "runs": runs, "options": repr(chosen)}
-    begin(out / HEAD, head, [task.result for task in tasks], resume=resume)
+    start_or_resume(out / HEAD, head, [task.result for task in tasks], resume=resume)
     todo = [task for task in tasks if not (resume and task.result.is_file())]
     before = len(tasks) - len(todo)
 
@@ -187,7 +183,7 @@ def run_ottawa(
         told += session_rows(found, centroid_m)
         title = f"Ottawa, {part}: real phones, each session on the map of the others"
         picture = out / part / PICTURE
-        plot_cumulative(_curves(every), picture, title=title, most_m=_MOST_M, share=0.95)
+        save(plot_cumulative(_curves(every), title=title, most_m=_MOST_M, share=0.95), picture)
     seconds = time.perf_counter() - began_s
     result = OttawaResult(seed, runs, tuple(rows), tuple(told), seconds, out)
     write_json(out / TABLE, to_jsonable(result))
@@ -231,12 +227,7 @@ def _session_files(data: Path, part: str) -> list[Path]:
 
 
 def _map_of(others: Sequence[Session], folder: Path) -> tuple[Path, Path]:
-    """Make levels, ways and database of sessions, as drive tests without a street map are.
-
-    Returns
-    -------
-    deviation, database : Path
-    """
+    """Make levels, ways and database of sessions, as drive tests without a street map are."""
     files = [str(other.path) for other in others]
     # The trend stays where nobody measured: not measured there is not the same as not heard.
     survey = {"files": files, "cross_validate": False, "fill": True}

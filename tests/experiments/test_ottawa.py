@@ -30,7 +30,7 @@ from mapfilter.models.fingerprint import LevelReading
 from mapfilter.models.measured_map import HeardOptions, HeardRows, ServingStatistics
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.rasters.rxlev_rasters import open_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.workflows.evaluate_ottawa import Task, find_left_out, run_ottawa
 
 CRS = "EPSG:32618"

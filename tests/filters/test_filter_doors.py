@@ -43,7 +43,6 @@ def test_the_usual_options():
         "switch_hold_m": 14.0,
     }
     assert asdict(CandidateOptions()) == {
-        "resolution_m": 5.0,
         "update_length_m": 22.0,
         "tracking_length_m": None,
         "prediction": "displacement",
@@ -160,7 +159,7 @@ def test_what_lies_on_the_border_is_taken():
     assert SirOptions(0.0, 2.0) != SirOptions(1.0, 0.0)
     assert SirOptions(0.0, 0.0).resample_below == 0.0
     assert SigmaPoints(1e-9, -1.0, -1.0).spread(2) == 1e-9
-    options = CandidateOptions(resolution_m=0.1, update_length_m=0.0, tracking_length_m=0.0)
+    options = CandidateOptions(update_length_m=0.0, tracking_length_m=0.0)
     assert options.tracking_length_m == 0.0
     assert Method("one", iterations=1).iterations == 1
     assert init(np.zeros(2), np.eye(2), [1], 2, np.random.default_rng(0)).state.shape == (2, 2)
@@ -204,8 +203,6 @@ DOORS = {
     "ParticleOptions, jitter": (lambda: P(jitter=(1.0, -1.0)), ConfigError),
     "ParticleOptions, jitter: exp": (lambda: P(jitter=(inf, 1.0)), ConfigError),
     "ParticleOptions, searching_jitter": (lambda: P(searching_jitter=(nan,)), ConfigError),
-    "resolution_m": (lambda: C(resolution_m=0.0), ConfigError),
-    "resolution_m: expected": (lambda: C(resolution_m=inf), ConfigError),
     "update_length_m": (lambda: C(update_length_m=-0.1), ConfigError),
     "update_length_m: expected": (lambda: C(update_length_m=inf), ConfigError),
     "tracking_length_m": (lambda: C(tracking_length_m=-0.1), ConfigError),

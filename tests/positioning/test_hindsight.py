@@ -10,8 +10,8 @@ from small_area import HEIGHT_M, ON_WAY, SOUTH_M, WEST_M, WIDTH_M, make_area
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.models.street_motion import MotionErrors
-from mapfilter.positioning.bayes.smoothing import History, Kept, settled, smoothed
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.bayes.smoothing import History, Kept, smoothed
+from mapfilter.positioning.estimate import Fix, StepOutput, TrackEstimate
 
 AREA = make_area()
 ERRORS = MotionErrors(
@@ -171,13 +171,17 @@ def test_positions_ways_and_masses_are_those_of_the_paths():
     assert places(estimate)[4].tolist() == pytest.approx([45.0, 25.0 - 20.0 / 3], abs=0.1)
 
 
-def at(epoch, state, challenger=None, wins=0):
-    """A forward pass's track after an epoch, as far as the history looks at it."""
+def at(epoch, state, alternative=None, takeovers=0):
+    """The part of the filter's state after an epoch that the history uses."""
     east_m, north_m, travelled_m = MOVED[epoch]
-    memory = SimpleNamespace(east_m=east_m, north_m=north_m, travelled_m=travelled_m)
+    reckoning = SimpleNamespace(east_m=east_m, north_m=north_m, travelled_m=travelled_m)
     belief = SimpleNamespace(state=state, log_weight=np.zeros(state.shape[1]))
     return SimpleNamespace(
-        memory=memory, belief=belief, leading=belief, challenger=challenger, wins=wins
+        reckoning=reckoning,
+        belief=belief,
+        leading=belief,
+        alternative=alternative,
+        takeovers=takeovers,
     )
 
 
@@ -197,25 +201,33 @@ def test_beliefs_are_kept_every_few_metres_and_at_the_end():
 
 
 @pytest.mark.parametrize("won", [False, True])
-def test_a_challenger_that_won_takes_the_place_of_what_was_kept_since(won):
+def test_an_alternative_that_took_over_replaces_what_was_kept_since(won):
     history, main, other = History(every_m=1.0), cloud((1.0, 1.0, 0, 0)), cloud((9.0, 9.0, 0, 0))
     rival = SimpleNamespace(
-        belief=SimpleNamespace(state=other, log_weight=np.zeros(1)), began_at_m=6.0
+        belief=SimpleNamespace(state=other, log_weight=np.zeros(1)), start_m=6.0
     )
     then = other if won else main
     tracks = [at(0, main), at(1, main, rival), at(2, main, rival)]
-    tracks += [at(3, then, wins=int(won)), at(4, then, wins=int(won))]
+    tracks += [at(3, then, takeovers=int(won)), at(4, then, takeovers=int(won))]
     for before, after in zip([tracks[0], *tracks], tracks, strict=False):
         history.add(before, after)
     assert [k.epoch for k in history.kept] == [0, 1, 2, 3, 4]
     expected = [1.0, 9.0, 9.0, 9.0, 9.0] if won else [1.0] * 5
     assert [float(k.state[0, 0]) for k in history.kept] == expected
-    assert history.challenging == []
+    assert history.alternative == []
 
 
 def test_a_fix_is_settled_where_it_tracks_within_ten_metres():
-    estimate = forward_pass()
-    estimate.radii_m[:, 2] = [10.0, 10.1, 5.0, nan, 9.0]
-    status = (*[Status.TRACKING] * 2, Status.CONVERGED, *[Status.TRACKING] * 2)
-    told = SimpleNamespace(status=status, radii_m=estimate.radii_m)
-    assert settled(told).tolist() == [True, False, False, False, True]
+    tracking, converged = Status.TRACKING, Status.CONVERGED
+    cases = [(10.0, tracking), (10.1, tracking), (5.0, converged), (nan, tracking), (9.0, tracking)]
+    outputs = [
+        StepOutput(
+            Fix(float(k), 0.0, 0.0, np.eye(2), np.array([1.0, 2.0, radius_m]), status, 1, 1.0, 0,
+                nan, Reason.USED),
+            (nan, nan, 0.0, 1.0, -1.0),
+        )
+        for k, (radius_m, status) in enumerate(cases)
+    ]  # fmt: skip
+    found = TrackEstimate.of_outputs("EPSG:32629", "bayes", outputs).evidence
+    assert found.settled.tolist() == [True, False, False, False, True]
+    assert found.entropy_bits.tolist() == [1.0] * 5

@@ -8,7 +8,7 @@ import rasterio
 from command_line import assert_done, assert_refused, contents, mapfilter, settings
 
 from mapfilter.geodesy import unproject
-from mapfilter.rasters.rxlev_rasters import open_rasters
+from mapfilter.rasters.raster_set import open_rasters
 
 HEADER = "cell,lat,lon,level_dbm,time,accuracy_m\n"
 
@@ -56,7 +56,7 @@ def test_a_survey_becomes_rasters_and_a_database(survey, world, tmp_path):
     assert found["pictures"] == [str(path) for path in pictures]
     assert sorted((tmp_path / "pictures").iterdir()) == sorted(pictures)
     assert (found["cells"], found["sessions"], found["measurements"]) == (3, 3, 1350)
-    assert found["reality"] is None
+    assert found["ground_truth"] is None
     told = found["validation"]
     assert told["by_session"]
     assert told["rmse_db"] < 0.85 * told["trend_rmse_db"]
@@ -169,7 +169,7 @@ def test_what_cannot_be_surveyed_is_told(survey, tmp_path):
     refused("absent.csv", "a readable file", prediction__survey__files="absent.csv")
     refused("method", "'gp', 'knn' or 'trend'", prediction__survey__method="svm")
     refused("positions accurate to 1 m", prediction__survey__max_accuracy_m=1.0)
-    refused("heard in at least 900 squares", prediction__survey__min_points=900)
+    refused("received in at least 900 squares", prediction__survey__min_points=900)
     refused("measurements", "some in the area", area__bbox="24.99,60.19,25.0,60.2")
     refused("longitude and latitude swapped", area__bbox="60.166,24.942,60.1697,24.9495")
     far = tmp_path / "far.csv"

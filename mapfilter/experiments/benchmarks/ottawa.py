@@ -30,14 +30,14 @@ from mapfilter.models.fingerprint import LevelErrors, ServingWeights
 from mapfilter.models.measured_map import HeardOptions, HeardRows, ServingStatistics
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.evidence import EvidenceOptions
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import MeasuredMapModel
 from mapfilter.positioning.bayes.options import BayesOptions, open_area
-from mapfilter.positioning.bayes.replay import position_by_bayes
+from mapfilter.positioning.bayes.radio import EvidenceOptions
 from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.filter import locate
 from mapfilter.propagation.shadowing import named_rng
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.tracks.log import TrackLog
 
 PARTS = ("lacolyoc", "uottawa", "carling")
@@ -62,11 +62,8 @@ class OttawaOptions:
 
     Parameters
     ----------
-    filter : BayesOptions
     unmeasured_db : float
         Deviation of a level where its cell was not measured, and only its trend is known.
-    heard : HeardOptions
-    errors : ReckoningErrors
     """
 
     filter: BayesOptions = field(
@@ -99,14 +96,12 @@ class FoundSession:
 
     Parameters
     ----------
-    part, session, method : str
     on_map : float
         Share of all good fixes that lie within 50 m of the map.
     converged, success : bool
         At most 50 m off at the first good fix from CONVERGED on.
     switch_m : float
         Metres by dead reckoning until CONVERGED.
-    error_at_switch_m : float
     lost : int
         Epochs that were LOST.
     error_m : ndarray, shape (N,)
@@ -140,8 +135,6 @@ def surveyed_positioner(
     ----------
     database : RadioRouteDatabase
         Of the other sessions.
-    others : sequence of Session
-    options : OttawaOptions
     deviation : RxLevRasters, optional
         By how much a new reading differs from the map of levels, as the survey tells it; no value
         where a cell was not measured.
@@ -165,7 +158,7 @@ def surveyed_positioner(
     model = MeasuredMapModel(
         area, chosen.motion, chosen.map, chosen.evidence, heard=heard, level_sd_db=level_sd_db
     )
-    return replace(chosen.over(area), model=model)
+    return replace(chosen.over_area(area), model=model)
 
 
 def _level_sd_db(deviation: RxLevRasters, area: AreaMap, unmeasured_db: float) -> Floats32:
@@ -196,7 +189,7 @@ def find_session(
     for method in METHODS:
         # The same stream of numbers: the filter below the smoother is the filter itself.
         own = named_rng(seed, "filter", session.name, str(draw))
-        located = position_by_bayes(positioner, log, own, smooth=method == "smoothed")
+        located = locate(log, replace(positioner, smooth=method == "smoothed"), own)
         found.append(_scored(part, session, method, log, located.estimate, positioner))
     return found
 

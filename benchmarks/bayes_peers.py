@@ -1,0 +1,276 @@
+"""A step of the Bayes map filter against NumPy, particles and Stone Soup, with the same model.
+
+Run by hand, after ``pip install particles stonesoup``: ``python benchmarks/bayes_peers.py``.
+Nanoseconds per particle are medians over repetitions that take turns; packages that are not
+installed are left out.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import tempfile
+import time
+from collections.abc import Callable
+from datetime import datetime, timedelta
+from functools import cached_property
+from math import exp
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from mapfilter._types import Floats, Ints
+from mapfilter.database.store import open_database
+from mapfilter.models.fingerprint import log_serving
+from mapfilter.models.street_motion import BIAS, EAST, LOG_SCALE, NORTH, OFF
+from mapfilter.positioning.bayes.options import BayesOptions, open_area
+from mapfilter.tracks.store import read_log
+from mapfilter.workflows.bench_filter import StepInputs, make_world, step_inputs, whole_step
+
+Step = Callable[[Floats], Floats]
+"""From equally weighted particles, shape (6, N), to those after a whole step."""
+
+MAP = 5
+"""Row of a step's log-likelihood of the map, after the rows of the model's own state."""
+
+_NEW_ROWS = 4
+_RUNS, _PACKAGE_STEPS = 5, 10
+_JITTER = (0.5, 0.5, 0.005, 0.003, 0.0)
+_TABLE_DB, _PER_DB = 64, 4
+
+
+class NumpyModel:
+    """One step of the Bayes map filter's model, by whole arrays."""
+
+    def __init__(self, inputs: StepInputs) -> None:
+        self.model, self.motion = inputs.model, inputs.motion
+        self.reading, self.levels = inputs.reading, inputs.levels
+
+    @cached_property
+    def _serving(self) -> Floats:
+        span = np.arange(-_TABLE_DB * _PER_DB, _TABLE_DB * _PER_DB + 1) / _PER_DB
+        return log_serving(span, self.model.evidence.serving)
+
+    def move(self, state: Floats, rng: np.random.Generator) -> Floats:
+        """Return particles after the step of dead reckoning and the map, with the latter's row."""
+        errors, count = self.model.motion, state.shape[1]
+        length_m = abs(self.motion.step_m)
+        a, b, c, d = rng.standard_normal((4, count))
+        moved = np.empty_like(state)
+        bias = state[BIAS] + errors.bias_drift_rad_per_sqrt_m * length_m**0.5 * c
+        moved[BIAS] = (bias + np.pi) % (2 * np.pi) - np.pi
+        scale = state[LOG_SCALE] + errors.scale_drift_per_sqrt_m * length_m**0.5 * d
+        moved[LOG_SCALE] = scale
+        heading = self.motion.heading_rad + moved[BIAS]
+        stretch = exp(0.5 * errors.heading_sd_rad**2)
+        along_sd_m = errors.step_sd_m * (length_m / errors.typical_step_m) ** 0.5
+        along = self.motion.step_m * stretch * np.exp(scale) + along_sd_m * a
+        across = length_m * errors.heading_sd_rad * b
+        cosine, sine = np.cos(heading), np.sin(heading)
+        moved[EAST] = state[EAST] + along * cosine - across * sine
+        moved[NORTH] = state[NORTH] + along * sine + across * cosine
+        moved[OFF], moved[MAP] = self._mapped(moved, state[OFF], length_m)
+        return moved
+
+    def log_likelihood(self, state: Floats) -> Floats:
+        """Return the log-likelihood of map, serving cell and levels, shape (N,)."""
+        area, levels, reading = self.model.area, self.levels, self.reading
+        now = area.level_dbm[self._pixels(state[EAST], state[NORTH])]
+        level, best, second = now[:, reading.serving], now[:, -2], now[:, -1]
+        margin = level - np.where(level >= best, second, best)
+        middle = _TABLE_DB * _PER_DB
+        place = np.clip(margin * _PER_DB + middle + 0.5, 0, 2 * middle).astype(np.int64)
+        served = reading.serving_weight * self._serving[place]
+        cosine, sine = np.cos(state[BIAS]), np.sin(state[BIAS])
+        stretch = np.exp(state[LOG_SCALE])
+        back_east, back_north = levels.back_east_m, levels.back_north_m
+        east = state[EAST] - stretch * (back_east * cosine - back_north * sine)
+        north = state[NORTH] - stretch * (back_east * sine + back_north * cosine)
+        then = area.level_dbm[self._pixels(east, north)]
+        seen, before = now[:, levels.cell], then[:, levels.cell]
+        v = (levels.offset_db - seen + levels.rho * before) * levels.scale
+        v = np.clip(v, -levels.clip, levels.clip)
+        common = levels.common
+        shared = common / (1 + (levels.cell.size - 1) * common) * v.sum(axis=1) ** 2
+        matched = -0.5 * levels.weight / (1 - common) * ((v**2).sum(axis=1) - shared)
+        return np.asarray(state[MAP] + served + matched)
+
+    def _mapped(self, state: Floats, off: Floats, length_m: float) -> tuple[Floats, Floats]:
+        lattice, raster = self.model.area.lattice, self.model.log_map
+        step = lattice.resolution_m
+        x = np.maximum((state[EAST] - step / 2) / step, 0)
+        y = np.maximum(((lattice.rows - 0.5) * step - state[NORTH]) / step, 0)
+        col = np.minimum(x.astype(np.int64), lattice.cols - 2)
+        row = np.minimum(y.astype(np.int64), lattice.rows - 2)
+        u, v = np.minimum(x - col, 1), np.minimum(y - row, 1)
+        upper = raster[row, col] + u * (raster[row, col + 1] - raster[row, col])
+        under = raster[row + 1, col] + u * (raster[row + 1, col + 1] - raster[row + 1, col])
+        factors = self.model.weights.over(length_m)
+        on = np.exp(factors.exponent * (upper + v * (under - upper)))
+        away = off * (1 - factors.come_back) + (1 - off) * factors.leave
+        total = away * factors.off + (1 - away) * on
+        return away * factors.off / total, np.log(total)
+
+    def _pixels(self, east: Floats, north: Floats) -> tuple[Ints, Ints]:
+        lattice = self.model.area.lattice
+        step = lattice.resolution_m
+        col = np.clip(east / step, 0, lattice.cols - 1).astype(np.int64)
+        row = np.clip(lattice.rows - north / step, 0, lattice.rows - 1).astype(np.int64)
+        return row, col
+
+
+def numpy_step(model: NumpyModel, jitter: Floats, rng: np.random.Generator) -> Step:
+    """Return a whole step in NumPy: move, weigh, normalise, resample, jitter the copies."""
+
+    def step(state: Floats) -> Floats:
+        moved = model.move(state, rng)
+        log_weight = model.log_likelihood(moved)
+        weight = np.exp(log_weight - log_weight.max())
+        weight /= weight.sum()
+        count = weight.size
+        places = (np.arange(count) + rng.random()) / count
+        chosen = np.minimum(np.searchsorted(np.cumsum(weight), places), count - 1)
+        copies = moved[:, chosen]
+        noise = rng.standard_normal((_NEW_ROWS, count))
+        copies[:_NEW_ROWS] += jitter[:_NEW_ROWS, None] * noise
+        return copies
+
+    return step
+
+
+def particles_step(model: NumpyModel, rng: np.random.Generator, steps: int) -> Step | None:
+    """Return some steps by the package ``particles``, or None without it."""
+    if importlib.util.find_spec("particles") is None:
+        return None
+    import particles
+    from particles.core import FeynmanKac
+
+    class Walk(FeynmanKac):  # type: ignore[misc]
+        first: Floats
+
+        def M0(self, N: int) -> Floats:  # noqa: N802, N803
+            return self.first[:N]
+
+        def M(self, t: int, xp: Floats) -> Floats:  # noqa: ARG002, N802
+            return model.move(xp.T, rng).T
+
+        def logG(self, t: int, xp: Floats, x: Floats) -> Floats:  # noqa: ARG002, N802
+            return model.log_likelihood(x.T)
+
+    def step(state: Floats) -> Floats:
+        walk = Walk(T=steps)
+        walk.first = np.ascontiguousarray(state.T)
+        run = particles.SMC(fk=walk, N=state.shape[1], resampling="systematic", ESSrmin=1.0)
+        run.run()
+        return np.asarray(run.X).T
+
+    return step
+
+
+def stone_soup_step(model: NumpyModel, rng: np.random.Generator) -> Step | None:
+    """Return a whole step by Stone Soup, or None without it."""
+    if importlib.util.find_spec("stonesoup") is None:
+        return None
+    from stonesoup.models.measurement import MeasurementModel
+    from stonesoup.models.transition import TransitionModel
+    from stonesoup.predictor.particle import ParticlePredictor
+    from stonesoup.resampler.particle import SystematicResampler
+    from stonesoup.types.array import StateVectors
+    from stonesoup.types.detection import Detection
+    from stonesoup.types.hypothesis import SingleHypothesis
+    from stonesoup.types.state import ParticleState
+    from stonesoup.updater.particle import ParticleUpdater
+
+    class Walk(TransitionModel):  # type: ignore[misc]
+        ndim_state = MAP + 1
+
+        def function(self, state: Any, **_: Any) -> Any:
+            return StateVectors(model.move(np.asarray(state.state_vector), rng))
+
+        def rvs(self, *_: Any, **__: Any) -> Any:
+            raise NotImplementedError
+
+        def pdf(self, *_: Any, **__: Any) -> Any:
+            raise NotImplementedError
+
+    class ReportRow(MeasurementModel):  # type: ignore[misc]
+        ndim_state = MAP + 1
+        ndim_meas = 1
+        mapping = (0,)
+
+        def function(self, state: Any, **_: Any) -> Any:
+            return state.state_vector[:1]
+
+        def rvs(self, *_: Any, **__: Any) -> Any:
+            raise NotImplementedError
+
+        def pdf(self, *_: Any, **__: Any) -> Any:
+            raise NotImplementedError
+
+        def logpdf(self, _: Any, state: Any, **__: Any) -> Floats:
+            return model.log_likelihood(np.asarray(state.state_vector))
+
+    began = datetime(2000, 1, 1)
+    later = began + timedelta(seconds=1)
+    predictor = ParticlePredictor(Walk())
+    updater = ParticleUpdater(measurement_model=ReportRow(), resampler=SystematicResampler())
+    report = Detection(np.zeros((1, 1)), timestamp=later)
+
+    def step(state: Floats) -> Floats:
+        count = state.shape[1]
+        known = ParticleState(
+            StateVectors(state), weight=np.full(count, 1 / count), timestamp=began
+        )
+        predicted = predictor.predict(known, timestamp=later)
+        found = updater.update(SingleHypothesis(predicted, report))
+        return np.asarray(found.state_vector)
+
+    return step
+
+
+def compare(inputs: StepInputs, belief: Any, runs: int = _RUNS) -> dict[str, float]:
+    """Return nanoseconds per particle of a whole step, by package."""
+    count = belief.log_weight.size
+    rng, jitter = np.random.default_rng(1), np.array(_JITTER)
+    peer = NumpyModel(inputs)
+    wide = np.vstack([belief.state.astype(np.float64), np.zeros(count)])
+    steps = {
+        "numpy": (numpy_step(peer, jitter, rng), 1),
+        "particles": (particles_step(peer, rng, _PACKAGE_STEPS), _PACKAGE_STEPS),
+        "stonesoup": (stone_soup_step(peer, rng), 1),
+    }
+    tasks: dict[str, tuple[Callable[[], object], int]] = {
+        name: (lambda step=step: step(wide), times)
+        for name, (step, times) in steps.items()
+        if step is not None
+    }
+    tasks["mapfilter"] = (
+        lambda: whole_step(inputs, belief, jitter.astype(np.float32), rng),
+        1,
+    )
+    took_ns: dict[str, list[float]] = {name: [] for name in tasks}
+    for run in range(runs + 1):
+        for name, (task, times) in tasks.items():
+            began_s = time.process_time()
+            task()
+            # The first loads what is compiled.
+            if run > 0:
+                took_ns[name].append(1e9 * (time.process_time() - began_s) / (times * count))
+    return {name: median(values) for name, values in took_ns.items()}
+
+
+def main() -> None:
+    """Print a line for each number of particles and package."""
+    with tempfile.TemporaryDirectory(prefix="mapfilter-bench-") as name:
+        database, folders = make_world(Path(name), ["journeys.count=1"])
+        model = BayesOptions().over(open_area(open_database(database))).model
+        for count in (10_000, 100_000):
+            found = compare(*step_inputs(model, read_log(folders[0]), count))
+            for package, ns in found.items():
+                ratio = ns / found["mapfilter"]
+                print(f"{count} particles, {package}: {ns:.0f} ns per particle, {ratio:.1f} times")
+
+
+if __name__ == "__main__":
+    main()
