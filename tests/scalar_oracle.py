@@ -77,11 +77,13 @@ def map_log_likelihood(distance_m, sd_m):
 def map_step(log_map, off, length_m, weights):
     """Log-likelihood of one step by the map, and the probability of being off it after."""
     prior = np.array([1 - off, off])
-    leave, come_back = (1 - exp(-rate * length_m)
-                        for rate in (weights.leave_per_m, weights.return_per_m))  # fmt: skip
+    leave, come_back = (
+        1 - exp(-rate * length_m) for rate in (weights.leave_per_m, weights.return_per_m)
+    )
     change = np.array([[1 - leave, leave], [come_back, 1 - come_back]])
-    gain = np.array([exp(weights.weight_per_m * length_m * log_map),
-                     exp(-weights.off_cost_per_m * length_m)])  # fmt: skip
+    gain = np.array(
+        [exp(weights.weight_per_m * length_m * log_map), exp(-weights.off_cost_per_m * length_m)]
+    )
     beliefs, log_evidence = forward(prior, [(change, gain)])
     return log_evidence, beliefs[-1][1]
 

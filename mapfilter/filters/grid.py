@@ -84,13 +84,12 @@ _LEAST_MASS = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Transport:
-    """What one stretch of dead reckoning does to mass.
+    """Effect of one stretch of dead reckoning on mass.
 
     Parameters
     ----------
-    right_px, down_px : ndarray, shape (B,)
-        Mean displacement of each bin of the heading error, in pixels.
-    sd_right_px, sd_down_px : ndarray, shape (B,)
+    right_px, down_px, sd_right_px, sd_down_px : ndarray, shape (B,)
+        Mean displacement of each bin of the heading error and its deviation, in pixels.
     turned_bins : float
         Standard deviation of the heading error's change, in bins.
     on, off : ndarray of float32, shape (rows, cols), and float
@@ -111,7 +110,7 @@ class Transport:
 
 
 class GridModel(Protocol[PriorT, ReadingT]):
-    """What a grid filter needs to know of the world."""
+    """Motion, map and measurements, as a grid filter needs them."""
 
     @property
     def bins(self) -> Bins:
@@ -132,24 +131,25 @@ class GridModel(Protocol[PriorT, ReadingT]):
         """Return pixels as states of the particle model, shape (R, N)."""
 
     def transport(self, east_m: float, north_m: float, length_m: float) -> Transport:
-        """Return what a displacement by dead reckoning, of some length, does."""
+        """Return the effect of a displacement by dead reckoning, of some length."""
 
     def weigh(self, state: Floats32, log_weight: Floats, reading: ReadingT) -> Reason:
         """Add a reading's log-likelihood to the log weights, in place; return why not, if so."""
 
     def can_converge(self, summary: BeliefSummary) -> bool:
-        """Tell whether a belief may count as having converged, if it agrees on a place."""
+        """Return whether a belief may count as having converged, if it agrees on a place."""
 
 
 @dataclass(frozen=True, eq=False)
 class GridBelief:
-    """Mass on the grid, and how the filter stands.
+    """Mass on the grid, and the status of the filter.
 
     Parameters
     ----------
     on, off : ndarray of float32, shape (B, rows, cols)
         Mass of those on and off the map; together they sum to one after an update.
     model : GridModel
+        Motion, map and measurements.
     waiting_m : (float, float, float)
         Displacement east and north, and its length, that mass has not been moved by yet.
     travelled_m, log_evidence, status, agreement_start_m
@@ -172,8 +172,27 @@ class GridBelief:
 
     @cached_property
     def moved(self) -> GridBelief:
-        """The belief with nothing waiting."""
-        return _moved(self)
+        """The belief with all mass moved by the displacement that waits, and weighed by the map."""
+        if self.waiting_m[2] == 0:
+            return self
+        model = self.model
+        step = model.transport(*self.waiting_m)
+        on, off = np.empty_like(self.on), np.empty_like(self.off)
+        for b in range(on.shape[0]):
+            right = taps(step.right_px[b], step.sd_right_px[b])
+            down = taps(step.down_px[b], step.sd_down_px[b])
+            for source, target in ((self.on, on), (self.off, off)):
+                target[b] = shifted(shifted(source[b], *right, axis=1), *down, axis=0)
+        if step.turned_bins > 0 and on.shape[0] > 1:
+            spread = taps(0.0, step.turned_bins)
+            on, off = (turned(mass, *spread, circular=model.circular) for mass in (on, off))
+        leave, come_back = np.float32(step.leave), np.float32(step.come_back)
+        stayed = on * (1 - leave) + off * come_back
+        away = on * leave + off * (1 - come_back)
+        waiting = (0.0, 0.0, 0.0)
+        return replace(
+            self, on=stayed * step.on, off=away * np.float32(step.off), waiting_m=waiting
+        )
 
     @cached_property
     def _cloud(self) -> tuple[Floats32, Floats32]:
@@ -203,7 +222,7 @@ class GridBelief:
 
     @cached_property
     def summary(self) -> BeliefSummary:
-        """What the belief says."""
+        """Leading hypothesis, radii and runners-up."""
         if not self.weight.size:
             return empty_summary(self.state.shape[0])
         return summarise(self.state, self.weight, self.bins)
@@ -214,13 +233,7 @@ class GridBelief:
 
 @dataclass(frozen=True, slots=True)
 class GridFilter(Generic[PriorT, ReadingT]):
-    """The exact filter; its switch rule is the particle filter's.
-
-    Parameters
-    ----------
-    model : GridModel
-    options : ParticleOptions
-    """
+    """The exact filter for a model; its switch rule is the particle filter's, with its options."""
 
     model: GridModel[PriorT, ReadingT]
     options: ParticleOptions = field(default_factory=ParticleOptions)
@@ -258,7 +271,7 @@ class GridFilter(Generic[PriorT, ReadingT]):
         reading: ReadingT,
         rng: np.random.Generator,  # noqa: ARG002
     ) -> tuple[GridBelief, UpdateInfo]:
-        """Move the mass by what waits, weigh it, and look whether it agrees."""
+        """Move the mass by what waits, weigh it, and apply the switch rule."""
         before = belief.moved
         both = before.on + before.off
         bias, row, col = np.nonzero(both > _LEAST_MASS * float(both.max(initial=0.0)))
@@ -294,27 +307,6 @@ class GridFilter(Generic[PriorT, ReadingT]):
 
     def locate(self, belief: GridBelief) -> Estimate:
         """Return the leading hypothesis."""
-        said = belief.summary
-        return Estimate(float(said.mean[0]), float(said.mean[1]), said.covariance_m2, said.radii_m)
-
-
-def _moved(belief: GridBelief) -> GridBelief:
-    """Move all mass by the displacement that waits, and weigh it by the map."""
-    if belief.waiting_m[2] == 0:
-        return belief
-    model = belief.model
-    step = model.transport(*belief.waiting_m)
-    on, off = np.empty_like(belief.on), np.empty_like(belief.off)
-    for b in range(on.shape[0]):
-        right = taps(step.right_px[b], step.sd_right_px[b])
-        down = taps(step.down_px[b], step.sd_down_px[b])
-        for source, target in ((belief.on, on), (belief.off, off)):
-            target[b] = shifted(shifted(source[b], *right, axis=1), *down, axis=0)
-    if step.turned_bins > 0 and on.shape[0] > 1:
-        spread = taps(0.0, step.turned_bins)
-        on, off = (turned(mass, *spread, circular=model.circular) for mass in (on, off))
-    leave, come_back = np.float32(step.leave), np.float32(step.come_back)
-    stayed = on * (1 - leave) + off * come_back
-    away = on * leave + off * (1 - come_back)
-    waiting = (0.0, 0.0, 0.0)
-    return replace(belief, on=stayed * step.on, off=away * np.float32(step.off), waiting_m=waiting)
+        found = belief.summary
+        east_m, north_m = float(found.mean[0]), float(found.mean[1])
+        return Estimate(east_m, north_m, found.covariance_m2, found.radii_m)

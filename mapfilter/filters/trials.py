@@ -164,7 +164,7 @@ def factors_of(covariance: ArrayLike, size: int, trials: int) -> Floats:
 
 
 def is_diagonal(matrix: Floats) -> bool:
-    """Tell whether a matrix has nothing off its diagonal."""
+    """Return whether a matrix is diagonal."""
     return not np.any(matrix - np.diag(np.diagonal(matrix)))
 
 

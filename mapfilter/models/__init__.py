@@ -1,1 +1,1 @@
-"""How things move and how they are heard, as equations over arrays."""
+"""Models of motion and of measurements, as equations over arrays."""

@@ -1,15 +1,15 @@
-"""What earlier sessions say of a cell: how often it served at a place, at which timing advance.
+"""Serving cells and timing advances counted in earlier sessions, as maps.
 
-Where phones tell nothing but their serving cell, nobody knows how the others were heard, and a
-margin over the best other cell is made of extrapolations. What was served can be counted. Rows of
+Where phones report nothing but their serving cell, the levels of the others are unknown, and a
+margin over the best other cell is made of extrapolations. Serving cells can be counted. Rows of
 sessions are spread by a Gaussian kernel (Nadaraya 1964; Watson 1964): with n rows of any cell about
 a place and n_c of one, that one serves with the probability ``(n_c + a p_c) / (n + a)``, with p_c
-its share of all rows and a the weight of not knowing. On another day another cell of the same site
+its share of all rows and a the weight of the prior. On another day another cell of the same site
 may serve, of another carrier: a part of the probability goes by how often the site served.
 
 Timing advances get mean and deviation in the same way, a cell's drawn to those of its site:
-buildings bend the way of the signal, so that rings about the site, whose place is not known either,
-say less than what was told nearby.
+buildings bend the way of the signal, so that rings about the site, whose position is not known
+either, are less informative than what was reported nearby.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ _CLIP_SD = 4.0
 
 @dataclass(frozen=True, slots=True)
 class HeardOptions:
-    """How rows are spread.
+    """Smoothing of the counts.
 
     Parameters
     ----------
     reach_m : float
         Standard deviation of the kernel.
     prior_rows : float
-        Weight of not knowing: so many rows at a place say as much as all rows together.
+        Weight of the prior: so many rows at a place count as much as all rows together.
     site_part : float
         Part of the probability that goes by the site.
     rounding_steps : float
@@ -58,7 +58,7 @@ class HeardRows:
         Band of the serving cell; -1 for one that is not of the map.
     east_m, north_m : ndarray
     timing_advance : ndarray
-        Steps; NaN where it was not told.
+        Steps; NaN where it was not reported.
     """
 
     cell: Ints
@@ -76,7 +76,7 @@ class ServingStatistics:
     log_share : ndarray of float32, shape (C, P)
         Log probability that a cell serves.
     advance_steps, deviation_steps : ndarray of float32, shape (C, P)
-        Timing advance; NaN for a cell of which none was told.
+        Timing advance; NaN for a cell of which none was reported.
     """
 
     log_share: Floats32
@@ -87,21 +87,14 @@ class ServingStatistics:
     def of_rows(
         cls, rows: HeardRows, lattice: Lattice, site: Ints, options: HeardOptions
     ) -> ServingStatistics:
-        """Count rows on a lattice.
+        """Count the rows that lie on a lattice.
 
-        Parameters
-        ----------
-        rows : HeardRows
-            Those outside the lattice do not count.
-        lattice : Lattice
-        site : ndarray of int, shape (C,)
-            Which site each cell is of, as numbers from 0.
-        options : HeardOptions
+        ``site`` is the site of each cell, as numbers from 0, shape (C,).
         """
         row, col = lattice.row_col(rows.east_m, rows.north_m)
         inside = np.asarray(lattice.contains(row, col))
         pixel = (np.asarray(row) * lattice.cols + np.asarray(col))[inside]
-        cell, told = rows.cell[inside], rows.timing_advance[inside]
+        cell, reported = rows.cell[inside], rows.timing_advance[inside]
         sigma = options.reach_m / lattice.resolution_m
         # Scaled so that a row counts as one at its own place.
         scale = 2 * np.pi * max(sigma, 1 / np.sqrt(2 * np.pi)) ** 2
@@ -122,15 +115,16 @@ class ServingStatistics:
             own, bands = place == one, np.flatnonzero(site == one)
             usual = often[bands].sum()
             by_site = (spread(own, ones) + prior * usual) / total
-            known = own & np.isfinite(told)
-            usual_steps = _moments_of(told[known])
-            by_place = _moments(spread, known, told, usual_steps, prior)
+            known = own & np.isfinite(reported)
+            steps = reported[known] if known.any() else np.array([np.nan])
+            usual_steps = (np.array([steps.mean()]), np.array([np.mean(steps**2)]))
+            by_place = _moments(spread, known, reported, usual_steps, prior)
             for band in bands:
                 by_cell = (spread(cell == band, ones) + prior * often[band]) / total
                 part = options.site_part
                 share = (1 - part) * by_cell + part * by_site * often[band] / usual
                 maps[0, band] = np.log(share)
-                first, second = _moments(spread, known & (cell == band), told, by_place, prior)
+                first, second = _moments(spread, known & (cell == band), reported, by_place, prior)
                 variance = np.maximum(second - first**2, 0.0) + options.rounding_steps**2
                 maps[1, band], maps[2, band] = first, np.sqrt(variance)
         return cls(*maps)
@@ -147,22 +141,15 @@ class ServingStatistics:
         return np.asarray(np.nan_to_num(found, nan=0.0), dtype=np.float32)
 
 
-def _moments_of(values: Floats) -> tuple[Floats, Floats]:
-    """Return mean and mean square, NaN without any."""
-    if not values.size:
-        return np.full(1, np.nan), np.full(1, np.nan)
-    return np.array([values.mean()]), np.array([np.mean(values**2)])
-
-
 def _moments(
     spread: Callable[[Bools, Floats], Floats],
     known: Bools,
-    told: Floats,
+    reported: Floats,
     otherwise: tuple[Floats, Floats],
     prior: float,
 ) -> tuple[Floats, Floats]:
-    """Return maps of mean and mean square, drawn to what is known otherwise."""
-    count = spread(known, np.ones(told.size)) + prior
-    first = (spread(known, told) + prior * otherwise[0]) / count
-    second = (spread(known, told**2) + prior * otherwise[1]) / count
+    """Return maps of mean and mean square, drawn towards those given otherwise."""
+    count = spread(known, np.ones(reported.size)) + prior
+    first = (spread(known, reported) + prior * otherwise[0]) / count
+    second = (spread(known, reported**2) + prior * otherwise[1]) / count
     return first, second

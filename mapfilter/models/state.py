@@ -1,6 +1,6 @@
-"""Which component of a state vector is what.
+"""Meaning of the components of a state vector, and protocols of measurements.
 
-A :class:`Likelihood` says how probable a reading is in a state and draws one. Cell identities,
+A :class:`Likelihood` gives the probability of a reading in a state and draws one. Cell identities,
 censored levels and ambiguous neighbours are only this. A :class:`GaussianMeasurement` is a function
 of the state with additive Gaussian noise; one such object serves five uses: a simulator samples
 it, an extended Kalman filter linearises it, sigma points go through it, particle filters weigh
@@ -90,17 +90,9 @@ class Likelihood(Protocol[ReadingT]):
     """How probable a reading is, given the state."""
 
     def log_likelihood(self, state: Floats, reading: ReadingT) -> Floats:
-        """Return the natural logarithm of the likelihood.
+        """Return the natural logarithm of the likelihood, shape (...), in states (..., n).
 
-        Parameters
-        ----------
-        state : (..., n) array
-        reading : object
-            What was measured; what is absent of it does not count.
-
-        Returns
-        -------
-        (...) array
+        What is absent of the reading does not count.
         """
 
     def sample(self, state: Floats, rng: np.random.Generator) -> ReadingT:
@@ -125,18 +117,7 @@ class GaussianMeasurement(Likelihood[Floats], Protocol):
 
 
 def fisher_information(measurement: GaussianMeasurement, state: Floats) -> Floats:
-    """Return the Fisher information of one reading about the state, ``Hᵀ R⁻¹ H``.
-
-    Parameters
-    ----------
-    measurement : GaussianMeasurement
-    state : (..., n) array
-        True states.
-
-    Returns
-    -------
-    (..., n, n) array
-    """
+    """Return the Fisher information of one reading, ``Hᵀ R⁻¹ H``, (..., n, n), in true states."""
     slope = measurement.jacobian(state)
     factor = np.linalg.cholesky(measurement.covariance())
     # R⁻¹ is never formed.

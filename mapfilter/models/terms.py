@@ -34,9 +34,11 @@ _ONE_BITS = 0x3FF0000000000000
 _MANTISSA = 0x000FFFFFFFFFFFFF
 _TINY = 1e-300
 
+_kernel = njit(cache=True, nogil=True, error_model="numpy")
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def log_lanes(value: Floats, out: Floats, scratch: Floats) -> None:  # pragma: no cover
+
+@_kernel
+def log_lanes(value: Floats, out: Floats, scratch: Floats) -> None:
     """Write the natural logarithms of positive normal numbers."""
     bits, reduced_bits = value.view(np.int64), scratch.view(np.int64)
     for w in range(value.size):
@@ -63,8 +65,8 @@ def log_lanes(value: Floats, out: Floats, scratch: Floats) -> None:  # pragma: n
         out[w] = out[w] * _LN2 + (f - (half - s * (half + t1 + t2)))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def atan2_lanes(left: Floats, ahead: Floats, out: Floats) -> None:  # pragma: no cover
+@_kernel
+def atan2_lanes(left: Floats, ahead: Floats, out: Floats) -> None:
     """Write the angles of directions, in [-π, π]; 0 where a direction is none."""
     for w in range(left.size):
         high, low = max(abs(left[w]), abs(ahead[w])), min(abs(left[w]), abs(ahead[w]))
@@ -115,10 +117,10 @@ _LOG10_E = 0.4342944819032518
 _TWO_PI = 2 * np.pi
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@_kernel
 def _offsets(
     points: Floats, slots: Ints, x: float, y: float, z: float, delta: Floats, squared: Floats
-) -> None:  # pragma: no cover
+) -> None:
     """Write the vectors from a place to the receivers and their squared lengths."""
     east, north, up = slots[0], slots[1], slots[2]
     for w in range(points.shape[1]):
@@ -133,11 +135,17 @@ def _offsets(
         squared[w] = delta[0, w] ** 2 + delta[1, w] ** 2 + delta[2, w] ** 2
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@_kernel
 def _add_range(
-    points: Floats, slots: Ints, place: Floats, sign: float, work: Floats, mean: Floats,
-    slope: Floats, derive: bool,
-) -> None:  # pragma: no cover  # fmt: skip
+    points: Floats,
+    slots: Ints,
+    place: Floats,
+    sign: float,
+    work: Floats,
+    mean: Floats,
+    slope: Floats,
+    derive: bool,
+) -> None:
     """Add a signed distance; its derivative is the unit vector, 0 on the transmitter itself."""
     delta, distance = work[:3], work[3]
     _offsets(points, slots, place[0], place[1], place[2], delta, distance)
@@ -155,11 +163,16 @@ def _add_range(
                     slope[slot, w] += delta[axis, w] * scale[w]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@_kernel
 def _add_gain(
-    row: Floats, slots: Ints, patterns: Floats, work: Floats, mean: Floats, slope: Floats,
+    row: Floats,
+    slots: Ints,
+    patterns: Floats,
+    work: Floats,
+    mean: Floats,
+    slope: Floats,
     derive: bool,
-) -> None:  # pragma: no cover  # fmt: skip
+) -> None:
     """Add an antenna's gain, by formula or by its samples; work holds the offsets."""
     delta, left, ahead, angle = work[:3], work[4], work[5], work[6]
     sign, cos_boresight, sin_boresight = row[6], np.cos(row[7]), np.sin(row[7])
@@ -192,11 +205,17 @@ def _add_gain(
             slope[north, w] += delta[0, w] * turn
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@_kernel
 def _add_level(
-    points: Floats, slots: Ints, row: Floats, patterns: Floats, work: Floats, mean: Floats,
-    slope: Floats, derive: bool,
-) -> None:  # pragma: no cover  # fmt: skip
+    points: Floats,
+    slots: Ints,
+    row: Floats,
+    patterns: Floats,
+    work: Floats,
+    mean: Floats,
+    slope: Floats,
+    derive: bool,
+) -> None:
     """Add a level by distance and antenna; nearer than the shortest distance it stays."""
     delta, squared, logarithm = work[:3], work[3], work[4]
     _offsets(points, slots, row[1], row[2], row[3], delta, squared)
@@ -220,9 +239,14 @@ def _add_level(
 
 @njit([MEASURE_SIGNATURE], cache=True, nogil=True, error_model="numpy")
 def measure(
-    points: Floats, slots: Ints, rows: Floats, patterns: Floats, mean: Floats, slope: Floats,
+    points: Floats,
+    slots: Ints,
+    rows: Floats,
+    patterns: Floats,
+    mean: Floats,
+    slope: Floats,
     derive: bool,
-) -> None:  # pragma: no cover  # fmt: skip
+) -> None:
     """Write what is expected of each term in each lane, and the derivatives.
 
     Parameters
@@ -239,7 +263,6 @@ def measure(
         Written.
     slope : (m, q, W) array
         Written where ``derive``; else left alone.
-    derive : bool
     """
     work = np.empty((7, points.shape[1]))
     for i in range(rows.shape[0]):

@@ -53,9 +53,16 @@ class Tiny:
         way = [displaced(b, east_m, north_m) for b in range(3)]
         right, down = np.array(way).T
         return Transport(
-            right, down, np.full(3, SD_RIGHT), np.full(3, SD_DOWN), TURNED,
-            ON.astype(np.float32), OFF, LEAVE, COME_BACK,
-        )  # fmt: skip
+            right,
+            down,
+            np.full(3, SD_RIGHT),
+            np.full(3, SD_DOWN),
+            TURNED,
+            ON.astype(np.float32),
+            OFF,
+            LEAVE,
+            COME_BACK,
+        )
 
     def weigh(self, state, log_weight, reading):
         if reading is None:
@@ -83,8 +90,10 @@ def transition(east_m, north_m, *, circular):
     matrix = np.zeros((len(STATES), len(STATES)))
     for i, (m, b, row, col) in enumerate(STATES):
         right_px, down_px = displaced(b, east_m, north_m)
-        right, down = (oracle.three_taps(right_px, SD_RIGHT**2),
-                       oracle.three_taps(down_px, SD_DOWN**2))  # fmt: skip
+        right, down = (
+            oracle.three_taps(right_px, SD_RIGHT**2),
+            oracle.three_taps(down_px, SD_DOWN**2),
+        )
         for j, (m2, b2, row2, col2) in enumerate(STATES):
             turns = [k for k in turn if (b + k - b2) % 3 == 0] if circular else [b2 - b]
             turned = sum(turn.get(k, 0.0) for k in turns)

@@ -49,8 +49,17 @@ class Places:
 
     def transport(self, *_):
         still = np.zeros(self.headings)
-        return Transport(still + self.right_px, still, still, still, self.turned_bins,
-                         np.ones((1, 5), dtype=np.float32), 1.0, 0.0, 0.0)  # fmt: skip
+        return Transport(
+            still + self.right_px,
+            still,
+            still,
+            still,
+            self.turned_bins,
+            np.ones((1, 5), dtype=np.float32),
+            1.0,
+            0.0,
+            0.0,
+        )
 
     def weigh(self, state, log_weight, reading):  # noqa: ARG002
         log_weight += reading
@@ -77,8 +86,13 @@ def test_a_grid_switches_after_the_metres_that_it_must_hold():
     belief, news = followed(GridFilter(Places()), ONE, 5)
     # Agreed at 7 m: 14 m later it has converged.
     statuses = [info.status for info in news]
-    assert statuses == [Status.SEARCHING, Status.SEARCHING, Status.CONVERGED, Status.TRACKING,
-                        Status.TRACKING]  # fmt: skip
+    assert statuses == [
+        Status.SEARCHING,
+        Status.SEARCHING,
+        Status.CONVERGED,
+        Status.TRACKING,
+        Status.TRACKING,
+    ]
     assert {info.hypotheses for info in news} == {1}
     assert belief.agreement_start_m == 7.0
     assert belief.travelled_m == 35.0
@@ -115,8 +129,11 @@ def test_mass_that_has_left_the_grid_is_told():
     belief, _ = filter_.predict(filter_.init(ONE, rng), EAST, rng)
     after, info = filter_.update(belief, LOG_GAIN, rng)
     assert after is belief
-    assert (info.reason, info.status, info.hypotheses) == (Reason.NO_CANDIDATES_LEFT,
-                                                          Status.SEARCHING, 0)  # fmt: skip
+    assert (info.reason, info.status, info.hypotheses) == (
+        Reason.NO_CANDIDATES_LEFT,
+        Status.SEARCHING,
+        0,
+    )
     assert np.isnan(filter_.locate(belief).east_m)
     assert belief.summary.mass_50m == 0.0
 
@@ -124,9 +141,11 @@ def test_mass_that_has_left_the_grid_is_told():
 def test_motion_of_a_grid_that_is_absent_or_nothing():
     filter_, rng = GridFilter(Places()), np.random.default_rng(0)
     start = filter_.init(ONE, rng)
-    for motion, why in ((MotionStep(nan, 0.0), Reason.NO_STEP),
-                        (MotionStep(1.0, nan), Reason.NO_HEADING),
-                        (MotionStep(0.0, 1.0), Reason.USED)):  # fmt: skip
+    for motion, why in (
+        (MotionStep(nan, 0.0), Reason.NO_STEP),
+        (MotionStep(1.0, nan), Reason.NO_HEADING),
+        (MotionStep(0.0, 1.0), Reason.USED),
+    ):
         assert filter_.predict(start, motion, rng) == (start, why)
     assert start.moved is start
     assert (start.travelled_m, start.log_evidence, start.status) == (0.0, 0.0, Status.SEARCHING)

@@ -31,8 +31,11 @@ def test_one_normal_cloud():
 
 
 def test_leader_and_runners_up():
-    groups = ((300.0, 300.0, 8.0, 500, 0.3), (2500.0, 1500.0, 8.0, 200, 0.6),
-              (1000.0, 1800.0, 8.0, 900, 0.1))  # fmt: skip
+    groups = (
+        (300.0, 300.0, 8.0, 500, 0.3),
+        (2500.0, 1500.0, 8.0, 200, 0.6),
+        (1000.0, 1800.0, 8.0, 900, 0.1),
+    )
     said = summarise(*cloud(*groups), BINS)
     np.testing.assert_allclose(said.mean[:2], [2500, 1500], atol=2)
     assert said.mass_50m == pytest.approx(0.6, abs=1e-3)

@@ -32,9 +32,14 @@ ROOT = np.random.default_rng(1).normal(0, 1, (5, 5))
 PROCESS = 0.5 * ROOT @ ROOT.T
 WIDE = 30.0 * np.eye(5) + 4.0 * ROOT.T @ ROOT
 METHODS = [
-    EKF, CKF, UKF, IEKF, Method("two", iterations=2), Method("far", SigmaPoints(0.7, 1.5, 0.5)),
+    EKF,
+    CKF,
+    UKF,
+    IEKF,
+    Method("two", iterations=2),
+    Method("far", SigmaPoints(0.7, 1.5, 0.5)),
     Method("near", SigmaPoints(0.05, 2.0, 0.0)),
-]  # fmt: skip
+]
 
 
 def expected(model, state):
@@ -47,8 +52,12 @@ def expected(model, state):
 
 
 def slopes(model, state):
-    return np.array([(expected(model, state + step) - expected(model, state - step)) / 2e-4
-                     for step in 1e-4 * np.eye(5)]).T  # fmt: skip
+    return np.array(
+        [
+            (expected(model, state + step) - expected(model, state - step)) / 2e-4
+            for step in 1e-4 * np.eye(5)
+        ]
+    ).T
 
 
 NOISE = np.diag([9.0, 16.0, 25.0, 4.0, 4.0, 13.0, 25.0])
@@ -141,8 +150,9 @@ def test_many_trials_are_the_same_steps_one_after_the_other(method):
     """More trials than a kernel takes at once, each from a belief of its own."""
     means, covariances, readings = trials(FULL, 67, 3)
     readings[5, 1], readings[66, 2] = np.nan, np.nan
-    found = run_trials(compiled(FULL), PHI, PROCESS, method, means, covariances, readings,
-                       covariances=True)  # fmt: skip
+    found = run_trials(
+        compiled(FULL), PHI, PROCESS, method, means, covariances, readings, covariances=True
+    )
     assert found.means.shape == (67, 3, 5)
     assert found.covariances.shape == (67, 3, 5, 5)
     for t in (0, 5, 63, 64, 66):
@@ -178,8 +188,9 @@ def test_what_cannot_be_taken_in_is_left_and_told(method):
     """A reading beyond all bounds leaves its own trial's prediction, and no other trial's."""
     means, covariances, readings = trials(NEAR, 3, 2)
     readings[1, 0] = 1e200
-    found = run_trials(compiled(NEAR), PHI, PROCESS, method, means, covariances, readings,
-                       covariances=True)  # fmt: skip
+    found = run_trials(
+        compiled(NEAR), PHI, PROCESS, method, means, covariances, readings, covariances=True
+    )
     assert np.isnan([found.evidence[1, 0], found.nis[1, 0]]).all()
     assert np.isfinite(found.evidence).sum() == np.isfinite(found.nis).sum() == 5
     kept = kalman.predict(Gaussian(means[1], covariances[1]), PHI, PROCESS)
@@ -199,8 +210,9 @@ def test_many_components_of_wide_or_narrow_noise_have_a_density(sigma_m):
     layout = StateLayout(2, 0, 1)
     model = stack([position_fix(layout, sigma_m**2 * np.eye(2))] * 10)
     covariance = np.diag([1e-60, 1e-60])
-    belief, news = kalman.update(Gaussian(np.zeros(2), covariance), compiled(model),
-                                 np.zeros(20), EKF)  # fmt: skip
+    belief, news = kalman.update(
+        Gaussian(np.zeros(2), covariance), compiled(model), np.zeros(20), EKF
+    )
     assert news.evidence == pytest.approx(-10 * log(2 * pi) - 20 * log(sigma_m), rel=1e-9)
     assert belief.mean.tolist() == [0.0, 0.0]
 
@@ -211,8 +223,9 @@ def test_a_component_that_is_known_stays(method):
     covariance = WIDE.copy()
     covariance[2], covariance[:, 2] = 0.0, 0.0
     _, _, readings = trials(FULL, 1, 1)
-    belief, news = kalman.update(Gaussian(np.ones(5), covariance), compiled(FULL), readings[0, 0],
-                                 method)  # fmt: skip
+    belief, news = kalman.update(
+        Gaussian(np.ones(5), covariance), compiled(FULL), readings[0, 0], method
+    )
     assert belief.mean[2] == pytest.approx(1.0, abs=1e-12)
     np.testing.assert_allclose(belief.covariance[2], 0.0, atol=1e-12)
     assert abs(belief.mean[0] - 1.0) > 1e-3
@@ -221,8 +234,9 @@ def test_a_component_that_is_known_stays(method):
 
 def mixture_by_formula(first, start, readings, least):
     """Means, covariances, log densities and numbers of components left."""
-    parts = [(w, start + m, first.covariance) for w, m in zip(first.weights, first.means,
-                                                             strict=True)]  # fmt: skip
+    parts = [
+        (w, start + m, first.covariance) for w, m in zip(first.weights, first.means, strict=True)
+    ]
     for reading in readings:
         updated = []
         for weight, mean, covariance in parts:
@@ -241,8 +255,9 @@ def test_a_mixture_is_that_of_the_formula():
     rng = np.random.default_rng(8)
     first = Mixture(rng.dirichlet(np.ones(9)), rng.normal(0, 12, (9, 5)), 0.3 * WIDE)
     starts, _, readings = trials(FULL, 2, 3, seed=9)
-    found = run_mixtures(compiled(FULL), PHI, PROCESS, EKF, first, starts, readings,
-                         least_weight=1e-30)  # fmt: skip
+    found = run_mixtures(
+        compiled(FULL), PHI, PROCESS, EKF, first, starts, readings, least_weight=1e-30
+    )
     for t in range(2):
         steps = mixture_by_formula(first, starts[t], readings[t], 1e-30)
         for k, (mean, covariance, evidence, left) in enumerate(steps):
@@ -270,12 +285,16 @@ def test_components_that_lost_all_weight_are_not_missed():
 
 def test_sizes_that_do_not_fit_are_told():
     first = Mixture(np.ones(1), np.zeros((1, 5)), WIDE)
-    for readings, said in ((np.zeros((2, 3)), "readings"), (np.zeros((1, 1, 6)), "steps, 7"),
-                           (np.full((1, 1, 7), np.inf), "infinity")):  # fmt: skip
+    for readings, said in (
+        (np.zeros((2, 3)), "readings"),
+        (np.zeros((1, 1, 6)), "steps, 7"),
+        (np.full((1, 1, 7), np.inf), "infinity"),
+    ):
         with pytest.raises(InputError, match=said):
             run_trials(compiled(FULL), PHI, PROCESS, EKF, np.zeros(5), WIDE, readings)
         with pytest.raises(InputError, match=said):
             run_mixtures(compiled(FULL), PHI, PROCESS, EKF, first, np.zeros(5), readings)
     with pytest.raises(InputError, match="a state of 3 components, found 4"):
-        run_trials(compiled(FULL), np.eye(3), np.eye(3), EKF, np.zeros(3), np.eye(3),
-                   np.zeros((1, 1, 7)))  # fmt: skip
+        run_trials(
+            compiled(FULL), np.eye(3), np.eye(3), EKF, np.zeros(3), np.eye(3), np.zeros((1, 1, 7))
+        )

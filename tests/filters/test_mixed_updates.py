@@ -16,10 +16,13 @@ from mapfilter.positioning.kalman.models import compiled
 LAYOUT = StateLayout(5, 3, 0, clock=2)
 SITES = np.array([[90.0, 0.0], [-20.0, 110.0], [-60.0, -70.0]])
 AWAY = np.array([[300.0, 400.0, 900.0], [-500.0, 100.0, 800.0]])
-MODEL = stack([
-    pseudoranges(LAYOUT, AWAY, [2.0, 3.0]), range_differences(LAYOUT, SITES, [2.0, 3.0, 4.0]),
-    timing_advances(LAYOUT, SITES[:1], 5.0),
-])  # fmt: skip
+MODEL = stack(
+    [
+        pseudoranges(LAYOUT, AWAY, [2.0, 3.0]),
+        range_differences(LAYOUT, SITES, [2.0, 3.0, 4.0]),
+        timing_advances(LAYOUT, SITES[:1], 5.0),
+    ]
+)
 NOISE = np.diag([4.0, 9.0, 13.0, 20.0, 25.0])
 NOISE[2, 3] = NOISE[3, 2] = 4.0
 LOADING = np.zeros((5, 5))
@@ -50,8 +53,14 @@ def test_an_update_is_that_of_each_particle_s_own_kalman_filter(loaded, absent):
     start = rb.MixedBelief(start.state, np.log(weights), start.covariance, start.sampled)
     reading = expected(np.array([5.0, 1.0, -3.0, 4.0, 2.0]))
     reading[absent] = np.nan
-    after, news = rb.update(start, compiled(MODEL), reading, np.random.default_rng(4),
-                            SirOptions(0.0), LOADING if loaded else None)  # fmt: skip
+    after, news = rb.update(
+        start,
+        compiled(MODEL),
+        reading,
+        np.random.default_rng(4),
+        SirOptions(0.0),
+        LOADING if loaded else None,
+    )
     there = np.isfinite(reading)
     slope = (SLOPE + LOADING if loaded else SLOPE)[there]
     extra = (LOADING if loaded else np.zeros((5, 5)))[there]
@@ -102,8 +111,9 @@ def test_what_is_drawn_corrects_the_rest():
     slope = whole[o] @ np.linalg.inv(whole[s])
     np.testing.assert_allclose(
         after.covariance[np.ix_(OTHERS, OTHERS)],
-        whole[np.ix_(OTHERS, OTHERS)] - slope @ whole[o].T, atol=1e-9,
-    )  # fmt: skip
+        whole[np.ix_(OTHERS, OTHERS)] - slope @ whole[o].T,
+        atol=1e-9,
+    )
     np.testing.assert_array_equal(after.covariance[SAMPLED], 0.0)
     gone = after.state - phi @ start.state
     np.testing.assert_allclose(gone[OTHERS], slope @ gone[SAMPLED], atol=1e-5)
@@ -138,15 +148,17 @@ def untouched(rng):
 def test_when_particles_are_drawn_anew():
     layout = StateLayout(2, 0, 1)
     fix = compiled(position_fix(layout, np.eye(2)))
-    alike = rb.MixedBelief(np.zeros((2, 4)), np.full(4, -log(4)), np.zeros((2, 2)),
-                           np.array([0, 1]))  # fmt: skip
+    alike = rb.MixedBelief(
+        np.zeros((2, 4)), np.full(4, -log(4)), np.zeros((2, 2)), np.array([0, 1])
+    )
     rng = np.random.default_rng(1)
     # Four of four are effective, and none fewer.
     after, _ = rb.update(alike, fix, [1.0, 0.0], rng, SIR)
     assert untouched(rng)
     np.testing.assert_array_equal(after.state, alike.state)
-    apart = rb.MixedBelief(np.array([[0.0, 0, 0, 9], [0.0] * 4]), alike.log_weight,
-                           alike.covariance, alike.sampled)  # fmt: skip
+    apart = rb.MixedBelief(
+        np.array([[0.0, 0, 0, 9], [0.0] * 4]), alike.log_weight, alike.covariance, alike.sampled
+    )
     kept, _ = rb.update(apart, fix, [0.0, 0.0], rng, SirOptions(0.7))
     assert untouched(rng)
     assert kept.weights()[3] < 1e-6

@@ -15,8 +15,9 @@ from mapfilter.models.signal_strength import levels
 from mapfilter.models.state import MOVING_CLOCK, MOVING_CLOCK_3D, POSITION_CLOCK_3D, StateLayout
 from mapfilter.positioning.kalman.models import compiled
 
-AWAY = np.array([[0.6, 0.0, 0.8], [-0.5, 0.6, 0.62], [0.1, -0.8, 0.59], [0.3, 0.4, 0.87],
-                 [-0.7, -0.3, 0.65]])  # fmt: skip
+AWAY = np.array(
+    [[0.6, 0.0, 0.8], [-0.5, 0.6, 0.62], [0.1, -0.8, 0.59], [0.3, 0.4, 0.87], [-0.7, -0.3, 0.65]]
+)
 AWAY /= np.linalg.norm(AWAY, axis=1)[:, None]
 
 
@@ -118,10 +119,13 @@ def test_levels_and_one_satellite_against_a_grid():
         log_density[..., k] = prior + both.log_likelihood(state, reading)
     density = np.exp(log_density - log_density.max())
     density /= density.sum()
-    told = np.array([
-        (density.sum(axis=2) * east).sum(), (density.sum(axis=2) * north).sum(),
-        (density.sum(axis=(0, 1)) * bias).sum(),
-    ])  # fmt: skip
+    told = np.array(
+        [
+            (density.sum(axis=2) * east).sum(),
+            (density.sum(axis=2) * north).sum(),
+            (density.sum(axis=(0, 1)) * bias).sum(),
+        ]
+    )
     rng = np.random.default_rng(5)
     belief = rb.init(mean, covariance, [0, 1], 200_000, rng)
     after, news = rb.update(belief, compiled(both), reading, rng, SirOptions(0.0))
@@ -200,10 +204,14 @@ def test_regularising_keeps_the_spread():
         (lambda rng: rb.update(START, LINEAR, np.full(5, np.inf), rng), "infinity"),
         (lambda rng: rb.update(PART, LINEAR, np.zeros(5), rng), "sampled"),
         (lambda rng: rb.update(START, LINEAR, np.zeros(5), rng, SIR, np.zeros((2, 2))), "loading"),
-        (lambda rng: rb.update(START, compiled(pseudoranges(MOVING_CLOCK, AWAY, 1.0)),
-                               np.zeros(5), rng), "a state of 4"),
+        (
+            lambda rng: rb.update(
+                START, compiled(pseudoranges(MOVING_CLOCK, AWAY, 1.0)), np.zeros(5), rng
+            ),
+            "a state of 4",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_does_not_fit_is_told(call, told):
     with pytest.raises(InputError, match=told):
         call(np.random.default_rng(1))

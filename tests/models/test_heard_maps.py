@@ -14,9 +14,16 @@ LATTICE = Lattice("EPSG:32629", 500.0, 1120.0, SIDE_M, ROWS, COLS)
 SITE = np.array([0, 1, 0, 2])
 # Cell, column, row, timing advance.
 TOLD = (
-    (0, 3, 4, 5.0), (0, 4, 4, 6.0), (0, 9, 8, NAN), (1, 3, 5, 2.0), (1, 3, 5, 9.0),
-    (2, 10, 9, 7.0), (-1, 5, 5, 3.0), (0, 0, 0, 4.0), (3, 14, 11, NAN),
-)  # fmt: skip
+    (0, 3, 4, 5.0),
+    (0, 4, 4, 6.0),
+    (0, 9, 8, NAN),
+    (1, 3, 5, 2.0),
+    (1, 3, 5, 9.0),
+    (2, 10, 9, 7.0),
+    (-1, 5, 5, 3.0),
+    (0, 0, 0, 4.0),
+    (3, 14, 11, NAN),
+)
 
 
 def rows(told=TOLD):
@@ -90,8 +97,10 @@ def test_maps_are_sums_over_rows(options):
     for band in range(4):
         for row, col in PIXELS:
             at = row * COLS + col
-            found = [float(m[band, at]) for m in
-                     (maps.log_share, maps.advance_steps, maps.deviation_steps)]  # fmt: skip
+            found = [
+                float(m[band, at])
+                for m in (maps.log_share, maps.advance_steps, maps.deviation_steps)
+            ]
             assert found == pytest.approx(expected(band, row, col, options), rel=2e-4, nan_ok=True)
 
 
@@ -105,8 +114,10 @@ def test_shares_of_all_cells_and_of_foreign_ones_sum_to_at_most_one():
 
 def test_rows_beyond_the_lattice_do_not_count():
     outside = ((0, -1, 4, 9.0), (1, 3, -1, 9.0), (2, COLS, 4, 9.0), (3, 3, ROWS, 9.0))
-    maps = [ServingStatistics.of_rows(rows(told), LATTICE, SITE, HeardOptions())
-            for told in (TOLD, TOLD + outside)]  # fmt: skip
+    maps = [
+        ServingStatistics.of_rows(rows(told), LATTICE, SITE, HeardOptions())
+        for told in (TOLD, TOLD + outside)
+    ]
     np.testing.assert_array_equal(maps[0].log_share, maps[1].log_share)
     np.testing.assert_array_equal(maps[0].advance_steps, maps[1].advance_steps)
 

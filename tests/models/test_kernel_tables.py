@@ -39,21 +39,35 @@ def log_cdf(x):
 
 def test_the_usual_options():
     assert asdict(ServingWeights()) == {
-        "hysteresis_db": 2.0, "sd_db": 9.0, "weight_per_m": 1 / 22,
-    }  # fmt: skip
+        "hysteresis_db": 2.0,
+        "sd_db": 9.0,
+        "weight_per_m": 1 / 22,
+    }
     assert asdict(LevelErrors()) == {
-        "sd_db": 10.0, "correlation_m": 50.0, "measurement_db": 1.5, "roughness_db": 6.0,
-        "common": 0.3, "clip_sd": 3.0, "weight": 0.7,
-    }  # fmt: skip
+        "sd_db": 10.0,
+        "correlation_m": 50.0,
+        "measurement_db": 1.5,
+        "roughness_db": 6.0,
+        "common": 0.3,
+        "clip_sd": 3.0,
+        "weight": 0.7,
+    }
     assert asdict(MotionErrors()) == {
-        "step_sd_m": 0.3, "typical_step_m": 1.4, "heading_sd_rad": radians(6),
-        "bias_sd_rad": radians(3), "bias_drift_rad_per_sqrt_m": radians(0.05), "scale_sd": 0.02,
+        "step_sd_m": 0.3,
+        "typical_step_m": 1.4,
+        "heading_sd_rad": radians(6),
+        "bias_sd_rad": radians(3),
+        "bias_drift_rad_per_sqrt_m": radians(0.05),
+        "scale_sd": 0.02,
         "scale_drift_per_sqrt_m": 0.0,
-    }  # fmt: skip
+    }
     assert asdict(MapWeights()) == {
-        "sd_m": 4.0, "weight_per_m": 1 / 18, "off_cost_per_m": 0.1, "leave_per_m": 0.001,
+        "sd_m": 4.0,
+        "weight_per_m": 1 / 18,
+        "off_cost_per_m": 0.1,
+        "leave_per_m": 0.001,
         "return_per_m": 0.01,
-    }  # fmt: skip
+    }
     assert (EAST, NORTH, BIAS, LOG_SCALE, OFF, STATES) == (0, 1, 2, 3, 4, 5)
 
 
@@ -108,8 +122,9 @@ def test_a_bound_is_looked_up_at_the_nearest_thirty_second():
 
 
 def test_corners_of_a_raster_have_their_own_pixels():
-    places = np.array([[0.5, 29.5], [49.5, 29.5], [0.5, 0.5], [49.5, 0.5], [-99, 99], [99, -99],
-                       [10.5, 19.5]])  # fmt: skip
+    places = np.array(
+        [[0.5, 29.5], [49.5, 29.5], [0.5, 0.5], [49.5, 0.5], [-99, 99], [99, -99], [10.5, 19.5]]
+    )
     state = np.zeros((5, 7), dtype=np.float32)
     state[:2] = places.T + np.array([[200.0], [-70.0]])
     pixel = fingerprint.pixels(state, 0.0, 0.0, RasterFrame(200.0, -40.0, 0.1, 3, 5))
@@ -127,10 +142,14 @@ def test_clipped_innovations_count_as_the_clip_on_both_sides():
 
 
 def test_logarithms_over_all_magnitudes():
-    value = np.concatenate([
-        np.logspace(-300, 300, 5001), np.linspace(0.4, 3.0, 5001), [1.0, 2.0, sqrt(0.5), sqrt(2.0)],
-        np.nextafter(1.0, [0.0, 2.0]),
-    ])  # fmt: skip
+    value = np.concatenate(
+        [
+            np.logspace(-300, 300, 5001),
+            np.linspace(0.4, 3.0, 5001),
+            [1.0, 2.0, sqrt(0.5), sqrt(2.0)],
+            np.nextafter(1.0, [0.0, 2.0]),
+        ]
+    )
     out, work = np.empty_like(value), np.empty_like(value)
     log_lanes(value, out, work)
     np.testing.assert_allclose(out, [log(x) for x in value], rtol=4e-16, atol=2e-16)

@@ -47,9 +47,18 @@ def test_the_columns_of_terms_are_those_of_the_table():
     expected = [1.0, 1.0, 2.0, 0.0, -130.0, -35.0, 0.0, 0.0, math.pi / 3, 20.0, 0.0, 0.0, 1.0]
     assert plain.tolist() == expected
     pattern = levels(
-        POSITION, [[1.0, 2.0]], 8.0, **LOSS, eirp_dbm=50.0, boresight_rad=0.5, beamwidth_rad=0.7,
-        max_attenuation_db=0.0, pattern_db=np.zeros(2), shortest_distance_m=3.0, quantity="loss",
-    )  # fmt: skip
+        POSITION,
+        [[1.0, 2.0]],
+        8.0,
+        **LOSS,
+        eirp_dbm=50.0,
+        boresight_rad=0.5,
+        beamwidth_rad=0.7,
+        max_attenuation_db=0.0,
+        pattern_db=np.zeros(2),
+        shortest_distance_m=3.0,
+        quantity="loss",
+    )
     expected = [1.0, 1.0, 2.0, 0.0, 80.0, 35.0, -1.0, 0.5, 0.7, 0.0, 0.0, 2.0, 3.0]
     assert pattern.rows[0].tolist() == expected
     assert pattern.patterns.tolist() == [0.0, 0.0]
@@ -71,8 +80,9 @@ def test_a_fixed_height_is_taken_from_those_of_transmitters():
 
 def test_names_and_steps_of_components():
     assert timing_advances(POSITION, [[0, 0], [1, 1]], 1.0).names == (
-        "timing advance 0", "timing advance 1",
-    )  # fmt: skip
+        "timing advance 0",
+        "timing advance 1",
+    )
     assert pseudoranges(MOVING_CLOCK, [[0, 0, 1]], 1.0).names == ("pseudorange 0",)
     differences = range_differences(POSITION, [[0, 0], [1, 1], [2, 2]], 1.0, 1)
     assert differences.names == ("difference 0", "difference 2")
@@ -120,8 +130,9 @@ def test_the_steps_of_timing_advances():
 def test_a_drawn_step_is_the_middle_of_what_it_covers_and_never_below_the_first():
     model = timing_advances(POSITION, [[0.0, 0.0]] * 2, 1e-9, 100.0)
     both = stack([model, timing_advances(POSITION, ORIGIN, 1e-9)])
-    drawn = both.sample(np.array([[99.0, 0.0], [101.0, 0.0], [350.0, 0.0]]),
-                        np.random.default_rng(1))  # fmt: skip
+    drawn = both.sample(
+        np.array([[99.0, 0.0], [101.0, 0.0], [350.0, 0.0]]), np.random.default_rng(1)
+    )
     np.testing.assert_array_equal(drawn[:, :2], [[50.0] * 2, [150.0] * 2, [350.0] * 2])
     np.testing.assert_allclose(drawn[:, 2], [99.0, 101.0, 350.0], atol=1e-6)
     # Errors of a hundred metres bring half of these below 0.
@@ -131,8 +142,9 @@ def test_a_drawn_step_is_the_middle_of_what_it_covers_and_never_below_the_first(
 
 def test_a_measured_pattern_is_sampled_anticlockwise():
     angle = np.arange(360.0)
-    antenna = MeasuredAntenna("made", angle, angle / 30, np.array([0.0, 10.0, 180.0]),
-                              np.array([0.0, 4.0, 6.0]))  # fmt: skip
+    antenna = MeasuredAntenna(
+        "made", angle, angle / 30, np.array([0.0, 10.0, 180.0]), np.array([0.0, 4.0, 6.0])
+    )
     four = sampled_pattern(antenna, samples=4)
     assert four.shape == (4,)
     np.testing.assert_array_equal(sampled_pattern(antenna)[[0, 90, 180, 270]], four)

@@ -102,12 +102,16 @@ def every_kind(state):
         timing_advances(state, sites, 300.0),
         levels(state, sites, 8.0, eirp_dbm=50.0, **antenna),
         levels(
-            state, sites, 8.0, eirp_dbm=50.0, pattern_db=sampled_pattern(measured_antenna()),
+            state,
+            sites,
+            8.0,
+            eirp_dbm=50.0,
+            pattern_db=sampled_pattern(measured_antenna()),
             **antenna,
         ),
         range_differences(state, sites, [5.0, 8.0, 12.0], 1),
         position_fix(state, [[9.0, 2.0], [2.0, 4.0]]),
-    ]  # fmt: skip
+    ]
     if state.clock is not None:
         parts.append(pseudoranges(state, [[1e7, 1e7, 1.5e7], [-1e7, 5e6, 1.9e7]], 15.0))
     return stack(parts)
@@ -146,9 +150,14 @@ def test_a_batch_is_its_states_one_by_one():
 def test_a_measured_pattern_is_that_of_the_antenna():
     antenna = measured_antenna()
     model = levels(
-        POSITION, [[0.0, 0.0]], 8.0, loss_at_km_db=0.0, exponent=0.0, boresight_rad=0.7,
+        POSITION,
+        [[0.0, 0.0]],
+        8.0,
+        loss_at_km_db=0.0,
+        exponent=0.0,
+        boresight_rad=0.7,
         pattern_db=sampled_pattern(antenna),
-    )  # fmt: skip
+    )
     offsets = np.radians(np.arange(-180.0, 181.0))
     places = 300.0 * np.stack([np.cos(offsets + 0.7), np.sin(offsets + 0.7)], axis=-1)
     expected = antenna.gain_db(offsets, np.zeros(361))

@@ -79,10 +79,12 @@ def innovations(table, before, reading):
     """Standardised innovations at each pixel by the formula, from the report's two halves."""
     rows = []
     for now, then in zip(EVERY, before, strict=True):
-        rows.append([
-            oracle.innovation_db(r, float(table[now, c]), rho, r0, float(table[then, c])) / sd
-            for c, r, r0, rho, sd in reading
-        ])  # fmt: skip
+        rows.append(
+            [
+                oracle.innovation_db(r, float(table[now, c]), rho, r0, float(table[then, c])) / sd
+                for c, r, r0, rho, sd in reading
+            ]
+        )
     return rows
 
 

@@ -87,9 +87,11 @@ def test_the_moments_of_a_step_are_those_of_the_oracle(step_m):
 
 def test_bias_and_scale_walk_and_the_step_follows_them():
     errors = MotionErrors(
-        step_sd_m=0.0, heading_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.1,
+        step_sd_m=0.0,
+        heading_sd_rad=0.0,
+        bias_drift_rad_per_sqrt_m=0.1,
         scale_drift_per_sqrt_m=0.05,
-    )  # fmt: skip
+    )
     before = states(COUNT, 0.3, -0.1)
     after = move(before, 9.0, 0.7, errors, KEY)
     walked = (after[[BIAS, LOG_SCALE]] - before[[BIAS, LOG_SCALE]]).astype(np.float64)
@@ -99,8 +101,9 @@ def test_bias_and_scale_walk_and_the_step_follows_them():
     assert abs(np.corrcoef(walked)[0, 1]) < SPREAD
     # The state that is kept is the one that the step was made with.
     for one, start in zip(after.T[:50], before.T[:50], strict=True):
-        expected = oracle.moved(*(float(x) for x in start[:2]), float(one[BIAS]),
-                                float(one[LOG_SCALE]), 9.0, 0.7)  # fmt: skip
+        expected = oracle.moved(
+            *(float(x) for x in start[:2]), float(one[BIAS]), float(one[LOG_SCALE]), 9.0, 0.7
+        )
         assert one[:2] == pytest.approx(expected, abs=2e-4)
 
 
