@@ -99,9 +99,9 @@ WHOLE = {(1, 0, 0): (100, 50), (1, 1, 0): (150, 50), (1, 0, 1): (200, 50), (1, 1
         # Four bytes at least for each block's place.
         (source(160, 160, (16, 16), blocks={(1, 0, 0): (8, 8)}), 400, []),
         (source(160, 160, (16, 16), blocks={(1, 0, 0): (8, 8)}), 399,
-         ["as many bytes as its header tells"]),
+         ["as many bytes as its header needs"]),
         (source(160, 160, (16, 16), 2, blocks={(1, 0, 0): (8, 8)}), 799,
-         ["as many bytes as its header tells"]),
+         ["as many bytes as its header needs"]),
         (source(160, 160, (16, 16), 2, "PIXEL", blocks={(1, 0, 0): (8, 8)}), 400, []),
         # A block of 64 MiB at most, or of the size of the file.
         (source(4096, 4096, (4096, 4096), blocks={(1, 0, 0): (8, 8)}), 100, []),
