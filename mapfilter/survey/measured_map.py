@@ -194,14 +194,29 @@ def fit_survey(
     level_dbm = float(np.mean([some.level_dbm.mean() for some in points]))
     plan = plan.to_crs(measurements.crs) if plan is not None else None
     shadowing = Shadowing()
+
+    def trend_of(points: Points) -> Trend:
+        prior = Prior(level_dbm)
+        covariate: Covariate | None = None
+        if predicted is not None:
+            prior = Prior(level_dbm, **_CALIBRATION)
+            covariate = predicted[points.cell_id]
+        elif options.trend == "path_loss" and plan is not None and points.cell_id in plan:
+            cell = plan[points.cell_id]
+            above_m = max(cell.height_m - _PHONE_HEIGHT_M, 1.0)
+            covariate = DistanceLoss(cell.east_m, cell.north_m, above_m)
+        elif options.trend == "path_loss" and len(points) >= options.min_points_to_locate:
+            some = points.thinned(_LOCATED_FROM)
+            covariate = locate_antenna(some, shadowing.covariance_db2(some), prior)
+        return fit_trend(covariate, points, shadowing.covariance_db2(points), prior)
+
     cells = {}
     # Threads make small matrices slower, and their sums depend on how many there are.
     with threadpool_limits(1):
         for _ in range(_ROUNDS):
-            trends = [_trend(p, options, level_dbm, shadowing, plan, predicted) for p in points]
-            shadowing = learn_shadowing(points, trends, shadowing)
+            shadowing = learn_shadowing(points, [trend_of(some) for some in points], shadowing)
         for some in points:
-            trend = _trend(some, options, level_dbm, shadowing, plan, predicted)
+            trend = trend_of(some)
             antenna = trend.covariate if isinstance(trend.covariate, DistanceLoss) else None
             made: ResidualField = TrendField(trend, shadowing)
             if options.method == "gp":
@@ -226,29 +241,6 @@ def fit_survey(
             "the trend is their mean level"
         )
     return Survey(measurements.crs, options, shadowing, cells, tuple(notes))
-
-
-def _trend(
-    points: Points,
-    options: SurveyOptions,
-    level_dbm: float,
-    shadowing: Shadowing,
-    plan: CellPlan | None,
-    predicted: Mapping[str, Covariate] | None,
-) -> Trend:
-    prior = Prior(level_dbm)
-    covariate: Covariate | None = None
-    if predicted is not None:
-        prior = Prior(level_dbm, **_CALIBRATION)
-        covariate = predicted[points.cell_id]
-    elif options.trend == "path_loss" and plan is not None and points.cell_id in plan:
-        cell = plan[points.cell_id]
-        above_m = max(cell.height_m - _PHONE_HEIGHT_M, 1.0)
-        covariate = DistanceLoss(cell.east_m, cell.north_m, above_m)
-    elif options.trend == "path_loss" and len(points) >= options.min_points_to_locate:
-        some = points.thinned(_LOCATED_FROM)
-        covariate = locate_antenna(some, shadowing.covariance_db2(some), prior)
-    return fit_trend(covariate, points, shadowing.covariance_db2(points), prior)
 
 
 _MOST_FOLDS = 20
