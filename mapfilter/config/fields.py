@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
+from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -13,9 +15,11 @@ from pydantic import (
     ConfigDict,
     Field,
     ValidationInfo,
+    create_model,
 )
 
 from mapfilter._io import path_fault
+from mapfilter.options import Options, annotations_of
 
 EMBEDDED_MAP = "helsinki"
 NO_MAP = "none"
@@ -81,7 +85,43 @@ FilterName = Annotated[str, AfterValidator(check_filter_name)]
 Count = Annotated[int, Field(ge=0, le=1_000_000)]
 
 
+OptionsT = TypeVar("OptionsT", bound=Options)
+SectionT = TypeVar("SectionT", bound="Section")
+
+
 class Section(BaseModel):
     """A section: frozen, and strict about its keys and the types of its values."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+    def of(self, kind: type[OptionsT]) -> OptionsT:
+        """Return the values of this section that an option dataclass takes."""
+        return kind(**{field.name: getattr(self, field.name) for field in fields(kind)})
+
+
+def with_options(*kinds: type[Options]) -> Callable[[type[SectionT]], type[SectionT]]:
+    """Return a class decorator that gives a section the fields of option dataclasses.
+
+    Names, limits and defaults are those of the dataclasses; what the section defines itself goes
+    first. :meth:`Section.of` returns the dataclasses again.
+    """
+
+    def extended(section: type[SectionT]) -> type[SectionT]:
+        given: dict[str, Any] = {}
+        for kind in kinds:
+            annotations = annotations_of(kind)
+            for field in fields(kind):
+                default = field.default
+                if field.default_factory is not MISSING:
+                    default = field.default_factory()
+                if field.name not in section.model_fields:
+                    given[field.name] = (annotations[field.name], default)
+        return create_model(
+            section.__name__,
+            __base__=section,
+            __module__=section.__module__,
+            __doc__=section.__doc__,
+            **given,
+        )
+
+    return extended

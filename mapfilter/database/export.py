@@ -16,11 +16,10 @@ from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, Geomet
 from rasterio.windows import Window as RasterWindow
 
 from mapfilter._io import atomic_file
-from mapfilter.database.columns import read_columns
 from mapfilter.database.manifest import POINTS, apart
+from mapfilter.database.parquet import WindowReader, read_columns
 from mapfilter.database.radioroutes import Points, RadioRouteDatabase
 from mapfilter.database.tiles import tile_windows
-from mapfilter.database.windows import WindowReader
 from mapfilter.errors import OutputError, fail
 from mapfilter.rasters.geotiff import new_geotiff
 

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from annotated_types import Ge, Le
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from mapfilter._types import Bools, Floats, Floats32
-from mapfilter.errors import ConfigError, Faults
 from mapfilter.geodesy import Lattice
+from mapfilter.options import NotNegative, Options
 from mapfilter.simulation.routes import Route
 
 PAVEMENT_M: Mapping[str, float] = MappingProxyType(
@@ -47,8 +48,11 @@ _PARTS = (0.25, 0.5, 0.75, 1.0)
 _CLEARANCE_PX = 7
 
 
+Beside = Annotated[float, Ge(0), Le(50)]
+
+
 @dataclass(frozen=True, slots=True)
-class WalkerModel:
+class WalkerModel(Options):
     """How a walker differs from a point that moves along centre lines at constant speed.
 
     Parameters
@@ -69,24 +73,10 @@ class WalkerModel:
         With every value that is out of range.
     """
 
-    beside: Literal["centre", "pavement"] | float = "centre"
-    change_side_m: float = 150.0
-    stop_every_m: float = 0.0
-    stop_s: float = 20.0
-
-    def __post_init__(self) -> None:
-        faults = Faults()
-        beside = self.beside
-        if isinstance(beside, str):
-            if beside not in ("centre", "pavement"):
-                faults.add("journeys, beside", "centre, pavement or metres", repr(beside))
-        elif not 0 <= beside <= 50:
-            faults.add("journeys, beside", "centre, pavement or 0..50 m", beside)
-        for name, least in (("change_side_m", 1.0), ("stop_every_m", 0.0), ("stop_s", 0.0)):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value >= least):
-                faults.add(f"journeys, {name}", f"a finite number >= {least:g}", value)
-        faults.raise_if_any(ConfigError)
+    beside: Literal["centre", "pavement"] | Beside = "centre"
+    change_side_m: Annotated[float, Ge(1)] = 150.0
+    stop_every_m: NotNegative = 0.0
+    stop_s: NotNegative = 20.0
 
     @property
     def on_centre_line(self) -> bool:

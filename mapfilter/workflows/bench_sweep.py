@@ -14,12 +14,12 @@ from statistics import median
 from mapfilter._parallel import SerialExecutor, cluster_executor, local_executor
 from mapfilter.database.store import open_database
 from mapfilter.evaluation.accuracy import accuracy
-from mapfilter.experiments.papers.khalaf_allah_2007.experiment import ONE_SIGMA_TRANS_M, plans
+from mapfilter.experiments.papers.khalaf_allah_2007 import MAP_SETTINGS, ONE_SIGMA_TRANS_M, plans
 from mapfilter.experiments.sweep.journeys import filter_rng, heard, sensed, true_path, truth_of
 from mapfilter.experiments.sweep.plan import SweepPlan
 from mapfilter.experiments.sweep.run import sweep
 from mapfilter.experiments.sweep.world import SweepWorld
-from mapfilter.positioning.locators import open_locator
+from mapfilter.positioning.filter import locate
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.reproduce import paper_config
@@ -89,7 +89,7 @@ def bench_sweep(*, runs: int = 3, trials: int = 160) -> SweepBench:
 
 
 def _bench(folder: Path, repetitions: int, trials: int) -> SweepBench:
-    config = paper_config(folder, "helsinki", None)
+    config = paper_config(MAP_SETTINGS, folder, "helsinki", None)
     run_predict(config)
     run_build(config)
     whole = plans(trials, 0)[0]
@@ -141,7 +141,7 @@ def _parts(plan: SweepPlan, world: SweepWorld, database: Path) -> tuple[int, dic
         yield
         took.setdefault(part, []).append(time.perf_counter() - began_s)
 
-    locate = open_locator(open_database(database), plan.readings[0].choice, ways=False)
+    filter_ = plan.readings[0].choice.over(open_database(database), ways=False)
     epochs = 0
     runs_of_route = plan.runs // plan.routes
     for number in range(plan.routes):
@@ -155,7 +155,7 @@ def _parts(plan: SweepPlan, world: SweepWorld, database: Path) -> tuple[int, dic
             with timed("sensed_s"):
                 moved = sensed(plan, log, run)
             with timed("located_s"):
-                found = locate(moved, filter_rng(plan.seed, run)).estimate
+                found = locate(moved, filter_, filter_rng(plan.seed, run)).estimate
             with timed("scored_s"):
                 accuracy(found, truth_of(log.truth))
             epochs = len(found)

@@ -11,7 +11,7 @@ from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.roads.lattice import RouteLattice
-from mapfilter.roads.routable import route_lattice
+from mapfilter.roads.routes import route_lattice
 from mapfilter.roads.ways import Squares, Ways
 
 CRS = "EPSG:32629"

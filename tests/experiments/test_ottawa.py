@@ -39,7 +39,10 @@ ANTENNAS = {1: (-60.0, 40.0), 2: (300.0, 460.0), 3: (520.0, -40.0)}
 STEP_M, SPEED_MPS = 20.0, 4.0
 CHOSEN = OttawaOptions()
 QUICK = replace(
-    CHOSEN, filter=replace(CHOSEN.filter, particles=ParticleOptions(most=2000, searching=1500))
+    CHOSEN,
+    filter=replace(
+        CHOSEN.filter, particles=ParticleOptions(max_particles=2000, min_search_particles=1500)
+    ),
 )
 """A fifteenth of the particles."""
 

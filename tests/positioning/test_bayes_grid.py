@@ -53,10 +53,10 @@ def positioner(area, *, grid, count=100_000):
     evidence = EvidenceOptions(levels=levels, spacing_m=4.0)
     model = BayesModel(area, ERRORS, MapWeights(), evidence)
     options = ParticleOptions(
-        most=count,
-        searching=count,
-        least=count,
-        flatten=1.0,
+        max_particles=count,
+        min_search_particles=count,
+        min_particles=count,
+        mass_exponent=1.0,
         jitter=(0.0,) * 5,
         searching_jitter=(0.0,) * 5,
     )
@@ -74,7 +74,7 @@ def beliefs(positioner, log, side_m, seed=0, count=30):
     """Squares of mass after every tenth epoch."""
     rng, track, found = np.random.default_rng(seed), positioner.begin(), []
     for index, epoch in enumerate(epochs(log)[:count]):
-        track, _ = positioner.advance(track, epoch, rng)
+        track, _ = positioner.step(track, epoch, rng)
         if index % 10 == 9:
             found.append(blocks(track.belief, side_m))
     return found

@@ -14,9 +14,9 @@ from typing import Any
 
 from mapfilter._io import read_json, write_json
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
+from mapfilter._resume import start_or_resume
 from mapfilter.experiments.benchmarks.cases import CASES, Case
 from mapfilter.experiments.benchmarks.journeys import displaced_walk, log_of, walk
-from mapfilter.experiments.benchmarks.resuming import begin
 from mapfilter.experiments.benchmarks.satellites import TOWN_HEIGHT, spoofer_of, with_satellites
 from mapfilter.experiments.benchmarks.scores import (
     CaseResult,
@@ -26,8 +26,8 @@ from mapfilter.experiments.benchmarks.scores import (
     summarise,
 )
 from mapfilter.experiments.benchmarks.world import BenchmarkWorld
-from mapfilter.positioning.bayes.options import BayesOptions
-from mapfilter.positioning.locators import FilterChoice
+from mapfilter.positioning.bayes.options import BayesFilter, BayesOptions
+from mapfilter.positioning.filter import FilterOptions, locate
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.simulation.reports import Levels
 
@@ -43,7 +43,7 @@ class Batch:
     Parameters
     ----------
     world : BenchmarkWorld
-    choice : FilterChoice
+    choice : FilterOptions
     cases : tuple of str
     seed : int
     first, end : int
@@ -53,7 +53,7 @@ class Batch:
     """
 
     world: BenchmarkWorld
-    choice: FilterChoice
+    choice: FilterOptions
     cases: tuple[str, ...]
     seed: int
     first: int
@@ -84,8 +84,8 @@ def _run_route(batch: Batch, route: int) -> list[Row]:
         skyline = world.skyline(case)
         log = with_satellites(case, log, walked, skyline, batch.seed, route, world.reception)
         choice = informed(batch.choice, case, batch.fixed)
-        locate = world.locator(choice, thinned=case.missing_ways > 0)
-        found = locate(log, named_rng(batch.seed, "filter", name, str(route)))
+        filter_ = world.filter(choice, thinned=case.missing_ways > 0)
+        found = locate(log, filter_, named_rng(batch.seed, "filter", name, str(route)))
         row = {**score(case, walked, found), "route": route}
         if case.satellites is not None:
             row |= score_window(walked, found, spoofer_of(walked, batch.seed, route).from_s)
@@ -93,17 +93,21 @@ def _run_route(batch: Batch, route: int) -> list[Row]:
     return rows
 
 
-def informed(choice: FilterChoice, case: Case, fixed: frozenset[str] = frozenset()) -> FilterChoice:
+def informed(
+    choice: FilterOptions, case: Case, fixed: frozenset[str] = frozenset()
+) -> FilterOptions:
     """Return a filter with what the case's data sheet states; nothing else is known to it.
 
     Parameters
     ----------
-    choice : FilterChoice
+    choice : FilterOptions
     case : Case
     fixed : frozenset of str
         Options that were set for all cases.
     """
-    match choice.options:
+    if isinstance(choice, BayesFilter):
+        choice = choice.options
+    match choice:
         case BayesOptions() as options:
             known = replace(
                 options, motion=case.stated_to(options.motion, fixed), smooth=case.smooth
@@ -111,13 +115,13 @@ def informed(choice: FilterChoice, case: Case, fixed: frozenset[str] = frozenset
             if case.satellites is not None:
                 height = {k: v for k, v in TOWN_HEIGHT.items() if k not in fixed}
                 known = replace(known, satellites=replace(options.satellites, **height))
-            return replace(choice, options=known)
+            return known
     return choice
 
 
 def benchmark(
     world: BenchmarkWorld,
-    choice: FilterChoice,
+    choice: FilterOptions,
     cases: Sequence[str],
     runs: int,
     seed: int,
@@ -134,7 +138,7 @@ def benchmark(
     Parameters
     ----------
     world : BenchmarkWorld
-    choice : FilterChoice
+    choice : FilterOptions
     cases : sequence of str
         Names out of :data:`mapfilter.experiments.benchmarks.cases.CASES`.
     runs : int
@@ -165,7 +169,7 @@ def benchmark(
         "world": world.sha256,
     }
     (out / BATCHES).mkdir(parents=True, exist_ok=True)
-    begin(out / HEAD, head, (out / BATCHES).glob("*.json"), resume=resume)
+    start_or_resume(out / HEAD, head, (out / BATCHES).glob("*.json"), resume=resume)
     tasks, kept = [], dict[int, list[Row]]()
     for first in range(0, runs, ROUTES_PER_BATCH):
         end = min(first + ROUTES_PER_BATCH, runs)

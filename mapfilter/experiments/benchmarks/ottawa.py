@@ -26,8 +26,7 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
 )
 from mapfilter.filters.contract import Status
 from mapfilter.filters.particle import ParticleOptions
-from mapfilter.models.cell_id import ServingWeights
-from mapfilter.models.fingerprint import LevelErrors
+from mapfilter.models.fingerprint import LevelErrors, ServingWeights
 from mapfilter.models.measured_map import HeardOptions, HeardRows, ServingStatistics
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.positioning.bayes.area_map import AreaMap
@@ -35,8 +34,8 @@ from mapfilter.positioning.bayes.evidence import EvidenceOptions
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import MeasuredMapModel
 from mapfilter.positioning.bayes.options import BayesOptions, open_area
-from mapfilter.positioning.bayes.replay import position_by_bayes
 from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.filter import locate
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.tracks.log import TrackLog
@@ -82,7 +81,7 @@ class OttawaOptions:
                 scale_drift_per_sqrt_m=0.005,
             ),
             map=MapWeights(sd_m=16.0),
-            particles=ParticleOptions(most=10_000, searching=7_000),
+            particles=ParticleOptions(max_particles=10_000, min_search_particles=7_000),
             evidence=EvidenceOptions(
                 serving=ServingWeights(weight_per_m=1 / 150),
                 levels=LevelErrors(sd_db=5.0, correlation_m=100.0, measurement_db=3.0),
@@ -166,7 +165,7 @@ def surveyed_positioner(
     model = MeasuredMapModel(
         area, chosen.motion, chosen.map, chosen.evidence, heard=heard, level_sd_db=level_sd_db
     )
-    return replace(chosen.over(area), model=model)
+    return replace(chosen.over_area(area), model=model)
 
 
 def _level_sd_db(deviation: RxLevRasters, area: AreaMap, unmeasured_db: float) -> Floats32:
@@ -197,7 +196,7 @@ def find_session(
     for method in METHODS:
         # The same stream of numbers: the filter below the smoother is the filter itself.
         own = named_rng(seed, "filter", session.name, str(draw))
-        located = position_by_bayes(positioner, log, own, smooth=method == "smoothed")
+        located = locate(log, replace(positioner, smooth=method == "smoothed"), own)
         found.append(_scored(part, session, method, log, located.estimate, positioner))
     return found
 

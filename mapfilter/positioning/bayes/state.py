@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 from math import inf, isfinite, nan, sqrt
 
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.filters.hypotheses import BeliefSummary, nothing
+from mapfilter.filters.hypotheses import BeliefSummary, empty_summary
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, EvidenceCusum, MapBelief
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import RadioHistory
 from mapfilter.positioning.epochs import ReportRow
-from mapfilter.positioning.estimate import Fix, UnusedReading
+from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
 from mapfilter.positioning.gnss.state import NO_GNSS_STATE, GnssState
 from mapfilter.positioning.matched_way import matched_way
 
@@ -61,23 +61,6 @@ class BayesTrack:
         return self.challenger.belief if lost and self.challenger else self.belief
 
 
-@dataclass(frozen=True, slots=True)
-class StepOutput:
-    """What one epoch brought.
-
-    Parameters
-    ----------
-    fix : Fix
-    evidence : tuple of float
-        Runner-up's east, north and mass, entropy in bits, log evidence.
-    unused : tuple of UnusedReading
-    """
-
-    fix: Fix
-    evidence: tuple[float, float, float, float, float]
-    unused: tuple[UnusedReading, ...]
-
-
 _STREET_SHARE = 0.3
 _FIRST_GRAIN_M, _LEAST_GRAIN_M = 5.0, 1.5
 
@@ -103,7 +86,7 @@ def news_of(
     """
     belief, (west, south) = track.leading, area.origin_m
     if belief is None:
-        said, count, way = nothing(STATES), 0, (0, nan)
+        said, count, way = empty_summary(STATES), 0, (0, nan)
     else:
         said, count = belief.summary, belief.log_weight.size
         way = matched_way(area, belief.state[0], belief.state[1], belief.weight)

@@ -1,0 +1,442 @@
+"""Kalman-type filters over a log: GNSS fixes, timing advances, levels and dead reckoning.
+
+No map is needed, only the sites. With dead reckoning the state is the position, moved by each step;
+without, it is position and velocity, and motion is that of constant velocity with white
+acceleration. A start without a fix is a Gaussian sum: one Gaussian over a kilometre goes astray.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import cos, inf, isfinite, nan, pi, sin
+from typing import Any, Literal
+
+import numpy as np
+
+from mapfilter._types import Floats
+from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.filters.contract import MotionStep, Reason, Status
+from mapfilter.filters.gaussian import METHODS, Gaussian, Method
+from mapfilter.models.gaussian import GaussianTerms
+from mapfilter.models.motion import constant_velocity
+from mapfilter.models.ranging import position_fix
+from mapfilter.models.state import MOVING, POSITION, StateLayout
+from mapfilter.positioning.epochs import Epoch, GnssFix
+from mapfilter.positioning.estimate import Fix, StepOutput, TrackEstimate, UnusedReading
+from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind
+from mapfilter.positioning.kalman.belief import FusionHistory, SumBelief
+from mapfilter.positioning.kalman.models import FusionOptions, SiteModels, compiled
+from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
+from mapfilter.radio.antenna import MeasuredAntenna
+from mapfilter.radio.cells import CellPlan
+
+_ANGLES = np.pi * (np.arange(256) + 0.5) / 256
+_SHARES = np.array([0.50, 0.67, 0.95])
+
+
+def gaussian_radii_m(covariance_m2: Floats, within_m: float) -> tuple[Floats, float]:
+    """Return the radii that hold 50, 67 and 95 %, and the share within a distance.
+
+    In polar coordinates, ``P(r > R) = 1/(π sqrt(ab)) ∫ exp(-R² q / 2) / q dθ`` over half a turn,
+    ``q = cos²θ/a + sin²θ/b``, with the eigenvalues a and b of the covariance.
+
+    Parameters
+    ----------
+    covariance_m2 : (2, 2) array
+        East, north.
+    within_m : float
+
+    Examples
+    --------
+    >>> radii, share = gaussian_radii_m(np.diag([100.0, 100.0]), 20.0)
+    >>> radii.round(2).tolist(), round(share, 4)
+    ([11.77, 14.89, 24.48], 0.8647)
+    """
+    high, low = _spread(covariance_m2)
+    near, far = np.zeros(3), np.full(3, 6.0 * np.sqrt(high))
+    for _ in range(40):
+        middle = 0.5 * (near + far)
+        beyond = _outside(middle, high, low) > 1 - _SHARES
+        near, far = np.where(beyond, middle, near), np.where(beyond, far, middle)
+    return 0.5 * (near + far), share_within(covariance_m2, within_m)
+
+
+def share_within(covariance_m2: Floats, within_m: float) -> float:
+    """Return the share of a normal belief within a distance of its mean.
+
+    Examples
+    --------
+    >>> round(share_within(np.diag([100.0, 100.0]), 20.0), 4)
+    0.8647
+    """
+    return float(1 - _outside(np.array([within_m]), *_spread(covariance_m2))[0])
+
+
+def _spread(covariance_m2: Floats) -> tuple[float, float]:
+    values = np.maximum(np.linalg.eigvalsh(covariance_m2), 1e-6)
+    # Ratios beyond this are a line as far as any radius can tell.
+    return float(values[1]), float(max(values[0], 1e-4 * values[1]))
+
+
+def _outside(radius_m: Floats, high: float, low: float) -> Floats:
+    q = np.cos(_ANGLES) ** 2 / high + np.sin(_ANGLES) ** 2 / low
+    inner = np.exp(-0.5 * radius_m[:, None] ** 2 * q) / q
+    return np.asarray(inner.mean(axis=1) / np.sqrt(high * low))
+
+
+_SURPRISE, _WINDOW = 5.0, 10
+_WITHIN_M = 50.0
+_MOST_PARTS = 64
+_LEAST_MOVED_M = 0.1
+_WALK_MPS = 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class KalmanFilter(FusionOptions):
+    """A Kalman-type filter over GNSS fixes, timing advances, levels and dead reckoning.
+
+    It needs no map, only the sites of the cells. Parameters besides these are those of
+    :class:`mapfilter.positioning.kalman.models.FusionOptions`.
+
+    Parameters
+    ----------
+    method : str
+        Extended (EKF), iterated (IEKF), unscented (UKF), cubature (CKF) or Rao-Blackwellised
+        unscented Kalman filter (RBUKF).
+    smooth : bool
+        Whether positions are smoothed by the whole log (Rauch-Tung-Striebel).
+    """
+
+    method: Literal["ekf", "iekf", "rbukf", "ukf", "ckf"] = "ekf"
+    smooth: bool = False
+
+    @property
+    def name(self) -> str:
+        """The filter's name."""
+        return self.method
+
+    def over(self, database: RadioRouteDatabase, *, ways: bool = True) -> KalmanTracker:  # noqa: ARG002
+        """Return the filter over the sites of a database."""
+        return self.over_sites(database.plan)
+
+    def over_sites(
+        self, plan: CellPlan, antennas: Mapping[str, MeasuredAntenna] | None = None
+    ) -> KalmanTracker:
+        """Return the filter over the sites of a cell plan.
+
+        Parameters
+        ----------
+        plan : CellPlan
+        antennas : mapping of str to MeasuredAntenna, optional
+            As for :class:`mapfilter.positioning.kalman.models.SiteModels`.
+        """
+        return KalmanTracker(
+            SiteModels(plan, self, antennas), plan.crs, METHODS[self.method], self.smooth
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class KalmanState:
+    """State of a journey.
+
+    Parameters
+    ----------
+    layout : StateLayout
+        Position only where there is dead reckoning, else position and velocity.
+    belief : SumBelief or None
+        None before the first measurement that it can start from.
+    time_s : float
+        Of the last epoch.
+    moved_m : float
+        Travelled since levels or timing advances were last used.
+    status : Status
+    surprise : tuple of float
+        Normalised innovations squared of the last measurements, per component.
+    motion : tuple of arrays
+        Transition, noise and shift that led to the last epoch.
+    """
+
+    layout: StateLayout
+    belief: SumBelief | None = None
+    time_s: float = nan
+    moved_m: float = inf
+    status: Status = Status.SEARCHING
+    surprise: tuple[float, ...] = ()
+    motion: tuple[Floats, Floats, Floats] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class KalmanTracker(Filter[KalmanState]):
+    """A Kalman-type filter over the sites of an area.
+
+    Parameters
+    ----------
+    sites : SiteModels
+    sites_crs : str
+    method : Method
+    smooth : bool
+    """
+
+    sites: SiteModels
+    sites_crs: str
+    method: Method
+    smooth: bool = False
+
+    @property
+    def name(self) -> str:
+        """The filter's name."""
+        return self.method.name
+
+    @property
+    def crs(self) -> str:
+        """CRS of the sites."""
+        return self.sites_crs
+
+    @property
+    def uses(self) -> Collection[Kind]:
+        """Kinds of measurements that it takes."""
+        return ("motion", "serving", "neighbour", "gnss")
+
+    def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> KalmanState:
+        """Return the state before the first epoch."""
+        return KalmanState(POSITION if "motion" in kinds else MOVING)
+
+    def step(
+        self,
+        state: KalmanState,
+        epoch: Epoch,
+        rng: np.random.Generator,  # noqa: ARG002
+    ) -> tuple[KalmanState, StepOutput]:
+        """Take one epoch: first move, then measure."""
+        work = _Step(self.sites, self.method, state)
+        fix = work.take(epoch)
+        return work.state, StepOutput(fix, unused=tuple(work.unused))
+
+    def smoother(self) -> KalmanSmoother | None:
+        """Return a new smoother where positions shall be smoothed."""
+        return KalmanSmoother() if self.smooth else None
+
+
+@dataclass(eq=False)
+class KalmanSmoother:
+    """Smooths each part of the Gaussian sum (Rauch-Tung-Striebel)."""
+
+    history: FusionHistory = field(default_factory=FusionHistory)
+    where: list[int] = field(default_factory=list)
+
+    def add(self, before: KalmanState, after: KalmanState) -> None:  # noqa: ARG002
+        """Record the state after an epoch, and the motion that led to it."""
+        if after.belief is not None and after.motion is not None:
+            self.where = [after.layout.east, after.layout.north]
+            self.history.add(after.belief, *after.motion)
+
+    def smoothed(
+        self,
+        estimate: TrackEstimate,
+        rng: np.random.Generator,  # noqa: ARG002
+    ) -> TrackEstimate:
+        """Replace the positions since the start by smoothed ones; statuses stay."""
+        later = self.history.smoothed()
+        first = len(estimate) - len(later)
+        fixes = [estimate.fix(index) for index in range(len(estimate))]
+        fixes[first:] = [
+            replace(fix, **_place(belief, self.where))
+            for fix, belief in zip(fixes[first:], later, strict=True)
+        ]
+        return TrackEstimate.of_fixes(
+            estimate.crs,
+            estimate.filter,
+            fixes,
+            start_utc_s=estimate.start_utc_s,
+            unused=estimate.unused,
+        )
+
+
+class _Step:
+    """One epoch in work: the state is replaced by parts."""
+
+    def __init__(self, sites: SiteModels, method: Method, state: KalmanState) -> None:
+        self.sites, self.method, self.options = sites, method, sites.options
+        self.layout, self.belief, self.time_s = state.layout, state.belief, state.time_s
+        self.where = [self.layout.east, self.layout.north]
+        self.moved_m, self.status = state.moved_m, state.status
+        self.surprise = list(state.surprise)
+        self.motion = state.motion
+        self.unused: list[UnusedReading] = []
+
+    @property
+    def state(self) -> KalmanState:
+        """The state after the epoch."""
+        return KalmanState(
+            self.layout,
+            self.belief,
+            self.time_s,
+            self.moved_m,
+            self.status,
+            tuple(self.surprise),
+            self.motion,
+        )
+
+    def take(self, epoch: Epoch) -> Fix:
+        """Move, then measure; return the epoch's fix."""
+        self.motion = self._move(epoch)
+        reason = self._measure(epoch, site_readings(self.sites, epoch))
+        self.time_s = epoch.time_s
+        return self._fix(epoch.time_s, reason)
+
+    def _move(self, epoch: Epoch) -> tuple[Floats, Floats, Floats]:
+        """Predict; return the transition, the noise and the shift."""
+        size = self.layout.size
+        elapsed_s = max(epoch.time_s - self.time_s, 0.0) if isfinite(self.time_s) else 0.0
+        transition, noise, shift = np.eye(size), np.zeros((size, size)), np.zeros(size)
+        if self.belief is None:
+            self._label(epoch, epoch.motion, Reason.NOT_STARTED)
+            return transition, noise, shift
+        if self.layout is MOVING:
+            if elapsed_s > 0:
+                motion = constant_velocity(elapsed_s, self.options.acceleration, noise="continuous")
+                transition, noise = motion.transition, motion.noise
+                self.moved_m += self._speed_mps() * elapsed_s
+        else:
+            noise = self.options.drift_m**2 * elapsed_s * np.eye(2)
+            for step in epoch.motion:
+                moved, spread = self._step(epoch, step)
+                shift, noise = shift + moved, noise + spread
+                self.moved_m += step.step_m if isfinite(step.step_m) else 0.0
+        self.belief = self.belief.predict(transition, noise, shift)
+        return transition, noise, shift
+
+    def _speed_mps(self) -> float:
+        """Return how fast one is believed to go, at least at a walk."""
+        if self.belief is None:
+            raise AssertionError("asked once started")
+        mean = self.belief.moments.mean
+        return max(float(np.hypot(*mean[list(self.layout.velocity)])), _WALK_MPS)
+
+    def _step(self, epoch: Epoch, step: MotionStep) -> tuple[Floats, Floats]:
+        """Return where a step leads and how sure that is; without direction it is all spread."""
+        if not isfinite(step.step_m):
+            self._label(epoch, (step,), Reason.NO_STEP)
+            return np.zeros(2), np.zeros((2, 2))
+        if not isfinite(step.heading_rad):
+            self._label(epoch, (step,), Reason.NO_HEADING)
+            return np.zeros(2), step.step_m**2 * np.eye(2)
+        along = np.array([cos(step.heading_rad), sin(step.heading_rad)])
+        across = np.array([-along[1], along[0]])
+        cross_m = step.step_m * self.options.heading_sigma_rad
+        noise = self.options.step_sigma_m**2 * np.outer(along, along)
+        return step.step_m * along, noise + cross_m**2 * np.outer(across, across)
+
+    def _measure(self, epoch: Epoch, given: SiteReadings) -> Reason:
+        self.unused += given.unused
+        fix = epoch.fix
+        if fix is not None and not (isfinite(fix.east_m) and isfinite(fix.north_m)):
+            self.unused.append(UnusedReading(epoch.time_s, "gnss", "", Reason.NO_READING))
+            fix = None
+        if fix is None and not given.cells and not given.timed:
+            return Reason.UNKNOWN_CELL if epoch.heard else Reason.NO_READING
+        if self.belief is None:
+            self.belief = self._start(fix, given)
+        taken = fix is not None and self._update_fix(fix)
+        if given.cells or given.timed:
+            model = self.sites.of(self.layout, given.cells, given.timed)
+            step_m = self.options.timing_step_m
+            reading = [*given.levels_dbm, *((steps + 0.5) * step_m for steps in given.steps)]
+            kept_m = [self.options.level_memory_m] * len(given.cells)
+            kept_m += [self.options.timing_memory_m] * len(given.timed)
+            if self._update(self._aged(model, kept_m), reading):
+                self.moved_m, taken = 0.0, True
+        return Reason.USED if taken else Reason.UPDATE_FAILED
+
+    def _aged(self, model: GaussianTerms, kept_m: Sequence[float]) -> GaussianTerms:
+        """Return a model with noise for errors that last: reports in a row tell it only once."""
+        growth = np.sqrt(np.maximum(1.0, np.array(kept_m) / max(self.moved_m, _LEAST_MOVED_M)))
+        return replace(model, noise=model.noise * np.outer(growth, growth))
+
+    def _start(self, fix: GnssFix | None, given: SiteReadings) -> SumBelief:
+        """Return the first belief: at a fix, on a timing advance's circle, or about a site."""
+        options, east, north = self.options, *self.where
+        mean, deviation = np.zeros(self.layout.size), np.zeros(self.layout.size)
+        deviation[list(self.layout.velocity if self.layout is MOVING else ())] = (
+            options.speed_sigma_mps
+        )
+        if fix is not None:
+            mean[self.where] = fix.east_m, fix.north_m
+            deviation[self.where] = options.start_sigma_m
+            return SumBelief.start(mean, np.diag(deviation**2))
+        cell = self.sites.cells[(given.timed or given.cells)[0]]
+        mean[self.where] = cell.east_m, cell.north_m
+        if not given.timed:
+            deviation[self.where] = options.start_sigma_m
+            parts = {east: options.start_parts, north: options.start_parts}
+            return SumBelief.start(mean, np.diag(deviation**2), parts)
+        radius_m = (given.steps[0] + 0.5) * options.timing_step_m
+        count = min(max(round(2 * pi * radius_m / options.start_spacing_m), 8), _MOST_PARTS)
+        deviation[self.where] = max(options.start_spacing_m, 0.7 * 2 * pi * radius_m / count)
+        angle = 2 * pi * np.arange(count) / count
+        return SumBelief.around(
+            mean, np.diag(deviation**2),
+            {east: cell.east_m + radius_m * np.cos(angle),
+             north: cell.north_m + radius_m * np.sin(angle)},
+        )  # fmt: skip
+
+    def _update_fix(self, fix: GnssFix) -> bool:
+        noise = np.array(
+            [
+                [fix.var_east_m2, fix.cov_east_north_m2],
+                [fix.cov_east_north_m2, fix.var_north_m2],
+            ]
+        )
+        if not isfinite(fix.cov_east_north_m2):
+            noise[0, 1] = noise[1, 0] = 0.0
+        sure = np.isfinite(noise).all() and noise[0, 0] > 0 and np.linalg.det(noise) > 0
+        if not sure:
+            noise = np.eye(2) * self.options.fix_sigma_m**2
+        return self._update(position_fix(self.layout, noise), [fix.east_m, fix.north_m])
+
+    def _update(self, model: GaussianTerms, reading: Sequence[float]) -> bool:
+        """Take a reading in; tell whether that could be done."""
+        if self.belief is None:
+            raise AssertionError("started before it measures")
+        self.belief, news = self.belief.update(compiled(model), reading, self.method)
+        if news.used:
+            self.surprise = [*self.surprise, news.nis / len(reading)][-_WINDOW:]
+        return news.used
+
+    def _label(self, epoch: Epoch, steps: Sequence[MotionStep], reason: Reason) -> None:
+        self.unused += [UnusedReading(epoch.time_s, "motion", "", reason) for _ in steps]
+
+    def _fix(self, time_s: float, reason: Reason) -> Fix:
+        if self.belief is None:
+            return Fix.nowhere(time_s, self.status, reason)
+        place = _place(self.belief.moments, self.where)
+        self._tell(float(place["radii_m"][2]))
+        count = self.belief.weights.size
+        if count > 1:
+            lead = self.belief.leading.covariance[np.ix_(self.where, self.where)]
+            place["mass_50m"] = share_within(lead, _WITHIN_M) * float(self.belief.weights.max())
+        return Fix(
+            time_s, **place, status=self.status, hypotheses=count, way_id=0, way_probability=nan,
+            reason=reason,
+        )  # fmt: skip
+
+    def _tell(self, radius_m: float) -> None:
+        """Bring the status up to date: settled or not, surprised for long or not."""
+        lost = len(self.surprise) == _WINDOW and float(np.mean(self.surprise)) > _SURPRISE
+        if self.status is Status.SEARCHING:
+            if radius_m <= self.options.converged_radius_m:
+                self.status = Status.CONVERGED
+        else:
+            self.status = Status.LOST if lost else Status.TRACKING
+
+
+def _place(belief: Gaussian, where: list[int]) -> dict[str, Any]:
+    """Return what a belief says about the position, as fields of a fix."""
+    covariance = belief.covariance[np.ix_(where, where)]
+    radii, mass = gaussian_radii_m(covariance, _WITHIN_M)
+    east_m, north_m = (float(value) for value in belief.mean[where])
+    return {
+        "east_m": east_m, "north_m": north_m, "covariance_m2": covariance, "radii_m": radii,
+        "mass_50m": mass,
+    }  # fmt: skip
