@@ -48,11 +48,8 @@ class Lobe:
 
     def score(self, azimuth_deg: float) -> float:
         """Return the score of a boresight, interpolated between the steps."""
-        place = (azimuth_deg % 360.0) / STEP_DEG
-        low = int(place) % _DIRECTIONS
-        share = place - int(place)
-        high = (low + 1) % _DIRECTIONS
-        return float((1 - share) * self.scores[low] + share * self.scores[high])
+        boresights_deg = np.arange(_DIRECTIONS) * STEP_DEG
+        return float(np.interp(azimuth_deg, boresights_deg, self.scores, period=360.0))
 
     def offset_deg(self, azimuth_deg: float) -> float:
         """Return how far the best boresight is from another, clockwise, in -180..180."""

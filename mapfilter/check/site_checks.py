@@ -17,12 +17,7 @@ from scipy.optimize import linear_sum_assignment
 
 from mapfilter._types import Floats, Floats32
 from mapfilter.check.findings import Findings, listed
-from mapfilter.check.lobes import (
-    AzimuthMistake,
-    Lobe,
-    azimuth_mistakes,
-    find_lobe,
-)
+from mapfilter.check.lobes import Lobe, azimuth_mistakes, find_lobe
 from mapfilter.check.raster_checks import RasterSample, above_free_space_db, falls_with_distance
 from mapfilter.radio.cells import Cell, CellPlan
 
@@ -283,7 +278,13 @@ def check_against_sites(
     held = {sample.cell_id for sample in in_place}
     cells = [cell for cell in plan.cells if cell.id in held]
     for mistake in azimuth_mistakes(cells, lobes):
-        findings.add(mistake.mistake, f"{where}, cells {listed(mistake.cells)}", _evidence(mistake))
+        evidence = f"Azimuths and lobes of the rasters differ by {mistake.offset_deg:.0f}° (median)"
+        if mistake.mistake == "azimuth-off-lobe":
+            evidence += f": {mistake.reading}."
+        else:
+            how = "if" if mistake.mistake == "sector-labels-swapped" else "if azimuths are"
+            evidence += f"; by {mistake.offset_read_deg:.0f}° {how} {mistake.reading}."
+        findings.add(mistake.mistake, f"{where}, cells {listed(mistake.cells)}", evidence)
     return in_place
 
 
@@ -326,14 +327,6 @@ def check_power(
         evidence = f"That is little for a sector on a mast. {_as_watts(small[0])}"
         ids = [cell.id for cell in small]
         findings.add("eirp-watts", f"{where}, cells {listed(ids)}", evidence, "warning")
-
-
-def _evidence(mistake: AzimuthMistake) -> str:
-    seen = f"Azimuths and lobes of the rasters differ by {mistake.offset_deg:.0f}° (median)"
-    if mistake.mistake == "azimuth-off-lobe":
-        return f"{seen}: {mistake.reading}."
-    how = "if" if mistake.mistake == "sector-labels-swapped" else "if azimuths are"
-    return f"{seen}; by {mistake.offset_read_deg:.0f}° {how} {mistake.reading}."
 
 
 def _check_turned(

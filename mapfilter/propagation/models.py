@@ -222,12 +222,10 @@ def path_loss_db(
     roof_height_m: ArrayLike,
     sight: ArrayLike,
 ) -> Floats:
-    """Return the path loss in dB by the model that a prediction asks for.
+    """Return the path loss in dB by the model of a prediction, at horizontal distances.
 
     Parameters
     ----------
-    distance_m : array_like
-        Horizontal distance.
     roof_height_m : array_like
         Mean height of the roofs around the mobile; of use to Walfisch-Ikegami only.
     sight : array_like
@@ -276,14 +274,10 @@ def needs_sight(model: PredictionModel) -> bool:
 
 def shortest_distance_m(model: PredictionModel) -> float:
     """Return the distance below which distances count as this one."""
-    match model.model:
-        case "friis":
-            return SHORTEST_FREE_DISTANCE_M
-        case "log_distance":
-            return model.reference_distance_m
-        case "tr38901_uma" | "tr38901_umi":
-            return SHORTEST_TR38901_DISTANCE_M
-    return SHORTEST_DISTANCE_M
+    if model.model in _SCENARIOS:
+        return SHORTEST_TR38901_DISTANCE_M
+    special = {"friis": SHORTEST_FREE_DISTANCE_M, "log_distance": model.reference_distance_m}
+    return special.get(model.model, SHORTEST_DISTANCE_M)
 
 
 def outside_published_range(

@@ -1,1 +1,1 @@
-"""What the network is and how it is heard: cell plans, levels, rasters, the RXLEV scale."""
+"""The radio network: cell plans, antennas, the RXLEV scale."""

@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -134,7 +133,7 @@ class CellPlan:
 
     @cached_property
     def _positions(self) -> Mapping[str, int]:
-        return MappingProxyType({cell.id: i for i, cell in enumerate(self.cells)})
+        return {cell.id: i for i, cell in enumerate(self.cells)}
 
     @cached_property
     def ids_by_carrier(self) -> Mapping[tuple[int, int], tuple[str, ...]]:
@@ -145,13 +144,6 @@ class CellPlan:
                 key = (cell.arfcn, cell.bsic)
                 found[key] = (*found.get(key, ()), cell.id)
         return found
-
-    def __getstate__(self) -> tuple[str, tuple[Cell, ...], tuple[str, ...]]:
-        return self.crs, self.cells, self.notes
-
-    def __setstate__(self, state: tuple[str, tuple[Cell, ...], tuple[str, ...]]) -> None:
-        for name, value in zip(("crs", "cells", "notes"), state, strict=True):
-            object.__setattr__(self, name, value)
 
     def __len__(self) -> int:
         return len(self.cells)

@@ -215,7 +215,7 @@ def open_geotiff(
 
 
 def _masked(source: Any, bands: list[int], window: Any) -> Floats32:
-    """Read bands with NaN where the file's own mask or nodata value says so."""
+    """Read bands, NaN where the file's own mask or nodata value applies."""
     # Each of these properties asks the file about all of its bands.
     masks, empty = source.mask_flag_enums, source.nodatavals
     flags = {flag.name for band in bands for flag in masks[band - 1]}
@@ -299,7 +299,7 @@ def _check_extent_of_file(path: Path, source: Any, faults: Faults) -> None:
         return
     if down * across * planes * _INDEX_ENTRY_BYTES > size_bytes:
         got = f"{size_bytes} bytes for {source.height} x {source.width} x {source.count} pixels"
-        faults.add(str(path), "as many bytes as its header tells", got, hint)
+        faults.add(str(path), "as many bytes as its header needs", got, hint)
         return
     needed, blocks = 0, down * across
     step = max(1, -(-blocks * planes // _MOST_BLOCKS_LOOKED_AT))

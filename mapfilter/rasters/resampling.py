@@ -160,29 +160,26 @@ def _holding(place: Floats) -> Ints:
 
 
 def _nearest(file: RasterFile, bands: Sequence[int], rows: Ints, cols: Ints) -> Floats32:
-    """Take pixels; rows and columns ascend, and those beyond the file are NaN."""
+    """Take pixels, read in strips that fit into memory; rows and columns ascend.
+
+    Those beyond the file are NaN.
+    """
     values = np.full((len(bands), rows.size, cols.size), np.nan, dtype=np.float32)
     r = np.flatnonzero((rows >= 0) & (rows < file.lattice.rows))
     c = np.flatnonzero((cols >= 0) & (cols < file.lattice.cols))
-    if r.size and c.size:
-        found = _taken(file, bands, rows[r], cols[c])
-        values[:, r[0] : r[-1] + 1, c[0] : c[-1] + 1] = found
-    return values
-
-
-def _taken(file: RasterFile, bands: Sequence[int], rows: Ints, cols: Ints) -> Floats32:
-    """Return the pixels at rows and columns of a file, in strips that fit into memory."""
-    width = int(cols.max()) - int(cols.min()) + 1
-    least, step = int(cols.min()), max(1, _LARGEST_SOURCE_BYTES // (4 * width * len(bands)))
-    values = np.empty((len(bands), rows.size, cols.size), dtype=np.float32)
+    if not (r.size and c.size):
+        return values
+    rows, cols = rows[r], cols[c]
+    left, width = int(cols[0]), int(cols[-1] - cols[0]) + 1
+    step = max(1, _LARGEST_SOURCE_BYTES // (4 * width * len(bands)))
+    inside = values[:, r[0] : r[-1] + 1, c[0] : c[-1] + 1]
     done = 0
     while done < rows.size:
-        top = int(rows[done:].min())
-        some = int(np.searchsorted(rows[done:], top + step)) or 1
-        part = rows[done : done + some]
-        strip = file.read(bands, (top, least, int(part.max()) - top + 1, width))
-        values[:, done : done + some] = strip[:, (part - top)[:, None], cols - least]
-        done += some
+        top = int(rows[done])
+        part = rows[done : done + (int(np.searchsorted(rows[done:], top + step)) or 1)]
+        strip = file.read(bands, (top, left, int(part[-1]) - top + 1, width))
+        inside[:, done : done + part.size] = strip[:, (part - top)[:, None], cols - left]
+        done += part.size
     return values
 
 
@@ -199,12 +196,11 @@ def _bilinear(
     above, left = np.floor(row - 0.5), np.floor(col - 0.5)
     for down in (0, 1):
         for right in (0, 1):
+            at = (above + down).astype(np.int64), (left + right).astype(np.int64)
             share = np.outer(
                 1 - np.abs(row - 0.5 - above - down), 1 - np.abs(col - 0.5 - left - right)
             )
-            values = _nearest(
-                file, bands, (above + down).astype(np.int64), (left + right).astype(np.int64)
-            )
+            values = _nearest(file, bands, *at)
             known = ~np.isnan(values)
             weighted += np.where(known, values, 0.0) * share
             weight += known * share

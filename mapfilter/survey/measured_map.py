@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from threadpoolctl import threadpool_limits
 
 from mapfilter._parallel import Progress
-from mapfilter._types import Bools, Floats, Ints
+from mapfilter._types import Floats, Ints
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.radio.cells import CellPlan
 from mapfilter.survey.cell_model import (
@@ -194,19 +194,39 @@ def fit_survey(
     level_dbm = float(np.mean([some.level_dbm.mean() for some in points]))
     plan = plan.to_crs(measurements.crs) if plan is not None else None
     shadowing = Shadowing()
+
+    def trend_of(points: Points) -> Trend:
+        prior = Prior(level_dbm)
+        covariate: Covariate | None = None
+        if predicted is not None:
+            prior = Prior(level_dbm, **_CALIBRATION)
+            covariate = predicted[points.cell_id]
+        elif options.trend == "path_loss" and plan is not None and points.cell_id in plan:
+            cell = plan[points.cell_id]
+            above_m = max(cell.height_m - _PHONE_HEIGHT_M, 1.0)
+            covariate = DistanceLoss(cell.east_m, cell.north_m, above_m)
+        elif options.trend == "path_loss" and len(points) >= options.min_points_to_locate:
+            some = points.thinned(_LOCATED_FROM)
+            covariate = locate_antenna(some, shadowing.covariance_db2(some), prior)
+        return fit_trend(covariate, points, shadowing.covariance_db2(points), prior)
+
     cells = {}
     # Threads make small matrices slower, and their sums depend on how many there are.
     with threadpool_limits(1):
         for _ in range(_ROUNDS):
-            trends = [_trend(p, options, level_dbm, shadowing, plan, predicted) for p in points]
-            shadowing = learn_shadowing(points, trends, shadowing)
+            shadowing = learn_shadowing(points, [trend_of(some) for some in points], shadowing)
         for some in points:
-            trend = _trend(some, options, level_dbm, shadowing, plan, predicted)
+            trend = trend_of(some)
             antenna = trend.covariate if isinstance(trend.covariate, DistanceLoss) else None
+            made: ResidualField = TrendField(trend, shadowing)
+            if options.method == "gp":
+                made = GaussianField(some, trend, shadowing)
+            elif options.method == "knn":
+                made = NeighbourField(some, trend, shadowing, options.neighbours)
             cells[some.cell_id] = SurveyedCell(
                 some,
                 trend,
-                _field(some, trend, shadowing, options),
+                made,
                 (antenna.east_m, antenna.north_m) if antenna is not None else None,
                 antenna is not None and not (plan is not None and some.cell_id in plan),
                 cKDTree(some.heard_at),
@@ -221,39 +241,6 @@ def fit_survey(
             "the trend is their mean level"
         )
     return Survey(measurements.crs, options, shadowing, cells, tuple(notes))
-
-
-def _trend(
-    points: Points,
-    options: SurveyOptions,
-    level_dbm: float,
-    shadowing: Shadowing,
-    plan: CellPlan | None,
-    predicted: Mapping[str, Covariate] | None,
-) -> Trend:
-    prior = Prior(level_dbm)
-    covariate: Covariate | None = None
-    if predicted is not None:
-        prior = Prior(level_dbm, **_CALIBRATION)
-        covariate = predicted[points.cell_id]
-    elif options.trend == "path_loss" and plan is not None and points.cell_id in plan:
-        cell = plan[points.cell_id]
-        above_m = max(cell.height_m - _PHONE_HEIGHT_M, 1.0)
-        covariate = DistanceLoss(cell.east_m, cell.north_m, above_m)
-    elif options.trend == "path_loss" and len(points) >= options.min_points_to_locate:
-        some = points.thinned(_LOCATED_FROM)
-        covariate = locate_antenna(some, shadowing.covariance_db2(some), prior)
-    return fit_trend(covariate, points, shadowing.covariance_db2(points), prior)
-
-
-def _field(
-    points: Points, trend: Trend, shadowing: Shadowing, options: SurveyOptions
-) -> ResidualField:
-    if options.method == "gp":
-        return GaussianField(points, trend, shadowing)
-    if options.method == "knn":
-        return NeighbourField(points, trend, shadowing, options.neighbours)
-    return TrendField(trend, shadowing)
 
 
 _MOST_FOLDS = 20
@@ -328,21 +315,26 @@ class LeftOut:
     @property
     def validation(self) -> Validation:
         """The errors in a few figures."""
+        counts = self.folds, self.sessions > 1, self.measurements, len(self)
+        if not len(self):
+            nan = float("nan")
+            return Validation(*counts, nan, nan, nan, nan, nan, nan, 1.0)
         error_db = self.measured_dbm - self.predicted_dbm
         relative = np.abs(error_db) / self.deviation_db
         return Validation(
-            self.folds,
-            self.sessions > 1,
-            self.measurements,
-            len(self),
+            *counts,
             _rms(error_db),
             _rms(self.measured_dbm - self.trend_dbm),
             _rms(self.measured_dbm - self.mean_dbm),
-            _mean(error_db),
-            _mean(relative <= 1),
-            _mean(relative <= 2),
-            float(np.quantile(relative, _WITHIN_1)) if len(self) else 1.0,
+            float(np.mean(error_db)),
+            float(np.mean(relative <= 1)),
+            float(np.mean(relative <= 2)),
+            float(np.quantile(relative, _WITHIN_1)),
         )
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def leave_out(
@@ -403,11 +395,3 @@ def _predictions(survey: Survey, left_out: Measurements) -> list[Floats]:
         predicted = *cell.predict(*place), cell.trend.level_dbm(*place), mean_dbm
         found.append(np.column_stack((some.level_dbm[near], *predicted)))
     return found
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
-
-
-def _mean(values: Floats | Bools) -> float:
-    return float(np.mean(values)) if values.size else float("nan")

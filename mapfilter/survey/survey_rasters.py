@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
@@ -98,38 +99,30 @@ def surveyed_plan(
     return CellPlan(survey.crs, tuple(cells))
 
 
-@dataclass(frozen=True)
-class PredictedLevel:
-    """The predicted level of one cell at places, read from rasters where it is asked for."""
-
-    rasters: RxLevRasters
-    plan: CellPlan | None
-    cell_id: str
-
-    def __call__(self, east_m: Floats, north_m: Floats) -> Floats:
-        """Return dBm at places in the rasters' CRS; NaN beyond the rasters."""
-        lattice = self.rasters.lattice
-        row, col = lattice.row_col(east_m, north_m)
-        on = np.asarray(lattice.contains(row, col))
-        level_dbm = np.full(len(row), np.nan)
-        if not on.any():
-            return level_dbm
-        top, left = int(row[on].min()), int(col[on].min())
-        window = (top, left, int(row[on].max()) - top + 1, int(col[on].max()) - left + 1)
-        if self.plan is None or self.rasters.quantity == "level":
-            values = self.rasters.read(window, (self.cell_id,))[0]
-        else:
-            values = self.rasters.read_levels_dbm(self.plan, window, (self.cell_id,))[0]
-        level_dbm[on] = values[row[on] - top, col[on] - left]
-        return level_dbm
-
-
 def predicted_levels(rasters: RxLevRasters, plan: CellPlan | None) -> dict[str, Covariate]:
     """Return each cell's predicted level as a function of place, for a survey to calibrate.
 
     The plan is needed for losses only.
     """
-    return {cell_id: PredictedLevel(rasters, plan, cell_id) for cell_id in rasters.cell_ids}
+    return {cell_id: partial(_predicted, rasters, plan, cell_id) for cell_id in rasters.cell_ids}
+
+
+def _predicted(
+    rasters: RxLevRasters, plan: CellPlan | None, cell_id: str, east_m: Floats, north_m: Floats
+) -> Floats:
+    """Return a cell's predicted level at places in the rasters' CRS; NaN beyond the rasters."""
+    row, col = rasters.lattice.row_col(east_m, north_m)
+    on = np.asarray(rasters.lattice.contains(row, col))
+    level_dbm = np.full(len(row), np.nan)
+    if on.any():
+        top, left = int(row[on].min()), int(col[on].min())
+        window = (top, left, int(row[on].max()) - top + 1, int(col[on].max()) - left + 1)
+        if plan is None or rasters.quantity == "level":
+            values = rasters.read(window, (cell_id,))[0]
+        else:
+            values = rasters.read_levels_dbm(plan, window, (cell_id,))[0]
+        level_dbm[on] = values[row[on] - top, col[on] - left]
+    return level_dbm
 
 
 def _on_lattice(

@@ -42,9 +42,16 @@ def write_bil(
     east_m, north_m = lattice.east_north(shift_px, shift_px)
     path.write_bytes(values.astype(values.dtype.newbyteorder("<" if order == "I" else ">")))
     text = header.format(
-        rows=lattice.rows, cols=lattice.cols, bits=8 * values.dtype.itemsize, order=order,
-        ulx=east_m, uly=north_m, side=lattice.resolution_m, kind=kind, nodata=nodata,
-    )  # fmt: skip
+        rows=lattice.rows,
+        cols=lattice.cols,
+        bits=8 * values.dtype.itemsize,
+        order=order,
+        ulx=east_m,
+        uly=north_m,
+        side=lattice.resolution_m,
+        kind=kind,
+        nodata=nodata,
+    )
     path.with_suffix(".hdr").write_text(text)
     return path
 
@@ -64,10 +71,12 @@ def write_ascii(
     half_m = 0 if corner else lattice.resolution_m / 2
     name = "corner" if corner else "center"
     lines = [
-        f"ncols         {lattice.cols}", f"nrows         {lattice.rows}",
-        f"xll{name}     {west + half_m!r}", f"yll{name}     {south + half_m!r}",
+        f"ncols         {lattice.cols}",
+        f"nrows         {lattice.rows}",
+        f"xll{name}     {west + half_m!r}",
+        f"yll{name}     {south + half_m!r}",
         f"cellsize      {lattice.resolution_m!r}",
-    ]  # fmt: skip
+    ]
     lines += [f"NODATA_value  {nodata}"] if nodata else []
     lines += [" ".join(f"{value:g}" for value in row) for row in values]
     path.write_text("\n".join(lines) + "\n")

@@ -177,9 +177,14 @@ def test_sixteenths_of_a_decibel(tmp_path: Path) -> None:
 
 def test_an_index_may_name_geotiffs_and_raw_pixels_of_any_suffix(tmp_path: Path) -> None:
     profile = {
-        "driver": "GTiff", "width": 8, "height": 6, "count": 1, "dtype": "int16", "crs": CRS,
+        "driver": "GTiff",
+        "width": 8,
+        "height": 6,
+        "count": 1,
+        "dtype": "int16",
+        "crs": CRS,
         "transform": rasterio.Affine.from_gdal(*LATTICE.gdal_transform),
-    }  # fmt: skip
+    }
     with rasterio.open(tmp_path / "a.tif", "w", **profile) as target:
         target.write(LOSS, 1)
     write_bil(tmp_path / "b.bil", LATTICE, LOSS + 1).rename(tmp_path / "b.los")

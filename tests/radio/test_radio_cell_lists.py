@@ -76,9 +76,13 @@ def test_projected_positions_of_a_planning_tool(tmp_path: Path) -> None:
 def test_a_map_of_columns(tmp_path: Path) -> None:
     text = "Name,E,N,AGL,dBm,MHz,Remark\nA,385500,6672000,30,50,1800,x\n"
     columns = {
-        "cell": "Name", "east": "E", "north": "N", "height_m": "AGL", "eirp_dbm": "dBm",
+        "cell": "Name",
+        "east": "E",
+        "north": "N",
+        "height_m": "AGL",
+        "eirp_dbm": "dBm",
         "frequency_mhz": "MHz",
-    }  # fmt: skip
+    }
     plan = _read(tmp_path, text, columns=columns)
     assert (plan["A"].height_m, plan["A"].eirp_dbm, plan.notes) == (30.0, 50.0, ())
     said = _complaint(tmp_path, text, columns={**columns, "height_m": "AGI"})

@@ -55,7 +55,9 @@ def _panel(**changes: object) -> MeasuredAntenna:
         (_model("log_distance"), log_distance_db(DISTANCE_M, 900.0, 3.0)),
         (
             _model(
-                "log_distance", path_loss_exponent=3.5, reference_distance_m=50.0,
+                "log_distance",
+                path_loss_exponent=3.5,
+                reference_distance_m=50.0,
                 reference_loss_db=70.0,
             ),
             log_distance_db(DISTANCE_M, 900.0, 3.5, 50.0, 70.0),
@@ -65,7 +67,7 @@ def _panel(**changes: object) -> MeasuredAntenna:
             okumura_hata_db(DISTANCE_M, 900.0, 25.0, 1.5, "suburban"),
         ),
     ],
-)  # fmt: skip
+)
 def test_level_is_eirp_less_the_loss(model: PredictionModel, loss_db: np.ndarray) -> None:
     np.testing.assert_allclose(predict_cell(OMNI, LATTICE, None, model), 50.0 - loss_db, atol=1e-4)
 
@@ -113,8 +115,9 @@ def test_3gpp_antenna_has_a_vertical_cut_of_ten_degrees_unless_told() -> None:
 
 
 def test_electrical_tilt_is_alike_all_around_and_mechanical_tilt_is_not() -> None:
-    base = replace(NORTH, antenna="3gpp", beamwidth_deg=360.0, side_lobe_db=100.0,
-                   max_attenuation_db=100.0)  # fmt: skip
+    base = replace(
+        NORTH, antenna="3gpp", beamwidth_deg=360.0, side_lobe_db=100.0, max_attenuation_db=100.0
+    )
     row, col = PIXEL
     at = [(row - 30, col), (row + 30, col), (row, col + 30)]
     down_deg = np.degrees(np.arctan2(23.5, 300.0))
@@ -208,10 +211,20 @@ def test_antennas_measured_at_another_frequency_are_told() -> None:
 
 def test_wrong_choices_are_told_together() -> None:
     with pytest.raises(ConfigError) as caught:
-        _model("cost231_hata", line_of_sight="probability", environment="town",
-               path_loss_exponent=0.0, reference_distance_m=0.0,
-               reference_loss_db=-1.0)  # fmt: skip
+        _model(
+            "cost231_hata",
+            line_of_sight="probability",
+            environment="town",
+            path_loss_exponent=0.0,
+            reference_distance_m=0.0,
+            reference_loss_db=-1.0,
+        )
     text = str(caught.value)
-    for part in ("line_of_sight", "environment", "path_loss_exponent", "reference_distance_m",
-                 "reference_loss_db"):  # fmt: skip
+    for part in (
+        "line_of_sight",
+        "environment",
+        "path_loss_exponent",
+        "reference_distance_m",
+        "reference_loss_db",
+    ):
         assert part in text

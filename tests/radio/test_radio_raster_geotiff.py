@@ -66,9 +66,14 @@ def source(height, width, block, count=1, interleaving="band", kinds=("float32",
         return None if found is None else str(found[kind == "SIZE"])
 
     return SimpleNamespace(
-        height=height, width=width, count=count, interleaving=interleaving, dtypes=kinds,
-        block_shapes=[block] * count, get_tag_item=tag,
-    )  # fmt: skip
+        height=height,
+        width=width,
+        count=count,
+        interleaving=interleaving,
+        dtypes=kinds,
+        block_shapes=[block] * count,
+        get_tag_item=tag,
+    )
 
 
 def of_size(folder, size):
@@ -92,29 +97,46 @@ WHOLE = {(1, 0, 0): (100, 50), (1, 1, 0): (150, 50), (1, 0, 1): (200, 50), (1, 1
         (source(20, 20, (16, 16), blocks={(1, 1, 0): (100, 50)}), 149, ["at least 150 bytes"]),
         (source(20, 20, (16, 16)), 300, ["pixels"]),
         # The second band has its own blocks, unless both share theirs.
-        (source(9, 9, (16, 16), 2, blocks={(1, 0, 0): (8, 8), (2, 0, 0): (16, 8)}), 23,
-         ["at least 24 bytes"]),
-        (source(9, 9, (16, 16), 2, "PIXEL", blocks={(1, 0, 0): (8, 8), (2, 0, 0): (16, 8)}), 23,
-         []),
+        (
+            source(9, 9, (16, 16), 2, blocks={(1, 0, 0): (8, 8), (2, 0, 0): (16, 8)}),
+            23,
+            ["at least 24 bytes"],
+        ),
+        (
+            source(9, 9, (16, 16), 2, "PIXEL", blocks={(1, 0, 0): (8, 8), (2, 0, 0): (16, 8)}),
+            23,
+            [],
+        ),
         # Four bytes at least for each block's place.
         (source(160, 160, (16, 16), blocks={(1, 0, 0): (8, 8)}), 400, []),
-        (source(160, 160, (16, 16), blocks={(1, 0, 0): (8, 8)}), 399,
-         ["as many bytes as its header tells"]),
-        (source(160, 160, (16, 16), 2, blocks={(1, 0, 0): (8, 8)}), 799,
-         ["as many bytes as its header tells"]),
+        (
+            source(160, 160, (16, 16), blocks={(1, 0, 0): (8, 8)}),
+            399,
+            ["as many bytes as its header needs"],
+        ),
+        (
+            source(160, 160, (16, 16), 2, blocks={(1, 0, 0): (8, 8)}),
+            799,
+            ["as many bytes as its header needs"],
+        ),
         (source(160, 160, (16, 16), 2, "PIXEL", blocks={(1, 0, 0): (8, 8)}), 400, []),
         # A block of 64 MiB at most, or of the size of the file.
         (source(4096, 4096, (4096, 4096), blocks={(1, 0, 0): (8, 8)}), 100, []),
-        (source(4096, 4096, (4096, 4097), blocks={(1, 0, 0): (8, 8)}), 100,
-         ["blocks under 64 MiB"]),
-        (source(4096, 4096, (4096, 4096), kinds=("uint8", "float64"), blocks=WHOLE), 300,
-         ["blocks under 64 MiB"]),
-        (source(4096, 4096, (4096, 4096), 2, "PIXEL", blocks=WHOLE), 300,
-         ["blocks under 64 MiB"]),
+        (
+            source(4096, 4096, (4096, 4097), blocks={(1, 0, 0): (8, 8)}),
+            100,
+            ["blocks under 64 MiB"],
+        ),
+        (
+            source(4096, 4096, (4096, 4096), kinds=("uint8", "float64"), blocks=WHOLE),
+            300,
+            ["blocks under 64 MiB"],
+        ),
+        (source(4096, 4096, (4096, 4096), 2, "PIXEL", blocks=WHOLE), 300, ["blocks under 64 MiB"]),
         (source(4096, 4096, (4096, 4096), 2, blocks=WHOLE), 300, []),
         (source(4096, 4096, (4096, 4097), blocks={(1, 0, 0): (8, 8)}), 4 * 4096 * 4097, []),
     ],
-)  # fmt: skip
+)
 def test_bytes_that_a_header_promises(tmp_path, header, size, said):
     found = complaints(_check_extent_of_file, of_size(tmp_path, size), header)
     assert len(found) == len(said)
@@ -135,18 +157,26 @@ def test_of_many_blocks_some_are_looked_at_and_the_last_always(tmp_path, monkeyp
         "at least 160 bytes; the file is cut off, or its header is damaged"
     ]
     assert [name for name in looked if "OFFSET" in name] == [
-        "BLOCK_OFFSET_4_1", "BLOCK_OFFSET_0_1", "BLOCK_OFFSET_1_0",
-    ]  # fmt: skip
+        "BLOCK_OFFSET_4_1",
+        "BLOCK_OFFSET_0_1",
+        "BLOCK_OFFSET_1_0",
+    ]
 
 
 @pytest.mark.parametrize(
     ("tag", "units", "quantity"),
     [
-        ("loss", ("dBm",), "loss"), ("deviation", (None,), "deviation"), ("other", ("dBm",), None),
-        (None, ("dBm", " DBM "), "level"), (None, ("dB",), "loss"), (None, ("dB", "dBm"), None),
-        (None, ("m",), None), (None, ("dB", None), None), (None, (None, ""), None),
+        ("loss", ("dBm",), "loss"),
+        ("deviation", (None,), "deviation"),
+        ("other", ("dBm",), None),
+        (None, ("dBm", " DBM "), "level"),
+        (None, ("dB",), "loss"),
+        (None, ("dB", "dBm"), None),
+        (None, ("m",), None),
+        (None, ("dB", None), None),
+        (None, (None, ""), None),
     ],
-)  # fmt: skip
+)
 def test_what_a_file_says_that_it_holds(tag, units, quantity):
     tags = {} if tag is None else {QUANTITY_TAG: tag}
     assert _quantity(SimpleNamespace(tags=lambda: tags, units=units)) == quantity
@@ -163,12 +193,19 @@ def rasters(tmp_path_factory):
 @pytest.mark.parametrize(
     ("window", "fits"),
     [
-        ((0, 0, 6, 8), True), ((5, 7, 1, 1), True), ((5, 0, 1, 8), True), ((0, 0, 7, 8), False),
-        ((0, 0, 6, 9), False), ((-1, 0, 2, 2), False), ((0, -1, 2, 2), False),
-        ((6, 0, 1, 1), False), ((0, 8, 1, 1), False), ((0, 0, 0, 1), False),
+        ((0, 0, 6, 8), True),
+        ((5, 7, 1, 1), True),
+        ((5, 0, 1, 8), True),
+        ((0, 0, 7, 8), False),
+        ((0, 0, 6, 9), False),
+        ((-1, 0, 2, 2), False),
+        ((0, -1, 2, 2), False),
+        ((6, 0, 1, 1), False),
+        ((0, 8, 1, 1), False),
+        ((0, 0, 0, 1), False),
         ((0, 0, 1, 0), False),
     ],
-)  # fmt: skip
+)
 def test_windows_on_the_lattice(rasters, window, fits):
     if fits:
         assert rasters.read(window).shape == (2, *window[2:])
@@ -190,11 +227,14 @@ def test_reads_of_four_gibibytes_are_the_largest(rasters, monkeypatch):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"factor": 0.0}, "factor"), ({"factor": np.nan}, "factor"), ({"factor": np.inf}, "factor"),
-        ({"resolution_m": 0.0}, "resolution_m"), ({"resolution_m": -5.0}, "resolution_m"),
+        ({"factor": 0.0}, "factor"),
+        ({"factor": np.nan}, "factor"),
+        ({"factor": np.inf}, "factor"),
+        ({"resolution_m": 0.0}, "resolution_m"),
+        ({"resolution_m": -5.0}, "resolution_m"),
         ({"nodata": np.nan}, "nodata"),
     ],
-)  # fmt: skip
+)
 def test_options_that_are_none(rasters, options, said):
     with pytest.raises(InputError, match=said):
         open_rasters(Path(rasters.path), **options)

@@ -184,9 +184,13 @@ def test_files_that_reach_a_window_by_a_pixel():
     rasters = set_of(left, right)
     assert rasters.reaching((0, 0, 6, 8)) is rasters
     for col, cols, ids in [
-        (0, 4, ("C0",)), (0, 5, ("C0", "C1")), (4, 1, ("C0", "C1")), (5, 1, ("C1",)),
-        (3, 1, ("C0",)), (5, 3, ("C1",)),
-    ]:  # fmt: skip
+        (0, 4, ("C0",)),
+        (0, 5, ("C0", "C1")),
+        (4, 1, ("C0", "C1")),
+        (5, 1, ("C1",)),
+        (3, 1, ("C0",)),
+        (5, 3, ("C1",)),
+    ]:
         assert rasters.reaching((0, col, 6, cols)).cell_ids == ids, (col, cols)
     upper = set_of(replace(LATTICE, rows=2))
     for row, ids in [(0, ("C0",)), (2, ("C0",)), (3, ())]:

@@ -35,10 +35,15 @@ def _plane(lattice: Lattice) -> np.ndarray:
 def _geotiff(path: Path, lattice: Lattice, values: np.ndarray, **more: Any) -> Path:
     names, unit = more.pop("names", (None,)), more.pop("unit", None)
     profile = {
-        "driver": "GTiff", "width": lattice.cols, "height": lattice.rows, "count": 1,
-        "dtype": "float32", "crs": lattice.crs,
-        "transform": rasterio.Affine.from_gdal(*lattice.gdal_transform), **more,
-    }  # fmt: skip
+        "driver": "GTiff",
+        "width": lattice.cols,
+        "height": lattice.rows,
+        "count": 1,
+        "dtype": "float32",
+        "crs": lattice.crs,
+        "transform": rasterio.Affine.from_gdal(*lattice.gdal_transform),
+        **more,
+    }
     with rasterio.open(path, "w", **profile) as target:
         target.write(values.astype(profile["dtype"]), 1)
         target.descriptions = names

@@ -40,9 +40,14 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def _foreign(path: Path, **changes: Any) -> Path:
     """Write a GeoTIFF as another program might."""
     profile = {
-        "driver": "GTiff", "width": 8, "height": 6, "count": 2, "dtype": "float32",
-        "crs": "EPSG:32635", "transform": rasterio.Affine(5, 0, 385000, 0, -5, 6673000),
-    }  # fmt: skip
+        "driver": "GTiff",
+        "width": 8,
+        "height": 6,
+        "count": 2,
+        "dtype": "float32",
+        "crs": "EPSG:32635",
+        "transform": rasterio.Affine(5, 0, 385000, 0, -5, 6673000),
+    }
     names = changes.pop("names", ("A", "B"))
     units = changes.pop("units", ("dBm", "dBm"))
     data = changes.pop("data", None)
@@ -232,10 +237,17 @@ def test_damaged_bytes_are_told_or_harmless(
 def _tiff_header(width: int, height: int, rows_per_strip: int) -> bytes:
     """Return a classic TIFF of one IFD that promises pixels which are not there."""
     entries = [
-        (256, 4, 1, width), (257, 4, 1, height), (258, 3, 1, 32), (259, 3, 1, 1), (262, 3, 1, 1),
-        (273, 4, 1, 8), (277, 3, 1, 1), (278, 4, 1, rows_per_strip), (279, 4, 1, 2**32 - 1),
+        (256, 4, 1, width),
+        (257, 4, 1, height),
+        (258, 3, 1, 32),
+        (259, 3, 1, 1),
+        (262, 3, 1, 1),
+        (273, 4, 1, 8),
+        (277, 3, 1, 1),
+        (278, 4, 1, rows_per_strip),
+        (279, 4, 1, 2**32 - 1),
         (339, 3, 1, 3),
-    ]  # fmt: skip
+    ]
     body = b"".join(struct.pack("<HHII", *entry) for entry in entries)
     return b"II*\0" + struct.pack("<I", 8) + struct.pack("<H", len(entries)) + body + b"\0" * 4
 

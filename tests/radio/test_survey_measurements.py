@@ -107,9 +107,13 @@ def test_column_map_semicolons_and_decimal_commas(tmp_path):
         for s in range(3)
     )
     columns = {
-        "lat": "Breite", "lon": "Laenge", "level_dbm": "RSRP", "cell": "Zelle", "time": "Zeit",
+        "lat": "Breite",
+        "lon": "Laenge",
+        "level_dbm": "RSRP",
+        "cell": "Zelle",
+        "time": "Zeit",
         "session": "Fahrt",
-    }  # fmt: skip
+    }
     found = read_measurements([write(tmp_path, text)], columns=columns)
     np.testing.assert_array_equal(found.level_dbm, [-80.5, -81.5, -82.5] * 2)
     assert len(found.sessions) == 2
@@ -241,8 +245,21 @@ def test_places_that_a_crs_does_not_have_are_left_out(tmp_path):
 
 def test_identity_gives_cells_the_names_of_the_plan(tmp_path):
     found = read_measurements([write(tmp_path, OPENCELLID)])
-    known = Cell("West 1", "W", 444_800.0, 5_029_000.0, 30.0, None, 50.0, 1800.0, "omni",
-                 mcc=302, mnc=720, lac=29100, ci=8302920)  # fmt: skip
+    known = Cell(
+        "West 1",
+        "W",
+        444_800.0,
+        5_029_000.0,
+        30.0,
+        None,
+        50.0,
+        1800.0,
+        "omni",
+        mcc=302,
+        mnc=720,
+        lac=29100,
+        ci=8302920,
+    )
     named = named_after(found, CellPlan(found.crs, (known,)))
     assert named.cell_ids == ("302-720-29100-8302871", "West 1")
     assert [named.cell_ids[i] for i in named.cell] == [

@@ -65,9 +65,14 @@ def test_the_walks_become_a_database_of_their_own_tracks(walks, tmp_path):
     tracks = [shapely.LineString(places[walks.session == i]) for i in range(len(walks.sessions))]
     count = len(tracks)
     ways = Ways(
-        walks.crs, np.arange(1, count + 1), np.zeros(count, np.int16), ("track",),
-        np.array(tracks), np.zeros(count, np.bool_), np.zeros(count, np.int8),
-    )  # fmt: skip
+        walks.crs,
+        np.arange(1, count + 1),
+        np.zeros(count, np.int16),
+        ("track",),
+        np.array(tracks),
+        np.zeros(count, np.bool_),
+        np.zeros(count, np.int8),
+    )
     routes = route_lattice(ways, None, None, lattice)
     database = build(open_rasters(mean), plan, routes, tmp_path / "database", floor_dbm=-125.0)
     assert database.cell_ids == ids

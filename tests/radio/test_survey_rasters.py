@@ -105,10 +105,16 @@ def test_cells_not_measured_on_the_lattice_are_left_out(tmp_path):
         **{
             name: np.concatenate([getattr(rows, name), getattr(far, name)])
             for name in (
-                "cell", "session", "time_s", "east_m", "north_m", "level_dbm", "accuracy_m",
+                "cell",
+                "session",
+                "time_s",
+                "east_m",
+                "north_m",
+                "level_dbm",
+                "accuracy_m",
             )
         },
-    )  # fmt: skip
+    )
     survey = fit_survey(both, SurveyOptions())
     assert list(survey.cells) == ["A", "B"]
     ids, mean, _ = written(tmp_path, survey)

@@ -21,9 +21,18 @@ SITES = {
     "S3": (386_410.0, 6_673_290.0, (70.0, 200.0, 310.0)),
 }
 COLUMNS = (
-    "cell", "site", "lat", "lon", "height_m", "azimuth_deg", "antenna", "eirp_dbm",
-    "frequency_mhz", "indoor", "penetration_loss_db",
-)  # fmt: skip
+    "cell",
+    "site",
+    "lat",
+    "lon",
+    "height_m",
+    "azimuth_deg",
+    "antenna",
+    "eirp_dbm",
+    "frequency_mhz",
+    "indoor",
+    "penetration_loss_db",
+)
 
 
 def make_plan():
@@ -116,9 +125,18 @@ def make_world(folder, levels):
     for cell, x, y in zip(plan.cells, lon, lat, strict=True):
         azimuth = "" if cell.azimuth_deg is None else cell.azimuth_deg
         values = (
-            cell.id, cell.site, round(float(y), 7), round(float(x), 7), cell.height_m, azimuth,
-            cell.antenna, cell.eirp_dbm, cell.frequency_mhz, int(cell.indoor), 0,
-        )  # fmt: skip
+            cell.id,
+            cell.site,
+            round(float(y), 7),
+            round(float(x), 7),
+            cell.height_m,
+            azimuth,
+            cell.antenna,
+            cell.eirp_dbm,
+            cell.frequency_mhz,
+            int(cell.indoor),
+            0,
+        )
         rows.append(dict(zip(COLUMNS, values, strict=True)))
     write_map(folder / "streets.osm")
     landuse = np.ones((LATTICE.rows, LATTICE.cols))
@@ -136,10 +154,14 @@ def box_deg():
 def write_tiff(path, lattice, levels, quantity):
     """Write as a planner's tool does: plain bands, the quantity told by the unit."""
     profile = {
-        "driver": "GTiff", "dtype": "float32", "count": len(levels), "crs": lattice.crs,
-        "height": lattice.rows, "width": lattice.cols,
+        "driver": "GTiff",
+        "dtype": "float32",
+        "count": len(levels),
+        "crs": lattice.crs,
+        "height": lattice.rows,
+        "width": lattice.cols,
         "transform": Affine.from_gdal(*lattice.gdal_transform),
-    }  # fmt: skip
+    }
     with rasterio.open(path, "w", **profile) as target:
         for band, (name, values) in enumerate(levels.items(), start=1):
             target.write(values.astype(np.float32), band)

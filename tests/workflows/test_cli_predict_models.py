@@ -13,14 +13,17 @@ from mapfilter.propagation import models as _models
 BOX = "[area]\nbbox = [24.9445, 60.1672, 24.9470, 60.1684]\n"
 MODELS = {
     "friis": {},
-    "log_distance": {"path_loss_exponent": 3.5, "reference_distance_m": 50.0,
-                     "reference_loss_db": 75.0},
+    "log_distance": {
+        "path_loss_exponent": 3.5,
+        "reference_distance_m": 50.0,
+        "reference_loss_db": 75.0,
+    },
     "okumura_hata": {"environment": "large_city"},
     "cost231_hata": {"metropolitan": "true"},
     "cost231_walfisch_ikegami": {"street_orientation_deg": 30.0},
     "tr38901_uma": {},
     "tr38901_umi": {"line_of_sight": "probability"},
-}  # fmt: skip
+}
 
 
 @pytest.fixture

@@ -74,10 +74,15 @@ def test_a_survey_becomes_rasters_and_a_database(survey, world, tmp_path):
     assert info["quantity"] == "deviation"
     built = assert_done(
         mapfilter(
-            "build", "-c", config, "--out", tmp_path, "--json",
+            "build",
+            "-c",
+            config,
+            "--out",
+            tmp_path,
+            "--json",
             *settings(cells__plan=tmp_path / "cells.csv"),
         )
-    ).json  # fmt: skip
+    ).json
     assert built["points"] > 1000
 
 
@@ -99,9 +104,16 @@ def test_what_is_said_of_rasters_is_said_of_those_to_calibrate(survey, world, tm
     rasters = open_rasters(world.rasters)
     tenths, lattice = tmp_path / "tenths.tif", rasters.lattice
     with rasterio.open(
-        tenths, "w", driver="GTiff", count=3, dtype="float32", crs=lattice.crs, height=lattice.rows,
-        width=lattice.cols, transform=rasterio.Affine.from_gdal(*lattice.gdal_transform),
-    ) as target:  # fmt: skip
+        tenths,
+        "w",
+        driver="GTiff",
+        count=3,
+        dtype="float32",
+        crs=lattice.crs,
+        height=lattice.rows,
+        width=lattice.cols,
+        transform=rasterio.Affine.from_gdal(*lattice.gdal_transform),
+    ) as target:
         target.write(rasters.read() * 10)
         target.descriptions = rasters.cell_ids
     more = settings(
