@@ -111,9 +111,9 @@ def test_every_room_has_files_and_tests_and_every_mutant_is_python():
 def test_imports_through_others():
     imports = Imports(ROOT)
     models = Path("mapfilter/models")
-    assert models / "clock.py" in imports.direct(models / "motion.py")
-    assert models / "motion.py" in imports.importers(models / "clock.py")
-    assert Path("mapfilter/positioning/bayes/filter.py") in imports.importers(models / "clock.py")
+    assert models / "terms.py" in imports.direct(models / "gaussian.py")
+    assert models / "gaussian.py" in imports.importers(models / "terms.py")
+    assert Path("mapfilter/positioning/bayes/filter.py") in imports.importers(models / "street_motion.py")
     assert models / "motion.py" not in imports.importers(models / "state.py")
 
 

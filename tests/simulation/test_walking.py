@@ -232,5 +232,5 @@ def test_what_a_walker_cannot_be():
         "stop_s",
     ):
         assert part in str(caught.value)
-    with pytest.raises(ConfigError, match=r"0\.\.50 m"):
+    with pytest.raises(ConfigError, match=r"a number in 0\.\.50"):
         WalkerModel(51.0)

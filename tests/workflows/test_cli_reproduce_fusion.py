@@ -18,9 +18,7 @@ def told(words):
 
 
 def test_fritsche_and_klein(tmp_path, monkeypatch):
-    from mapfilter.experiments.papers.fritsche_klein_2009.experiment import (
-        experiment as fritsche_klein_2009,
-    )
+    from mapfilter.experiments.papers.fritsche_klein_2009 import experiment as fritsche_klein_2009
 
     monkeypatch.setattr(fritsche_klein_2009, "SUM_PARTS", {0: 3, 2: 3})
     (tmp_path / "mine.toml").write_text("steps = 20\nserving = 1\n", encoding="utf-8")
