@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 
 from mapfilter.config.sections import Config
-from mapfilter.workflows.pipeline import Stage, run_pipeline
 from mapfilter.workflows.reproduce import ReproduceResult, run_reproduce
+from mapfilter.workflows.terminal import Stage, run_pipeline
 
 WORKERS = 2
 

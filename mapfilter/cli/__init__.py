@@ -9,8 +9,7 @@ import typer
 
 from mapfilter import __version__
 from mapfilter.cli.databases import bound, build, check, export, info, merge, predict
-from mapfilter.cli.evaluate import evaluate
-from mapfilter.cli.experiments import bench, reproduce, sweep
+from mapfilter.cli.experiments import bench, evaluate, reproduce, sweep
 from mapfilter.cli.options import DONE
 from mapfilter.cli.tracks import demo, replay, simulate
 from mapfilter.workflows.terminal import guarded

@@ -18,10 +18,17 @@ from mapfilter.geodesy import Lattice, projected_crs, same_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.rxlev_rasters import RxLevRasters
 from mapfilter.workflows.area import pixels_on
-from mapfilter.workflows.cover import check_cells_near, map_cover, raster_cover
-from mapfilter.workflows.network_pictures import NETWORK_PICTURES, draw_network
+from mapfilter.workflows.pictures import NETWORK_PICTURES, draw_network
 from mapfilter.workflows.results import clear_pictures
-from mapfilter.workflows.world import World, area_lattice, check_scale, planned_rasters
+from mapfilter.workflows.world import (
+    World,
+    area_lattice,
+    check_cells_near,
+    check_scale,
+    map_cover,
+    planned_rasters,
+    raster_cover,
+)
 
 PIXELS_A_TASK = 10_000_000
 MOST_TILES_A_TASK = 64

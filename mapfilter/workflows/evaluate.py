@@ -32,11 +32,10 @@ from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.reflections import NlosModel
 from mapfilter.simulation.satellites import ReceptionModel
-from mapfilter.workflows.filters import filter_choice
-from mapfilter.workflows.jsonable import to_jsonable
 from mapfilter.workflows.predict import ground_truth_errors, prediction_model
 from mapfilter.workflows.simulate import simulation_settings
-from mapfilter.workflows.world import World
+from mapfilter.workflows.terminal import to_jsonable
+from mapfilter.workflows.world import World, filter_choice
 
 NAMES = ("global-positioning", "audit", "ottawa")
 RUNS = 20

@@ -13,7 +13,7 @@ from mapfilter.errors import ConfigError, Faults
 from mapfilter.experiments.benchmarks.scores import CaseResult
 from mapfilter.workflows.evaluate import TABLE, run_global_positioning
 from mapfilter.workflows.evaluate_settings import load_benchmark
-from mapfilter.workflows.jsonable import to_jsonable
+from mapfilter.workflows.terminal import to_jsonable
 
 _GYRO = {
     "imu.turns": "gyro",

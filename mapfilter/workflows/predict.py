@@ -23,8 +23,7 @@ from mapfilter.propagation.predict import (
 )
 from mapfilter.radio.cells import write_cell_plan
 from mapfilter.rasters.rxlev_rasters import RxLevRasters, open_rasters, write_rasters
-from mapfilter.workflows.cover import check_cells_near, map_cover
-from mapfilter.workflows.world import World
+from mapfilter.workflows.world import World, check_cells_near, map_cover
 
 _PREDICTION_TAG = "PREDICTION_SHA256"
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import ceil
 from pathlib import Path
 
 import numpy as np
@@ -16,21 +17,124 @@ from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs
 from mapfilter.radio.cells import CellPlan, write_cell_plan
 from mapfilter.rasters.rxlev_rasters import RxLevRasters, open_rasters
+from mapfilter.report.basemap import BaseMap
+from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
 from mapfilter.survey.fit import Survey, SurveyOptions, fit_survey
 from mapfilter.survey.measurements import Measurements, named_after, read_measurements
 from mapfilter.survey.rasters import predicted_levels, surveyed_plan, write_survey
 from mapfilter.survey.trend import Covariate
-from mapfilter.survey.validation import Validation, leave_out
-from mapfilter.workflows.cover import check_cells_near
+from mapfilter.survey.validation import LeftOut, Validation, leave_out
 from mapfilter.workflows.results import clear_pictures
-from mapfilter.workflows.survey_pictures import SURVEY_PICTURES, SurveyEvidence, draw_survey
+from mapfilter.workflows.served import thinned_lattice
 from mapfilter.workflows.world import (
     LARGEST_AREA_PX,
     area_lattice,
+    check_cells_near,
     check_scale,
     open_as_said,
+    outside_m,
     planned_cells,
 )
+
+SURVEY_PICTURES = ("survey-levels.png", "survey-left-out.png")
+
+_CELLS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class SurveyEvidence:
+    """A survey as written, and what it was made from.
+
+    Parameters
+    ----------
+    measurements : Measurements
+        In the CRS of the rasters.
+    reach_m : float
+        Places farther from every reading of a cell count as not measured.
+    levels, deviations : RxLevRasters
+        On one lattice.
+    left_out : LeftOut, optional
+        What left-out sessions showed.
+    attribution : str
+        Whose measurements they are.
+    """
+
+    measurements: Measurements
+    reach_m: float
+    levels: RxLevRasters
+    deviations: RxLevRasters
+    left_out: LeftOut | None = None
+    attribution: str = ""
+
+
+def draw_survey(survey: SurveyEvidence, folder: Path) -> tuple[Path, ...]:
+    """Draw the three cells with the most measurements, and the sessions left out one by one.
+
+    Without a left-out measurement that the others could tell there is no second picture.
+
+    Raises
+    ------
+    InputError
+        A raster is damaged, or no cell of the rasters was measured.
+    OutputError
+        A picture cannot be written.
+    """
+    levels, left_out_levels = (folder / name for name in SURVEY_PICTURES)
+    plot_surveyed_levels(*_surveyed(survey), levels)
+    told = survey.left_out
+    if told is None or not len(told):
+        return (levels,)
+    plot_left_out(
+        told.measured_dbm, told.predicted_dbm, left_out_levels, title=_named(told),
+        trend_dbm=told.trend_dbm, attribution=survey.attribution,
+    )  # fmt: skip
+    return levels, left_out_levels
+
+
+def _named(left_out: LeftOut) -> str:
+    """Return what was left out, as a title."""
+    folds, sessions = left_out.folds, left_out.sessions
+    if sessions == 1:
+        return f"{folds} parts of one session, each told by the others"
+    groups = f" in {folds} groups" if folds < sessions else ""
+    return f"{sessions} sessions{groups}, each told by the others"
+
+
+def _surveyed(survey: SurveyEvidence) -> tuple[list[SurveyedLevels], BaseMap]:
+    """Return the cells with the most measurements in reach of the lattice, and its map."""
+    rows, whole = survey.measurements, survey.levels.lattice
+    near = outside_m(rows.east_m, rows.north_m, whole) <= survey.reach_m
+    counts = np.bincount(rows.cell[near], minlength=len(rows.cell_ids))
+    shown = [
+        index
+        for index in np.argsort(-counts, kind="stable").tolist()
+        if counts[index] and rows.cell_ids[index] in survey.levels.cell_ids
+    ][:_CELLS]
+    if not shown:
+        expected = "measurements of cells of the survey's rasters"
+        raise fail(InputError, str(survey.levels.path), expected, "none", "rasters of another area")
+    cells = [
+        _cell(survey, rows.where(near & (rows.cell == index)), rows.cell_ids[index])
+        for index in shown
+    ]
+    return cells, BaseMap(whole.bounds_m, attribution=survey.attribution)
+
+
+def _cell(survey: SurveyEvidence, own: Measurements, cell_id: str) -> SurveyedLevels:
+    """Return the map about a cell's own measurements, thinned to what a picture can show."""
+    whole = survey.levels.lattice
+    row, col = whole.row_col(own.east_m, own.north_m)
+    around = ceil(survey.reach_m / whole.resolution_m)
+    top, bottom = np.clip((row.min() - around, row.max() + around), 0, whole.rows - 1).tolist()
+    left, right = np.clip((col.min() - around, col.max() + around), 0, whole.cols - 1).tolist()
+    part = whole.window(top, left, bottom - top + 1, right - left + 1)
+    lattice, _ = thinned_lattice(part)
+    level_dbm, deviation_db = (
+        replace(rasters, lattice=lattice, resampling="nearest").read(cells=(cell_id,))[0]
+        for rasters in (survey.levels, survey.deviations)
+    )
+    places = own.east_m, own.north_m, own.level_dbm
+    return SurveyedLevels(cell_id, lattice, level_dbm, deviation_db, *places)
 
 
 @dataclass(frozen=True)

@@ -29,11 +29,9 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.rxlev_rasters import RxLevRasters, check_against_plan
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.network import street_network
-from mapfilter.workflows.cover import check_cells_near
-from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.predict import open_ground_truth
 from mapfilter.workflows.simulate import simulation_settings
-from mapfilter.workflows.world import World, planned_rasters
+from mapfilter.workflows.world import World, check_cells_near, filter_choice, planned_rasters
 
 GROUND_TRUTH = "ground truth"
 

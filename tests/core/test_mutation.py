@@ -113,7 +113,9 @@ def test_imports_through_others():
     models = Path("mapfilter/models")
     assert models / "terms.py" in imports.direct(models / "gaussian.py")
     assert models / "gaussian.py" in imports.importers(models / "terms.py")
-    assert Path("mapfilter/positioning/bayes/filter.py") in imports.importers(models / "street_motion.py")
+    assert Path("mapfilter/positioning/bayes/filter.py") in imports.importers(
+        models / "street_motion.py"
+    )
     assert models / "motion.py" not in imports.importers(models / "state.py")
 
 

@@ -16,10 +16,9 @@ from mapfilter.simulation.walking import WalkerModel
 from mapfilter.workflows.evaluate import _world as prepare_world
 from mapfilter.workflows.evaluate_audit import CHANGES
 from mapfilter.workflows.evaluate_settings import load_benchmark
-from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.predict import ground_truth_errors, prediction_model
 from mapfilter.workflows.simulate import simulation_settings
-from mapfilter.workflows.world import World
+from mapfilter.workflows.world import World, filter_choice
 
 EASY = (
     PredictionModel(shadowing_db=6.0),

@@ -29,8 +29,7 @@ from mapfilter.positioning.locators import FilterChoice
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.workflows.evaluate import _world as prepare_world
 from mapfilter.workflows.evaluate_settings import _refused, load_benchmark
-from mapfilter.workflows.filters import filter_choice
-from mapfilter.workflows.world import World
+from mapfilter.workflows.world import World, filter_choice
 
 SMALL = {
     "area.map": "manhattan",
