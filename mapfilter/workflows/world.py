@@ -311,17 +311,7 @@ def filter_choice(section: FilterSection, resolution_m: float) -> FilterChoice:
     """
     match section.name:
         case "candidate":
-            options = CandidateOptions(
-                resolution_m=resolution_m,
-                update_length_m=section.update_length_m,
-                tracking_length_m=section.tracking_length_m,
-                prediction=section.prediction,
-                duplicates=section.duplicates,
-                threshold=section.threshold,
-                at_threshold=section.at_threshold,
-                switch_check=section.switch_check,
-                when_empty=section.when_empty,
-            )
+            options = section.of(CandidateOptions, resolution_m=resolution_m)
             return FilterChoice(options, section.margin_db)
         case "bayes" | "grid":
             return FilterChoice(replace(section.bayes.options, grid=section.name == "grid"))

@@ -16,7 +16,6 @@ from mapfilter.simulation.walking import WalkerModel
 from mapfilter.workflows.evaluate import _world as prepare_world
 from mapfilter.workflows.evaluate_audit import CHANGES
 from mapfilter.workflows.evaluate_settings import load_benchmark
-from mapfilter.workflows.predict import ground_truth_errors, prediction_model
 from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.world import World, filter_choice
 
@@ -100,8 +99,8 @@ def load(name):
 def simulated(config):
     made = simulation_settings(config)
     return (
-        prediction_model(config.prediction),
-        ground_truth_errors(config.prediction),
+        config.prediction.of(PredictionModel),
+        config.prediction.ground_truth.of(GroundTruthErrors),
         made.imu,
         made.reports,
         made.journey.walker,
