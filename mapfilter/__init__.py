@@ -2,10 +2,10 @@
 
 The data's way::
 
-    cell plan + buildings ── radio.predict ──▶ RxLev rasters ─┐
-    planner exports ── radio.rasters ────────────────────────▶┤
+    cell plan + buildings ── propagation ──▶ RxLev rasters ───┐
+    planner exports, drive tests ── rasters, survey ─────────▶┤
                                                               ├─ database.build ─▶ RadioRouteDatabase ─┐
-    OSM, land-use raster ── roads ──▶ lattice ────────────────┘                                        │
+    OSM, vector layers, land use ── roads ──▶ RouteLattice ───┘                                        │
                                                                                                        ├─ positioning ─▶ TrackEstimate ─▶ evaluation ─▶ report
     logs ── tracks ──▶ TrackLog (motion, radio, GNSS, truth) ──────────────────────────────────────────┘
 
@@ -19,24 +19,25 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from mapfilter.api import Track as Track
+    from mapfilter.api import locate as locate
+    from mapfilter.api import score as score
     from mapfilter.database.build import build as build
-    from mapfilter.database.radioroutes import RadioField as RadioField
     from mapfilter.database.radioroutes import RadioRouteDatabase as RadioRouteDatabase
     from mapfilter.database.store import open_database as open_database
     from mapfilter.errors import MapfilterError as MapfilterError
-    from mapfilter.evaluation.accuracy import Truth as Truth
-    from mapfilter.evaluation.accuracy import accuracy as accuracy
-    from mapfilter.evaluation.success import wilson_interval as wilson_interval
-    from mapfilter.filters.candidate import CandidateFilter as CandidateFilter
-    from mapfilter.filters.candidate import CandidateOptions as CandidateOptions
     from mapfilter.filters.contract import Status as Status
     from mapfilter.geodesy import Lattice as Lattice
-    from mapfilter.positioning.candidate import cell_points as cell_points
-    from mapfilter.positioning.candidate import (
-        position_by_candidates as position_by_candidates,
-    )
+    from mapfilter.positioning.bayes.options import BayesFilter as BayesFilter
+    from mapfilter.positioning.bayes.options import GridFilter as GridFilter
+    from mapfilter.positioning.candidate import CandidateFilter as CandidateFilter
+    from mapfilter.positioning.epochs import Epoch as Epoch
+    from mapfilter.positioning.epochs import epochs as epochs
     from mapfilter.positioning.estimate import Fix as Fix
+    from mapfilter.positioning.estimate import StepOutput as StepOutput
     from mapfilter.positioning.estimate import TrackEstimate as TrackEstimate
+    from mapfilter.positioning.filter import Filter as Filter
+    from mapfilter.positioning.kalman.filter import KalmanFilter as KalmanFilter
     from mapfilter.radio.cells import CellPlan as CellPlan
     from mapfilter.radio.cells import read_cell_plan as read_cell_plan
     from mapfilter.rasters.rxlev_rasters import RxLevRasters as RxLevRasters
@@ -45,32 +46,37 @@ if TYPE_CHECKING:
     from mapfilter.tracks.log import TrackLog as TrackLog
     from mapfilter.tracks.log import make_log as make_log
     from mapfilter.tracks.store import read_log as read_log
+    from mapfilter.tracks.store import write_log as write_log
 
 _HOMES = {
-    "CandidateFilter": "filters.candidate",
-    "CandidateOptions": "filters.candidate",
+    "BayesFilter": "positioning.bayes.options",
+    "CandidateFilter": "positioning.candidate",
     "CellPlan": "radio.cells",
+    "Epoch": "positioning.epochs",
+    "Filter": "positioning.filter",
     "Fix": "positioning.estimate",
+    "GridFilter": "positioning.bayes.options",
+    "KalmanFilter": "positioning.kalman.filter",
     "Lattice": "geodesy",
     "MapfilterError": "errors",
-    "RadioField": "database.radioroutes",
     "RadioRouteDatabase": "database.radioroutes",
     "RouteLattice": "roads.lattice",
     "RxLevRasters": "rasters.rxlev_rasters",
     "Status": "filters.contract",
+    "StepOutput": "positioning.estimate",
+    "Track": "api",
     "TrackEstimate": "positioning.estimate",
     "TrackLog": "tracks.log",
-    "Truth": "evaluation.accuracy",
-    "accuracy": "evaluation.accuracy",
     "build": "database.build",
-    "cell_points": "positioning.candidate",
+    "epochs": "positioning.epochs",
+    "locate": "api",
     "make_log": "tracks.log",
     "open_database": "database.store",
     "open_rasters": "rasters.rxlev_rasters",
-    "position_by_candidates": "positioning.candidate",
     "read_cell_plan": "radio.cells",
     "read_log": "tracks.store",
-    "wilson_interval": "evaluation.success",
+    "score": "api",
+    "write_log": "tracks.store",
 }
 
 __all__ = sorted(_HOMES)

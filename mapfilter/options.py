@@ -271,8 +271,15 @@ def _holds(limit: Any, value: Any) -> bool:
 
 @cache
 def descriptions(options: Any) -> dict[str, str]:
-    """Return the descriptions in the ``Parameters`` section of a class's numpydoc docstring."""
-    _, _, rest = cleandoc(options.__doc__ or "").partition("Parameters\n----------\n")
+    """Return the descriptions in the ``Parameters`` sections of a class and of its bases."""
+    found: dict[str, str] = {}
+    for one in reversed(options.__mro__):
+        found |= _described(cleandoc(one.__doc__ or ""))
+    return found
+
+
+def _described(docstring: str) -> dict[str, str]:
+    _, _, rest = docstring.partition("Parameters\n----------\n")
     found: dict[str, str] = {}
     names: list[str] = []
     for line in rest.splitlines():

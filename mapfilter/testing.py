@@ -1,35 +1,45 @@
-"""The contract suite: what every filter promises, for filters that users write.
+"""Contract suites: what every filter promises, for filters that users write.
 
-Import :func:`check_filter` into a test of your own and hand it your filter::
+Import :func:`check_filter` into a test of your own and hand it your filter, a database and a log::
 
     def test_my_filter_keeps_the_contract():
-        check_filter(make, prior, motions, readings)
+        check_filter(MyFilter, database, log)
+
+:func:`check_belief_filter` checks a filter of beliefs by itself, without database and log.
 """
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Sequence
-from dataclasses import fields, is_dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields, is_dataclass
 from math import isfinite, nan
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.filters.contract import (
+    BeliefFilter,
     Estimate,
-    Event,
-    Filter,
     MotionStep,
     Reason,
     Status,
-    Step,
     UpdateInfo,
-    run,
-    step,
 )
+from mapfilter.positioning.epochs import Epoch, epochs
+from mapfilter.positioning.estimate import StepOutput
+from mapfilter.positioning.filter import Filter, estimate_of, kinds_of, locate
+from mapfilter.positioning.locators import as_filter
+from mapfilter.tracks.log import TrackLog
 
-AnyFilter = Filter[Any, Any, Any]
+AnyFilter = BeliefFilter[Any, Any, Any]
+_ORDER = {
+    Status.SEARCHING: {Status.SEARCHING, Status.CONVERGED},
+    Status.CONVERGED: {Status.TRACKING, Status.LOST},
+    Status.TRACKING: {Status.TRACKING, Status.LOST},
+    Status.LOST: {Status.LOST, Status.TRACKING},
+}
 
 
 class ContractError(AssertionError):
@@ -48,7 +58,164 @@ def same(a: Any, b: Any) -> bool:
     return bool(a is b or a == b or (a != a and b != b))
 
 
+StepBeliefT = TypeVar("StepBeliefT")
+EventT = TypeVar("EventT")
+
+
+@dataclass(frozen=True, slots=True)
+class Event(Generic[EventT]):
+    """What happened at one moment: a motion interval that ended, a reading, or both.
+
+    With both, the belief is moved first and weighed then.
+
+    Parameters
+    ----------
+    time_s : float
+        When; for motion the end of the interval.
+    motion : MotionStep or None
+        Dead reckoning over the interval that ends now.
+    reading : object or None
+        What the filter's ``update`` takes.
+    """
+
+    time_s: float
+    motion: MotionStep | None = None
+    reading: EventT | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Step(Generic[StepBeliefT, EventT]):
+    """The belief after one event, and the news.
+
+    Parameters
+    ----------
+    event : Event
+        What happened.
+    belief : object
+        The filter's belief after it.
+    motion_reason : Reason
+        Whether the motion was used; ``USED`` when there was none.
+    info : UpdateInfo or None
+        StepOutput of the update; None without a reading.
+    """
+
+    event: Event[EventT]
+    belief: StepBeliefT
+    motion_reason: Reason
+    info: UpdateInfo | None
+
+
+def step(
+    filter_: BeliefFilter[Any, StepBeliefT, EventT],
+    belief: StepBeliefT,
+    event: Event[EventT],
+    rng: np.random.Generator,
+) -> Step[StepBeliefT, EventT]:
+    """Take one event in."""
+    motion_reason, info = Reason.USED, None
+    if event.motion is not None:
+        belief, motion_reason = filter_.predict(belief, event.motion, rng)
+    if event.reading is not None:
+        belief, info = filter_.update(belief, event.reading, rng)
+    return Step(event, belief, motion_reason, info)
+
+
+def run(
+    filter_: BeliefFilter[Any, StepBeliefT, EventT],
+    belief: StepBeliefT,
+    events: Iterable[Event[EventT]],
+    rng: np.random.Generator,
+) -> Iterator[Step[StepBeliefT, EventT]]:
+    """Yield the belief after every event, in the order given."""
+    for event in events:
+        taken = step(filter_, belief, event, rng)
+        belief = taken.belief
+        yield taken
+
+
 def check_filter(
+    filter_: Any, database: RadioRouteDatabase, log: TrackLog, *, seed: int = 0
+) -> None:
+    """Check a filter over a log against :class:`mapfilter.positioning.filter.Filter`.
+
+    Parameters
+    ----------
+    filter_ : str, options, Filter, or class
+        As :func:`mapfilter.locate` takes it: built-in and custom filters alike.
+    database : RadioRouteDatabase
+    log : TrackLog
+        At least ten epochs with motion, in the CRS of the database.
+    seed : int
+
+    Raises
+    ------
+    ContractError
+        With the clause that is broken: a fix for every epoch, statuses in order, radii that grow,
+        finite positions once converged, states that are never changed in place, an epoch without
+        measurements that moves nothing, a result that only the generator decides, one epoch at a
+        time the same as the whole log.
+    """
+    bound = as_filter(filter_, database)
+    merged = epochs(log)
+    if len(merged) < 10:
+        raise ValueError("a log of at least ten epochs")
+    replayed = locate(log, bound, np.random.default_rng(seed)).estimate
+    again = locate(log, as_filter(filter_, database), np.random.default_rng(seed)).estimate
+    _require(same(replayed, again), "the generator alone decides the result")
+    outputs = _step_by_step(bound, merged, kinds_of(log), seed)
+    live = estimate_of(bound, outputs, start_utc_s=log.start_utc_s)
+    if bound.smoother() is None and len(live) == len(replayed):
+        for name in ("east_m", "north_m", "radii_m", "status"):
+            same_values = same(getattr(live, name), getattr(replayed, name))
+            _require(same_values, f"one epoch at a time gives the {name} of the whole log")
+
+
+def _step_by_step(
+    bound: Filter[Any], merged: Sequence[Epoch], kinds: Any, seed: int
+) -> list[StepOutput]:
+    """Step through epochs; check purity, order of statuses and each output on the way."""
+    rng = np.random.default_rng(seed)
+    state, last = bound.begin(kinds), Status.SEARCHING
+    outputs: list[StepOutput] = []
+    for epoch in merged:
+        kept, kept_epoch = copy.deepcopy(state), copy.deepcopy(epoch)
+        after, output = bound.step(state, epoch, rng)
+        _require(isinstance(output, StepOutput), "step returns (state, StepOutput)")
+        _require(same(state, kept), "states are never changed in place")
+        _require(same(epoch, kept_epoch), "epochs are never changed in place")
+        _check_output(output, epoch, last)
+        if len(outputs) % 10 == 5:
+            _check_idle(bound, after, output, epoch)
+        state, last = after, output.fix.status
+        outputs.append(output)
+    return outputs
+
+
+def _check_output(output: StepOutput, epoch: Epoch, last: Status) -> None:
+    fix = output.fix
+    _require(fix.time_s == epoch.time_s, "a fix has the time of its epoch")
+    _require(isinstance(fix.status, Status) and isinstance(fix.reason, Reason), "types of a fix")
+    _require(fix.status in _ORDER[last], f"{last} is not followed by {fix.status}")
+    known = np.isfinite([fix.east_m, fix.north_m])
+    if fix.status is not Status.SEARCHING:
+        _require(bool(known.all()), "a filter that has converged gives a position")
+    radii = fix.radii_m[np.isfinite(fix.radii_m)]
+    _require(bool(np.all(np.diff(radii) >= 0)), "radii for 50, 67 and 95 % do not shrink")
+    for reading in output.unused:
+        _require(reading.reason is not Reason.USED, "unused readings have a reason")
+
+
+def _check_idle(bound: Filter[Any], state: Any, output: StepOutput, epoch: Epoch) -> None:
+    _, idle = bound.step(state, Epoch(epoch.time_s), np.random.default_rng(0))
+    before, after = output.fix, idle.fix
+    places = (before.east_m, before.north_m), (after.east_m, after.north_m)
+    _require(
+        np.allclose(*places, rtol=0, atol=1e-6, equal_nan=True),
+        "an epoch without motion and measurements moves nothing",
+    )
+
+
+def check_belief_filter(
     make: Callable[[], AnyFilter],
     prior: Any,
     motions: Sequence[MotionStep],
@@ -56,7 +223,7 @@ def check_filter(
     *,
     seed: int = 0,
 ) -> None:
-    """Check a filter against the contract of :mod:`mapfilter.filters.contract`.
+    """Check a filter against the contract of :class:`mapfilter.filters.contract.BeliefFilter`.
 
     Parameters
     ----------

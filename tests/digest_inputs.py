@@ -42,8 +42,8 @@ length_m = 400
 margin_db = 3.0
 update_length_m = 10.0
 [filter.bayes]
-most_particles = 6000
-searching_particles = 4000
+max_particles = 6000
+min_search_particles = 4000
 [sweep]
 sigma_orient_deg = [3, 10]
 routes = 3

@@ -5,11 +5,10 @@ Each section is a noun. Lengths, angles and levels carry their unit in the name.
 
 from __future__ import annotations
 
-from math import radians
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from annotated_types import Ge, Gt, Le, Lt
+from annotated_types import Ge, Le, Lt
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from mapfilter.config.fields import (
@@ -27,14 +26,9 @@ from mapfilter.config.fields import (
     with_options,
 )
 from mapfilter.database.build import FLOOR_DBM, MARGIN_DB, TILE_PX
-from mapfilter.filters.candidate import CandidateOptions
-from mapfilter.filters.particle import ParticleOptions
-from mapfilter.models.fingerprint import LevelErrors
-from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.options import NotNegative, Positive, Seed
-from mapfilter.positioning.bayes.evidence import EvidenceOptions
-from mapfilter.positioning.bayes.options import BayesOptions
-from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
+from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.propagation.models import GroundTruthErrors, ModelName, PredictionModel
 from mapfilter.roads.buildings import DEFAULT_HEIGHT_M, STOREY_HEIGHT_M
 from mapfilter.roads.corridors import MAX_ACCURACY_M, MAX_GAP_M
@@ -373,74 +367,9 @@ class SweepSection(Section):
     seed: Seed = 0
 
 
+@with_options(BayesFilter)
 class BayesSection(Section):
-    """``[filter.bayes]``: errors of dead reckoning and of the prediction, weights, particles.
-
-    Angles are degrees. A noise that is taken too large costs some metres until the filter has
-    converged, one taken too small costs wrong positions.
-    """
-
-    step_sd_m: NotNegative = 0.3
-    heading_sd_deg: NotNegative = 6.0
-    bias_sd_deg: NotNegative = 3.0
-    drift_deg_per_sqrt_m: NotNegative = 0.05
-    scale: Annotated[float, Ge(0), Lt(1)] = 0.02
-    map_sd_m: Positive = 4.0
-    map_weight_per_m: NotNegative = 1 / 18
-    off_cost_per_m: NotNegative = 0.1
-    levels: bool = True
-    level_error_db: Positive = 10.0
-    level_correlation_m: Positive = 50.0
-    level_weight: Annotated[float, Gt(0), Le(1)] = 0.7
-    report_spacing_m: NotNegative = 5.0
-    most_particles: Annotated[int, Ge(100), Le(10_000_000)] = 20_000
-    searching_particles: Annotated[int, Ge(10), Le(10_000_000)] = 12_000
-    least_particles: Annotated[int, Ge(10), Le(10_000_000)] = 1000
-    switch_mass: Annotated[float, Gt(0), Lt(1)] = 0.99
-    switch_hold_m: NotNegative = 14.0
-    smooth: bool = False
-    satellite_sd_m: Positive = 2.0
-    antenna_height_m: float = 100.0
-    antenna_height_sd_m: NotNegative = 200.0
-    timing_step_m: Positive = 553.5
-    timing_sd_m: Positive = 200.0
-
-    @property
-    def options(self) -> BayesOptions:
-        """The options that these settings mean."""
-        return BayesOptions(
-            MotionErrors(
-                step_sd_m=self.step_sd_m,
-                heading_sd_rad=radians(self.heading_sd_deg),
-                bias_sd_rad=radians(self.bias_sd_deg),
-                bias_drift_rad_per_sqrt_m=radians(self.drift_deg_per_sqrt_m),
-                scale_sd=self.scale,
-            ),
-            MapWeights(self.map_sd_m, self.map_weight_per_m, self.off_cost_per_m),
-            EvidenceOptions(
-                levels=LevelErrors(
-                    sd_db=self.level_error_db,
-                    correlation_m=self.level_correlation_m,
-                    weight=self.level_weight,
-                ),
-                spacing_m=self.report_spacing_m,
-                use_levels=self.levels,
-            ),
-            ParticleOptions(
-                most=self.most_particles,
-                searching=self.searching_particles,
-                least=self.least_particles,
-                switch_mass=self.switch_mass,
-                switch_hold_m=self.switch_hold_m,
-            ),
-            satellites=GnssOptions(
-                zenith_m=self.satellite_sd_m,
-                height_m=self.antenna_height_m,
-                height_sd_m=self.antenna_height_sd_m,
-            ),
-            timing=TimingOptions(step_m=self.timing_step_m, advance_sd_m=self.timing_sd_m),
-            smooth=self.smooth,
-        )
+    """``[filter.bayes]``: errors of dead reckoning and of the prediction, weights, particles."""
 
 
 MADE_SOUTHWEST = (3.0, 0.0)
@@ -656,7 +585,7 @@ class Track(Section):
     without: Annotated[tuple[Kind, ...], Field(strict=False)] = ()
 
 
-@with_options(CandidateOptions, without=("resolution_m",))
+@with_options(CandidateFilter)
 class FilterSection(Section):
     """``[filter]``: which filter; most options are those of the filter "candidate".
 
@@ -665,15 +594,11 @@ class FilterSection(Section):
     name : str
         "candidate", "bayes", "grid" or a custom filter as ``package.module:Name`` (its code is
         run); without a map "ekf", "iekf", "rbukf", "ukf" or "ckf".
-    margin_db : float, optional
-        A point belongs to cells at most this much weaker than its best server; by default the
-        margin of the database.
     smooth : bool
         Smooth the track, with ekf, iekf, rbukf, ukf and ckf.
     """
 
     name: FilterName = "candidate"
-    margin_db: NotNegative | None = None
     smooth: bool = False
     bayes: BayesSection = BayesSection()
 

@@ -24,7 +24,7 @@ from annotated_types import Ge
 
 from mapfilter._types import Floats, Ints
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
-from mapfilter.options import NotNegative, Options, Positive
+from mapfilter.options import NotNegative, Options
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +33,6 @@ class CandidateOptions(Options):
 
     Parameters
     ----------
-    resolution_m : float
-        ``DB_res``: a candidate survives if its match is at most this far away (line 15).
     update_length_m : float
         Distance after which candidates are updated (line 8). The paper uses ``DB_res``; 0 updates
         at every step. On a 5 m lattice steps of 1.4 m snap back to the point they came from; about
@@ -59,7 +57,6 @@ class CandidateOptions(Options):
         With no candidate left the run has failed, or starts again from the serving cell's points.
     """
 
-    resolution_m: Positive = 5.0
     update_length_m: NotNegative = 22.0
     tracking_length_m: NotNegative | None = None
     prediction: Literal["last_heading", "displacement"] = "displacement"
@@ -133,7 +130,7 @@ _UNKNOWN_RADII_M: Floats = np.full(3, nan)
 
 
 @dataclass(frozen=True, slots=True)
-class CandidateFilter:
+class CandidateSearch:
     """Tables 2 and 3 of Khalaf-Allah (2007), as a filter of the common contract.
 
     The prior and each reading are the name of the serving cell.
@@ -144,10 +141,14 @@ class CandidateFilter:
         Returns the points of a cell, or None for a cell that the database does not know.
     options : CandidateOptions
         The reading of the paper.
+    resolution_m : float
+        ``DB_res`` of the paper: a candidate survives if its match is at most this far away
+        (line 15).
     """
 
     points_of: Callable[[str], PointSet | None]
     options: CandidateOptions = field(default_factory=CandidateOptions)
+    resolution_m: float = 5.0
 
     def init(self, prior: str, rng: np.random.Generator) -> CandidateBelief:  # noqa: ARG002
         """Return all points of the first serving cell as candidates (Table 2, lines 2 and 4)."""
@@ -231,7 +232,7 @@ class CandidateFilter:
             return belief, _info(belief, Reason.NOT_MOVED_ENOUGH)
         shift_east_m, shift_north_m = self._shift(belief)
         matched, _ = points.nearest(
-            belief.east_m + shift_east_m, belief.north_m + shift_north_m, options.resolution_m
+            belief.east_m + shift_east_m, belief.north_m + shift_north_m, self.resolution_m
         )
         matched = matched[matched >= 0]
         if options.duplicates == "set":

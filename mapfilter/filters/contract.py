@@ -6,10 +6,9 @@ inertial data, radio reports and GNSS fixes tick at different rates.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -98,7 +97,7 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True)
 class UpdateInfo:
-    """StepOutput of one update.
+    """What an update did.
 
     Parameters
     ----------
@@ -115,8 +114,8 @@ class UpdateInfo:
     hypotheses: int
 
 
-class Filter(Protocol[PriorT, BeliefT, ReadingT]):
-    """What every filter offers. All functions are pure: beliefs are never changed in place."""
+class BeliefFilter(Protocol[PriorT, BeliefT, ReadingT]):
+    """A filter of beliefs. All functions are pure: beliefs are never changed in place."""
 
     def init(self, prior: PriorT, rng: np.random.Generator) -> BeliefT:
         """Return the first belief."""
@@ -133,78 +132,3 @@ class Filter(Protocol[PriorT, BeliefT, ReadingT]):
 
     def locate(self, belief: BeliefT) -> Estimate:
         """Say where the belief is."""
-
-
-StepBeliefT = TypeVar("StepBeliefT")
-EventT = TypeVar("EventT")
-
-
-@dataclass(frozen=True, slots=True)
-class Event(Generic[EventT]):
-    """What happened at one moment: a motion interval that ended, a reading, or both.
-
-    With both, the belief is moved first and weighed then.
-
-    Parameters
-    ----------
-    time_s : float
-        When; for motion the end of the interval.
-    motion : MotionStep or None
-        Dead reckoning over the interval that ends now.
-    reading : object or None
-        What the filter's ``update`` takes.
-    """
-
-    time_s: float
-    motion: MotionStep | None = None
-    reading: EventT | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Step(Generic[StepBeliefT, EventT]):
-    """The belief after one event, and the news.
-
-    Parameters
-    ----------
-    event : Event
-        What happened.
-    belief : object
-        The filter's belief after it.
-    motion_reason : Reason
-        Whether the motion was used; ``USED`` when there was none.
-    info : UpdateInfo or None
-        StepOutput of the update; None without a reading.
-    """
-
-    event: Event[EventT]
-    belief: StepBeliefT
-    motion_reason: Reason
-    info: UpdateInfo | None
-
-
-def step(
-    filter_: Filter[Any, StepBeliefT, EventT],
-    belief: StepBeliefT,
-    event: Event[EventT],
-    rng: np.random.Generator,
-) -> Step[StepBeliefT, EventT]:
-    """Take one event in."""
-    motion_reason, info = Reason.USED, None
-    if event.motion is not None:
-        belief, motion_reason = filter_.predict(belief, event.motion, rng)
-    if event.reading is not None:
-        belief, info = filter_.update(belief, event.reading, rng)
-    return Step(event, belief, motion_reason, info)
-
-
-def run(
-    filter_: Filter[Any, StepBeliefT, EventT],
-    belief: StepBeliefT,
-    events: Iterable[Event[EventT]],
-    rng: np.random.Generator,
-) -> Iterator[Step[StepBeliefT, EventT]]:
-    """Yield the belief after every event, in the order given."""
-    for event in events:
-        taken = step(filter_, belief, event, rng)
-        belief = taken.belief
-        yield taken

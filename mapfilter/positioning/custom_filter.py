@@ -1,8 +1,10 @@
-"""A filter that a user wrote, imported by its name.
+"""Custom filters: classes that users write, given as objects or imported by name.
 
-The name is ``package.module:Name``. Called with a database, it gives an object with the four
-functions of :class:`mapfilter.filters.contract.Filter`; prior and readings are epochs. Importing it
-runs the code of its module: give only names of modules that you trust.
+A name is ``package.module:Name``. Called with a database, it gives a filter of either contract:
+``begin`` and ``step`` over epochs (:class:`mapfilter.positioning.filter.Filter`), or ``init``,
+``predict``, ``update`` and ``locate`` over beliefs
+(:class:`mapfilter.filters.contract.BeliefFilter`) with epochs as prior and readings. Importing a
+name runs the code of its module: give only names of modules that you trust.
 """
 
 from __future__ import annotations
@@ -10,14 +12,12 @@ from __future__ import annotations
 import hashlib
 import inspect
 import sys
-import time
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
-from math import nan
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -25,28 +25,15 @@ from typing import Any
 import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.errors import ConfigError, InputError, MapfilterError, fail
-from mapfilter.filters.contract import (
-    Estimate,
-    Event,
-    Filter,
-    Reason,
-    Status,
-    Step,
-    UpdateInfo,
-    run,
-)
-from mapfilter.geodesy import same_crs
-from mapfilter.positioning.epochs import Epoch, epochs
-from mapfilter.positioning.estimate import Fix, PositionedTrack, TrackEstimate, UnusedReading
-from mapfilter.positioning.matched_way import nearest_ways
-from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.schema import SERVING
+from mapfilter.errors import ConfigError, MapfilterError, fail
+from mapfilter.filters.contract import Reason
+from mapfilter.positioning.belief_tracker import BeliefTracker, TrackState
+from mapfilter.positioning.epochs import Epoch
+from mapfilter.positioning.estimate import StepOutput
+from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind
 
-MapFilter = Filter[Epoch, Any, Epoch]
-"""A filter whose prior and readings are epochs."""
-
-_FUNCTIONS = ("init", "predict", "update", "locate")
+_BELIEF_FUNCTIONS = ("init", "predict", "update", "locate")
+_EPOCH_FUNCTIONS = ("begin", "step")
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +50,18 @@ class CustomFilter:
 
     name: str
     source_sha256: str = ""
+
+    def over(self, database: RadioRouteDatabase, *, ways: bool = True) -> Filter[Any]:
+        """Import the filter and make it over a database.
+
+        Raises
+        ------
+        ConfigError
+            As :func:`custom_filter`, or the filter does not take a database.
+        """
+        with wrap_user_errors(self.name):
+            made = _imported(self.name)(database)
+        return adapted(made, database, self.name, ways=ways)
 
 
 def custom_filter(name: str) -> CustomFilter:
@@ -89,20 +88,6 @@ filter of a database, found float
     return CustomFilter(name, hashlib.sha256(text).hexdigest())
 
 
-def make_filter(own: CustomFilter, database: RadioRouteDatabase) -> MapFilter:
-    """Make the filter over a database.
-
-    Raises
-    ------
-    ConfigError
-        As :func:`custom_filter`, or the filter does not take a database.
-    """
-    with wrap_user_errors(own.name):
-        made: MapFilter = _imported(own.name)(database)
-    _check_functions(own.name, made)
-    return made
-
-
 def _imported(name: str) -> Any:
     module, _, path = name.partition(":")
     try:
@@ -126,10 +111,15 @@ def _imported(name: str) -> Any:
 
 
 def _check_functions(name: str, found: object) -> None:
-    lacking = [one for one in _FUNCTIONS if not callable(getattr(found, one, None))]
-    if lacking:
-        expected = f"the functions {', '.join(_FUNCTIONS)}"
-        raise fail(ConfigError, f"filter {name}", expected, f"no {', '.join(lacking)}")
+    if _lacking(found, _EPOCH_FUNCTIONS):
+        lacking = _lacking(found, _BELIEF_FUNCTIONS)
+        if lacking:
+            expected = f"the functions {', '.join(_BELIEF_FUNCTIONS)} (or begin and step)"
+            raise fail(ConfigError, f"filter {name}", expected, f"no {', '.join(lacking)}")
+
+
+def _lacking(found: object, names: tuple[str, ...]) -> list[str]:
+    return [one for one in names if not callable(getattr(found, one, None))]
 
 
 @contextmanager
@@ -168,144 +158,90 @@ def _file(module: ModuleType | None) -> Path | None:
     return Path(file) if file else None
 
 
-_NOWHERE = Estimate(nan, nan, np.full((2, 2), nan), np.full(3, nan))
-
-
-def position_by_own(
-    database: RadioRouteDatabase,
-    filter_: MapFilter,
-    log: TrackLog,
-    rng: np.random.Generator,
-    *,
-    name: str,
-    ways: bool = True,
-) -> PositionedTrack:
-    """Locate a log with a filter of one's own.
-
-    It starts at the first epoch with a fix or with a serving cell of which the database has points:
-    ``init`` is given that epoch, and ``update`` the same one and all later ones in which something
-    was heard: reports, fixes, pseudoranges or time differences. What is before is labelled and
-    passed over.
+def adapted(
+    made: Any, database: RadioRouteDatabase, name: str, *, ways: bool = True
+) -> Filter[Any]:
+    """Return an object of either contract as a filter over epochs.
 
     Parameters
     ----------
+    made : object
     database : RadioRouteDatabase
-    filter_ : Filter
-        Its prior and its readings are epochs.
-    log : TrackLog
-        In the database's CRS.
-    rng : numpy.random.Generator
-        Handed to the filter.
     name : str
-        What estimates call the filter.
+        Of the filter, in estimates and in messages of errors in its code.
     ways : bool
-        Whether positions are matched to ways.
+        Whether positions of a filter of beliefs are matched to ways.
 
     Raises
     ------
-    InputError
-        The log is in another CRS than the database.
     ConfigError
-        The filter's code fails, or returns something else than the contract says.
+        It lacks a function.
     """
-    if not same_crs(log.crs, database.lattice.crs):
-        raise fail(
-            InputError, "log, crs", database.lattice.crs, log.crs, "log of another area or zone"
-        )
-    known = _cells_with_points(database)
-    fixes: list[Fix] = []
-    unused: list[UnusedReading] = []
-    began_s = time.process_time()
-    with wrap_user_errors(name):
-        for fix, told in _follow(filter_, epochs(log), known, rng):
-            fixes.append(fix)
-            unused += told
-    filter_s = time.process_time() - began_s
-    estimate = TrackEstimate.of_fixes(
-        database.lattice.crs,
-        name,
-        nearest_ways(database, fixes) if ways else fixes,
-        start_utc_s=log.start_utc_s,
-        unused=unused,
-    )
-    return PositionedTrack(estimate, (), filter_s)
-
-
-def _follow(
-    filter_: MapFilter,
-    merged: Sequence[Epoch],
-    known: Callable[[str], Reason],
-    rng: np.random.Generator,
-) -> Iterator[tuple[Fix, list[UnusedReading]]]:
-    """Yield what the filter says after each epoch, and what it did not use."""
-    belief: Any = None
-    status, hypotheses = Status.SEARCHING, 0
-    for epoch in merged:
-        cell, reason = _serving(epoch, known)
-        unused: list[UnusedReading] = []
-        if belief is None:
-            if epoch.motion:
-                unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.NOT_STARTED))
-            if epoch.fix is None and reason is not Reason.USED:
-                if epoch.heard:
-                    unused.append(UnusedReading(epoch.time_s, SERVING, cell, reason))
-                yield _fix(epoch, _NOWHERE, status, 0, reason), unused
-                continue
-            belief = filter_.init(epoch, rng)
-            events: tuple[Event[Epoch], ...] = (Event(epoch.time_s, reading=epoch),)
-        else:
-            events = _events(epoch)
-        info = None
-        for taken in run(filter_, belief, events, rng):
-            _check_types(taken)
-            belief = taken.belief
-            if taken.motion_reason is not Reason.USED:
-                unused.append(UnusedReading(epoch.time_s, "motion", "", taken.motion_reason))
-            info = taken.info or info
-        if info is not None:
-            status, hypotheses, reason = info.status, info.hypotheses, info.reason
-            if reason not in (Reason.USED, Reason.NOT_MOVED_ENOUGH):
-                unused.append(UnusedReading(epoch.time_s, SERVING, cell, reason))
-        elif status is Status.CONVERGED:
-            status = Status.TRACKING
-        located = filter_.locate(belief)
-        if not isinstance(located, Estimate):
-            raise TypeError(f"locate returns an Estimate, not {type(located).__name__}")
-        yield _fix(epoch, located, status, hypotheses, reason), unused
-
-
-def _events(epoch: Epoch) -> tuple[Event[Epoch], ...]:
-    *earlier, last = epoch.motion or (None,)
-    told = epoch.heard or epoch.ranges or epoch.differences or epoch.fix is not None
-    heard = epoch if told else None
-    return (
-        *(Event[Epoch](epoch.time_s, motion) for motion in earlier),
-        Event(epoch.time_s, last, heard),
+    _check_functions(name, made)
+    if not _lacking(made, _EPOCH_FUNCTIONS):
+        return CustomEpochFilter(made, name, database.lattice.crs)
+    return CustomTracker(
+        made, database, _cells_with_points(database), _measured, name, start_by_fix=True, ways=ways
     )
 
 
-def _fix(epoch: Epoch, located: Estimate, status: Status, hypotheses: int, reason: Reason) -> Fix:
-    return Fix(
-        epoch.time_s,
-        float(located.east_m),
-        float(located.north_m),
-        np.asarray(located.covariance_m2, dtype=np.float64).reshape(2, 2),
-        np.asarray(located.radii_m, dtype=np.float64).reshape(3),
-        status,
-        hypotheses,
-        nan,
-        0,
-        nan,
-        reason,
-    )
+@dataclass(frozen=True, eq=False)
+class CustomTracker(BeliefTracker):
+    """A custom filter of beliefs; errors in its code name its file and line."""
+
+    def step(
+        self, state: TrackState, epoch: Epoch, rng: np.random.Generator
+    ) -> tuple[TrackState, StepOutput]:
+        """Take one epoch: first move, then measure."""
+        with wrap_user_errors(self.name):
+            return super().step(state, epoch, rng)
 
 
-def _serving(epoch: Epoch, known: Callable[[str], Reason]) -> tuple[str, Reason]:
-    """Return the serving cell, and whether the filter can start from it."""
-    if not epoch.heard:
-        return "", Reason.NO_READING
-    named = [row.cell for row in epoch.heard if row.role == SERVING and row.cell is not None]
-    return (named[0], known(named[0])) if named else ("", Reason.NO_SERVING_CELL)
+@dataclass(frozen=True, eq=False)
+class CustomEpochFilter(Filter[Any]):
+    """A custom filter over epochs; errors in its code name its file and line.
+
+    Parameters
+    ----------
+    filter : object
+        With ``begin(kinds)`` and ``step(state, epoch, rng)``.
+    filter_name : str
+    filter_crs : str
+        Of the database.
+    """
+
+    filter: Any
+    filter_name: str
+    filter_crs: str
+
+    @property
+    def name(self) -> str:
+        """Name of the filter."""
+        return self.filter_name
+
+    @property
+    def crs(self) -> str:
+        """CRS of the database."""
+        return self.filter_crs
+
+    def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> Any:
+        """Return the state before the first epoch."""
+        with wrap_user_errors(self.name):
+            return self.filter.begin(kinds)
+
+    def step(self, state: Any, epoch: Epoch, rng: np.random.Generator) -> tuple[Any, StepOutput]:
+        """Take one epoch."""
+        with wrap_user_errors(self.name):
+            state, output = self.filter.step(state, epoch, rng)
+            if not isinstance(output, StepOutput):
+                raise TypeError("step returns (state, StepOutput)")
+            return state, output
+
+
+def _measured(epoch: Epoch) -> Epoch | None:
+    """Return an epoch in which something besides motion was measured."""
+    some = epoch.heard or epoch.ranges or epoch.differences or epoch.fix is not None
+    return epoch if some else None
 
 
 def _cells_with_points(database: RadioRouteDatabase) -> Callable[[str], Reason]:
@@ -319,10 +255,3 @@ def _cells_with_points(database: RadioRouteDatabase) -> Callable[[str], Reason]:
         return Reason.USED if row.size else Reason.NO_POINTS_IN_CELL
 
     return known
-
-
-def _check_types(taken: Step[Any, Epoch]) -> None:
-    if not isinstance(taken.motion_reason, Reason):
-        raise TypeError("predict returns (belief, Reason)")
-    if taken.info is not None and not isinstance(taken.info, UpdateInfo):
-        raise TypeError("update returns (belief, UpdateInfo)")

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.filters.contract import Reason, Status
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+
+_SETTLED_M = 10.0
+"""A fix that tracks with a 95 % radius below is hardly moved by what comes later."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +60,14 @@ class Fix:
     way_probability: float
     reason: Reason
 
+    @classmethod
+    def nowhere(cls, time_s: float, status: Status, reason: Reason) -> Fix:
+        """Return the fix of an epoch at which the filter gives no position."""
+        empty = np.full((2, 2), np.nan)
+        return cls(
+            time_s, np.nan, np.nan, empty, np.full(3, np.nan), status, 0, np.nan, 0, np.nan, reason
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class UnusedReading:
@@ -73,6 +89,25 @@ class UnusedReading:
     kind: str
     what: str
     reason: Reason
+
+
+@dataclass(frozen=True, slots=True)
+class StepOutput:
+    """Output of one step of a filter.
+
+    Parameters
+    ----------
+    fix : Fix
+    evidence : tuple of float, optional
+        Runner-up's east, north and mass, entropy in bits, log evidence; of filters that hold
+        probabilities.
+    unused : tuple of UnusedReading
+        Measurements of the epoch that were not used, and why.
+    """
+
+    fix: Fix
+    evidence: tuple[float, float, float, float, float] | None = None
+    unused: tuple[UnusedReading, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -181,6 +216,62 @@ class TrackEstimate:
     def converged_at(self) -> int | None:
         """Index of the first CONVERGED epoch, or None."""
         return next((i for i, s in enumerate(self.status) if s is Status.CONVERGED), None)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return one row for each epoch, as in the Parquet file of a replay."""
+        columns: dict[str, Any] = {
+            "time_s": self.time_s,
+            "east_m": self.east_m,
+            "north_m": self.north_m,
+            "var_east_m2": self.covariance_m2[:, 0, 0],
+            "var_north_m2": self.covariance_m2[:, 1, 1],
+            "cov_east_north_m2": self.covariance_m2[:, 0, 1],
+            "radius_50_m": self.radii_m[:, 0],
+            "radius_67_m": self.radii_m[:, 1],
+            "radius_95_m": self.radii_m[:, 2],
+            "status": list(map(str, self.status)),
+            "hypotheses": self.hypotheses,
+            "mass_50m": self.mass_50m,
+            "way_id": self.way_id,
+            "way_probability": self.way_probability,
+            "reason": list(map(str, self.reason)),
+        }
+        if self.evidence is not None:
+            columns |= {one.name: getattr(self.evidence, one.name) for one in fields(self.evidence)}
+        return pd.DataFrame(columns)
+
+    def to_geodataframe(self) -> gpd.GeoDataFrame:
+        """Return the same with points in the CRS; epochs without a position are left out."""
+        import geopandas as gpd
+
+        table = self.to_dataframe()
+        table = table[np.isfinite(table["east_m"])].reset_index(drop=True)
+        points = gpd.points_from_xy(table["east_m"], table["north_m"])
+        return gpd.GeoDataFrame(table, geometry=points, crs=self.crs)
+
+    @classmethod
+    def of_outputs(
+        cls,
+        crs: str,
+        filter_name: str,
+        outputs: Sequence[StepOutput],
+        *,
+        start_utc_s: float = float("nan"),
+        unused: Sequence[UnusedReading] = (),
+    ) -> TrackEstimate:
+        """Put the outputs of a track's steps together; unused readings are given apart."""
+        fixes = [output.fix for output in outputs]
+        estimate = cls.of_fixes(crs, filter_name, fixes, start_utc_s=start_utc_s, unused=unused)
+        if not outputs or outputs[0].evidence is None:
+            return estimate
+        east_m, north_m, mass, entropy, log_evidence = np.array(
+            [output.evidence for output in outputs], dtype=np.float64
+        ).T
+        tracking = np.array([fix.status is Status.TRACKING for fix in fixes], dtype=np.bool_)
+        settled = tracking & (estimate.radii_m[:, 2] <= _SETTLED_M)
+        return replace(
+            estimate, evidence=TrackEvidence(east_m, north_m, mass, entropy, log_evidence, settled)
+        )
 
     @classmethod
     def of_fixes(

@@ -1,94 +1,85 @@
-"""From a filter's options to a function that locates logs: the seam that all commands share."""
+"""From what a user names or makes to a filter over a database."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-
-import numpy as np
+from typing import Any
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.filters.candidate import CandidateOptions
-from mapfilter.positioning.bayes.options import BayesOptions, open_area
-from mapfilter.positioning.bayes.replay import position_by_bayes
-from mapfilter.positioning.candidate import (
-    PositionedTrack,
-    cell_points,
-    position_by_candidates,
-)
-from mapfilter.positioning.custom_filter import CustomFilter, make_filter, position_by_own
-from mapfilter.tracks.log import TrackLog
+from mapfilter.errors import ConfigError, fail
+from mapfilter.filters.gaussian import METHODS
+from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
+from mapfilter.positioning.candidate import CandidateFilter
+from mapfilter.positioning.custom_filter import adapted, custom_filter, wrap_user_errors
+from mapfilter.positioning.filter import Filter, FilterOptions
+from mapfilter.positioning.kalman.filter import KalmanFilter
 
-Locator = Callable[[TrackLog, np.random.Generator], PositionedTrack]
-"""Locates one log; what it read of the database is kept and shared by all logs."""
+DEFAULT = "bayes"
+BUILT_IN = ("bayes", "grid", "candidate", *METHODS)
 
 
-@dataclass(frozen=True, slots=True)
-class FilterChoice:
-    """Which filter, and how it is set; the kind of the options tells the filter.
+def filter_options(name: str = DEFAULT) -> FilterOptions:
+    """Return the default options of a filter.
 
     Parameters
     ----------
-    options : CandidateOptions, BayesOptions or CustomFilter
-    margin_db : float, optional
-        A point belongs to every cell within this margin of its best server; None takes the
-        margin that the database was built with.
-    """
+    name : str
+        ``bayes``, ``grid``, ``candidate``, ``ekf``, ``iekf``, ``ukf``, ``ckf``, ``rbukf``, or a
+        custom filter as ``package.module:Name``.
 
-    options: CandidateOptions | BayesOptions | CustomFilter = field(
-        default_factory=CandidateOptions
-    )
-    margin_db: float | None = None
-
-    @property
-    def name(self) -> str:
-        """The filter's name, as estimates and commands call it."""
-        match self.options:
-            case CandidateOptions():
-                return "candidate"
-            case BayesOptions() as options:
-                return "grid" if options.grid else "bayes"
-            case CustomFilter() as own:
-                return own.name
-
-
-def open_locator(
-    database: RadioRouteDatabase, choice: FilterChoice, *, ways: bool = True
-) -> Locator:
-    """Return the function that locates logs on a database by a filter.
-
-    Parameters
-    ----------
-    database : RadioRouteDatabase
-    choice : FilterChoice
-    ways : bool
-        Whether positions are matched to ways; success and errors do not need it.
+    Raises
+    ------
+    ConfigError
+        There is no such filter.
 
     Examples
     --------
-    >>> choice = FilterChoice(CandidateOptions(threshold=1), margin_db=0.0)
-    >>> choice.name
+    >>> filter_options("candidate").name
     'candidate'
     """
-    match choice.options:
-        case CandidateOptions() as options:
-            points_of = cell_points(database, choice.margin_db)
+    match name:
+        case "bayes":
+            return BayesFilter()
+        case "grid":
+            return GridFilter()
+        case "candidate":
+            return CandidateFilter()
+        case name if name in METHODS:
+            return KalmanFilter(method=name)  # type: ignore[arg-type]
+        case name if ":" in name:
+            return custom_filter(name)
+    expected = f"{', '.join(BUILT_IN)}, or package.module:Name"
+    raise fail(ConfigError, "filter", expected, repr(name))
 
-            def locate(log: TrackLog, rng: np.random.Generator) -> PositionedTrack:
-                return position_by_candidates(database, points_of, log, options, rng, ways=ways)
 
-            return locate
-        case BayesOptions() as bayes:
-            positioner = bayes.over(open_area(database))
+def as_filter(given: Any, database: RadioRouteDatabase, *, ways: bool = True) -> Filter[Any]:
+    """Return a filter over the area of a database.
 
-            def locate_by_bayes(log: TrackLog, rng: np.random.Generator) -> PositionedTrack:
-                return position_by_bayes(positioner, log, rng, smooth=bayes.smooth, pictures=ways)
+    Parameters
+    ----------
+    given : str, options, Filter, or class
+        A name as in :func:`filter_options`; options such as :class:`BayesFilter`; a filter that
+        is already over an area; or a custom filter: a class or function that is called with the
+        database, or what it returned.
+    database : RadioRouteDatabase
+    ways : bool
+        Whether positions are matched to ways.
 
-            return locate_by_bayes
-        case CustomFilter() as own:
-            made = make_filter(own, database)
-
-            def locate_by_own(log: TrackLog, rng: np.random.Generator) -> PositionedTrack:
-                return position_by_own(database, made, log, rng, name=own.name, ways=ways)
-
-            return locate_by_own
+    Raises
+    ------
+    ConfigError
+        It is none of these.
+    """
+    if isinstance(given, str):
+        given = filter_options(given)
+    if isinstance(given, Filter):
+        return given
+    if hasattr(given, "over") and not isinstance(given, type):
+        found: Filter[Any] = given.over(database, ways=ways)
+        return found
+    name = getattr(given, "__name__", type(given).__name__)
+    if callable(given):
+        with wrap_user_errors(name):
+            given = given(database)
+        if isinstance(given, Filter):
+            return given
+    return adapted(given, database, name, ways=ways)

@@ -139,7 +139,7 @@ def bench_filter(
         database, folders = make_world(Path(name), given)
         logs = [read_log(folder) for folder in folders]
         area = open_area(open_database(database))
-        positioner = BayesOptions().over(area)
+        positioner = BayesOptions().over_area(area)
         steps = [_step(positioner.model, logs[0], count, runs) for count in particles]
         # The first loads what is compiled.
         timed = [_track(positioner, log) for _ in range(runs + 1) for log in logs][len(logs) :]
@@ -259,7 +259,7 @@ def _track(positioner: BayesPositioner, log: TrackLog) -> tuple[float, int]:
     began_s = time.process_time()
     for epoch in merged:
         before = track.challenger
-        track, _ = positioner.advance(track, epoch, rng)
+        track, _ = positioner.step(track, epoch, rng)
         challenges += before is None and track.challenger is not None
     return time.process_time() - began_s, challenges
 

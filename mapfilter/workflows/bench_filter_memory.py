@@ -10,8 +10,8 @@ import numpy as np
 
 from mapfilter.database.estimate import peak_memory_bytes
 from mapfilter.database.store import open_database
-from mapfilter.positioning.bayes.options import BayesOptions, open_area
-from mapfilter.positioning.bayes.replay import position_by_bayes
+from mapfilter.positioning.bayes.options import BayesOptions
+from mapfilter.positioning.filter import locate
 from mapfilter.tracks.store import read_log
 
 
@@ -31,6 +31,6 @@ def locating_memory_bytes(database: Path, log: Path, *, smooth: bool) -> tuple[i
 def locate_once(database: Path, log: Path, *, smooth: bool) -> tuple[int, int]:
     """Open, locate, and return this process's peak memory (bytes) before and after."""
     loaded = peak_memory_bytes()
-    positioner = BayesOptions(smooth=smooth).over(open_area(open_database(database)))
-    position_by_bayes(positioner, read_log(log), np.random.default_rng(0), smooth=smooth)
+    positioner = BayesOptions(smooth=smooth).over(open_database(database))
+    locate(read_log(log), positioner, np.random.default_rng(0))
     return loaded, peak_memory_bytes()

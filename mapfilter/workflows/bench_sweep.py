@@ -19,7 +19,7 @@ from mapfilter.experiments.sweep.journeys import filter_rng, heard, sensed, true
 from mapfilter.experiments.sweep.plan import SweepPlan
 from mapfilter.experiments.sweep.run import sweep
 from mapfilter.experiments.sweep.world import SweepWorld
-from mapfilter.positioning.locators import open_locator
+from mapfilter.positioning.filter import locate
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.reproduce import paper_config
@@ -141,7 +141,7 @@ def _parts(plan: SweepPlan, world: SweepWorld, database: Path) -> tuple[int, dic
         yield
         took.setdefault(part, []).append(time.perf_counter() - began_s)
 
-    locate = open_locator(open_database(database), plan.readings[0].choice, ways=False)
+    filter_ = plan.readings[0].choice.over(open_database(database), ways=False)
     epochs = 0
     runs_of_route = plan.runs // plan.routes
     for number in range(plan.routes):
@@ -155,7 +155,7 @@ def _parts(plan: SweepPlan, world: SweepWorld, database: Path) -> tuple[int, dic
             with timed("sensed_s"):
                 moved = sensed(plan, log, run)
             with timed("located_s"):
-                found = locate(moved, filter_rng(plan.seed, run)).estimate
+                found = locate(moved, filter_, filter_rng(plan.seed, run)).estimate
             with timed("scored_s"):
                 accuracy(found, truth_of(log.truth))
             epochs = len(found)

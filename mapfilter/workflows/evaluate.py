@@ -147,7 +147,7 @@ def run_global_positioning(
     """
     began_s = time.perf_counter()
     wanted = check_cases(cases)
-    choice = filter_choice(config.filter, config.area.resolution_m)
+    choice = filter_choice(config.filter)
     _check_lengths(wanted, fixed)
     ensure_writable_folder(out)
     world, points = _world(World.of(config), out / "world", seed)

@@ -14,8 +14,7 @@ from mapfilter._types import Floats32
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.geodesy import Lattice
-from mapfilter.positioning.candidate import PositionedTrack
-from mapfilter.positioning.estimate import Snapshot
+from mapfilter.positioning.estimate import PositionedTrack, Snapshot
 from mapfilter.rasters.rxlev_rasters import RxLevRasters
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.belief import plot_belief, plot_candidates
@@ -38,6 +37,7 @@ from mapfilter.workflows.served import (
     best_servers,
     common_window,
     served_points,
+    street_map,
     thinned_lattice,
 )
 
@@ -180,17 +180,6 @@ def land_use_of_map(points: ServedPoints, buildings: Buildings) -> LandUse:
         ("way", "square", "building", "other"),
         (True, True, False, False),
         (BLUE, ORANGE, "#8c8c8c", "#eee9dd"),
-    )
-
-
-def street_map(database: RadioRouteDatabase, points: ServedPoints) -> BaseMap:
-    """Return the base map of some points: they, and whose map they come from."""
-    lattice = points.best.lattice
-    return BaseMap(
-        lattice.bounds_m,
-        points_m=np.stack(points.places(), axis=-1),
-        attribution=database.attribution,
-        resolution_m=lattice.resolution_m,
     )
 
 

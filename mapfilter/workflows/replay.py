@@ -22,12 +22,10 @@ from mapfilter.evaluation.success import SuccessSummary, summarise
 from mapfilter.filters.contract import Reason
 from mapfilter.filters.gaussian import METHODS
 from mapfilter.geodesy import Lattice, same_crs
-from mapfilter.positioning.candidate import PositionedTrack
-from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
-from mapfilter.positioning.kalman.models import FusionOptions, SiteModels
-from mapfilter.positioning.kalman.replay import position_by_fusion
-from mapfilter.positioning.locators import open_locator
+from mapfilter.positioning.filter import Filter, locate
+from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
@@ -269,86 +267,17 @@ def _shared_notes(logs: Sequence[ReplayedLog]) -> list[str]:
     return [f"{note} (in {_named(names)})" for note, names in owners.items()]
 
 
-FUSION_FILTERS = tuple(METHODS)
+SITE_FILTERS = tuple(METHODS)
+"""Filters that need the sites of a cell plan, and no database."""
 
 
-def run_replay_fusion(
-    config: Config, out: Path, *, progress: Progress | None = None
-) -> ReplayResult:
-    """Locate logs by their fixes, timing advances and levels; write what a replay writes.
-
-    Parameters
-    ----------
-    config : Config
-        Its cells, track and filter sections count; ``cells.plan`` tells the sites.
-    out : Path
-    progress : callable, optional
-        Called with logs done and logs in all.
-
-    Raises
-    ------
-    MapfilterError
-        There is no cell plan, it, an antenna or a log is missing or damaged, or the output cannot
-        be written.
-    """
-    if config.cells.plan is None:
-        hint = "filters without a map take the sites from there"
-        raise fail(ConfigError, "cells.plan", "a cell plan", "none", hint)
-    folders = list_logs(config.track_path)
-    ensure_writable_folder(out)
-    clear_results(out)
-    method = METHODS[config.filter.name]
-    logs: list[ReplayedLog] = []
-    for index, folder in enumerate(folders):
-        log = leave_out(read_log(folder), config.track.without)
-        plan = planned_cells(config, log.crs)
-        sites = SiteModels(plan, FusionOptions(), _antennas(config, plan))
-        track = position_by_fusion(sites, plan.crs, log, method, smooth=config.filter.smooth)
-        into = out if len(folders) == 1 else out / folder.name
-        files = tuple(into / file for file in ESTIMATES)
-        write_estimate(track.estimate, files[0])
-        write_gpx(track.estimate, files[1], folder.name)
-        write_geojson(track.estimate, files[2])
-        truth = Truth.of_table(log.truth)
-        pictures: tuple[Path, ...] = ()
-        wanted = config.output.pictures
-        if truth is not None and (wanted == "all" or (wanted == "first" and not index)):
-            pictures = (into / "error.png",)
-            plot_error_over_distance(track.estimate, truth, pictures[0])
-        score = accuracy(track.estimate, truth) if truth is not None else None
-        lack = "" if track.estimate.converged_at is not None else "too little was measured"
-        replayed = ReplayedLog(
-            folder.name, outcome(track.estimate), score, log.notes, lack, track.filter_s,
-            (*files, into / FIGURES, *pictures), route_of(log),
-        )  # fmt: skip
-        head = {"log": folder.name, "filter": method.name}
-        write_json(into / FIGURES, {**head, **to_jsonable(replayed.figures)})
-        logs.append(replayed)
-        if progress is not None:
-            progress(index + 1, len(folders))
-    result = ReplayResult(method.name, tuple(logs), summary_of(logs), out)
-    if len(folders) > 1:
-        write_json(out / SUMMARY, to_jsonable(summary_figures(result)))
-    return result
-
-
-def _antennas(config: Config, plan: CellPlan) -> dict[str, MeasuredAntenna]:
-    folder = config.cells.antennas
-    return {} if folder is None else read_antennas(folder, (cell.antenna for cell in plan.cells))
-
-
-def run_replay(
-    config: Config,
-    out: Path,
-    *,
-    progress: Progress | None = None,
-) -> ReplayResult:
+def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -> ReplayResult:
     """Locate the log or logs of a configuration and write estimates, figures and pictures.
 
     Parameters
     ----------
     config : Config
-        Its database, track, filter and output sections count.
+        Its database (for Kalman-type filters its cells), track, filter and output sections count.
     out : Path
         Folder of the results; one log writes straight into it, several into a folder each.
     progress : callable, optional
@@ -357,38 +286,100 @@ def run_replay(
     Raises
     ------
     MapfilterError
-        The database or a log is missing or damaged, or the output cannot be written.
+        The database, the cell plan, an antenna or a log is missing or damaged, or the output
+        cannot be written.
     """
-    if config.filter.name in FUSION_FILTERS:
-        return run_replay_fusion(config, out, progress=progress)
-    database = open_database(config.database_path, verify="full")
+    replay = _Sites(config) if config.filter.name in SITE_FILTERS else _OnDatabase(config)
     folders = list_logs(config.track_path)
-    check_logs(folders, database.lattice)
-    choice = filter_choice(config.filter, database.lattice.resolution_m)
-    locate = open_locator(database, choice)
+    replay.check(folders)
     ensure_writable_folder(out)
     clear_results(out)
     logs: list[ReplayedLog] = []
+    wanted = config.output.pictures
     for index, folder in enumerate(folders):
         log = leave_out(read_log(folder), config.track.without)
         rng = named_rng(config.journeys.seed, "replay", folder.name)
-        track = locate(log, rng)
+        drawn = wanted == "all" or (wanted == "first" and not index)
+        track = locate(log, replay.filter_for(log), rng, snapshots=drawn)
         into = out if len(folders) == 1 else out / folder.name
-        drawn = config.output.pictures == "all" or (config.output.pictures == "first" and not index)
-        pictures: tuple[Path, ...] = ()
-        if drawn:
-            pictures = draw_track(database, log, track, into)
-        logs.append(_write(folder.name, log, track, into, pictures))
+        pictures = replay.draw(log, track, into) if drawn else ()
+        lack = replay.lack(log, track.estimate)
+        logs.append(_write(folder.name, log, track, into, pictures, lack))
         if progress is not None:
             progress(index + 1, len(folders))
-    result = ReplayResult(choice.name, tuple(logs), summary_of(logs), out)
+    result = ReplayResult(config.filter.name, tuple(logs), summary_of(logs), out)
     if len(folders) > 1:
         write_json(out / SUMMARY, to_jsonable(summary_figures(result)))
     return result
 
 
+class _OnDatabase:
+    """Replays by a filter over a radio-route database."""
+
+    def __init__(self, config: Config) -> None:
+        self.database = open_database(config.database_path, verify="full")
+        self.options = filter_choice(config.filter)
+        self.filter: Filter[Any] | None = None
+
+    def check(self, folders: Sequence[Path]) -> None:
+        check_logs(folders, self.database.lattice)
+        self.filter = self.options.over(self.database)
+
+    def filter_for(self, log: TrackLog) -> Filter[Any]:  # noqa: ARG002
+        if self.filter is None:
+            raise AssertionError("checked before")
+        return self.filter
+
+    def draw(self, log: TrackLog, track: PositionedTrack, into: Path) -> tuple[Path, ...]:
+        return draw_track(self.database, log, track, into)
+
+    def lack(self, log: TrackLog, estimate: TrackEstimate) -> str:
+        return lacking(log, estimate)
+
+
+class _Sites:
+    """Replays by a Kalman-type filter over the sites of a cell plan."""
+
+    def __init__(self, config: Config) -> None:
+        if config.cells.plan is None:
+            hint = "filters without a map take the sites from there"
+            raise fail(ConfigError, "cells.plan", "a cell plan", "none", hint)
+        self.config = config
+
+    def check(self, folders: Sequence[Path]) -> None:
+        """Accept logs in any CRS: the plan is projected to theirs."""
+
+    def filter_for(self, log: TrackLog) -> Filter[Any]:
+        options = filter_choice(self.config.filter)
+        if not isinstance(options, KalmanFilter):
+            raise TypeError(options.name)
+        plan = planned_cells(self.config, log.crs)
+        return options.over_sites(plan, _antennas(self.config, plan))
+
+    def draw(self, log: TrackLog, track: PositionedTrack, into: Path) -> tuple[Path, ...]:
+        truth = Truth.of_table(log.truth)
+        if truth is None:
+            return ()
+        path = into / "error.png"
+        plot_error_over_distance(track.estimate, truth, path)
+        return (path,)
+
+    def lack(self, log: TrackLog, estimate: TrackEstimate) -> str:  # noqa: ARG002
+        return "" if estimate.converged_at is not None else "too little was measured"
+
+
+def _antennas(config: Config, plan: CellPlan) -> dict[str, MeasuredAntenna]:
+    folder = config.cells.antennas
+    return {} if folder is None else read_antennas(folder, (cell.antenna for cell in plan.cells))
+
+
 def _write(
-    name: str, log: TrackLog, track: PositionedTrack, out: Path, pictures: tuple[Path, ...]
+    name: str,
+    log: TrackLog,
+    track: PositionedTrack,
+    out: Path,
+    pictures: tuple[Path, ...],
+    lack: str,
 ) -> ReplayedLog:
     files = tuple(out / file for file in ESTIMATES)
     write_estimate(track.estimate, files[0])
@@ -400,7 +391,7 @@ def _write(
         outcome(track.estimate),
         accuracy(track.estimate, truth) if truth is not None else None,
         log.notes,
-        lacking(log, track.estimate),
+        lack,
         track.filter_s,
         (*files, out / FIGURES, *pictures),
         route_of(log),

@@ -16,6 +16,7 @@ from mapfilter.database.windows import WindowReader
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.rasters.rxlev_rasters import RxLevRasters
+from mapfilter.report.basemap import BaseMap
 from mapfilter.workflows.area import pixels_on
 
 MOST_PX = 1200
@@ -247,3 +248,14 @@ def common_window(lattice: Lattice, part: Lattice, where: str) -> Window:
         expected = "rasters of the database's area and CRS"
         raise fail(InputError, where, expected, "others", "built from other rasters")
     return found
+
+
+def street_map(database: RadioRouteDatabase, points: ServedPoints) -> BaseMap:
+    """Return the base map of some points: they, and whose map they come from."""
+    lattice = points.best.lattice
+    return BaseMap(
+        lattice.bounds_m,
+        points_m=np.stack(points.places(), axis=-1),
+        attribution=database.attribution,
+        resolution_m=lattice.resolution_m,
+    )

@@ -64,10 +64,10 @@ def sweep_plan(config: Config) -> tuple[SweepPlan, dict[str, RadioRouteDatabase]
             databases[name] = open_database(path, verify="full")
         except MapfilterError as error:
             faults.found.extend(error.faults)
-    resolution_m = _one_resolution(databases, faults)
+    _check_resolutions(databases, faults)
     plan = None
     try:
-        plan = _plan(config, tuple(paths), resolution_m)
+        plan = _plan(config, tuple(paths))
     except ConfigError as error:
         faults.found.extend(error.faults)
     if plan is None or faults.found:
@@ -76,16 +76,15 @@ def sweep_plan(config: Config) -> tuple[SweepPlan, dict[str, RadioRouteDatabase]
     return plan, databases
 
 
-def _one_resolution(databases: Mapping[str, RadioRouteDatabase], faults: Faults) -> float:
+def _check_resolutions(databases: Mapping[str, RadioRouteDatabase], faults: Faults) -> None:
     found = {name: database.lattice.resolution_m for name, database in databases.items()}
     if len(set(found.values())) > 1:
         faults.add("sweep.databases", "databases of one resolution", found)
-    return next(iter(found.values()), 5.0)
 
 
-def _plan(config: Config, databases: tuple[str, ...], resolution_m: float) -> SweepPlan:
+def _plan(config: Config, databases: tuple[str, ...]) -> SweepPlan:
     section, imu, settings = config.sweep, config.imu, simulation_settings(config)
-    readings = _readings(config, resolution_m)
+    readings = _readings(config)
     # No candidate filter uses neighbours, and what serves does not depend on them.
     neighbours = 0 if all(one.choice.name == "candidate" for one in readings) else None
     reports = settings.reports
@@ -131,7 +130,7 @@ def _radios(config: Config) -> tuple[Radio, ...]:
     return (Radio(GROUND_TRUTH, math.nan),)
 
 
-def _readings(config: Config, resolution_m: float) -> tuple[Reading, ...]:
+def _readings(config: Config) -> tuple[Reading, ...]:
     named = config.sweep.readings or (ReadingSection(name=config.filter.name),)
     readings = []
     for one in named:
@@ -140,15 +139,15 @@ def _readings(config: Config, resolution_m: float) -> tuple[Reading, ...]:
             given["name"] = one.filter
         section = FilterSection(**{**config.filter.model_dump(), **given})
         if section.name != "candidate":
-            readings.append(Reading(one.name, filter_choice(section, resolution_m)))
+            readings.append(Reading(one.name, filter_choice(section)))
             continue
         lengths_m = config.sweep.update_length_m
         if lengths_m is None or one.update_length_m is not None:
-            options = section.of(CandidateOptions, resolution_m=resolution_m)
+            options = section.of(CandidateOptions)
             lengths_m = (options.update_length_m,)
         for length_m in map(float, lengths_m):
             chosen = section.model_copy(update={"update_length_m": length_m})
-            readings.append(Reading(one.name, filter_choice(chosen, resolution_m), length_m))
+            readings.append(Reading(one.name, filter_choice(chosen), length_m))
     return tuple(readings)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -12,11 +12,13 @@ import shapely
 from mapfilter._types import Floats
 from mapfilter.config.sections import Area, Config, FilterSection, Rasters
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes, Routes
-from mapfilter.errors import ConfigError, InputError, fail
-from mapfilter.filters.candidate import CandidateOptions
+from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, unproject
-from mapfilter.positioning.custom_filter import custom_filter
-from mapfilter.positioning.locators import FilterChoice
+from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
+from mapfilter.positioning.candidate import CandidateFilter
+from mapfilter.positioning.filter import FilterOptions
+from mapfilter.positioning.kalman.filter import KalmanFilter
+from mapfilter.positioning.locators import filter_options
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan, read_cell_plan
 from mapfilter.radio.msi import read_antennas
@@ -301,21 +303,22 @@ def _note(what: str, share: float) -> tuple[str, ...]:
     return () if share >= _ENOUGH else (f"{what} covers {share:.0%} of the area",)
 
 
-def filter_choice(section: FilterSection, resolution_m: float) -> FilterChoice:
-    """Return filter and options of a configuration, for a database of a resolution.
+def filter_choice(section: FilterSection) -> FilterOptions:
+    """Return the options of the filter that a configuration names.
 
     Raises
     ------
     ConfigError
-        The filter takes no database, or it is one's own and is not there.
+        A custom filter cannot be imported.
     """
     match section.name:
         case "candidate":
-            options = section.of(CandidateOptions, resolution_m=resolution_m)
-            return FilterChoice(options, section.margin_db)
-        case "bayes" | "grid":
-            return FilterChoice(replace(section.bayes.options, grid=section.name == "grid"))
+            return section.of(CandidateFilter)
+        case "bayes":
+            return section.bayes.of(BayesFilter)
+        case "grid":
+            return section.bayes.of(GridFilter)
         case name if ":" in name:
-            return FilterChoice(custom_filter(name))
+            return filter_options(name)
         case name:
-            raise fail(ConfigError, "filter.name", "a filter that takes a database", repr(name))
+            return KalmanFilter(method=name, smooth=section.smooth)  # type: ignore[arg-type]

@@ -17,8 +17,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapfilter.errors import ConfigError
-from mapfilter.filters.candidate import CandidateBelief, CandidateFilter, CandidateOptions, Mode
-from mapfilter.filters.contract import Event, MotionStep, Reason, Status, run
+from mapfilter.filters.candidate import CandidateBelief, CandidateOptions, CandidateSearch, Mode
+from mapfilter.filters.contract import MotionStep, Reason, Status
+from mapfilter.testing import Event, run
 
 RNG = np.random.default_rng(0)
 POINTS = [(0.0, 10.0), (5.0, 10.0), (0.0, 0.0), (5.0, 0.0), (10.0, 0.0), (15.0, 0.0)]
@@ -51,7 +52,7 @@ MAP = {"A": points(POINTS), "B": points(POINTS[4:]), "empty": points([])}
 
 
 def build(options=LITERAL):
-    return CandidateFilter(MAP.get, options)
+    return CandidateSearch(MAP.get, options)
 
 
 def call(filter_, belief, step_m=6.0, heading_rad=0.0, cell="A"):
@@ -121,7 +122,7 @@ def test_exactly_the_resolution_counts_on_both_sides_of_the_test():
 def test_travelled_distance_as_vector_or_along_the_last_heading(prediction, expected):
     square = points([(0, 0), (5, 0), (0, 5), (5, 5)])
     options = replace(LITERAL, prediction=prediction)
-    filter_ = CandidateFilter({"A": square}.get, options)
+    filter_ = CandidateSearch({"A": square}.get, options)
     belief = CandidateBelief(Mode.GLOBAL_POSITIONING, np.array([0.0, 99]), np.array([0.0, 99]))
     belief, _ = call(filter_, belief, 3.0, pi / 2)
     belief, _ = call(filter_, belief, 3.0, 0.0)
@@ -353,7 +354,7 @@ def test_equals_the_pseudo_code_line_by_line(world):
     cells, calls = world
     maps = {name: points(pairs) for name, pairs in cells.items()}
     options = replace(LITERAL, prediction="last_heading")
-    filter_ = CandidateFilter(maps.get, options)
+    filter_ = CandidateSearch(maps.get, options)
     events = [
         Event(float(i), MotionStep(trans, theta), cell)
         for i, (trans, theta, cell) in enumerate(calls)
@@ -370,7 +371,7 @@ def test_equals_the_pseudo_code_line_by_line(world):
 def test_candidates_are_always_distinct_points_of_some_cell_and_never_grow(world):
     cells, calls = world
     maps = {name: points(pairs) for name, pairs in cells.items()}
-    filter_ = CandidateFilter(maps.get, LITERAL)
+    filter_ = CandidateSearch(maps.get, LITERAL)
     everywhere = {p for pairs in cells.values() for p in pairs}
     belief = filter_.init(calls[0][2], RNG)
     for trans, theta, cell in calls:

@@ -17,18 +17,17 @@ import numpy as np
 import pytest
 
 from mapfilter.database.nearest import CellPointIndex
-from mapfilter.filters.candidate import CandidateFilter, CandidateOptions
+from mapfilter.filters.candidate import CandidateOptions, CandidateSearch
 from mapfilter.filters.contract import (
+    BeliefFilter,
     Estimate,
-    Event,
-    Filter,
     MotionStep,
     Reason,
     Status,
     UpdateInfo,
-    run,
 )
 from mapfilter.geodesy import Lattice, wrap_rad
+from mapfilter.testing import Event, run
 
 LATTICE = Lattice("EPSG:32629", 5_000.0, 8_000.0, 5.0, 60, 70)
 
@@ -54,7 +53,7 @@ class Case:
     """
 
     name: str
-    make: Callable[[World], Filter[Any, Any, Any]]
+    make: Callable[[World], BeliefFilter[Any, Any, Any]]
     prior: Any
     readings: tuple[Any, ...]
     turns_count: bool = False
@@ -64,7 +63,7 @@ def candidate(name: str, **options: Any) -> Case:
     reading = CandidateOptions(**options)
     return Case(
         name,
-        lambda world: CandidateFilter(world.points_of, reading),
+        lambda world: CandidateSearch(world.points_of, reading),
         "A",
         ("A", "A", "B", "A"),
         reading.prediction == "last_heading",

@@ -5,16 +5,8 @@ from math import nan
 import numpy as np
 import pytest
 
-from mapfilter.filters.contract import (
-    Event,
-    MotionStep,
-    Reason,
-    Status,
-    Step,
-    UpdateInfo,
-    run,
-    step,
-)
+from mapfilter.filters.contract import MotionStep, Reason, Status, UpdateInfo
+from mapfilter.testing import Event, Step, run, step
 
 MOVE = MotionStep(1.0, 0.5)
 

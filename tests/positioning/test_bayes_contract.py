@@ -16,9 +16,9 @@ from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel, Start
 from mapfilter.positioning.bayes.options import BayesOptions, open_area
-from mapfilter.positioning.bayes.replay import estimate_of, position_by_bayes
 from mapfilter.positioning.epochs import epochs
-from mapfilter.testing import ContractError, check_filter
+from mapfilter.positioning.filter import estimate_of, locate
+from mapfilter.testing import ContractError, check_belief_filter
 from mapfilter.tracks.log import make_log
 
 FEW = ParticleOptions(most=4000, searching=2000, least=500)
@@ -32,7 +32,7 @@ def area(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def positioner(area):
-    return BayesOptions(particles=FEW).over(area)
+    return BayesOptions(particles=FEW).over_area(area)
 
 
 def filters(area):
@@ -47,7 +47,7 @@ def filters(area):
 def test_the_contract(area, name):
     motions = [MotionStep(5.0, 0.1 * i, nan) for i in range(12)]
     readings = [READING if i % 3 else None for i in range(12)]
-    check_filter(filters(area)[name], Start(READING), motions, readings)
+    check_belief_filter(filters(area)[name], Start(READING), motions, readings)
 
 
 def test_a_filter_that_breaks_the_contract_is_found(area):
@@ -58,11 +58,13 @@ def test_a_filter_that_breaks_the_contract_is_found(area):
 
     motions = [MotionStep(5.0, 0.0, nan)] * 12
     with pytest.raises(ContractError, match="in place"):
-        check_filter(lambda: Greedy(BayesModel(area), FEW), Start(READING), motions, [READING] * 12)
+        check_belief_filter(
+            lambda: Greedy(BayesModel(area), FEW), Start(READING), motions, [READING] * 12
+        )
 
 
 def found(positioner, log, seed=0, **options):
-    return position_by_bayes(positioner, log, np.random.default_rng(seed), **options).estimate
+    return locate(log, positioner, np.random.default_rng(seed), **options).estimate
 
 
 def test_live_gives_the_bytes_of_the_replay(positioner):
@@ -71,9 +73,9 @@ def test_live_gives_the_bytes_of_the_replay(positioner):
     for epoch in epochs(log):
         # What is known survives a stop of the program.
         track, rng = pickle.loads(pickle.dumps((track, rng)))
-        track, news = positioner.advance(track, epoch, rng)
+        track, news = positioner.step(track, epoch, rng)
         told.append(news)
-    live, replayed = estimate_of(CRS, "bayes", told), found(positioner, log, 3)
+    live, replayed = estimate_of(positioner, told), found(positioner, log, 3)
     for name in ("east_m", "north_m", "radii_m", "covariance_m2", "mass_50m", "way_id"):
         assert getattr(live, name).tobytes() == getattr(replayed, name).tobytes(), name
     assert live.status == replayed.status

@@ -74,7 +74,7 @@ def beliefs(positioner, log, side_m, seed=0, count=30):
     """Squares of mass after every tenth epoch."""
     rng, track, found = np.random.default_rng(seed), positioner.begin(), []
     for index, epoch in enumerate(epochs(log)[:count]):
-        track, _ = positioner.advance(track, epoch, rng)
+        track, _ = positioner.step(track, epoch, rng)
         if index % 10 == 9:
             found.append(blocks(track.belief, side_m))
     return found

@@ -12,8 +12,8 @@ from mapfilter.filters.contract import Status
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.options import BayesOptions, open_area
-from mapfilter.positioning.bayes.replay import position_by_bayes
 from mapfilter.positioning.epochs import epochs
+from mapfilter.positioning.filter import locate
 
 FEW = ParticleOptions(most=4000, searching=2000, least=500)
 
@@ -32,7 +32,7 @@ def off_m(log, fix):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_search_without_the_true_place_is_taken_over(area, seed):
-    positioner = BayesOptions(particles=FEW).over(area)
+    positioner = BayesOptions(particles=FEW).over_area(area)
     log, rng = walk_log(), np.random.default_rng(seed)
     track, switches = positioner.begin(), []
     for number, epoch in enumerate(epochs(log)):
@@ -43,7 +43,7 @@ def test_a_search_without_the_true_place_is_taken_over(area, seed):
                 track.belief, state=state, status=Status.SEARCHING, agreement_start_m=nan
             )
             track = replace(track, belief=astray, status=Status.SEARCHING)
-        track, news = positioner.advance(track, epoch, rng)
+        track, news = positioner.step(track, epoch, rng)
         if news.fix.status is Status.CONVERGED:
             switches.append(off_m(log, news.fix))
         assert news.fix.status is not Status.LOST
@@ -54,8 +54,8 @@ def test_a_search_without_the_true_place_is_taken_over(area, seed):
 
 def test_a_belief_in_doubt_does_not_converge(area):
     never = AlternativeRules(doubt=1e9, doubt_of_cells=1e9, converge_below=-1.0)
-    positioner = replace(BayesOptions(particles=FEW).over(area), rules=never)
-    estimate = position_by_bayes(positioner, walk_log(), np.random.default_rng(0)).estimate
+    positioner = replace(BayesOptions(particles=FEW).over_area(area), rules=never)
+    estimate = locate(walk_log(), positioner, np.random.default_rng(0)).estimate
     assert set(estimate.status) == {Status.SEARCHING}
     assert estimate.mass_50m[-1] > 0.99
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from mapfilter.positioning.kalman.replay import position_by_fusion
 
 from mapfilter.errors import InputError
 from mapfilter.filters.contract import Reason
@@ -16,7 +17,6 @@ from mapfilter.models.ranging import position_fix
 from mapfilter.models.state import MOVING, POSITION
 from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.models import FusionOptions, SiteModels, compiled
-from mapfilter.positioning.kalman.replay import position_by_fusion
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.tracks.log import make_log

@@ -5,6 +5,7 @@ from math import cos, hypot, inf, log10, nan, pi, sin
 
 import numpy as np
 import pytest
+from mapfilter.positioning.kalman.replay import _Walk
 
 from mapfilter.errors import InputError
 from mapfilter.filters.contract import MotionStep, Reason, Status
@@ -14,7 +15,6 @@ from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.kalman.belief import FusionHistory, SumBelief
 from mapfilter.positioning.kalman.models import FusionOptions, SiteModels
 from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
-from mapfilter.positioning.kalman.replay import _Walk
 from mapfilter.radio.cells import Cell, CellPlan
 
 CRS = "EPSG:32629"

@@ -22,12 +22,13 @@ from hypothesis import strategies as st
 
 from mapfilter.errors import InputError
 from mapfilter.evaluation.accuracy import Truth, accuracy, position_errors_m
-from mapfilter.filters.candidate import CandidateFilter, CandidateOptions, Mode
-from mapfilter.filters.contract import Reason, Status, run, step
+from mapfilter.filters.candidate import CandidateOptions, CandidateSearch, Mode
+from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.candidate import cell_points, position_by_candidates
 from mapfilter.positioning.epochs import serving_events
 from mapfilter.positioning.estimate import TrackEstimate, UnusedReading
 from mapfilter.positioning.estimate_store import write_estimate
+from mapfilter.testing import run, step
 from mapfilter.tracks.log import make_log
 
 # 16 steps of 1.25 m: every match lands on a lattice point, so the walk is followed exactly.
@@ -155,7 +156,7 @@ def assert_same_belief(a, b):
 
 def test_a_live_stream_gives_the_same_beliefs_as_a_replay(locate, cross_points):
     log = walk_log()
-    filter_ = CandidateFilter(cross_points, OPTIONS)
+    filter_ = CandidateSearch(cross_points, OPTIONS)
     events, rng = serving_events(log).events, np.random.default_rng(0)
     first = filter_.init("W", rng)
     replayed = list(run(filter_, first, events, rng))
@@ -419,7 +420,7 @@ def test_whatever_comes_every_reading_is_used_or_told(locate, rows, when_empty):
 
 
 def test_the_filter_is_in_tracking_mode_when_the_track_says_so(cross_points):
-    filter_ = CandidateFilter(cross_points, OPTIONS)
+    filter_ = CandidateSearch(cross_points, OPTIONS)
     rng = np.random.default_rng(0)
     steps = run(filter_, filter_.init("W", rng), serving_events(walk_log()).events, rng)
     modes = [taken.belief.mode for taken in steps]

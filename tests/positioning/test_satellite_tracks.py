@@ -12,8 +12,8 @@ from sky_world import HEIGHTS, START_UTC_S, no_rows, off_m, sky_log, sky_table
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.positioning.bayes.options import BayesOptions, open_area
-from mapfilter.positioning.bayes.replay import estimate_of, position_by_bayes
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow, epochs
+from mapfilter.positioning.filter import estimate_of, locate
 from mapfilter.simulation.satellites import Spoofer
 from mapfilter.tracks.log import make_log
 
@@ -28,11 +28,11 @@ def area(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def positioner(area):
-    return BayesOptions(particles=FEW, satellites=HEIGHTS).over(area)
+    return BayesOptions(particles=FEW, satellites=HEIGHTS).over_area(area)
 
 
 def found(positioner, log, seed=0):
-    return position_by_bayes(positioner, log, np.random.default_rng(seed)).estimate
+    return locate(log, positioner, np.random.default_rng(seed)).estimate
 
 
 def switch_m(estimate):
@@ -71,9 +71,9 @@ def test_live_satellites_give_the_bytes_of_the_replay(positioner):
     track, told = positioner.begin(), []
     for epoch in epochs(log):
         track, rng = pickle.loads(pickle.dumps((track, rng)))
-        track, news = positioner.advance(track, epoch, rng)
+        track, news = positioner.step(track, epoch, rng)
         told.append(news)
-    live, replayed = estimate_of(CRS, "bayes", told), found(positioner, log, 5)
+    live, replayed = estimate_of(positioner, told), found(positioner, log, 5)
     for name in ("east_m", "north_m", "radii_m", "covariance_m2", "mass_50m"):
         assert getattr(live, name).tobytes() == getattr(replayed, name).tobytes(), name
     assert live.unused == replayed.unused
@@ -122,9 +122,9 @@ def test_honest_satellites_find_a_filter_that_is_lost(positioner):
     track = positioner.begin_at(west + 128.0, north - 40.0, 3.0, rng)
     told = []
     for epoch in merged:
-        track, news = positioner.advance(track, epoch, rng)
+        track, news = positioner.step(track, epoch, rng)
         told.append(news)
-    estimate = estimate_of(CRS, "bayes", told)
+    estimate = estimate_of(positioner, told)
     assert track.wins >= 1
     assert off_m(log, estimate)[-60:].mean() < 8
     assert south < estimate.north_m[-1] < north
@@ -191,7 +191,7 @@ def test_a_start_eighteen_seconds_off_is_rejected_epoch_by_epoch(positioner):
 
 
 def test_the_exact_filter_tells_that_it_takes_no_pseudoranges(area):
-    grid = BayesOptions(grid=True).over(area)
+    grid = BayesOptions(grid=True).over_area(area)
     log = sky_log(legs=((EAST, 30.0),), most=2)
     estimate = found(grid, log)
     reasons = {u.reason for u in estimate.unused if u.kind == "pseudorange"}
@@ -214,12 +214,12 @@ def test_hindsight_and_turns_alone_take_satellites_too(positioner):
     motion = log.motion.assign(heading_rad=np.nan, turn_rad=(turn + np.pi) % (2 * np.pi) - np.pi)
     for one, smooth in ((log, True), (replace(log, motion=motion), False)):
         rng = np.random.default_rng(1)
-        estimate = position_by_bayes(positioner, one, rng, smooth=smooth).estimate
+        estimate = locate(one, positioner, rng, smooth=smooth).estimate
         assert off_m(log, estimate)[-30:].mean() < 12
 
 
 def test_the_exact_filter_takes_fixes_and_rejects_lies(area):
-    grid = BayesOptions(grid=True, particles=FEW).over(area)
+    grid = BayesOptions(grid=True, particles=FEW).over_area(area)
     log = walk_log(((EAST, 90.0),))
     fixes = log.truth[["time_s", "east_m", "north_m"]].assign(var_east_m2=9.0, var_north_m2=9.0)
     fixes.loc[fixes["time_s"] > 40, "north_m"] += 400.0
@@ -230,13 +230,13 @@ def test_the_exact_filter_takes_fixes_and_rejects_lies(area):
 
 @pytest.mark.parametrize("grid", [False, True])
 def test_a_fix_of_no_place_is_no_fix_before_a_start_neither(area, grid):
-    positioner = BayesOptions(particles=FEW, satellites=HEIGHTS, grid=grid).over(area)
+    positioner = BayesOptions(particles=FEW, satellites=HEIGHTS, grid=grid).over_area(area)
     row = ReportRow("serving", "W", None, None, np.nan, 0)
     blank, report = Epoch(0.0, fix=GnssFix(np.nan, 1.0)), Epoch(1.0, heard=(row,))
     rng, other = np.random.default_rng(0), np.random.default_rng(0)
-    nothing, news = positioner.advance(positioner.begin(), blank, rng)
+    nothing, news = positioner.step(positioner.begin(), blank, rng)
     assert (nothing.belief, news.fix.hypotheses) == (None, 0)
-    _, told = positioner.advance(nothing, replace(report, fix=blank.fix), rng)
-    _, plain = positioner.advance(positioner.begin(), report, other)
+    _, told = positioner.step(nothing, replace(report, fix=blank.fix), rng)
+    _, plain = positioner.step(positioner.begin(), report, other)
     assert told.fix.east_m == plain.fix.east_m
     np.testing.assert_array_equal(told.fix.radii_m, plain.fix.radii_m)

@@ -9,9 +9,10 @@ from cross_world import CRS
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapfilter.filters.contract import Event, MotionStep, Reason
+from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.epochs import serving_events
 from mapfilter.positioning.estimate import UnusedReading
+from mapfilter.testing import Event
 from mapfilter.tracks.log import make_log
 
 

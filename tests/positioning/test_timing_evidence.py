@@ -12,9 +12,9 @@ from mapfilter.filters.contract import Reason
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.positioning.bayes import filter as bayes
 from mapfilter.positioning.bayes.options import BayesOptions, open_area
-from mapfilter.positioning.bayes.replay import position_by_bayes
 from mapfilter.positioning.bayes.timing import NEVER, is_timed, with_timing
 from mapfilter.positioning.epochs import Difference, Epoch, ReportRow
+from mapfilter.positioning.filter import locate
 from mapfilter.positioning.gnss.options import TimingOptions
 from mapfilter.tracks.log import make_log
 
@@ -109,9 +109,9 @@ def test_times_of_arrival_shorten_the_search(area):
     ]  # fmt: skip
     with_them = replace(log, tdoa=make_log(CRS, tdoa=pd.concat(rows)).tdoa)
     few = ParticleOptions(most=2000, searching=1000, least=300)
-    positioner = BayesOptions(particles=few).over(area)
+    positioner = BayesOptions(particles=few).over_area(area)
     switch = [
-        position_by_bayes(positioner, one, np.random.default_rng(1)).estimate.converged_at
+        locate(one, positioner, np.random.default_rng(1)).estimate.converged_at
         for one in (log, with_them)
     ]
     assert switch[1] is not None
@@ -134,5 +134,5 @@ def test_differences_between_reports_of_levels_do_not_make_it_a_log_of_cells(
     radio = log.radio.assign(level_dbm=level_dbm)
     told = make_log(CRS, motion=log.motion, radio=radio, tdoa=rows.assign(difference_m=0.0))
     few = ParticleOptions(most=500, searching=300, least=100)
-    position_by_bayes(BayesOptions(particles=few).over(area), told, np.random.default_rng(1))
+    locate(told, BayesOptions(particles=few).over_area(area), np.random.default_rng(1))
     assert seen == {np.isnan(level_dbm)}

@@ -163,7 +163,7 @@ def test_options_of_the_bayes_filter(name, entry):
         load({key: value, "filter.name": "candidate"})
 
 
-@pytest.mark.parametrize("name", ["most_particles", "searching_particles", "least_particles"])
+@pytest.mark.parametrize("name", ["max_particles", "min_search_particles", "min_particles"])
 def test_a_grid_has_no_particles(name):
     with pytest.raises(ConfigError, match="grid has no such option"):
         load({f"filter.bayes.{name}": 5000, "filter.name": "grid"})

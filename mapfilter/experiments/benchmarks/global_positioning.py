@@ -26,8 +26,8 @@ from mapfilter.experiments.benchmarks.scores import (
     summarise,
 )
 from mapfilter.experiments.benchmarks.world import BenchmarkWorld
-from mapfilter.positioning.bayes.options import BayesOptions
-from mapfilter.positioning.locators import FilterChoice
+from mapfilter.positioning.bayes.options import BayesFilter, BayesOptions
+from mapfilter.positioning.filter import FilterOptions, locate
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.simulation.reports import Levels
 
@@ -43,7 +43,7 @@ class Batch:
     Parameters
     ----------
     world : BenchmarkWorld
-    choice : FilterChoice
+    choice : FilterOptions
     cases : tuple of str
     seed : int
     first, end : int
@@ -53,7 +53,7 @@ class Batch:
     """
 
     world: BenchmarkWorld
-    choice: FilterChoice
+    choice: FilterOptions
     cases: tuple[str, ...]
     seed: int
     first: int
@@ -84,8 +84,8 @@ def _run_route(batch: Batch, route: int) -> list[Row]:
         skyline = world.skyline(case)
         log = with_satellites(case, log, walked, skyline, batch.seed, route, world.reception)
         choice = informed(batch.choice, case, batch.fixed)
-        locate = world.locator(choice, thinned=case.missing_ways > 0)
-        found = locate(log, named_rng(batch.seed, "filter", name, str(route)))
+        filter_ = world.filter(choice, thinned=case.missing_ways > 0)
+        found = locate(log, filter_, named_rng(batch.seed, "filter", name, str(route)))
         row = {**score(case, walked, found), "route": route}
         if case.satellites is not None:
             row |= score_window(walked, found, spoofer_of(walked, batch.seed, route).from_s)
@@ -93,17 +93,21 @@ def _run_route(batch: Batch, route: int) -> list[Row]:
     return rows
 
 
-def informed(choice: FilterChoice, case: Case, fixed: frozenset[str] = frozenset()) -> FilterChoice:
+def informed(
+    choice: FilterOptions, case: Case, fixed: frozenset[str] = frozenset()
+) -> FilterOptions:
     """Return a filter with what the case's data sheet states; nothing else is known to it.
 
     Parameters
     ----------
-    choice : FilterChoice
+    choice : FilterOptions
     case : Case
     fixed : frozenset of str
         Options that were set for all cases.
     """
-    match choice.options:
+    if isinstance(choice, BayesFilter):
+        choice = choice.options
+    match choice:
         case BayesOptions() as options:
             known = replace(
                 options, motion=case.stated_to(options.motion, fixed), smooth=case.smooth
@@ -111,13 +115,13 @@ def informed(choice: FilterChoice, case: Case, fixed: frozenset[str] = frozenset
             if case.satellites is not None:
                 height = {k: v for k, v in TOWN_HEIGHT.items() if k not in fixed}
                 known = replace(known, satellites=replace(options.satellites, **height))
-            return replace(choice, options=known)
+            return known
     return choice
 
 
 def benchmark(
     world: BenchmarkWorld,
-    choice: FilterChoice,
+    choice: FilterOptions,
     cases: Sequence[str],
     runs: int,
     seed: int,
@@ -134,7 +138,7 @@ def benchmark(
     Parameters
     ----------
     world : BenchmarkWorld
-    choice : FilterChoice
+    choice : FilterOptions
     cases : sequence of str
         Names out of :data:`mapfilter.experiments.benchmarks.cases.CASES`.
     runs : int

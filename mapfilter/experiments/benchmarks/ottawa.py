@@ -35,8 +35,8 @@ from mapfilter.positioning.bayes.evidence import EvidenceOptions
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import MeasuredMapModel
 from mapfilter.positioning.bayes.options import BayesOptions, open_area
-from mapfilter.positioning.bayes.replay import position_by_bayes
 from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.filter import locate
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.rasters.rxlev_rasters import RxLevRasters
 from mapfilter.tracks.log import TrackLog
@@ -166,7 +166,7 @@ def surveyed_positioner(
     model = MeasuredMapModel(
         area, chosen.motion, chosen.map, chosen.evidence, heard=heard, level_sd_db=level_sd_db
     )
-    return replace(chosen.over(area), model=model)
+    return replace(chosen.over_area(area), model=model)
 
 
 def _level_sd_db(deviation: RxLevRasters, area: AreaMap, unmeasured_db: float) -> Floats32:
@@ -197,7 +197,7 @@ def find_session(
     for method in METHODS:
         # The same stream of numbers: the filter below the smoother is the filter itself.
         own = named_rng(seed, "filter", session.name, str(draw))
-        located = position_by_bayes(positioner, log, own, smooth=method == "smoothed")
+        located = locate(log, replace(positioner, smooth=method == "smoothed"), own)
         found.append(_scored(part, session, method, log, located.estimate, positioner))
     return found
 

@@ -21,7 +21,7 @@ from mapfilter.evaluation.success import wilson_interval_of_routes
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.benchmarks.journeys import Walk
 from mapfilter.filters.contract import Status
-from mapfilter.positioning.candidate import PositionedTrack
+from mapfilter.positioning.estimate import PositionedTrack
 
 _STAY_S = 10.0
 _WINDOW_S = 120.0

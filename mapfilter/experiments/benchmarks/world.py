@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -19,7 +20,7 @@ from mapfilter.database.store import open_database
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.sweep.world import SweepWorld, open_world
 from mapfilter.gnss.visibility import Skyline
-from mapfilter.positioning.locators import FilterChoice, Locator, open_locator
+from mapfilter.positioning.filter import Filter, FilterOptions
 from mapfilter.propagation.predict import GroundTruthErrors, PredictionModel, realise
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.roads.lattice import RouteLattice
@@ -74,10 +75,10 @@ class BenchmarkWorld:
         folder = self.folder / STREETS
         return _streets(folder, sha256_file(folder / "world.json"))
 
-    def locator(self, choice: FilterChoice, *, thinned: bool) -> Locator:
-        """Return a function that locates logs, with the databases read once by each process."""
+    def filter(self, choice: FilterOptions, *, thinned: bool) -> Filter[Any]:
+        """Return the filter over the city, with the databases read once by each process."""
         folder = self.folder / (THINNED if thinned else FULL)
-        return _locator(folder, choice, sha256_file(folder / "manifest.json"))
+        return _filter(folder, choice, sha256_file(folder / "manifest.json"))
 
     def skyline(self, case: Case) -> Skyline | None:
         """Return the buildings that hide satellites, where a case has any satellites."""
@@ -131,8 +132,8 @@ def _streets(folder: Path, sha256: str) -> SweepWorld:  # noqa: ARG001
 
 
 @lru_cache(maxsize=32)
-def _locator(database: Path, choice: FilterChoice, sha256: str) -> Locator:  # noqa: ARG001
-    return open_locator(open_database(database), choice, ways=False)
+def _filter(database: Path, choice: FilterOptions, sha256: str) -> Filter[Any]:  # noqa: ARG001
+    return choice.over(open_database(database), ways=False)
 
 
 def without_ways(

@@ -45,8 +45,8 @@ def imu_rng(seed: int, run: Run) -> np.random.Generator:
     Examples
     --------
     >>> from mapfilter.experiments.sweep.plan import Noise, Reading, Run
-    >>> from mapfilter.positioning.locators import FilterChoice
-    >>> reading = Reading("as printed", FilterChoice())
+    >>> from mapfilter.positioning.candidate import CandidateFilter
+    >>> reading = Reading("as printed", CandidateFilter())
     >>> run = Run(Radio(), 1.0, 0, 1.0, Noise(), 0, "database", reading)
     >>> other = Run(Radio(), 1.0, 0, 1.0, Noise(), 0, "another", reading)
     >>> imu_rng(1, run).normal() == imu_rng(1, other).normal()

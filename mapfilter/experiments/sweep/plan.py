@@ -12,7 +12,7 @@ from math import ceil, isfinite, prod, radians
 from typing import Literal
 
 from mapfilter.errors import ConfigError, Faults
-from mapfilter.positioning.locators import FilterChoice
+from mapfilter.positioning.filter import FilterOptions
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
@@ -91,13 +91,13 @@ class Reading:
     Parameters
     ----------
     name : str
-    choice : FilterChoice
+    choice : FilterOptions
     update_length_m : float
         Of the filter; NaN where it knows none.
     """
 
     name: str
-    choice: FilterChoice
+    choice: FilterOptions
     update_length_m: float = float("nan")
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pyarrow as pa
@@ -22,7 +23,7 @@ from mapfilter.experiments.sweep import table
 from mapfilter.experiments.sweep.journeys import filter_rng, heard, sensed, true_path, truth_of
 from mapfilter.experiments.sweep.plan import Radio, Run, SweepPlan
 from mapfilter.experiments.sweep.world import SweepWorld, open_world, write_world
-from mapfilter.positioning.locators import FilterChoice, Locator, open_locator
+from mapfilter.positioning.filter import Filter, FilterOptions, locate
 from mapfilter.tracks.log import TrackLog
 
 RUNS = "runs.parquet"
@@ -76,8 +77,8 @@ def run_batch(batch: Batch) -> pa.Table:
         log = _heard(batch.world, batch.world_sha256, plan, route, radio, period_s)
         truth = truth_of(log.truth)
         for run in alike:
-            locate = _locator(*databases[run.database], run.reading.choice)
-            found = locate(sensed(plan, log, run), filter_rng(plan.seed, run)).estimate
+            filter_ = _filter(*databases[run.database], run.reading.choice)
+            found = locate(sensed(plan, log, run), filter_, filter_rng(plan.seed, run)).estimate
             last = str(found.status[-1]) if len(found) else ""
             rows.append(table.row(run, accuracy(found, truth), last))
     return table.to_table(rows)
@@ -203,8 +204,8 @@ def _world(folder: Path, sha256: str) -> SweepWorld:
 
 
 @lru_cache(maxsize=_LOCATORS)
-def _locator(path: Path, sha256: str, choice: FilterChoice) -> Locator:  # noqa: ARG001
-    return open_locator(open_database(path), choice, ways=False)
+def _filter(path: Path, sha256: str, choice: FilterOptions) -> Filter[Any]:  # noqa: ARG001
+    return choice.over(open_database(path), ways=False)
 
 
 @lru_cache(maxsize=_PATHS)

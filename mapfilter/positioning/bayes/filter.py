@@ -7,6 +7,7 @@ every one that comes in: equal epochs give equal bytes.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isfinite
@@ -14,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from mapfilter.filters.contract import Filter, Reason, Status
+from mapfilter.filters.contract import BeliefFilter, MotionStep, Reason, Status
 from mapfilter.filters.grid import GridBelief, GridFilter
 from mapfilter.filters.particle import ParticleFilter, ParticleOptions
+from mapfilter.models.fingerprint import BoundReading, LevelReading
 from mapfilter.positioning.bayes.alternative import (
     AlternativeHypothesis,
     AlternativeRules,
@@ -27,12 +29,13 @@ from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import RadioHistory, RadioReading, reading_of
 from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel, Start
+from mapfilter.positioning.bayes.smoothing import BayesSmoother
 from mapfilter.positioning.bayes.state import BayesTrack as BayesTrack
-from mapfilter.positioning.bayes.state import StepOutput as StepOutput
 from mapfilter.positioning.bayes.state import name_of, news_of, particle_spacing_of
 from mapfilter.positioning.bayes.timing import NEVER, is_timed, with_timing
 from mapfilter.positioning.epochs import Epoch, headed
-from mapfilter.positioning.estimate import UnusedReading
+from mapfilter.positioning.estimate import StepOutput, UnusedReading
+from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind
 from mapfilter.positioning.gnss.gate import GnssGate
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.satellites import GnssUpdate, Satellites
@@ -42,7 +45,7 @@ _MOST_TIMES, _SEARCHING_TIMES = 12, 8
 
 
 @dataclass(frozen=True)
-class BayesPositioner:
+class BayesPositioner(Filter[BayesTrack]):
     """The map filter over an area.
 
     Parameters
@@ -54,6 +57,8 @@ class BayesPositioner:
         The exact filter on a grid in place of particles.
     satellites : GnssOptions
     timing : TimingOptions
+    smooth : bool
+        Whether positions are smoothed by the whole log.
     """
 
     model: BayesModel
@@ -62,6 +67,12 @@ class BayesPositioner:
     grid: bool = False
     satellites: GnssOptions = field(default_factory=GnssOptions)
     timing: TimingOptions = field(default_factory=TimingOptions)
+    smooth: bool = False
+
+    @property
+    def crs(self) -> str:
+        """CRS of the area."""
+        return self.area.lattice.crs
 
     @property
     def area(self) -> AreaMap:
@@ -73,12 +84,12 @@ class BayesPositioner:
         """The filter's name."""
         return "grid" if self.grid else "bayes"
 
-    def filter_for(self, compass: bool) -> Filter[Start, MapBelief, RadioReading]:
+    def filter_for(self, compass: bool) -> BeliefFilter[Start, MapBelief, RadioReading]:
         """Return the filter by itself, for headings with or without a compass."""
         return self._filters[compass]
 
     @cached_property
-    def _filters(self) -> dict[bool, Filter[Start, Any, RadioReading]]:
+    def _filters(self) -> dict[bool, BeliefFilter[Start, Any, RadioReading]]:
         if not self.grid:
             known = self.options
             # Every place times every heading: most of them are gone after a few steps.
@@ -98,8 +109,8 @@ class BayesPositioner:
         listener = GnssGate(self.satellites, area.lattice.crs, area.origin_m)
         return Satellites(listener, (width_m / 2, height_m / 2), not self.grid)
 
-    def begin(self) -> BayesTrack:
-        """Return what is known before the first epoch: nothing."""
+    def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> BayesTrack:  # noqa: ARG002
+        """Return the state before the first epoch."""
         return BayesTrack(RadioHistory.empty(len(self.area.cell_ids)))
 
     def begin_at(
@@ -110,7 +121,7 @@ class BayesPositioner:
         belief = replace(belief, status=Status.TRACKING)
         return replace(self.begin(), belief=belief, status=Status.TRACKING)
 
-    def advance(
+    def step(
         self, track: BayesTrack, epoch: Epoch, rng: np.random.Generator
     ) -> tuple[BayesTrack, StepOutput]:
         """Take one epoch in."""
@@ -148,6 +159,33 @@ class BayesPositioner:
             unused.append(UnusedReading(epoch.time_s, "serving", cell, reason))
         after = track if memory is track.memory else replace(track, memory=memory)
         return after, news_of(self.area, after, epoch.time_s, reason, tuple(unused))
+
+    def warm_up(self, merged: Sequence[Epoch]) -> None:  # noqa: ARG002
+        """Load the compiled kernels, and prepare the area."""
+        if self.grid:
+            return
+        model, rng = self.model, np.random.default_rng(0)
+        west, south = model.area.origin_m
+        small = replace(self, options=replace(self.options, most=64, least=32))
+        track = small.begin_at(west, south, 1.0, rng)
+        track, _ = small.step(track, Epoch(0.0, (MotionStep(1.0, 0.0),)), rng)
+        if track.belief is not None and model.area.cell_ids:
+            small.filter_for(True).update(track.belief, _every_kind(), rng)
+
+    def smoother(self) -> BayesSmoother | None:
+        """Return a new smoother where positions shall be smoothed."""
+        return BayesSmoother(self.area, self.model.motion) if self.smooth else None
+
+    def hypotheses(self, state: BayesTrack) -> Hypotheses | None:
+        """Return the hypotheses of the belief that leads."""
+        belief, (west, south) = state.leading, self.area.origin_m
+        if belief is None:
+            return None
+        return Hypotheses(
+            belief.state[0].astype(np.float64) + west,
+            belief.state[1].astype(np.float64) + south,
+            belief.weight.astype(np.float64),
+        )
 
     def _weigh(
         self,
@@ -279,3 +317,9 @@ class BayesPositioner:
         state = self.model.any_heading(belief.state, _MOST_TIMES, rng)
         log_weight = np.tile(belief.log_weight, _MOST_TIMES) - np.log(_MOST_TIMES)
         return replace(belief, state=state, log_weight=log_weight)
+
+
+def _every_kind() -> RadioReading:
+    one, none = np.ones(1, dtype=np.float32), np.zeros(1, dtype=np.int32)
+    levels = LevelReading(none, one, one, one, 0.3, 1.0, 3.0, 0.0, 0.0)
+    return RadioReading(0, 1.0, levels, (BoundReading(none, -60.0, 1, 8.0, 1.0),))

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from math import radians
+from typing import Annotated
+
+from annotated_types import Ge, Gt, Le
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.filters.particle import ParticleOptions
+from mapfilter.models.fingerprint import LevelErrors
 from mapfilter.models.street_motion import MapWeights, MotionErrors
+from mapfilter.options import Below1, NotNegative, Options, Positive, Probability
 from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import EvidenceOptions
@@ -17,6 +22,8 @@ from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 
 _NARROW_BIAS_RAD, _NARROW_SCALE = radians(1.5), 0.015
 _MOST_TIMES = 5.0
+
+Particles = Annotated[int, Ge(10), Le(10_000_000)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,11 +63,26 @@ class BayesOptions:
     smooth: bool = False
     grid: bool = False
 
-    def over(self, area: AreaMap) -> BayesPositioner:
+    @property
+    def name(self) -> str:
+        """The filter's name."""
+        return "grid" if self.grid else "bayes"
+
+    def over(self, database: RadioRouteDatabase, *, ways: bool = True) -> BayesPositioner:  # noqa: ARG002
+        """Return the filter over the area of a database, which is read as a whole."""
+        return self.over_area(open_area(database))
+
+    def over_area(self, area: AreaMap) -> BayesPositioner:
         """Return the filter over an area."""
         model = BayesModel(area, self.motion, self.map, self.evidence)
         return BayesPositioner(
-            model, self._particles, self.challenge, self.grid, self.satellites, self.timing
+            model,
+            self._particles,
+            self.challenge,
+            self.grid,
+            self.satellites,
+            self.timing,
+            self.smooth,
         )
 
     @property
@@ -75,3 +97,149 @@ class BayesOptions:
 def open_area(database: RadioRouteDatabase) -> AreaMap:
     """Read a whole database into the map that the filter looks up."""
     return AreaMap.of_field(database.field(), database.plan, database.floor_dbm)
+
+
+@dataclass(frozen=True, slots=True)
+class BayesFilter(Options):
+    """The Bayes map filter: a particle filter over streets, serving cells and levels.
+
+    What it assumes of errors need not be what they are: a noise that is taken too large costs some
+    metres until the filter has converged, one taken too small costs wrong positions.
+
+    Parameters
+    ----------
+    step_sd_m : float
+        Assumed deviation of a step's length.
+    heading_sd_deg : float
+        Assumed deviation of a heading, white.
+    bias_sd_deg : float
+        Assumed deviation of the journey's constant heading error.
+    drift_deg_per_sqrt_m : float
+        Assumed random walk of the heading error, by distance.
+    scale : float
+        Assumed deviation of the journey's step scale.
+    map_sd_m : float
+        Deviation of positions from the points of the map.
+    map_weight_per_m : float
+        Weight of the map for each metre travelled.
+    off_cost_per_m : float
+        Log-likelihood that a hypothesis off the map loses with each metre.
+    levels : bool
+        Whether levels are used, or serving cells only.
+    level_error_db : float
+        Assumed deviation of levels from the prediction.
+    level_correlation_m : float
+        Distance over which such errors are correlated by 1/e.
+    level_weight : float
+        Exponent of the likelihood of levels.
+    report_spacing_m : float
+        Distance travelled between two reports that are used.
+    max_particles, min_particles : int
+        Limits of the number of particles once converged.
+    min_search_particles : int
+        Least number until then.
+    switch_mass : float
+        The filter has converged when so much of the belief lies within 50 m of the leading
+        hypothesis,
+    switch_hold_m : float
+        for so many metres travelled.
+    smooth : bool
+        Whether positions are smoothed by the whole log (backward simulation).
+    satellite_sd_m : float
+        Assumed white noise of a pseudorange at the zenith, where a log gives no deviation.
+    antenna_height_m, antenna_height_sd_m : float
+        Of the antenna above the ellipsoid, before anything is measured.
+    timing_step_m : float
+        Distance of a step of timing advance: 553.5 m in GSM, 78.1 m in LTE.
+    timing_sd_m : float
+        Assumed deviation of a timing advance besides its rounding.
+    """
+
+    step_sd_m: NotNegative = 0.3
+    heading_sd_deg: NotNegative = 6.0
+    bias_sd_deg: NotNegative = 3.0
+    drift_deg_per_sqrt_m: NotNegative = 0.05
+    scale: Below1 = 0.02
+    map_sd_m: Positive = 4.0
+    map_weight_per_m: NotNegative = 1 / 18
+    off_cost_per_m: NotNegative = 0.1
+    levels: bool = True
+    level_error_db: Positive = 10.0
+    level_correlation_m: Positive = 50.0
+    level_weight: Annotated[float, Gt(0), Le(1)] = 0.7
+    report_spacing_m: NotNegative = 5.0
+    max_particles: Annotated[int, Ge(100), Le(10_000_000)] = 20_000
+    min_search_particles: Particles = 12_000
+    min_particles: Particles = 1000
+    switch_mass: Probability = 0.99
+    switch_hold_m: NotNegative = 14.0
+    smooth: bool = False
+    satellite_sd_m: Positive = 2.0
+    antenna_height_m: float = 100.0
+    antenna_height_sd_m: NotNegative = 200.0
+    timing_step_m: Positive = 553.5
+    timing_sd_m: Positive = 200.0
+
+    @property
+    def name(self) -> str:
+        """The filter's name."""
+        return "bayes"
+
+    def over(self, database: RadioRouteDatabase, *, ways: bool = True) -> BayesPositioner:
+        """Return the filter over the area of a database, which is read as a whole."""
+        return self.options.over(database, ways=ways)
+
+    @property
+    def options(self) -> BayesOptions:
+        """The options of its parts, in SI units."""
+        return BayesOptions(
+            MotionErrors(
+                step_sd_m=self.step_sd_m,
+                heading_sd_rad=radians(self.heading_sd_deg),
+                bias_sd_rad=radians(self.bias_sd_deg),
+                bias_drift_rad_per_sqrt_m=radians(self.drift_deg_per_sqrt_m),
+                scale_sd=self.scale,
+            ),
+            MapWeights(self.map_sd_m, self.map_weight_per_m, self.off_cost_per_m),
+            EvidenceOptions(
+                levels=LevelErrors(
+                    sd_db=self.level_error_db,
+                    correlation_m=self.level_correlation_m,
+                    weight=self.level_weight,
+                ),
+                spacing_m=self.report_spacing_m,
+                use_levels=self.levels,
+            ),
+            ParticleOptions(
+                most=self.max_particles,
+                searching=self.min_search_particles,
+                least=self.min_particles,
+                switch_mass=self.switch_mass,
+                switch_hold_m=self.switch_hold_m,
+            ),
+            satellites=GnssOptions(
+                zenith_m=self.satellite_sd_m,
+                height_m=self.antenna_height_m,
+                height_sd_m=self.antenna_height_sd_m,
+            ),
+            timing=TimingOptions(step_m=self.timing_step_m, advance_sd_m=self.timing_sd_m),
+            smooth=self.smooth,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class GridFilter(BayesFilter):
+    """The exact Bayes filter on the lattice in place of particles: slow, without the step scale.
+
+    Parameters are those of :class:`BayesFilter`.
+    """
+
+    @property
+    def name(self) -> str:
+        """The filter's name."""
+        return "grid"
+
+    @property
+    def options(self) -> BayesOptions:
+        """The options of its parts, in SI units."""
+        return replace(super(GridFilter, self).options, grid=True)

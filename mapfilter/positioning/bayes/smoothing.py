@@ -14,14 +14,13 @@ from math import log
 import numpy as np
 
 from mapfilter._kernels import draw_key
-from mapfilter._types import Bools, Floats, Floats32
-from mapfilter.filters.contract import Status
+from mapfilter._types import Floats, Floats32
 from mapfilter.filters.hypotheses import Bins, summarise
 from mapfilter.filters.resampling import systematic
 from mapfilter.models.street_motion import STATES, MotionErrors, draw_ancestors
 from mapfilter.positioning.bayes.alternative import MapBelief
 from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.filter import BayesTrack
+from mapfilter.positioning.bayes.state import BayesTrack
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.matched_way import matched_way
 
@@ -216,10 +215,29 @@ def _reckoned(state: Floats32, moved_m: Floats) -> Floats32:
     return np.asarray(state[:2] + stretch * moved, dtype=np.float32)
 
 
-def settled(estimate: TrackEstimate) -> Bools:
-    """Tell which fixes of a forward pass will hardly be moved by what comes later.
+@dataclass(eq=False)
+class BayesSmoother:
+    """Collects beliefs of a forward pass, and smooths the track by them.
 
-    Such a fix is TRACKING, and 95 % of its belief lie within 10 m.
+    Parameters
+    ----------
+    area : AreaMap
+    errors : MotionErrors
+        Of the forward pass.
     """
-    tracking = np.array([status is Status.TRACKING for status in estimate.status], dtype=np.bool_)
-    return np.asarray(tracking & (estimate.radii_m[:, 2] <= 10.0))
+
+    area: AreaMap
+    errors: MotionErrors
+    history: History = field(default_factory=History)
+    last: BayesTrack | None = None
+
+    def add(self, before: BayesTrack, after: BayesTrack) -> None:
+        """Record the states before and after one epoch."""
+        self.history.add(before, after)
+        self.last = after
+
+    def smoothed(self, estimate: TrackEstimate, rng: np.random.Generator) -> TrackEstimate:
+        """Return the estimate with positions, radii and ways given the whole log."""
+        if self.last is not None:
+            self.history.close(self.last)
+        return smoothed(estimate, self.history, self.area, self.errors, rng)

@@ -12,7 +12,7 @@ from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, Evide
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import RadioHistory
 from mapfilter.positioning.epochs import ReportRow
-from mapfilter.positioning.estimate import Fix, UnusedReading
+from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
 from mapfilter.positioning.gnss.state import NO_GNSS_STATE, GnssState
 from mapfilter.positioning.matched_way import matched_way
 
@@ -59,23 +59,6 @@ class BayesTrack:
         """The belief to go by: the challenger's where the first one is lost."""
         lost = self.status is Status.LOST and self.challenger is not None
         return self.challenger.belief if lost and self.challenger else self.belief
-
-
-@dataclass(frozen=True, slots=True)
-class StepOutput:
-    """What one epoch brought.
-
-    Parameters
-    ----------
-    fix : Fix
-    evidence : tuple of float
-        Runner-up's east, north and mass, entropy in bits, log evidence.
-    unused : tuple of UnusedReading
-    """
-
-    fix: Fix
-    evidence: tuple[float, float, float, float, float]
-    unused: tuple[UnusedReading, ...]
 
 
 _STREET_SHARE = 0.3

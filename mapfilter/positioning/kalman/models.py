@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from math import atan2, hypot
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+from annotated_types import Ge
 
 from mapfilter.errors import Faults, InputError
 from mapfilter.filters.trials import CompiledMeasurement
@@ -17,6 +18,7 @@ from mapfilter.models.gaussian import GaussianTerms, stack
 from mapfilter.models.ranging import GSM_STEP_M, timing_advances
 from mapfilter.models.signal_strength import levels, sampled_pattern
 from mapfilter.models.state import StateLayout
+from mapfilter.options import Options, Positive
 from mapfilter.propagation.empirical import cost231_hata_db
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cell_rules import ANTENNAS
@@ -28,7 +30,7 @@ _SEEN_FROM_M = 1000.0
 
 
 @dataclass(frozen=True, slots=True)
-class FusionOptions:
+class FusionOptions(Options):
     """How sure readings and motion are.
 
     Parameters
@@ -62,34 +64,26 @@ class FusionOptions:
     reach_m : float
         Farthest that a cell is taken for the neighbour that a carrier and a BSIC tell, from the
         serving site; 63 steps of timing advance in GSM.
-    settled_m : float
+    converged_radius_m : float
         A 95 % radius below which the filter says that it has converged.
     """
 
-    level_sigma_db: float = 9.0
-    timing_step_m: float = GSM_STEP_M
-    timing_sigma_m: float = 200.0
-    level_memory_m: float = 100.0
-    timing_memory_m: float = 500.0
-    fix_sigma_m: float = 10.0
-    acceleration: float = 0.7
-    speed_sigma_mps: float = 8.0
-    step_sigma_m: float = 0.3
-    heading_sigma_rad: float = 0.2
-    drift_m: float = 0.3
-    start_sigma_m: float = 1500.0
-    start_parts: int = 11
-    start_spacing_m: float = 600.0
-    reach_m: float = 35_000.0
-    settled_m: float = 1000.0
-
-    def __post_init__(self) -> None:
-        faults = Faults()
-        for name in self.__slots__:
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                faults.add(f"fusion, {name}", "a number above 0", value)
-        faults.raise_if_any(InputError)
+    level_sigma_db: Positive = 9.0
+    timing_step_m: Positive = GSM_STEP_M
+    timing_sigma_m: Positive = 200.0
+    level_memory_m: Positive = 100.0
+    timing_memory_m: Positive = 500.0
+    fix_sigma_m: Positive = 10.0
+    acceleration: Positive = 0.7
+    speed_sigma_mps: Positive = 8.0
+    step_sigma_m: Positive = 0.3
+    heading_sigma_rad: Positive = 0.2
+    drift_m: Positive = 0.3
+    start_sigma_m: Positive = 1500.0
+    start_parts: Annotated[int, Ge(1)] = 11
+    start_spacing_m: Positive = 600.0
+    reach_m: Positive = 35_000.0
+    converged_radius_m: Positive = 1000.0
 
 
 class SiteModels:

@@ -9,7 +9,6 @@ from mapfilter.filters.contract import Reason
 from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.kalman.models import SiteModels
-from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.schema import NEIGHBOUR, SERVING
 
 
@@ -35,7 +34,7 @@ class SiteReadings:
     unused: tuple[UnusedReading, ...]
 
 
-def site_readings(sites: SiteModels, epoch: Epoch, timed: dict[str, int]) -> SiteReadings:
+def site_readings(sites: SiteModels, epoch: Epoch) -> SiteReadings:
     """Sort an epoch's report.
 
     A row without a cell is that cell of the plan whose carrier and BSIC it has, near the serving
@@ -45,9 +44,12 @@ def site_readings(sites: SiteModels, epoch: Epoch, timed: dict[str, int]) -> Sit
     ----------
     sites : SiteModels
     epoch : Epoch
-    timed : dict of str to int
-        Steps of timing advance by cell.
     """
+    timed = {
+        row.cell: int(row.timing_advance)
+        for row in epoch.heard
+        if row.cell is not None and isfinite(row.timing_advance)
+    }
     serving = next((row.cell for row in epoch.heard if row.role == SERVING and row.cell), None)
     heard: list[tuple[str, float]] = []
     unused: list[UnusedReading] = []
@@ -64,28 +66,6 @@ def site_readings(sites: SiteModels, epoch: Epoch, timed: dict[str, int]) -> Sit
         tuple(name for name, _ in heard), tuple(level for _, level in heard), tuple(known),
         tuple(known.values()), tuple(unused),
     )  # fmt: skip
-
-
-def not_taken(log: TrackLog) -> list[UnusedReading]:
-    """Return what a log holds that these filters make no use of, each kind once."""
-    kinds = (("pseudorange", log.pseudoranges), ("tdoa", log.tdoa))
-    return [
-        UnusedReading(
-            float(rows["time_s"].iloc[0]), kind, f"{len(rows)} rows", Reason.NOT_USED_BY_FILTER
-        )
-        for kind, rows in kinds
-        if len(rows)
-    ]
-
-
-def timing_advances_of(log: TrackLog) -> dict[float, dict[str, int]]:
-    """Return the steps of timing advance by time and cell."""
-    table = log.radio[log.radio["timing_advance"].notna() & log.radio["cell"].notna()]
-    found: dict[float, dict[str, int]] = {}
-    columns = (table["time_s"], table["cell"], table["timing_advance"])
-    for time_s, cell, steps in zip(*(column.tolist() for column in columns), strict=True):
-        found.setdefault(float(time_s), {})[str(cell)] = int(steps)
-    return found
 
 
 def _cell(sites: SiteModels, row: ReportRow, serving: str | None) -> tuple[str | None, Reason]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mapfilter.evaluation.success import SuccessCell
 from mapfilter.experiments.sweep.plan import (
@@ -19,8 +19,7 @@ from mapfilter.experiments.sweep.plan import (
     SweepPlan,
     noise_grid,
 )
-from mapfilter.filters.candidate import CandidateOptions
-from mapfilter.positioning.locators import FilterChoice
+from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.simulation.reports import ReportModel
 
 SIGMA_ORIENT_DEG = (0.0, 3.0, 6.0, 10.0, 15.0, 20.0)
@@ -82,13 +81,12 @@ def plans(trials: int, seed: int) -> tuple[SweepPlan, ...]:
     draws = -(-trials // routes)
     every = noise_grid(SIGMA_TRANS_M, SIGMA_ORIENT_DEG)
     some = noise_grid((ONE_SIGMA_TRANS_M,), SIGMA_ORIENT_DEG)
-    best = CandidateOptions(RESOLUTION_M, RESOLUTION_M)
-    projected = CandidateOptions(RESOLUTION_M, UPDATE_LENGTH_M, prediction="last_heading")
-    next_call = CandidateOptions(RESOLUTION_M, RESOLUTION_M, switch_check="next_call")
-    as_list = CandidateOptions(RESOLUTION_M, RESOLUTION_M, duplicates="list", threshold=10)
-    at_22_m = CandidateOptions(RESOLUTION_M, UPDATE_LENGTH_M)
-    printed = CandidateOptions(
-        RESOLUTION_M,
+    best = CandidateFilter(RESOLUTION_M)
+    projected = CandidateFilter(UPDATE_LENGTH_M, prediction="last_heading")
+    next_call = CandidateFilter(RESOLUTION_M, switch_check="next_call")
+    as_list = CandidateFilter(RESOLUTION_M, duplicates="list", threshold=10)
+    at_22_m = CandidateFilter(UPDATE_LENGTH_M)
+    printed = CandidateFilter(
         RESOLUTION_M,
         tracking_length_m=0.0,
         prediction="last_heading",
@@ -165,8 +163,8 @@ def _fit(name: str, cells: Sequence[SuccessCell]) -> Fit:
     return Fit(name, misfit, *least.values(), **errors_m)
 
 
-def _reading(name: str, options: CandidateOptions, margin_db: float = 0.0) -> Reading:
-    return Reading(name, FilterChoice(options, margin_db), options.update_length_m)
+def _reading(name: str, options: CandidateFilter, margin_db: float = 0.0) -> Reading:
+    return Reading(name, replace(options, margin_db=margin_db), options.update_length_m)
 
 
 def _plan(

@@ -1,4 +1,4 @@
-"""Replaying a log through a Kalman-type filter: GNSS, timing advances, levels, dead reckoning.
+"""Kalman-type filters over a log: GNSS fixes, timing advances, levels and dead reckoning.
 
 No map is needed, only the sites. With dead reckoning the state is the position, moved by each step;
 without, it is position and velocity, and motion is that of constant velocity with white
@@ -7,34 +7,29 @@ acceleration. A start without a fix is a Gaussian sum: one Gaussian over a kilom
 
 from __future__ import annotations
 
-import time
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from math import cos, inf, isfinite, nan, pi, sin
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from mapfilter._types import Floats
-from mapfilter.errors import InputError, fail
+from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.filters.contract import MotionStep, Reason, Status
-from mapfilter.filters.gaussian import Gaussian, Method
-from mapfilter.geodesy import same_crs
+from mapfilter.filters.gaussian import METHODS, Gaussian, Method
 from mapfilter.models.gaussian import GaussianTerms
 from mapfilter.models.motion import constant_velocity
 from mapfilter.models.ranging import position_fix
-from mapfilter.models.state import MOVING, POSITION
-from mapfilter.positioning.epochs import Epoch, GnssFix, epochs
-from mapfilter.positioning.estimate import Fix, PositionedTrack, TrackEstimate, UnusedReading
+from mapfilter.models.state import MOVING, POSITION, StateLayout
+from mapfilter.positioning.epochs import Epoch, GnssFix
+from mapfilter.positioning.estimate import Fix, StepOutput, TrackEstimate, UnusedReading
+from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind
 from mapfilter.positioning.kalman.belief import FusionHistory, SumBelief
-from mapfilter.positioning.kalman.models import SiteModels, compiled
-from mapfilter.positioning.kalman.readings import (
-    SiteReadings,
-    not_taken,
-    site_readings,
-    timing_advances_of,
-)
-from mapfilter.tracks.log import TrackLog
+from mapfilter.positioning.kalman.models import FusionOptions, SiteModels, compiled
+from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
+from mapfilter.radio.antenna import MeasuredAntenna
+from mapfilter.radio.cells import CellPlan
 
 _ANGLES = np.pi * (np.arange(256) + 0.5) / 256
 _SHARES = np.array([0.50, 0.67, 0.95])
@@ -97,78 +92,197 @@ _LEAST_MOVED_M = 0.1
 _WALK_MPS = 1.5
 
 
-def position_by_fusion(
-    sites: SiteModels, crs: str, log: TrackLog, method: Method, *, smooth: bool = False
-) -> PositionedTrack:
-    """Locate a log with a Kalman-type filter.
+@dataclass(frozen=True, slots=True)
+class KalmanFilter(FusionOptions):
+    """A Kalman-type filter over GNSS fixes, timing advances, levels and dead reckoning.
 
-    Nothing aborts a track: readings that cannot be used are labelled.
+    It needs no map, only the sites of the cells. Parameters besides these are those of
+    :class:`mapfilter.positioning.kalman.models.FusionOptions`.
+
+    Parameters
+    ----------
+    method : str
+        Extended (EKF), iterated (IEKF), unscented (UKF), cubature (CKF) or Rao-Blackwellised
+        unscented Kalman filter (RBUKF).
+    smooth : bool
+        Whether positions are smoothed by the whole log (Rauch-Tung-Striebel).
+    """
+
+    method: Literal["ekf", "iekf", "rbukf", "ukf", "ckf"] = "ekf"
+    smooth: bool = False
+
+    @property
+    def name(self) -> str:
+        """The filter's name."""
+        return self.method
+
+    def over(self, database: RadioRouteDatabase, *, ways: bool = True) -> KalmanTracker:  # noqa: ARG002
+        """Return the filter over the sites of a database."""
+        return self.over_sites(database.plan)
+
+    def over_sites(
+        self, plan: CellPlan, antennas: Mapping[str, MeasuredAntenna] | None = None
+    ) -> KalmanTracker:
+        """Return the filter over the sites of a cell plan.
+
+        Parameters
+        ----------
+        plan : CellPlan
+        antennas : mapping of str to MeasuredAntenna, optional
+            As for :class:`mapfilter.positioning.kalman.models.SiteModels`.
+        """
+        return KalmanTracker(
+            SiteModels(plan, self, antennas), plan.crs, METHODS[self.method], self.smooth
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class KalmanState:
+    """State of a journey.
+
+    Parameters
+    ----------
+    layout : StateLayout
+        Position only where there is dead reckoning, else position and velocity.
+    belief : SumBelief or None
+        None before the first measurement that it can start from.
+    time_s : float
+        Of the last epoch.
+    moved_m : float
+        Travelled since levels or timing advances were last used.
+    status : Status
+    surprise : tuple of float
+        Normalised innovations squared of the last measurements, per component.
+    motion : tuple of arrays
+        Transition, noise and shift that led to the last epoch.
+    """
+
+    layout: StateLayout
+    belief: SumBelief | None = None
+    time_s: float = nan
+    moved_m: float = inf
+    status: Status = Status.SEARCHING
+    surprise: tuple[float, ...] = ()
+    motion: tuple[Floats, Floats, Floats] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class KalmanTracker(Filter[KalmanState]):
+    """A Kalman-type filter over the sites of an area.
 
     Parameters
     ----------
     sites : SiteModels
-    crs : str
-        Of the sites.
-    log : TrackLog
-        In the same CRS.
+    sites_crs : str
     method : Method
     smooth : bool
-        Positions in hindsight, by the whole log; statuses stay those of the moment.
-
-    Raises
-    ------
-    InputError
-        The log is in another CRS than the sites.
     """
-    if not same_crs(log.crs, crs):
-        raise fail(InputError, "log, crs", crs, log.crs, "log of another area or zone")
-    began_s = time.process_time()
-    history = FusionHistory() if smooth else None
-    walked = _Walk(sites, method, reckoned=bool(len(log.motion)), history=history)
-    timed = timing_advances_of(log)
-    walked.unused += not_taken(log)
-    log = replace(log, pseudoranges=log.pseudoranges.iloc[:0], tdoa=log.tdoa.iloc[:0])
-    fixes = [walked.take(epoch, timed.get(epoch.time_s, {})) for epoch in epochs(log)]
-    if history is not None:
-        fixes = _in_hindsight(fixes, history, walked.where)
-    estimate = TrackEstimate.of_fixes(
-        crs, method.name, fixes, start_utc_s=log.start_utc_s, unused=walked.unused
-    )
-    return PositionedTrack(estimate, (), time.process_time() - began_s)
+
+    sites: SiteModels
+    sites_crs: str
+    method: Method
+    smooth: bool = False
+
+    @property
+    def name(self) -> str:
+        """The filter's name."""
+        return self.method.name
+
+    @property
+    def crs(self) -> str:
+        """CRS of the sites."""
+        return self.sites_crs
+
+    @property
+    def uses(self) -> Collection[Kind]:
+        """Kinds of measurements that it takes."""
+        return ("motion", "serving", "neighbour", "gnss")
+
+    def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> KalmanState:
+        """Return the state before the first epoch."""
+        return KalmanState(POSITION if "motion" in kinds else MOVING)
+
+    def step(
+        self,
+        state: KalmanState,
+        epoch: Epoch,
+        rng: np.random.Generator,  # noqa: ARG002
+    ) -> tuple[KalmanState, StepOutput]:
+        """Take one epoch: first move, then measure."""
+        work = _Step(self.sites, self.method, state)
+        fix = work.take(epoch)
+        return work.state, StepOutput(fix, unused=tuple(work.unused))
+
+    def smoother(self) -> KalmanSmoother | None:
+        """Return a new smoother where positions shall be smoothed."""
+        return KalmanSmoother() if self.smooth else None
 
 
-def _in_hindsight(fixes: list[Fix], history: FusionHistory, where: list[int]) -> list[Fix]:
-    """Replace the positions since the start by smoothed ones."""
-    later = history.smoothed()
-    first = len(fixes) - len(later)
-    return fixes[:first] + [
-        replace(fix, **_place(belief, where))
-        for fix, belief in zip(fixes[first:], later, strict=True)
-    ]
+@dataclass(eq=False)
+class KalmanSmoother:
+    """Smooths each part of the Gaussian sum (Rauch-Tung-Striebel)."""
+
+    history: FusionHistory = field(default_factory=FusionHistory)
+    where: list[int] = field(default_factory=list)
+
+    def add(self, before: KalmanState, after: KalmanState) -> None:  # noqa: ARG002
+        """Record the state after an epoch, and the motion that led to it."""
+        if after.belief is not None and after.motion is not None:
+            self.where = [after.layout.east, after.layout.north]
+            self.history.add(after.belief, *after.motion)
+
+    def smoothed(
+        self,
+        estimate: TrackEstimate,
+        rng: np.random.Generator,  # noqa: ARG002
+    ) -> TrackEstimate:
+        """Replace the positions since the start by smoothed ones; statuses stay."""
+        later = self.history.smoothed()
+        first = len(estimate) - len(later)
+        fixes = [estimate.fix(index) for index in range(len(estimate))]
+        fixes[first:] = [
+            replace(fix, **_place(belief, self.where))
+            for fix, belief in zip(fixes[first:], later, strict=True)
+        ]
+        return TrackEstimate.of_fixes(
+            estimate.crs,
+            estimate.filter,
+            fixes,
+            start_utc_s=estimate.start_utc_s,
+            unused=estimate.unused,
+        )
 
 
-class _Walk:
-    """One log on its way; the belief is replaced at each epoch."""
+class _Step:
+    """One epoch in work: the state is replaced by parts."""
 
-    def __init__(
-        self, sites: SiteModels, method: Method, *, reckoned: bool, history: FusionHistory | None
-    ) -> None:
+    def __init__(self, sites: SiteModels, method: Method, state: KalmanState) -> None:
         self.sites, self.method, self.options = sites, method, sites.options
-        self.layout = POSITION if reckoned else MOVING
+        self.layout, self.belief, self.time_s = state.layout, state.belief, state.time_s
         self.where = [self.layout.east, self.layout.north]
-        self.belief: SumBelief | None = None
-        self.history = history
-        self.time_s, self.moved_m, self.status = nan, inf, Status.SEARCHING
-        self.surprise: list[float] = []
+        self.moved_m, self.status = state.moved_m, state.status
+        self.surprise = list(state.surprise)
+        self.motion = state.motion
         self.unused: list[UnusedReading] = []
 
-    def take(self, epoch: Epoch, timed: dict[str, int]) -> Fix:
+    @property
+    def state(self) -> KalmanState:
+        """The state after the epoch."""
+        return KalmanState(
+            self.layout,
+            self.belief,
+            self.time_s,
+            self.moved_m,
+            self.status,
+            tuple(self.surprise),
+            self.motion,
+        )
+
+    def take(self, epoch: Epoch) -> Fix:
         """Move, then measure; return the epoch's fix."""
-        moved = self._move(epoch)
-        reason = self._measure(epoch, site_readings(self.sites, epoch, timed))
+        self.motion = self._move(epoch)
+        reason = self._measure(epoch, site_readings(self.sites, epoch))
         self.time_s = epoch.time_s
-        if self.history is not None and self.belief is not None:
-            self.history.add(self.belief, *moved)
         return self._fix(epoch.time_s, reason)
 
     def _move(self, epoch: Epoch) -> tuple[Floats, Floats, Floats]:
@@ -295,10 +409,7 @@ class _Walk:
 
     def _fix(self, time_s: float, reason: Reason) -> Fix:
         if self.belief is None:
-            empty = np.full((2, 2), nan)
-            return Fix(
-                time_s, nan, nan, empty, np.full(3, nan), self.status, 0, nan, 0, nan, reason
-            )
+            return Fix.nowhere(time_s, self.status, reason)
         place = _place(self.belief.moments, self.where)
         self._tell(float(place["radii_m"][2]))
         count = self.belief.weights.size
@@ -314,7 +425,7 @@ class _Walk:
         """Bring the status up to date: settled or not, surprised for long or not."""
         lost = len(self.surprise) == _WINDOW and float(np.mean(self.surprise)) > _SURPRISE
         if self.status is Status.SEARCHING:
-            if radius_m <= self.options.settled_m:
+            if radius_m <= self.options.converged_radius_m:
                 self.status = Status.CONVERGED
         else:
             self.status = Status.LOST if lost else Status.TRACKING

@@ -1,0 +1,295 @@
+"""The one contract of filters that locate a journey, and the one loop over a log.
+
+A filter is a frozen object. ``begin`` returns the state before the first epoch, and ``step`` takes
+one epoch: state in, state out, with a :class:`StepOutput`. :func:`locate` calls it for every epoch
+of a log, a live application for every one that comes in: equal epochs give equal bytes.
+"""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite, nan
+from typing import Any, Generic, Literal, Protocol, TypeVar
+
+import numpy as np
+
+from mapfilter._types import Floats
+from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.errors import InputError, fail
+from mapfilter.filters.contract import Reason, Status
+from mapfilter.geodesy import same_crs
+from mapfilter.positioning.epochs import Epoch, epochs
+from mapfilter.positioning.estimate import (
+    PositionedTrack,
+    Snapshot,
+    StepOutput,
+    TrackEstimate,
+    UnusedReading,
+)
+from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.schema import SERVING
+
+Kind = Literal["motion", "serving", "neighbour", "gnss", "pseudorange", "tdoa"]
+"""What a journey may record."""
+
+ALL_KINDS: frozenset[Kind] = frozenset(
+    ("motion", "serving", "neighbour", "gnss", "pseudorange", "tdoa")
+)
+_SNAPSHOT_EVERY_M = 20.0
+
+StateT = TypeVar("StateT")
+
+
+@dataclass(frozen=True, slots=True)
+class Hypotheses:
+    """Position hypotheses of a belief, in the CRS of the filter.
+
+    Parameters
+    ----------
+    east_m, north_m, weight : (n,) arrays
+        Weights sum to one.
+    """
+
+    east_m: Floats
+    north_m: Floats
+    weight: Floats
+
+
+class Smoother(Protocol):
+    """Collects the states of a forward pass, and smooths the track by them."""
+
+    def add(self, before: Any, after: Any) -> None:
+        """Record the states before and after one epoch."""
+
+    def smoothed(self, estimate: TrackEstimate, rng: np.random.Generator) -> TrackEstimate:
+        """Return the estimate with positions given the whole log; statuses stay."""
+
+
+class Filter(ABC, Generic[StateT]):
+    """A filter over an area, from an unknown start; subclasses are frozen dataclasses.
+
+    ``begin`` and ``step`` are all that a filter needs. They are pure: states are never changed in
+    place, and the generator alone decides the result.
+    """
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """Name of the filter, as in estimates and commands."""
+
+    @property
+    @abstractmethod
+    def crs(self) -> str:
+        """CRS of its positions."""
+
+    @property
+    def uses(self) -> Collection[Kind]:
+        """Kinds of measurements that it takes; others are reported as not used."""
+        return ALL_KINDS
+
+    @abstractmethod
+    def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> StateT:
+        """Return the state before the first epoch.
+
+        Parameters
+        ----------
+        kinds : collection of str
+            What the journey records: without "motion" there is no dead reckoning to wait for.
+        """
+
+    @abstractmethod
+    def step(
+        self, state: StateT, epoch: Epoch, rng: np.random.Generator
+    ) -> tuple[StateT, StepOutput]:
+        """Take one epoch: first move, then measure."""
+
+    def warm_up(self, merged: Sequence[Epoch]) -> None:
+        """Load kernels and map data before the clock starts."""
+
+    def smoother(self) -> Smoother | None:
+        """Return a new smoother where positions shall be smoothed, else None."""
+        return None
+
+    def hypotheses(self, state: StateT) -> Hypotheses | None:
+        """Return the hypotheses of a state, for pictures; None where there are none."""
+        del state
+        return None
+
+
+class FilterOptions(Protocol):
+    """Options of a filter, hashable: :meth:`over` binds them to a database."""
+
+    @property
+    def name(self) -> str:
+        """Name of the filter, as ``--filter`` takes it."""
+
+    def __hash__(self) -> int:
+        """Return a hash: workers keep one filter for equal options."""
+
+    def over(self, database: RadioRouteDatabase, *, ways: bool = True) -> Filter[Any]:
+        """Return the filter over the area of a database.
+
+        Parameters
+        ----------
+        database : RadioRouteDatabase
+            What is read of it is kept, and shared by all logs.
+        ways : bool
+            Whether positions are matched to ways; success and errors do not need it.
+        """
+
+
+def locate(
+    log: TrackLog, filter_: Filter[Any], rng: np.random.Generator, *, snapshots: bool = False
+) -> PositionedTrack:
+    """Locate a log: the one loop over epochs.
+
+    Nothing aborts a track: readings that cannot be used are labelled with a reason.
+
+    Parameters
+    ----------
+    log : TrackLog
+        In the filter's CRS.
+    filter_ : Filter
+    rng : numpy.random.Generator
+    snapshots : bool
+        Whether to keep the hypotheses at some epochs until the filter tracks, for figures.
+
+    Raises
+    ------
+    InputError
+        The log is in another CRS than the filter.
+    """
+    if not same_crs(log.crs, filter_.crs):
+        hint = "log of another area or zone"
+        raise fail(InputError, "log, crs", filter_.crs, log.crs, hint)
+    log, unused = _without_unused(log, filter_)
+    merged = epochs(log)
+    filter_.warm_up(merged)
+    smoother = filter_.smoother()
+    album = _Album(filter_)
+    outputs: list[StepOutput] = []
+    began_s = time.process_time()
+    for before, after, output in _steps(filter_, filter_.begin(kinds_of(log)), merged, rng):
+        outputs.append(output)
+        if smoother is not None:
+            smoother.add(before, after)
+        if snapshots:
+            album.add(after, merged[len(outputs) - 1], output)
+    estimate = estimate_of(filter_, outputs, unused, log.start_utc_s)
+    if smoother is not None:
+        estimate = smoother.smoothed(estimate, rng)
+    return PositionedTrack(estimate, tuple(album.taken), time.process_time() - began_s)
+
+
+def _steps(
+    filter_: Filter[Any], state: Any, merged: Sequence[Epoch], rng: np.random.Generator
+) -> Iterator[tuple[Any, Any, StepOutput]]:
+    for epoch in merged:
+        before = state
+        state, output = filter_.step(before, epoch, rng)
+        yield before, state, output
+
+
+def kinds_of(log: TrackLog) -> frozenset[Kind]:
+    """Return which kinds of measurements a log holds."""
+    serving = log.radio["role"] == SERVING
+    rows: dict[Kind, int] = {
+        "motion": len(log.motion),
+        "serving": int(serving.sum()),
+        "neighbour": int((~serving).sum()),
+        "gnss": len(log.gnss),
+        "pseudorange": len(log.pseudoranges),
+        "tdoa": len(log.tdoa),
+    }
+    return frozenset(kind for kind, count in rows.items() if count)
+
+
+def _without_unused(log: TrackLog, filter_: Filter[Any]) -> tuple[TrackLog, list[UnusedReading]]:
+    """Take out tables that the filter has no use for, and name each kind once.
+
+    Neighbours stay, as rows of the reports that the filter takes.
+    """
+    tables = {
+        "neighbour": log.radio[log.radio["role"] != SERVING],
+        "gnss": log.gnss,
+        "pseudorange": log.pseudoranges,
+        "tdoa": log.tdoa,
+    }
+    unused = [
+        UnusedReading(
+            float(rows["time_s"].iloc[0]), kind, f"{len(rows)} rows", Reason.NOT_USED_BY_FILTER
+        )
+        for kind, rows in tables.items()
+        if kind not in filter_.uses and len(rows)
+    ]
+    fields = {"gnss": "gnss", "pseudorange": "pseudoranges", "tdoa": "tdoa"}
+    empty = {
+        field: tables[kind].iloc[:0] for kind, field in fields.items() if kind not in filter_.uses
+    }
+    return replace(log, **empty), unused
+
+
+def estimate_of(
+    filter_: Filter[Any],
+    outputs: Sequence[StepOutput],
+    unused: Sequence[UnusedReading] = (),
+    start_utc_s: float = nan,
+) -> TrackEstimate:
+    """Put the outputs of a filter's steps together.
+
+    Parameters
+    ----------
+    filter_ : Filter
+        Gives name and CRS.
+    outputs : sequence of StepOutput
+        One for each epoch.
+    unused : sequence of UnusedReading
+        Besides those of the outputs.
+    start_utc_s : float
+        UTC seconds of time 0.
+    """
+    labelled = [*unused, *(reading for output in outputs for reading in output.unused)]
+    return TrackEstimate.of_outputs(
+        filter_.crs,
+        filter_.name,
+        outputs,
+        start_utc_s=start_utc_s,
+        unused=sorted(labelled, key=lambda reading: reading.time_s),
+    )
+
+
+class _Album:
+    """Hypotheses at chosen epochs: when the status changes, and every 20 m until tracking."""
+
+    def __init__(self, filter_: Filter[Any]) -> None:
+        self.filter, self.travelled_m, self.open = filter_, 0.0, True
+        self.taken: list[Snapshot] = []
+
+    def add(self, state: Any, epoch: Epoch, output: StepOutput) -> None:
+        fix, found = output.fix, self.filter.hypotheses(state)
+        if found is None or not self.open:
+            return
+        if self.taken:
+            moved = (step.step_m for step in epoch.motion if isfinite(step.step_m))
+            self.travelled_m += sum(map(abs, moved))
+            last = self.taken[-1]
+            near = self.travelled_m - last.travelled_m < _SNAPSHOT_EVERY_M
+            if fix.status is last.status and near:
+                return
+        self.open = fix.status is not Status.TRACKING
+        if self.open:
+            self.taken.append(
+                Snapshot(
+                    fix.time_s,
+                    self.travelled_m,
+                    found.east_m,
+                    found.north_m,
+                    found.weight,
+                    fix.east_m,
+                    fix.north_m,
+                    fix.status,
+                )
+            )
