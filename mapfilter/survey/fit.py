@@ -65,7 +65,7 @@ class SurveyOptions(Options):
         An antenna of unknown place is located from at least so many; with fewer the trend is the
         mean.
     neighbours : int
-        For "knn".
+        Number of neighbours that "knn" averages.
     square_m : float
         Readings of one session in one such square count once.
     most_points : int
