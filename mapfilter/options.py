@@ -134,7 +134,7 @@ def describe_options(options: type[Options]) -> Iterator[OptionInfo]:
     >>> next(info.name for info in describe_options(WalkerModel) if info.numeric)
     'change_side_m'
     """
-    described = descriptions(cast(Any, options))
+    described = descriptions(options)
     annotations = annotations_of(options)
     for field in fields(options):
         default = field.default if field.default is not MISSING else None
@@ -269,8 +269,7 @@ def _holds(limit: Any, value: Any) -> bool:
     return bool(value < limit.lt)
 
 
-@cache
-def descriptions(options: Any) -> dict[str, str]:
+def descriptions(options: type) -> dict[str, str]:
     """Return the descriptions in the ``Parameters`` sections of a class and of its bases."""
     found: dict[str, str] = {}
     for one in reversed(options.__mro__):

@@ -42,10 +42,10 @@ def _table(values: Section, path: str) -> Iterator[str]:
     section = type(values)
     yield ""
     yield from _entry(f"[{path}]", _summary(section))
-    meanings = {}
+    meanings: dict[str, str] = {}
     for kind in (*section.kinds, section):
         meanings |= descriptions(kind)
-    inner = []
+    inner: list[str] = []
     for name in section.model_fields:
         value, meaning = getattr(values, name), _plain(meanings.get(name, ""))
         if isinstance(value, Section):

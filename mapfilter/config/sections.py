@@ -347,7 +347,43 @@ def _names_once(readings: tuple[ReadingSection, ...]) -> tuple[ReadingSection, .
 
 
 class SweepSection(Section):
-    """``[sweep]``: axes of the grid, how many runs, and the filters that are compared."""
+    """``[sweep]``: axes of the grid, how many runs, and the filters that are compared.
+
+    An axis without values takes the value of its section.
+
+    Parameters
+    ----------
+    sigma_trans_m : list of float, optional
+        Values of ``imu.sigma_trans_m``.
+    sigma_orient_deg : list of float, optional
+        Values of ``imu.sigma_orient_deg``.
+    bias_sd_deg : list of float, optional
+        Values of ``imu.bias_sd_deg``.
+    drift_deg_per_sqrt_s : list of float, optional
+        Values of ``imu.drift_deg_per_sqrt_s``.
+    scale : list of float, optional
+        Values of ``imu.scale``.
+    prediction_error_db : list of float, optional
+        Standard deviations of the ground truth from the prediction, in place of
+        ``journeys.radio``.
+    report_period_s : list of float, optional
+        Values of ``journeys.report_period_s``.
+    imu_period_s : list of float, optional
+        Values of ``imu.period_s``.
+    update_length_m : list of float, optional
+        Values of ``filter.update_length_m``.
+    databases : list of Path
+        Databases that are compared; by default that of ``[database]``.
+    readings : list of section
+        Filters that are compared, each as ``[[sweep.readings]]`` with a ``name`` and the keys of
+        ``[filter]`` that differ (the filter's name is called ``filter`` there).
+    routes : int
+        Routes that each point of the grid is run on.
+    draws : int
+        Runs on each route, which differ in noise.
+    seed : int
+        Seed of routes and noise.
+    """
 
     sigma_trans_m: NotNegatives | None = None
     sigma_orient_deg: Degrees | None = None
@@ -530,7 +566,24 @@ class Database(Section):
 
 
 class Journeys(Section):
-    """``[journeys]``: routes along the streets and what the phone reports on them."""
+    """``[journeys]``: routes along the streets and what the phone reports on them.
+
+    Parameters
+    ----------
+    count : int
+        Number of routes.
+    draws : int
+        Logs of each route, which differ in noise.
+    length_m : float
+        Length of a route.
+    speed_mps : float
+        Speed of the walking profile.
+    nlos_satellites : bool
+        Whether satellites behind buildings are received by reflections, in those cases of evaluate
+        that have satellites.
+    seed : int
+        Seed of routes and noise.
+    """
 
     count: Annotated[int, Ge(1), Le(1_000_000)] = 1
     draws: Annotated[int, Ge(1), Le(1_000_000)] = 1
