@@ -30,7 +30,7 @@ def check(
     settings: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Look at all inputs together before anything runs; exit code 2 if something is wrong."""
+    """Check all inputs together before anything runs; exit code 2 if something is wrong."""
     from mapfilter.check.findings import paragraphs
     from mapfilter.config.load import load_config
     from mapfilter.workflows.check import run_check
@@ -67,7 +67,7 @@ def build(
     settings: SetOption = None,
     out: OutOption = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Only tell size, memory and time.")
+        bool, typer.Option("--dry-run", help="Only estimate size, memory and time.")
     ] = False,
     workers: WorkersOption = 1,
     cluster: ClusterOption = None,
@@ -90,16 +90,19 @@ def build(
 
 
 def merge(
-    databases: Annotated[list[Path], typer.Argument(metavar="DB...", help="One or more.")],
+    databases: Annotated[
+        list[Path], typer.Argument(metavar="DB...", help="Databases, one or more.")
+    ],
     out: Annotated[
-        Path, typer.Option("--out", metavar="DB", help="The new one.", callback=given_path)
+        Path, typer.Option("--out", metavar="DB", help="The merged database.", callback=given_path)
     ],
     without: Annotated[
-        list[str] | None, typer.Option("--without-cell", metavar="CELL", help="Repeatable.")
+        list[str] | None,
+        typer.Option("--without-cell", metavar="CELL", help="A cell to leave out; repeatable."),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Merge databases of other areas or cells; a later one replaces what it covers."""
+    """Merge databases of several areas or cells; later databases override earlier ones."""
     from mapfilter.workflows.databases import run_merge
 
     given = [given_path(path) or path for path in databases]
@@ -123,7 +126,7 @@ def export(
 
 
 def info(path: PathArgument, as_json: JsonOption = False) -> None:
-    """Tell what a database, raster set or log holds."""
+    """Describe a database, raster set or log."""
     from mapfilter.workflows.info import run_info
 
     print_result(run_info(path), as_json)
@@ -133,19 +136,23 @@ def bound(
     database: Annotated[Path, typer.Argument(metavar="DB", callback=given_path)],
     out: OutOption = None,
     spacing_m: Annotated[
-        float, typer.Option("--spacing", metavar="M", help="Metres between starts.")
+        float, typer.Option("--spacing", metavar="M", help="Metres between the starts of journeys.")
     ] = 50.0,
-    journeys: Annotated[int, typer.Option("--journeys", help="From each start.")] = 2,
+    journeys: Annotated[int, typer.Option("--journeys", help="Journeys from each start.")] = 2,
     level_error_db: Annotated[
-        float, typer.Option("--level-error", metavar="DB", help="Of predicted levels.")
+        float,
+        typer.Option(
+            "--level-error", metavar="DB", help="Standard deviation of errors of predicted levels."
+        ),
     ] = 7.0,
     correlation_m: Annotated[
-        float, typer.Option("--correlation", metavar="M", help="How far these errors last.")
+        float,
+        typer.Option("--correlation", metavar="M", help="Correlation length of these errors."),
     ] = 50.0,
     seed: SeedOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Tell where a database will work: accuracy, metres to convergence, places that look alike."""
+    """Predict where a database will work: accuracy, metres to a first fix, ambiguous places."""
     from mapfilter.evaluation.first_fix import FirstFixOptions
     from mapfilter.evaluation.radio_map import ErrorModel
     from mapfilter.workflows.bound import run_bound

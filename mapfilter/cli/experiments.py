@@ -85,7 +85,7 @@ def reproduce(
     cluster: ClusterOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Repeat a paper's experiments: figure, table, and every reading of what it leaves open."""
+    """Repeat a paper's experiments: its figure, its table, each reading of what it leaves open."""
     from mapfilter.workflows.reproduce import run_reproduce
     from mapfilter.workflows.reproduce_dlr import DLR, run_reproduce_dlr
     from mapfilter.workflows.reproduce_fusion import FUSION_PAPERS, run_reproduce_fusion
@@ -140,10 +140,10 @@ def bench(
     stage: Annotated[
         str, typer.Argument(metavar="[NAME]", help="build, filter, fusion or sweep.")
     ] = "build",
-    runs: Annotated[int, typer.Option("--runs", min=1, help="Runs that medians are of.")] = 5,
+    runs: Annotated[int, typer.Option("--runs", min=1, help="Runs; medians are reported.")] = 5,
     as_json: JsonOption = False,
 ) -> None:
-    """Tell how fast a stage is on this machine."""
+    """Measure how fast a stage is on this machine."""
     from mapfilter.workflows.bench import run_bench
 
     print_result(run_bench(stage, runs=runs), as_json)

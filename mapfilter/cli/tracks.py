@@ -45,7 +45,7 @@ def simulate(
     seed: SeedOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Simulate journeys with truth along the streets."""
+    """Simulate journeys along the streets, with ground truth."""
     from mapfilter.config.load import load_config
     from mapfilter.workflows.simulate import run_simulate
 
@@ -65,7 +65,7 @@ def replay(
         typer.Option(
             "--filter",
             metavar="NAME",
-            help="candidate, bayes, grid or your own, package.module:Name; "
+            help="candidate, bayes, grid or a custom filter, package.module:Name; "
             "without a map ekf, iekf, rbukf, ukf, ckf.",
         ),
     ] = None,
@@ -78,7 +78,10 @@ def replay(
         ),
     ] = None,
     smooth: Annotated[
-        bool, typer.Option("--smooth", help="Positions in hindsight, by the whole log.")
+        bool,
+        typer.Option(
+            "--smooth", help="Smooth the track by the whole log (forward filtering, backward pass)."
+        ),
     ] = False,
     config: ConfigOption = None,
     settings: SetOption = None,
@@ -86,7 +89,7 @@ def replay(
     seed: SeedOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Locate one log, or every log of a folder; exit code 3 if that was done in part only."""
+    """Locate one log, or every log of a folder; exit code 3 if done in part."""
     from mapfilter.config.load import load_config
     from mapfilter.workflows.replay import replay_facts, run_replay
 

@@ -143,6 +143,25 @@ def test_command_line_page_names_every_command_and_option():
                     assert option in text, (name, option)
 
 
+def test_help_has_whole_summaries_examples_and_pages(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "100")
+    text = CliRunner().invoke(app, ["--help"]).output
+    command = typer.main.get_command(app)
+    for name, sub in command.commands.items():
+        summary = sub.help.partition("\n")[0]
+        assert f"{name} {summary}" in " ".join(text.split()), name
+        shown = CliRunner().invoke(app, [name, "--help"]).output
+        example = re.search(r"Example:\n +mapfilter (.+)\n", shown)
+        pointer = re.search(r"Documentation: docs/(\S+)", shown)
+        assert example is not None, name
+        assert pointer is not None, name
+        first, *arguments = shlex.split(example[1])
+        assert first == name
+        sub.make_context(name, arguments)
+        assert (DOCS / pointer[1]).is_file()
+    assert "..." not in text.replace("[ARGS]...", "")
+
+
 def test_command_line_page_names_every_finding_of_check():
     assert set(REMEDIES) <= named(page("cli.rst"))
 
