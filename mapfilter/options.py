@@ -13,8 +13,9 @@ Names carry their unit (``_m``, ``_deg``, ``_dbm``).
 
 from __future__ import annotations
 
+import operator
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache
 from inspect import cleandoc
@@ -45,7 +46,12 @@ Probability = Annotated[float, Gt(0), Lt(1)]
 Degrees = Annotated[float, Ge(0), Le(360)]
 Seed = Annotated[int, Ge(0), Lt(2**63)]
 
-_LIMITS = (Ge, Gt, Le, Lt)
+_LIMITS: dict[type, tuple[str, str, Callable[[Any, Any], Any]]] = {
+    Ge: ("ge", ">=", operator.ge),
+    Gt: ("gt", ">", operator.gt),
+    Le: ("le", "<=", operator.le),
+    Lt: ("lt", "<", operator.lt),
+}
 _TYPES = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
 _TYPES |= {Path: "a path", NoneType: "nothing", tuple: "a list", dict: "a section"}
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*) : .*$")
@@ -70,8 +76,6 @@ class OptionInfo:
 
     Parameters
     ----------
-    name : str
-    default : object
     expected : str
         Type and limits in words, such as ``a number > 0``.
     description : str
@@ -203,14 +207,8 @@ def without_none(annotation: Any) -> Any:
 
 
 def _limit(limit: Any) -> str:
-    match limit:
-        case Ge(ge=bound):
-            return f">= {_number(bound)}"
-        case Gt(gt=bound):
-            return f"> {_number(bound)}"
-        case Le(le=bound):
-            return f"<= {_number(bound)}"
-    return f"< {_number(limit.lt)}"
+    name, sign, _ = _LIMITS[type(limit)]
+    return f"{sign} {_number(getattr(limit, name))}"
 
 
 def _number(value: Any) -> str:
@@ -220,7 +218,7 @@ def _number(value: Any) -> str:
 def _split(annotation: Any) -> tuple[Any, list[Any]]:
     if get_origin(annotation) is Annotated:
         inner, *marks = get_args(annotation)
-        return inner, [mark for mark in marks if isinstance(mark, _LIMITS)]
+        return inner, [mark for mark in marks if isinstance(mark, tuple(_LIMITS))]
     return annotation, []
 
 
@@ -233,7 +231,7 @@ def plain_types(annotation: Any) -> list[Any]:
 
 
 def fits(annotation: Any, value: Any) -> bool:
-    """Tell whether a value is what an annotation allows."""
+    """Return whether an annotation allows a value."""
     inner, limits = _split(annotation)
     origin = get_origin(inner)
     if origin is Literal:
@@ -259,14 +257,8 @@ def fits(annotation: Any, value: Any) -> bool:
 
 
 def _holds(limit: Any, value: Any) -> bool:
-    match limit:
-        case Ge(ge=bound):
-            return bool(value >= bound)
-        case Gt(gt=bound):
-            return bool(value > bound)
-        case Le(le=bound):
-            return bool(value <= bound)
-    return bool(value < limit.lt)
+    name, _, holds = _LIMITS[type(limit)]
+    return bool(holds(value, getattr(limit, name)))
 
 
 def descriptions(options: type) -> dict[str, str]:

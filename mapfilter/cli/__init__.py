@@ -46,7 +46,7 @@ _COMMANDS: tuple[tuple[Callable[..., None], str, str], ...] = (
     (evaluate, "global-positioning --case levels-6 --runs 5", "explanation/simulated-worlds.rst"),
     (bench, "filter --runs 3", "explanation/scale.rst"),
 )
-"""Commands, each with an example and the page of the documentation that tells more."""
+"""Commands, each with an example and a page of the documentation."""
 
 for _command, _example, _page in _COMMANDS:
     _name = _command.__name__

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -92,48 +91,33 @@ def reproduce(
     from mapfilter.workflows.reproduce_tesa import TESA, run_reproduce_tesa
     from mapfilter.workflows.sweep import brief
 
+    folder = (out or Path("out") / paper).absolute()
+    common: dict[str, Any] = {"trials": trials, "seed": seed or 0}
     if paper in FUSION_PAPERS:
         with rate_bar("reproduce", "parts") as progress:
             fused = run_reproduce_fusion(
-                paper,
-                (out or Path("out") / paper).absolute(),
-                layout_file=layout,
-                trials=trials,
-                seed=seed or 0,
-                progress=progress,
+                paper, folder, layout_file=layout, progress=progress, **common
             )
         print_result(fused, as_json)
         return
+    common |= {"workers": workers, "cluster": cluster}
     if paper in (TESA, DLR):
         refuse({"--map": area_map, "--bbox": bbox, "--layout": layout}, paper)
         run = run_reproduce_tesa if paper == TESA else run_reproduce_dlr
         with rate_bar("reproduce", "trials") as progress:
-            tried = run(
-                (out or Path("out") / paper).absolute(),
-                trials=trials,
-                seed=seed or 0,
-                workers=workers,
-                cluster=cluster,
-                progress=progress,
-            )
+            tried = run(folder, progress=progress, **common)
         # The table holds the rows, too.
         shown = {key: own for key, own in asdict(tried).items() if as_json or key != "rows"}
         print_result(shown, as_json)
         return
+    common["trials"] = trials or 100
+    box = numbers(bbox, 4, "--bbox")
     with rate_bar("reproduce", "runs") as progress:
         result = run_reproduce(
-            paper,
-            (out or Path("out") / paper).absolute(),
-            map_name=area_map,
-            bbox=numbers(bbox, 4, "--bbox"),
-            trials=trials or 100,
-            seed=seed or 0,
-            workers=workers,
-            cluster=cluster,
-            progress=progress,
+            paper, folder, map_name=area_map, bbox=box, progress=progress, **common
         )
-    told = asdict(result) | ({} if as_json else {"success": brief(result.success)})
-    print_result(told, as_json)
+    shown = asdict(result) | ({} if as_json else {"success": brief(result.success)})
+    print_result(shown, as_json)
 
 
 def bench(
@@ -209,15 +193,22 @@ def evaluate(
 ) -> None:
     """Benchmark localization accuracy: simulated on any map, or on real sessions."""
     from mapfilter.workflows.evaluate import RUNS, check_benchmark, run_global_positioning
+    from mapfilter.workflows.evaluate_audit import run_audit
+    from mapfilter.workflows.evaluate_ottawa import RUNS as OTTAWA_RUNS
+    from mapfilter.workflows.evaluate_ottawa import run_ottawa
     from mapfilter.workflows.evaluate_settings import load_benchmark
 
     check_benchmark(name, data)
+    common: dict[str, Any] = {"seed": seed, "workers": workers, "resume": resume}
+    result: Any
     if name == "ottawa" and data is not None:
         other = None if filter_name == "bayes" else filter_name
-        unheeded = {"--map": map_file, "--bbox": bbox, "--case": cases, "--filter": other}
-        unheeded |= {"--world": world}
-        refuse(unheeded | {"--config": config, "--set": settings}, name)
-        _ottawa(data, out, runs, seed, workers, resume, as_json)
+        unused = {"--map": map_file, "--bbox": bbox, "--case": cases, "--filter": other}
+        refuse(unused | {"--world": world, "--config": config, "--set": settings}, name)
+        folder = (out or Path("out") / "ottawa").absolute()
+        with rate_bar("evaluate", "sessions") as progress:
+            result = run_ottawa(data, folder, runs=runs or OTTAWA_RUNS, progress=progress, **common)
+        print_result(result, as_json)
         return
     refuse({"--data": data}, name)
     given = list(settings or ())
@@ -229,77 +220,17 @@ def evaluate(
         given.append(f"filter.name={toml(filter_name)}")
     if name == "audit":
         refuse({"--world": world}, name)
-        _audit(config, given, out, runs or RUNS, seed, cases or (), workers, resume, as_json)
-        return
+        world = "easy"
     loaded, fixed = load_benchmark(world or "plain", config, given)
     find_own_filter(loaded)
     folder = (out or loaded.output.dir / name).absolute()
+    common["runs"] = runs or RUNS
     with rate_bar("evaluate", "batches") as progress:
-        result = run_global_positioning(
-            loaded,
-            folder,
-            runs=runs or RUNS,
-            seed=seed,
-            cases=cases or (),
-            workers=workers,
-            resume=resume,
-            progress=progress,
-            fixed=fixed,
-        )
-    print_result(result, as_json)
-
-
-def _audit(
-    config: Path | None,
-    settings: list[str],
-    out: Path | None,
-    runs: int,
-    seed: int,
-    cases: Sequence[str],
-    workers: int,
-    resume: bool,
-    as_json: bool,
-) -> None:
-    from mapfilter.workflows.evaluate_audit import run_audit
-    from mapfilter.workflows.evaluate_settings import load_benchmark
-
-    loaded, _ = load_benchmark("easy", config, settings)
-    find_own_filter(loaded)
-    with rate_bar("evaluate", "batches") as progress:
-        result = run_audit(
-            config,
-            settings,
-            (out or loaded.output.dir / "audit").absolute(),
-            runs=runs,
-            seed=seed,
-            names=cases,
-            workers=workers,
-            resume=resume,
-            progress=progress,
-        )
-    print_result(result, as_json)
-
-
-def _ottawa(
-    data: Path,
-    out: Path | None,
-    runs: int | None,
-    seed: int,
-    workers: int,
-    resume: bool,
-    as_json: bool,
-) -> None:
-    from mapfilter.workflows.evaluate_ottawa import RUNS, run_ottawa
-
-    folder = (out or Path("out") / "ottawa").absolute()
-    with rate_bar("evaluate", "sessions") as progress:
-        result = run_ottawa(
-            data,
-            folder,
-            runs=runs or RUNS,
-            seed=seed,
-            workers=workers,
-            resume=resume,
-            progress=progress,
-        )
+        common["progress"] = progress
+        if name == "audit":
+            result = run_audit(config, given, folder, names=cases or (), **common)
+        else:
+            result = run_global_positioning(
+                loaded, folder, cases=cases or (), fixed=fixed, **common
+            )
     print_result(result, as_json)

@@ -55,7 +55,7 @@ def resolve_map(value: Any, info: ValidationInfo) -> Any:
 
 
 def check_filter_name(value: str) -> str:
-    """See that a filter is one of ours, or has the form ``package.module:Name``."""
+    """Check that a filter is built in, or has the form ``package.module:Name``."""
     known = (*MAP_FILTERS, *FUSION_FILTERS)
     if value not in known and not _OWN_FILTER.fullmatch(value):
         names = ", ".join(map(repr, known))
@@ -107,6 +107,15 @@ class Section(BaseModel):
         return kind(**values | others)
 
 
+class Columns(Section):
+    """A section that names columns of a table."""
+
+    @property
+    def given(self) -> dict[str, str]:
+        """The columns that are named."""
+        return {name: column for name, column in self if column is not None}
+
+
 def field_annotation(section: type[BaseModel], name: str) -> Any:
     """Return the annotation of a field of a section, with its limits."""
     field = section.model_fields[name]
@@ -137,14 +146,27 @@ def with_options(
             for info in describe_options(kind):
                 if info.name not in (*section.model_fields, *without):
                     given[info.name] = (annotations[info.name], info.default)
-        made = create_model(
-            section.__name__,
-            __base__=section,
-            __module__=section.__module__,
-            __doc__=section.__doc__,
-            **given,
-        )
+        made = _extended(section, given)
         made.kinds = kinds
         return made
 
     return extended
+
+
+def with_columns(*names: str) -> Callable[[type[SectionT]], type[SectionT]]:
+    """Return a class decorator that gives a section an optional text for each name."""
+
+    def extended(section: type[SectionT]) -> type[SectionT]:
+        return _extended(section, dict.fromkeys(names, (str | None, None)))
+
+    return extended
+
+
+def _extended(section: type[SectionT], given: dict[str, Any]) -> type[SectionT]:
+    return create_model(
+        section.__name__,
+        __base__=section,
+        __module__=section.__module__,
+        __doc__=section.__doc__,
+        **given,
+    )

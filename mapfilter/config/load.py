@@ -43,7 +43,7 @@ def load_config(
     Raises
     ------
     ConfigError
-        The file cannot be read or is no TOML, or keys or values are wrong; all told together.
+        The file cannot be read or is no TOML, or keys or values are wrong; all faults together.
 
     Examples
     --------
@@ -229,7 +229,7 @@ def _parse_value(text: str) -> Any:
 
 
 def _is_path(keys: tuple[str, ...]) -> bool:
-    """Tell whether a setting fills a field of paths."""
+    """Return whether a setting fills a field of paths."""
     annotation: Any = Config
     for key in keys:
         annotation = _inside(annotation, key)

@@ -16,6 +16,7 @@ from mapfilter.config.fields import (
     NO_MAP,
     SYNTHETIC_MAPS,
     Box,
+    Columns,
     Count,
     FilePath,
     FilterName,
@@ -23,6 +24,7 @@ from mapfilter.config.fields import (
     Pair,
     Section,
     Size,
+    with_columns,
     with_options,
 )
 from mapfilter.database.build import FLOOR_DBM, MARGIN_DB, TILE_PX
@@ -30,48 +32,24 @@ from mapfilter.options import NotNegative, Positive, Seed
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.propagation.models import GroundTruthErrors, ModelName, PredictionModel
+from mapfilter.radio.cell_layouts import COLUMNS as PLAN_COLUMNS
 from mapfilter.roads.buildings import DEFAULT_HEIGHT_M, STOREY_HEIGHT_M
 from mapfilter.roads.corridors import MAX_ACCURACY_M, MAX_GAP_M
 from mapfilter.simulation.imu import Turns
 from mapfilter.simulation.walking import Beside
 from mapfilter.survey.fit import SurveyOptions
 from mapfilter.survey.measurements import SESSION_GAP_S
+from mapfilter.survey.measurements_csv import FIELDS as MEASUREMENT_COLUMNS
 from mapfilter.tracks.leave_out import Kind
 
 
-class CellColumns(Section):
+@with_columns(*PLAN_COLUMNS, "east", "north", "crs")
+class CellColumns(Columns):
     """``[cells.columns]``: names of the plan's columns, where a cell list has others.
 
     Each key is a column of the plan; its value is the name of that column in the list. Positions
     are ``lat`` and ``lon``, or ``east`` and ``north``.
     """
-
-    cell: str | None = None
-    site: str | None = None
-    lat: str | None = None
-    lon: str | None = None
-    east: str | None = None
-    north: str | None = None
-    crs: str | None = None
-    height_m: str | None = None
-    azimuth_deg: str | None = None
-    downtilt_deg: str | None = None
-    mechanical_downtilt_deg: str | None = None
-    antenna: str | None = None
-    beamwidth_deg: str | None = None
-    max_attenuation_db: str | None = None
-    vertical_beamwidth_deg: str | None = None
-    side_lobe_db: str | None = None
-    eirp_dbm: str | None = None
-    frequency_mhz: str | None = None
-    indoor: str | None = None
-    penetration_loss_db: str | None = None
-    mcc: str | None = None
-    mnc: str | None = None
-    lac: str | None = None
-    ci: str | None = None
-    arfcn: str | None = None
-    bsic: str | None = None
 
 
 class Cells(Section):
@@ -125,24 +103,13 @@ def _listed(value: Any) -> Any:
 Files = Annotated[tuple[FilePath, ...], BeforeValidator(_listed), Field(strict=False)]
 
 
-class SurveyColumns(Section):
+@with_columns(*MEASUREMENT_COLUMNS)
+class SurveyColumns(Columns):
     """``[prediction.survey.columns]``: names of the columns of a CSV file with others.
 
     Each key is a field of a measurement; its value is the name of its column. Cells are named by
     ``cell``, or by ``mcc``, ``mnc``, ``lac`` and ``ci``.
     """
-
-    cell: str | None = None
-    mcc: str | None = None
-    mnc: str | None = None
-    lac: str | None = None
-    ci: str | None = None
-    lat: str | None = None
-    lon: str | None = None
-    level_dbm: str | None = None
-    time: str | None = None
-    accuracy_m: str | None = None
-    session: str | None = None
 
 
 @with_options(SurveyOptions, without=("most_points",))
@@ -467,9 +434,14 @@ class Area(Section):
         return self
 
     @property
+    def has_box(self) -> bool:
+        """Whether a box is given."""
+        return self.bbox is not None or self.southwest is not None
+
+    @property
     def has_extent(self) -> bool:
-        """Whether a box or the map says where the area is; else what is in it does."""
-        return self.map != NO_MAP or self.bbox is not None or self.southwest is not None
+        """Whether a box or the map gives the extent; else it is that of rasters or measurements."""
+        return self.map != NO_MAP or self.has_box
 
 
 @with_options(GroundTruthErrors)
@@ -535,10 +507,10 @@ class Rasters(Section):
     resampling: Literal["nearest", "bilinear"] = "nearest"
 
     @model_validator(mode="after")
-    def _said_of_a_path(self) -> Rasters:
-        said = (self.quantity, self.crs, self.nodata, self.resolution_m)
-        if self.path is None and (any(one is not None for one in said) or self.factor != 1):
-            raise ValueError("path, as the other keys say what is there")
+    def _keys_of_a_path(self) -> Rasters:
+        given = (self.quantity, self.crs, self.nodata, self.resolution_m)
+        if self.path is None and (any(one is not None for one in given) or self.factor != 1):
+            raise ValueError("path, which the other keys describe")
         if self.factor == 0:
             raise ValueError("a factor other than 0")
         return self

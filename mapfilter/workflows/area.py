@@ -98,7 +98,7 @@ def pixels_on(
 
 
 def check_scale(crs: str, bounds_m: tuple[float, float, float, float], where: str) -> None:
-    """See that metres of a CRS are metres on the ground in the middle of an area.
+    """Check that metres of a CRS are metres on the ground in the middle of an area.
 
     Raises
     ------

@@ -40,9 +40,9 @@ class BoundResult:
     plane_bound_m, along_bound_m : float
         Medians of the position-error bound of one report, of points that have one.
     without_plane_bound : float
-        Share of points at which levels tell nothing of one direction.
+        Share of points at which levels carry no information along one direction.
     cell_bits, level_bits : float
-        Means of what one report tells.
+        Mean information of one report.
     cells_bits_per_m, levels_bits_per_m : float
         Expected information on the start per metre, over the first ``path_m``.
     cells_to_fix_m, levels_to_fix_m : float

@@ -23,7 +23,6 @@ class MergeResult:
     ----------
     points, cells : int
         Of the new database.
-    database : Path
     seconds : float
         Wall time.
     """

@@ -70,7 +70,7 @@ def _no_raster(path: Path) -> str:
 def _is_export(path: Path) -> bool:
     try:
         with warnings.catch_warnings():
-            # A file that is cut off may have lost its place; its own reader tells so.
+            # A file that is cut off may have lost its place; its own reader reports that.
             warnings.simplefilter("ignore", NotGeoreferencedWarning)
             source = rasterio.open(path)
         with source:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -12,6 +13,7 @@ import numpy as np
 from mapfilter._io import ensure_writable_folder
 from mapfilter._types import Floats32
 from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.errors import OutputError, fail
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.geodesy import Lattice
 from mapfilter.positioning.estimate import PositionedTrack, Snapshot
@@ -30,7 +32,6 @@ from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.ways import Buildings
 from mapfilter.tracks.log import TrackLog
-from mapfilter.workflows.results import clear_pictures
 from mapfilter.workflows.served import (
     MOST_READ_PX,
     ServedPoints,
@@ -40,6 +41,67 @@ from mapfilter.workflows.served import (
     street_map,
     thinned_lattice,
 )
+
+ESTIMATES = ("estimate.parquet", "estimate.gpx", "estimate.geojson")
+FIGURES = "figures.json"
+SUMMARY = "summary.json"
+
+PICTURES = ("candidates.png", "belief.png", "track.png", "error.png", "evidence.png")
+
+_OF_ONE_LOG = {*ESTIMATES, FIGURES, *PICTURES}
+
+
+def clear_results(out: Path) -> None:
+    """Remove what an older replay wrote into a folder, so that no figures of two replays mix.
+
+    A folder in it is one of that replay's when it is called as the log that its figures are of,
+    and holds nothing else. All other files stay.
+
+    Raises
+    ------
+    OutputError
+        A file cannot be removed.
+    """
+    try:
+        for name in (*_OF_ONE_LOG, SUMMARY):
+            (out / name).unlink(missing_ok=True)
+        for inner in sorted(out.iterdir()):
+            if _is_result(inner):
+                for file in inner.iterdir():
+                    file.unlink()
+                inner.rmdir()
+    except OSError as error:
+        what = error.strerror or error
+        raise fail(OutputError, str(error.filename or out), "a place to write", what) from error
+
+
+def clear_pictures(folder: Path, names: Sequence[str]) -> None:
+    """Remove older pictures from a folder, so that none shows what is gone.
+
+    Raises
+    ------
+    OutputError
+        One cannot be removed.
+    """
+    try:
+        for name in names:
+            (folder / name).unlink(missing_ok=True)
+    except OSError as error:
+        what = error.strerror or error
+        where = str(error.filename or folder)
+        raise fail(OutputError, where, "a picture that can be removed", what) from error
+
+
+def _is_result(folder: Path) -> bool:
+    figures = folder / FIGURES
+    if folder.is_symlink() or not figures.is_file():
+        return False
+    try:
+        of = json.loads(figures.read_text(encoding="utf-8")).get("log")
+    except (ValueError, AttributeError, RecursionError):
+        return False
+    return of == folder.name and {file.name for file in folder.iterdir()} <= _OF_ONE_LOG
+
 
 NETWORK_PICTURES = (
     "coverage.png",
@@ -76,15 +138,14 @@ def draw_network(
     any has several, and land use where it is known. Memory is bounded whatever the area: it is
     thinned to what a picture can show, and of very large sets of rasters only the database's points
     are shown. Where nearly all points lie in less than half of the area, only that is shown, and
-    the titles tell so.
+    the titles show that.
 
     Parameters
     ----------
     rasters : RxLevRasters
         Levels or losses.
-    database : RadioRouteDatabase
     folder : Path
-        Made where it is missing; pictures of an older database in it make way.
+        Made where it is missing; pictures of an older database in it are removed.
     area : Lattice, optional
         The part of the database's lattice that its roads were laid on, when that is not all.
     landuse : LandUse, optional
@@ -122,9 +183,7 @@ def draw_network(
     drawn = [folder / name for name in NETWORK_PICTURES[:4]]
     titles = [f"{title}{told}" for title in _TITLES]
     ends_dbm = _ends(best.level_dbm)
-    plot_level(
-        best.level_dbm, lattice, plan, base, drawn[0], title=titles[0], range_dbm=ends_dbm
-    )  # fmt: skip
+    plot_level(best.level_dbm, lattice, plan, base, drawn[0], title=titles[0], range_dbm=ends_dbm)
     plot_best_server(best.server, plan.ids, lattice, plan, base, drawn[1], title=titles[1])
     plot_margin(best.margin_db, lattice, plan, base, drawn[2], title=titles[2])
     _draw_points(database, points, database.cell_ids, drawn[3], titles[3])
@@ -163,7 +222,7 @@ def draw_site(database: RadioRouteDatabase, points: ServedPoints, site: str, pat
 
 
 def land_use_of_map(points: ServedPoints, buildings: Buildings) -> LandUse:
-    """Return the land use that a street map tells: ways, squares, buildings, and the rest.
+    """Return the land use of a street map: ways, squares, buildings, and the rest.
 
     Parameters
     ----------

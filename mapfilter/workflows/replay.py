@@ -27,24 +27,20 @@ from mapfilter.positioning.estimate_store import write_estimate, write_geojson, 
 from mapfilter.positioning.filter import Filter, locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.propagation.shadowing import named_rng
-from mapfilter.radio.antenna import MeasuredAntenna
-from mapfilter.radio.cells import CellPlan
-from mapfilter.radio.msi import read_antennas
 from mapfilter.report.errors import plot_error_over_distance
 from mapfilter.tracks.leave_out import leave_out
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.schema import SERVING
 from mapfilter.tracks.store import list_logs, read_log
-from mapfilter.workflows.pictures import draw_track
-from mapfilter.workflows.results import ESTIMATES, FIGURES, SUMMARY, clear_results
+from mapfilter.workflows.pictures import ESTIMATES, FIGURES, SUMMARY, clear_results, draw_track
 from mapfilter.workflows.terminal import to_jsonable
-from mapfilter.workflows.world import filter_choice, outside_m, planned_cells
+from mapfilter.workflows.world import filter_choice, outside_m, plan_antennas, planned_cells
 
 _AWAY_M = 5000.0
 
 
 def check_logs(folders: Sequence[Path], lattice: Lattice) -> None:
-    """Read every log once before any is located, so that all faults are told and none half-way.
+    """Read every log once before any is located, so that all faults are reported before any result.
 
     Raises
     ------
@@ -122,7 +118,7 @@ class ReplayedLog:
     name : str
         Of the log's folder.
     outcome : Outcome
-        What the filter says of itself.
+        As the filter reports it, without ground truth.
     accuracy : Accuracy or None
         Against the truth, where the log has it.
     notes : tuple of str
@@ -148,7 +144,7 @@ class ReplayedLog:
 
     @property
     def figures(self) -> dict[str, Any]:
-        """What is told of the log: its outcome, its notes, and its score where there is one."""
+        """Outcome, notes and, with ground truth, the score."""
         score = asdict(self.accuracy) if self.accuracy is not None else {}
         return {**asdict(self.outcome), "notes": self.notes, **score}
 
@@ -354,7 +350,7 @@ class _Sites:
         if not isinstance(options, KalmanFilter):
             raise TypeError(options.name)
         plan = planned_cells(self.config, log.crs)
-        return options.over_sites(plan, _antennas(self.config, plan))
+        return options.over_sites(plan, plan_antennas(self.config, plan))
 
     def draw(self, log: TrackLog, track: PositionedTrack, into: Path) -> tuple[Path, ...]:
         truth = Truth.of_table(log.truth)
@@ -366,11 +362,6 @@ class _Sites:
 
     def lack(self, log: TrackLog, estimate: TrackEstimate) -> str:  # noqa: ARG002
         return "" if estimate.converged_at is not None else "too little was measured"
-
-
-def _antennas(config: Config, plan: CellPlan) -> dict[str, MeasuredAntenna]:
-    folder = config.cells.antennas
-    return {} if folder is None else read_antennas(folder, (cell.antenna for cell in plan.cells))
 
 
 def _write(

@@ -24,7 +24,7 @@ from mapfilter.survey.measurements import Measurements, named_after, read_measur
 from mapfilter.survey.rasters import predicted_levels, surveyed_plan, write_survey
 from mapfilter.survey.trend import Covariate
 from mapfilter.survey.validation import LeftOut, Validation, leave_out
-from mapfilter.workflows.results import clear_pictures
+from mapfilter.workflows.pictures import clear_pictures
 from mapfilter.workflows.served import thinned_lattice
 from mapfilter.workflows.world import (
     LARGEST_AREA_PX,
@@ -70,7 +70,7 @@ class SurveyEvidence:
 def draw_survey(survey: SurveyEvidence, folder: Path) -> tuple[Path, ...]:
     """Draw the three cells with the most measurements, and the sessions left out one by one.
 
-    Without a left-out measurement that the others could tell there is no second picture.
+    There is no second picture where nothing could be predicted from other sessions.
 
     Raises
     ------
@@ -85,9 +85,13 @@ def draw_survey(survey: SurveyEvidence, folder: Path) -> tuple[Path, ...]:
     if told is None or not len(told):
         return (levels,)
     plot_left_out(
-        told.measured_dbm, told.predicted_dbm, left_out_levels, title=_named(told),
-        trend_dbm=told.trend_dbm, attribution=survey.attribution,
-    )  # fmt: skip
+        told.measured_dbm,
+        told.predicted_dbm,
+        left_out_levels,
+        title=_named(told),
+        trend_dbm=told.trend_dbm,
+        attribution=survey.attribution,
+    )
     return levels, left_out_levels
 
 
@@ -95,9 +99,9 @@ def _named(left_out: LeftOut) -> str:
     """Return what was left out, as a title."""
     folds, sessions = left_out.folds, left_out.sessions
     if sessions == 1:
-        return f"{folds} parts of one session, each told by the others"
+        return f"{folds} parts of one session, each predicted from the others"
     groups = f" in {folds} groups" if folds < sessions else ""
-    return f"{sessions} sessions{groups}, each told by the others"
+    return f"{sessions} sessions{groups}, each predicted from the others"
 
 
 def _surveyed(survey: SurveyEvidence) -> tuple[list[SurveyedLevels], BaseMap]:
@@ -244,7 +248,7 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
 
 
 def _draw(config: Config, evidence: SurveyEvidence) -> tuple[Path, ...]:
-    """Draw the survey; pictures of an older one make way in any case."""
+    """Draw the survey; pictures of an older one are removed in any case."""
     folder = config.pictures_path
     clear_pictures(folder, SURVEY_PICTURES)
     return () if config.output.pictures == "none" else draw_survey(evidence, folder)
@@ -303,12 +307,11 @@ def _measurements(config: Config, lattice: Lattice | None) -> tuple[Measurements
     crs = lattice.crs if lattice is not None else None
     if crs is None and config.area.crs is not None:
         crs = projected_crs(config.area.crs, "area.crs")
-    columns = {name: column for name, column in section.columns if column is not None}
     found = read_measurements(
         section.files,
         crs,
         format=section.format,
-        columns=columns or None,
+        columns=section.columns.given or None,
         session_gap_s=section.session_gap_s,
     ).accurate(section.max_accuracy_m)
     if not len(found):
@@ -324,7 +327,7 @@ def _given_lattice(config: Config, rasters: RxLevRasters | None) -> Lattice | No
     if rasters is not None:
         return rasters.lattice
     area = config.area
-    if area.bbox is None and area.southwest is None:
+    if not area.has_box:
         return None
     return area_lattice(area, on_map=False)
 

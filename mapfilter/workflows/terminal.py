@@ -41,7 +41,7 @@ def print_result(result: Any, as_json: bool) -> None:
 
 @contextlib.contextmanager
 def progress_bar(label: str) -> Iterator[Progress | None]:
-    """Give a progress bar on stderr, or nothing when nobody watches."""
+    """Show a progress bar on stderr, if that is a terminal."""
     if not sys.stderr.isatty():
         yield None
         return
@@ -66,7 +66,7 @@ def rate_text(per_s: float, unit: str) -> str:
 
 @contextlib.contextmanager
 def rate_bar(label: str, unit: str, every_s: float = 30.0) -> Iterator[Progress]:
-    """Give a progress on stderr with rate and time left; a line now and then where nobody watches.
+    """Show progress, rate and time left on stderr: a bar, or a line now and then without terminal.
 
     Parameters
     ----------
@@ -119,12 +119,7 @@ _NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def guarded(run: Callable[[], int | None]) -> int:
-    """Run a command and return its exit code, 0 for none; a user's error is told on stderr.
-
-    Parameters
-    ----------
-    run : callable
-    """
+    """Run a command and return its exit code, 0 for none; errors of input go to stderr."""
     try:
         return run() or 0
     except MapfilterError as error:

@@ -42,11 +42,11 @@ def planned_rasters(config: Config) -> RxLevRasters:
     Raises
     ------
     InputError
-        They are wrong, or do not fit what the configuration says of them.
+        They are wrong, or do not fit the configuration.
     """
     section = config.rasters
     if config.prediction.model == "survey" and config.prediction.survey.calibrate is not None:
-        # What is said of rasters is said of those to calibrate; a survey's own tell it all.
+        # The other keys describe the rasters to calibrate; a survey's own need none.
         section = Rasters(path=section.path)
     if section.path is None and not config.rasters_path.exists():
         hint = "not predicted yet; run mapfilter predict first, or set rasters.path"
@@ -57,12 +57,12 @@ def planned_rasters(config: Config) -> RxLevRasters:
 
 
 def open_as_said(path: Path, section: Rasters) -> RxLevRasters:
-    """Open rasters as ``[rasters]`` says that they are.
+    """Open rasters as ``[rasters]`` describes them.
 
     Raises
     ------
     InputError
-        They are wrong, or do not fit what is said of them.
+        They are wrong, or do not fit their description.
     """
     return open_rasters(
         path,
@@ -95,7 +95,7 @@ def planned_cells(config: Config, crs: str, area: Lattice | None = None) -> Cell
         cells.plan,
         crs,
         layout=cells.layout,
-        columns={name: column for name, column in cells.columns if column is not None},
+        columns=cells.columns.given,
         defaults={
             "height_m": cells.height_m,
             "eirp_dbm": cells.eirp_dbm,
@@ -103,6 +103,12 @@ def planned_cells(config: Config, crs: str, area: Lattice | None = None) -> Cell
         },
         bounds_m=bounds_m,
     )
+
+
+def plan_antennas(config: Config, plan: CellPlan) -> dict[str, MeasuredAntenna]:
+    """Read the measured antennas that a plan names from their folder, where one is given."""
+    folder = config.cells.antennas
+    return {} if folder is None else read_antennas(folder, (cell.antenna for cell in plan.cells))
 
 
 @dataclass(frozen=True)
@@ -153,7 +159,7 @@ class World:
 
     @property
     def landuse(self) -> LandUse | None:
-        """What the land-use raster says, where one is given."""
+        """The land-use raster, where one is given."""
         return self.streets.landuse
 
     @cached_property
@@ -199,15 +205,12 @@ class World:
 
     @cached_property
     def antennas(self) -> dict[str, MeasuredAntenna]:
-        """The measured antennas that the plan names, read from their folder."""
-        folder = self.config.cells.antennas
-        if folder is None:
-            return {}
-        return read_antennas(folder, (cell.antenna for cell in self.plan.cells))
+        """The measured antennas that the plan names."""
+        return plan_antennas(self.config, self.plan)
 
 
 FARTHEST_M = 50_000.0
-"""No cell is heard from farther away."""
+"""No cell is received from farther away."""
 
 _ENOUGH = 0.95
 _ABOUT_WAYS_M = 100.0
@@ -216,13 +219,12 @@ _NAMED = 3
 
 
 def check_cells_near(plan: CellPlan, lattice: Lattice, where: str) -> None:
-    """See that no cell lies more than 50 km outside an area.
+    """Check that no cell lies more than 50 km outside an area.
 
     Parameters
     ----------
     plan : CellPlan
         In the CRS of the lattice.
-    lattice : Lattice
     where : str
         What messages call the plan.
 
@@ -257,13 +259,13 @@ def outside_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> Floats:
 def map_cover(world: World) -> tuple[str, ...]:
     """Return a note when the ways of a map extend over but a part of the area that is asked for.
 
-    What a map's header says is only taken as a reason to look: maps often hold more, as whole ways
-    are kept. The share is that of the ways' convex hull, 100 m about it included.
+    The extent in a map's header is only a reason to look: maps often hold more, as whole ways are
+    kept. The share is that of the ways' convex hull, 100 m about it included.
     """
     config, lattice = world.config, world.lattice
     area, roads = config.area, config.roads
     replaced = roads.layer is not None or roads.tracks.files
-    if not _has_box(area) or not area.map_is_a_file or replaced:
+    if not area.has_box or not area.map_is_a_file or replaced:
         return ()
     if _told_share(area, lattice) >= _ENOUGH:
         return ()
@@ -287,16 +289,12 @@ def _told_share(area: Area, lattice: Lattice) -> float:
 
 def raster_cover(area: Area, lattice: Lattice) -> tuple[str, ...]:
     """Return a note when rasters, cut to ``lattice``, cover but a part of the area asked for."""
-    if not _has_box(area):
+    if not area.has_box:
         return ()
     wanted = area_lattice(area.model_copy(update={"crs": lattice.crs}))
     covered_m2 = lattice.rows * lattice.cols * lattice.resolution_m**2
     wanted_m2 = wanted.rows * wanted.cols * wanted.resolution_m**2
     return _note("the set of rasters", covered_m2 / wanted_m2)
-
-
-def _has_box(area: Area) -> bool:
-    return area.bbox is not None or area.southwest is not None
 
 
 def _note(what: str, share: float) -> tuple[str, ...]:
