@@ -9,10 +9,20 @@ from typing import Annotated
 import typer
 
 from mapfilter import __version__
-from mapfilter.cli.databases import bound, build, check, export, info, merge, predict
+from mapfilter.cli.chain import (
+    bound,
+    build,
+    check,
+    demo,
+    export,
+    info,
+    merge,
+    predict,
+    replay,
+    simulate,
+)
 from mapfilter.cli.experiments import bench, evaluate, reproduce, sweep
 from mapfilter.cli.options import DONE
-from mapfilter.cli.tracks import demo, replay, simulate
 from mapfilter.workflows.terminal import guarded
 
 __all__ = ["app", "main"]

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress, executor_of
-from mapfilter.config.sections import Area, Config
+from mapfilter.config.inputs import Area
+from mapfilter.config.sections import Config
 from mapfilter.database.build import build
 from mapfilter.database.estimate import BuildEstimate, dry_run
 from mapfilter.database.manifest import InputFile

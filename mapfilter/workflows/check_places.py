@@ -10,7 +10,8 @@ import shapely
 
 from mapfilter._types import Bools, Floats
 from mapfilter.check.findings import Findings, listed
-from mapfilter.config.sections import Area, Config
+from mapfilter.config.inputs import Area
+from mapfilter.config.sections import Config
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice, project, projected_crs, same_crs, unproject, utm_crs
 from mapfilter.radio.cells import CellPlan

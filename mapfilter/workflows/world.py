@@ -10,7 +10,8 @@ import numpy as np
 import shapely
 
 from mapfilter._types import Floats
-from mapfilter.config.sections import Area, Config, FilterSection, Rasters
+from mapfilter.config.inputs import Area, Rasters
+from mapfilter.config.sections import Config, FilterSection
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes, Routes
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, unproject
