@@ -25,7 +25,10 @@ from mapfilter.cli.options import (
     seeded,
     toml,
 )
+from mapfilter.experiments.papers import PAPERS
 from mapfilter.workflows.terminal import print_result, rate_bar, say
+
+*_FIRST, _LAST = PAPERS
 
 
 def sweep(
@@ -58,10 +61,7 @@ def sweep(
 def reproduce(
     paper: Annotated[
         str,
-        typer.Argument(
-            metavar="PAPER",
-            help="khalaf-allah-2007, fritsche-klein-2009, zhang-2006, tesa or dlr.",
-        ),
+        typer.Argument(metavar="PAPER", help=f"{', '.join(_FIRST)} or {_LAST}."),
     ],
     area_map: Annotated[
         str | None,
@@ -84,40 +84,24 @@ def reproduce(
     cluster: ClusterOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Repeat a paper's experiments: its figure, its table, each reading of what it leaves open."""
-    from mapfilter.workflows.reproduce import run_reproduce
-    from mapfilter.workflows.reproduce_dlr import DLR, run_reproduce_dlr
-    from mapfilter.workflows.reproduce_fusion import FUSION_PAPERS, run_reproduce_fusion
-    from mapfilter.workflows.reproduce_tesa import TESA, run_reproduce_tesa
-    from mapfilter.workflows.sweep import brief
+    """Repeat a paper's experiments: figure, table, and every reading of what it leaves open."""
+    from mapfilter.experiments.papers import find_paper
+    from mapfilter.workflows.reproduce import brief_figures, run_reproduce
 
-    folder = (out or Path("out") / paper).absolute()
-    common: dict[str, Any] = {"trials": trials, "seed": seed or 0}
-    if paper in FUSION_PAPERS:
-        with rate_bar("reproduce", "parts") as progress:
-            fused = run_reproduce_fusion(
-                paper, folder, layout_file=layout, progress=progress, **common
-            )
-        print_result(fused, as_json)
-        return
-    common |= {"workers": workers, "cluster": cluster}
-    if paper in (TESA, DLR):
-        refuse({"--map": area_map, "--bbox": bbox, "--layout": layout}, paper)
-        run = run_reproduce_tesa if paper == TESA else run_reproduce_dlr
-        with rate_bar("reproduce", "trials") as progress:
-            tried = run(folder, progress=progress, **common)
-        # The table holds the rows, too.
-        shown = {key: own for key, own in asdict(tried).items() if as_json or key != "rows"}
-        print_result(shown, as_json)
-        return
-    common["trials"] = trials or 100
-    box = numbers(bbox, 4, "--bbox")
-    with rate_bar("reproduce", "runs") as progress:
-        result = run_reproduce(
-            paper, folder, map_name=area_map, bbox=box, progress=progress, **common
+    with rate_bar("reproduce", find_paper(paper).unit) as progress:
+        found = run_reproduce(
+            paper,
+            (out or Path("out") / paper).absolute(),
+            map_name=area_map,
+            bbox=numbers(bbox, 4, "--bbox"),
+            layout_file=layout,
+            trials=trials,
+            seed=seed or 0,
+            workers=workers,
+            cluster=cluster,
+            progress=progress,
         )
-    shown = asdict(result) | ({} if as_json else {"success": brief(result.success)})
-    print_result(shown, as_json)
+    print_result(found if as_json else brief_figures(found), as_json)
 
 
 def bench(

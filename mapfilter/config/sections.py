@@ -32,7 +32,7 @@ from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.simulation.imu import Turns
 from mapfilter.simulation.walking import Beside
-from mapfilter.tracks.leave_out import Kind
+from mapfilter.tracks.log import Kind
 
 
 def _axis_values(value: Any) -> Any:

@@ -21,10 +21,20 @@ MANIFEST = "manifest.json"
 CELLS = "cells.parquet"
 POINTS = "points.parquet"
 
-InputRole = Literal[
-    "map", "roads", "tracks", "buildings", "water", "landuse", "landuse_table", "plan", "rasters",
-    "database",
-]  # fmt: skip
+InputRole = (
+    Literal[
+        "map",
+        "roads",
+        "tracks",
+        "buildings",
+        "water",
+        "landuse",
+        "landuse_table",
+        "plan",
+        "rasters",
+    ]
+    | Literal["database"]
+)
 
 _LONGEST_NAME = 200
 _DAMAGED = "edited or damaged"
@@ -32,16 +42,7 @@ _DAMAGED = "edited or damaged"
 
 @dataclass(frozen=True, slots=True)
 class InputFile:
-    """A file that a database was made from, for the record.
-
-    Parameters
-    ----------
-    role : {"map", "roads", "tracks", "buildings", "water", "landuse", "landuse_table", "plan", \
-            "rasters", "database"}
-    name : str
-        Its name without its folder.
-    sha256 : str
-    """
+    """A file that a database was made from; ``name`` is without its folder."""
 
     role: InputRole
     name: str

@@ -14,15 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import distance_transform_edt
 
 from mapfilter._types import Bools, Floats32, Ints, Ints32
-from mapfilter.database.columns import read_columns
 from mapfilter.database.manifest import POINTS
-from mapfilter.database.windows import WindowReader
+from mapfilter.database.parquet import WindowReader, read_columns
 from mapfilter.errors import InputError, StoreError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class RadioField:
     """What would be heard at every pixel of an area.
 
@@ -52,6 +51,10 @@ class RadioField:
     way_id: Ints
     on_way: Bools
 
+    def __repr__(self) -> str:
+        points = int(self.on_way.sum())
+        return f"RadioField({len(self.cell_ids)} cells, {points} points; {self.lattice})"
+
     def levels_at(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats32:
         """Return the levels at positions, shape (N, cells); NaN below the floor or off the area.
 
@@ -78,7 +81,6 @@ def fill_field(
 
     Parameters
     ----------
-    window : Lattice
     pixels : tuple of numpy.ndarray, shape (N,) each
         Rows and columns of the points in the window, at least one.
     way_id, distance_m : numpy.ndarray, shape (N,)
@@ -110,7 +112,7 @@ def fill_field(
 Rows = Ints32
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Points:
     """All points of a database in row-major order, as columns of length N.
 
@@ -118,16 +120,12 @@ class Points:
     ----------
     point : numpy.ndarray of int64
         ``row * lattice.cols + col``: the same in every rebuild on the same lattice.
-    row, col : numpy.ndarray of int32
     way_id : numpy.ndarray of int64
         0 where the point belongs to no way.
     way_class : tuple of (numpy.ndarray of int32, tuple of str)
         Codes and the names that they stand for.
-    on_square : numpy.ndarray of bool
-    distance_to_way_m : numpy.ndarray of float32
     best_server : numpy.ndarray of int32
         Index into the database's ``cell_ids``.
-    best_level_dbm : numpy.ndarray of float32
     margin_db : numpy.ndarray of float32
         Best level above the second best, NaN where only one cell is predicted.
     """
@@ -146,8 +144,11 @@ class Points:
     def __len__(self) -> int:
         return int(self.point.size)
 
+    def __repr__(self) -> str:
+        return f"Points({len(self)} of {', '.join(self.__dataclass_fields__)})"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class RadioRouteDatabase:
     """A database folder, read when asked and only as far as asked.
 
@@ -175,6 +176,13 @@ class RadioRouteDatabase:
     margin_db: float
     floor_dbm: float
     manifest: Mapping[str, Any]
+
+    def __repr__(self) -> str:
+        points = self.manifest.get("counts", {}).get("points", "unknown number of")
+        return (
+            f"RadioRouteDatabase({str(self.path)!r}, {len(self.plan)} cells, {points} points;\n"
+            f"  {self.lattice}; margin {self.margin_db:g} dB, floor {self.floor_dbm:g} dBm)"
+        )
 
     @property
     def cell_ids(self) -> tuple[str, ...]:
@@ -231,7 +239,6 @@ class RadioRouteDatabase:
 
         Parameters
         ----------
-        cell_id : str
         margin_db : float or None
             A point belongs to the cell when the cell is at most this much weaker than the point's
             best server; infinity gives all points above the floor, None takes the database's own.

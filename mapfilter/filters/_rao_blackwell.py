@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 from numba import float64, int64, njit, types
 
-from mapfilter._kernels import hashed, normals
+from mapfilter._kernels import MEASURE_SIGNATURE, hashed, normals
 from mapfilter._types import Floats, Floats32, Ints, Ints32
-from mapfilter.filters._square_root import MEASURE_SIGNATURE
 
 _LANES = 256
 """Particles that are weighed at once: what they need stays in the nearest cache."""

@@ -15,8 +15,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite, nan
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Ge, Le
 from numpy.typing import ArrayLike
 
 from mapfilter._kernels import draw_key
@@ -27,39 +29,32 @@ from mapfilter.filters.gaussian import Gaussian, factor_of
 from mapfilter.filters.kalman import Taken
 from mapfilter.filters.resampling import normalise, systematic
 from mapfilter.filters.trials import CompiledMeasurement
+from mapfilter.options import Options, Share
 
 
 @dataclass(frozen=True, slots=True)
-class SirOptions:
-    """How particles are drawn anew.
+class SirOptions(Options):
+    """Resampling of the particles.
 
     Parameters
     ----------
     resample_below : float
-        Share of the effective sample size under which particles are drawn anew; 1 does so at every
+        Share of the effective sample size below which particles are resampled; 1 does so at every
         reading (sampling importance resampling, SIR).
     regularise : float
-        Width of the kernel that parts copies, as a share of the best one for normal beliefs
+        Width of the kernel that jitters copies, as a share of the best one for normal beliefs
         (Musso, Oudjane & Le Gland 2001); 0 for none.
     """
 
-    resample_below: float = 1.0
-    regularise: float = 0.0
-
-    def __post_init__(self) -> None:
-        faults = Faults()
-        if not 0 <= self.resample_below <= 1:
-            faults.add("SIR, resample_below", "a share in 0..1", self.resample_below)
-        if not 0 <= self.regularise <= 2:
-            faults.add("SIR, regularise", "a share in 0..2", self.regularise)
-        faults.raise_if_any(InputError)
+    resample_below: Share = 1.0
+    regularise: Annotated[float, Ge(0), Le(2)] = 0.0
 
 
 SIR = SirOptions()
-"""Drawn anew at every reading."""
+"""Resampled at every reading."""
 
 REGULARISED = SirOptions(0.5, 0.5)
-"""Drawn anew where half of the particles carry the weight, copies parted."""
+"""Resampled where half of the particles carry the weight, copies jittered."""
 
 
 _LOG_TWO_PI = float(np.log(2 * np.pi))

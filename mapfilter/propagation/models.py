@@ -43,8 +43,6 @@ ModelName = Literal[
 ]
 LineOfSight = Literal["buildings", "probability"]
 Clutter = Literal["own", "shared"]
-
-
 _Length = Annotated[float, Ge(1e-3), Le(1e4)]
 _Correlation = Annotated[float, Gt(0), Le(1e5)]
 _Deviation = Annotated[float, Ge(0), Le(50)]
@@ -164,11 +162,6 @@ class GroundTruthErrors(Options):
     offset_db : float
         Added to all levels: the mean by which another propagation model differs, which drive tests
         would have taken out of the prediction.
-
-    Raises
-    ------
-    ConfigError
-        With every fault.
     """
 
     level_error_db: _Deviation = 7.0
@@ -189,13 +182,7 @@ class GroundTruthErrors(Options):
     offset_db: Annotated[float, Ge(-50), Le(50)] = 0.0
 
     def truth_of(self, prediction: PredictionModel) -> PredictionModel:
-        """Return the ground truth's propagation model, for that of a prediction.
-
-        Raises
-        ------
-        ConfigError
-            What differs from the prediction is out of range.
-        """
+        """Return the ground truth's propagation model, for that of a prediction."""
         names = ("model", "street_width_m", "building_separation_m", "default_roof_height_m")
         given = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         return replace(prediction, **given)
@@ -241,10 +228,8 @@ def path_loss_db(
 
     Parameters
     ----------
-    model : PredictionModel
     distance_m : array_like
         Horizontal distance.
-    frequency_mhz, base_height_m : float
     roof_height_m : array_like
         Mean height of the roofs around the mobile; of use to Walfisch-Ikegami only.
     sight : array_like
@@ -256,10 +241,8 @@ def path_loss_db(
         case "friis":
             return friis_db(distance_m, frequency_mhz)
         case "log_distance":
-            return log_distance_db(
-                distance_m, frequency_mhz, model.path_loss_exponent, model.reference_distance_m,
-                model.reference_loss_db,
-            )  # fmt: skip
+            reference = model.reference_distance_m, model.reference_loss_db
+            return log_distance_db(distance_m, frequency_mhz, model.path_loss_exponent, *reference)
         case "okumura_hata":
             return okumura_hata_db(
                 distance_m, frequency_mhz, base_height_m, mobile_m, model.environment
@@ -267,11 +250,12 @@ def path_loss_db(
         case "cost231_hata":
             return cost231_hata_db(distance_m, frequency_mhz, base_height_m, mobile_m, city)
         case "cost231_walfisch_ikegami":
+            place = distance_m, frequency_mhz, base_height_m, mobile_m, roof_height_m
+            streets = (model.street_width_m, model.building_separation_m)
+            seen = np.asarray(sight) > 0.5
             return cost231_walfisch_ikegami_db(
-                distance_m, frequency_mhz, base_height_m, mobile_m, roof_height_m,
-                model.street_width_m, model.building_separation_m, model.street_orientation_deg,
-                city, np.asarray(sight) > 0.5,
-            )  # fmt: skip
+                *place, *streets, model.street_orientation_deg, city, seen
+            )
         case "tr38901_uma" | "tr38901_umi":
             where = (distance_m, frequency_mhz, base_height_m, mobile_m)
             seen_db = seen_loss_db(_SCENARIOS[model.model], *where)
@@ -313,14 +297,9 @@ def outside_published_range(
     longest_distance_m: float,
     nearest_distance_m: float | None = None,
 ) -> tuple[str, ...]:
-    """Tell in words which values lie outside the range a model was published for.
+    """Return remarks on the values that lie outside the range a model was published for.
 
-    Parameters
-    ----------
-    model : str
-    frequency_mhz, base_height_m, mobile_height_m : float
-    longest_distance_m, nearest_distance_m : float
-        Between which distances it is used; the nearest need not be looked at.
+    ``nearest_distance_m`` and ``longest_distance_m`` limit the distances at which it is used.
 
     Examples
     --------
@@ -338,7 +317,7 @@ def outside_published_range(
         "mobile_height_m": mobile_height_m,
         "distance_m": longest_distance_m,
     }
-    told = [
+    remarks = [
         f"{name} {values[name]:g} is "
         + (f"outside {low:g}..{high:g}" if low < high else f"not {low:g}")
         for name, (low, high) in published.items()
@@ -347,5 +326,7 @@ def outside_published_range(
     if nearest_distance_m is not None and "distance_m" in published:
         low, high = published["distance_m"]
         if nearest_distance_m < low <= longest_distance_m:
-            told.append(f"distance_m from {nearest_distance_m:g} on is outside {low:g}..{high:g}")
-    return tuple(told)
+            remarks.append(
+                f"distance_m from {nearest_distance_m:g} on is outside {low:g}..{high:g}"
+            )
+    return tuple(remarks)

@@ -17,16 +17,13 @@ from mapfilter.errors import OutputError, fail
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.geodesy import Lattice
 from mapfilter.positioning.estimate import PositionedTrack, Snapshot
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.belief import plot_belief, plot_candidates
-from mapfilter.report.canvas import BLUE, ORANGE
-from mapfilter.report.coverage import plot_best_server, plot_level, plot_points_per_cell
-from mapfilter.report.errors import plot_error_over_distance
-from mapfilter.report.evidence import plot_evidence
+from mapfilter.report.belief import MAX_PANELS, plot_belief, plot_candidates
+from mapfilter.report.canvas import BLUE, ORANGE, save
+from mapfilter.report.errors import plot_error_over_distance, plot_evidence
 from mapfilter.report.landuse import plot_landuse
-from mapfilter.report.network import plot_margin
-from mapfilter.report.panels import MAX_PANELS
+from mapfilter.report.network import plot_best_server, plot_level, plot_margin, plot_points_per_cell
 from mapfilter.report.track import plot_track
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
@@ -183,9 +180,11 @@ def draw_network(
     drawn = [folder / name for name in NETWORK_PICTURES[:4]]
     titles = [f"{title}{told}" for title in _TITLES]
     ends_dbm = _ends(best.level_dbm)
-    plot_level(best.level_dbm, lattice, plan, base, drawn[0], title=titles[0], range_dbm=ends_dbm)
-    plot_best_server(best.server, plan.ids, lattice, plan, base, drawn[1], title=titles[1])
-    plot_margin(best.margin_db, lattice, plan, base, drawn[2], title=titles[2])
+    on_map = lattice, plan, base
+    level = plot_level(best.level_dbm, *on_map, title=titles[0], range_dbm=ends_dbm)
+    save(level, drawn[0])
+    save(plot_best_server(best.server, plan.ids, *on_map, title=titles[1]), drawn[1])
+    save(plot_margin(best.margin_db, *on_map, title=titles[2]), drawn[2])
     _draw_points(database, points, database.cell_ids, drawn[3], titles[3])
     site, cells = Counter(cell.site for cell in plan.cells).most_common(1)[0]
     if cells > 1:
@@ -202,7 +201,7 @@ def draw_network(
     if classes is not None:
         drawn.append(folder / NETWORK_PICTURES[5])
         below = BaseMap(points.best.lattice.bounds_m, attribution=database.attribution)
-        plot_landuse(classes, points.best.lattice, below, drawn[-1], title=titles[4])
+        save(plot_landuse(classes, points.best.lattice, below, title=titles[4]), drawn[-1])
     return tuple(drawn)
 
 
@@ -258,15 +257,15 @@ def _draw_points(
     title: str,
 ) -> None:
     numbers = [database.plan.index(cell_id) for cell_id in cells]
-    plot_points_per_cell(
+    drawn = plot_points_per_cell(
         {cell_id: points.places(number) for cell_id, number in zip(cells, numbers, strict=True)},
         database.plan,
         street_map(database, points),
-        path,
         title=title,
         counts=points.counts[numbers].tolist(),
         resolution_m=points.best.lattice.resolution_m,
     )
+    save(drawn, path)
 
 
 _SQUARE_M = 5.0
@@ -281,20 +280,18 @@ def draw_track(
     """
     base, truth = street_map(database, served_points(database)), Truth.of_table(log.truth)
     drawn = []
-    evidence = track.estimate.evidence
-    if track.snapshots:
-        drawn.append(folder / ("candidates.png" if evidence is None else "belief.png"))
-        plot = plot_candidates if evidence is None else plot_belief
-        spread = _candidates if evidence is None else _places
-        plot(choose_snapshots(track.snapshots, spread), truth, base, drawn[-1])
-    drawn.append(folder / "track.png")
-    plot_track(track.estimate, truth, base, drawn[-1])
+    estimate, evidence = track.estimate, track.estimate.evidence
+    if track.snapshots and evidence is None:
+        chosen = choose_snapshots(track.snapshots, _candidates)
+        drawn.append(save(plot_candidates(chosen, truth, base), folder / "candidates.png"))
+    elif track.snapshots:
+        chosen = choose_snapshots(track.snapshots, _places)
+        drawn.append(save(plot_belief(chosen, truth, base), folder / "belief.png"))
+    drawn.append(save(plot_track(estimate, truth, base), folder / "track.png"))
     if truth is not None:
-        drawn.append(folder / "error.png")
-        plot_error_over_distance(track.estimate, truth, drawn[-1])
-    if evidence is not None and len(track.estimate):
-        drawn.append(folder / "evidence.png")
-        plot_evidence(track.estimate, truth, drawn[-1])
+        drawn.append(save(plot_error_over_distance(estimate, truth), folder / "error.png"))
+    if evidence is not None and len(estimate):
+        drawn.append(save(plot_evidence(estimate, truth), folder / "evidence.png"))
     return tuple(drawn)
 
 

@@ -7,22 +7,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import rasterio
+from rasterio.errors import RasterioError
 
 from mapfilter import __version__
 from mapfilter._io import ensure_writable_folder, sha256_file
 from mapfilter._parallel import Progress, part_of
 from mapfilter.config.sections import Config
-from mapfilter.errors import InputError, fail
+from mapfilter.errors import Faults, InputError, OutputError, fail
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import (
-    GroundTruthErrors,
-    PredictionModel,
     off_frequency,
     outside_validity,
     predict,
-    realise,
+    simulate_ground_truth,
 )
 from mapfilter.radio.cells import write_cell_plan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.workflows.world import World, check_cells_near, map_cover
 
 _PREDICTION_TAG = "PREDICTION_SHA256"
@@ -69,6 +70,31 @@ def open_ground_truth(config: Config) -> RxLevRasters:
     return rasters
 
 
+def check_only_own_replaced(*paths: Path) -> None:
+    """Check that no rasters are replaced that another program made.
+
+    Raises
+    ------
+    OutputError
+        With every path at which there is something else than rasters that mapfilter predicted.
+    """
+    faults = Faults()
+    for path in paths:
+        if not path.exists():
+            continue
+        try:
+            with rasterio.open(path) as source:
+                software = str(source.tags().get("SOFTWARE", ""))
+        except RasterioError:
+            software = ""
+        if not software.startswith("mapfilter"):
+            expected = "nothing yet, or rasters that mapfilter predicted"
+            got = "a folder" if path.is_dir() else f"a file of {software or 'another program'}"
+            hint = "[rasters] names your own export; give the prediction another path, or none"
+            faults.add(str(path), expected, got, hint)
+    faults.raise_if_any(OutputError)
+
+
 if TYPE_CHECKING:
     from mapfilter.workflows.survey import SurveyResult
 
@@ -110,13 +136,16 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     MapfilterError
         The area, map or plan is wrong, or the output cannot be written.
     """
-    name = config.prediction.model
-    if name == "survey":
+    target, ground_truth = config.rasters_path, config.ground_truth_path
+    surveyed, both = config.prediction.model == "survey", config.prediction.ground_truth.write
+    check_only_own_replaced(
+        target, *([config.deviation_path] if surveyed else [ground_truth] if both else [])
+    )
+    if surveyed:
         from mapfilter.workflows.survey import run_survey
 
         return run_survey(config, progress)
     world = World.of(config)
-    target, ground_truth = config.rasters_path, config.ground_truth_path
     for folder in (target.parent, ground_truth.parent, config.output.dir):
         ensure_writable_folder(folder)
     plan, lattice, model = world.plan, world.lattice, config.prediction.of(PredictionModel)
@@ -131,7 +160,7 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
         *off_frequency(plan, antennas),
     )
     heights_m = world.heights_m
-    wanted = 2 if config.prediction.ground_truth.write else 1
+    wanted = 2 if both else 1
     tags = {"SOFTWARE": f"mapfilter {__version__}", "MODEL": model.model, "MAP": world.map_name}
     levels = predict(
         plan, lattice, heights_m, model, part_of(progress, 0, wanted), antennas=antennas
@@ -139,7 +168,7 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     write_rasters(target, lattice, levels, plan.ids, tags)
     if wanted == 2:
         errors = config.prediction.ground_truth.of(GroundTruthErrors)
-        real = realise(
+        real = simulate_ground_truth(
             plan, lattice, heights_m, model, errors, part_of(progress, 1, wanted), antennas=antennas
         )
         write_rasters(ground_truth, lattice, real, plan.ids, {**tags, **ground_truth_tags(target)})

@@ -16,14 +16,21 @@ from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs
 from mapfilter.radio.cells import CellPlan, write_cell_plan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.report.basemap import BaseMap
+from mapfilter.report.canvas import save
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
-from mapfilter.survey.fit import Survey, SurveyOptions, fit_survey
+from mapfilter.survey.cell_model import Covariate
+from mapfilter.survey.measured_map import (
+    LeftOut,
+    Survey,
+    SurveyOptions,
+    Validation,
+    fit_survey,
+    leave_out,
+)
 from mapfilter.survey.measurements import Measurements, named_after, read_measurements
-from mapfilter.survey.rasters import predicted_levels, surveyed_plan, write_survey
-from mapfilter.survey.trend import Covariate
-from mapfilter.survey.validation import LeftOut, Validation, leave_out
+from mapfilter.survey.survey_rasters import predicted_levels, surveyed_plan, write_survey
 from mapfilter.workflows.pictures import clear_pictures
 from mapfilter.workflows.served import thinned_lattice
 from mapfilter.workflows.world import (
@@ -80,19 +87,18 @@ def draw_survey(survey: SurveyEvidence, folder: Path) -> tuple[Path, ...]:
         A picture cannot be written.
     """
     levels, left_out_levels = (folder / name for name in SURVEY_PICTURES)
-    plot_surveyed_levels(*_surveyed(survey), levels)
+    save(plot_surveyed_levels(*_surveyed(survey)), levels)
     told = survey.left_out
     if told is None or not len(told):
         return (levels,)
-    plot_left_out(
+    drawn = plot_left_out(
         told.measured_dbm,
         told.predicted_dbm,
-        left_out_levels,
         title=_named(told),
         trend_dbm=told.trend_dbm,
         attribution=survey.attribution,
     )
-    return levels, left_out_levels
+    return levels, save(drawn, left_out_levels)
 
 
 def _named(left_out: LeftOut) -> str:

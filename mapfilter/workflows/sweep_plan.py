@@ -28,7 +28,7 @@ from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.propagation.models import GroundTruthErrors
 from mapfilter.propagation.shadowing import site_shadowing
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, check_against_plan
+from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.network import street_network
 from mapfilter.workflows.predict import open_ground_truth

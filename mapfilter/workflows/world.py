@@ -13,22 +13,21 @@ from mapfilter._types import Floats
 from mapfilter.config.inputs import Area, Rasters
 from mapfilter.config.sections import Config, FilterSection
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes, Routes
-from mapfilter.errors import InputError, fail
+from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import Lattice, unproject
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.filter import FilterOptions
-from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.locators import filter_options
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan, read_cell_plan
 from mapfilter.radio.msi import read_antennas
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.maps import map_bounds_deg, resolve_map
-from mapfilter.roads.routable import route_lattice_from_landuse
+from mapfilter.roads.routes import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings, Ways
 from mapfilter.simulation.layout import lay_out_plan
 from mapfilter.workflows.area import LARGEST_AREA_PX as LARGEST_AREA_PX
@@ -308,7 +307,7 @@ def filter_choice(section: FilterSection) -> FilterOptions:
     Raises
     ------
     ConfigError
-        A custom filter cannot be imported.
+        The filter takes no database, or a custom filter cannot be imported.
     """
     match section.name:
         case "candidate":
@@ -320,4 +319,4 @@ def filter_choice(section: FilterSection) -> FilterOptions:
         case name if ":" in name:
             return filter_options(name)
         case name:
-            return KalmanFilter(method=name, smooth=section.smooth)  # type: ignore[arg-type]
+            raise fail(ConfigError, "filter.name", "a filter that takes a database", repr(name))

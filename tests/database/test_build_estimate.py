@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import shapely
+from mapfilter.roads.routable import RouteSource
 
 from mapfilter.database.build import build
 from mapfilter.database.estimate import dry_run, peak_memory_bytes
@@ -10,8 +11,8 @@ from mapfilter.database.sources import LayerRoutes
 from mapfilter.database.store import info
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
-from mapfilter.roads.routable import RouteSource
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.ways import Squares, Ways
 
 CRS = "EPSG:32629"

@@ -11,7 +11,8 @@ import pytest
 from mapfilter.errors import ConfigError
 from mapfilter.geodesy import Lattice
 from mapfilter.propagation import predict as module
-from mapfilter.propagation.predict import GroundTruthErrors, PredictionModel, predict, realise
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
+from mapfilter.propagation.predict import predict, simulate_ground_truth
 from mapfilter.radio.cells import Cell, CellPlan
 
 CRS = "EPSG:32635"
@@ -43,7 +44,7 @@ def predicted(model=MODEL, plan=PLAN, heights=None, lattice=LATTICE):
 
 
 def real(errors, model=MODEL, plan=PLAN, heights=None, lattice=LATTICE):
-    return levels(realise(plan, lattice, heights, model, errors))
+    return levels(simulate_ground_truth(plan, lattice, heights, model, errors))
 
 
 def drawn(errors, model=MODEL, plan=ONE):
@@ -195,7 +196,11 @@ def test_roofs_are_off_by_a_factor_that_neighbours_share(monkeypatch):
 
     monkeypatch.setattr(module.Surroundings, "of", record)
     for seed in range(60):
-        next(realise(ONE, LATTICE, heights, MODEL, replace(NONE, roof_error=0.2, seed=seed)))
+        next(
+            simulate_ground_truth(
+                ONE, LATTICE, heights, MODEL, replace(NONE, roof_error=0.2, seed=seed)
+            )
+        )
     factor = np.log(np.array(seen)[:, :, :60] / 20.0) / 0.2
     assert not np.array(seen)[:, :, 60:].any()
     assert_mean((factor**2).mean(axis=(1, 2)), 1.0, 0.3)

@@ -9,7 +9,7 @@ from command_line import assert_done, assert_refused, mapfilter, settings
 
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.scores import CaseResult
-from mapfilter.propagation.predict import GroundTruthErrors, PredictionModel
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel

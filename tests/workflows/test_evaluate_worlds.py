@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from mapfilter.config.sections import Config
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError
-from mapfilter.propagation.predict import GroundTruthErrors, PredictionModel
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel

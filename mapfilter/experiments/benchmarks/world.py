@@ -19,9 +19,12 @@ from mapfilter._io import atomic_file, sha256_file
 from mapfilter.database.store import open_database
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.sweep.world import SweepWorld, open_world
-from mapfilter.gnss.visibility import Skyline
+from mapfilter.gnss.sky import Skyline
 from mapfilter.positioning.filter import Filter, FilterOptions
-from mapfilter.propagation.predict import GroundTruthErrors, PredictionModel, realise
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
+from mapfilter.propagation.predict import (
+    simulate_ground_truth,
+)
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.ways import Buildings, Ways
@@ -100,7 +103,7 @@ class BenchmarkWorld:
         if level_error_db is not None:
             errors = replace(errors, level_error_db=level_error_db)
         streets = self.streets
-        cells = realise(
+        cells = simulate_ground_truth(
             streets.plan,
             streets.lattice,
             streets.heights_m,

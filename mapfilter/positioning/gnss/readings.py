@@ -9,8 +9,7 @@ import numpy as np
 
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Reason
-from mapfilter.gnss.grid_frame import GridFrame
-from mapfilter.gnss.sky import directions
+from mapfilter.gnss.sky import GridFrame, directions
 from mapfilter.models.street_motion import EAST, NORTH
 from mapfilter.positioning.epochs import Epoch, GnssFix, Pseudorange
 from mapfilter.positioning.gnss.options import GnssOptions
@@ -57,7 +56,7 @@ def sky_over(
         return None, tuple(told)
     east, north = middle_m[0] + origin_m[0], middle_m[1] + origin_m[1]
     frame = GridFrame(crs, east, north, options.height_m)
-    local = frame.satellites_m(np.array([row.place_m for row in chosen.values()]))
+    local = frame.local.to_local(np.array([row.place_m for row in chosen.values()]))
     seen = directions(local)
     sky = Sky(
         tuple(chosen),
