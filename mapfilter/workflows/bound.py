@@ -57,10 +57,8 @@ class BoundResult:
         Of those that did by levels, the share that did so in a wrong place.
     twins : float
         Share of journeys with a twin.
-    seconds : float
     notes : tuple of str
         What is exact and what is approximate.
-    outputs : tuple of Path
     """
 
     points: int
@@ -123,10 +121,8 @@ def run_bound(
     save(drawn, out / "metres-to-fix.png")
     pairs_m = twins[["east_m", "north_m", "twin_east_m", "twin_north_m"]].to_numpy()
     save(plot_twins(rasters["twin_error"], pairs_m, *on_map), out / "twins.png")
-    names = (
-        "bound.tif", "ways.parquet", "twins.parquet", "position-bound.png", "metres-to-fix.png",
-        "twins.png",
-    )  # fmt: skip
+    tables = ["bound.tif", "ways.parquet", "twins.parquet"]
+    names = [*tables, "position-bound.png", "metres-to-fix.png", "twins.png"]
     return _summary(found, began_s, tuple(out / name for name in names))
 
 
