@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from mapfilter import __version__
+from mapfilter._io import VERSION
 from mapfilter.cli.chain import (
     bound,
     build,
@@ -71,7 +71,7 @@ def _version(
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ) -> None:
     if version:
-        sys.stdout.write(f"mapfilter {__version__}\n")
+        sys.stdout.write(f"mapfilter {VERSION}\n")
         raise typer.Exit(DONE)
 
 

@@ -17,7 +17,7 @@ from mapfilter._parallel import Progress
 from mapfilter.database.export import BANDS, CELLS_TAG
 from mapfilter.database.manifest import MANIFEST
 from mapfilter.database.merge import merge
-from mapfilter.database.store import export_cog, export_geopackage, info, open_database
+from mapfilter.database.store import info, open_database
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.rasters.formats import is_raster_folder
 from mapfilter.rasters.raster_set import open_rasters
@@ -74,6 +74,8 @@ def run_export(database: Path, to: Path) -> dict[str, Any]:
     MapfilterError
         The database is missing or damaged, the file's kind is unknown, or it cannot be written.
     """
+    from mapfilter.database.export import export_cog, export_geopackage
+
     kind = to.suffix.lower()
     if kind not in (".gpkg", ".tif", ".tiff"):
         expected = "a name that ends in .gpkg or .tif"
