@@ -25,6 +25,11 @@ from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import is_log, read_log
 
 
+_MAPS = (".pbf", ".osm", ".osm.gz", ".osm.bz2")
+_INDEX_COLUMN = b"TX_NAME"
+_LONGEST_LINE_BYTES = 1 << 16
+
+
 @dataclass(frozen=True)
 class MergeResult:
     """What was merged.
@@ -87,11 +92,6 @@ def run_export(database: Path, to: Path) -> dict[str, Any]:
         export_cog(opened, to)
     points = opened.manifest["counts"]["points"]
     return {"points": points, "cells": len(opened.cell_ids), "file": to}
-
-
-_MAPS = (".pbf", ".osm", ".osm.gz", ".osm.bz2")
-_INDEX_COLUMN = b"TX_NAME"
-_LONGEST_LINE_BYTES = 1 << 16
 
 
 def run_info(path: Path) -> dict[str, Any]:

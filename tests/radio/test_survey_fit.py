@@ -243,7 +243,7 @@ def test_few_points_are_left_out_or_take_the_mean():
     assert survey.cells["B"].antenna is None
     assert survey.notes[0] == "1 cells left out: received in fewer than 3 squares"
     assert "1 antennas not located (fewer than 15 squares)" in survey.notes[1]
-    with pytest.raises(InputError, match="heard in at least 9 squares, found 2 cells, none"):
+    with pytest.raises(InputError, match="received in at least 9 squares, found 2 cells, none"):
         fit_survey(rows, SurveyOptions(min_points=9))
 
 
