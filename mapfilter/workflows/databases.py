@@ -24,7 +24,6 @@ from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import is_log, read_log
 
-
 _MAPS = (".pbf", ".osm", ".osm.gz", ".osm.bz2")
 _INDEX_COLUMN = b"TX_NAME"
 _LONGEST_LINE_BYTES = 1 << 16
