@@ -13,12 +13,14 @@ Names carry their unit (``_m``, ``_deg``, ``_dbm``).
 
 from __future__ import annotations
 
+import operator
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache
 from inspect import cleandoc
 from math import isfinite
+from pathlib import Path
 from types import NoneType, UnionType
 from typing import (
     Annotated,
@@ -44,8 +46,28 @@ Probability = Annotated[float, Gt(0), Lt(1)]
 Degrees = Annotated[float, Ge(0), Le(360)]
 Seed = Annotated[int, Ge(0), Lt(2**63)]
 
-_LIMITS = (Ge, Gt, Le, Lt)
+_LIMITS: dict[type, tuple[str, str, Callable[[Any, Any], Any]]] = {
+    Ge: ("ge", ">=", operator.ge),
+    Gt: ("gt", ">", operator.gt),
+    Le: ("le", "<=", operator.le),
+    Lt: ("lt", "<", operator.lt),
+}
+_TYPES = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
+_TYPES |= {Path: "a path", NoneType: "nothing", tuple: "a list", dict: "a section"}
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*) : .*$")
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """In an annotation: what it allows, where the type does not say enough.
+
+    Parameters
+    ----------
+    text : str
+        Such as ``two numbers: longitude, latitude``.
+    """
+
+    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +76,6 @@ class OptionInfo:
 
     Parameters
     ----------
-    name : str
-    default : object
     expected : str
         Type and limits in words, such as ``a number > 0``.
     description : str
@@ -89,7 +109,8 @@ class Options:
         for name, annotation in _annotations(cast(Any, type(self))).items():
             value = getattr(self, name)
             if not fits(annotation, value):
-                faults.add(f"{type(self).__name__}, {name}", expected(annotation), repr(value))
+                where = f"{type(self).__name__}, {name}"
+                faults.add(where, expected(annotation), repr(value), likely(annotation, value))
         self.check(faults)
         faults.raise_if_any(ConfigError)
 
@@ -117,7 +138,7 @@ def describe_options(options: type[Options]) -> Iterator[OptionInfo]:
     >>> next(info.name for info in describe_options(WalkerModel) if info.numeric)
     'change_side_m'
     """
-    described = _descriptions(cast(Any, options))
+    described = descriptions(options)
     annotations = annotations_of(options)
     for field in fields(options):
         default = field.default if field.default is not MISSING else None
@@ -142,55 +163,62 @@ def expected(annotation: Any) -> str:
     >>> expected(Share), expected(Positive), expected(Literal["set", "list"] | None)
     ('a number in 0..1', 'a number > 0', "'set', 'list', or nothing")
     """
+    if words := next((one for one in get_args(annotation) if isinstance(one, Words)), None):
+        return words.text
     inner, limits = _split(annotation)
     origin = get_origin(inner)
-    if origin is Literal:
-        return " or ".join(repr(value) for value in get_args(inner))
-    if origin in (Union, UnionType):
-        *others, last = (
-            word
-            for one in get_args(inner)
-            for word in (
-                map(repr, get_args(one)) if get_origin(one) is Literal else [expected(one)]
-            )
-        )
-        return (
-            f"{', '.join(others)} or {last}"
-            if len(others) < 2
-            else f"{', '.join(others)}, or {last}"
-        )
-    words = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
-    if inner is NoneType:
-        return "nothing"
-    word = words.get(inner, getattr(inner, "__name__", str(inner)))
-    low = next((one for one in limits if isinstance(one, Ge | Gt)), None)
-    high = next((one for one in limits if isinstance(one, Le | Lt)), None)
-    match low, high:
-        case Ge(ge=a), Le(le=b):
-            return f"{word} in {a}..{b}"
-        case None, None:
+    if origin in (Literal, Union, UnionType):
+        *others, last = _alternatives(inner)
+        comma = "," if len(others) > 1 else ""
+        return f"{', '.join(others)}{comma} or {last}" if others else last
+    known = "a section" if hasattr(inner, "model_fields") else str(inner)
+    word = _TYPES.get(origin or inner, known)
+    match limits:
+        case [Ge(ge=low), Le(le=high)]:
+            return f"{word} in {_number(low)}..{_number(high)}"
+        case []:
             return word
-    parts = [
-        f"{sign} {getattr(one, name)}"
-        for one, (sign, name) in (
-            (limit, _SIGNS[type(limit)]) for limit in (low, high) if limit is not None
-        )
-    ]
-    return f"{word} {' and '.join(parts)}"
+    return f"{word} {' and '.join(map(_limit, limits))}"
 
 
-_SIGNS: dict[type, tuple[str, str]] = {
-    Ge: (">=", "ge"),
-    Gt: (">", "gt"),
-    Le: ("<=", "le"),
-    Lt: ("<", "lt"),
-}
+def _alternatives(annotation: Any) -> list[str]:
+    """Return in words what each member of a union or literal allows."""
+    if get_origin(annotation) is Literal:
+        return [repr(value) for value in get_args(annotation)]
+    if get_origin(annotation) in (Union, UnionType):
+        return [word for one in get_args(annotation) for word in _alternatives(one)]
+    return [expected(annotation)]
+
+
+def likely(annotation: Any, value: Any) -> str:
+    """Return the probable mistake behind a value beyond its limits, or an empty text."""
+    _, limits = _split(without_none(annotation))
+    share = any(getattr(limit, "le", getattr(limit, "lt", None)) == 1 for limit in limits)
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return "per cent given for a fraction" if share and number and 1 < value <= 100 else ""
+
+
+def without_none(annotation: Any) -> Any:
+    """Return an annotation without ``None``."""
+    inner, _ = _split(annotation)
+    if get_origin(inner) not in (Union, UnionType):
+        return annotation
+    return Union[tuple(one for one in get_args(inner) if one is not NoneType)]  # noqa: UP007
+
+
+def _limit(limit: Any) -> str:
+    name, sign, _ = _LIMITS[type(limit)]
+    return f"{sign} {_number(getattr(limit, name))}"
+
+
+def _number(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _split(annotation: Any) -> tuple[Any, list[Any]]:
     if get_origin(annotation) is Annotated:
         inner, *marks = get_args(annotation)
-        return inner, [mark for mark in marks if isinstance(mark, _LIMITS)]
+        return inner, [mark for mark in marks if isinstance(mark, tuple(_LIMITS))]
     return annotation, []
 
 
@@ -203,7 +231,7 @@ def plain_types(annotation: Any) -> list[Any]:
 
 
 def fits(annotation: Any, value: Any) -> bool:
-    """Tell whether a value is what an annotation allows."""
+    """Return whether an annotation allows a value."""
     inner, limits = _split(annotation)
     origin = get_origin(inner)
     if origin is Literal:
@@ -225,26 +253,24 @@ def fits(annotation: Any, value: Any) -> bool:
             _holds(one, value) for one in limits
         )
     # Lists, paths and nested options check themselves or are checked by their owner.
-    return is_dataclass(inner) is False or isinstance(value, inner)
+    return not (isinstance(inner, type) and is_dataclass(inner)) or isinstance(value, inner)
 
 
 def _holds(limit: Any, value: Any) -> bool:
-    match limit:
-        case Ge(ge=bound):
-            return bool(value >= bound)
-        case Gt(gt=bound):
-            return bool(value > bound)
-        case Le(le=bound):
-            return bool(value <= bound)
-        case Lt(lt=bound):
-            return bool(value < bound)
-    return True
+    name, _, holds = _LIMITS[type(limit)]
+    return bool(holds(value, getattr(limit, name)))
 
 
-@cache
-def _descriptions(options: Any) -> dict[str, str]:
-    """Return the descriptions in the ``Parameters`` section of a numpydoc docstring."""
-    _, _, rest = cleandoc(options.__doc__ or "").partition("Parameters\n----------\n")
+def descriptions(options: type) -> dict[str, str]:
+    """Return the descriptions in the ``Parameters`` sections of a class and of its bases."""
+    found: dict[str, str] = {}
+    for one in reversed(options.__mro__):
+        found |= _described(cleandoc(one.__doc__ or ""))
+    return found
+
+
+def _described(docstring: str) -> dict[str, str]:
+    _, _, rest = docstring.partition("Parameters\n----------\n")
     found: dict[str, str] = {}
     names: list[str] = []
     for line in rest.splitlines():

@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from typing import Annotated
 
 import typer
 
 from mapfilter._io import VERSION
-from mapfilter.cli.databases import bound, build, check, export, info, merge, predict
-from mapfilter.cli.evaluate import evaluate
-from mapfilter.cli.experiments import bench, reproduce, sweep
+from mapfilter.cli.chain import (
+    bound,
+    build,
+    check,
+    demo,
+    export,
+    info,
+    merge,
+    predict,
+    replay,
+    simulate,
+)
+from mapfilter.cli.experiments import bench, evaluate, reproduce, sweep
 from mapfilter.cli.options import DONE
-from mapfilter.cli.tracks import demo, replay, simulate
 from mapfilter.workflows.terminal import guarded
 
 __all__ = ["app", "main"]
@@ -23,25 +33,37 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     no_args_is_help=True,
     help="Find where a phone or a vehicle is without GNSS.",
+    epilog="\b\nStart with:\n  mapfilter demo\n\nDocumentation: docs/quickstart.rst",
 )
 
-for _command in (
-    demo,
-    check,
-    predict,
-    build,
-    merge,
-    export,
-    info,
-    bound,
-    simulate,
-    replay,
-    sweep,
-    reproduce,
-    evaluate,
-    bench,
-):
-    app.command()(_command)
+_COMMANDS: tuple[tuple[Callable[..., None], str, str], ...] = (
+    (demo, "--out demo", "quickstart.rst"),
+    (check, "-c area.toml", "cli.rst"),
+    (predict, "-c area.toml --out area", "howto/sites-and-osm.rst"),
+    (build, "-c area.toml --out area --workers 4", "howto/planner-rasters.rst"),
+    (merge, "north/database south/database --out both", "cli.rst"),
+    (export, "area/database --to area.gpkg", "cli.rst"),
+    (info, "area/database", "cli.rst"),
+    (bound, "area/database --out bound", "howto/where-will-it-work.rst"),
+    (simulate, "-c area.toml --out area", "explanation/simulated-worlds.rst"),
+    (
+        replay,
+        "--db area/database --log walk --filter bayes --out located",
+        "howto/which-filter.rst",
+    ),
+    (sweep, "-c sweep.toml --out sweep --workers 4", "howto/sweep.rst"),
+    (reproduce, "khalaf-allah-2007 --trials 20 --out paper", "explanation/success-statistics.rst"),
+    (evaluate, "global-positioning --case levels-6 --runs 5", "explanation/simulated-worlds.rst"),
+    (bench, "filter --runs 3", "explanation/scale.rst"),
+)
+"""Commands, each with an example and a page of the documentation."""
+
+for _command, _example, _page in _COMMANDS:
+    _name = _command.__name__
+    app.command(
+        short_help=(_command.__doc__ or "").partition("\n")[0],
+        epilog=f"\b\nExample:\n  mapfilter {_name} {_example}\n\nDocumentation: docs/{_page}",
+    )(_command)
 
 
 @app.callback(invoke_without_command=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -19,8 +19,11 @@ from mapfilter.cli.options import (
     SetOption,
     WorkersOption,
     find_own_filter,
+    given_path,
     numbers,
+    refuse,
     seeded,
+    toml,
 )
 from mapfilter.experiments.papers import PAPERS
 from mapfilter.workflows.terminal import print_result, rate_bar, say
@@ -116,10 +119,117 @@ def bench(
     stage: Annotated[
         str, typer.Argument(metavar="[NAME]", help="build, filter, fusion or sweep.")
     ] = "build",
-    runs: Annotated[int, typer.Option("--runs", min=1, help="Runs that medians are of.")] = 5,
+    runs: Annotated[int, typer.Option("--runs", min=1, help="Runs; medians are reported.")] = 5,
     as_json: JsonOption = False,
 ) -> None:
-    """Tell how fast a stage is on this machine."""
+    """Measure how fast a stage is on this machine."""
     from mapfilter.workflows.bench import run_bench
 
     print_result(run_bench(stage, runs=runs), as_json)
+
+
+def evaluate(
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="global-positioning, audit or ottawa.")
+    ],
+    map_file: Annotated[
+        Path | None,
+        typer.Option("--map", metavar="FILE", help="An OpenStreetMap file.", callback=given_path),
+    ] = None,
+    bbox: Annotated[
+        str | None, typer.Option("--bbox", metavar="W,S,E,N", help="The box, in degrees.")
+    ] = None,
+    cases: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--case", metavar="NAME", help="A case; repeatable. Default: all without satellites."
+        ),
+    ] = None,
+    filter_name: Annotated[
+        str | None,
+        typer.Option(
+            "--filter",
+            metavar="NAME",
+            help="bayes (default), grid, candidate or package.module:Name.",
+        ),
+    ] = None,
+    world: Annotated[
+        str | None,
+        typer.Option(
+            "--world",
+            metavar="NAME",
+            help="The simulated world: plain (default), or easy, which flatters.",
+        ),
+    ] = None,
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            "--data",
+            metavar="DIR",
+            help="Folder of the data sets, for ottawa.",
+            callback=given_path,
+        ),
+    ] = None,
+    runs: Annotated[
+        int | None,
+        typer.Option(
+            "--runs",
+            min=1,
+            help="Routes for each case (20); draws of the noise for each session (3).",
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of what is drawn.")] = 0,
+    workers: Annotated[int, typer.Option("--workers", min=1, help="Local processes.")] = 2,
+    resume: ResumeOption = False,
+    config: ConfigOption = None,
+    settings: SetOption = None,
+    out: OutOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Benchmark localization accuracy: simulated on any map, or on real sessions."""
+    from mapfilter.workflows.evaluate import (
+        RUNS,
+        check_benchmark,
+        load_benchmark,
+        run_global_positioning,
+    )
+    from mapfilter.workflows.evaluate_audit import run_audit
+    from mapfilter.workflows.evaluate_ottawa import RUNS as OTTAWA_RUNS
+    from mapfilter.workflows.evaluate_ottawa import run_ottawa
+
+    check_benchmark(name, data)
+    common: dict[str, Any] = {"seed": seed, "workers": workers, "resume": resume}
+    result: Any
+    if name == "ottawa" and data is not None:
+        other = None if filter_name == "bayes" else filter_name
+        unused = {"--map": map_file, "--bbox": bbox, "--case": cases, "--filter": other}
+        refuse(unused | {"--world": world, "--config": config, "--set": settings}, name)
+        folder = (out or Path("out") / "ottawa").absolute()
+        with rate_bar("evaluate", "sessions") as progress:
+            result = run_ottawa(data, folder, runs=runs or OTTAWA_RUNS, progress=progress, **common)
+        print_result(result, as_json)
+        return
+    refuse({"--data": data}, name)
+    given = list(settings or ())
+    if map_file is not None:
+        given.append(f"area.map={toml(str(map_file))}")
+    if bbox is not None:
+        given.append(f"area.bbox={bbox}")
+    if filter_name is not None:
+        given.append(f"filter.name={toml(filter_name)}")
+    if name == "audit":
+        refuse({"--world": world}, name)
+        world = "easy"
+    loaded, fixed = load_benchmark(world or "plain", config, given)
+    find_own_filter(loaded)
+    folder = (out or loaded.output.dir / name).absolute()
+    common["runs"] = runs or RUNS
+    with rate_bar("evaluate", "batches") as progress:
+        common["progress"] = progress
+        if name == "audit":
+            result = run_audit(config, given, folder, names=cases or (), **common)
+        else:
+            result = run_global_positioning(
+                loaded, folder, cases=cases or (), fixed=fixed, **common
+            )
+    print_result(result, as_json)

@@ -76,7 +76,7 @@ def numbers(text: str | None, count: int, where: str) -> list[float] | None:
 
 
 def find_own_filter(config: Config) -> None:
-    """Have modules in the working folder found, after all others, where a filter is one's own."""
+    """Let a custom filter be imported from the working folder, after all other places."""
     names = [config.filter.name, *(reading.filter or "" for reading in config.sweep.readings)]
     folder = str(Path.cwd())
     if any(":" in name for name in names) and folder not in sys.path:
@@ -84,7 +84,7 @@ def find_own_filter(config: Config) -> None:
 
 
 def refuse(given: Mapping[str, object], whom: str) -> None:
-    """See that no option is given that would be left unheeded."""
+    """Refuse options that would have no effect."""
     faults = Faults()
     for option, value in given.items():
         if value is not None and value != []:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterator, Mapping, Sequence
 from types import NoneType
-from typing import Annotated, Any
+from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from mapfilter.config.fields import field_annotation
 from mapfilter.config.load import faults_of
 from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, Faults, MapfilterError, fail
@@ -128,13 +129,12 @@ def vary(config: Config, changes: Mapping[str, float]) -> Config:
 
 
 def _leaves(section: Any, name: str) -> Iterator[tuple[str, Any]]:
-    for key, field in section.model_fields.items():
-        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
-            yield from _leaves(field.annotation, f"{name}.{key}")
+    for key in section.model_fields:
+        annotation = field_annotation(section, key)
+        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+            yield from _leaves(annotation, f"{name}.{key}")
         else:
-            marks = tuple(field.metadata)
-            annotation: Any = field.annotation
-            yield f"{name}.{key}", Annotated[(annotation, *marks)] if marks else annotation
+            yield f"{name}.{key}", annotation
 
 
 def _is_numeric(annotation: Any) -> bool:

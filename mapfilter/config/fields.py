@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from dataclasses import MISSING, fields
+from collections.abc import Callable, Sequence
+from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, ClassVar, TypeVar
 
+from annotated_types import Ge, Le
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -19,7 +20,7 @@ from pydantic import (
 )
 
 from mapfilter._io import path_fault
-from mapfilter.options import Options, annotations_of
+from mapfilter.options import Options, Positive, Words, annotations_of, describe_options
 
 EMBEDDED_MAP = "helsinki"
 NO_MAP = "none"
@@ -54,7 +55,7 @@ def resolve_map(value: Any, info: ValidationInfo) -> Any:
 
 
 def check_filter_name(value: str) -> str:
-    """See that a filter is one of ours, or has the form ``package.module:Name``."""
+    """Check that a filter is built in, or has the form ``package.module:Name``."""
     known = (*MAP_FILTERS, *FUSION_FILTERS)
     if value not in known and not _OWN_FILTER.fullmatch(value):
         names = ", ".join(map(repr, known))
@@ -64,16 +65,21 @@ def check_filter_name(value: str) -> str:
 
 FilePath = Annotated[Path, BeforeValidator(resolve_path)]
 MapName = Annotated[str, BeforeValidator(resolve_map)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Box = Annotated[tuple[Finite, Finite, Finite, Finite], Field(strict=False)]
-Pair = Annotated[tuple[Finite, Finite], Field(strict=False)]
-Size = Annotated[tuple[Positive, Positive], Field(strict=False)]
-Share = Annotated[float, Field(ge=0, le=1)]
-Seed = Annotated[int, Field(ge=0, lt=2**63)]
+Box = Annotated[
+    tuple[float, float, float, float],
+    Field(strict=False),
+    Words("four numbers: west, south, east, north"),
+]
+Pair = Annotated[
+    tuple[float, float], Field(strict=False), Words("two numbers: longitude, latitude")
+]
+Size = Annotated[
+    tuple[Positive, Positive],
+    Field(strict=False),
+    Words("two numbers: metres east, metres north"),
+]
 FilterName = Annotated[str, AfterValidator(check_filter_name)]
-Count = Annotated[int, Field(ge=0, le=1_000_000)]
+Count = Annotated[int, Ge(1), Le(1_000_000)]
 
 
 OptionsT = TypeVar("OptionsT", bound=Options)
@@ -84,35 +90,83 @@ class Section(BaseModel):
     """A section: frozen, and strict about its keys and the types of its values."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+    kinds: ClassVar[tuple[type[Options], ...]] = ()
 
-    def of(self, kind: type[OptionsT]) -> OptionsT:
-        """Return the values of this section that an option dataclass takes."""
-        return kind(**{field.name: getattr(self, field.name) for field in fields(kind)})
+    def of(self, kind: type[OptionsT], **others: Any) -> OptionsT:
+        """Return an option dataclass with the values of this section.
+
+        Parameters
+        ----------
+        kind : type
+            The dataclass.
+        **others
+            Values of further fields; those of neither have their defaults.
+        """
+        own = type(self).model_fields
+        values = {one.name: getattr(self, one.name) for one in fields(kind) if one.name in own}
+        return kind(**values | others)
 
 
-def with_options(*kinds: type[Options]) -> Callable[[type[SectionT]], type[SectionT]]:
+class Columns(Section):
+    """A section that names columns of a table."""
+
+    @property
+    def given(self) -> dict[str, str]:
+        """The columns that are named."""
+        return {name: column for name, column in self if column is not None}
+
+
+def field_annotation(section: type[BaseModel], name: str) -> Any:
+    """Return the annotation of a field of a section, with its limits."""
+    field = section.model_fields[name]
+    annotation: Any = field.annotation
+    return Annotated[annotation, *field.metadata] if field.metadata else annotation
+
+
+def with_options(
+    *kinds: type[Options], without: Sequence[str] = ()
+) -> Callable[[type[SectionT]], type[SectionT]]:
     """Return a class decorator that gives a section the fields of option dataclasses.
 
     Names, limits and defaults are those of the dataclasses; what the section defines itself goes
     first. :meth:`Section.of` returns the dataclasses again.
+
+    Parameters
+    ----------
+    *kinds : type
+        Dataclasses of options.
+    without : sequence of str
+        Fields that no configuration sets.
     """
 
     def extended(section: type[SectionT]) -> type[SectionT]:
         given: dict[str, Any] = {}
         for kind in kinds:
             annotations = annotations_of(kind)
-            for field in fields(kind):
-                default = field.default
-                if field.default_factory is not MISSING:
-                    default = field.default_factory()
-                if field.name not in section.model_fields:
-                    given[field.name] = (annotations[field.name], default)
-        return create_model(
-            section.__name__,
-            __base__=section,
-            __module__=section.__module__,
-            __doc__=section.__doc__,
-            **given,
-        )
+            for info in describe_options(kind):
+                if info.name not in (*section.model_fields, *without):
+                    given[info.name] = (annotations[info.name], info.default)
+        made = _extended(section, given)
+        made.kinds = kinds
+        return made
 
     return extended
+
+
+def with_columns(*names: str) -> Callable[[type[SectionT]], type[SectionT]]:
+    """Return a class decorator that gives a section an optional text for each name."""
+
+    def extended(section: type[SectionT]) -> type[SectionT]:
+        return _extended(section, dict.fromkeys(names, (str | None, None)))
+
+    return extended
+
+
+def _extended(section: type[SectionT], given: dict[str, Any]) -> type[SectionT]:
+    return create_model(
+        section.__name__,
+        __base__=section,
+        __module__=section.__module__,
+        __doc__=section.__doc__,
+        **given,
+    )

@@ -6,33 +6,17 @@ import difflib
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ValidationError
 
 from mapfilter._io import path_fault, shown
-from mapfilter.config.fields import MAP_NAMES, resolve_map, resolve_path
+from mapfilter.config.fields import MAP_NAMES, field_annotation, resolve_map, resolve_path
 from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, Fault, Faults, fail
+from mapfilter.options import expected, likely, without_none
 
 _RESOLVERS = (resolve_path, resolve_map)
-_EXPECTED = {
-    "model_type": "a section",
-    "missing": "one value more",
-    "path_type": "a path",
-    "is_instance_of": "a path",
-    "int_type": "a whole number",
-    "int_from_float": "a whole number",
-    "float_type": "a number",
-    "string_type": "a text",
-    "tuple_type": "a list",
-    "bool_type": "true or false",
-}
-_LISTS = {
-    "bbox": "four numbers: west, south, east, north",
-    "southwest": "two numbers: longitude, latitude",
-    "size_m": "two numbers: metres east, metres north",
-}
 
 
 def load_config(
@@ -59,7 +43,7 @@ def load_config(
     Raises
     ------
     ConfigError
-        The file cannot be read or is no TOML, or keys or values are wrong; all told together.
+        The file cannot be read or is no TOML, or keys or values are wrong; all faults together.
 
     Examples
     --------
@@ -79,9 +63,27 @@ def load_config(
 def faults_of(
     error: ValidationError, file: Path | None = None, settings: Sequence[str] = ()
 ) -> tuple[Fault, ...]:
-    """Return what pydantic found as faults; where ``settings`` are at fault, the file is not."""
+    """Return what pydantic found as faults, one for each field.
+
+    Parameters
+    ----------
+    error : ValidationError
+        From :class:`~mapfilter.config.sections.Config`.
+    file : Path, optional
+        Named as the place of faults that no setting caused.
+    settings : sequence of str
+        As for :func:`load_config`.
+    """
     changed = [_keys(setting) for setting in settings]
-    return tuple(_fault(file, changed, detail) for detail in error.errors())
+    faults: dict[tuple[str, ...], Fault] = {}
+    for detail in error.errors():
+        keys, annotation = _field_at(detail)
+        in_file = file is not None and not any(
+            keys[: len(key)] == key[: len(keys)] for key in changed
+        )
+        where = f"{file}, {'.'.join(keys)}" if in_file else f"setting {'.'.join(keys)}"
+        faults.setdefault(keys, _fault(where, keys, annotation, detail))
+    return tuple(faults.values())
 
 
 def given_keys(file: Path | None, settings: Sequence[str] = ()) -> tuple[str, ...]:
@@ -185,8 +187,8 @@ def _read_toml(file: Path) -> dict[str, Any]:
     return values
 
 
-def _keys(setting: str) -> list[str]:
-    return [part.strip() for part in setting.partition("=")[0].split(".")]
+def _keys(setting: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in setting.partition("=")[0].split("."))
 
 
 def _apply(values: dict[str, Any], setting: str, faults: Faults) -> None:
@@ -227,62 +229,68 @@ def _parse_value(text: str) -> Any:
 
 
 def _is_path(keys: tuple[str, ...]) -> bool:
-    """Tell whether a setting fills a field of paths."""
-    model: Any = Config
-    for key in keys[:-1]:
-        field = model.model_fields.get(key)
-        model = field.annotation if field is not None else None
-        if not (isinstance(model, type) and issubclass(model, BaseModel)):
-            return False
-    field = model.model_fields.get(keys[-1])
-    if field is None:
-        return False
-    marks = [*field.metadata]
-    for variant in getattr(field.annotation, "__args__", ()):
+    """Return whether a setting fills a field of paths."""
+    annotation: Any = Config
+    for key in keys:
+        annotation = _inside(annotation, key)
+    inner = without_none(annotation)
+    marks = [*getattr(inner, "__metadata__", ())]
+    for variant in get_args(get_args(inner)[0] if marks else inner):
         marks += getattr(variant, "__metadata__", ())
     return any(isinstance(m, BeforeValidator) and m.func in _RESOLVERS for m in marks)
 
 
-def _fault(file: Path | None, changed: Sequence[list[str]], detail: Mapping[str, Any]) -> Fault:
-    """Turn one of pydantic's findings into a fault, with the key that was probably meant."""
-    keys = [str(part) for part in detail["loc"]]
-    in_file = file is not None and not any(_one_path(keys, key) for key in changed)
-    where = f"{file}, {'.'.join(keys)}" if in_file else f"setting {'.'.join(keys)}"
+def _inside(annotation: Any, part: str | int) -> Any:
+    """Return the annotation of a key of a section, or of an element of a list; None without any."""
+    inner = without_none(annotation)
+    while get_origin(inner) is Annotated:
+        inner = get_args(inner)[0]
+    if isinstance(inner, type) and issubclass(inner, BaseModel):
+        return field_annotation(inner, part) if part in inner.model_fields else None
+    found = get_args(inner)
+    if get_origin(inner) is tuple and isinstance(part, int):
+        return found[0] if found[-1] is Ellipsis else found[min(part, len(found) - 1)]
+    return found[1] if get_origin(inner) is dict and isinstance(part, str) else None
+
+
+def _field_at(detail: Mapping[str, Any]) -> tuple[tuple[str, ...], Any]:
+    """Return keys and annotation of the field that one of pydantic's findings is of.
+
+    The place of a finding goes on with the members of a union, and ends with an element where a
+    list is too short.
+    """
+    place: tuple[str | int, ...] = detail["loc"]
+    if detail["type"] == "missing" and isinstance(place[-1], int):
+        place = place[:-1]
+    annotation: Any = Config
+    keys: list[str] = []
+    for part in place:
+        inner = _inside(annotation, part)
+        if inner is None:
+            break
+        annotation = inner
+        keys.append(str(part))
     if detail["type"] == "extra_forbidden":
-        close = difflib.get_close_matches(keys[-1], _known_keys(keys[:-1]), n=1)
-        kind = "section" if len(keys) == 1 else "key"
-        return Fault(where, f"a known {kind}", repr(keys[-1]), f"{close[0]!r}" if close else "")
-    if detail["type"] == "value_error":
-        given = detail["input"]
+        keys.append(str(place[-1]))
+    return tuple(keys), annotation
+
+
+def _fault(where: str, keys: Sequence[str], annotation: Any, detail: Mapping[str, Any]) -> Fault:
+    """Return the fault of a field; of an unknown key, with the one that was probably meant."""
+    kind, given = detail["type"], detail["input"]
+    wanted = without_none(annotation)
+    if kind == "extra_forbidden":
+        close = difflib.get_close_matches(keys[-1], list(wanted.model_fields), n=1)
+        what = "section" if len(keys) == 1 else "key"
+        return Fault(where, f"a known {what}", repr(keys[-1]), f"{close[0]!r}" if close else "")
+    if kind == "value_error":
         got = ", ".join(given) if isinstance(given, Mapping) else shown(given)
         return Fault(where, str(detail["ctx"]["error"]), got)
-    whole = keys[-2:-1] if detail["type"] == "missing" else keys[-1:]
-    if detail["type"] in ("missing", "too_short", "too_long") and whole and whole[0] in _LISTS:
-        place = where.removesuffix(f".{keys[-1]}") if detail["type"] == "missing" else where
-        return Fault(place, _LISTS[whole[0]], shown(detail["input"]))
-    if detail["type"] == "missing" and isinstance(detail["input"], Mapping):
+    if kind == "missing" and isinstance(given, Mapping):
         return Fault(where, "a value", "none")
-    if detail["type"] == "too_short" and not detail["input"]:
+    if kind in ("too_short", "string_too_short") and not given:
         return Fault(where, "at least one value", "none")
-    if detail["type"] in ("too_short", "too_long"):
-        wanted = detail["ctx"].get("max_length", detail["ctx"].get("min_length"))
-        return Fault(where, f"{wanted} values", f"{len(detail['input'])}")
-    return Fault(where, _EXPECTED.get(detail["type"], _said(detail)), shown(detail["input"]))
-
-
-def _one_path(a: Sequence[str], b: Sequence[str]) -> bool:
-    shorter = min(len(a), len(b))
-    return a[:shorter] == b[:shorter]
-
-
-def _said(detail: Mapping[str, Any]) -> str:
-    return str(detail["msg"]).removeprefix("Input should be ")
-
-
-def _known_keys(parents: Sequence[str]) -> list[str]:
-    model: Any = Config
-    for parent in parents:
-        # A number is a place in a list of sections.
-        inner = parent.isdecimal()
-        model = model.__args__[0] if inner else model.model_fields[parent].annotation
-    return list(model.model_fields)
+    words = expected(wanted)
+    if kind == "finite_number":
+        words = words.replace("a number", "a finite number")
+    return Fault(where, words, shown(given), likely(wanted, given))

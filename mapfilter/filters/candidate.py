@@ -38,7 +38,7 @@ class CandidateOptions(Options):
         at every step. On a 5 m lattice steps of 1.4 m snap back to the point they came from; about
         22 m fit the paper's Fig. 5 best.
     tracking_length_m : float or None
-        The same for Table 3, which as printed matches at every step (0); None takes
+        The same for Table 3, which as printed matches at every step (0); by default
         ``update_length_m``.
     prediction : {"last_heading", "displacement"}
         Line 10 projects the whole travelled distance along the last heading, as printed;
@@ -46,9 +46,10 @@ class CandidateOptions(Options):
     duplicates : {"set", "list"}
         Whether candidates matched to the same point become one.
     threshold : int
-        α: the filter switches when no more candidates are left. With a set 1, with a list about 10.
+        α of Table 2: the filter switches when no more candidates are left. With a set 1, with a
+        list about 10.
     at_threshold : {"switch", "stall"}
-        n = α is covered by neither branch of Table 2: it switches, or, as printed, nothing happens.
+        n = α is covered by neither branch of Table 2: the filter switches, or, as printed, stalls.
     switch_check : {"next_call", "same_call"}
         As printed, Table 2 finds out at the next call that few are left and gives up that call's
         motion, 22 m where a call is that long; "same_call" looks right after the update, which

@@ -31,7 +31,7 @@ class CandidateFilter(CandidateOptions):
     Parameters
     ----------
     margin_db : float or None
-        A point belongs to every cell within this margin of its best server; None takes the margin
+        A point belongs to every cell within this margin of its best server; by default the margin
         that the database was built with.
     """
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any, Literal, get_args
+from typing import Annotated, Literal
 
 import numpy as np
+from annotated_types import Ge, Gt, Le
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats
-from mapfilter.errors import ConfigError, Faults
+from mapfilter.errors import Faults
+from mapfilter.options import Below1, Options, Seed, Share
 from mapfilter.propagation.empirical import (
     SHORTEST_DISTANCE_M,
     SHORTEST_FREE_DISTANCE_M,
@@ -41,136 +43,143 @@ ModelName = Literal[
 ]
 LineOfSight = Literal["buildings", "probability"]
 Clutter = Literal["own", "shared"]
-Range = tuple[float, float]
+_Length = Annotated[float, Ge(1e-3), Le(1e4)]
+_Correlation = Annotated[float, Gt(0), Le(1e5)]
+_Deviation = Annotated[float, Ge(0), Le(50)]
 
 
-@dataclass(frozen=True)
-class PredictionModel:
+@dataclass(frozen=True, slots=True)
+class PredictionModel(Options):
     """How levels are predicted.
+
+    Random clutter (``shadowing_db``) stands for detail in the levels. A prediction that is used
+    for positioning should have none: what is drawn at random is nowhere in the world.
 
     Parameters
     ----------
     model : str
-        One of :data:`ModelName`.
+        Propagation model, one of :data:`ModelName`.
     line_of_sight : {"buildings", "probability"}
-        By the raster of building heights; or the path losses with and without line of sight are
-        averaged by their probability (TR 38.901 only).
+        Whether the raster of building heights decides on line of sight, or path losses with and
+        without it are averaged by their probability (TR 38.901 only).
     mobile_height_m : float
         Height of the phone above ground.
     environment : {"large_city", "city", "suburban", "open"}
-        Of Okumura-Hata.
-    path_loss_exponent, reference_distance_m, reference_loss_db : float
-        Of log-distance; the loss at the reference distance is that of free space when it is None.
-    street_width_m, building_separation_m : float
-        Mean width of the streets, and mean distance between the buildings' centres.
+        Environment of Okumura-Hata.
+    path_loss_exponent : float
+        Exponent of the log-distance model.
+    reference_distance_m : float
+        Reference distance of the log-distance model.
+    reference_loss_db : float or None
+        Loss at the reference distance; by default that of free space.
+    street_width_m : float
+        Mean width of the streets.
+    building_separation_m : float
+        Mean distance between the centres of buildings.
     street_orientation_deg : float
-        Angle between street and direct path, 0..90.
+        Angle between street and direct path; 90 where it is unknown.
     default_roof_height_m : float
-        Where no building is near, or no building heights are given.
+        Roof height where no building is near, or no building heights are given.
     metropolitan : bool
-        Metropolitan centre, or medium-sized city and suburbs.
-    shadowing_db, shadowing_correlation_m, site_share : float
-        Random clutter that stands for detail in the levels: deviation, correlation length, and the
-        share of its variance that is common to the sectors of a site. A prediction that is used for
-        positioning should have none.
+        Metropolitan centre, in place of medium-sized city and suburbs.
+    shadowing_db : float
+        Standard deviation of the random clutter.
+    shadowing_correlation_m : float
+        Correlation length of the random clutter.
+    site_share : float
+        Share of its variance that is common to the sectors of a site.
+    seed : int
+        Seed of the random clutter.
+
+    Raises
+    ------
+    ConfigError
+        With every fault.
     """
 
     model: ModelName = "cost231_walfisch_ikegami"
     line_of_sight: LineOfSight = "buildings"
-    mobile_height_m: float = 1.5
+    mobile_height_m: _Length = 1.5
     environment: Environment = "city"
-    path_loss_exponent: float = 3.0
-    reference_distance_m: float = 1.0
-    reference_loss_db: float | None = None
-    street_width_m: float = 20.0
-    building_separation_m: float = 40.0
-    street_orientation_deg: float = 90.0
-    default_roof_height_m: float = 12.0
+    path_loss_exponent: Annotated[float, Ge(0.1), Le(20)] = 3.0
+    reference_distance_m: _Length = 1.0
+    reference_loss_db: Annotated[float, Ge(0), Le(300)] | None = None
+    street_width_m: _Length = 20.0
+    building_separation_m: _Length = 40.0
+    street_orientation_deg: Annotated[float, Ge(0), Le(90)] = 90.0
+    default_roof_height_m: _Length = 12.0
     metropolitan: bool = False
-    shadowing_db: float = 0.0
-    shadowing_correlation_m: float = 50.0
-    site_share: float = 0.5
-    seed: int = 0
+    shadowing_db: _Deviation = 0.0
+    shadowing_correlation_m: _Correlation = 50.0
+    site_share: Share = 0.5
+    seed: Seed = 0
 
-    def __post_init__(self) -> None:
-        faults = Faults()
-        choices = {"model": ModelName, "line_of_sight": LineOfSight, "environment": Environment}
-        for name, allowed in choices.items():
-            if getattr(self, name) not in get_args(allowed):
-                expected = ", ".join(get_args(allowed))
-                faults.add(f"prediction, {name}", expected, repr(getattr(self, name)))
-        if self.line_of_sight == "probability" and not self.model.startswith("tr38901"):
-            expected = "buildings, as only tr38901_uma and tr38901_umi have a probability"
+    def check(self, faults: Faults) -> None:
+        """See that the model has a probability of line of sight where one is asked for."""
+        if self.line_of_sight == "probability" and not str(self.model).startswith("tr38901"):
+            expected = "buildings, as only tr38901_uma and tr38901_umi tell a probability"
             faults.add("prediction, line_of_sight", expected, "probability")
-        lengths = ["mobile_height_m", "street_width_m", "building_separation_m"]
-        lengths += ["default_roof_height_m", "reference_distance_m"]
-        limits: dict[str, Range] = dict.fromkeys(lengths, (1e-3, 1e4))
-        limits["path_loss_exponent"] = 0.1, 20
-        if self.reference_loss_db is not None:
-            limits["reference_loss_db"] = 0, 300
-        limits |= {"street_orientation_deg": (0, 90), "shadowing_db": (0, 50)}
-        limits |= {"shadowing_correlation_m": (0, 1e5), "site_share": (0, 1), "seed": (0, np.inf)}
-        _check(self, "prediction", limits, faults)
-        faults.raise_if_any(ConfigError)
 
 
-@dataclass(frozen=True)
-class GroundTruthErrors:
+@dataclass(frozen=True, slots=True)
+class GroundTruthErrors(Options):
     """How the simulated ground truth differs from its prediction.
 
     Parameters
     ----------
-    level_error_db, correlation_m : float
-        Deviation and correlation length of a shadowing field independent of the prediction's.
+    level_error_db : float
+        Standard deviation of a shadowing field that the prediction does not know.
+    correlation_m : float
+        Correlation length of that field.
     site_share : float
-        Share of that field's variance common to the sectors of a site, 0..1.
-    eirp_error_db, azimuth_error_deg, slope_error : float
-        Each cell's EIRP, azimuth and path-loss slope are off by uniform draws within ± these; the
-        last is a fraction.
+        Share of its variance that is common to the sectors of a site.
+    eirp_error_db : float
+        Each cell's EIRP is off by a uniform draw within ± this.
+    azimuth_error_deg : float
+        Each cell's azimuth is off by a uniform draw within ± this.
+    slope_error : float
+        Each cell's path-loss slope is off by a uniform draw within ± this fraction.
+    seed : int
+        Seed of all these draws.
     clutter : {"own", "shared"}
-        Whether the ground truth's random clutter is drawn anew, with the same deviation, or is
-        that of the prediction.
-    local_share, local_correlation_m : float
-        Share of the shadowing's variance that has another, shorter correlation length.
+        Whether the prediction's random clutter is drawn anew, with the same deviation, or is the
+        ground truth's too, as if the prediction had known it.
+    local_share : float
+        Share of the shadowing's variance that has ``local_correlation_m``.
+    local_correlation_m : float
+        The shorter correlation length.
     model : str or None
-        The ground truth's propagation model; None for the prediction's.
-    street_width_m, building_separation_m, default_roof_height_m : float or None
-        Likewise, of the ground truth.
+        Propagation model of the ground truth; by default that of the prediction.
+    street_width_m : float or None
+        Street width of the ground truth; by default that of the prediction.
+    building_separation_m : float or None
+        Building separation of the ground truth; by default that of the prediction.
+    default_roof_height_m : float or None
+        Default roof height of the ground truth; by default that of the prediction.
     roof_error : float
         Heights of buildings are off by a factor, the same for neighbours, whose logarithm is
-        normal with this deviation.
+        normal with this standard deviation.
     offset_db : float
         Added to all levels: the mean by which another propagation model differs, which drive tests
         would have taken out of the prediction.
     """
 
-    level_error_db: float = 7.0
-    correlation_m: float = 50.0
-    site_share: float = 0.5
-    eirp_error_db: float = 2.0
-    azimuth_error_deg: float = 5.0
-    slope_error: float = 0.05
-    seed: int = 0
+    level_error_db: _Deviation = 7.0
+    correlation_m: _Correlation = 50.0
+    site_share: Share = 0.5
+    eirp_error_db: _Deviation = 2.0
+    azimuth_error_deg: Annotated[float, Ge(0), Le(180)] = 5.0
+    slope_error: Below1 = 0.05
+    seed: Seed = 0
     clutter: Clutter = "own"
-    local_share: float = 0.0
-    local_correlation_m: float = 20.0
+    local_share: Share = 0.0
+    local_correlation_m: _Correlation = 20.0
     model: ModelName | None = None
-    street_width_m: float | None = None
-    building_separation_m: float | None = None
-    default_roof_height_m: float | None = None
-    roof_error: float = 0.0
-    offset_db: float = 0.0
-
-    def __post_init__(self) -> None:
-        faults = Faults()
-        limits: dict[str, Range] = {"level_error_db": (0, 50), "eirp_error_db": (0, 50)}
-        limits |= {"correlation_m": (0, 1e5), "local_correlation_m": (0, 1e5)}
-        limits |= dict.fromkeys(("site_share", "local_share", "slope_error", "roof_error"), (0, 1))
-        limits |= {"azimuth_error_deg": (0, 180), "offset_db": (-50, 50), "seed": (0, np.inf)}
-        _check(self, "ground_truth", limits, faults)
-        if self.clutter not in get_args(Clutter):
-            faults.add("ground_truth, clutter", "own or shared", repr(self.clutter))
-        faults.raise_if_any(ConfigError)
+    street_width_m: _Length | None = None
+    building_separation_m: _Length | None = None
+    default_roof_height_m: _Length | None = None
+    roof_error: Share = 0.0
+    offset_db: Annotated[float, Ge(-50), Le(50)] = 0.0
 
     def truth_of(self, prediction: PredictionModel) -> PredictionModel:
         """Return the ground truth's propagation model, for that of a prediction."""
@@ -179,14 +188,7 @@ class GroundTruthErrors:
         return replace(prediction, **given)
 
 
-def _check(owner: Any, section: str, limits: Mapping[str, Range], faults: Faults) -> None:
-    for name, (low, high) in limits.items():
-        value = getattr(owner, name)
-        if not low <= value <= high:
-            hint = "per cent given for a fraction" if high == 1 and 1 < value <= 100 else ""
-            expected = f"a number ≥ {low:g}" if high == np.inf else f"{low:g}..{high:g}"
-            faults.add(f"{section}, {name}", expected, value, hint)
-
+Range = tuple[float, float]
 
 _HATA = {"base_height_m": (30.0, 200.0), "mobile_height_m": (1.0, 10.0)}
 _HATA_DISTANCE = {"distance_m": (1000.0, 20000.0)}

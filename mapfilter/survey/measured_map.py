@@ -9,15 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from annotated_types import Ge
 from scipy.spatial import cKDTree
 from threadpoolctl import threadpool_limits
 
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats, Ints
-from mapfilter.errors import ConfigError, Faults, InputError, fail
+from mapfilter.errors import InputError, fail
+from mapfilter.options import Options
 from mapfilter.radio.cells import CellPlan
 from mapfilter.survey.cell_model import (
     Covariate,
@@ -41,8 +43,8 @@ _PHONE_HEIGHT_M = 1.5
 _CALIBRATION = {"slope": 1.0, "slope_deviation": 0.2}
 
 
-@dataclass(frozen=True)
-class SurveyOptions:
+@dataclass(frozen=True, slots=True)
+class SurveyOptions(Options):
     """How measurements become a map.
 
     Parameters
@@ -60,7 +62,7 @@ class SurveyOptions:
         An antenna of unknown place is located from at least so many; with fewer the trend is the
         mean.
     neighbours : int
-        For "knn".
+        Number of neighbours that "knn" averages.
     square_m : float
         Readings of one session in one such square count once.
     most_points : int
@@ -69,26 +71,12 @@ class SurveyOptions:
 
     method: Literal["gp", "knn", "trend"] = "gp"
     trend: Literal["path_loss", "mean"] = "path_loss"
-    reach_m: float = 100.0
-    min_points: int = 3
-    min_points_to_locate: int = 15
-    neighbours: int = 8
-    square_m: float = 10.0
-    most_points: int = 1500
-
-    def __post_init__(self) -> None:
-        faults = Faults()
-        if self.method not in ("gp", "knn", "trend"):
-            faults.add("survey, method", "gp, knn or trend", repr(self.method))
-        if self.trend not in ("path_loss", "mean"):
-            faults.add("survey, trend", "path_loss or mean", repr(self.trend))
-        least = {"reach_m": 1.0, "min_points": 1, "min_points_to_locate": 3}
-        least |= {"neighbours": 1, "square_m": 0.1, "most_points": 10}
-        for name, low in least.items():
-            value = getattr(self, name)
-            if not low <= value < np.inf:
-                faults.add(f"survey, {name}", f"a number ≥ {low:g}", value)
-        faults.raise_if_any(ConfigError)
+    reach_m: Annotated[float, Ge(1)] = 100.0
+    min_points: Annotated[int, Ge(1)] = 3
+    min_points_to_locate: Annotated[int, Ge(3)] = 15
+    neighbours: Annotated[int, Ge(1)] = 8
+    square_m: Annotated[float, Ge(0.1)] = 10.0
+    most_points: Annotated[int, Ge(10)] = 1500
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from mapfilter.config.fields import SYNTHETIC_MAP, SYNTHETIC_MAPS
-from mapfilter.config.sections import Area
+from mapfilter.config.inputs import Area
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.geodesy import Lattice, check_bbox, project, projected_crs, unproject, utm_crs
 from mapfilter.roads.maps import check_on_map, map_bounds_deg
@@ -98,7 +98,7 @@ def pixels_on(
 
 
 def check_scale(crs: str, bounds_m: tuple[float, float, float, float], where: str) -> None:
-    """See that metres of a CRS are metres on the ground in the middle of an area.
+    """Check that metres of a CRS are metres on the ground in the middle of an area.
 
     Raises
     ------

@@ -44,9 +44,9 @@ class BoundResult:
     plane_bound_m, along_bound_m : float
         Medians of the position-error bound of one report, of points that have one.
     without_plane_bound : float
-        Share of points at which levels tell nothing of one direction.
+        Share of points at which levels carry no information along one direction.
     cell_bits, level_bits : float
-        Means of what one report tells.
+        Mean information of one report.
     cells_bits_per_m, levels_bits_per_m : float
         Expected information on the start per metre, over the first ``path_m``.
     cells_to_fix_m, levels_to_fix_m : float
@@ -57,10 +57,8 @@ class BoundResult:
         Of those that did by levels, the share that did so in a wrong place.
     twins : float
         Share of journeys with a twin.
-    seconds : float
     notes : tuple of str
         What is exact and what is approximate.
-    outputs : tuple of Path
     """
 
     points: int
@@ -122,10 +120,8 @@ def run_bound(
     save(drawn, out / "metres-to-fix.png")
     pairs_m = twins[["east_m", "north_m", "twin_east_m", "twin_north_m"]].to_numpy()
     save(plot_twins(rasters["twin_error"], pairs_m, *on_map), out / "twins.png")
-    names = (
-        "bound.tif", "ways.parquet", "twins.parquet", "position-bound.png", "metres-to-fix.png",
-        "twins.png",
-    )  # fmt: skip
+    tables = ["bound.tif", "ways.parquet", "twins.parquet"]
+    names = [*tables, "position-bound.png", "metres-to-fix.png", "twins.png"]
     return _summary(found, began_s, tuple(out / name for name in names))
 
 

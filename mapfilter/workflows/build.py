@@ -8,7 +8,8 @@ from pathlib import Path
 
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress, executor_of
-from mapfilter.config.sections import Area, Config
+from mapfilter.config.inputs import Area
+from mapfilter.config.sections import Config
 from mapfilter.database.build import build
 from mapfilter.database.estimate import BuildEstimate, dry_run
 from mapfilter.database.manifest import InputFile
@@ -18,10 +19,16 @@ from mapfilter.geodesy import Lattice, projected_crs, same_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.workflows.area import pixels_on
-from mapfilter.workflows.cover import check_cells_near, map_cover, raster_cover
-from mapfilter.workflows.network_pictures import NETWORK_PICTURES, draw_network
-from mapfilter.workflows.results import clear_pictures
-from mapfilter.workflows.world import World, area_lattice, check_scale, planned_rasters
+from mapfilter.workflows.pictures import NETWORK_PICTURES, clear_pictures, draw_network
+from mapfilter.workflows.world import (
+    World,
+    area_lattice,
+    check_cells_near,
+    check_scale,
+    map_cover,
+    planned_rasters,
+    raster_cover,
+)
 
 PIXELS_A_TASK = 10_000_000
 MOST_TILES_A_TASK = 64
@@ -35,9 +42,9 @@ class BuildResult:
     Parameters
     ----------
     points, cells : int
-        Points that hear at least one cell, and cells.
+        Points that receive at least one cell, and cells.
     routable_points : int
-        Points of the roads, those that hear nothing included.
+        Points of the roads, including those that receive no cell.
     database : Path
         The folder.
     seconds : float
@@ -69,7 +76,6 @@ def run_build(
 
     Parameters
     ----------
-    config : Config
     workers : int
         Local processes.
     cluster : str, optional
@@ -77,7 +83,6 @@ def run_build(
         rasters by the same paths.
     resume : bool
         Go on where a build of the same inputs was cut short.
-    progress : callable, optional
 
     Raises
     ------
@@ -171,7 +176,7 @@ def _raster_world(config: Config) -> tuple[RxLevRasters, CellPlan, World]:
             raise fail(InputError, f"{rasters.path}, CRS", expected, lattice.crs, "another zone")
     check_scale(lattice.crs, lattice.bounds_m, f"{rasters.path}, CRS")
     whole = World(config, lattice)
-    if area.bbox is None and area.southwest is None:
+    if not area.has_box:
         return rasters, whole.plan, whole
     cut = _cut(lattice, area, str(rasters.path))
     if cut == lattice:
@@ -193,7 +198,7 @@ def _cut(lattice: Lattice, area: Area, name: str) -> Lattice:
 def _draw(
     config: Config, rasters: RxLevRasters, database: RadioRouteDatabase, world: World
 ) -> tuple[Path, ...]:
-    """Draw the database; pictures of an older one make way in any case."""
+    """Draw the database; pictures of an older one are removed in any case."""
     folder = config.pictures_path
     if config.output.pictures == "none":
         clear_pictures(folder, NETWORK_PICTURES)

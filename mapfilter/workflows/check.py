@@ -27,7 +27,6 @@ from mapfilter.workflows.check_places import (
     check_same_pixels,
     check_sites,
     check_ways,
-    has_box,
 )
 from mapfilter.workflows.survey import survey_inputs
 from mapfilter.workflows.world import World, area_lattice, planned_rasters
@@ -105,7 +104,7 @@ def _area(config: Config, rasters: RxLevRasters | None, findings: Findings) -> L
     if about is not None and not _says_where(config):
         return about
     if findings.found and not config.area.has_extent and config.rasters_path.exists():
-        # What keeps the rasters, which would tell the area, from being read is told already.
+        # Why the rasters, which give the area, cannot be read is reported already.
         return None
     try:
         return area_lattice(config.area)
@@ -116,10 +115,10 @@ def _area(config: Config, rasters: RxLevRasters | None, findings: Findings) -> L
 
 
 def _says_where(config: Config) -> bool:
-    """Tell whether box or map say where rasters should be; layers and tracks replace the map."""
+    """Return whether box or map place the rasters; layers and tracks replace the map."""
     area, roads = config.area, config.roads
     replaced = roads.layer is not None or bool(roads.tracks.files)
-    return has_box(area) or (area.has_extent and not replaced)
+    return area.has_box or (area.has_extent and not replaced)
 
 
 def _rasters(config: Config, findings: Findings) -> RxLevRasters | None:
@@ -219,7 +218,7 @@ def _misspelt(named: Sequence[str]) -> Iterator[str]:
 
 def _check_roads(inputs: _Inputs, area: Lattice, findings: Findings) -> None:
     config, rasters = inputs.config, inputs.rasters
-    lattice = rasters.lattice if rasters is not None and not has_box(config.area) else area
+    lattice = rasters.lattice if rasters is not None and not config.area.has_box else area
     world = World(config, lattice)
     if config.roads.landuse is None:
         try:

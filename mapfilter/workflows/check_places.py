@@ -10,14 +10,15 @@ import shapely
 
 from mapfilter._types import Bools, Floats
 from mapfilter.check.findings import Findings, listed
-from mapfilter.config.sections import Area, Config
+from mapfilter.config.inputs import Area
+from mapfilter.config.sections import Config
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice, project, projected_crs, same_crs, unproject, utm_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.maps import box_deg, map_bounds_deg
 from mapfilter.roads.ways import Ways
-from mapfilter.workflows.world import area_lattice
+from mapfilter.workflows.world import area_lattice, outside_m
 
 BoxDeg = tuple[float, float, float, float]
 Move = Callable[[Floats, Floats], tuple[Floats, Floats]]
@@ -30,13 +31,8 @@ _MOST_ZONES = 2
 _NEARLY_ALL = 0.9
 
 
-def has_box(area: Area) -> bool:
-    """Tell whether an area says where it is, rather than leaving it to the map."""
-    return area.bbox is not None or area.southwest is not None
-
-
 def check_rasters_place(rasters: RxLevRasters, config: Config, findings: Findings) -> bool:
-    """See that rasters and area, or map, overlap; tell when their numbers fit another CRS.
+    """Check that rasters and area overlap, and whether their numbers fit another CRS.
 
     Returns
     -------
@@ -66,7 +62,7 @@ def check_rasters_place(rasters: RxLevRasters, config: Config, findings: Finding
 
 
 def check_sites(plan: CellPlan, lattice: Lattice, where: str, findings: Findings) -> frozenset[str]:
-    """See that sites lie in the area, and tell which mistake would put them there.
+    """Check that sites lie in the area, and which mistake explains those that do not.
 
     Returns
     -------
@@ -79,11 +75,7 @@ def check_sites(plan: CellPlan, lattice: Lattice, where: str, findings: Findings
     if not outside.any():
         return frozenset()
     ids = [cell.id for cell, out in zip(plan.cells, outside, strict=True) if out]
-    west, south, right, top = lattice.bounds_m
-    beyond_m = np.hypot(
-        np.maximum(np.maximum(west - east, east - right), 0),
-        np.maximum(np.maximum(south - north, north - top), 0),
-    )[outside]
+    beyond_m = outside_m(east, north, lattice)[outside]
     named = f"{where}, cells {listed(ids)}"
     seen = f"{len(ids)} of {len(plan)} cells lie up to {_metres(beyond_m.max())} outside the area."
     for code, words, move in _moves(lattice):
@@ -97,7 +89,7 @@ def check_sites(plan: CellPlan, lattice: Lattice, where: str, findings: Findings
 
 
 def check_pixels(rasters: RxLevRasters, findings: Findings) -> None:
-    """See whether rasters are half a pixel off one another, or off multiples of their own pixels.
+    """Check whether rasters are half a pixel off one another, or off multiples of their own pixels.
 
     The lattice of an area lies on multiples of its pixels, and so do those of nearly all exports.
     """
@@ -126,15 +118,12 @@ def check_pixels(rasters: RxLevRasters, findings: Findings) -> None:
 def check_same_pixels(
     path: str, transform: Sequence[float], rasters: RxLevRasters, findings: Findings
 ) -> None:
-    """See whether another raster of the same resolution is half a pixel off the levels.
+    """Check whether another raster of the same resolution is half a pixel off the levels.
 
     Parameters
     ----------
-    path : str
     transform : sequence of float
         West edge, pixel width, north edge.
-    rasters : RxLevRasters
-    findings : Findings
     """
     lattice = rasters.lattice
     west_m, side_m, north_m = transform
@@ -148,7 +137,7 @@ def check_same_pixels(
 
 
 def check_ways(ways: Ways, rasters: RxLevRasters, where: str, findings: Findings) -> None:
-    """See that the rasters cover the ways."""
+    """Check that the rasters cover the ways."""
     length_m = float(shapely.length(ways.geometry).sum())
     inside = shapely.clip_by_rect(ways.geometry, *rasters.lattice.bounds_m)
     outside_m = length_m - float(shapely.length(inside).sum())
@@ -162,7 +151,7 @@ def check_ways(ways: Ways, rasters: RxLevRasters, where: str, findings: Findings
 
 
 def _area_box(area: Area) -> BoxDeg:
-    if has_box(area):
+    if area.has_box:
         lattice = area_lattice(area)
         return box_deg(lattice.crs, lattice.bounds_m)
     return map_bounds_deg(area.map)
@@ -202,31 +191,15 @@ def _moves(lattice: Lattice) -> Iterator[tuple[str, str, Move]]:
     for crs in _other_systems(box):
         if same_crs(crs, lattice.crs):
             continue
-        yield (
-            "crs-mixed",
-            f"With their numbers read as {lattice.crs}, not {crs}",
-            _into(crs, lattice),
-        )
-        yield "crs-mixed", f"With their numbers read as {crs}", _from(crs, lattice)
+        said_other = f"With their numbers read as {lattice.crs}, not {crs}"
+        yield "crs-mixed", said_other, _read_as(crs, lattice.crs)
+        yield "crs-mixed", f"With their numbers read as {crs}", _read_as(lattice.crs, crs)
     yield "lon-lat-swapped", "With the other sign of longitude", mirrored
 
 
-def _into(crs: str, lattice: Lattice) -> Move:
-    """Undo that numbers of the lattice's CRS were said to be of another."""
-
-    def move(east: Floats, north: Floats) -> tuple[Floats, Floats]:
-        return _projected(crs, *unproject(lattice.crs, east, north))
-
-    return move
-
-
-def _from(crs: str, lattice: Lattice) -> Move:
-    """Undo that numbers of another CRS were taken for those of the lattice's."""
-
-    def move(east: Floats, north: Floats) -> tuple[Floats, Floats]:
-        return _projected(lattice.crs, *unproject(crs, east, north))
-
-    return move
+def _read_as(to_crs: str, from_crs: str) -> Move:
+    """Return what projects numbers of one CRS to another."""
+    return lambda east, north: _projected(to_crs, *unproject(from_crs, east, north))
 
 
 def _projected(crs: str, lon: Floats, lat: Floats) -> tuple[Floats, Floats]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
-from importlib.resources import as_file, files
+from dataclasses import asdict, dataclass, fields
+from importlib import resources
 from pathlib import Path
 
 from mapfilter._io import ensure_writable_folder
@@ -108,7 +108,7 @@ def run_demo(
     """
     ensure_writable_folder(out)
     seeds = [] if seed is None else [f"journeys.seed={seed}"]
-    with as_file(files("mapfilter.data")) as data:
+    with resources.as_file(resources.files("mapfilter.data")) as data:
         config = load_config(
             data / "demo.toml",
             [*settings, *seeds],
@@ -158,11 +158,4 @@ def _figures(walk: ReplayedLog) -> FilterFigures:
     score = walk.accuracy
     if score is None:
         raise AssertionError("a simulated walk has its truth")
-    return FilterFigures(
-        score.switched,
-        score.switch_distance_m,
-        score.error_at_switch_m,
-        score.error_mean_m,
-        score.error_67_m,
-        score.error_95_m,
-    )
+    return FilterFigures(*(getattr(score, one.name) for one in fields(FilterFigures)))

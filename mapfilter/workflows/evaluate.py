@@ -29,17 +29,16 @@ from mapfilter.experiments.benchmarks.world import (
     write_buildings,
 )
 from mapfilter.experiments.sweep.world import SweepWorld, write_world
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import predict
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.satellites import NlosModel, ReceptionModel
-from mapfilter.workflows.filters import filter_choice
-from mapfilter.workflows.jsonable import to_jsonable
-from mapfilter.workflows.predict import ground_truth_errors, prediction_model
 from mapfilter.workflows.simulate import simulation_settings
-from mapfilter.workflows.world import World
+from mapfilter.workflows.terminal import to_jsonable
+from mapfilter.workflows.world import World, filter_choice
 
 NAMES = ("global-positioning", "audit", "ottawa")
 RUNS = 20
@@ -177,7 +176,7 @@ def _world(world: World, folder: Path, seed: int) -> tuple[BenchmarkWorld, int]:
     """Predict the cells, and build a database of all ways and one that lacks every tenth."""
     folder.mkdir(parents=True, exist_ok=True)
     config = world.config
-    model, antennas = prediction_model(config.prediction), world.antennas
+    model, antennas = config.prediction.of(PredictionModel), world.antennas
     rasters_path = folder / "rxlev.tif"
     levels = predict(world.plan, world.lattice, world.heights_m, model, antennas=antennas)
     write_rasters(rasters_path, world.lattice, levels, world.plan.ids)
@@ -200,7 +199,10 @@ def _world(world: World, folder: Path, seed: int) -> tuple[BenchmarkWorld, int]:
     network = street_network(world.ways, world.routes)
     streets = SweepWorld(network, world.plan, world.lattice, {}, world.heights_m)
     write_world(streets, folder / STREETS)
-    errors, settings = ground_truth_errors(config.prediction), simulation_settings(config)
+    errors, settings = (
+        config.prediction.ground_truth.of(GroundTruthErrors),
+        simulation_settings(config),
+    )
     settings = replace(settings, reports=replace(settings.reports, radio="ground_truth"))
     reception = ReceptionModel(nlos=NlosModel() if config.journeys.nlos_satellites else None)
     return BenchmarkWorld(folder, model, errors, settings, antennas, reception), count

@@ -12,7 +12,7 @@ from mapfilter._parallel import Progress, part_of
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.experiments.benchmarks.scores import CaseResult
 from mapfilter.workflows.evaluate import TABLE, load_benchmark, run_global_positioning
-from mapfilter.workflows.jsonable import to_jsonable
+from mapfilter.workflows.terminal import to_jsonable
 
 _GYRO = {
     "imu.turns": "gyro",

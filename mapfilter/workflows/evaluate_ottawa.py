@@ -42,8 +42,8 @@ from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.report.canvas import BLUE, GREEN, GREY, save
 from mapfilter.report.curves import Distribution, plot_cumulative
 from mapfilter.workflows.build import run_build
-from mapfilter.workflows.jsonable import to_jsonable
 from mapfilter.workflows.survey import run_survey
+from mapfilter.workflows.terminal import to_jsonable
 
 HEAD, TABLE, FOUND, PICTURE = "benchmark.json", "table.json", "found.json", "errors.png"
 RUNS = 3

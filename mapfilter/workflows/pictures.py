@@ -1,22 +1,272 @@
-"""Which pictures a replay gets."""
+"""Which pictures a database gets, and the rasters that it was built from."""
 
 from __future__ import annotations
 
+import json
+from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from mapfilter._io import ensure_writable_folder
+from mapfilter._types import Floats32
 from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.errors import OutputError, fail
 from mapfilter.evaluation.accuracy import Truth
+from mapfilter.geodesy import Lattice
 from mapfilter.positioning.estimate import PositionedTrack, Snapshot
+from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.report.basemap import BaseMap
 from mapfilter.report.belief import MAX_PANELS, plot_belief, plot_candidates
-from mapfilter.report.canvas import save
+from mapfilter.report.canvas import BLUE, ORANGE, save
 from mapfilter.report.errors import plot_error_over_distance, plot_evidence
+from mapfilter.report.landuse import plot_landuse
+from mapfilter.report.network import plot_best_server, plot_level, plot_margin, plot_points_per_cell
 from mapfilter.report.track import plot_track
+from mapfilter.roads.buildings import rasterise_heights
+from mapfilter.roads.landuse import LandUse
+from mapfilter.roads.ways import Buildings
 from mapfilter.tracks.log import TrackLog
-from mapfilter.workflows.network_pictures import street_map
-from mapfilter.workflows.served import served_points
+from mapfilter.workflows.served import (
+    MOST_READ_PX,
+    ServedPoints,
+    best_servers,
+    common_window,
+    served_points,
+    street_map,
+    thinned_lattice,
+)
+
+ESTIMATES = ("estimate.parquet", "estimate.gpx", "estimate.geojson")
+FIGURES = "figures.json"
+SUMMARY = "summary.json"
+
+PICTURES = ("candidates.png", "belief.png", "track.png", "error.png", "evidence.png")
+
+_OF_ONE_LOG = {*ESTIMATES, FIGURES, *PICTURES}
+
+
+def clear_results(out: Path) -> None:
+    """Remove what an older replay wrote into a folder, so that no figures of two replays mix.
+
+    A folder in it is one of that replay's when it is called as the log that its figures are of,
+    and holds nothing else. All other files stay.
+
+    Raises
+    ------
+    OutputError
+        A file cannot be removed.
+    """
+    try:
+        for name in (*_OF_ONE_LOG, SUMMARY):
+            (out / name).unlink(missing_ok=True)
+        for inner in sorted(out.iterdir()):
+            if _is_result(inner):
+                for file in inner.iterdir():
+                    file.unlink()
+                inner.rmdir()
+    except OSError as error:
+        what = error.strerror or error
+        raise fail(OutputError, str(error.filename or out), "a place to write", what) from error
+
+
+def clear_pictures(folder: Path, names: Sequence[str]) -> None:
+    """Remove older pictures from a folder, so that none shows what is gone.
+
+    Raises
+    ------
+    OutputError
+        One cannot be removed.
+    """
+    try:
+        for name in names:
+            (folder / name).unlink(missing_ok=True)
+    except OSError as error:
+        what = error.strerror or error
+        where = str(error.filename or folder)
+        raise fail(OutputError, where, "a picture that can be removed", what) from error
+
+
+def _is_result(folder: Path) -> bool:
+    figures = folder / FIGURES
+    if folder.is_symlink() or not figures.is_file():
+        return False
+    try:
+        of = json.loads(figures.read_text(encoding="utf-8")).get("log")
+    except (ValueError, AttributeError, RecursionError):
+        return False
+    return of == folder.name and {file.name for file in folder.iterdir()} <= _OF_ONE_LOG
+
+
+NETWORK_PICTURES = (
+    "coverage.png",
+    "best-server.png",
+    "margin.png",
+    "points-per-cell.png",
+    "points-of-one-site.png",
+    "land-use.png",
+)
+
+_TITLES = (
+    "Level of the best server",
+    "Best server",
+    "Margin of the best server over the second",
+    "Points by best server",
+    "Land use",
+)
+_NEARLY_ALL = (1.0, 99.0)
+_IF_NONE_DBM = (-110.0, -50.0)
+
+
+def draw_network(
+    rasters: RxLevRasters,
+    database: RadioRouteDatabase,
+    folder: Path,
+    *,
+    area: Lattice | None = None,
+    landuse: LandUse | None = None,
+    buildings: Buildings | None = None,
+) -> tuple[Path, ...]:
+    """Draw a database and the rasters that it was built from.
+
+    Coverage, best server, margin, points per cell, points of the site with the most sectors if
+    any has several, and land use where it is known. Memory is bounded whatever the area: it is
+    thinned to what a picture can show, and of very large sets of rasters only the database's points
+    are shown. Where nearly all points lie in less than half of the area, only that is shown, and
+    the titles show that.
+
+    Parameters
+    ----------
+    rasters : RxLevRasters
+        Levels or losses.
+    folder : Path
+        Made where it is missing; pictures of an older database in it are removed.
+    area : Lattice, optional
+        The part of the database's lattice that its roads were laid on, when that is not all.
+    landuse : LandUse, optional
+        On that part: what the points were made from.
+    buildings : Buildings, optional
+        Without ``landuse``: drawn beside ways and squares.
+
+    Returns
+    -------
+    tuple of Path
+        The pictures, in this order.
+
+    Raises
+    ------
+    InputError
+        Rasters and database are of different areas, or a raster is damaged.
+    OutputError
+        A picture cannot be written.
+    """
+    _ = common_window(rasters.lattice, database.lattice, str(database.path))
+    within = common_window(database.lattice, area or database.lattice, str(database.path))
+    ensure_writable_folder(folder)
+    clear_pictures(folder, NETWORK_PICTURES)
+    everywhere = served_points(database, within)
+    window, points, told = everywhere.crowded_window(database.lattice), everywhere, ""
+    if window != within:
+        points = served_points(database, window)
+        share = 100 * points.counts.sum() // everywhere.counts.sum()
+        told = f", where {share} % of the points lie"
+    shown = database.lattice.window(*window)
+    at_points = shown.rows * shown.cols * len(rasters.cell_ids) > MOST_READ_PX
+    best = points.best if at_points else best_servers(rasters, database, shown)
+    lattice, plan = best.lattice, database.plan
+    base = BaseMap(lattice.bounds_m, attribution=database.attribution)
+    drawn = [folder / name for name in NETWORK_PICTURES[:4]]
+    titles = [f"{title}{told}" for title in _TITLES]
+    ends_dbm = _ends(best.level_dbm)
+    on_map = lattice, plan, base
+    level = plot_level(best.level_dbm, *on_map, title=titles[0], range_dbm=ends_dbm)
+    save(level, drawn[0])
+    save(plot_best_server(best.server, plan.ids, *on_map, title=titles[1]), drawn[1])
+    save(plot_margin(best.margin_db, *on_map, title=titles[2]), drawn[2])
+    _draw_points(database, points, database.cell_ids, drawn[3], titles[3])
+    site, cells = Counter(cell.site for cell in plan.cells).most_common(1)[0]
+    if cells > 1:
+        drawn.append(folder / NETWORK_PICTURES[4])
+        draw_site(database, everywhere, site, drawn[-1])
+    classes = None
+    if landuse is not None:
+        _, step = thinned_lattice(shown)
+        top, left = window[0] - within[0], window[1] - within[1]
+        code = landuse.code[top : top + window[2] : step, left : left + window[3] : step]
+        classes = replace(landuse, code=code)
+    elif buildings is not None and len(buildings):
+        classes = land_use_of_map(points, buildings)
+    if classes is not None:
+        drawn.append(folder / NETWORK_PICTURES[5])
+        below = BaseMap(points.best.lattice.bounds_m, attribution=database.attribution)
+        save(plot_landuse(classes, points.best.lattice, below, title=titles[4]), drawn[-1])
+    return tuple(drawn)
+
+
+def draw_site(database: RadioRouteDatabase, points: ServedPoints, site: str, path: Path) -> None:
+    """Draw the points that the sectors of one site serve best (the paper's Fig. 2).
+
+    In an area that had to be thinned, only the surroundings of these points are shown.
+    """
+    plan, lattice = database.plan, database.lattice
+    cells = [cell.id for cell in plan.cells if cell.site == site]
+    own = np.isin(points.best.server, [plan.index(cell_id) for cell_id in cells])
+    row, col = np.nonzero(own)
+    if points.best.lattice.resolution_m > lattice.resolution_m and row.size:
+        rows, cols = ((int(at.min()), int(at.max())) for at in (row, col))
+        points = served_points(database, points.window_about(rows, cols, lattice))
+    _draw_points(database, points, cells, path, f"Points served by site {site}")
+
+
+def land_use_of_map(points: ServedPoints, buildings: Buildings) -> LandUse:
+    """Return the land use of a street map: ways, squares, buildings, and the rest.
+
+    Parameters
+    ----------
+    points : ServedPoints
+        What is walkable.
+    buildings : Buildings
+        In the CRS of the points.
+    """
+    code = np.where(rasterise_heights(buildings, points.best.lattice) > 0, 2, 3).astype(np.int16)
+    there = points.best.server >= 0
+    code[there] = np.where(points.on_square[there], 1, 0)
+    return LandUse(
+        code,
+        ("way", "square", "building", "other"),
+        (True, True, False, False),
+        (BLUE, ORANGE, "#8c8c8c", "#eee9dd"),
+    )
+
+
+def _ends(level_dbm: Floats32) -> tuple[float, float]:
+    """Return tens of dBm between which nearly all levels lie."""
+    known = level_dbm[np.isfinite(level_dbm)]
+    low, high = np.percentile(known, _NEARLY_ALL) if known.size else _IF_NONE_DBM
+    low, high = 10 * np.floor(low / 10), 10 * np.ceil(high / 10)
+    return float(low), float(max(high, low + 10))
+
+
+def _draw_points(
+    database: RadioRouteDatabase,
+    points: ServedPoints,
+    cells: Sequence[str],
+    path: Path,
+    title: str,
+) -> None:
+    numbers = [database.plan.index(cell_id) for cell_id in cells]
+    drawn = plot_points_per_cell(
+        {cell_id: points.places(number) for cell_id, number in zip(cells, numbers, strict=True)},
+        database.plan,
+        street_map(database, points),
+        title=title,
+        counts=points.counts[numbers].tolist(),
+        resolution_m=points.best.lattice.resolution_m,
+    )
+    save(drawn, path)
+
 
 _SQUARE_M = 5.0
 

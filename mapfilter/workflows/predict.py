@@ -11,7 +11,7 @@ from rasterio.errors import RasterioError
 
 from mapfilter._io import VERSION, ensure_writable_folder, sha256_file
 from mapfilter._parallel import Progress, part_of
-from mapfilter.config.sections import Config, Prediction
+from mapfilter.config.sections import Config
 from mapfilter.errors import Faults, InputError, OutputError, fail
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import (
@@ -23,8 +23,7 @@ from mapfilter.propagation.predict import (
 from mapfilter.radio.cells import write_cell_plan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
-from mapfilter.workflows.cover import check_cells_near, map_cover
-from mapfilter.workflows.world import World
+from mapfilter.workflows.world import World, check_cells_near, map_cover
 
 _PREDICTION_TAG = "PREDICTION_SHA256"
 
@@ -148,7 +147,7 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     world = World.of(config)
     for folder in (target.parent, ground_truth.parent, config.output.dir):
         ensure_writable_folder(folder)
-    plan, lattice, model = world.plan, world.lattice, prediction_model(config.prediction)
+    plan, lattice, model = world.plan, world.lattice, config.prediction.of(PredictionModel)
     check_cells_near(plan, lattice, str(config.cells.plan or "cells"))
     antennas = world.antennas
     notes = (
@@ -160,14 +159,14 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
         *off_frequency(plan, antennas),
     )
     heights_m = world.heights_m
-    wanted = 2 if config.prediction.ground_truth.write else 1
+    wanted = 2 if both else 1
     tags = {"SOFTWARE": f"mapfilter {VERSION}", "MODEL": model.model, "MAP": world.map_name}
     levels = predict(
         plan, lattice, heights_m, model, part_of(progress, 0, wanted), antennas=antennas
     )
     write_rasters(target, lattice, levels, plan.ids, tags)
     if wanted == 2:
-        errors = ground_truth_errors(config.prediction)
+        errors = config.prediction.ground_truth.of(GroundTruthErrors)
         real = simulate_ground_truth(
             plan, lattice, heights_m, model, errors, part_of(progress, 1, wanted), antennas=antennas
         )
@@ -183,13 +182,3 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
         plan_path,
         notes,
     )
-
-
-def prediction_model(section: Prediction) -> PredictionModel:
-    """Return the propagation model of a configuration that does not ask for a survey."""
-    return PredictionModel(**section.model_dump(exclude={"ground_truth", "survey"}))
-
-
-def ground_truth_errors(section: Prediction) -> GroundTruthErrors:
-    """Return how a configuration's ground truth differs from its prediction."""
-    return GroundTruthErrors(**section.ground_truth.model_dump(exclude={"write"}))

@@ -11,33 +11,100 @@ from typing import Any
 
 import numpy as np
 
-from mapfilter._io import ensure_writable_folder, write_json
+from mapfilter._io import ensure_writable_folder, path_fault, shown, write_json
 from mapfilter._parallel import Progress
+from mapfilter._types import Floats
 from mapfilter.config.sections import Config
 from mapfilter.database.store import open_database
-from mapfilter.errors import ConfigError, fail
+from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
 from mapfilter.evaluation.accuracy import Accuracy, Outcome, Truth, accuracy, outcome
 from mapfilter.evaluation.success import SuccessSummary, summarise
 from mapfilter.filters.contract import Reason
 from mapfilter.filters.gaussian import METHODS
+from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.filter import Filter, locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.propagation.shadowing import named_rng
-from mapfilter.radio.antenna import MeasuredAntenna
-from mapfilter.radio.cells import CellPlan
-from mapfilter.radio.msi import read_antennas
 from mapfilter.report.canvas import save
 from mapfilter.report.errors import plot_error_over_distance
 from mapfilter.tracks.log import TrackLog, leave_out
+from mapfilter.tracks.schema import SERVING
 from mapfilter.tracks.store import list_logs, read_log
-from mapfilter.workflows.filters import filter_choice
-from mapfilter.workflows.jsonable import to_jsonable
-from mapfilter.workflows.log_checks import check_logs, lacking
-from mapfilter.workflows.pictures import draw_track
-from mapfilter.workflows.results import ESTIMATES, FIGURES, SUMMARY, clear_results
-from mapfilter.workflows.world import planned_cells
+from mapfilter.workflows.pictures import ESTIMATES, FIGURES, SUMMARY, clear_results, draw_track
+from mapfilter.workflows.terminal import to_jsonable
+from mapfilter.workflows.world import filter_choice, outside_m, plan_antennas, planned_cells
+
+_AWAY_M = 5000.0
+
+
+def check_logs(folders: Sequence[Path], lattice: Lattice) -> None:
+    """Read every log once before any is located, so that all faults are reported before any result.
+
+    Raises
+    ------
+    InputError
+        Logs cannot be read, are in another CRS than the database, or their truth or GNSS fixes all
+        lie more than 5 km outside its lattice.
+    """
+    faults = Faults()
+    for folder in folders:
+        if wrong := path_fault(folder):
+            faults.add("logs", wrong, shown(str(folder)))
+            continue
+        try:
+            log = read_log(folder)
+        except MapfilterError as error:
+            faults.found.extend(error.faults)
+            continue
+        if not same_crs(log.crs, lattice.crs):
+            expected = f"{lattice.crs}, the database's"
+            faults.add(f"{folder}, crs", expected, log.crs, "log of another area or zone")
+            continue
+        for table in ("truth", "gnss"):
+            places = getattr(log, table)
+            east_m, north_m = places["east_m"].to_numpy(), places["north_m"].to_numpy()
+            _check_near(f"{folder}, {table}", east_m, north_m, lattice, faults)
+    faults.raise_if_any(InputError)
+
+
+def lacking(log: TrackLog, estimate: TrackEstimate) -> str:
+    """Return what a log lacks so that nothing could be located in it, or an empty text."""
+    serving = (log.radio["role"] == SERVING) & log.radio["cell"].notna()
+    moved = log.motion["step_m"].notna()
+    lacks = []
+    if not serving.any() and not (estimate.hypotheses > 0).any():
+        lacks.append("no serving cell")
+    elif not (estimate.hypotheses > 0).any():
+        lacks.append("no serving cell of which the database has points")
+    if not moved.any():
+        lacks.append("no motion")
+    elif not (moved & log.motion["heading_rad"].notna()).any():
+        turns = log.motion["turn_rad"].notna().any()
+        lacks.append("no heading" + (" (turns alone do not tell it)" if turns else ""))
+    return " and ".join(lacks)
+
+
+def _check_near(
+    where: str, east_m: Floats, north_m: Floats, lattice: Lattice, faults: Faults
+) -> None:
+    if not east_m.size or outside_m(east_m, north_m, lattice).min() <= _AWAY_M:
+        return
+    box = lattice.bounds_m
+    found = east_m.min(), north_m.min(), east_m.max(), north_m.max()
+    swapped = outside_m(north_m, east_m, lattice).min() <= _AWAY_M
+    faults.add(
+        where,
+        f"positions near the database's {_box(*box)}",
+        _box(*found),
+        "east and north swapped" if swapped else "log of another area or zone",
+    )
+
+
+def _box(west_m: float, south_m: float, east_m: float, north_m: float) -> str:
+    return f"{west_m:.0f}..{east_m:.0f} m east, {south_m:.0f}..{north_m:.0f} m north"
+
 
 _NAMED = 3
 
@@ -51,7 +118,7 @@ class ReplayedLog:
     name : str
         Of the log's folder.
     outcome : Outcome
-        What the filter says of itself.
+        As the filter reports it, without ground truth.
     accuracy : Accuracy or None
         Against the truth, where the log has it.
     notes : tuple of str
@@ -77,7 +144,7 @@ class ReplayedLog:
 
     @property
     def figures(self) -> dict[str, Any]:
-        """What is told of the log: its outcome, its notes, and its score where there is one."""
+        """Outcome, notes and, with ground truth, the score."""
         score = asdict(self.accuracy) if self.accuracy is not None else {}
         return {**asdict(self.outcome), "notes": self.notes, **score}
 
@@ -282,7 +349,7 @@ class _Sites:
         section = self.config.filter
         options = KalmanFilter(method=section.name, smooth=section.smooth)  # type: ignore[arg-type]
         plan = planned_cells(self.config, log.crs)
-        return options.over_sites(plan, _antennas(self.config, plan))
+        return options.over_sites(plan, plan_antennas(self.config, plan))
 
     def draw(self, log: TrackLog, track: PositionedTrack, into: Path) -> tuple[Path, ...]:
         truth = Truth.of_table(log.truth)
@@ -292,11 +359,6 @@ class _Sites:
 
     def lack(self, log: TrackLog, estimate: TrackEstimate) -> str:  # noqa: ARG002
         return "" if estimate.converged_at is not None else "too little was measured"
-
-
-def _antennas(config: Config, plan: CellPlan) -> dict[str, MeasuredAntenna]:
-    folder = config.cells.antennas
-    return {} if folder is None else read_antennas(folder, (cell.antenna for cell in plan.cells))
 
 
 def _write(

@@ -16,12 +16,13 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.report.basemap import BaseMap
 from mapfilter.workflows.area import pixels_on
 
 MOST_PX = 1200
 """Pixels along the longer side of a thinned area; a map in a picture is some 1 000 wide."""
 MOST_READ_PX = 1_000_000_000
-"""Of larger sets of rasters (pixels times cells) pictures show what is heard at the points."""
+"""Of larger sets of rasters (pixels times cells) pictures show the levels at the points."""
 
 _BLOCK_PX = 1024
 _READ_PX = 40_000_000
@@ -42,11 +43,11 @@ class BestServers:
     lattice : Lattice
         Of the arrays.
     server : numpy.ndarray of int32, shape (rows, cols)
-        Index into the database's cells; -1 where none is heard.
+        Index into the database's cells; -1 where none is received.
     level_dbm : numpy.ndarray of float32, shape (rows, cols)
         NaN where nothing is predicted.
     margin_db : numpy.ndarray of float32, shape (rows, cols)
-        Above the second best; infinite where there is none, NaN where none is heard.
+        Above the second best; infinite where there is none, NaN where none is received.
     """
 
     lattice: Lattice
@@ -56,7 +57,7 @@ class BestServers:
 
     @classmethod
     def nowhere(cls, lattice: Lattice) -> BestServers:
-        """Return a lattice on which nothing is heard yet."""
+        """Return a lattice without any served pixel."""
         shape = lattice.rows, lattice.cols
         unknown = np.full(shape, np.nan, dtype=np.float32)
         return cls(lattice, np.full(shape, -1, dtype=np.int32), unknown, unknown.copy())
@@ -74,7 +75,6 @@ class ServedPoints:
         At the pixels that hold a point.
     number : numpy.ndarray of int64, shape (rows, cols)
         Points at each pixel.
-    on_square : numpy.ndarray of bool, shape (rows, cols)
     counts : numpy.ndarray of int64, shape (cells,)
         Points that each cell serves best, all of them.
     """
@@ -156,7 +156,7 @@ def best_servers(
 ) -> BestServers:
     """Return the best server, its level and its margin over a database, or some of its area.
 
-    Cells below the database's floor are not heard. Of large areas every second, third... pixel is
+    Levels below the database's floor do not count. Of large areas every second, third... pixel is
     taken, block by block.
 
     Raises
@@ -247,3 +247,14 @@ def common_window(lattice: Lattice, part: Lattice, where: str) -> Window:
         expected = "rasters of the database's area and CRS"
         raise fail(InputError, where, expected, "others", "built from other rasters")
     return found
+
+
+def street_map(database: RadioRouteDatabase, points: ServedPoints) -> BaseMap:
+    """Return the base map of some points: they, and whose map they come from."""
+    lattice = points.best.lattice
+    return BaseMap(
+        lattice.bounds_m,
+        points_m=np.stack(points.places(), axis=-1),
+        attribution=database.attribution,
+        resolution_m=lattice.resolution_m,
+    )

@@ -18,9 +18,8 @@ from mapfilter.simulation.reports import ReportModel, level_sampler
 from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
 from mapfilter.simulation.walking import WalkerModel, inside_buildings
 from mapfilter.tracks.store import check_log_replaceable, is_log, write_log
-from mapfilter.workflows.cover import check_cells_near
 from mapfilter.workflows.predict import open_ground_truth
-from mapfilter.workflows.world import World, planned_rasters
+from mapfilter.workflows.world import World, check_cells_near, planned_rasters
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,6 @@ class Streets:
 
     Parameters
     ----------
-    config : Config
     lattice : Lattice
         Of the area.
     """
@@ -76,7 +75,7 @@ class Streets:
 
     @cached_property
     def landuse(self) -> LandUse | None:
-        """What the land-use raster says, where one is given."""
+        """The land-use raster, where one is given."""
         roads = self.config.roads
         if roads.landuse is None or roads.landuse_table is None:
             return None
@@ -151,6 +150,10 @@ class Streets:
 
     @cached_property
     def _roads(self) -> Roads:
+        """Ways and squares in and just about the area, and notes on them.
+
+        Ways outside reach points inside by their half width.
+        """
         roads, lattice = self.config.roads, self.lattice
         by_class_m = roads.half_width_by_class_m
         if roads.tracks.files:
@@ -215,12 +218,11 @@ def _parts(path: Path) -> list[Path]:
 def _corridors(config: Config, crs: str, bounds_m: Bounds) -> Roads:
     """Return the ways that the tracks of measurements make, cut to a box."""
     tracks, survey = config.roads.tracks, config.prediction.survey
-    columns = {name: column for name, column in survey.columns if column is not None}
     read = read_measurements(
         tracks.files,
         crs,
         format=survey.format,
-        columns=columns or None,
+        columns=survey.columns.given or None,
         session_gap_s=survey.session_gap_s,
     )
     found = corridors(

@@ -3,32 +3,147 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import ceil
 from pathlib import Path
 
 import numpy as np
 
 from mapfilter._io import VERSION, ensure_writable_folder
 from mapfilter._parallel import Progress
-from mapfilter.config.sections import Config, SurveySection
+from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs
 from mapfilter.radio.cells import CellPlan, write_cell_plan
 from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
+from mapfilter.report.basemap import BaseMap
+from mapfilter.report.canvas import save
+from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
 from mapfilter.survey.cell_model import Covariate
-from mapfilter.survey.measured_map import Survey, SurveyOptions, Validation, fit_survey, leave_out
+from mapfilter.survey.measured_map import (
+    LeftOut,
+    Survey,
+    SurveyOptions,
+    Validation,
+    fit_survey,
+    leave_out,
+)
 from mapfilter.survey.measurements import Measurements, named_after, read_measurements
 from mapfilter.survey.survey_rasters import predicted_levels, surveyed_plan, write_survey
-from mapfilter.workflows.cover import check_cells_near
-from mapfilter.workflows.results import clear_pictures
-from mapfilter.workflows.survey_pictures import SURVEY_PICTURES, SurveyEvidence, draw_survey
+from mapfilter.workflows.pictures import clear_pictures
+from mapfilter.workflows.served import thinned_lattice
 from mapfilter.workflows.world import (
     LARGEST_AREA_PX,
     area_lattice,
+    check_cells_near,
     check_scale,
     open_as_said,
+    outside_m,
     planned_cells,
 )
+
+SURVEY_PICTURES = ("survey-levels.png", "survey-left-out.png")
+
+_CELLS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class SurveyEvidence:
+    """A survey as written, and what it was made from.
+
+    Parameters
+    ----------
+    measurements : Measurements
+        In the CRS of the rasters.
+    reach_m : float
+        Places farther from every reading of a cell count as not measured.
+    levels, deviations : RxLevRasters
+        On one lattice.
+    left_out : LeftOut, optional
+        What left-out sessions showed.
+    attribution : str
+        Whose measurements they are.
+    """
+
+    measurements: Measurements
+    reach_m: float
+    levels: RxLevRasters
+    deviations: RxLevRasters
+    left_out: LeftOut | None = None
+    attribution: str = ""
+
+
+def draw_survey(survey: SurveyEvidence, folder: Path) -> tuple[Path, ...]:
+    """Draw the three cells with the most measurements, and the sessions left out one by one.
+
+    There is no second picture where nothing could be predicted from other sessions.
+
+    Raises
+    ------
+    InputError
+        A raster is damaged, or no cell of the rasters was measured.
+    OutputError
+        A picture cannot be written.
+    """
+    levels, left_out_levels = (folder / name for name in SURVEY_PICTURES)
+    save(plot_surveyed_levels(*_surveyed(survey)), levels)
+    told = survey.left_out
+    if told is None or not len(told):
+        return (levels,)
+    drawn = plot_left_out(
+        told.measured_dbm,
+        told.predicted_dbm,
+        title=_named(told),
+        trend_dbm=told.trend_dbm,
+        attribution=survey.attribution,
+    )
+    return levels, save(drawn, left_out_levels)
+
+
+def _named(left_out: LeftOut) -> str:
+    """Return what was left out, as a title."""
+    folds, sessions = left_out.folds, left_out.sessions
+    if sessions == 1:
+        return f"{folds} parts of one session, each predicted from the others"
+    groups = f" in {folds} groups" if folds < sessions else ""
+    return f"{sessions} sessions{groups}, each predicted from the others"
+
+
+def _surveyed(survey: SurveyEvidence) -> tuple[list[SurveyedLevels], BaseMap]:
+    """Return the cells with the most measurements in reach of the lattice, and its map."""
+    rows, whole = survey.measurements, survey.levels.lattice
+    near = outside_m(rows.east_m, rows.north_m, whole) <= survey.reach_m
+    counts = np.bincount(rows.cell[near], minlength=len(rows.cell_ids))
+    shown = [
+        index
+        for index in np.argsort(-counts, kind="stable").tolist()
+        if counts[index] and rows.cell_ids[index] in survey.levels.cell_ids
+    ][:_CELLS]
+    if not shown:
+        expected = "measurements of cells of the survey's rasters"
+        raise fail(InputError, str(survey.levels.path), expected, "none", "rasters of another area")
+    cells = [
+        _cell(survey, rows.where(near & (rows.cell == index)), rows.cell_ids[index])
+        for index in shown
+    ]
+    return cells, BaseMap(whole.bounds_m, attribution=survey.attribution)
+
+
+def _cell(survey: SurveyEvidence, own: Measurements, cell_id: str) -> SurveyedLevels:
+    """Return the map about a cell's own measurements, thinned to what a picture can show."""
+    whole = survey.levels.lattice
+    row, col = whole.row_col(own.east_m, own.north_m)
+    around = ceil(survey.reach_m / whole.resolution_m)
+    top, bottom = np.clip((row.min() - around, row.max() + around), 0, whole.rows - 1).tolist()
+    left, right = np.clip((col.min() - around, col.max() + around), 0, whole.cols - 1).tolist()
+    part = whole.window(top, left, bottom - top + 1, right - left + 1)
+    lattice, _ = thinned_lattice(part)
+    level_dbm, deviation_db = (
+        replace(rasters, lattice=lattice, resampling="nearest").read(cells=(cell_id,))[0]
+        for rasters in (survey.levels, survey.deviations)
+    )
+    places = own.east_m, own.north_m, own.level_dbm
+    return SurveyedLevels(cell_id, lattice, level_dbm, deviation_db, *places)
 
 
 @dataclass(frozen=True)
@@ -82,13 +197,13 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         cannot be written.
     """
     section = config.prediction.survey
+    options = section.of(SurveyOptions)
     target, deviation = config.rasters_path, config.deviation_path
     for folder in (target.parent, deviation.parent, config.output.dir):
         ensure_writable_folder(folder)
     inputs = survey_inputs(config)
     measurements, plan, lattice = inputs.measurements, inputs.plan, inputs.lattice
     predicted = _predicted(inputs.predicted, plan)
-    options = _options(section)
     left_out = None
     if section.cross_validate:
         left_out = leave_out(
@@ -104,7 +219,7 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         deviation,
         fill=section.fill,
         deviation_factor=factor,
-        tags={"SOFTWARE": f"mapfilter {VERSION}", "MODEL": f"survey {section.method}"},
+        tags={"SOFTWARE": f"mapfilter {VERSION}", "MODEL": f"survey {options.method}"},
         progress=progress,
     )
     plan_path = config.output.dir / "cells.csv"
@@ -119,7 +234,7 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
     )
     write_cell_plan(cells, plan_path)
     evidence = SurveyEvidence(
-        measurements, section.reach_m, open_rasters(target), open_rasters(deviation), left_out
+        measurements, options.reach_m, open_rasters(target), open_rasters(deviation), left_out
     )
     return SurveyResult(
         len(ids),
@@ -138,7 +253,7 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
 
 
 def _draw(config: Config, evidence: SurveyEvidence) -> tuple[Path, ...]:
-    """Draw the survey; pictures of an older one make way in any case."""
+    """Draw the survey; pictures of an older one are removed in any case."""
     folder = config.pictures_path
     clear_pictures(folder, SURVEY_PICTURES)
     return () if config.output.pictures == "none" else draw_survey(evidence, folder)
@@ -182,8 +297,9 @@ def survey_inputs(config: Config) -> SurveyInputs:
         predicted = open_as_said(section.calibrate, config.rasters)
     given = _given_lattice(config, predicted)
     measurements, plan = _measurements(config, given)
-    lattice = given or _lattice_about(measurements, section.reach_m, config.area.resolution_m)
-    _check_inside(measurements, lattice, section.reach_m)
+    reach_m = section.of(SurveyOptions).reach_m
+    lattice = given or _lattice_about(measurements, reach_m, config.area.resolution_m)
+    _check_inside(measurements, lattice, reach_m)
     # A public list holds the cells of whole countries.
     if plan is not None and config.cells.layout != "opencellid":
         check_cells_near(plan, lattice, str(config.cells.plan))
@@ -196,12 +312,11 @@ def _measurements(config: Config, lattice: Lattice | None) -> tuple[Measurements
     crs = lattice.crs if lattice is not None else None
     if crs is None and config.area.crs is not None:
         crs = projected_crs(config.area.crs, "area.crs")
-    columns = {name: column for name, column in section.columns if column is not None}
     found = read_measurements(
         section.files,
         crs,
         format=section.format,
-        columns=columns or None,
+        columns=section.columns.given or None,
         session_gap_s=section.session_gap_s,
     ).accurate(section.max_accuracy_m)
     if not len(found):
@@ -217,7 +332,7 @@ def _given_lattice(config: Config, rasters: RxLevRasters | None) -> Lattice | No
     if rasters is not None:
         return rasters.lattice
     area = config.area
-    if area.bbox is None and area.southwest is None:
+    if not area.has_box:
         return None
     return area_lattice(area, on_map=False)
 
@@ -264,18 +379,6 @@ def _predicted(
         hint = "the cell plan says what to take the losses from"
         raise fail(ConfigError, "cells.plan", "the plan of the losses to calibrate", "none", hint)
     return predicted_levels(rasters, plan)
-
-
-def _options(section: SurveySection) -> SurveyOptions:
-    return SurveyOptions(
-        method=section.method,
-        trend=section.trend,
-        reach_m=section.reach_m,
-        min_points=section.min_points,
-        min_points_to_locate=section.min_points_to_locate,
-        neighbours=section.neighbours,
-        square_m=section.square_m,
-    )
 
 
 def _advice(config: Config, survey: Survey, factor: float) -> list[str]:

@@ -25,7 +25,9 @@ from mapfilter.experiments.sweep.plan import (
     noise_grid,
 )
 from mapfilter.experiments.sweep.world import SweepWorld
+from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.propagation.models import GroundTruthErrors
 from mapfilter.propagation.shadowing import site_shadowing
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan
@@ -33,11 +35,9 @@ from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
-from mapfilter.workflows.cover import check_cells_near
-from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.predict import open_ground_truth
 from mapfilter.workflows.simulate import simulation_settings
-from mapfilter.workflows.world import World, planned_rasters
+from mapfilter.workflows.world import World, check_cells_near, filter_choice, planned_rasters
 
 GROUND_TRUTH = "ground truth"
 _NOISE = ("sigma_trans_m", "sigma_orient_deg", "bias_sd_deg", "drift_deg_per_sqrt_s", "scale")
@@ -170,7 +170,8 @@ def _readings(config: Config) -> tuple[Reading, ...]:
             continue
         lengths_m = config.sweep.update_length_m
         if lengths_m is None or one.update_length_m is not None:
-            lengths_m = (section.update_length_m,)
+            options = section.of(CandidateOptions)
+            lengths_m = (options.update_length_m,)
         for length_m in map(float, lengths_m):
             chosen = section.model_copy(update={"update_length_m": length_m})
             readings.append(Reading(one.name, filter_choice(chosen), length_m))
@@ -231,7 +232,7 @@ def _heard(
 ) -> Floats32:
     if radio.name in (AS_PREDICTED, GROUND_TRUTH):
         return predicted_dbm
-    truth = config.prediction.ground_truth
+    truth = config.prediction.ground_truth.of(GroundTruthErrors)
     fields = site_shadowing(
         plan,
         lattice,

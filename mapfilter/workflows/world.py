@@ -7,11 +7,18 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+import shapely
 
-from mapfilter.config.sections import Config, Rasters
+from mapfilter._types import Floats
+from mapfilter.config.inputs import Area, Rasters
+from mapfilter.config.sections import Config, FilterSection
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes, Routes
-from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.errors import ConfigError, InputError, fail
+from mapfilter.geodesy import Lattice, unproject
+from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
+from mapfilter.positioning.candidate import CandidateFilter
+from mapfilter.positioning.filter import FilterOptions
+from mapfilter.positioning.locators import filter_options
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan, read_cell_plan
 from mapfilter.radio.msi import read_antennas
@@ -19,7 +26,7 @@ from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.lattice import RouteLattice
-from mapfilter.roads.maps import resolve_map
+from mapfilter.roads.maps import map_bounds_deg, resolve_map
 from mapfilter.roads.routes import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings, Ways
 from mapfilter.simulation.layout import lay_out_plan
@@ -35,11 +42,11 @@ def planned_rasters(config: Config) -> RxLevRasters:
     Raises
     ------
     InputError
-        They are wrong, or do not fit what the configuration says of them.
+        They are wrong, or do not fit the configuration.
     """
     section = config.rasters
     if config.prediction.model == "survey" and config.prediction.survey.calibrate is not None:
-        # What is said of rasters is said of those to calibrate; a survey's own tell it all.
+        # The other keys describe the rasters to calibrate; a survey's own need none.
         section = Rasters(path=section.path)
     if section.path is None and not config.rasters_path.exists():
         hint = "not predicted yet; run mapfilter predict first, or set rasters.path"
@@ -50,12 +57,12 @@ def planned_rasters(config: Config) -> RxLevRasters:
 
 
 def open_as_said(path: Path, section: Rasters) -> RxLevRasters:
-    """Open rasters as ``[rasters]`` says that they are.
+    """Open rasters as ``[rasters]`` describes them.
 
     Raises
     ------
     InputError
-        They are wrong, or do not fit what is said of them.
+        They are wrong, or do not fit their description.
     """
     return open_rasters(
         path,
@@ -88,7 +95,7 @@ def planned_cells(config: Config, crs: str, area: Lattice | None = None) -> Cell
         cells.plan,
         crs,
         layout=cells.layout,
-        columns={name: column for name, column in cells.columns if column is not None},
+        columns=cells.columns.given,
         defaults={
             "height_m": cells.height_m,
             "eirp_dbm": cells.eirp_dbm,
@@ -96,6 +103,12 @@ def planned_cells(config: Config, crs: str, area: Lattice | None = None) -> Cell
         },
         bounds_m=bounds_m,
     )
+
+
+def plan_antennas(config: Config, plan: CellPlan) -> dict[str, MeasuredAntenna]:
+    """Read the measured antennas that a plan names from their folder, where one is given."""
+    folder = config.cells.antennas
+    return {} if folder is None else read_antennas(folder, (cell.antenna for cell in plan.cells))
 
 
 @dataclass(frozen=True)
@@ -146,7 +159,7 @@ class World:
 
     @property
     def landuse(self) -> LandUse | None:
-        """What the land-use raster says, where one is given."""
+        """The land-use raster, where one is given."""
         return self.streets.landuse
 
     @cached_property
@@ -192,8 +205,118 @@ class World:
 
     @cached_property
     def antennas(self) -> dict[str, MeasuredAntenna]:
-        """The measured antennas that the plan names, read from their folder."""
-        folder = self.config.cells.antennas
-        if folder is None:
-            return {}
-        return read_antennas(folder, (cell.antenna for cell in self.plan.cells))
+        """The measured antennas that the plan names."""
+        return plan_antennas(self.config, self.plan)
+
+
+FARTHEST_M = 50_000.0
+"""No cell is received from farther away."""
+
+_ENOUGH = 0.95
+_ABOUT_WAYS_M = 100.0
+_SAMPLES = 64
+_NAMED = 3
+
+
+def check_cells_near(plan: CellPlan, lattice: Lattice, where: str) -> None:
+    """Check that no cell lies more than 50 km outside an area.
+
+    Parameters
+    ----------
+    plan : CellPlan
+        In the CRS of the lattice.
+    where : str
+        What messages call the plan.
+
+    Raises
+    ------
+    InputError
+        Some do; one fault for all of them.
+    """
+    east_m = np.array([cell.east_m for cell in plan.cells])
+    north_m = np.array([cell.north_m for cell in plan.cells])
+    away_m = outside_m(east_m, north_m, lattice)
+    far = np.flatnonzero(away_m > FARTHEST_M)
+    if not far.size:
+        return
+    named = ", ".join(plan.ids[index] for index in far[:_NAMED])
+    more = f" and {far.size - _NAMED} more" if far.size > _NAMED else ""
+    got = f"{far.size} of {len(plan)} up to {away_m.max() / 1000:.0f} km off ({named}{more})"
+    swapped = outside_m(north_m[far], east_m[far], lattice).min() <= FARTHEST_M
+    hint = "east and north swapped" if swapped else "a CRS of another zone, or swapped coordinates"
+    expected = f"cells within {FARTHEST_M / 1000:.0f} km of the area"
+    raise fail(InputError, where, expected, got, hint)
+
+
+def outside_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> Floats:
+    """Return how far outside a lattice positions lie; 0 inside."""
+    west, south, east, north = lattice.bounds_m
+    off_east_m = np.maximum(np.maximum(west - east_m, east_m - east), 0.0)
+    off_north_m = np.maximum(np.maximum(south - north_m, north_m - north), 0.0)
+    return np.asarray(np.hypot(off_east_m, off_north_m))
+
+
+def map_cover(world: World) -> tuple[str, ...]:
+    """Return a note when the ways of a map extend over but a part of the area that is asked for.
+
+    The extent in a map's header is only a reason to look: maps often hold more, as whole ways are
+    kept. The share is that of the ways' convex hull, 100 m about it included.
+    """
+    config, lattice = world.config, world.lattice
+    area, roads = config.area, config.roads
+    replaced = roads.layer is not None or roads.tracks.files
+    if not area.has_box or not area.map_is_a_file or replaced:
+        return ()
+    if _told_share(area, lattice) >= _ENOUGH:
+        return ()
+    box = shapely.box(*lattice.bounds_m)
+    try:
+        hull = shapely.convex_hull(shapely.geometrycollections(world.ways.geometry))
+    except InputError:
+        return _note(f"the map {area.map}", 0.0)
+    near = shapely.intersection(shapely.buffer(hull, _ABOUT_WAYS_M), box)
+    return _note(f"the map {area.map}", float(near.area / box.area))
+
+
+def _told_share(area: Area, lattice: Lattice) -> float:
+    along = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
+    rows, cols = np.meshgrid(along * lattice.rows - 0.5, along * lattice.cols - 0.5, indexing="ij")
+    lon, lat = unproject(lattice.crs, *lattice.east_north(rows.ravel(), cols.ravel()))
+    west, south, east, north = map_bounds_deg(area.map)
+    inside = (lon >= west) & (lon <= east) & (lat >= south) & (lat <= north)
+    return float(inside.mean())
+
+
+def raster_cover(area: Area, lattice: Lattice) -> tuple[str, ...]:
+    """Return a note when rasters, cut to ``lattice``, cover but a part of the area asked for."""
+    if not area.has_box:
+        return ()
+    wanted = area_lattice(area.model_copy(update={"crs": lattice.crs}))
+    covered_m2 = lattice.rows * lattice.cols * lattice.resolution_m**2
+    wanted_m2 = wanted.rows * wanted.cols * wanted.resolution_m**2
+    return _note("the set of rasters", covered_m2 / wanted_m2)
+
+
+def _note(what: str, share: float) -> tuple[str, ...]:
+    return () if share >= _ENOUGH else (f"{what} covers {share:.0%} of the area",)
+
+
+def filter_choice(section: FilterSection) -> FilterOptions:
+    """Return the options of the filter that a configuration names.
+
+    Raises
+    ------
+    ConfigError
+        The filter takes no database, or a custom filter cannot be imported.
+    """
+    match section.name:
+        case "candidate":
+            return section.of(CandidateFilter)
+        case "bayes":
+            return section.bayes.of(BayesFilter)
+        case "grid":
+            return section.bayes.of(GridFilter)
+        case name if ":" in name:
+            return filter_options(name)
+        case name:
+            raise fail(ConfigError, "filter.name", "a filter that takes a database", repr(name))

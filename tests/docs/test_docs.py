@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 from mapfilter.check.findings import REMEDIES
 from mapfilter.cli import app
 from mapfilter.config.load import load_config
+from mapfilter.config.reference import reference_toml
 from mapfilter.config.sections import Config
 from mapfilter.experiments.sweep.table import SCHEMA as SWEEP_SCHEMA
 from mapfilter.filters.candidate import CandidateOptions
@@ -116,12 +117,16 @@ def test_filter_page_tells_every_option_with_its_default():
     assert told == {field.name: str(field.default) for field in fields(CandidateOptions)}
 
 
+def test_configuration_file_is_made_from_the_sections():
+    """Written anew by ``python -m mapfilter.config.reference > docs/configuration.toml``."""
+    assert page("configuration.toml") == reference_toml()
+
+
 def test_configuration_file_holds_every_key_with_its_default(tmp_path):
     file = DOCS / "configuration.toml"
-    given = tomllib.loads(file.read_text(encoding="utf-8"))
-    text = file.read_text(encoding="utf-8")
     assert load_config(file, out=tmp_path) == load_config(None, out=tmp_path)
-    _compare(Config, given, text)
+    text = file.read_text(encoding="utf-8")
+    _compare(Config, tomllib.loads(text), text)
 
 
 def _compare(model: type[BaseModel], given: dict[str, object], text: str) -> None:
@@ -133,8 +138,8 @@ def _compare(model: type[BaseModel], given: dict[str, object], text: str) -> Non
             _compare(field.annotation, values, text)
         elif field.default is None:
             assert re.search(rf"^# {key} = ", text, flags=re.MULTILINE), key
-        elif key not in given:
-            assert re.search(rf"^(# )?{key} = ", text, flags=re.MULTILINE), key
+        else:
+            assert key in given, key
 
 
 def test_command_line_page_names_every_command_and_option():
@@ -146,6 +151,25 @@ def test_command_line_page_names_every_command_and_option():
             for option in parameter.opts:
                 if option.startswith("-") and option != "--help":
                     assert option in text, (name, option)
+
+
+def test_help_has_whole_summaries_examples_and_pages(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "100")
+    text = CliRunner().invoke(app, ["--help"]).output
+    command = typer.main.get_command(app)
+    for name, sub in command.commands.items():
+        summary = sub.help.partition("\n")[0]
+        assert f"{name} {summary}" in " ".join(text.split()), name
+        shown = CliRunner().invoke(app, [name, "--help"]).output
+        example = re.search(r"Example:\n +mapfilter (.+)\n", shown)
+        pointer = re.search(r"Documentation: docs/(\S+)", shown)
+        assert example is not None, name
+        assert pointer is not None, name
+        first, *arguments = shlex.split(example[1])
+        assert first == name
+        sub.make_context(name, arguments)
+        assert (DOCS / pointer[1]).is_file()
+    assert "..." not in text.replace("[ARGS]...", "")
 
 
 def test_command_line_page_names_every_finding_of_check():

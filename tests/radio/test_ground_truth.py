@@ -140,7 +140,7 @@ def test_clutter_of_its_own_is_drawn_by_its_own_seed_and_beside_the_shadowing():
 def test_shared_clutter_is_the_predictions():
     errors = replace(NONE, clutter="shared", seed=5)
     np.testing.assert_allclose(real(errors, CLUTTERED), predicted(CLUTTERED), atol=1e-4)
-    with pytest.raises(ConfigError, match="own or shared"):
+    with pytest.raises(ConfigError, match="expected 'own' or 'shared', found 'none'"):
         GroundTruthErrors(clutter="none")  # type: ignore[arg-type]
 
 

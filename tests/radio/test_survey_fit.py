@@ -263,4 +263,4 @@ def test_options_out_of_range_are_told_together():
     with pytest.raises(ConfigError) as error:
         SurveyOptions(method="svm", trend="none", reach_m=0.0, min_points=0, square_m=np.nan)  # type: ignore[arg-type]
     for name in ("method", "trend", "reach_m", "min_points", "square_m"):
-        assert f"survey, {name}" in str(error.value)
+        assert f"SurveyOptions, {name}" in str(error.value)

@@ -20,8 +20,9 @@ from mapfilter.report.network import plot_margin
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.routes import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings
-from mapfilter.workflows import network_pictures, served
-from mapfilter.workflows.network_pictures import draw_network, land_use_of_map
+from mapfilter.workflows import pictures as network_pictures
+from mapfilter.workflows import served
+from mapfilter.workflows.pictures import draw_network, land_use_of_map
 from mapfilter.workflows.served import best_servers, served_points, thinned_lattice
 
 CRS = "EPSG:32635"

@@ -179,7 +179,7 @@ def test_what_cannot_be_surveyed_is_told(survey, tmp_path):
 
     refused("prediction.survey.files", "measurement files", prediction__survey__files="[]")
     refused("absent.csv", "a readable file", prediction__survey__files="absent.csv")
-    refused("method", "'gp', 'knn' or 'trend'", prediction__survey__method="svm")
+    refused("method", "'gp', 'knn', or 'trend'", prediction__survey__method="svm")
     refused("positions accurate to 1 m", prediction__survey__max_accuracy_m=1.0)
     refused("received in at least 900 squares", prediction__survey__min_points=900)
     refused("measurements", "some in the area", area__bbox="24.99,60.19,25.0,60.2")

@@ -14,16 +14,16 @@ from mapfilter.roads.buildings import read_buildings
 from mapfilter.simulation.layout import lay_out_plan
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.simulate import SimulationSettings
-from mapfilter.workflows import predict, simulate
-from mapfilter.workflows.filters import filter_choice
+from mapfilter.workflows import simulate
+from mapfilter.workflows.world import filter_choice
 
 CONFIG = Config()
 
 
 def test_prediction():
     section = CONFIG.prediction
-    assert predict.prediction_model(section) == PredictionModel()
-    assert predict.ground_truth_errors(section) == GroundTruthErrors()
+    assert section.of(PredictionModel) == PredictionModel()
+    assert section.ground_truth.of(GroundTruthErrors) == GroundTruthErrors()
 
 
 def test_simulation():

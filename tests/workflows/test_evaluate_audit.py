@@ -6,6 +6,7 @@ from math import radians
 
 import pytest
 from command_line import assert_done, assert_refused, mapfilter, settings
+from mapfilter.workflows.filters import filter_choice
 
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.scores import CaseResult
@@ -16,8 +17,6 @@ from mapfilter.simulation.walking import WalkerModel
 from mapfilter.workflows.evaluate import _world as prepare_world
 from mapfilter.workflows.evaluate import load_benchmark
 from mapfilter.workflows.evaluate_audit import CHANGES
-from mapfilter.workflows.filters import filter_choice
-from mapfilter.workflows.predict import ground_truth_errors, prediction_model
 from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.world import World
 
@@ -101,8 +100,8 @@ def load(name):
 def simulated(config):
     made = simulation_settings(config)
     return (
-        prediction_model(config.prediction),
-        ground_truth_errors(config.prediction),
+        config.prediction.of(PredictionModel),
+        config.prediction.ground_truth.of(GroundTruthErrors),
         made.imu,
         made.reports,
         made.journey.walker,
@@ -114,7 +113,7 @@ def test_a_row_differs_from_the_easy_world_in_what_it_says(name):
     config, fixed = load(name)
     assert simulated(config) == EXPECTED[name]
     # The filter is not told.
-    assert filter_choice(config.filter, 5.0) == filter_choice(load("easy")[0].filter, 5.0)
+    assert filter_choice(config.filter) == filter_choice(load("easy")[0].filter)
     change = CHANGES[name]
     assert change.world == "easy"
     assert change.case == ("levels-nocompass" if name == "gyro" else "levels-6")

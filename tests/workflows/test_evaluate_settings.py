@@ -18,6 +18,7 @@ from benchmark_settings import (
     REFUSED_SECTIONS,
     toml,
 )
+from mapfilter.workflows.filters import filter_choice
 from pydantic import BaseModel
 
 from mapfilter._io import sha256_file
@@ -29,7 +30,6 @@ from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.simulation.imu import ImuNoise
 from mapfilter.workflows.evaluate import _refused, load_benchmark
 from mapfilter.workflows.evaluate import _world as prepare_world
-from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.world import World
 
 SMALL = {

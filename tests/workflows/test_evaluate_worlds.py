@@ -7,6 +7,7 @@ from importlib.resources import files
 import numpy as np
 import pytest
 from command_line import assert_refused, mapfilter
+from mapfilter.workflows.filters import filter_choice
 from pydantic import BaseModel
 
 from mapfilter.config.sections import Config
@@ -18,8 +19,6 @@ from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
 from mapfilter.workflows.evaluate import WORLDS, load_benchmark
 from mapfilter.workflows.evaluate import _world as prepare_world
-from mapfilter.workflows.filters import filter_choice
-from mapfilter.workflows.predict import ground_truth_errors, prediction_model
 from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.world import World
 
@@ -62,8 +61,8 @@ def test_every_key_of_a_world_is_known_and_taken(name):
 def test_the_plain_world_is_what_it_says():
     """Sizes as its file gives them with their sources."""
     config, _ = load_benchmark("plain", None, [])
-    assert prediction_model(config.prediction) == PredictionModel(shadowing_db=0.0)
-    assert ground_truth_errors(config.prediction) == GroundTruthErrors(
+    assert config.prediction.of(PredictionModel) == PredictionModel(shadowing_db=0.0)
+    assert config.prediction.ground_truth.of(GroundTruthErrors) == GroundTruthErrors(
         level_error_db=5.0,
         correlation_m=100.0,
         site_share=0.5,
@@ -99,8 +98,8 @@ def test_the_plain_world_is_what_it_says():
 
 def test_the_easy_world_is_the_one_of_before():
     config, _ = load_benchmark("easy", None, [])
-    assert prediction_model(config.prediction) == PredictionModel(shadowing_db=6.0)
-    errors = ground_truth_errors(config.prediction)
+    assert config.prediction.of(PredictionModel) == PredictionModel(shadowing_db=6.0)
+    errors = config.prediction.ground_truth.of(GroundTruthErrors)
     assert errors == GroundTruthErrors(level_error_db=7.0, correlation_m=50.0, clutter="shared")
     settings = simulation_settings(config)
     assert settings.imu == ImuNoise(sigma_trans_m=0.2)
@@ -113,7 +112,7 @@ def test_the_easy_world_is_the_one_of_before():
 def test_a_world_tells_the_filter_nothing(name):
     config, _ = load_benchmark(name, None, [])
     usual = Config.model_validate({"filter": {"name": "bayes"}})
-    assert filter_choice(config.filter, 5.0) == filter_choice(usual.filter, 5.0)
+    assert filter_choice(config.filter) == filter_choice(usual.filter)
 
 
 def test_what_is_given_goes_before_the_world(tmp_path):

@@ -5,8 +5,7 @@ import errno
 import pytest
 
 from mapfilter.errors import InputError, fail
-from mapfilter.workflows.pipeline import run_pipeline
-from mapfilter.workflows.terminal import guarded
+from mapfilter.workflows.terminal import guarded, run_pipeline
 
 RAISED = [
     (fail(InputError, "cells.csv", "a plan", "none"), "cells.csv: expected a plan, found none"),

@@ -3,7 +3,7 @@
 import pytest
 from command_line import assert_refused, mapfilter, settings
 
-EXPECTED = "expected 'centre', 'pavement', or 0..50 metres beside the centre line, found"
+EXPECTED = "expected 'centre', 'pavement', or a number in 0..50, found"
 
 
 @pytest.mark.parametrize("value", ["sidewalk", 99, -1, "true", "nan"])

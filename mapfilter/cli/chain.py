@@ -1,0 +1,267 @@
+"""Commands from inputs to a radio-route database and to located tracks."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mapfilter.cli.options import (
+    PARTIAL,
+    WRONG,
+    ClusterOption,
+    ConfigOption,
+    JsonOption,
+    OutOption,
+    PathArgument,
+    ResumeOption,
+    SeedOption,
+    SetOption,
+    WorkersOption,
+    find_own_filter,
+    given_path,
+    seeded,
+    toml,
+)
+from mapfilter.errors import ConfigError, fail
+from mapfilter.workflows.terminal import print_result, progress_bar, say
+
+
+def check(
+    config: ConfigOption = None,
+    settings: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Check all inputs together before anything runs; exit code 2 if something is wrong."""
+    from mapfilter.check.findings import paragraphs
+    from mapfilter.config.load import load_config
+    from mapfilter.workflows.check import run_check
+
+    with progress_bar("check") as progress:
+        result = run_check(load_config(config, settings or ()), progress)
+    if as_json:
+        print_result(result, as_json)
+    else:
+        sys.stdout.write("\n\n".join(paragraphs(result)) + "\n")
+    if not result.ok:
+        raise typer.Exit(WRONG)
+
+
+def predict(
+    config: ConfigOption = None,
+    settings: SetOption = None,
+    out: OutOption = None,
+    seed: SeedOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Predict RxLev rasters from cell plan and buildings, and a perturbed set: the ground truth."""
+    from mapfilter.config.load import load_config
+    from mapfilter.workflows.predict import run_predict
+
+    settings = seeded(settings, seed, "prediction.seed", "prediction.ground_truth.seed")
+    with progress_bar("predict") as progress:
+        result = run_predict(load_config(config, settings, out=out), progress)
+    print_result(result, as_json)
+
+
+def build(
+    config: ConfigOption = None,
+    settings: SetOption = None,
+    out: OutOption = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Only estimate size, memory and time.")
+    ] = False,
+    workers: WorkersOption = 1,
+    cluster: ClusterOption = None,
+    resume: ResumeOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Build a radio-route database from RxLev rasters and roads."""
+    from mapfilter.config.load import load_config
+    from mapfilter.workflows.build import run_build, run_dry_build
+
+    loaded = load_config(config, settings or (), out=out)
+    if dry_run:
+        print_result(run_dry_build(loaded), as_json)
+        return
+    with progress_bar("build") as progress:
+        result = run_build(
+            loaded, workers=workers, cluster=cluster, resume=resume, progress=progress
+        )
+    print_result(result, as_json)
+
+
+def merge(
+    databases: Annotated[
+        list[Path], typer.Argument(metavar="DB...", help="Databases, one or more.")
+    ],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DB", help="The merged database.", callback=given_path)
+    ],
+    without: Annotated[
+        list[str] | None,
+        typer.Option("--without-cell", metavar="CELL", help="A cell to leave out; repeatable."),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Merge databases of several areas or cells; later databases override earlier ones."""
+    from mapfilter.workflows.databases import run_merge
+
+    given = [given_path(path) or path for path in databases]
+    with progress_bar("merge") as progress:
+        result = run_merge(given, out.absolute(), without=without or (), progress=progress)
+    print_result(result, as_json)
+
+
+def export(
+    database: Annotated[Path, typer.Argument(metavar="DB", callback=given_path)],
+    to: Annotated[
+        Path,
+        typer.Option("--to", metavar="FILE", help="A .gpkg or .tif file.", callback=given_path),
+    ],
+    as_json: JsonOption = False,
+) -> None:
+    """Write a radio-route database as GeoPackage, or best server and margin as GeoTIFF."""
+    from mapfilter.workflows.databases import run_export
+
+    print_result(run_export(database, to), as_json)
+
+
+def info(path: PathArgument, as_json: JsonOption = False) -> None:
+    """Describe a database, raster set or log."""
+    from mapfilter.workflows.databases import run_info
+
+    print_result(run_info(path), as_json)
+
+
+def bound(
+    database: Annotated[Path, typer.Argument(metavar="DB", callback=given_path)],
+    out: OutOption = None,
+    spacing_m: Annotated[
+        float, typer.Option("--spacing", metavar="M", help="Metres between the starts of journeys.")
+    ] = 50.0,
+    journeys: Annotated[int, typer.Option("--journeys", help="Journeys from each start.")] = 2,
+    level_error_db: Annotated[
+        float,
+        typer.Option(
+            "--level-error", metavar="DB", help="Standard deviation of errors of predicted levels."
+        ),
+    ] = 7.0,
+    correlation_m: Annotated[
+        float,
+        typer.Option("--correlation", metavar="M", help="Correlation length of these errors."),
+    ] = 50.0,
+    seed: SeedOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Predict where a database will work: accuracy, metres to a first fix, ambiguous places."""
+    from mapfilter.evaluation.first_fix import FirstFixOptions
+    from mapfilter.evaluation.radio_map import ErrorModel
+    from mapfilter.workflows.bound import run_bound
+
+    errors = ErrorModel(level_error_db, correlation_m)
+    options = FirstFixOptions(spacing_m=spacing_m, journeys=journeys)
+    folder = (out or Path("bound")).absolute()
+    with progress_bar("bound") as progress:
+        result = run_bound(
+            database, folder, errors=errors, options=options, seed=seed or 0, progress=progress
+        )
+    print_result(result, as_json)
+
+
+def demo(
+    out: OutOption = None,
+    seed: SeedOption = None,
+    settings: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Run the whole chain on the embedded map of central Helsinki."""
+    from mapfilter.workflows.demo import run_demo
+
+    with progress_bar("demo") as progress:
+        result = run_demo(
+            (out or Path("mapfilter-demo")).absolute(), settings or (), seed=seed, progress=progress
+        )
+    print_result(result, as_json)
+
+
+def simulate(
+    config: ConfigOption = None,
+    settings: SetOption = None,
+    out: OutOption = None,
+    seed: SeedOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Simulate journeys along the streets, with ground truth."""
+    from mapfilter.config.load import load_config
+    from mapfilter.workflows.simulate import run_simulate
+
+    settings = seeded(settings, seed, "journeys.seed")
+    with progress_bar("simulate") as progress:
+        result = run_simulate(load_config(config, settings, out=out), progress)
+    print_result(result, as_json)
+
+
+def replay(
+    database: Annotated[Path | None, typer.Option("--db", metavar="DB", help="Database.")] = None,
+    log: Annotated[
+        Path | None, typer.Option("--log", metavar="LOG", help="A log, or a folder of logs.")
+    ] = None,
+    filter_name: Annotated[
+        str | None,
+        typer.Option(
+            "--filter",
+            metavar="NAME",
+            help="candidate, bayes, grid or a custom filter, package.module:Name; "
+            "without a map ekf, iekf, rbukf, ukf, ckf.",
+        ),
+    ] = None,
+    without: Annotated[
+        str | None,
+        typer.Option(
+            "--without",
+            metavar="KINDS",
+            help="What to leave out: gnss (fixes, pseudoranges), ta, tdoa, neighbours, radio.",
+        ),
+    ] = None,
+    smooth: Annotated[
+        bool,
+        typer.Option(
+            "--smooth", help="Smooth the track by the whole log (forward filtering, backward pass)."
+        ),
+    ] = False,
+    config: ConfigOption = None,
+    settings: SetOption = None,
+    out: OutOption = None,
+    seed: SeedOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Locate one log, or every log of a folder; exit code 3 if done in part."""
+    from mapfilter.config.load import load_config
+    from mapfilter.workflows.replay import replay_facts, run_replay
+
+    given = seeded(settings, seed, "journeys.seed")
+    for key, value in (("database.path", database), ("track.path", log)):
+        if value is not None:
+            given.append(f"{key}={toml(str(value))}")
+    if filter_name is not None:
+        given.append(f"filter.name={toml(filter_name)}")
+    if without is not None:
+        given.append(f"track.without={toml([kind.strip() for kind in without.split(',')])}")
+    if smooth:
+        given += ["filter.bayes.smooth=true", "filter.smooth=true"]
+    loaded = load_config(config, given)
+    find_own_filter(loaded)
+    name = loaded.filter.name
+    if smooth and (name in ("candidate", "grid") or ":" in name):
+        raise fail(ConfigError, "--smooth", "bayes, ekf, iekf, rbukf, ukf, ckf", name)
+    folder = (out or loaded.output.dir / "replay").absolute()
+    with progress_bar("replay") as progress:
+        result = run_replay(loaded, folder, progress=progress)
+    print_result(replay_facts(result), as_json)
+    for warning in result.warnings:
+        say(warning)
+    if result.partial:
+        raise typer.Exit(PARTIAL)
