@@ -47,8 +47,8 @@ def test_a_wrong_axis_is_refused(key, values, words):
 
 
 def test_whole_numbers_stay_whole():
-    assert parse_axis("filter.bayes.most_particles=1000,2e3") == (
-        "filter.bayes.most_particles",
+    assert parse_axis("filter.bayes.max_particles=1000,2e3") == (
+        "filter.bayes.max_particles",
         (1000, 2000),
     )
     varied = vary(Config(), {"filter.threshold": 3.0})

@@ -114,7 +114,7 @@ def test_a_row_differs_from_the_easy_world_in_what_it_says(name):
     config, fixed = load(name)
     assert simulated(config) == EXPECTED[name]
     # The filter is not told.
-    assert filter_choice(config.filter, 5.0) == filter_choice(load("easy")[0].filter, 5.0)
+    assert filter_choice(config.filter) == filter_choice(load("easy")[0].filter)
     change = CHANGES[name]
     assert change.world == "easy"
     assert change.case == ("levels-nocompass" if name == "gyro" else "levels-6")

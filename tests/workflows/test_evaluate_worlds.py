@@ -113,7 +113,7 @@ def test_the_easy_world_is_the_one_of_before():
 def test_a_world_tells_the_filter_nothing(name):
     config, _ = load_benchmark(name, None, [])
     usual = Config.model_validate({"filter": {"name": "bayes"}})
-    assert filter_choice(config.filter, 5.0) == filter_choice(usual.filter, 5.0)
+    assert filter_choice(config.filter) == filter_choice(usual.filter)
 
 
 def test_what_is_given_goes_before_the_world(tmp_path):
