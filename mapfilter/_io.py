@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import errno
+import glob
 import hashlib
 import json
 import os
@@ -17,12 +18,12 @@ import stat
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from mapfilter.errors import MapfilterError, OutputError, StoreError, fail
 
-_CHUNK_BYTES = 1 << 20
 _ASIDE = "old"
 _AT_FDCWD = -100
 _RENAME_EXCHANGE = 2
@@ -30,14 +31,14 @@ _NO_PATH = (errno.ENAMETOOLONG, errno.ELOOP)
 _SHOWN = 60
 _WRITE_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
+VERSION = version("mapfilter")
+"""Of the program, for the record in what it writes."""
+
 
 def sha256_file(path: Path) -> str:
     """Return the SHA-256 of a file's bytes as hexadecimal digits."""
-    digest = hashlib.sha256()
     with path.open("rb") as stream:
-        while chunk := stream.read(_CHUNK_BYTES):
-            digest.update(chunk)
-    return digest.hexdigest()
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 @contextlib.contextmanager
@@ -105,7 +106,7 @@ def atomic_dir(path: Path) -> Iterator[Path]:
 
 def left_aside(path: Path) -> Path | None:
     """Return the folder moved aside by a replacement that was cut short, if there is one."""
-    found = path.parent.glob(f"{_glob_escape(f'.{path.name}.partial-')}*/{_ASIDE}")
+    found = path.parent.glob(f"{glob.escape(f'.{path.name}.partial-')}*/{_ASIDE}")
     return next((aside for aside in sorted(found) if aside.is_dir()), None)
 
 
@@ -207,7 +208,7 @@ def _writing(temporary: Path, path: Path) -> Iterator[None]:
 def _partial_folder(path: Path) -> Path:
     ensure_writable_folder(path.parent)
     prefix = f".{path.name}.partial-"
-    for stale in path.parent.glob(f"{_glob_escape(prefix)}*"):
+    for stale in path.parent.glob(f"{glob.escape(prefix)}*"):
         if not _is_alive(stale.name.removeprefix(prefix).split("-")[0]):
             if (stale / _ASIDE).is_dir() and not path.exists():
                 # Its process died between the two renames of an exchange.
@@ -217,10 +218,6 @@ def _partial_folder(path: Path) -> Path:
         return Path(tempfile.mkdtemp(prefix=f"{prefix}{os.getpid()}-", dir=path.parent))
     except OSError as error:
         raise _not_writable(path, error) from error
-
-
-def _glob_escape(text: str) -> str:
-    return "".join(f"[{c}]" if c in "*?[" else c for c in text)
 
 
 def _is_alive(pid: str) -> bool:

@@ -128,13 +128,7 @@ class FinishedParts:
         return part if _checksum(part) == checksum else None
 
     def save(self, number: int, part: bytes) -> None:
-        """Write a finished part.
-
-        Raises
-        ------
-        OutputError
-            It cannot be written.
-        """
+        """Write a finished part; raise OutputError where that fails."""
         file = self._file(number)
         temporary = file.with_name(f"{file.name}.{os.getpid()}")
         try:

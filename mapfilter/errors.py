@@ -55,13 +55,13 @@ class MapfilterError(Exception):
             kind = (_NUMBER.sub("#", fault.where), _NUMBER.sub("#", fault.expected), fault.hint)
             alike.setdefault(kind, []).append(fault)
         lines: list[str] = []
-        told = 0
+        shown = 0
         for faults in alike.values():
             if len(lines) + min(len(faults), _MAX_ALIKE) > _MAX_SHOWN:
-                lines.append(f"… and {len(self.faults) - told} more faults")
+                lines.append(f"… and {len(self.faults) - shown} more faults")
                 break
             lines += [str(fault) for fault in faults[:_MAX_ALIKE]]
-            told += len(faults)
+            shown += len(faults)
             if len(faults) > _MAX_ALIKE:
                 lines[-1] += f" … and {len(faults) - _MAX_ALIKE} more like this"
         return "\n".join(lines)

@@ -211,13 +211,7 @@ class Lattice:
     def covering(
         cls, crs: str, bounds_m: tuple[float, float, float, float], resolution_m: float
     ) -> Lattice:
-        """Return the lattice over west, south, east, north (m), snapped out to the resolution.
-
-        Raises
-        ------
-        InputError
-            A bound is not finite, the resolution is not above zero, or the bounds hold nothing.
-        """
+        """Return the lattice over west, south, east, north (m), snapped out to the resolution."""
         west, south, east, north = bounds_m
         if not (np.isfinite([*bounds_m, resolution_m]).all() and resolution_m > 0):
             got = f"{bounds_m} m at {resolution_m} m"

@@ -143,7 +143,7 @@ def build(
         made = job.made(executor or SerialExecutor(), finished, in_flight, tiles_a_task)
         crs, ids = rasters.lattice.crs, job.plan.ids
         written = write_parts(folder, crs, ids, made, len(job.windows), writers, progress)
-        if written.heard == 0:
+        if written.received == 0:
             expected = f"a level of at least {floor_dbm:g} dBm at a point"
             hint = "floor too high, or rasters hold no data along the roads"
             got = "none"
@@ -152,8 +152,8 @@ def build(
                 got = "no point of the roads on the rasters"
             raise fail(InputError, str(rasters.path), expected, got, hint)
         counts = {
-            "points": written.heard,
-            "points_below_floor": written.points - written.heard,
+            "points": written.received,
+            "points_below_floor": written.points - written.received,
             "points_off_rasters": job.off_rasters(written.points),
         }
         inputs = (*inputs, InputFile("rasters", rasters.path.name, digest.result()))

@@ -113,8 +113,8 @@ def peak_memory_bytes() -> int:
     """Return the peak memory of this process, or a usual figure where it is not known."""
     with contextlib.suppress(OSError):
         # Under Linux getrusage begins with the peak of the process that started this one.
-        told = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")
-        for line in told.splitlines():
+        status = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")
+        for line in status.splitlines():
             if line.startswith("VmHWM:"):
                 return int(line.split()[1]) * 1024
     try:

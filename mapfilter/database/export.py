@@ -1,4 +1,4 @@
-"""Best server and margin of a database as a cloud-optimised GeoTIFF."""
+"""Export a database: best server and margin as GeoTIFF, points and cells as GeoPackage."""
 
 from __future__ import annotations
 
@@ -27,10 +27,25 @@ BANDS = (("best_server", ""), ("best_level_dbm", "dBm"), ("margin_db", "dB"))
 CELLS_TAG = "CELLS"
 
 _TILE_PX = 512
+_WRITE_ERRORS = (DataSourceError, DataLayerError, FeatureError, GeometryError)
+# GeoPackages hold the time of writing; a fixed one gives equal bytes for equal databases.
+_WRITTEN = "2000-01-01T00:00:00.000Z"
 
 
-def write_cog(database: RadioRouteDatabase, path: Path) -> None:
-    """Write a database; see :func:`mapfilter.database.store.export_cog`."""
+def export_cog(database: RadioRouteDatabase, path: Path | str) -> None:
+    """Write best server and margin as a cloud-optimised GeoTIFF on the database's lattice.
+
+    Bands: ``best_server`` (index into the JSON list in the tag ``CELLS``), ``best_level_dbm`` and
+    ``margin_db``; NaN where there is no point. ``path`` ends in .tif; an older file is replaced.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in (".tif", ".tiff"):
+        raise fail(OutputError, str(path), "a name that ends in .tif", path.suffix or "no suffix")
     lattice = database.lattice
     columns = ("row", "col", *(name for name, _ in BANDS))
     reader = WindowReader([database.path / POINTS], columns, lattice)
@@ -52,18 +67,27 @@ def write_cog(database: RadioRouteDatabase, path: Path) -> None:
             target.write(values, window=RasterWindow(col, row, cols, rows))
 
 
-# GeoPackages hold the time of writing; a fixed one gives equal bytes for equal databases.
-_WRITE_ERRORS = (DataSourceError, DataLayerError, FeatureError, GeometryError)
-_WRITTEN = "2000-01-01T00:00:00.000Z"
+def export_geopackage(
+    database: RadioRouteDatabase, path: Path | str, cells: Sequence[str] = ()
+) -> None:
+    """Write a database as GeoPackage: layers ``points`` and ``cells``, and one per cell named.
 
+    ``path`` ends in .gpkg; an older file is replaced. The points of ``cells``, within the
+    database's margin, become a layer each.
 
-def write_geopackage(database: RadioRouteDatabase, path: Path, cells: Sequence[str]) -> None:
-    """Write a database; see :func:`mapfilter.database.store.export_geopackage`."""
+    Raises
+    ------
+    InputError
+        The database has no such cell.
+    OutputError
+        The file cannot be written.
+    """
+    path = Path(path)
     if path.suffix.lower() != ".gpkg":
         raise fail(OutputError, str(path), "a name that ends in .gpkg", path.suffix or "no suffix")
     crs = database.lattice.crs
     layers = {"points": _points(database), "cells": _cells(database)}
-    # Layers of a GeoPackage are tables, whose names SQLite does not tell apart by case.
+    # Layers of a GeoPackage are tables, whose names SQLite compares without case.
     names = apart({cell_id: f"cell {cell_id}" for cell_id in cells})
     for cell_id, name in names.items():
         row, col, level_dbm = database.cell_points(cell_id)

@@ -38,6 +38,8 @@ InputRole = (
 
 _LONGEST_NAME = 200
 _DAMAGED = "edited or damaged"
+_Count = Annotated[int, Field(ge=0)]
+_Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,10 +61,6 @@ def _within(path: str) -> str:
     if place.is_absolute() or ".." in place.parts or "\0" in path:
         raise ValueError("a path within the folder")
     return path
-
-
-_Count = Annotated[int, Field(ge=0)]
-_Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 
 
 class _Strict(BaseModel):
@@ -143,8 +141,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 def levels_folders(cell_ids: Iterable[str]) -> dict[str, str]:
     """Return each cell's folder within the database; no id leads out of it.
 
-    Ids that differ only in case get folders that differ in more, as not every disk tells cases
-    apart.
+    Ids that differ only in case get folders that differ in more, as not every file
+    system distinguishes them.
 
     Examples
     --------
@@ -200,7 +198,7 @@ def _fault(file: Path, detail: Mapping[str, Any]) -> Fault:
 
 
 def _check_together(manifest: _Manifest, where: str, faults: Faults) -> None:
-    """Note what fields say against each other."""
+    """Note fields that contradict each other."""
     if manifest.crs != manifest.lattice.crs:
         faults.add(f"{where}, crs", "the lattice's CRS", manifest.crs, _DAMAGED)
     folders = levels_folders(manifest.cells)

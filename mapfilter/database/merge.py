@@ -23,7 +23,7 @@ from mapfilter.database.store import open_database
 from mapfilter.database.tiles import (
     TileLevels,
     TileRows,
-    heard_levels,
+    received_levels,
     tile_windows,
     z_order,
 )
@@ -86,11 +86,11 @@ def merge(
     with atomic_dir(out) as folder:
         tiles = _tiles(databases, lattice, plan, windows)
         written = write_parts(folder, lattice.crs, plan.ids, tiles, len(windows), 1, progress)
-        if written.heard == 0:
-            raise fail(InputError, "merge", "a point that hears a cell", "none")
+        if written.received == 0:
+            raise fail(InputError, "merge", "a point with a level of a cell", "none")
         # No database holds points without a level, so they cannot be counted.
         counts = dict.fromkeys(("points", "points_below_floor", "points_off_rasters"))
-        counts["points"] = written.heard
+        counts["points"] = written.received
         Head(lattice, plan, parameters, attribution, inputs, counts).write(folder, written.parts)
     return open_database(out)
 
@@ -207,8 +207,8 @@ def _levels(
             level[sorter[at]] = rows["level_dbm"]
     cells = np.array(sorted(by_cell), dtype=np.int32)
     if not cells.size:
-        return heard_levels(np.full((1, point.size), np.nan), floor_dbm)
-    found = heard_levels(np.stack([by_cell[cell] for cell in cells.tolist()]), floor_dbm)
+        return received_levels(np.full((1, point.size), np.nan), floor_dbm)
+    found = received_levels(np.stack([by_cell[cell] for cell in cells.tolist()]), floor_dbm)
     return found.of_cells(cells.tolist())
 
 

@@ -19,6 +19,11 @@ from mapfilter.geodesy import Lattice
 
 # A damaged footer or page header can ask for absurd amounts of memory or name other columns.
 DAMAGE = (OSError, pa.ArrowException, ValueError, KeyError, MemoryError)
+_WKB_POINT = np.dtype([("order", "u1"), ("kind", "<u4"), ("east", "<f8"), ("north", "<f8")])
+Window = tuple[int, int, int, int]
+"""Row, column, rows and columns on a lattice."""
+
+_EVERYWHERE = (-(2**62), 2**62)
 
 
 def write_columns(
@@ -48,13 +53,7 @@ def open_writer(schema: pa.Schema, where: Path | pa.NativeFile) -> pq.ParquetWri
 
 
 def read_columns(path: Path, columns: Sequence[str]) -> pa.Table:
-    """Read some columns of a part; the checksums of what is read are compared.
-
-    Raises
-    ------
-    StoreError
-        The part is missing or damaged, or has no such column.
-    """
+    """Read some columns of a part and compare their checksums; StoreError where damaged."""
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as source:
             table = source.read(list(columns))
@@ -64,6 +63,15 @@ def read_columns(path: Path, columns: Sequence[str]) -> pa.Table:
     if missing := [name for name in columns if name not in table.column_names]:
         raise fail(StoreError, str(path), f"column {missing[0]}", "none", "damaged")
     return table.select(list(columns))
+
+
+def check_places(path: Path, table: pa.Table, lattice: Lattice) -> None:
+    """Check that the points of a part lie on the lattice, and are numbered by it."""
+    point, row, col = (table[name].to_numpy() for name in ("point", "row", "col"))
+    numbers = row.astype(np.int64) * lattice.cols + col
+    if not (np.array_equal(point, numbers) and lattice.contains(row, col).all()):
+        expected = "points on the database's lattice"
+        raise fail(StoreError, str(path), expected, "others", "parts mixed up")
 
 
 def count_rows(path: Path) -> int:
@@ -78,11 +86,8 @@ def damaged(path: Path, error: Exception) -> MapfilterError:
     """Return the error for a part that cannot be read."""
     if isinstance(error, FileNotFoundError):
         return fail(StoreError, str(path), "a part of the database", "no such file")
-    said = (str(error).splitlines() or [type(error).__name__])[0]
-    return fail(StoreError, str(path), "a whole Parquet file", said, "damaged")
-
-
-_WKB_POINT = np.dtype([("order", "u1"), ("kind", "<u4"), ("east", "<f8"), ("north", "<f8")])
+    reason = (str(error).splitlines() or [type(error).__name__])[0]
+    return fail(StoreError, str(path), "a whole Parquet file", reason, "damaged")
 
 
 def point_geometry(east_m: Floats, north_m: Floats) -> pa.Array:
@@ -110,7 +115,7 @@ def point_coordinates(geometry: pa.Array) -> Floats:
     >>> point_coordinates(point_geometry(np.array([3.0, 5.0]), np.array([4.0, 6.0]))).tolist()
     [[3.0, 4.0], [5.0, 6.0]]
     """
-    # Offsets into the bytes tell where a slice of a longer array begins.
+    # Offsets into the bytes show where a slice of a longer array begins.
     _, offsets, data = geometry.buffers()
     first = np.frombuffer(offsets, np.int32)[geometry.offset] if len(geometry) else 0
     points = np.frombuffer(data, _WKB_POINT, len(geometry), int(first))
@@ -135,12 +140,6 @@ def dictionary(codes: NDArray[Any], names: tuple[str, ...]) -> pa.Array:
     return pa.DictionaryArray.from_arrays(
         pa.array(np.asarray(codes, dtype=np.int32)), pa.array(names, type=pa.string())
     )
-
-
-Window = tuple[int, int, int, int]
-"""Row, column, rows and columns on a lattice."""
-
-_EVERYWHERE = (-(2**62), 2**62)
 
 
 class WindowReader:
@@ -175,13 +174,7 @@ class WindowReader:
         self._boxes = np.array(boxes, dtype=np.int64).reshape(-1, 4)
 
     def read(self, window: Window) -> dict[str, Any]:
-        """Return the rows within a window, column by column: text as Arrow, others as NumPy.
-
-        Raises
-        ------
-        StoreError
-            A part is damaged or of another lattice.
-        """
+        """Return the rows within a window, column by column: text as Arrow, others as NumPy."""
         row, col, rows, cols = window
         low_row, high_row, low_col, high_col = self._boxes.T
         meets = (low_row < row + rows) & (high_row >= row)
@@ -212,15 +205,10 @@ class WindowReader:
             table.validate(full=True)
         except DAMAGE as error:
             raise damaged(part, error) from error
-        at = table["row"].to_numpy(), table["col"].to_numpy()
-        number = at[0].astype(np.int64) * self._lattice.cols + at[1]
-        placed = np.array_equal(number, table["point"].to_numpy())
-        if not (placed and self._lattice.contains(*at).all()):
-            expected = "points on the database's lattice"
-            raise fail(StoreError, str(part), expected, "others", "parts mixed up")
+        check_places(part, table, self._lattice)
         return table
 
 
 def _ends(group: pq.RowGroupMetaData, column: int) -> tuple[int, int]:
-    told = group.column(column).statistics
-    return (told.min, told.max) if told is not None and told.has_min_max else _EVERYWHERE
+    known = group.column(column).statistics
+    return (known.min, known.max) if known is not None and known.has_min_max else _EVERYWHERE

@@ -48,12 +48,12 @@ ROWS_IN_MEMORY = 1 << 22
 
 def points_table(places: pa.Table, levels: TileLevels, cell_ids: tuple[str, ...]) -> pa.Table:
     """Return rows of ``points.parquet``: the places with a level above the floor."""
-    heard = levels.best >= 0
-    table = places.filter(pa.array(heard))
+    received = levels.best >= 0
+    table = places.filter(pa.array(received))
     columns = {
-        "best_server": dictionary(levels.best[heard], cell_ids),
-        "best_level_dbm": levels.best_level_dbm[heard],
-        "margin_db": levels.margin_db[heard],
+        "best_server": dictionary(levels.best[received], cell_ids),
+        "best_level_dbm": levels.best_level_dbm[received],
+        "margin_db": levels.margin_db[received],
     }
     for name, values in columns.items():
         table = table.add_column(table.num_columns - 1, name, pa.array(values))
@@ -67,9 +67,9 @@ def levels_rows(places: pa.Table, levels: TileLevels) -> Iterator[tuple[int, Lev
         "level_dbm": levels.level_dbm,
         "below_best_db": levels.below_best_db,
     }
-    heard, first = np.unique(levels.cell, return_index=True)
+    received, first = np.unique(levels.cell, return_index=True)
     ends = np.append(first, levels.cell.size)[1:]
-    for cell, start, end in zip(heard.tolist(), first.tolist(), ends.tolist(), strict=True):
+    for cell, start, end in zip(received.tolist(), first.tolist(), ends.tolist(), strict=True):
         yield cell, {name: values[start:end] for name, values in columns.items()}
 
 
@@ -171,7 +171,7 @@ class Written(NamedTuple):
 
     parts: tuple[Mapping[str, Any], ...]
     points: int
-    heard: int
+    received: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,13 +217,13 @@ def write_parts(
     progress: Progress | None = None,
 ) -> Written:
     """Write points and levels of tiles, as they come, with bounded memory."""
-    points, heard = 0, 0
+    points, received = 0, 0
     with PartWriter(folder, crs, cell_ids, writers) as writer:
         for done, tile in enumerate(tiles, start=1):
             writer.add(tile)
             points += tile.places.num_rows
-            heard += int((tile.levels.best >= 0).sum())
+            received += int((tile.levels.best >= 0).sum())
             if progress is not None:
                 progress(done, total)
-        parts = writer.finish() if heard else []
-    return Written(tuple(parts), points, heard)
+        parts = writer.finish() if received else []
+    return Written(tuple(parts), points, received)

@@ -2,7 +2,7 @@
 
 ``manifest.json`` holds format and version, CRS, lattice, cells, parameters, the SHA-256 of inputs
 and parts, and counts. ``cells.parquet`` is the cell table, ``points.parquet`` (GeoParquet) has one
-row per point, ``levels/CELL/part-N.parquet`` one row per point at which the cell is heard.
+row per point, ``levels/CELL/part-N.parquet`` one row per point at which the cell is received.
 """
 
 from __future__ import annotations
@@ -114,51 +114,6 @@ def info(database: RadioRouteDatabase) -> dict[str, Any]:
         **{key: manifest[key] for key in ("counts", "parameters", "inputs")},
         "levels_per_cell": counts,
     }
-
-
-def export_geopackage(
-    database: RadioRouteDatabase, path: Path | str, cells: Sequence[str] = ()
-) -> None:
-    """Write a database as GeoPackage: layers ``points`` and ``cells``, and one per cell named.
-
-    Parameters
-    ----------
-    path : Path or str
-        Ends in .gpkg; an older file is replaced.
-    cells : sequence of str
-        Cells whose points, within the database's margin, become a layer of their own.
-
-    Raises
-    ------
-    InputError
-        The database has no such cell.
-    OutputError
-        The file cannot be written.
-    """
-    from mapfilter.database.export import write_geopackage
-
-    write_geopackage(database, Path(path), cells)
-
-
-def export_cog(database: RadioRouteDatabase, path: Path | str) -> None:
-    """Write best server and margin as a cloud-optimised GeoTIFF on the database's lattice.
-
-    Bands: ``best_server`` (index into the JSON list in the tag ``CELLS``), ``best_level_dbm`` and
-    ``margin_db``; NaN where there is no point.
-
-    Parameters
-    ----------
-    path : Path or str
-        Ends in .tif; an older file is replaced.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
-    from mapfilter.database.export import write_cog
-
-    write_cog(database, Path(path))
 
 
 def _check_parts(path: Path, parts: Sequence[Mapping[str, Any]], verify: str) -> None:

@@ -18,6 +18,8 @@ from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.lattice import RouteLattice
 
 _CELLS_AT_A_TIME = 128
+_AT_POINTS = ("best", "best_level_dbm", "margin_db")
+_AT_LEVELS = ("cell", "which", "level_dbm", "below_best_db")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +63,7 @@ class TileLevels:
     below_best_db: Floats32
 
     def of_cells(self, numbers: Sequence[int]) -> TileLevels:
-        """Return the same with its cells numbered anew: those of a plan, in its order."""
+        """Return the same with other numbers of the cells."""
         # The last one is that of "none".
         number = np.array([*numbers, -1], dtype=np.int32)
         return replace(self, best=number[self.best], cell=number[self.cell])
@@ -98,23 +100,13 @@ class TileRows:
         return cls(points.drop_columns(list(_AT_POINTS)), TileLevels(**columns))
 
 
-_AT_POINTS = ("best", "best_level_dbm", "margin_db")
-_AT_LEVELS = ("cell", "which", "level_dbm", "below_best_db")
-
-
 def read_tiles(tasks: Sequence[TileTask]) -> list[bytes]:
     """Make some tiles, on a worker."""
     return [read_tile(task).to_bytes() for task in tasks]
 
 
 def read_tile(task: TileTask) -> TileRows:
-    """Lay the points of a tile and read its levels, a few cells at a time.
-
-    Raises
-    ------
-    InputError
-        The rasters are cut off.
-    """
+    """Lay the points of a tile and read its levels, a few cells at a time."""
     lattice, (top, left, _, _) = task.rasters.lattice, task.window
     routes = task.part if isinstance(task.part, RouteLattice) else task.part()
     places = places_table(routes, lattice)
@@ -125,16 +117,16 @@ def read_tile(task: TileTask) -> TileRows:
         some = ids[first : first + _CELLS_AT_A_TIME]
         window_dbm = task.rasters.read_levels_dbm(task.plan, task.window, some)
         level[first : first + len(some)] = window_dbm[:, row - top, col - left]
-    return TileRows(places, heard_levels(level, task.floor_dbm).of_cells(task.numbers))
+    return TileRows(places, received_levels(level, task.floor_dbm).of_cells(task.numbers))
 
 
-def heard_levels(level_dbm: Floats, floor_dbm: float) -> TileLevels:
+def received_levels(level_dbm: Floats, floor_dbm: float) -> TileLevels:
     """Return the levels above the floor of those of shape (cells, points), NaN where unknown.
 
     Examples
     --------
-    >>> heard = heard_levels(np.array([[-80.0, -99.0], [-70.5, np.nan]]), -104.0)
-    >>> heard.best.tolist(), heard.margin_db.tolist()
+    >>> received = received_levels(np.array([[-80.0, -99.0], [-70.5, np.nan]]), -104.0)
+    >>> received.best.tolist(), received.margin_db.tolist()
     ([1, 0], [9.5, nan])
     """
     level = np.round(level_dbm, 2)

@@ -24,6 +24,9 @@ from mapfilter.filters._updates import BLOCK, INDEX, MATRIX, RUN, TYPES, VECTOR,
 from mapfilter.filters.gaussian import Method, factor_of
 from mapfilter.filters.trials import CompiledMeasurement, checked_sizes, problem_of
 
+_WIDEST = 0.9
+"""Largest deviation of a part, as a share of that of the whole."""
+
 
 @dataclass(frozen=True, eq=False)
 class Mixture:
@@ -34,6 +37,7 @@ class Mixture:
     weights : (c,) array
         They sum to one.
     means : (c, n) array
+        Means of the components.
     covariance : (n, n) array
         Of each of them.
     """
@@ -49,15 +53,14 @@ def split(
     """Cut a Gaussian into narrower ones along some components of the state.
 
     Along a component cut into c parts, the parts' means are spaced evenly over ± ``reach``
-    standard deviations, and their deviation is that spacing, at most what it was; weights are such
-    that mean and variance are kept, up to the cut tails. Components must be independent at the
-    start.
+    standard deviations (two parts lie nearer), and their deviation is that spacing, at most 0.9 of
+    what it was; weights are such that mean and variance are kept, up to the cut tails. Components
+    must be independent at the start.
 
     Parameters
     ----------
-    mean : (n,) array_like
-    covariance : (n, n) array_like
-        Without correlation between what is cut and anything else.
+    mean, covariance : (n,) and (n, n) array_like
+        The Gaussian, without correlation between what is cut and anything else.
     parts : mapping of int to int
         Number of parts for each index that is cut.
     reach : float
@@ -90,27 +93,25 @@ def split(
     for index, count in parts.items():
         if count == 1:
             continue
-        places = np.linspace(-reach, reach, count)
-        narrow = min(places[1] - places[0], 0.9) ** 2
+        # Two parts farther out would have more than the whole variance by their means alone.
+        out = min(reach, np.sqrt(1 - _WIDEST**2)) if count == 2 else reach
+        places = np.linspace(-out, out, count)
         # The weights' own variance is 1 - narrow: searched for, as the ends are cut.
+        narrow = min(places[1] - places[0], _WIDEST) ** 2
         share = _shares(places, 1.0 - narrow)
-        kept = 1.0 - float(share @ places**2)
-        deviation = np.sqrt(wide[index, index])
-        axes.append([(index, deviation * place) for place in places])
+        axes.append([(index, np.sqrt(wide[index, index]) * place) for place in places])
         shares.append(share)
-        wide[index, index] *= kept
-    means, weights = [], []
-    for chosen, factors in zip(product(*axes), product(*shares), strict=True):
-        shifted = centre.copy()
+        wide[index, index] *= 1.0 - float(share @ places**2)
+    weights = np.array([np.prod(factors) for factors in product(*shares)])
+    means = np.tile(centre, (weights.size, 1))
+    for shifted, chosen in zip(means, product(*axes), strict=True):
         for index, shift in chosen:
             shifted[index] += shift
-        means.append(shifted)
-        weights.append(np.prod(factors))
-    return Mixture(np.array(weights), np.array(means), wide)
+    return Mixture(weights, means, wide)
 
 
 def _shares(places: Floats, variance: float) -> Floats:
-    """Return normal weights on places, of a variance as near to the one wanted as they can be."""
+    """Return normal weights on places whose variance is the one wanted, as near as possible."""
     low, high = 1e-3, 1e3
     for _ in range(80):
         middle = np.sqrt(low * high)
@@ -231,13 +232,14 @@ def _run_mixture(
 
 @dataclass(frozen=True, eq=False)
 class MixtureRun:
-    """What Gaussian sums made of T trials of K steps.
+    """Results of Gaussian sums over T trials of K steps.
 
     Parameters
     ----------
     means : (T, K, n) array
         Means of the mixtures.
     covariances : (T, K, n, n) array
+        Covariances of the mixtures.
     evidence : (T, K) array
         Log density of each reading given those before it.
     counts : (T, K) integer array

@@ -1,9 +1,8 @@
 """Kalman-type filters over many trials of one experiment, by compiled kernels.
 
 All trials share motion, measurement and noise; each has its own first belief and its own readings,
-of which any component may be absent at any step. What the filters are is told in
-:mod:`mapfilter.filters.kalman` and :mod:`mapfilter.filters.sigma_point`; the arithmetic is the
-same.
+of which any component may be absent at any step. The updates are those of
+:mod:`mapfilter.filters._updates`.
 """
 
 from __future__ import annotations
@@ -34,10 +33,11 @@ class CompiledMeasurement:
         Compiled with the arguments (points, slots, rows, patterns, mean, slope, derive), see
         :data:`mapfilter._kernels.MEASURE_SIGNATURE`.
     slots : (4,) integer array
+        Rows of the points that hold east, north, up and the clock's bias; -1 for none.
     uses : (q,) integer array
         Components of the state that it depends on.
-    rows : (m, c) array
-    patterns : (p,) array
+    rows, patterns : (m, c) and (p,) arrays
+        The measurement's own constants.
     noise : (m, m) array
         Covariance of its noise, positive definite.
     """
@@ -52,7 +52,7 @@ class CompiledMeasurement:
 
 @dataclass(frozen=True, eq=False)
 class TrialRun:
-    """What filters made of T trials of K steps.
+    """Results of a filter over T trials of K steps.
 
     Parameters
     ----------
@@ -89,6 +89,7 @@ def run_trials(
     Parameters
     ----------
     measurement : CompiledMeasurement
+        Which readings.
     transition, process : (n, n) arrays
         Φ and Q.
     method : Method

@@ -50,6 +50,42 @@ _RANGES = {
     "anomaly_rad": (-7.0, 7.0, "radians"),
 }
 _HINT = "a file cut off, or an almanac of another kind (SEM, RINEX)"
+_GPS_AXIS_M = 26_559_700.0
+_GPS_TILT_DEG = 55.0
+_GALILEO_AXIS_M = 29_600_318.0
+_GALILEO_TILT_DEG = 56.0
+_GALILEO_PER_PLANE, _GALILEO_PLANES = 9, 3
+_GREENWICH_DEG = 279.0553
+"""Sidereal angle of Greenwich at the epoch of the slots."""
+
+_NODE_OF_A_DEG = 272.847
+_SLOTS_DEG = (
+    (268.126, 161.786, 11.676, 41.806),
+    (80.956, 173.336, 309.976, 204.376),
+    (111.876, 11.796, 339.666, 241.556),
+    (135.226, 265.446, 35.156, 167.356),
+    (197.046, 302.596, 66.066, 333.686),
+    (238.886, 345.226, 105.206, 135.346),
+)
+"""Arguments of latitude in planes A to F."""
+
+EARTH_GRAVITY_M3_S2 = 3.986005e14
+"""μ of IS-GPS-200, as receivers take it."""
+
+EARTH_RATE_RAD_S = 7.2921151467e-5
+OLDEST_DAYS = 180.0
+"""Farther from its time of applicability an almanac is too inaccurate."""
+
+_GPS_EPOCH_S = datetime(1980, 1, 6, tzinfo=UTC).timestamp()
+# UTC dates from which on GPS time is ahead by one second more.
+_LEAPS = tuple(
+    datetime(year, month, 1, tzinfo=UTC).timestamp()
+    for month, years in (
+        (1, (1988, 1990, 1991, 1996, 1999, 2006, 2009, 2017)),
+        (7, (1981, 1982, 1983, 1985, 1992, 1993, 1994, 1997, 2012, 2015)),
+    )
+    for year in years
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,8 +224,8 @@ def _blocks(text: str, path: Path, faults: Faults) -> list[tuple[int, dict[str, 
             blocks.append((number, {}))
             continue
         label, colon, given = line.partition(":")
-        told = label.strip().lower()
-        name = next((name for key, name in _KEYS.items() if told.startswith(key)), None)
+        start = label.strip().lower()
+        name = next((name for key, name in _KEYS.items() if start.startswith(key)), None)
         if not colon or name is None or not blocks:
             if line.strip():
                 where, got = f"{path}, line {number}", repr(line)[:60]
@@ -209,27 +245,6 @@ def _blocks(text: str, path: Path, faults: Faults) -> list[tuple[int, dict[str, 
             continue
         blocks[-1][1].setdefault(name, np.nan)
     return blocks
-
-
-_GPS_AXIS_M = 26_559_700.0
-_GPS_TILT_DEG = 55.0
-_GALILEO_AXIS_M = 29_600_318.0
-_GALILEO_TILT_DEG = 56.0
-_GALILEO_PER_PLANE, _GALILEO_PLANES = 9, 3
-
-_GREENWICH_DEG = 279.0553
-"""Sidereal angle of Greenwich at the epoch of the slots."""
-
-_NODE_OF_A_DEG = 272.847
-_SLOTS_DEG = (
-    (268.126, 161.786, 11.676, 41.806),
-    (80.956, 173.336, 309.976, 204.376),
-    (111.876, 11.796, 339.666, 241.556),
-    (135.226, 265.446, 35.156, 167.356),
-    (197.046, 302.596, 66.066, 333.686),
-    (238.886, 345.226, 105.206, 135.346),
-)
-"""Arguments of latitude in planes A to F."""
 
 
 def nominal_gps(week: int = 0) -> Almanac:
@@ -284,25 +299,6 @@ def _circular(
         anomaly_rad=np.radians(latitude_deg),
         healthy=np.ones(count, dtype=np.bool_),
     )
-
-
-EARTH_GRAVITY_M3_S2 = 3.986005e14
-"""μ of IS-GPS-200, as receivers take it."""
-EARTH_RATE_RAD_S = 7.2921151467e-5
-
-OLDEST_DAYS = 180.0
-"""Farther from its time of applicability an almanac is too inaccurate."""
-
-_GPS_EPOCH_S = datetime(1980, 1, 6, tzinfo=UTC).timestamp()
-# UTC dates from which on GPS time is ahead by one second more.
-_LEAPS = tuple(
-    datetime(year, month, 1, tzinfo=UTC).timestamp()
-    for month, years in (
-        (1, (1988, 1990, 1991, 1996, 1999, 2006, 2009, 2017)),
-        (7, (1981, 1982, 1983, 1985, 1992, 1993, 1994, 1997, 2012, 2015)),
-    )
-    for year in years
-)
 
 
 def gps_time(utc_s: float) -> tuple[int, float]:

@@ -21,6 +21,9 @@ from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import unproject
 
+_ARM_M = 100.0
+_MOST_PAIRS = 2_000_000
+
 
 @lru_cache(maxsize=1)
 def _geocentric() -> Transformer:
@@ -140,9 +143,6 @@ def directions(satellites_m: ArrayLike, receiver_m: ArrayLike = (0.0, 0.0, 0.0))
     return Directions(np.arctan2(away[..., 2], flat), np.where(azimuth >= 2 * np.pi, 0.0, azimuth))
 
 
-_ARM_M = 100.0
-
-
 @dataclass(frozen=True)
 class GridFrame:
     """The surroundings of a place of a projected CRS.
@@ -186,9 +186,6 @@ class GridFrame:
         lon, lat = self._lonlat
         there = self.local.to_local(ecef_from_lonlat(lon, lat, self.height_m))
         return np.asarray((there[1:, :2] - there[0, :2]).T / _ARM_M)
-
-
-_MOST_PAIRS = 2_000_000
 
 
 class Skyline:

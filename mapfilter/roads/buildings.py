@@ -102,15 +102,15 @@ def made_buildings(
     by_height = _numbers(heights)[origin]
     by_levels = _numbers(levels)[origin] * storey_height_m
     height = np.where(np.isfinite(by_height), by_height, by_levels)
-    told = np.isfinite(height)
+    known = np.isfinite(height)
     from_height = int(np.isfinite(by_height).sum())
     return Buildings(
         crs,
         footprints,
-        np.where(told, height, default_height_m),
+        np.where(known, height, default_height_m),
         from_height,
-        int(told.sum()) - from_height,
-        int((~told).sum()),
+        int(known.sum()) - from_height,
+        int((~known).sum()),
     )
 
 

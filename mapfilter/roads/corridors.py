@@ -382,8 +382,8 @@ def _sessions_near(place_m: Floats, measured: cKDTree, of_session: Ints, reach_m
     for first in range(0, len(place_m), _AT_A_TIME):
         some = place_m[first : first + _AT_A_TIME]
         of, near = _pairs(measured, some, reach_m)
-        heard = np.unique(np.column_stack([of, of_session[near]]), axis=0)[:, 0]
-        counts.append(np.bincount(heard, minlength=len(some)))
+        passing = np.unique(np.column_stack([of, of_session[near]]), axis=0)[:, 0]
+        counts.append(np.bincount(passing, minlength=len(some)))
     return np.concatenate(counts).astype(np.int64)
 
 

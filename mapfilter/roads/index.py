@@ -255,13 +255,7 @@ class RouteSource:
         return described(allowed, window, on_square, self.ways, (way, distance_m), SQUARE_CLASS)
 
     def over(self, lattice: Lattice, tile_px: int = TILE_PX) -> RouteLattice:
-        """Return the route lattice of a whole area, made tile by tile.
-
-        Raises
-        ------
-        InputError
-            No point is left.
-        """
+        """Return the route lattice of a whole area, made tile by tile; at least one point."""
         tiles = [
             (row, col, self.tile(lattice.window(row, col, rows, cols)))
             for row, col, rows, cols in lattice.tiles(tile_px)

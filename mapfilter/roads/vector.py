@@ -1,4 +1,4 @@
-"""Reading a layer of any vector file that GDAL knows, or GeoParquet, cut to an area."""
+"""Reading a layer of any vector file that GDAL reads, or GeoParquet, cut to an area."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _PARQUET = (".parquet", ".geoparquet")
 _LARGEST_RATIO = 60
 _ALWAYS_ALLOWED_BYTES = 64 << 20
 _HEAD_BYTES = 4096
-# Files that only say where the data are: on another path, or in the net.
+# Marks of files that only refer to data elsewhere.
 _POINTERS = b"<OGRVRTDataSource <OGRWFSDataSource <OGRCSWDataSource gdal_streamed_alg".split()
 _POINTERS += b"<WFS_Capabilities <VRTDataset".split()
 _MOST_DEG = 360.0

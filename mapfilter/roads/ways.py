@@ -17,6 +17,9 @@ Bounds = tuple[float, float, float, float]
 """West, south, east, north in metres."""
 
 Geometries = NDArray[np.object_]
+_LINE, _RING, _POLYGON = 1, 2, 3
+_FARTHEST_M = 1e8
+"""Larger than the coordinates of any map; much larger ones overflow in products."""
 
 
 class _Layer:
@@ -163,7 +166,7 @@ class Buildings(_Layer):
         return int(self.footprints.size)
 
     @property
-    def told(self) -> str:
+    def height_sources(self) -> str:
         """One sentence on the sources of the heights."""
         return (
             f"{len(self)} buildings: height from the map for {self.from_height}, "
@@ -207,12 +210,6 @@ def _check_geometry(what: str, geometry: Geometries, kind: str, faults: Faults) 
         faults.add(f"{what}, geometry", f"only {kind}s", "another kind")
     elif not np.all(np.isfinite(shapely.get_coordinates(geometry))):
         faults.add(f"{what}, geometry", "finite coordinates", "NaN or infinity")
-
-
-_LINE, _RING, _POLYGON = 1, 2, 3
-
-_FARTHEST_M = 1e8
-"""Larger than the coordinates of any map; much larger ones overflow in products."""
 
 
 def on_earth(geometry: Geometries) -> Bools:

@@ -23,6 +23,8 @@ from mapfilter.gnss.orbits import Almanac
 from mapfilter.tracks.satellites import place_satellites
 from mapfilter.tracks.schema import NEIGHBOUR, PLACE, TABLES, tidy_table
 
+Kind = Literal["gnss", "fixes", "pseudoranges", "ta", "tdoa", "neighbours", "radio"]
+
 _APART_S = 600.0
 """Tables may begin this long after another ends."""
 _TIMES_MS = (300.0, 3000.0)
@@ -32,6 +34,19 @@ _EARLY_S = 30.0
 _EARLY_SHARE = 0.1
 _EARLIEST_UTC_S = datetime(1, 1, 1, tzinfo=UTC).timestamp()
 _MOST_S = 1e11
+
+_FEW_ROWS = 10
+_MANY_ROWS = 20
+_FASTEST_MPS = 100.0
+_SLOWEST_MPS = 0.02
+_LONG_S = 60.0
+_MOSTLY = 2 / 3
+_SOMEWHERE_M = 100.0
+_KILO = (100.0, 1200.0)
+"""Between these, positions lie apart by the kilometres of the steps, or a part of them."""
+_FASTEST_KMPS = 0.1
+
+_EXPECTED = "metres moved in each interval"
 
 
 def check_clocks(
@@ -109,20 +124,6 @@ def _milliseconds(times: Mapping[str, Floats]) -> str:
             if low <= longer <= high and low <= seldomer <= high:
                 return f"milliseconds for s in {name}"
     return ""
-
-
-_FEW_ROWS = 10
-_MANY_ROWS = 20
-_FASTEST_MPS = 100.0
-_SLOWEST_MPS = 0.02
-_LONG_S = 60.0
-_MOSTLY = 2 / 3
-_SOMEWHERE_M = 100.0
-_KILO = (100.0, 1200.0)
-"""Between these, positions lie apart by the kilometres of the steps, or a part of them."""
-_FASTEST_KMPS = 0.1
-
-_EXPECTED = "metres moved in each interval"
 
 
 def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) -> tuple[str, ...]:
@@ -203,7 +204,7 @@ class TrackLog:
     pseudoranges : pandas.DataFrame
         time_s, satellite ("G07": its constellation's letter and number), pseudorange_m, sigma_m,
         and where the satellite was, earth-centred: x_m, y_m, z_m. One row for each satellite
-        received. NaN: not measured, not told, or not known.
+        received. NaN: not measured or not known.
     tdoa : pandas.DataFrame
         time_s, cell, reference, difference_m (how much farther the cell is than the reference),
         sigma_m and reference_sigma_m: of each one's time of arrival, as distances.
@@ -359,33 +360,30 @@ def make_log(
     present = {table: rows for table, rows in every if rows is not None}
     given, start_utc_s = _seconds(present, float(start_utc_s), called, faults)
     tables: dict[str, pd.DataFrame] = {}
-    told = tuple(notes)
+    every_note = tuple(notes)
     for table in TABLES:
         where = called.get(table, table)
-        rows, news = tidy_table(table, given.get(table), where, faults, numbers.get(table))
+        rows, more = tidy_table(table, given.get(table), where, faults, numbers.get(table))
         tables[table] = rows
-        told += news
+        every_note += more
     check_start(start_utc_s, tables, faults, whole)
     if not any(fault.where.endswith("time_s") for fault in faults.found):
         check_clocks(tables, called, faults)
-        told += check_steps(tables, called.get("motion", "motion"), faults)
-        told += early_ends(tables)
+        every_note += check_steps(tables, called.get("motion", "motion"), faults)
+        every_note += early_ends(tables)
     faults.raise_if_any(InputError)
     placeless = int(tables["pseudoranges"][list(PLACE)].isna().any(axis=1).sum())
     if almanac is None and placeless:
-        told += (
+        every_note += (
             f"pseudoranges: {placeless} rows without the place of their satellite, of no use "
             "without an almanac beside the log",
         )
     if almanac is not None:
         where = called.get("pseudoranges", "pseudoranges")
-        placed, news = place_satellites(tables["pseudoranges"], almanac, start_utc_s, where)
+        placed, more = place_satellites(tables["pseudoranges"], almanac, start_utc_s, where)
         tables["pseudoranges"] = placed
-        told += news
-    return TrackLog(str(crs), start_utc_s, **tables, notes=tuple(dict.fromkeys(told)))
-
-
-Kind = Literal["gnss", "fixes", "pseudoranges", "ta", "tdoa", "neighbours", "radio"]
+        every_note += more
+    return TrackLog(str(crs), start_utc_s, **tables, notes=tuple(dict.fromkeys(every_note)))
 
 
 def leave_out(log: TrackLog, kinds: Collection[Kind]) -> TrackLog:
@@ -400,8 +398,8 @@ def leave_out(log: TrackLog, kinds: Collection[Kind]) -> TrackLog:
     Examples
     --------
     >>> from mapfilter.tracks.log import make_log
-    >>> heard = pd.DataFrame({"time_s": [0.0, 0.0], "role": ["serving", "neighbour"]})
-    >>> log = make_log("EPSG:32635", radio=heard.assign(timing_advance=[1, None]))
+    >>> received = pd.DataFrame({"time_s": [0.0, 0.0], "role": ["serving", "neighbour"]})
+    >>> log = make_log("EPSG:32635", radio=received.assign(timing_advance=[1, None]))
     >>> alone = leave_out(log, ["neighbours", "ta"])
     >>> alone.radio["role"].tolist(), alone.radio["timing_advance"].isna().all()
     (['serving'], np.True_)

@@ -60,7 +60,7 @@ def place_satellites(
     if not unplaced.any():
         return rows, ()
     if not np.isfinite(start_utc_s):
-        hint = "without it an almanac does not tell where satellites were"
+        hint = "needed for places of satellites by an almanac"
         raise fail(InputError, f"{where}, start_utc_s", "UTC seconds of the start", "none", hint)
     time_s = rows["time_s"].to_numpy(dtype=np.float64)
     week, second = gps_time(start_utc_s + float(time_s[unplaced][0]))

@@ -46,6 +46,8 @@ _MOVING = ("motion", "gnss", "truth")
 _TURN_RAD = 2 * np.pi + 1e-9
 # 2.0**63 itself is one more than an int64 holds.
 _LARGEST_ID = float(np.nextafter(2.0**63, 0.0))
+_DEGREES, _SIGMA = "degrees given for radians", "metres in 0.001..100000"
+_RANGE_HINT = "kilometres or seconds for metres, or a leap second or week in the times"
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,8 +88,6 @@ def _integer(name: str, low: float, high: float, expected: str) -> Column:
 _TIME = Column("time_s", -1e11, 1e11, "seconds", "milliseconds for s", required=True)
 _EAST = Column("east_m", -1e8, 1e8, "metres east", required=True)
 _NORTH = Column("north_m", -1e8, 1e8, "metres north", required=True)
-_DEGREES, _SIGMA = "degrees given for radians", "metres in 0.001..100000"
-_RANGE_HINT = "kilometres or seconds for metres, or a leap second or week in the times"
 
 SCHEMA: dict[str, tuple[Column, ...]] = {
     "motion": (

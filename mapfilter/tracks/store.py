@@ -2,7 +2,7 @@
 
 ``log.json`` holds the format, its version, the CRS, the start and the checksums of the tables. A
 folder made by hand needs only ``{"crs": "EPSG:…"}`` in it; a table that is absent is empty. An
-almanac beside it (``almanac.txt``, YUMA) tells where satellites were whose rows do not.
+almanac beside it (``almanac.txt``, YUMA) gives the places of satellites whose rows have none.
 """
 
 from __future__ import annotations
@@ -37,6 +37,13 @@ HEAD = "log.json"
 ALMANAC = "almanac.txt"
 
 _SUFFIXES = (".parquet", ".csv")
+_SEPARATORS = (",", ";", "\t")
+_LONGEST_ROW_BYTES = 1 << 16
+_DECIMAL_COMMA = r"^\s*([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)\s*$"
+FORMAT = "mapfilter track log"
+VERSION = 1
+_KEYS = ("format", "version", "crs", "start_utc_s", "notes", "parts")
+_ARROW = {"number": pa.float64(), "integer": pa.int64(), "text": pa.string()}
 
 
 def checked_parts(folder: Path, head: dict[str, Any]) -> dict[str, Path]:
@@ -98,11 +105,6 @@ def _others(folder: Path, used: Collection[Path]) -> list[Path]:
         for path in sorted(folder.iterdir())
         if path.name not in known and not path.name.startswith(".") and path.is_file()
     ]
-
-
-_SEPARATORS = (",", ";", "\t")
-_LONGEST_ROW_BYTES = 1 << 16
-_DECIMAL_COMMA = r"^\s*([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)\s*$"
 
 
 class ReadTable(NamedTuple):
@@ -187,13 +189,6 @@ def _cut_off(path: Path, separator: str, header: str) -> tuple[str, ...]:
     if last.endswith(("\n", "\r")) or last.count(separator) >= header.count(separator):
         return ()
     return (f"{path}: ends within a row, as if cut off",)
-
-
-FORMAT = "mapfilter track log"
-VERSION = 1
-
-_KEYS = ("format", "version", "crs", "start_utc_s", "notes", "parts")
-_ARROW = {"number": pa.float64(), "integer": pa.int64(), "text": pa.string()}
 
 
 def write_log(
@@ -285,13 +280,7 @@ def check_log_replaceable(folder: Path) -> None:
 
 
 def list_logs(path: str | Path) -> list[Path]:
-    """Return the log that ``path`` is, or the logs that lie in it, by name.
-
-    Raises
-    ------
-    InputError
-        There is none, or a folder in it holds tables without a head.
-    """
+    """Return the log that ``path`` is, or the logs in it, by name; InputError without any."""
     path = Path(path)
     if is_log(path):
         return [path]

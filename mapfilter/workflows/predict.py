@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import rasterio
 from rasterio.errors import RasterioError
 
-from mapfilter import __version__
-from mapfilter._io import ensure_writable_folder, sha256_file
+from mapfilter._io import VERSION, ensure_writable_folder, sha256_file
 from mapfilter._parallel import Progress, part_of
 from mapfilter.config.sections import Config, Prediction
 from mapfilter.errors import Faults, InputError, OutputError, fail
@@ -154,7 +153,7 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     antennas = world.antennas
     notes = (
         *map_cover(world),
-        world.buildings.told,
+        world.buildings.height_sources,
         *plan.notes,
         *(note for antenna in antennas.values() for note in antenna.notes),
         *outside_validity(plan, lattice, model),
@@ -162,7 +161,7 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     )
     heights_m = world.heights_m
     wanted = 2 if config.prediction.ground_truth.write else 1
-    tags = {"SOFTWARE": f"mapfilter {__version__}", "MODEL": model.model, "MAP": world.map_name}
+    tags = {"SOFTWARE": f"mapfilter {VERSION}", "MODEL": model.model, "MAP": world.map_name}
     levels = predict(
         plan, lattice, heights_m, model, part_of(progress, 0, wanted), antennas=antennas
     )

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mapfilter import __version__
-from mapfilter._io import ensure_writable_folder
+from mapfilter._io import VERSION, ensure_writable_folder
 from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config, SurveySection
 from mapfilter.errors import ConfigError, InputError, fail
@@ -105,7 +104,7 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         deviation,
         fill=section.fill,
         deviation_factor=factor,
-        tags={"SOFTWARE": f"mapfilter {__version__}", "MODEL": f"survey {section.method}"},
+        tags={"SOFTWARE": f"mapfilter {VERSION}", "MODEL": f"survey {section.method}"},
         progress=progress,
     )
     plan_path = config.output.dir / "cells.csv"

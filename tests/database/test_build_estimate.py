@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import shapely
-from mapfilter.roads.routable import RouteSource
 
 from mapfilter.database.build import build
 from mapfilter.database.estimate import dry_run, peak_memory_bytes
@@ -13,6 +12,7 @@ from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.roads.index import RouteSource
 from mapfilter.roads.ways import Squares, Ways
 
 CRS = "EPSG:32629"

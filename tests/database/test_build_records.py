@@ -11,8 +11,8 @@ from small_world import LATTICE, make_plan, make_world
 
 from mapfilter._parallel import SerialExecutor
 from mapfilter.database.build import build
+from mapfilter.database.export import export_geopackage
 from mapfilter.database.manifest import InputFile
-from mapfilter.database.store import export_geopackage
 from mapfilter.errors import OutputError
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import open_rasters

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import shapely
 from killed_worker import KillsOneWorker
-from mapfilter.roads.routable import RouteSource, route_lattice
 from small_world import CRS, FLOOR_DBM, LATTICE, make_plan, make_routes, make_world
 
 from mapfilter._parallel import SerialExecutor, cluster_executor, local_executor
@@ -19,6 +18,8 @@ from mapfilter.database.sources import LayerRoutes
 from mapfilter.database.store import info, open_database
 from mapfilter.errors import InputError, MapfilterError
 from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
+from mapfilter.roads.index import RouteSource
+from mapfilter.roads.routes import route_lattice
 from mapfilter.roads.ways import Buildings, Squares, Ways
 
 OPTIONS = {"floor_dbm": FLOOR_DBM, "tile_px": 8}

@@ -166,6 +166,15 @@ def test_what_lies_on_the_border_is_taken():
     assert split([0.0, 0.0], np.eye(2), {1: 3}).means.shape == (3, 2)
 
 
+def test_two_parts_keep_mean_and_variance():
+    cut = split([1.0, 5.0], np.diag([4.0, 9.0]), {0: 2, 1: 2})
+    for index, (mean, variance) in enumerate([(1.0, 4.0), (5.0, 9.0)]):
+        off = cut.means[:, index] - mean
+        assert cut.weights @ off == pytest.approx(0.0, abs=1e-12)
+        assert cut.weights @ off**2 + cut.covariance[index, index] == pytest.approx(variance)
+    np.testing.assert_allclose(np.diagonal(cut.covariance), 0.81 * np.array([4.0, 9.0]))
+
+
 P, C, S = ParticleOptions, CandidateOptions, SirOptions
 ODD = np.array([[1.0, 0.5], [0.5 * (1 + 1.5e-9), 1.0]])
 DOORS = {

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 import shapely
-from mapfilter.roads.routable import route_lattice
 
 from mapfilter.database.build import build
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.roads.routes import route_lattice
 from mapfilter.roads.ways import Ways
 from mapfilter.survey.measured_map import SurveyOptions, fit_survey, leave_out
 from mapfilter.survey.measurements import read_measurements
