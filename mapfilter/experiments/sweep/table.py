@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
@@ -85,15 +86,7 @@ def row(
         *(float(value) for _, value in varied),
         run.route,
         run.draw,
-        score.switched,
-        score.success,
-        score.switch_time_s,
-        score.switch_distance_m,
-        score.error_at_switch_m,
-        score.error_mean_m,
-        score.error_67_m,
-        score.error_95_m,
-        score.scored_epochs,
+        *astuple(score),
         final_status,
     )
 
