@@ -25,7 +25,6 @@ class AreaMap:
 
     Parameters
     ----------
-    lattice : Lattice
     cell_ids : tuple of str
         Cells with a level somewhere in the area: bands 0 to C - 1.
     known_ids : frozenset of str

@@ -45,7 +45,6 @@ class BayesSmoother:
 
     Parameters
     ----------
-    area : AreaMap
     errors : MotionErrors
         Of the forward pass.
     every_m : float
@@ -110,7 +109,6 @@ class BayesSmoother:
         ----------
         estimate : TrackEstimate
             Of the forward pass; its statuses and unused readings stay.
-        rng : numpy.random.Generator
         paths : int
             Number of paths.
         jitter : tuple of float

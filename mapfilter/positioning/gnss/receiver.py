@@ -198,7 +198,6 @@ def weighed(
 
     Parameters
     ----------
-    sky : Sky
     sigma_m : (m,) array
         Standard deviations.
     receiver : Receiver
