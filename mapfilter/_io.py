@@ -1,4 +1,4 @@
-"""Atomic writes and checksums: nothing half-written is ever left behind.
+"""Atomic writes and checksums: no incomplete file is ever left behind.
 
 A result is written beside its place and renamed into it. A process killed in between leaves the
 old result intact, and a hidden ``.NAME.partial-*`` that the next write of that name removes.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import errno
+import glob
 import hashlib
 import json
 import os
@@ -17,25 +18,27 @@ import stat
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from mapfilter.errors import MapfilterError, OutputError, StoreError, fail
 
-_CHUNK_BYTES = 1 << 20
 _ASIDE = "old"
 _AT_FDCWD = -100
 _RENAME_EXCHANGE = 2
+_NO_PATH = (errno.ENAMETOOLONG, errno.ELOOP)
+_SHOWN = 60
 _WRITE_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
+
+VERSION = version("mapfilter")
+"""Of the program, for the record in what it writes."""
 
 
 def sha256_file(path: Path) -> str:
     """Return the SHA-256 of a file's bytes as hexadecimal digits."""
-    digest = hashlib.sha256()
     with path.open("rb") as stream:
-        while chunk := stream.read(_CHUNK_BYTES):
-            digest.update(chunk)
-    return digest.hexdigest()
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 @contextlib.contextmanager
@@ -43,7 +46,7 @@ def atomic_file(path: Path) -> Iterator[Path]:
     """Give a temporary path beside ``path``; rename it into place when the block succeeds.
 
     The temporary path keeps the suffix of ``path``, because drivers choose formats by it. Where
-    ``path`` is a link, what it leads to is replaced.
+    ``path`` is a link, its target is replaced.
 
     Raises
     ------
@@ -70,13 +73,12 @@ def atomic_file(path: Path) -> Iterator[Path]:
 def atomic_dir(path: Path) -> Iterator[Path]:
     """Give a temporary folder beside ``path``; exchange it with ``path`` when the block succeeds.
 
-    Where ``path`` is a link, what it leads to is replaced.
+    Where ``path`` is a link, its target is replaced.
 
     Raises
     ------
     OutputError
-        The parent folder cannot be made or written, ``path`` is a file, or writing in the folder
-        fails, as on a full disk.
+        ``path`` is a file, or the folder cannot be made or written.
     """
     if path.exists() and not path.is_dir():
         raise fail(OutputError, str(path), "a folder, or nothing yet", "a file")
@@ -103,26 +105,22 @@ def atomic_dir(path: Path) -> Iterator[Path]:
 
 
 def left_aside(path: Path) -> Path | None:
-    """Return where a folder lies that was moved aside to be replaced, if that was cut short."""
-    found = path.parent.glob(f"{_glob_escape(f'.{path.name}.partial-')}*/{_ASIDE}")
+    """Return the folder moved aside by a replacement that was cut short, if there is one."""
+    found = path.parent.glob(f"{glob.escape(f'.{path.name}.partial-')}*/{_ASIDE}")
     return next((aside for aside in sorted(found) if aside.is_dir()), None)
 
 
 def check_replaceable(folder: Path, head: str, what: str) -> None:
-    """See that replacing a folder loses nothing but what mapfilter wrote there as ``what``.
+    """Raise OutputError where a folder holds other files than mapfilter wrote there.
 
     Parameters
     ----------
     folder : Path
         May be absent.
     head : str
-        Name of the JSON file in it that holds ``format``, which is ``what``, and lists ``parts``.
+        Name of the JSON file in it with ``format``, which must be ``what``, and ``parts``.
     what : str
-
-    Raises
-    ------
-    OutputError
-        The folder holds a file that is neither the head nor listed there.
+        Format, as messages name it.
     """
     inner = folder.rglob("*") if folder.is_dir() else ()
     found = {p.relative_to(folder).as_posix() for p in inner if p.is_symlink() or not p.is_dir()}
@@ -147,13 +145,7 @@ def _listed(head: Path, what: str) -> set[str]:
 
 
 def check_version(where: str, found: object, known: int) -> None:
-    """See that what is read has the version that this mapfilter knows.
-
-    Raises
-    ------
-    StoreError
-        It has another.
-    """
+    """Raise StoreError where a file has another version than this mapfilter reads."""
     if found == known and not isinstance(found, bool):
         return
     newer = isinstance(found, int) and found > known
@@ -169,13 +161,7 @@ def write_json(path: Path, value: Mapping[str, Any]) -> None:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Read a JSON object that mapfilter wrote.
-
-    Raises
-    ------
-    StoreError
-        The file is missing, cut off or not a JSON object.
-    """
+    """Read a JSON object; raise StoreError where it is missing, cut off or something else."""
     try:
         value = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -188,13 +174,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def ensure_writable_folder(path: Path) -> None:
-    """Make ``path`` and its parents, and see that files can be made in it.
-
-    Raises
-    ------
-    OutputError
-        It cannot be made, is a file, or nothing can be written in it.
-    """
+    """Make ``path`` and its parents; raise OutputError where no file can be made in it."""
     try:
         path.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=path):
@@ -209,10 +189,7 @@ def _behind_link(path: Path) -> Path:
 
 @contextlib.contextmanager
 def _writing(temporary: Path, path: Path) -> Iterator[None]:
-    """Tell what fails in writing ``temporary`` as an OutputError of ``path``.
-
-    Errors of files read meanwhile are not of writing and go through as they are.
-    """
+    """Turn errors in writing ``temporary`` into OutputErrors of ``path``, but not of reading."""
     try:
         yield
     except OutputError as error:
@@ -231,7 +208,7 @@ def _writing(temporary: Path, path: Path) -> Iterator[None]:
 def _partial_folder(path: Path) -> Path:
     ensure_writable_folder(path.parent)
     prefix = f".{path.name}.partial-"
-    for stale in path.parent.glob(f"{_glob_escape(prefix)}*"):
+    for stale in path.parent.glob(f"{glob.escape(prefix)}*"):
         if not _is_alive(stale.name.removeprefix(prefix).split("-")[0]):
             if (stale / _ASIDE).is_dir() and not path.exists():
                 # Its process died between the two renames of an exchange.
@@ -241,10 +218,6 @@ def _partial_folder(path: Path) -> Path:
         return Path(tempfile.mkdtemp(prefix=f"{prefix}{os.getpid()}-", dir=path.parent))
     except OSError as error:
         raise _not_writable(path, error) from error
-
-
-def _glob_escape(text: str) -> str:
-    return "".join(f"[{c}]" if c in "*?[" else c for c in text)
 
 
 def _is_alive(pid: str) -> bool:
@@ -277,7 +250,7 @@ def _exchange(new: Path, old: Path) -> None:
 
 
 def _sync(path: Path) -> None:
-    """Have a file's bytes, or a folder's list of names, on the disk before going on."""
+    """Flush a file, or a folder's list of names, to the disk."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -293,15 +266,11 @@ def _not_writable(path: Path, error: OSError) -> MapfilterError:
     return fail(OutputError, str(path), "a place that can be written", error.strerror or error)
 
 
-_NO_PATH = (errno.ENAMETOOLONG, errno.ELOOP)
-_SHOWN = 60
-
-
 def path_fault(path: Path) -> str:
-    """Return what is expected in place of a path, or an empty text when nothing is wrong.
+    """Return the expected kind of path for messages, or an empty text when nothing is wrong.
 
     A path may name a file, a folder or nothing yet; whether it can be read or written is found
-    later. A pipe is refused because it would be waited for, and cannot be read twice.
+    later. Pipes are refused because reading would block, and cannot be repeated.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""The executor seam: tiles and batches go to whatever ``concurrent.futures.Executor`` is handed in.
+"""The executor seam: tiles and batches go to any ``concurrent.futures.Executor``.
 
-With one worker the work is done in this process; with more, in local processes. Results come back
-in the order of the tasks, so the number of workers never changes them.
+One worker is this process, more are local processes. Results come back in the order of the tasks,
+so the number of workers never changes them.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def local_executor(workers: int) -> Iterator[Executor]:
 def cluster_executor(address: str) -> Iterator[tuple[Executor, int]]:
     """Give an executor of a Dask cluster, and its number of worker threads.
 
-    A worker that dies costs time only: its tasks are done again by the others.
+    A worker that dies costs only time: its tasks are repeated by the others.
 
     Parameters
     ----------
@@ -80,8 +80,8 @@ def cluster_executor(address: str) -> Iterator[tuple[Executor, int]]:
     Raises
     ------
     MapfilterError
-        Dask is not installed, the address is none, nobody answers there, or workers die over and
-        over again.
+        Dask is not installed, the address is malformed, no scheduler answers there, or workers die
+        repeatedly.
     """
     try:
         import dask.config
@@ -120,20 +120,7 @@ def cluster_executor(address: str) -> Iterator[tuple[Executor, int]]:
 
 @contextlib.contextmanager
 def executor_of(workers: int, cluster: str | None = None) -> Iterator[tuple[Executor, int]]:
-    """Give an executor of local processes, or of a cluster, and how many tasks it does at once.
-
-    Parameters
-    ----------
-    workers : int
-        Local processes, where there is no cluster.
-    cluster : str, optional
-        As for :func:`cluster_executor`.
-
-    Raises
-    ------
-    MapfilterError
-        As :func:`cluster_executor`.
-    """
+    """Give an executor of local processes or a cluster, and its number of concurrent tasks."""
     if cluster is not None:
         with cluster_executor(cluster) as (executor, threads):
             yield executor, threads
@@ -150,11 +137,10 @@ def ordered_results(
     in_flight: int = 8,
     progress: Progress | None = None,
 ) -> Iterator[T]:
-    """Yield ``function(task)`` for every task, in order, with at most ``in_flight`` waiting.
+    """Yield ``function(task)`` for every task, in order, with at most ``in_flight`` submitted.
 
-    Tasks are taken as they are needed, so memory stays bounded by ``in_flight`` tasks and results,
-    however many there are; four times the number of workers keeps all of them busy. Only to tell
-    progress must they be counted first.
+    Tasks are taken as they are needed, so memory stays bounded however many there are; four times
+    the number of workers keeps all of them busy. Only for progress they are counted first.
 
     Raises
     ------
@@ -186,23 +172,24 @@ def ordered_results(
 
 
 def _start_worker() -> None:
-    """Leave Ctrl-C to the process that hands out the tasks, which ends its workers."""
+    """Ignore Ctrl-C, on which the main process ends its workers."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _keep_freed_memory()
 
 
 def _keep_freed_memory() -> None:
-    """Have glibc keep twice the size of a large block that is freed ready for the next ones.
+    """Make glibc keep freed memory, twice the size of a large freed block.
 
-    Else a worker gives the arrays of each task back to the system, and a third of its time goes
-    into getting their pages anew.
+    Otherwise a worker returns the arrays of each task to the system, and spends a third of its
+    time on new pages.
     """
     np.empty(_LARGE_BLOCK_BYTES, np.uint8)
 
 
 def _died() -> MapfilterError:
-    hint = "out of memory: take fewer workers or a smaller tile_px; finished work is kept"
-    return fail(MapfilterError, "worker processes", "all of them at work", "one that died", hint)
+    got = "one that died (out of memory?)"
+    hint = "too many workers or too large a tile_px; finished work is kept for --resume"
+    return fail(MapfilterError, "worker processes", "all of them running", got, hint)
 
 
 def part_of(progress: Progress | None, part: int, parts: int) -> Progress | None:

@@ -1,6 +1,6 @@
-"""Named errors. Each fault says where, what was expected, what was found and the likely mistake.
+"""Named errors. Each fault names the place, what was expected and found, and the likely mistake.
 
-Input is checked once, at the door, and every fault is reported together: collect them in a
+Input is checked once, when it is read, and all faults are reported together: collect them in a
 :class:`Faults` and call :meth:`Faults.raise_if_any`.
 
 Examples
@@ -26,16 +26,9 @@ _NUMBER = re.compile(r"[0-9]+")
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One thing that is wrong with an input.
+    """One fault of an input, at ``where``: file, row and field as a user can find it.
 
-    Parameters
-    ----------
-    where : str
-        File, row and field, as a user can find it.
-    expected, got : str
-        What the field should hold and what it holds.
-    hint : str
-        The likely mistake, or an empty string.
+    ``hint`` is the likely mistake, or an empty string.
     """
 
     where: str
@@ -62,13 +55,13 @@ class MapfilterError(Exception):
             kind = (_NUMBER.sub("#", fault.where), _NUMBER.sub("#", fault.expected), fault.hint)
             alike.setdefault(kind, []).append(fault)
         lines: list[str] = []
-        told = 0
+        shown = 0
         for faults in alike.values():
             if len(lines) + min(len(faults), _MAX_ALIKE) > _MAX_SHOWN:
-                lines.append(f"… and {len(self.faults) - told} more faults")
+                lines.append(f"… and {len(self.faults) - shown} more faults")
                 break
             lines += [str(fault) for fault in faults[:_MAX_ALIKE]]
-            told += len(faults)
+            shown += len(faults)
             if len(faults) > _MAX_ALIKE:
                 lines[-1] += f" … and {len(faults) - _MAX_ALIKE} more like this"
         return "\n".join(lines)

@@ -20,6 +20,8 @@ from pyproj.exceptions import CRSError, ProjError
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 
+_SHORT = 20
+
 
 def wrap_rad(angle_rad: ArrayLike) -> Floats:
     """Wrap angles into [-π, π).
@@ -84,7 +86,7 @@ def projected_crs(spec: Any, where: str = "crs") -> str:
     Raises
     ------
     InputError
-        There is no CRS, nobody knows it, or it does not count metres east and north.
+        The CRS is missing or unknown, or does not count metres east and north.
     """
     if spec is None or spec == "":
         raise fail(InputError, where, "a projected CRS in metres", "none", "CRS left out on export")
@@ -93,9 +95,8 @@ def projected_crs(spec: Any, where: str = "crs") -> str:
     except (CRSError, TypeError, ValueError) as error:
         raise fail(InputError, where, "a CRS such as EPSG:32629", repr(spec)) from error
     if crs.is_geographic:
-        raise fail(
-            InputError, where, "a projected CRS in metres", crs.name, "degrees given for metres"
-        )
+        hint = "degrees given for metres"
+        raise fail(InputError, where, "a projected CRS in metres", crs.name, hint)
     horizontal = crs.axis_info[:2]
     if not crs.is_projected or any(
         axis.unit_name not in ("metre", "meter") or axis.direction == "west" for axis in horizontal
@@ -106,8 +107,13 @@ def projected_crs(spec: Any, where: str = "crs") -> str:
     return f"{authority[0]}:{authority[1]}" if authority else str(crs.to_wkt())
 
 
+def short_crs(crs: str) -> str:
+    """Return a CRS as people call it: its code, or the name in its WKT."""
+    return crs if len(crs) <= _SHORT else str(CRS.from_user_input(crs).name)
+
+
 def same_crs(a: str, b: str) -> bool:
-    """Tell whether two CRS texts mean the same system."""
+    """Return whether two CRS texts mean the same system."""
     return a == b or bool(CRS.from_user_input(a).equals(CRS.from_user_input(b)))
 
 
@@ -138,13 +144,7 @@ def unproject(crs: str, east_m: ArrayLike, north_m: ArrayLike) -> tuple[Floats, 
 
 
 def check_bbox(bbox: tuple[float, float, float, float], where: str = "bbox") -> None:
-    """Check a box given as west, south, east, north in degrees.
-
-    Raises
-    ------
-    InputError
-        With every fault and its likely mistake.
-    """
+    """Check a box of west, south, east, north in degrees; raise InputError with its faults."""
     west, south, east, north = bbox
     faults = Faults()
     if not all(np.isfinite(bbox)):
@@ -180,6 +180,8 @@ class Lattice:
     (500002.5, 4500007.5)
     >>> lattice.row_col(500002.5, 4500007.5)
     (0, 0)
+    >>> print(lattice)
+    2 x 3 pixels of 5 m (0.015 x 0.01 km), EPSG:32629
     """
 
     crs: str
@@ -199,17 +201,17 @@ class Lattice:
             faults.add("lattice size", "at least one pixel", f"{self.rows} x {self.cols}")
         faults.raise_if_any(InputError)
 
+    def __str__(self) -> str:
+        """Return size, resolution and CRS in a few words."""
+        width_km, height_km = (n * self.resolution_m / 1000 for n in (self.cols, self.rows))
+        size = f"{self.rows} x {self.cols} pixels of {self.resolution_m:g} m"
+        return f"{size} ({width_km:.3g} x {height_km:.3g} km), {short_crs(self.crs)}"
+
     @classmethod
     def covering(
         cls, crs: str, bounds_m: tuple[float, float, float, float], resolution_m: float
     ) -> Lattice:
-        """Return the lattice over west, south, east, north (m), snapped out to the resolution.
-
-        Raises
-        ------
-        InputError
-            A bound is not finite, the resolution is not above zero, or the bounds hold nothing.
-        """
+        """Return the lattice over west, south, east, north (m), snapped out to the resolution."""
         west, south, east, north = bounds_m
         if not (np.isfinite([*bounds_m, resolution_m]).all() and resolution_m > 0):
             got = f"{bounds_m} m at {resolution_m} m"
@@ -254,7 +256,7 @@ class Lattice:
         return (int(row), int(col)) if row.ndim == 0 else (row, col)
 
     def contains(self, row: Any, col: Any) -> Any:
-        """Tell which pixels lie on the lattice."""
+        """Return which pixels lie on the lattice."""
         return (row >= 0) & (row < self.rows) & (col >= 0) & (col < self.cols)
 
     def window(self, row: int, col: int, rows: int, cols: int) -> Lattice:
@@ -273,7 +275,7 @@ class Lattice:
         ]
 
     def aligned_with(self, other: Lattice) -> bool:
-        """Tell whether both are the same lattice to within a thousandth of a pixel."""
+        """Return whether both are the same lattice to within a thousandth of a pixel."""
         tolerance_m = 1e-3 * self.resolution_m
         return (
             (self.rows, self.cols) == (other.rows, other.cols)

@@ -32,7 +32,7 @@ from mapfilter.config.fields import (
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.propagation.models import Clutter, ModelName
 from mapfilter.simulation.imu import Turns
-from mapfilter.tracks.leave_out import Kind
+from mapfilter.tracks.log import Kind
 
 
 class CellColumns(Section):

@@ -1,1 +1,1 @@
-"""Per-cell radio-route databases: the places where one can be and what would be heard there."""
+"""Radio-route databases: the points where one can be, and the levels of each cell there."""

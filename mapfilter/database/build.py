@@ -1,18 +1,13 @@
-"""Roads times rasters: building a radio-route database tile by tile."""
+"""Build a radio-route database from rasters and roads, tile by tile."""
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
-import os
-import shutil
-import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
-from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from threading import Thread
@@ -21,9 +16,11 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from mapfilter._io import atomic_dir, check_replaceable, ensure_writable_folder
+from mapfilter._io import atomic_dir, check_replaceable
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
+from mapfilter._resume import FinishedParts
 from mapfilter.database.manifest import FORMAT, MANIFEST, InputFile
+from mapfilter.database.parquet import Window
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.sources import LatticeRoutes, Routes, check_aligned, overlap
@@ -34,14 +31,15 @@ from mapfilter.database.tiles import (
     read_tiles,
     tile_windows,
 )
-from mapfilter.database.windows import Window
-from mapfilter.errors import Faults, InputError, OutputError, fail
+from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, check_against_plan
+from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan
 from mapfilter.roads.lattice import RouteLattice
 
-_CHECKSUM_BYTES = 4
+MARGIN_DB = 6.0
+FLOOR_DBM = -104.0
+TILE_PX = 256
 
 
 def work_key(
@@ -51,96 +49,13 @@ def work_key(
     routes_digest: str,
     parameters: Mapping[str, Any],
 ) -> str:
-    """Return a checksum of all that the tiles of a build depend on."""
+    """Return a checksum of everything that the tiles of a build depend on."""
     read_as = (rasters.cell_ids, asdict(rasters.lattice), rasters.quantity, rasters.factor)
-    parts = (
-        version("mapfilter"), pa.__version__, rasters_sha256, read_as, rasters.resampling,
-        [asdict(cell) for cell in plan.cells], routes_digest,
-        {name: value for name, value in parameters.items() if name != "margin_db"},
-    )  # fmt: skip
+    versions = version("mapfilter"), pa.__version__
+    cells = [asdict(cell) for cell in plan.cells]
+    of_tiles = {name: value for name, value in parameters.items() if name != "margin_db"}
+    parts = (*versions, rasters_sha256, read_as, rasters.resampling, cells, routes_digest, of_tiles)
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
-
-
-class FinishedTiles:
-    """A hidden folder beside a database, with one file per finished tile.
-
-    It is left when the build is killed or interrupted or a worker dies, and removed when the build
-    is done, its inputs are wrong, or it cannot be written.
-
-    Parameters
-    ----------
-    database : Path
-        The folder that is being built.
-    key : callable
-        Gives a checksum of the inputs, when it is first needed: tiles of others are never taken.
-    keep : bool
-        Take tiles that are there already.
-    """
-
-    def __init__(self, database: Path, key: Callable[[], str], *, keep: bool = False) -> None:
-        self._database, self._key = database, key
-        self.keep = keep
-
-    @cached_property
-    def folder(self) -> Path:
-        """Where the tiles lie; emptied at first, unless they are kept."""
-        folder = self._database.parent / f".{self._database.name}.tiles-{self._key()[:16]}"
-        if not self.keep:
-            shutil.rmtree(folder, ignore_errors=True)
-        return folder
-
-    def __enter__(self) -> FinishedTiles:
-        ensure_writable_folder(self._database.parent)
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        # Where nobody asked for the folder there is none, and its name may take long to be known.
-        asked = "folder" in vars(self)
-        if asked and (kind is None or issubclass(kind, InputError | OutputError)):
-            shutil.rmtree(self.folder, ignore_errors=True)
-
-    def missing(self, total: int) -> list[int]:
-        """Return the tiles, of so many, that are still to be made."""
-        return [n for n in range(total) if not self.keep or self.load(n) is None]
-
-    def load(self, number: int) -> TileRows | None:
-        """Return a finished tile, or None when there is none or its file is damaged."""
-        try:
-            data = self._file(number).read_bytes()
-        except OSError:
-            return None
-        checksum, rows = data[:_CHECKSUM_BYTES], data[_CHECKSUM_BYTES:]
-        if zlib.crc32(rows).to_bytes(_CHECKSUM_BYTES, "big") != checksum:
-            return None
-        return TileRows.from_bytes(rows)
-
-    def save(self, number: int, rows: bytes) -> None:
-        """Put a finished tile on disk.
-
-        Raises
-        ------
-        OutputError
-            It cannot be written.
-        """
-        file = self._file(number)
-        temporary = file.with_name(f"{file.name}.{os.getpid()}")
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            temporary.write_bytes(zlib.crc32(rows).to_bytes(_CHECKSUM_BYTES, "big") + rows)
-            temporary.replace(file)
-        except OSError as error:
-            with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
-            got = error.strerror or error
-            raise fail(OutputError, str(file), "a place that can be written", got) from error
-
-    def _file(self, number: int) -> Path:
-        return self.folder / f"tile-{number}.arrow"
-
-
-MARGIN_DB = 6.0
-FLOOR_DBM = -104.0
-TILE_PX = 256
 
 
 def build(
@@ -164,40 +79,41 @@ def build(
     """Build a database folder and open it.
 
     A point belongs to its best server and to every cell at most ``margin_db`` weaker. All levels
-    above the floor are kept, so the margin can be chosen anew when the database is read; a point
-    that hears no cell above the floor is left out and counted. Levels are kept to 0.01 dB.
+    above the floor are kept, so the margin can be changed when the database is read; points with
+    no cell above the floor are left out and counted. Levels are kept to 0.01 dB.
 
     Parameters
     ----------
     rasters : RxLevRasters
-        Levels, or losses that are taken from the plan's EIRP. Their lattice is the database's.
+        Levels, or losses that are subtracted from the plan's EIRP. Their lattice is the database's.
     plan : CellPlan
         The same cells as in the rasters.
     routes : RouteLattice or Routes
-        Aligned with the rasters' lattice; points beyond it are left out and counted. Given as
-        layers (:class:`mapfilter.database.sources.LayerRoutes`), points are laid by the workers,
-        tile by tile.
+        Aligned with the rasters' lattice; points beyond it are left out and counted. Of layers
+        (:class:`mapfilter.database.sources.LayerRoutes`) the workers lay the points of each tile.
     out : Path or str
-        The folder; an older one is replaced once the new one is whole.
-    margin_db, floor_dbm : float
+        The folder; an older database is replaced once the new one is complete.
+    margin_db : float
+        Default margin of readers (dB, >= 0).
+    floor_dbm : float
+        Weakest level that is kept (dBm).
     tile_px : int
-        Side of the tiles that the work is done by. Points are stored tile by tile along the
+        Side of the tiles that are processed at a time. Points are stored tile by tile along the
         Z-order curve, and along it within each tile.
     inputs : sequence of InputFile
-        What the roads and the rasters were made from, for the record; the rasters are added.
+        Files that roads and rasters were made from, for the record; the rasters are added.
     attribution : str
-        Whose map the roads come from, as its licence wants it shown.
+        Attribution that the licence of the map demands.
     executor : Executor, optional
         Where tiles are read; the result does not depend on it.
     in_flight : int
-        Tasks handed to it at a time; four for each worker keep all of them busy.
+        Tasks submitted at a time; four per worker keep all of them busy.
     tiles_a_task : int
-        Tiles in a task: many where handing one over takes long.
+        Tiles per task: many where submitting one takes long.
     writers : int
         Cells whose parts are written at a time.
     resume : bool
-        Go on where a build of the same inputs stopped. Finished tiles lie beside the folder until
-        the build is done.
+        Take over the tiles that an interrupted build of the same inputs has finished.
     progress : callable, optional
         Called with tiles done and tiles in all.
 
@@ -205,7 +121,7 @@ def build(
     ------
     InputError
         Rasters and plan hold different cells, rasters and roads do not align or overlap, a
-        parameter is out of range, or no point hears any cell.
+        parameter is out of range, or no point has a level above the floor.
     OutputError
         The folder cannot be written, or holds other files than a database.
     """
@@ -222,12 +138,12 @@ def build(
             laid = job.routes.digest()
             return work_key(digest.result(), rasters, job.plan, laid, parameters)
 
-        finished = stack.enter_context(FinishedTiles(out, key, keep=resume))
+        finished = stack.enter_context(FinishedParts(out, key, keep=resume, name="tile"))
         folder = stack.enter_context(atomic_dir(out))
         made = job.made(executor or SerialExecutor(), finished, in_flight, tiles_a_task)
         crs, ids = rasters.lattice.crs, job.plan.ids
         written = write_parts(folder, crs, ids, made, len(job.windows), writers, progress)
-        if written.heard == 0:
+        if written.received == 0:
             expected = f"a level of at least {floor_dbm:g} dBm at a point"
             hint = "floor too high, or rasters hold no data along the roads"
             got = "none"
@@ -236,8 +152,8 @@ def build(
                 got = "no point of the roads on the rasters"
             raise fail(InputError, str(rasters.path), expected, got, hint)
         counts = {
-            "points": written.heard,
-            "points_below_floor": written.points - written.heard,
+            "points": written.received,
+            "points_below_floor": written.points - written.received,
             "points_off_rasters": job.off_rasters(written.points),
         }
         inputs = (*inputs, InputFile("rasters", rasters.path.name, digest.result()))
@@ -252,11 +168,8 @@ class BuildJob:
 
     Parameters
     ----------
-    rasters : RxLevRasters
     plan : CellPlan
         In the rasters' CRS.
-    routes : Routes
-    floor_dbm : float
     windows : tuple of (row, col, rows, cols)
         Tiles on the rasters' lattice that may hold points, along the Z-order curve.
     """
@@ -276,25 +189,22 @@ class BuildJob:
         floor_dbm: float,
         tile_px: int,
     ) -> BuildJob:
-        """Check that the inputs fit each other, and cut them.
-
-        Raises
-        ------
-        InputError
-            As :func:`build`.
-        """
+        """Check that the inputs fit each other, and cut them; errors as of :func:`build`."""
         source = LatticeRoutes(routes) if isinstance(routes, RouteLattice) else routes
         check_against_plan(rasters, plan)
         check_aligned(rasters.lattice, source.lattice, f"{rasters.path} and roads")
-        job = cls(rasters, plan.to_crs(rasters.lattice.crs), source, floor_dbm, ())
-        windows = tuple(w for w in tile_windows(rasters.lattice, tile_px) if job._holds(w))
+        lattice, windows = rasters.lattice, []
+        for window in tile_windows(lattice, tile_px):
+            inside = overlap(lattice, source.lattice, window)
+            if inside is not None and source.holds(lattice.window(*inside)):
+                windows.append(window)
         if not windows:
             hint = "files of different areas"
             raise fail(InputError, str(rasters.path), "points of the roads", "none", hint)
-        return cls(rasters, job.plan, source, floor_dbm, windows)
+        return cls(rasters, plan.to_crs(lattice.crs), source, floor_dbm, tuple(windows))
 
     def task(self, number: int) -> TileTask:
-        """Return what a worker needs to make a tile."""
+        """Return the task that makes a tile."""
         window = self.windows[number]
         part = self.routes.part(self.covered(window))
         rasters, plan = self.rasters.reaching(window), self.plan
@@ -312,35 +222,31 @@ class BuildJob:
         return self.rasters.lattice.window(*inside)
 
     def made(
-        self, executor: Executor, finished: FinishedTiles, in_flight: int, tiles_a_task: int
+        self, executor: Executor, finished: FinishedParts, in_flight: int, tiles_a_task: int
     ) -> Iterator[TileRows]:
-        """Yield the tiles in order: those that are finished already, and the others as made."""
-        missing = finished.missing(len(self.windows))
+        """Yield the tiles in order, finished ones from disk."""
+        every = range(len(self.windows))
+        missing = [n for n in every if not finished.keep or finished.load(n) is None]
         groups = [missing[n : n + tiles_a_task] for n in range(0, len(missing), tiles_a_task)]
         tasks = ([self.task(number) for number in group] for group in groups)
         results = ordered_results(executor, read_tiles, tasks, in_flight=in_flight)
         made = (rows for group in results for rows in group)
-        for number in range(len(self.windows)):
+        for number in every:
             if missing and number == missing[0]:
                 rows = next(made)
                 finished.save(missing.pop(0), rows)
-                yield TileRows.from_bytes(rows)
-            elif (tile := finished.load(number)) is not None:
-                yield tile
             else:
-                yield TileRows.from_bytes(read_tiles([self.task(number)])[0])
+                # A file that was removed or damaged meanwhile is made again.
+                rows = finished.load(number) or read_tiles([self.task(number)])[0]
+            yield TileRows.from_bytes(rows)
 
     def off_rasters(self, points: int) -> int:
-        """Return how many points lie beyond the rasters, of routes that are laid already."""
+        """Return how many points of a route lattice lie beyond the rasters."""
         return len(self.routes.points) - points if isinstance(self.routes, LatticeRoutes) else 0
-
-    def _holds(self, window: Window) -> bool:
-        inside = overlap(self.rasters.lattice, self.routes.lattice, window)
-        return inside is not None and self.routes.holds(self.rasters.lattice.window(*inside))
 
 
 def _aside(function: Callable[[], str]) -> Future[str]:
-    """Run a function in a thread of its own; who stops before it has ended does not wait for it."""
+    """Run a function in a daemon thread, which an interrupted build does not wait for."""
     future: Future[str] = Future()
 
     def run() -> None:
@@ -354,7 +260,7 @@ def _aside(function: Callable[[], str]) -> Future[str]:
 
 
 def check_parameters(margin_db: float, floor_dbm: float, tile_px: int) -> None:
-    """Note every parameter that is out of range."""
+    """Check the ranges of the parameters."""
     faults = Faults()
     if not (np.isfinite(margin_db) and margin_db >= 0):
         faults.add("margin_db", "dB >= 0", margin_db)

@@ -1,4 +1,4 @@
-"""What a build would take, told from a few of its tiles."""
+"""Estimate the size and time of a build from a few of its tiles."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pyarrow as pa
 
 from mapfilter._types import Floats
 from mapfilter.database.build import FLOOR_DBM, MARGIN_DB, TILE_PX, BuildJob, check_parameters
-from mapfilter.database.columns import write_columns
+from mapfilter.database.parquet import geo_metadata, write_columns
 from mapfilter.database.parts import (
     ROWS_IN_MEMORY,
     LevelsRows,
@@ -25,8 +25,7 @@ from mapfilter.database.sources import LatticeRoutes, Routes
 from mapfilter.database.store import cells_table
 from mapfilter.database.tiles import read_tile
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
-from mapfilter.roads.geoparquet import geo_metadata
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.lattice import RouteLattice
 
 _SAMPLED_TILES = 16
@@ -36,20 +35,19 @@ _BYTES_OF_A_PROCESS = 350 << 20
 
 @dataclass(frozen=True, slots=True)
 class BuildEstimate:
-    """What a build would give, extrapolated from a few of its tiles.
+    """Size and time of a build, extrapolated from a few of its tiles.
 
     Parameters
     ----------
     points : int
-        Points of the routes on the rasters, those that hear nothing included; exact where the
-        points are laid already.
+        Points of the routes on the rasters, with or without a level; exact for a route lattice.
     levels : int
         Rows of all cells together.
     bytes : int
         Size of the database on disk.
     memory_bytes : int
-        Most memory that a process needs which does it alone: what this one has taken to read a few
-        tiles, and the rows that wait to be written.
+        Peak memory of a process that does it alone: of this one while reading a few tiles, and the
+        rows that wait to be written.
     seconds : float
         Time with one worker.
     """
@@ -80,7 +78,7 @@ def dry_run(
     """
     check_parameters(margin_db, floor_dbm, tile_px)
     job = BuildJob.of(rasters, plan, routes, floor_dbm, tile_px)
-    # A little for each, as a way outside a tile may reach points in it.
+    # Some weight for each, as a way outside a tile may reach points in it.
     weight = np.array([job.routes.weight(job.covered(window)) for window in job.windows])
     share = weight + 0.01 * weight.mean() + 1e-9
     share /= share.sum()
@@ -90,7 +88,7 @@ def dry_run(
         middle = (np.arange(_SAMPLED_TILES) + 0.5) / _SAMPLED_TILES
         drawn = share.cumsum().searchsorted(middle).clip(max=len(share) - 1)
         scale = 1 / share[drawn] / _SAMPLED_TILES
-    # The first read opens files and compiles, which is no share of a tile's work.
+    # The first read opens files and compiles, which is not part of a tile's work.
     read_tile(job.task(int(drawn[0])))
     found = [_Sample.of(job, number) for number in drawn.tolist()]
     points = float(scale @ [tile.places for tile in found])
@@ -112,11 +110,11 @@ def dry_run(
 
 
 def peak_memory_bytes() -> int:
-    """Return the most memory that this process has taken, or a usual figure where nobody tells."""
+    """Return the peak memory of this process, or a usual figure where it is not known."""
     with contextlib.suppress(OSError):
         # Under Linux getrusage begins with the peak of the process that started this one.
-        told = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")
-        for line in told.splitlines():
+        status = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")
+        for line in status.splitlines():
             if line.startswith("VmHWM:"):
                 return int(line.split()[1]) * 1024
     try:

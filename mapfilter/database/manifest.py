@@ -21,27 +21,30 @@ MANIFEST = "manifest.json"
 CELLS = "cells.parquet"
 POINTS = "points.parquet"
 
-InputRole = Literal[
-    "map", "roads", "tracks", "buildings", "water", "landuse", "landuse_table", "plan", "rasters",
-    "database",
-]  # fmt: skip
+InputRole = (
+    Literal[
+        "map",
+        "roads",
+        "tracks",
+        "buildings",
+        "water",
+        "landuse",
+        "landuse_table",
+        "plan",
+        "rasters",
+    ]
+    | Literal["database"]
+)
 
 _LONGEST_NAME = 200
 _DAMAGED = "edited or damaged"
+_Count = Annotated[int, Field(ge=0)]
+_Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 
 
 @dataclass(frozen=True, slots=True)
 class InputFile:
-    """A file that a database was made from, for the record.
-
-    Parameters
-    ----------
-    role : {"map", "roads", "tracks", "buildings", "water", "landuse", "landuse_table", "plan", \
-            "rasters", "database"}
-    name : str
-        Its name without its folder.
-    sha256 : str
-    """
+    """A file that a database was made from; ``name`` is without its folder."""
 
     role: InputRole
     name: str
@@ -58,10 +61,6 @@ def _within(path: str) -> str:
     if place.is_absolute() or ".." in place.parts or "\0" in path:
         raise ValueError("a path within the folder")
     return path
-
-
-_Count = Annotated[int, Field(ge=0)]
-_Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 
 
 class _Strict(BaseModel):
@@ -142,8 +141,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 def levels_folders(cell_ids: Iterable[str]) -> dict[str, str]:
     """Return each cell's folder within the database; no id leads out of it.
 
-    Ids that differ only in case get folders that differ in more, as not every disk tells cases
-    apart.
+    Ids that differ only in case get folders that differ in more, as not every file
+    system distinguishes them.
 
     Examples
     --------
@@ -199,7 +198,7 @@ def _fault(file: Path, detail: Mapping[str, Any]) -> Fault:
 
 
 def _check_together(manifest: _Manifest, where: str, faults: Faults) -> None:
-    """Note what fields say against each other."""
+    """Note fields that contradict each other."""
     if manifest.crs != manifest.lattice.crs:
         faults.add(f"{where}, crs", "the lattice's CRS", manifest.crs, _DAMAGED)
     folders = levels_folders(manifest.cells)

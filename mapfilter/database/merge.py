@@ -1,4 +1,4 @@
-"""Databases to one: other areas, other cells, newer cells in place of older ones, fewer cells."""
+"""Merge databases: add areas or cells, replace cells by newer ones, leave cells out."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from mapfilter._io import atomic_dir, check_replaceable, sha256_file
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats, Ints
 from mapfilter.database.manifest import FORMAT, MANIFEST, POINTS, InputFile
+from mapfilter.database.parquet import Window, WindowReader, point_geometry
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.sources import overlap, pixels_between
@@ -22,15 +23,13 @@ from mapfilter.database.store import open_database
 from mapfilter.database.tiles import (
     TileLevels,
     TileRows,
-    heard_levels,
+    received_levels,
     tile_windows,
     z_order,
 )
-from mapfilter.database.windows import Window, WindowReader
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.roads.geoparquet import point_geometry
 
 _PLACE = ("row", "col", "way_id", "way_class", "on_square", "distance_to_way_m")
 
@@ -44,21 +43,20 @@ def merge(
 ) -> RadioRouteDatabase:
     """Write a database of all points and cells of some databases, tile by tile, and open it.
 
-    Within its own area a later database has the only word on its own cells: what the earlier ones
-    say of these cells there is dropped. So new cells or a new area are added, and cells or areas
-    built anew replace the older ones, without building the rest again. Databases of the same inputs
-    but for cells or area give, merged, the parts that one build of all would have given. Of a cell
-    in several of them the data in the last one's cell table are kept.
+    Within its area a later database overrides earlier ones for all cells in its cell table. So new
+    cells or areas are added, and rebuilt ones replace the older ones, without building the rest
+    again. Databases of the same inputs but for cells or area give, merged, the parts that one
+    build of all would have given. Of a cell in several cell tables the last entry is kept.
 
     Parameters
     ----------
     databases : sequence of RadioRouteDatabase
         One or more, with one CRS, one resolution, aligned pixels, and the same margin and floor.
     out : Path or str
-        The folder; an older database is replaced once the new one is whole. It may be one of those
-        merged.
+        The folder, possibly one of those merged; an older database is replaced once the new one is
+        complete.
     without : sequence of str
-        Cells that are left out.
+        Cells to leave out.
     progress : callable, optional
         Called with tiles done and tiles in all.
 
@@ -88,19 +86,18 @@ def merge(
     with atomic_dir(out) as folder:
         tiles = _tiles(databases, lattice, plan, windows)
         written = write_parts(folder, lattice.crs, plan.ids, tiles, len(windows), 1, progress)
-        if written.heard == 0:
-            raise fail(InputError, "merge", "a point that hears a cell", "none")
-        # Points that hear nothing are in no database, so they cannot be counted.
-        counts = {
-            "points": written.heard, "points_below_floor": None, "points_off_rasters": None,
-        }  # fmt: skip
+        if written.received == 0:
+            raise fail(InputError, "merge", "a point with a level of a cell", "none")
+        # No database holds points without a level, so they cannot be counted.
+        counts = dict.fromkeys(("points", "points_below_floor", "points_off_rasters"))
+        counts["points"] = written.received
         Head(lattice, plan, parameters, attribution, inputs, counts).write(folder, written.parts)
     return open_database(out)
 
 
 @dataclass(frozen=True)
 class _Source:
-    """One of the databases, read by windows of the merged lattice."""
+    """One of the databases, read by windows of the merged lattice; so are its results."""
 
     database: RadioRouteDatabase
     lattice: Lattice
@@ -118,15 +115,14 @@ class _Source:
         }
 
     def window(self, window: Window) -> Window | None:
-        """Return the part of a window that this database covers, on the merged lattice."""
+        """Return the part of a window that this database covers."""
         return overlap(self.lattice, self.database.lattice, window)
 
     def points(self, window: Window) -> dict[str, Any]:
-        """Return the places in a window, with their pixels on the merged lattice."""
         return self._moved(self._points, window)
 
     def levels(self, window: Window) -> Iterator[tuple[str, dict[str, Any]]]:
-        """Yield the cells heard in a window, with their rows there."""
+        """Yield the cells with a level in a window, with their rows there."""
         for cell_id, reader in self._cells.items():
             found = self._moved(reader, window)
             if found and found["row"].size:
@@ -152,17 +148,12 @@ def _tiles(
     floor_dbm = databases[0].floor_dbm
     for window in windows:
         places = _places(sources, lattice, window)
-        yield TileRows(places, _levels(sources, plan, places["point"].to_numpy(), lattice, window,
-                                       floor_dbm))  # fmt: skip
+        point = places["point"].to_numpy()
+        yield TileRows(places, _levels(sources, plan, point, lattice, window, floor_dbm))
 
 
 def _places(sources: Sequence[_Source], lattice: Lattice, window: Window) -> pa.Table:
-    """Return the places of a tile; of one that several databases have, what the last one says."""
-    found = [
-        rows
-        for source in sources
-        if (inside := source.window(window)) is not None and (rows := source.points(inside))
-    ]
+    """Return the places of a tile; of one in several databases, the row of the last one."""
     tables = [
         pa.table(
             {
@@ -173,7 +164,8 @@ def _places(sources: Sequence[_Source], lattice: Lattice, window: Window) -> pa.
                 "geometry": point_geometry(*lattice.east_north(rows["row"], rows["col"])),
             }
         )
-        for rows in found
+        for source in sources
+        if (inside := source.window(window)) is not None and (rows := source.points(inside))
     ]
     if not tables:
         return pa.table({name: np.empty(0, np.int64) for name in ("point", "row", "col")})
@@ -194,7 +186,7 @@ def _levels(
     window: Window,
     floor_dbm: float,
 ) -> TileLevels:
-    """Return what is heard at the places of a tile."""
+    """Return the levels at the places of a tile."""
     sorter = point.argsort()
     row, col = np.divmod(point, lattice.cols)
     by_cell: dict[int, Floats] = {}
@@ -215,13 +207,9 @@ def _levels(
             level[sorter[at]] = rows["level_dbm"]
     cells = np.array(sorted(by_cell), dtype=np.int32)
     if not cells.size:
-        return heard_levels(np.full((1, point.size), np.nan), floor_dbm)
-    found = heard_levels(np.stack([by_cell[cell] for cell in cells.tolist()]), floor_dbm)
-    best = np.where(found.best >= 0, cells[found.best], -1).astype(np.int32)
-    return TileLevels(
-        best, found.best_level_dbm, found.margin_db, cells[found.cell], found.which,
-        found.level_dbm, found.below_best_db,
-    )  # fmt: skip
+        return received_levels(np.full((1, point.size), np.nan), floor_dbm)
+    found = received_levels(np.stack([by_cell[cell] for cell in cells.tolist()]), floor_dbm)
+    return found.of_cells(cells.tolist())
 
 
 def _check(
@@ -248,9 +236,10 @@ def _check(
     if not left:
         faults.add("without", "a cell that is left", "none")
     faults.raise_if_any(InputError)
-    boxes = np.array([_pixel_box(first.lattice, database.lattice) for database in databases])
-    (top, left_col), (bottom, right) = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
     base = first.lattice
+    corner = np.array([pixels_between(base, database.lattice) for database in databases])
+    size = [(database.lattice.rows, database.lattice.cols) for database in databases]
+    (top, left_col), (bottom, right) = corner.min(axis=0), (corner + size).max(axis=0)
     lattice = Lattice(
         base.crs,
         base.west_m + int(left_col) * base.resolution_m,
@@ -276,8 +265,3 @@ def _note_misfit(first: RadioRouteDatabase, other: RadioRouteDatabase, faults: F
         shift = np.array([a.north_m - b.north_m, b.west_m - a.west_m]) / a.resolution_m
         if np.abs(shift - shift.round()).max() > 1e-3:
             faults.add(where, "pixels that align", "shifted pixels", "rasters of another lattice")
-
-
-def _pixel_box(base: Lattice, other: Lattice) -> tuple[int, int, int, int]:
-    top, left = pixels_between(base, other)
-    return top, left, top + other.rows, left + other.cols

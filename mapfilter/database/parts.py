@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from mapfilter._io import write_json
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats
-from mapfilter.database.columns import open_writer, write_columns
 from mapfilter.database.manifest import (
     CELLS,
     FORMAT,
@@ -29,11 +28,17 @@ from mapfilter.database.manifest import (
     describe_part,
     levels_folders,
 )
+from mapfilter.database.parquet import (
+    dictionary,
+    geo_metadata,
+    open_writer,
+    point_coordinates,
+    write_columns,
+)
 from mapfilter.database.store import write_cells
 from mapfilter.database.tiles import TileLevels, TileRows
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.roads.geoparquet import dictionary, geo_metadata, point_coordinates
 
 LevelsRows = dict[str, NDArray[Any]]
 
@@ -42,13 +47,13 @@ ROWS_IN_MEMORY = 1 << 22
 
 
 def points_table(places: pa.Table, levels: TileLevels, cell_ids: tuple[str, ...]) -> pa.Table:
-    """Return rows of ``points.parquet``: the places at which some cell is heard."""
-    heard = levels.best >= 0
-    table = places.filter(pa.array(heard))
+    """Return rows of ``points.parquet``: the places with a level above the floor."""
+    received = levels.best >= 0
+    table = places.filter(pa.array(received))
     columns = {
-        "best_server": dictionary(levels.best[heard], cell_ids),
-        "best_level_dbm": levels.best_level_dbm[heard],
-        "margin_db": levels.margin_db[heard],
+        "best_server": dictionary(levels.best[received], cell_ids),
+        "best_level_dbm": levels.best_level_dbm[received],
+        "margin_db": levels.margin_db[received],
     }
     for name, values in columns.items():
         table = table.add_column(table.num_columns - 1, name, pa.array(values))
@@ -56,15 +61,15 @@ def points_table(places: pa.Table, levels: TileLevels, cell_ids: tuple[str, ...]
 
 
 def levels_rows(places: pa.Table, levels: TileLevels) -> Iterator[tuple[int, LevelsRows]]:
-    """Yield (cell, what its ``levels`` part says of it) for every cell heard at the places."""
+    """Yield (cell, columns of its ``levels`` part) for every cell with a level at the places."""
     columns: LevelsRows = {
         **{name: places[name].to_numpy()[levels.which] for name in ("point", "row", "col")},
         "level_dbm": levels.level_dbm,
         "below_best_db": levels.below_best_db,
     }
-    heard, first = np.unique(levels.cell, return_index=True)
+    received, first = np.unique(levels.cell, return_index=True)
     ends = np.append(first, levels.cell.size)[1:]
-    for cell, start, end in zip(heard.tolist(), first.tolist(), ends.tolist(), strict=True):
+    for cell, start, end in zip(received.tolist(), first.tolist(), ends.tolist(), strict=True):
         yield cell, {name: values[start:end] for name, values in columns.items()}
 
 
@@ -76,14 +81,12 @@ def levels_table(cell_id: str, rows: Sequence[LevelsRows]) -> pa.Table:
 
 
 class PartWriter:
-    """Gathers rows and writes them out whenever enough of them are in memory.
+    """Collects rows, and writes them whenever enough of them are in memory.
 
     Parameters
     ----------
     folder : Path
         The database folder under construction.
-    crs : str
-    cell_ids : tuple of str
     writers : int
         Parts written at a time; they do not depend on it.
     """
@@ -163,26 +166,17 @@ class PartWriter:
         written.append(describe_part(self._folder, file, table.num_rows, cell_id))
 
 
-@dataclass(frozen=True, slots=True)
-class Written:
-    """What was written of some tiles.
-
-    Parameters
-    ----------
-    parts : tuple of mapping
-        Entries for the manifest; none when nothing is heard.
-    points, heard : int
-        Points of the tiles, and how many of them hear a cell.
-    """
+class Written(NamedTuple):
+    """Manifest entries of the parts written, the points of the tiles, and those with a level."""
 
     parts: tuple[Mapping[str, Any], ...]
     points: int
-    heard: int
+    received: int
 
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """What a manifest says besides its parts."""
+    """Everything in a manifest but the parts."""
 
     lattice: Lattice
     plan: CellPlan
@@ -223,13 +217,13 @@ def write_parts(
     progress: Progress | None = None,
 ) -> Written:
     """Write points and levels of tiles, as they come, with bounded memory."""
-    points, heard = 0, 0
+    points, received = 0, 0
     with PartWriter(folder, crs, cell_ids, writers) as writer:
         for done, tile in enumerate(tiles, start=1):
             writer.add(tile)
             points += tile.places.num_rows
-            heard += int((tile.levels.best >= 0).sum())
+            received += int((tile.levels.best >= 0).sum())
             if progress is not None:
                 progress(done, total)
-        parts = writer.finish() if heard else []
-    return Written(tuple(parts), points, heard)
+        parts = writer.finish() if received else []
+    return Written(tuple(parts), points, received)

@@ -1,4 +1,4 @@
-"""The radio-route database: where one can be, per cell, and the levels heard there."""
+"""The radio-route database: the points where one can be, and the levels of each cell there."""
 
 from __future__ import annotations
 
@@ -14,31 +14,32 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import distance_transform_edt
 
 from mapfilter._types import Bools, Floats32, Ints, Ints32
-from mapfilter.database.columns import read_columns
 from mapfilter.database.manifest import POINTS
-from mapfilter.database.windows import WindowReader
+from mapfilter.database.parquet import WindowReader, check_places, read_columns
 from mapfilter.errors import InputError, StoreError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
 
+Rows = Ints32
 
-@dataclass(frozen=True, slots=True, eq=False)
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class RadioField:
-    """What would be heard at every pixel of an area.
+    """Predicted levels at every pixel of an area.
 
-    Off the points each pixel holds what its nearest point of the area holds.
+    Off the points each pixel has the values of its nearest point of the area.
 
     Parameters
     ----------
     lattice : Lattice
         The area's part of the database's lattice.
     cell_ids : tuple of str
-        The cells heard in the area, in the plan's order.
+        The cells with a level in the area, in the plan's order.
     level_dbm : numpy.ndarray of float32, shape (rows, cols, cells)
         NaN below the database's floor.
     distance_to_way_m : numpy.ndarray of float32, shape (rows, cols)
-        How far it is to where one can be: 0 in squares, else to the nearest way's centre line;
-        off the points the distance to the nearest point and what that point has itself.
+        Distance to the nearest way's centre line, 0 in squares; off the points, that of the
+        nearest point plus the distance to it.
     way_id : numpy.ndarray of int64, shape (rows, cols)
         0 where the (nearest) point belongs to no way.
     on_way : numpy.ndarray of bool, shape (rows, cols)
@@ -51,6 +52,10 @@ class RadioField:
     distance_to_way_m: Floats32
     way_id: Ints
     on_way: Bools
+
+    def __repr__(self) -> str:
+        points = int(self.on_way.sum())
+        return f"RadioField({len(self.cell_ids)} cells, {points} points; {self.lattice})"
 
     def levels_at(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats32:
         """Return the levels at positions, shape (N, cells); NaN below the floor or off the area.
@@ -72,19 +77,18 @@ def fill_field(
     pixels: tuple[NDArray[Any], NDArray[Any]],
     way_id: Ints,
     distance_m: Floats32,
-    heard: Sequence[tuple[str, NDArray[Any], NDArray[Any], Floats32]],
+    received: Sequence[tuple[str, NDArray[Any], NDArray[Any], Floats32]],
 ) -> RadioField:
     """Spread points over a window and fill the gaps from the nearest point.
 
     Parameters
     ----------
-    window : Lattice
     pixels : tuple of numpy.ndarray, shape (N,) each
         Rows and columns of the points in the window, at least one.
     way_id, distance_m : numpy.ndarray, shape (N,)
         Each point's way, and how far its centre line is.
-    heard : sequence of (cell id, row, col, level_dbm)
-        The points at which each cell is heard; they are among ``pixels``.
+    received : sequence of (cell id, row, col, level_dbm)
+        The points at which each cell is received; they are among ``pixels``.
     """
     size = (window.rows, window.cols)
     on_way = np.zeros(size, dtype=np.bool_)
@@ -92,14 +96,14 @@ def fill_field(
     away_px, (row, col) = distance_transform_edt(~on_way, return_indices=True)
     ways, distance = np.zeros(size, dtype=np.int64), np.zeros(size)
     ways[pixels], distance[pixels] = way_id, distance_m
-    level = np.empty((*size, len(heard)), dtype=np.float32)
-    for i, (_, cell_row, cell_col, level_dbm) in enumerate(heard):
+    level = np.empty((*size, len(received)), dtype=np.float32)
+    for i, (_, cell_row, cell_col, level_dbm) in enumerate(received):
         layer = np.full(size, np.nan, dtype=np.float32)
         layer[cell_row, cell_col] = level_dbm
         level[..., i] = layer[row, col]
     return RadioField(
         window,
-        tuple(cell_id for cell_id, *_ in heard),
+        tuple(cell_id for cell_id, *_ in received),
         level,
         (away_px * window.resolution_m + distance[row, col]).astype(np.float32),
         ways[row, col],
@@ -107,10 +111,7 @@ def fill_field(
     )
 
 
-Rows = Ints32
-
-
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Points:
     """All points of a database in row-major order, as columns of length N.
 
@@ -118,16 +119,12 @@ class Points:
     ----------
     point : numpy.ndarray of int64
         ``row * lattice.cols + col``: the same in every rebuild on the same lattice.
-    row, col : numpy.ndarray of int32
     way_id : numpy.ndarray of int64
         0 where the point belongs to no way.
     way_class : tuple of (numpy.ndarray of int32, tuple of str)
         Codes and the names that they stand for.
-    on_square : numpy.ndarray of bool
-    distance_to_way_m : numpy.ndarray of float32
     best_server : numpy.ndarray of int32
         Index into the database's ``cell_ids``.
-    best_level_dbm : numpy.ndarray of float32
     margin_db : numpy.ndarray of float32
         Best level above the second best, NaN where only one cell is predicted.
     """
@@ -146,10 +143,13 @@ class Points:
     def __len__(self) -> int:
         return int(self.point.size)
 
+    def __repr__(self) -> str:
+        return f"Points({len(self)} of {', '.join(self.__dataclass_fields__)})"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class RadioRouteDatabase:
-    """A database folder, read when asked and only as far as asked.
+    """A database folder, read on demand and only as far as needed.
 
     Open one with :func:`mapfilter.database.store.open_database`.
 
@@ -164,7 +164,7 @@ class RadioRouteDatabase:
     margin_db : float
         A point belongs to its best server and to every cell at most this much weaker.
     floor_dbm : float
-        Levels below it are not heard and not kept.
+        Weakest level that is kept.
     manifest : mapping
         Everything that ``manifest.json`` holds: inputs, parameters, parts, counts, versions.
     """
@@ -176,9 +176,16 @@ class RadioRouteDatabase:
     floor_dbm: float
     manifest: Mapping[str, Any]
 
+    def __repr__(self) -> str:
+        points = self.manifest.get("counts", {}).get("points", "unknown number of")
+        return (
+            f"RadioRouteDatabase({str(self.path)!r}, {len(self.plan)} cells, {points} points;\n"
+            f"  {self.lattice}; margin {self.margin_db:g} dB, floor {self.floor_dbm:g} dBm)"
+        )
+
     @property
     def cell_ids(self) -> tuple[str, ...]:
-        """Ids of all cells, also of those that no point hears."""
+        """Ids of all cells, also of those without a level at any point."""
         return self.plan.ids
 
     @property
@@ -188,7 +195,7 @@ class RadioRouteDatabase:
 
     @cached_property
     def level_parts(self) -> Mapping[str, tuple[Path, ...]]:
-        """The files with each cell's levels; cells that no point hears have none."""
+        """The files with each cell's levels; cells without a level have none."""
         parts: dict[str, tuple[Path, ...]] = {}
         for part in self.manifest["parts"]:
             if part.get("cell") is not None:
@@ -200,7 +207,7 @@ class RadioRouteDatabase:
     def _points(self) -> Points:
         file = self.path / POINTS
         table = read_columns(file, _POINT_COLUMNS)
-        self._check_places(file, *(table[name].to_numpy() for name in ("point", "row", "col")))
+        check_places(file, table, self.lattice)
         order = np.argsort(table["point"].to_numpy())
         server, names = _codes(table["best_server"])
         try:
@@ -231,7 +238,6 @@ class RadioRouteDatabase:
 
         Parameters
         ----------
-        cell_id : str
         margin_db : float or None
             A point belongs to the cell when the cell is at most this much weaker than the point's
             best server; infinity gives all points above the floor, None takes the database's own.
@@ -283,15 +289,17 @@ class RadioRouteDatabase:
             raise fail(InputError, where, "points of the database", "none", "another area or CRS")
         order = np.lexsort((points["col"], points["row"]))
         points = {name: values[order] for name, values in points.items()}
-        heard: list[tuple[str, Rows, Rows, Floats32]] = []
+        received: list[tuple[str, Rows, Rows, Floats32]] = []
         for cell_id in self.cell_ids:
             parts = self.level_parts.get(cell_id, ())
             found = WindowReader(parts, ("row", "col", "level_dbm"), self.lattice).read(area)
             if found and found["row"].size:
-                heard.append((cell_id, found["row"] - top, found["col"] - left, found["level_dbm"]))
+                received.append(
+                    (cell_id, found["row"] - top, found["col"] - left, found["level_dbm"])
+                )
         on_way_m = np.where(points["on_square"], np.float32(0), points["distance_to_way_m"])
         pixels = points["row"] - top, points["col"] - left
-        return fill_field(window, pixels, points["way_id"], on_way_m, heard)
+        return fill_field(window, pixels, points["way_id"], on_way_m, received)
 
     def _window(
         self, bounds_m: tuple[float, float, float, float] | None
@@ -302,10 +310,8 @@ class RadioRouteDatabase:
         top, left = self.lattice.row_col(west, north)
         bottom, right = self.lattice.row_col(east, south)
         top, left = max(top, 0), max(left, 0)
-        rows, cols = (
-            min(bottom, self.lattice.rows - 1) - top + 1,
-            min(right, self.lattice.cols - 1) - left + 1,
-        )
+        rows = min(bottom, self.lattice.rows - 1) - top + 1
+        cols = min(right, self.lattice.cols - 1) - left + 1
         if rows < 1 or cols < 1:
             covered = ", ".join(f"{value:.0f}" for value in self.lattice.bounds_m)
             hint = "degrees given for metres, or another CRS"
@@ -318,19 +324,12 @@ class RadioRouteDatabase:
         tables = []
         for part in self.level_parts.get(cell_id, ()):
             tables.append(read_columns(part, columns))
-            self._check_places(part, *(tables[-1][name].to_numpy() for name in columns[:3]))
+            check_places(part, tables[-1], self.lattice)
         point, row, col, level, below = (
             np.concatenate([np.empty(0, kind), *(table[name].to_numpy() for table in tables)])
             for name, kind in zip(columns, kinds, strict=True)
         )
         return point, row, col, level, below
-
-    def _check_places(self, file: Path, point: Ints, row: Rows, col: Rows) -> None:
-        """See that the points of a part lie on the lattice."""
-        numbers = row.astype(np.int64) * self.lattice.cols + col
-        if not (np.array_equal(point, numbers) and self.lattice.contains(row, col).all()):
-            expected = "points on the database's lattice"
-            raise fail(StoreError, str(file), expected, "others", "parts mixed up")
 
 
 _POINT_COLUMNS = tuple(Points.__dataclass_fields__)

@@ -1,11 +1,12 @@
-"""Where the points of a build come from: a route lattice, or the layers it is made of, by tile."""
+"""Points of a build: a route lattice, or the layers that it is made of, tile by tile."""
 
 from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from functools import partial
 
 import numpy as np
 import shapely
@@ -15,54 +16,19 @@ from shapely import STRtree
 from mapfilter._types import Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.roads.index import RouteSource, WayIndex
 from mapfilter.roads.lattice import RouteLattice
-from mapfilter.roads.near import WayIndex
-from mapfilter.roads.routable import AreaIndex, RouteSource
 
 _ALIGNED_PX = 1e-3
 
 
-class RoutePart(Protocol):
-    """The points of one tile, or what they are made from; it can be sent to other processes."""
-
-    def routes(self) -> RouteLattice:
-        """Return the points."""
-
-
-class Routes(Protocol):
-    """The points of an area, tile by tile."""
-
-    @property
-    def lattice(self) -> Lattice:
-        """Where the points lie."""
-
-    def holds(self, window: Lattice) -> bool:
-        """Tell whether there may be a point in a window within the lattice."""
-
-    def part(self, window: Lattice) -> RoutePart:
-        """Return the part for a window within the lattice."""
-
-    def weight(self, window: Lattice) -> float:
-        """Return about how many points a window holds, times a constant."""
-
-    def digest(self) -> str:
-        """Return a checksum of all that the points depend on."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Laid:
-    """Points that are laid already."""
-
-    points: RouteLattice
-
-    def routes(self) -> RouteLattice:
-        """Return the points."""
-        return self.points
+RoutePart = RouteLattice | Callable[[], RouteLattice]
+"""The points of one tile, or what lays them; it can be sent to other processes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LatticeRoutes:
-    """A whole route lattice, cut by tile."""
+    """A route lattice, cut by tile."""
 
     points: RouteLattice
 
@@ -75,21 +41,19 @@ class LatticeRoutes:
         """Tell whether there is a point in a window."""
         return bool(self._inside(window).size)
 
-    def part(self, window: Lattice) -> Laid:
+    def part(self, window: Lattice) -> RouteLattice:
         """Return the points within a window."""
         inside = self._inside(window)
-        whole, (top, left) = self.points, self._corner(window)
-        return Laid(
-            RouteLattice(
-                window,
-                whole.row[inside] - np.int32(top),
-                whole.col[inside] - np.int32(left),
-                whole.way_id[inside],
-                whole.way_class[inside],
-                whole.class_names,
-                whole.distance_to_way_m[inside],
-                whole.on_square[inside],
-            )
+        whole, (top, left) = self.points, pixels_between(self.lattice, window)
+        return RouteLattice(
+            window,
+            whole.row[inside] - np.int32(top),
+            whole.col[inside] - np.int32(left),
+            whole.way_id[inside],
+            whole.way_class[inside],
+            whole.class_names,
+            whole.distance_to_way_m[inside],
+            whole.on_square[inside],
         )
 
     def weight(self, window: Lattice) -> float:
@@ -102,28 +66,13 @@ class LatticeRoutes:
         columns = (whole.row, whole.col, whole.way_id, whole.way_class, whole.distance_to_way_m)
         return _digest(repr(whole.lattice), repr(whole.class_names), *columns, whole.on_square)
 
-    def _corner(self, window: Lattice) -> tuple[int, int]:
-        return pixels_between(self.lattice, window)
-
     def _inside(self, window: Lattice) -> Ints:
         # The points are in row-major order: only the rows of the window are looked at.
-        top, left = self._corner(window)
+        top, left = pixels_between(self.lattice, window)
         first, last = np.searchsorted(self.points.row, [top, top + window.rows])
         col = self.points.col[first:last]
         inside: Ints = np.flatnonzero((col >= left) & (col < left + window.cols))
         return inside + int(first)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LayerPart:
-    """The layers near one tile."""
-
-    layers: RouteSource
-    window: Lattice
-
-    def routes(self) -> RouteLattice:
-        """Lay the points."""
-        return self.layers.tile(self.window)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,27 +84,26 @@ class LayerRoutes:
 
     def holds(self, window: Lattice) -> bool:
         """Tell whether a way or a square is near a window."""
-        squares = _areas_near(self.layers.squares, window)
-        if squares is not None and squares.geometry.size:
+        squares = self.layers.squares
+        if squares is not None and squares.near(window).geometry.size:
             return True
-        return bool(_reaching(self.layers.ways, window).size)
+        return bool(self.layers.ways.segments_near(window).size)
 
-    def part(self, window: Lattice) -> LayerPart:
-        """Return the layers near a window: the points are those of the whole layers."""
+    def part(self, window: Lattice) -> Callable[[], RouteLattice]:
+        """Return what lays the points of a window: the same as of the whole layers."""
         layers = self.layers
-        squares = _areas_near(layers.squares, window)
+        squares = layers.squares.near(window) if layers.squares else None
         if squares is not None and not squares.geometry.size:
             squares = None
-        ways = _ways_near(layers.ways, window, far=squares is not None)
         near = RouteSource(
             layers.crs,
-            ways,
+            _ways_near(layers.ways, window, far=squares is not None),
             squares,
-            _areas_near(layers.buildings, window),
-            _areas_near(layers.water, window),
-            None if layers.bridges is None else _ways_near(layers.bridges, window, far=False),
+            layers.buildings.near(window) if layers.buildings else None,
+            layers.water.near(window) if layers.water else None,
+            _ways_near(layers.bridges, window, far=False) if layers.bridges else None,
         )
-        return LayerPart(near, window)
+        return partial(near.tile, window)
 
     def weight(self, window: Lattice) -> float:
         """Return the area of the ways' half widths and of the squares in a window."""
@@ -163,9 +111,8 @@ class LayerRoutes:
         near = ways.tree.query(box)
         inside = shapely.intersection(ways.tree.geometries[near], box)
         area = float((shapely.length(inside) * 2 * ways.half_width_m[near]).sum())
-        squares = _areas_near(self.layers.squares, window)
-        if squares is not None:
-            valid = shapely.make_valid(squares.geometry)
+        if self.layers.squares is not None:
+            valid = shapely.make_valid(self.layers.squares.near(window).geometry)
             area += float(shapely.area(shapely.intersection(valid, box)).sum())
         return area
 
@@ -181,14 +128,12 @@ class LayerRoutes:
         return _digest(*names, *parts, ways.ways.way_class[ways.way])
 
 
-def check_aligned(raster: Lattice, lattice: Lattice, where: str) -> None:
-    """See that a route lattice lies on the pixels of the rasters.
+Routes = LatticeRoutes | LayerRoutes
+"""The points of an area, tile by tile."""
 
-    Raises
-    ------
-    InputError
-        CRS, resolution or pixel edges differ, or the two do not overlap.
-    """
+
+def check_aligned(raster: Lattice, lattice: Lattice, where: str) -> None:
+    """Check that a route lattice lies on the pixels of the rasters, and overlaps them."""
     faults, hint = Faults(), "make the route lattice on the rasters' lattice"
     if not same_crs(raster.crs, lattice.crs):
         faults.add(where, f"one CRS ({raster.crs})", lattice.crs, "files of different zones")
@@ -228,21 +173,6 @@ def overlap(
     return first_row, first_col, last_row - first_row, last_col - first_col
 
 
-def _areas_near(areas: AreaIndex | None, window: Lattice) -> AreaIndex | None:
-    if areas is None:
-        return None
-    near = np.sort(areas.tree.query(shapely.box(*window.bounds_m)))
-    return AreaIndex.of(areas.geometry[near])
-
-
-def _reaching(index: WayIndex, window: Lattice, least_m: float = 0.0) -> Ints:
-    """Return the segments that reach a window, or are at most ``least_m`` away from it."""
-    west, south, east, north = window.bounds_m
-    reach_m = max(float(index.half_width_m.max(initial=0.0)), least_m)
-    box = shapely.box(west - reach_m, south - reach_m, east + reach_m, north + reach_m)
-    return np.sort(index.tree.query(box))
-
-
 def _ways_near(index: WayIndex, window: Lattice, *, far: bool) -> WayIndex:
     """Return the segments that reach a window; ``far``: and the nearest of each point in it."""
     west, south, east, north = window.bounds_m
@@ -253,7 +183,7 @@ def _ways_near(index: WayIndex, window: Lattice, *, far: bool) -> WayIndex:
         nearest_m = float(index.nearest(*centre)[1][0])
         if math.isfinite(nearest_m):
             least_m = nearest_m + math.hypot(east - west, north - south)
-    near = _reaching(index, window, least_m)
+    near = index.segments_near(window, least_m)
     used, way = np.unique(index.way[near], return_inverse=True)
     taken = np.zeros(len(index.ways), dtype=np.bool_)
     taken[used] = True

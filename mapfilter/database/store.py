@@ -2,7 +2,7 @@
 
 ``manifest.json`` holds format and version, CRS, lattice, cells, parameters, the SHA-256 of inputs
 and parts, and counts. ``cells.parquet`` is the cell table, ``points.parquet`` (GeoParquet) has one
-row per point, ``levels/CELL/part-N.parquet`` one row per point at which the cell is heard.
+row per point, ``levels/CELL/part-N.parquet`` one row per point at which the cell is received.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import Any, Literal
 import pyarrow as pa
 
 from mapfilter._io import left_aside, sha256_file
-from mapfilter.database.columns import count_rows, read_columns, write_columns
 from mapfilter.database.manifest import CELLS, MANIFEST, read_manifest
+from mapfilter.database.parquet import count_rows, read_columns, write_columns
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, MapfilterError, StoreError, fail
 from mapfilter.geodesy import Lattice
@@ -45,13 +45,7 @@ def cells_table(plan: CellPlan) -> pa.Table:
 
 
 def read_cells(path: Path, crs: str) -> CellPlan:
-    """Read a cell table.
-
-    Raises
-    ------
-    StoreError
-        It is damaged.
-    """
+    """Read a cell table; raise StoreError where it is damaged."""
     rows = read_columns(path, [field.name for field in fields(Cell)]).to_pylist()
     try:
         return CellPlan(crs, tuple(Cell(**row) for row in rows))
@@ -68,10 +62,8 @@ def open_database(
 
     Parameters
     ----------
-    path : Path or str
     verify : {"sizes", "full"}
-        Compare the parts' sizes and numbers of rows, or read them all and compare their SHA-256,
-        too.
+        Compare the parts' sizes and numbers of rows; or read them all and compare SHA-256, too.
 
     Raises
     ------
@@ -105,76 +97,23 @@ def open_database(
 
 
 def info(database: RadioRouteDatabase) -> dict[str, Any]:
-    """Return what a database holds, ready for JSON: area, counts, sizes, parameters, inputs."""
-    manifest = database.manifest
+    """Return area, counts, sizes, parameters and inputs of a database, ready for JSON."""
+    manifest, lattice = database.manifest, database.lattice
     counts = dict.fromkeys(database.cell_ids, 0)
     for part in manifest["parts"]:
         if part.get("cell") is not None:
             counts[part["cell"]] += part["rows"]
     return {
-        "format": manifest["format"],
-        "version": manifest["version"],
-        "software": manifest["software"],
-        "crs": database.lattice.crs,
-        "bounds_m": list(database.lattice.bounds_m),
-        "resolution_m": database.lattice.resolution_m,
-        "rows": database.lattice.rows,
-        "cols": database.lattice.cols,
+        **{key: manifest[key] for key in ("format", "version", "software")},
+        "crs": lattice.crs,
+        "bounds_m": list(lattice.bounds_m),
+        **{key: getattr(lattice, key) for key in ("resolution_m", "rows", "cols")},
         "points": manifest["counts"]["points"],
         "levels": sum(counts.values()),
         "bytes": sum(part["bytes"] for part in manifest["parts"]),
-        "counts": manifest["counts"],
-        "parameters": manifest["parameters"],
-        "inputs": manifest["inputs"],
+        **{key: manifest[key] for key in ("counts", "parameters", "inputs")},
         "levels_per_cell": counts,
     }
-
-
-def export_geopackage(
-    database: RadioRouteDatabase, path: Path | str, cells: Sequence[str] = ()
-) -> None:
-    """Write a database as GeoPackage: layers ``points`` and ``cells``, and one per cell named.
-
-    Parameters
-    ----------
-    database : RadioRouteDatabase
-    path : Path or str
-        Ends in .gpkg; an older file is replaced.
-    cells : sequence of str
-        Cells whose points, within the database's margin, become a layer of their own.
-
-    Raises
-    ------
-    InputError
-        The database has no such cell.
-    OutputError
-        The file cannot be written.
-    """
-    from mapfilter.database.export import write_geopackage
-
-    write_geopackage(database, Path(path), cells)
-
-
-def export_cog(database: RadioRouteDatabase, path: Path | str) -> None:
-    """Write best server and margin as a cloud-optimised GeoTIFF on the database's lattice.
-
-    Bands: ``best_server`` (index into the JSON list in the tag ``CELLS``), ``best_level_dbm`` and
-    ``margin_db``; NaN where there is no point.
-
-    Parameters
-    ----------
-    database : RadioRouteDatabase
-    path : Path or str
-        Ends in .tif; an older file is replaced.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
-    from mapfilter.database.export import write_cog
-
-    write_cog(database, Path(path))
 
 
 def _check_parts(path: Path, parts: Sequence[Mapping[str, Any]], verify: str) -> None:

@@ -1,4 +1,4 @@
-"""One tile of a build: its points, and the levels of all cells there."""
+"""One tile of a build: its points, and the levels of all cells at them."""
 
 from __future__ import annotations
 
@@ -10,34 +10,24 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from mapfilter._types import Floats, Floats32, Ints, Ints32
+from mapfilter.database.parquet import Window, dictionary, point_geometry
 from mapfilter.database.sources import RoutePart
-from mapfilter.database.windows import Window
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
-from mapfilter.roads.geoparquet import dictionary, point_geometry
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.lattice import RouteLattice
 
 _CELLS_AT_A_TIME = 128
+_AT_POINTS = ("best", "best_level_dbm", "margin_db")
+_AT_LEVELS = ("cell", "which", "level_dbm", "below_best_db")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TileTask:
-    """All that a worker needs to make a tile; small enough to be sent to it.
+    """Everything a worker needs to make a tile; small enough to be sent to it.
 
-    Parameters
-    ----------
-    rasters : RxLevRasters
-        Those that reach the tile.
-    plan : CellPlan
-        Their cells; when no raster does, any.
-    numbers : tuple of int
-        Which cells of the whole plan these are.
-    window : (row, col, rows, cols)
-        On the rasters' lattice.
-    part : RoutePart
-        What the points of the tile are made from.
-    floor_dbm : float
+    ``plan`` has the cells of the ``rasters`` that reach the tile (any cell where none does), whose
+    numbers in the whole plan are ``numbers``; ``window`` lies on the rasters' lattice.
     """
 
     rasters: RxLevRasters
@@ -50,15 +40,14 @@ class TileTask:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TileLevels:
-    """What is heard at a tile's points.
+    """Levels at a tile's N points: L of them in all.
 
     Parameters
     ----------
     best : numpy.ndarray of int32, shape (N,)
-        The strongest cell, the first in the plan's order of equals; -1 when none is above the
-        floor.
+        Strongest cell, of equals the first in the plan; -1 when none is above the floor.
     best_level_dbm, margin_db : numpy.ndarray of float32, shape (N,)
-        Its level, and how far above the second strongest it is; NaN when no second one is heard.
+        Its level, and how far it is above the second strongest; NaN without a second one.
     cell, which : numpy.ndarray of int32, shape (L,)
         Each level's cell, and its point as an index into the tile's points; sorted by both.
     level_dbm, below_best_db : numpy.ndarray of float32, shape (L,)
@@ -74,7 +63,7 @@ class TileLevels:
     below_best_db: Floats32
 
     def of_cells(self, numbers: Sequence[int]) -> TileLevels:
-        """Return the same with its cells numbered anew: those of a plan, in its order."""
+        """Return the same with other numbers of the cells."""
         # The last one is that of "none".
         number = np.array([*numbers, -1], dtype=np.int32)
         return replace(self, best=number[self.best], cell=number[self.cell])
@@ -82,14 +71,7 @@ class TileLevels:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TileRows:
-    """A finished tile: its points, those that hear nothing included, and what they hear.
-
-    Parameters
-    ----------
-    places : pyarrow.Table, N rows
-        As :func:`places_table` gives them.
-    levels : TileLevels
-    """
+    """A finished tile: its points as of :func:`places_table`, also without a level; the levels."""
 
     places: pa.Table
     levels: TileLevels
@@ -97,10 +79,12 @@ class TileRows:
     def to_bytes(self) -> bytes:
         """Return the tile as two Arrow streams, one after the other."""
         levels = self.levels
-        heard = {name: getattr(levels, name) for name in _AT_POINTS}
-        rows = {name: getattr(levels, name) for name in _AT_LEVELS}
+        points = self.places
+        for name in _AT_POINTS:
+            points = points.append_column(name, pa.array(getattr(levels, name)))
+        rows = pa.table({name: getattr(levels, name) for name in _AT_LEVELS})
         sink = pa.BufferOutputStream()
-        for table in (_with(self.places, heard), pa.table(rows)):
+        for table in (points, rows):
             with pa.ipc.new_stream(sink, table.schema) as stream:
                 stream.write_table(table)
         return bytes(sink.getvalue().to_pybytes())
@@ -116,31 +100,16 @@ class TileRows:
         return cls(points.drop_columns(list(_AT_POINTS)), TileLevels(**columns))
 
 
-_AT_POINTS = ("best", "best_level_dbm", "margin_db")
-_AT_LEVELS = ("cell", "which", "level_dbm", "below_best_db")
-
-
 def read_tiles(tasks: Sequence[TileTask]) -> list[bytes]:
-    """Make some tiles; what a worker does.
-
-    Raises
-    ------
-    InputError
-        The rasters are cut off.
-    """
+    """Make some tiles, on a worker."""
     return [read_tile(task).to_bytes() for task in tasks]
 
 
 def read_tile(task: TileTask) -> TileRows:
-    """Lay the points of a tile, read its window, a few cells at a time, and keep what is heard.
-
-    Raises
-    ------
-    InputError
-        The rasters are cut off.
-    """
+    """Lay the points of a tile and read its levels, a few cells at a time."""
     lattice, (top, left, _, _) = task.rasters.lattice, task.window
-    places = places_table(task.part.routes(), lattice)
+    routes = task.part if isinstance(task.part, RouteLattice) else task.part()
+    places = places_table(routes, lattice)
     row, col = (places[name].to_numpy().astype(np.int64) for name in ("row", "col"))
     ids = task.plan.ids if task.numbers else ()
     level = np.empty((len(ids), row.size), dtype=np.float64)
@@ -148,16 +117,16 @@ def read_tile(task: TileTask) -> TileRows:
         some = ids[first : first + _CELLS_AT_A_TIME]
         window_dbm = task.rasters.read_levels_dbm(task.plan, task.window, some)
         level[first : first + len(some)] = window_dbm[:, row - top, col - left]
-    return TileRows(places, heard_levels(level, task.floor_dbm).of_cells(task.numbers))
+    return TileRows(places, received_levels(level, task.floor_dbm).of_cells(task.numbers))
 
 
-def heard_levels(level_dbm: Floats, floor_dbm: float) -> TileLevels:
-    """Return what is heard of levels, shape (cells, points), NaN where there is none.
+def received_levels(level_dbm: Floats, floor_dbm: float) -> TileLevels:
+    """Return the levels above the floor of those of shape (cells, points), NaN where unknown.
 
     Examples
     --------
-    >>> heard = heard_levels(np.array([[-80.0, -99.0], [-70.5, np.nan]]), -104.0)
-    >>> heard.best.tolist(), heard.margin_db.tolist()
+    >>> received = received_levels(np.array([[-80.0, -99.0], [-70.5, np.nan]]), -104.0)
+    >>> received.best.tolist(), received.margin_db.tolist()
     ([1, 0], [9.5, nan])
     """
     level = np.round(level_dbm, 2)
@@ -192,13 +161,9 @@ def tile_windows(lattice: Lattice, tile_px: int) -> list[Window]:
 
 
 def places_table(routes: RouteLattice, lattice: Lattice) -> pa.Table:
-    """Return what is known of points before anything is heard, along the Z-order curve.
+    """Return points without their levels, along the Z-order curve.
 
-    Parameters
-    ----------
-    routes : RouteLattice
-    lattice : Lattice
-        The database's, aligned with that of the routes; rows, columns and point numbers are its.
+    Rows, columns and point numbers are those of ``lattice``, which the routes are aligned with.
     """
     row, col = lattice.row_col(*routes.east_north_m)
     order = np.argsort(z_order(row, col))
@@ -241,9 +206,3 @@ def _spread(number: Ints) -> NDArray[np.uint64]:
     ):
         bits = (bits | (bits << np.uint64(shift))) & np.uint64(mask)
     return bits
-
-
-def _with(table: pa.Table, columns: dict[str, NDArray[np.generic]]) -> pa.Table:
-    for name, values in columns.items():
-        table = table.append_column(name, pa.array(values))
-    return table

@@ -1,4 +1,4 @@
-"""Noise of pseudoranges: it grows towards the horizon, and echoes in streets make them longer."""
+"""Noise of pseudoranges: it grows towards the horizon, and multipath in streets adds to it."""
 
 from __future__ import annotations
 
@@ -43,9 +43,13 @@ def elevation_sigma_m(elevation_rad: ArrayLike, zenith_m: float = 2.0) -> Floats
 
 
 def multipath_bias_m(
-    travelled_m: ArrayLike, satellites: int, rng: np.random.Generator, *,
-    mean_m: float = 3.0, correlation_m: float = 10.0,
-) -> Floats:  # fmt: skip
+    travelled_m: ArrayLike,
+    satellites: int,
+    rng: np.random.Generator,
+    *,
+    mean_m: float = 3.0,
+    correlation_m: float = 10.0,
+) -> Floats:
     """Draw the excess of pseudoranges by echoes in a street, never below 0.
 
     Each satellite's excess is exponentially distributed; along the way it is that of a normal
@@ -55,11 +59,8 @@ def multipath_bias_m(
     ----------
     travelled_m : (K,) array_like
         Distance travelled at each epoch, never decreasing.
-    satellites : int
-    rng : numpy.random.Generator
     mean_m : float
         0 in the open.
-    correlation_m : float
 
     Returns
     -------
@@ -81,11 +82,8 @@ def correlated_along(
 
     Parameters
     ----------
-    travelled_m : (K,) array_like
     columns : int
         Independent processes.
-    correlation_m : float
-    rng : numpy.random.Generator
 
     Returns
     -------

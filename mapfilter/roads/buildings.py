@@ -15,10 +15,8 @@ from rasterio.transform import Affine
 from mapfilter._types import Floats, Floats32
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice
-from mapfilter.roads.clip import polygons_inside
-from mapfilter.roads.maps import read_elements
-from mapfilter.roads.osm_readers import Query
-from mapfilter.roads.ways import Bounds, Buildings, Geometries
+from mapfilter.roads.maps import Query, read_elements
+from mapfilter.roads.ways import Bounds, Buildings, Geometries, polygons_inside
 
 STOREY_HEIGHT_M = 3.2
 DEFAULT_HEIGHT_M = 12.0
@@ -53,7 +51,7 @@ def read_buildings(
     bounds_m : tuple of float
         West, south, east, north of the area in ``crs``. Footprints are not cut at its edge.
     default_height_m, storey_height_m : float
-        Heights for buildings that tell none.
+        Heights (m) of buildings without their own.
 
     Raises
     ------
@@ -76,18 +74,12 @@ def read_buildings(
 
 
 def check_heights(default_height_m: float, storey_height_m: float) -> None:
-    """See that the heights for buildings that tell none are heights.
-
-    Raises
-    ------
-    InputError
-        One is not > 0.
-    """
+    """Check that the heights of buildings without their own are > 0."""
     faults = Faults()
-    if not (np.isfinite(default_height_m) and default_height_m > 0):
-        faults.add("default_height_m", "metres > 0", default_height_m)
-    if not (np.isfinite(storey_height_m) and storey_height_m > 0):
-        faults.add("storey_height_m", "metres > 0", storey_height_m)
+    heights = {"default_height_m": default_height_m, "storey_height_m": storey_height_m}
+    for name, height_m in heights.items():
+        if not (np.isfinite(height_m) and height_m > 0):
+            faults.add(name, "metres > 0", height_m)
     faults.raise_if_any(InputError)
 
 
@@ -101,33 +93,24 @@ def made_buildings(
     default_height_m: float,
     storey_height_m: float,
 ) -> Buildings:
-    """Return the buildings that touch an area.
+    """Return the polygons that touch an area, uncut, as buildings.
 
-    Parameters
-    ----------
-    crs : str
-    geometry : numpy.ndarray of shapely geometries, shape (N,)
-        Other than polygons are left out.
-    bounds_m : tuple of float
-        West, south, east, north. Footprints are not cut at its edge.
-    heights, levels : numpy.ndarray of object, shape (N,)
-        As a map writes them: texts such as ``12``, ``12.5 m`` or ``40 ft``, numbers, or nothing.
-    default_height_m, storey_height_m : float
-        Checked by :func:`check_heights`.
+    ``heights`` and ``levels`` are as in maps: texts such as ``12``, ``12.5 m`` or ``40 ft``,
+    numbers, or nothing. The default heights are checked by :func:`check_heights`.
     """
     footprints, origin = polygons_inside(geometry, bounds_m, cut=False)
     by_height = _numbers(heights)[origin]
     by_levels = _numbers(levels)[origin] * storey_height_m
     height = np.where(np.isfinite(by_height), by_height, by_levels)
-    told = np.isfinite(height)
+    known = np.isfinite(height)
     from_height = int(np.isfinite(by_height).sum())
     return Buildings(
         crs,
         footprints,
-        np.where(told, height, default_height_m),
+        np.where(known, height, default_height_m),
         from_height,
-        int(told.sum()) - from_height,
-        int((~told).sum()),
+        int(known.sum()) - from_height,
+        int((~known).sum()),
     )
 
 

@@ -23,6 +23,17 @@ from mapfilter.roads.ways import Ways
 
 Place = tuple[float, float]
 
+CORRIDOR_CLASS = "corridor"
+CORRIDOR_HALF_WIDTH_M = 15.0
+MAX_ACCURACY_M = 50.0
+MAX_GAP_M = 100.0
+
+_SHIFTS = 5
+_AT_A_TIME = 4096
+_SAME_DIRECTION = np.cos(np.radians(45.0))
+_UNKNOWN_ACCURACY_M = 10.0
+_BEST_ACCURACY_M = 1.0
+
 # A track's own last vertices, two to a reach, are not what it meets again.
 _TRAIL = 5
 # Two vertices are joined already when so few steps lead from one to the other.
@@ -93,7 +104,7 @@ class _Net:
 
 
 class _Track:
-    """The part of a track that is new, while it grows."""
+    """The new part of a track, while it grows."""
 
     def __init__(self, net: _Net) -> None:
         self._net = net
@@ -109,7 +120,8 @@ class _Track:
         """End the new part, at a vertex that is there already or at nothing."""
         before, places = self._joint, [place for place, _ in self._own]
         line = [place for place in (before, *places, joint) if place is not None]
-        long_enough = _length_m(places) >= self._net.reach_m
+        length_m = sum(math.dist(a, b) for a, b in itertools.pairwise(places))
+        long_enough = length_m >= self._net.reach_m
         joins = before is not None and joint is not None and not self._net.are_joined(before, joint)
         if long_enough or joins:
             self._net.keep(line)
@@ -153,31 +165,11 @@ def grown_lines(
     return net.lines
 
 
-def _length_m(line: Sequence[Place]) -> float:
-    return sum(math.dist(a, b) for a, b in itertools.pairwise(line))
-
-
-CORRIDOR_CLASS = "corridor"
-CORRIDOR_HALF_WIDTH_M = 15.0
-MAX_ACCURACY_M = 50.0
-MAX_GAP_M = 100.0
-
-_SHIFTS = 5
-_AT_A_TIME = 4096
-_SAME_DIRECTION = np.cos(np.radians(45.0))
-_UNKNOWN_ACCURACY_M = 10.0
-_BEST_ACCURACY_M = 1.0
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Positions:
-    """Where one session was, in the order of time.
+    """Positions of one session (m), in the order of time.
 
-    Parameters
-    ----------
-    east_m, north_m : numpy.ndarray, shape (N,)
-    accuracy_m : numpy.ndarray, shape (N,), or None
-        As the receiver tells it; NaN where unknown.
+    ``accuracy_m`` is the receiver's own estimate; NaN where unknown.
     """
 
     east_m: Floats
@@ -194,11 +186,11 @@ class Corridors:
     ways : Ways
         Of one class, numbered from 1; they join in shared vertices.
     sessions : numpy.ndarray of int64, shape (N,)
-        How many sessions went along each way, at its middle.
+        Number of sessions along each way, at its middle.
     half_width_m : float
-        One may be so far from the line: the stated width of the corridor about it.
+        Half width of the corridor about each line.
     notes : tuple of str
-        What was left out, and what the corridor is.
+        What was left out, and the width of the corridors.
     """
 
     ways: Ways
@@ -222,14 +214,13 @@ def corridors(
     ----------
     crs : str
         Projected CRS of the positions, in metres.
-    sessions : sequence of Positions
     half_width_m : float
         Tracks nearer to each other than this are of one way. It should not be below the
         accuracy of the positions, nor above half the distance between parallel streets.
     max_accuracy_m : float
-        Positions that are less accurate are left out; those of unknown accuracy are kept.
+        Less accurate positions are left out; those of unknown accuracy are kept.
     max_gap_m : float
-        Where positions that follow each other are farther apart, nobody knows the way between.
+        Farther apart, the way between two positions is unknown.
     min_sessions : int
         Keep what at least so many sessions passed within the half width.
 
@@ -247,7 +238,8 @@ def corridors(
     >>> len(found.ways), found.sessions.tolist(), shapely.length(found.ways.geometry).tolist()
     (1, [2], [95.0])
     """
-    _check(sessions, half_width_m, max_accuracy_m, max_gap_m, min_sessions)
+    lengths_m = {"max_accuracy_m": max_accuracy_m, "max_gap_m": max_gap_m}
+    _check(sessions, min_sessions, half_width_m=half_width_m, **lengths_m)
     step_m = half_width_m / 2
     pieces, aside = [], 0
     for session, positions in enumerate(sessions):
@@ -295,20 +287,9 @@ class _Piece:
     weight: Floats
 
 
-def _check(
-    sessions: Sequence[Positions],
-    half_width_m: float,
-    max_accuracy_m: float,
-    max_gap_m: float,
-    min_sessions: int,
-) -> None:
+def _check(sessions: Sequence[Positions], min_sessions: int, **lengths_m: float) -> None:
     faults = Faults()
-    lengths = {
-        "half_width_m": half_width_m,
-        "max_accuracy_m": max_accuracy_m,
-        "max_gap_m": max_gap_m,
-    }
-    for name, value in lengths.items():
+    for name, value in lengths_m.items():
         if not (np.isfinite(value) and value > 0):
             faults.add(name, "metres > 0", value)
     if min_sessions < 1:
@@ -401,8 +382,8 @@ def _sessions_near(place_m: Floats, measured: cKDTree, of_session: Ints, reach_m
     for first in range(0, len(place_m), _AT_A_TIME):
         some = place_m[first : first + _AT_A_TIME]
         of, near = _pairs(measured, some, reach_m)
-        heard = np.unique(np.column_stack([of, of_session[near]]), axis=0)[:, 0]
-        counts.append(np.bincount(heard, minlength=len(some)))
+        passing = np.unique(np.column_stack([of, of_session[near]]), axis=0)[:, 0]
+        counts.append(np.bincount(passing, minlength=len(some)))
     return np.concatenate(counts).astype(np.int64)
 
 

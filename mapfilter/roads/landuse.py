@@ -1,4 +1,4 @@
-"""Where one can be, from a classified land-use raster: the paper's second database.
+"""A classified land-use raster: the paper's second database.
 
 The table is a CSV file with the columns ``class`` and ``walkable`` (0 or 1), and either ``value``,
 for rasters of one band, or ``r``, ``g``, ``b``, for rasters of three colour bands.
@@ -32,26 +32,18 @@ _MOST_TOLD = 10
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LandUse:
-    """Classes of land use on a lattice, and in which of them one can be.
+    """Classes of land use on a lattice, and which of them are walkable.
 
     Parameters
     ----------
     code : numpy.ndarray of int, shape (rows, cols) of the lattice
         Index into ``names``; negative where nothing is known.
-    names : tuple of str
-        Of the classes.
-    can_walk : tuple of bool
-        Whether one can walk in each class.
+    names, can_walk : tuple of str, tuple of bool
+        Name of each class, and whether it is walkable.
     colours : tuple of str
-        Of the classes, such as "#8c8c8c"; empty where they have none.
+        Colour of each class, such as "#8c8c8c"; empty without colours.
     notes : tuple of str
-        What was done to the raster, and how much of the lattice it covers if not nearly all; empty
-        when it lay there already.
-
-    Raises
-    ------
-    InputError
-        Names, ``can_walk`` and colours differ in number, or a code has no name.
+        How the raster was resampled, and its coverage of the lattice if incomplete.
     """
 
     code: NDArray[np.integer]
@@ -62,10 +54,9 @@ class LandUse:
 
     def __post_init__(self) -> None:
         faults = Faults()
-        if len(self.names) != len(self.can_walk):
-            faults.add("land use, can_walk", f"{len(self.names)} of them", len(self.can_walk))
-        if self.colours and len(self.names) != len(self.colours):
-            faults.add("land use, colours", f"{len(self.names)} of them", len(self.colours))
+        for name, values in (("can_walk", self.can_walk), ("colours", self.colours)):
+            if len(values) != len(self.names) and (values or name == "can_walk"):
+                faults.add(f"land use, {name}", f"{len(self.names)} of them", len(values))
         if self.code.size and int(self.code.max()) >= len(self.names):
             faults.add("land use, code", f"below {len(self.names)}", int(self.code.max()))
         faults.raise_if_any(InputError)
@@ -81,21 +72,18 @@ def read_landuse(path: Path | str, table_path: Path | str, lattice: Lattice) -> 
     """Return the class of land use at each lattice point.
 
     Each lattice point takes the class of the pixel that holds it (nearest neighbour), whatever
-    the raster's resolution; nothing is known of points off the raster and of no-data pixels. The
-    raster is read by windows of bounded size. Classes of a colour raster have its colours.
+    the raster's resolution; points off the raster and no-data pixels have none. The raster is read
+    by windows of bounded size. Classes of a colour raster have its colours.
 
     Parameters
     ----------
     path : Path or str
         GeoTIFF or the like with one band of values or three of colours (8 bits each; a fourth
-        band is taken for transparency: 0 is no data), in the lattice's CRS, north up.
+        band is transparency: 0 is no data), in the lattice's CRS, north up.
     table_path : Path or str
-        What values or colours mean.
+        Table of the classes of values or colours.
     lattice : Lattice
-
-    Returns
-    -------
-    LandUse
+        Points to classify.
 
     Raises
     ------

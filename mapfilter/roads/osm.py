@@ -1,18 +1,21 @@
-"""Ways and squares from OpenStreetMap.
+"""Ways, squares and water from OpenStreetMap.
 
 Which ways a profile may use is decided by these tables and nothing else.
 
 ========== =============================================================================
-walking    classes: :data:`WALKING_CLASSES` (no motorway, no trunk). ``foot=yes`` and its
-           like allow, ``foot=no`` and its like forbid; otherwise ``access=private``, ``no``
+walking    classes: :data:`WALKING_CLASSES` (no motorway, no trunk). ``foot=yes`` and the
+           like allow, ``foot=no`` and the like forbid; otherwise ``access=private``, ``no``
            and the like forbid. Tunnels are left out (no sky, no prediction), passages
            through buildings are kept and marked ``covered``. Indoor ways are left out.
-driving    classes: :data:`DRIVING_CLASSES`. The most exact of ``motorcar``,
+driving    classes: :data:`DRIVING_CLASSES`. The most specific of ``motorcar``,
            ``motor_vehicle``, ``vehicle`` and ``access`` decides. Tunnels are kept and marked
-           ``covered``. One-way streets are told by ``oneway``.
+           ``covered``. One-way streets follow ``oneway``.
 squares    ``place=square``, and ``area=yes`` or multipolygon areas of the classes
            :data:`SQUARE_CLASSES`, with the access rules of walking. A closed way without
            ``area=yes`` is a loop to walk along, not an area.
+water      ``natural=water``, ``waterway=riverbank`` and ``dock``, ``landuse=reservoir``; not
+           in tunnels, below ground or ``intermittent=yes``. An extract holds no sea: the
+           coast is a line there, and polygons of the sea come from a layer.
 ========== =============================================================================
 """
 
@@ -27,37 +30,34 @@ from geopandas import GeoDataFrame
 from numpy.typing import NDArray
 
 from mapfilter._types import Bools
-from mapfilter.roads.clip import lines_inside, polygons_inside
-from mapfilter.roads.maps import nothing_there, read_elements
-from mapfilter.roads.osm_readers import Query
-from mapfilter.roads.ways import Bounds, Squares, Ways
+from mapfilter.roads.maps import Query, nothing_there, read_elements
+from mapfilter.roads.ways import Bounds, Squares, Water, Ways, lines_inside, polygons_inside
 
 Profile = Literal["walking", "driving"]
 
-_SHARED_CLASSES = (
-    "primary", "primary_link", "secondary", "secondary_link", "tertiary", "tertiary_link",
-    "unclassified", "residential", "living_street", "service", "road",
-)  # fmt: skip
-WALKING_CLASSES = frozenset(
-    (*_SHARED_CLASSES, "bridleway", "cycleway", "footway", "path", "pedestrian", "platform",
-     "steps", "track")
-)  # fmt: skip
-DRIVING_CLASSES = frozenset(
-    (*_SHARED_CLASSES, "motorway", "motorway_link", "trunk", "trunk_link")
-)  # fmt: skip
+_MAIN = ("primary", "primary_link", "secondary", "secondary_link", "tertiary", "tertiary_link")
+_MINOR = ("unclassified", "residential", "living_street", "service", "road")
+_SHARED = frozenset((*_MAIN, *_MINOR))
+_ON_FOOT = ("bridleway", "cycleway", "footway", "path", "pedestrian", "platform", "steps", "track")
+WALKING_CLASSES = _SHARED.union(_ON_FOOT)
+DRIVING_CLASSES = _SHARED.union(("motorway", "motorway_link", "trunk", "trunk_link"))
 SQUARE_CLASSES = frozenset(("footway", "living_street", "path", "pedestrian"))
 
 _ALLOWING = frozenset(("yes", "designated", "permissive", "official", "destination", "customers"))
-_FORBIDDING = frozenset(
-    ("no", "private", "military", "agricultural", "forestry", "delivery", "permit", "residents",
-     "use_sidepath", "emergency")
-)  # fmt: skip
+_PERMITTED = ("agricultural", "forestry", "delivery", "permit", "residents", "emergency")
+_FORBIDDING = frozenset(("no", "private", "military", "use_sidepath", *_PERMITTED))
 _OPEN_TUNNELS = frozenset(("", "no", "building_passage", "covered", "avalanche_protector"))
+_ACCESS = ("access", "foot", "vehicle", "motor_vehicle", "motorcar")
+_FORM = ("tunnel", "covered", "indoor", "oneway", "junction")
 _HIGHWAYS = Query(
-    {"highway": (), "place": ("square",)},
-    ("highway", "place", "area", "access", "foot", "vehicle", "motor_vehicle", "motorcar",
-     "tunnel", "covered", "indoor", "oneway", "junction"),
-)  # fmt: skip
+    {"highway": (), "place": ("square",)}, ("highway", "place", "area", *_ACCESS, *_FORM)
+)
+_WATER = Query(
+    {"natural": ("water",), "waterway": ("riverbank", "dock"), "landuse": ("reservoir",)},
+    ("natural", "waterway", "landuse", "tunnel", "covered", "location", "intermittent"),
+)
+_NOT_OPEN = frozenset(("yes", "culvert", "flooded", "building_passage"))
+_BURIED = frozenset(("underground", "indoor"))
 
 
 def read_ways(path: str | Path, profile: Profile, crs: str, bounds_m: Bounds) -> Ways:
@@ -85,7 +85,7 @@ def read_ways(path: str | Path, profile: Profile, crs: str, bounds_m: Bounds) ->
     InputError
         The map is missing or damaged, or has no such ways in the area.
     """
-    found = _read_highways(path, crs, bounds_m)
+    found = read_elements(path, crs, bounds_m, _HIGHWAYS)
     area = _is_area(found)
     # Lifts drawn as outlines come as polygons, too; they fall out by their class.
     loops = ~area & (shapely.get_type_id(found.geometry.to_numpy()) == 3)
@@ -108,11 +108,8 @@ def read_ways(path: str | Path, profile: Profile, crs: str, bounds_m: Bounds) ->
 
 
 def read_squares(path: str | Path, crs: str, bounds_m: Bounds) -> Squares:
-    """Read squares and pedestrian areas, clipped to an area; there may be none.
-
-    Parameters and errors are those of :func:`read_ways`, save that no square is no fault.
-    """
-    found = _read_highways(path, crs, bounds_m)
+    """Read squares and pedestrian areas, clipped; there may be none. As :func:`read_ways`."""
+    found = read_elements(path, crs, bounds_m, _HIGHWAYS)
     chosen = (found["place"] == "square") | found["highway"].isin(SQUARE_CLASSES)
     found = found[_is_area(found) & chosen & _walkable(found)]
     geometry, origin = polygons_inside(found.geometry.to_numpy(), bounds_m, cut=True)
@@ -120,10 +117,6 @@ def read_squares(path: str | Path, crs: str, bounds_m: Bounds) -> Squares:
     number = kept["id"].to_numpy(dtype=np.int64)
     relation = (kept["osm_type"] == "relation").to_numpy(dtype=bool)
     return Squares(crs, np.where(relation, -number, number), geometry)
-
-
-def _read_highways(path: str | Path, crs: str, bounds_m: Bounds) -> GeoDataFrame:
-    return read_elements(path, crs, bounds_m, _HIGHWAYS)
 
 
 def _is_area(found: GeoDataFrame) -> Bools:
@@ -155,3 +148,12 @@ def _oneway(found: GeoDataFrame) -> NDArray[np.int8]:
     forward = found["oneway"].isin(["yes", "true", "1"]) | (implied & (found["oneway"] == ""))
     backward = found["oneway"].isin(["-1", "reverse"])
     return np.where(backward, -1, np.where(forward, 1, 0)).astype(np.int8)
+
+
+def read_water(path: str | Path, crs: str, bounds_m: Bounds) -> Water:
+    """Read the water of a map, clipped to an area; there may be none. As :func:`read_ways`."""
+    found = read_elements(path, crs, bounds_m, _WATER)
+    hidden = found["tunnel"].isin(_NOT_OPEN) | found["covered"].isin(_NOT_OPEN)
+    hidden |= found["location"].isin(_BURIED) | (found["intermittent"] == "yes")
+    geometry, _ = polygons_inside(found.geometry[~hidden].to_numpy(), bounds_m, cut=True)
+    return Water(crs, geometry)

@@ -1,4 +1,4 @@
-"""Reading a layer of any vector file that GDAL knows, or GeoParquet, cut to an area."""
+"""Reading a layer of any vector file that GDAL reads, or GeoParquet, cut to an area."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import geopandas
 import numpy as np
@@ -24,27 +24,27 @@ from shapely.errors import GEOSException
 
 from mapfilter._types import Ints
 from mapfilter.errors import InputError, MapfilterError, fail
-from mapfilter.roads.clip import on_earth
 from mapfilter.roads.maps import box_deg
-from mapfilter.roads.ways import Bounds, Geometries
+from mapfilter.roads.ways import Bounds, Geometries, on_earth
 
 T = TypeVar("T")
+
+Layer: TypeAlias = Path | str | GeoDataFrame
+"""A vector file, or a table with geometry in memory."""
 
 _PARQUET = (".parquet", ".geoparquet")
 _LARGEST_RATIO = 60
 _ALWAYS_ALLOWED_BYTES = 64 << 20
 _HEAD_BYTES = 4096
-# Files that only say where the data are: on another path, or in the net.
-_POINTERS = (b"<OGRVRTDataSource", b"<OGRWFSDataSource", b"<OGRCSWDataSource", b"gdal_streamed_alg",
-             b"<WFS_Capabilities", b"<VRTDataset")  # fmt: skip
+# Marks of files that only refer to data elsewhere.
+_POINTERS = b"<OGRVRTDataSource <OGRWFSDataSource <OGRCSWDataSource gdal_streamed_alg".split()
+_POINTERS += b"<WFS_Capabilities <VRTDataset".split()
 _MOST_DEG = 360.0
-# What reading trips over when a file is not what its format wants; a name that is not bound is
-# pyogrio's way of saying that a CRS cannot be written out.
-_DAMAGES = (
-    RuntimeError, ValueError, TypeError, LookupError, ArithmeticError, OSError, EOFError,
-    MemoryError, UnboundLocalError, GEOSException, ArrowException, CRSError, ProjError,
-    zipfile.BadZipFile, zlib.error,
-)  # fmt: skip
+# Raised where a file is not what its format demands; pyogrio raises UnboundLocalError for a CRS
+# that cannot be written out.
+_ANY_DAMAGE = (RuntimeError, ValueError, TypeError, LookupError, ArithmeticError, UnboundLocalError)
+_FILE_DAMAGE = (OSError, EOFError, MemoryError, zipfile.BadZipFile, zlib.error, ArrowException)
+_DAMAGES = (*_ANY_DAMAGE, *_FILE_DAMAGE, GEOSException, CRSError, ProjError)
 _SHP_LENGTH = slice(24, 28)
 
 
@@ -54,6 +54,8 @@ class Features:
 
     Parameters
     ----------
+    name : str
+        The file, for messages.
     geometry : numpy.ndarray of shapely geometries, shape (N,)
         In two dimensions and the CRS asked for; they reach beyond the area.
     number : numpy.ndarray of int64, shape (N,)
@@ -64,6 +66,7 @@ class Features:
         What was left out.
     """
 
+    name: str
     geometry: Geometries
     number: Ints
     columns: Mapping[str, NDArray[np.object_]]
@@ -71,7 +74,7 @@ class Features:
 
 
 def read_layer(
-    path: Path,
+    source: Layer,
     crs: str,
     bounds_m: Bounds,
     layer_name: str | None,
@@ -83,8 +86,8 @@ def read_layer(
 
     Parameters
     ----------
-    path : Path
-        A file, a zipped one, or a folder that is a file geodatabase.
+    source : path or GeoDataFrame
+        A file, a zipped one, or a folder that is a file geodatabase; or a table in memory.
     crs : str
         Projected CRS of the result, in metres.
     bounds_m : tuple of float
@@ -94,7 +97,7 @@ def read_layer(
     columns : sequence of str
         Columns to read beside the geometry.
     may_be_empty : bool
-        Nothing in the area is no fault.
+        Accept a layer with nothing in the area.
 
     Raises
     ------
@@ -102,45 +105,55 @@ def read_layer(
         The file is missing, damaged or no vector file, has several layers, no CRS, or lacks a
         column, or nothing of it lies in the area.
     """
-    _check_file(path)
-    if path.suffix.lower() in _PARQUET:
-        frame = _guarded(path, lambda: geopandas.read_parquet(path))
-        _check_columns(path, [name for name in frame.columns if name != "geometry"], columns)
+    name, frame, hint = "GeoDataFrame", None, ""
+    if isinstance(source, GeoDataFrame):
+        frame, hint = source.reset_index(drop=True), "not set; see GeoDataFrame.set_crs"
+        if frame.active_geometry_name is None:
+            raise fail(InputError, name, "a geometry column", "none", "a plain table")
+    else:
+        path, name = Path(source), str(source)
+        _check_file(path)
+        if path.suffix.lower() in _PARQUET:
+            frame = _guarded(name, lambda: geopandas.read_parquet(path))
+        elif path.suffix.lower() == ".shp":
+            hint = "the .prj file was left behind"
+    if frame is not None:
+        known = [str(column) for column in frame.columns if column != frame.active_geometry_name]
+        _check_columns(name, known, columns)
         source_crs, covered = frame.crs, frame.total_bounds
     else:
         layer = _layer(path, layer_name)
-        about = _guarded(path, lambda: pyogrio.read_info(path, layer=layer))
-        _check_columns(path, list(about["fields"]), columns)
-        frame, source_crs, covered = None, about["crs"], about["total_bounds"]
+        about = _guarded(name, lambda: pyogrio.read_info(path, layer=layer))
+        _check_columns(name, list(about["fields"]), columns)
+        source_crs, covered = about["crs"], about["total_bounds"]
     if source_crs is None:
-        hint = "the .prj file was left behind" if path.suffix.lower() == ".shp" else ""
-        raise fail(InputError, f"{path}, crs", "a layer that tells its CRS", "none", hint)
-    box = _box(path, crs, bounds_m, source_crs)
+        raise fail(InputError, f"{name}, crs", "a layer with a CRS", "none", hint)
+    box = _box(name, crs, bounds_m, source_crs)
     if frame is None:
-        frame = _guarded(path, lambda: _read(path, layer, box, columns))
-    found = _features(path, frame, crs, bounds_m, columns)
+        frame = _guarded(name, lambda: _read(path, layer, box, columns))
+    found = _features(name, frame, crs, bounds_m, columns)
     if not (found.number.size or may_be_empty):
-        raise _nothing_there(path, crs, bounds_m, source_crs, covered)
+        raise _nothing_there(name, crs, bounds_m, source_crs, covered)
     return found
 
 
 def _features(
-    path: Path, frame: Any, crs: str, bounds_m: Bounds, columns: Sequence[str]
+    name: str, frame: Any, crs: str, bounds_m: Bounds, columns: Sequence[str]
 ) -> Features:
     notes = []
     has_shape = (~frame.geometry.isna()).to_numpy()
     if not has_shape.all():
-        notes.append(f"{path}: {(~has_shape).sum()} features without geometry left out")
+        notes.append(f"{name}: {(~has_shape).sum()} features without geometry left out")
         frame = frame[has_shape]
     number = frame.index.to_numpy().astype(np.int64) + 1
-    frame = _guarded(path, lambda: frame.to_crs(crs))
+    frame = _guarded(name, lambda: frame.to_crs(crs))
     geometry = shapely.force_2d(frame.geometry.to_numpy())
     kept = on_earth(geometry)
     if not kept.all():
-        notes.append(f"{path}: {(~kept).sum()} features left out: {crs} has no such places")
+        notes.append(f"{name}: {(~kept).sum()} features left out: {crs} has no such places")
     kept[kept] = shapely.intersects(shapely.box(*bounds_m), geometry[kept])
-    values = {name: frame[name].to_numpy(dtype=object)[kept] for name in columns}
-    return Features(geometry[kept], number[kept], values, tuple(notes))
+    values = {column: frame[column].to_numpy(dtype=object)[kept] for column in columns}
+    return Features(name, geometry[kept], number[kept], values, tuple(notes))
 
 
 def _check_file(path: Path) -> None:
@@ -165,20 +178,17 @@ def _check_file(path: Path) -> None:
         if size_bytes < told_bytes:
             raise fail(InputError, str(path), f"{told_bytes} bytes", size_bytes, "cut off")
     if zipfile.is_zipfile(path):
-        unpacked_bytes = _guarded(path, lambda: _unpacked_bytes(path))
+        with _guarded(str(path), lambda: zipfile.ZipFile(path)) as archive:
+            unpacked_bytes = sum(inner.file_size for inner in archive.infolist())
         allowed_bytes = _LARGEST_RATIO * size_bytes + _ALWAYS_ALLOWED_BYTES
         if unpacked_bytes > allowed_bytes:
             expected = f"at most {allowed_bytes >> 20} MB when unpacked"
-            raise fail(InputError, str(path), expected, f"{unpacked_bytes >> 20} MB", "a bomb")
-
-
-def _unpacked_bytes(path: Path) -> int:
-    with zipfile.ZipFile(path) as archive:
-        return sum(inner.file_size for inner in archive.infolist())
+            got, hint = f"{unpacked_bytes >> 20} MB", "possible decompression bomb"
+            raise fail(InputError, str(path), expected, got, hint)
 
 
 def _layer(path: Path, wanted: str | None) -> str:
-    layers = _guarded(path, lambda: pyogrio.list_layers(path))
+    layers = _guarded(str(path), lambda: pyogrio.list_layers(path))
     names = [str(name) for name, kind in layers if kind is not None]
     if wanted is None and len(names) == 1:
         return names[0]
@@ -193,25 +203,25 @@ def _layer(path: Path, wanted: str | None) -> str:
     raise fail(InputError, f"{path}, layer", expected, repr(wanted) if wanted else "none", hint)
 
 
-def _check_columns(path: Path, known: Sequence[str], wanted: Sequence[str]) -> None:
-    for name in wanted:
-        if name not in known:
-            close = difflib.get_close_matches(name, known, n=1)
+def _check_columns(name: str, known: Sequence[str], wanted: Sequence[str]) -> None:
+    for column in wanted:
+        if column not in known:
+            close = difflib.get_close_matches(column, known, n=1)
             expected = f"one of its columns: {', '.join(known) or 'it has none'}"
             hint = repr(close[0]) if close else ""
-            raise fail(InputError, f"{path}, column", expected, repr(name), hint)
+            raise fail(InputError, f"{name}, column", expected, repr(column), hint)
 
 
-def _box(path: Path, crs: str, bounds_m: Bounds, source_crs: Any) -> tuple[float, ...]:
+def _box(name: str, crs: str, bounds_m: Bounds, source_crs: Any) -> tuple[float, ...]:
     """Return a box in the layer's CRS that holds a box in another."""
     try:
         change = pyproj.Transformer.from_crs(crs, source_crs, always_xy=True)
         box = change.transform_bounds(*bounds_m, densify_pts=21)
     except (CRSError, ProjError) as error:
-        raise fail(InputError, f"{path}, crs", "a CRS on Earth", error) from error
+        raise fail(InputError, f"{name}, crs", "a CRS on Earth", error) from error
     if not np.isfinite(box).all():
         expected = f"a CRS that can show the area {_numbers(bounds_m)}"
-        raise fail(InputError, f"{path}, crs", expected, source_crs, "a CRS of another region")
+        raise fail(InputError, f"{name}, crs", expected, source_crs, "a CRS of another region")
     return tuple(float(side) for side in box)
 
 
@@ -221,7 +231,7 @@ def _read(path: Path, layer: str, box: tuple[float, ...], columns: Sequence[str]
     )
 
 
-def _guarded(path: Path, read: Callable[[], T]) -> T:
+def _guarded(name: str, read: Callable[[], T]) -> T:
     try:
         with warnings.catch_warnings():
             # GDAL warns of much that it copes with; what it cannot read has no geometry.
@@ -229,29 +239,22 @@ def _guarded(path: Path, read: Callable[[], T]) -> T:
             warnings.simplefilter("ignore", UserWarning)
             return read()
     except _DAMAGES as error:
-        raise _unreadable(path, error) from error
-
-
-def _unreadable(path: Path, error: Exception) -> MapfilterError:
-    reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-    hint = "cut off, or another format under this name"
-    return fail(InputError, str(path), "a vector file that GDAL reads", reason, hint)
+        reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        hint = "cut off, or another format under this name"
+        raise fail(InputError, name, "a vector file that GDAL reads", reason, hint) from error
 
 
 def _nothing_there(
-    path: Path, crs: str, bounds_m: Bounds, source_crs: Any, covered: Any
+    name: str, crs: str, bounds_m: Bounds, source_crs: Any, covered: Any
 ) -> MapfilterError:
     """Return the error for a layer with nothing in the area, with the likely mistake."""
-    where, hint = f"{path}, area {_numbers(bounds_m)} in {crs}", "the area lies outside the layer"
+    where, hint = f"{name}, area {_numbers(bounds_m)} in {crs}", "the area lies outside the layer"
     if covered is None or not np.isfinite(covered).all():
         return fail(InputError, where, "features in the area", "none", hint)
     if pyproj.CRS.from_user_input(source_crs).is_geographic:
         west, south, east, north = box_deg(crs, bounds_m)
-        if (
-            max(abs(covered[0]), abs(covered[2])) > 360
-            or max(abs(covered[1]), abs(covered[3])) > 90
-        ):
-            hint = "its CRS says degrees and its numbers are none: another CRS left out on export"
+        if np.any(np.abs(covered) > (_MOST_DEG, 90.0, _MOST_DEG, 90.0)):
+            hint = "a CRS in degrees with other numbers: another CRS left out on export"
         elif south < covered[2] and covered[0] < north and west < covered[3] and covered[1] < east:
             hint = "longitude and latitude swapped"
     expected = f"features in the area; the layer covers {_numbers(covered)}"

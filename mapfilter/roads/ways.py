@@ -1,4 +1,4 @@
-"""The ways, squares, buildings and waters of an area, in metres, whatever map they come from."""
+"""Ways, squares, buildings and water of an area, in metres; cutting them at its edge."""
 
 from __future__ import annotations
 
@@ -11,15 +11,32 @@ from numpy.typing import NDArray
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError
+from mapfilter.geodesy import short_crs
 
 Bounds = tuple[float, float, float, float]
 """West, south, east, north in metres."""
 
 Geometries = NDArray[np.object_]
+_LINE, _RING, _POLYGON = 1, 2, 3
+_FARTHEST_M = 1e8
+"""Larger than the coordinates of any map; much larger ones overflow in products."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Ways:
+class _Layer:
+    """Shows the number of features and the CRS."""
+
+    __slots__ = ()
+    crs: str
+
+    def __len__(self) -> int:
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({len(self)} in {short_crs(self.crs)})"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Ways(_Layer):
     """The ways that a profile may use.
 
     A way that leaves the area and comes back is several rows with the same ``way_id``.
@@ -73,21 +90,21 @@ class Ways:
     def __len__(self) -> int:
         return int(self.way_id.size)
 
-    def select(self, which: Any) -> Ways:
-        """Return the ways chosen by a mask or by indices."""
+    def select(self, which: Any, geometry: Geometries | None = None) -> Ways:
+        """Return the ways chosen by a mask or by indices, with other lines where given."""
         return Ways(
             self.crs,
             self.way_id[which],
             self.way_class[which],
             self.class_names,
-            self.geometry[which],
+            self.geometry[which] if geometry is None else geometry,
             self.covered[which],
             self.oneway[which],
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Squares:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Squares(_Layer):
     """Areas where one may walk in any direction.
 
     Parameters
@@ -114,8 +131,8 @@ class Squares:
         return int(self.area_id.size)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Buildings:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Buildings(_Layer):
     """Building footprints and heights.
 
     Parameters
@@ -149,17 +166,17 @@ class Buildings:
         return int(self.footprints.size)
 
     @property
-    def told(self) -> str:
-        """One sentence on where the heights come from."""
+    def height_sources(self) -> str:
+        """One sentence on the sources of the heights."""
         return (
             f"{len(self)} buildings: height from the map for {self.from_height}, "
             f"from storeys for {self.from_levels}, the default for {self.from_default}"
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Water:
-    """Where one cannot be without a boat.
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Water(_Layer):
+    """Water, where nobody walks or drives except on bridges.
 
     Parameters
     ----------
@@ -193,3 +210,61 @@ def _check_geometry(what: str, geometry: Geometries, kind: str, faults: Faults) 
         faults.add(f"{what}, geometry", f"only {kind}s", "another kind")
     elif not np.all(np.isfinite(shapely.get_coordinates(geometry))):
         faults.add(f"{what}, geometry", "finite coordinates", "NaN or infinity")
+
+
+def on_earth(geometry: Geometries) -> Bools:
+    """Tell which geometries, in metres, have only coordinates that can be places."""
+    corner, origin = shapely.get_coordinates(geometry, return_index=True)
+    # Written so that NaN is no place.
+    is_place = (np.abs(corner) < _FARTHEST_M).all(axis=1)
+    good = np.ones(len(geometry), dtype=np.bool_)
+    good[origin[~is_place]] = False
+    return good
+
+
+def lines_inside(geometry: Geometries, bounds_m: Bounds) -> tuple[Geometries, Ints]:
+    """Return the lines among geometries, cut at a box, and which geometry each comes from.
+
+    Lines keep their direction, and within the box all their vertices.
+    """
+    lines, origin = shapely.get_parts(geometry, return_index=True)
+    chosen = np.isin(shapely.get_type_id(lines), (_LINE, _RING))
+    lines, origin = lines[chosen], origin[chosen]
+    crossing = ~shapely.covers(shapely.box(*bounds_m), lines)
+    # Unlike an intersection, this walks along the line.
+    lines[crossing] = shapely.clip_by_rect(lines[crossing], *bounds_m)
+    parts, line = shapely.get_parts(lines, return_index=True)
+    kept = (shapely.get_type_id(parts) == _LINE) & (shapely.length(parts) > 0)
+    return parts[kept], origin[line[kept]].astype(np.int64)
+
+
+def polygons_inside(
+    geometry: Geometries, bounds_m: Bounds, *, cut: bool
+) -> tuple[Geometries, Ints]:
+    """Return the polygons among geometries that touch a box, and which geometry each comes from.
+
+    What crosses itself is mended first.
+
+    Parameters
+    ----------
+    bounds_m : tuple of float
+        West, south, east, north.
+    cut : bool
+        Cut them at the edge of the box; else they are kept whole.
+    """
+    box = shapely.box(*bounds_m)
+    flat, origin = shapely.get_parts(geometry, return_index=True)
+    chosen = (shapely.get_type_id(flat) == _POLYGON) & shapely.intersects(box, flat)
+    whole = shapely.make_valid(flat[chosen])
+    parts, index = shapely.get_parts(
+        shapely.intersection(whole, box) if cut else whole, return_index=True
+    )
+    # Touching the edge of the area leaves lines and points behind.
+    kept = (shapely.get_type_id(parts) == _POLYGON) & (shapely.area(parts) > 0)
+    return parts[kept], origin[chosen][index[kept]].astype(np.int64)
+
+
+def clip_ways(ways: Ways, bounds_m: Bounds) -> Ways:
+    """Return the ways cut at a box; there may be none left."""
+    lines, origin = lines_inside(ways.geometry, bounds_m)
+    return ways.select(origin, lines)

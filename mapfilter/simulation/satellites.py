@@ -16,12 +16,9 @@ import pandas as pd
 from mapfilter._types import Bools, Floats
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.geodesy import unproject
-from mapfilter.gnss.almanac import Almanac
-from mapfilter.gnss.grid_frame import GridFrame
 from mapfilter.gnss.noise import correlated_along, multipath_bias_m
-from mapfilter.gnss.orbits import gps_time, satellite_positions_m
-from mapfilter.gnss.sky import Directions, directions, ecef_from_lonlat
-from mapfilter.gnss.visibility import Skyline
+from mapfilter.gnss.orbits import Almanac, gps_time, satellite_positions_m
+from mapfilter.gnss.sky import Directions, GridFrame, Skyline, directions, ecef_from_lonlat
 from mapfilter.models.motion import clock_noise
 from mapfilter.simulation.reflections import NlosModel, draw_reflections
 from mapfilter.tracks.satellites import sent_from_m
@@ -182,7 +179,7 @@ def receive(
     satellites = np.stack(
         [_places(usable, index, week, tow_s, there) for index in range(len(usable.names))], axis=1
     )
-    seen = directions(frame.satellites_m(satellites), frame.satellites_m(there)[:, None])
+    seen = directions(frame.local.to_local(satellites), frame.local.to_local(there)[:, None])
     open_sky, echo_m = _sky(seen, place, skyline, frame, model)
     range_m = np.linalg.norm(satellites - there[:, None], axis=2)
     sigma_m = model.zenith_m / np.sin(np.maximum(seen.elevation_rad, 0.05))
@@ -228,7 +225,7 @@ def _over_horizon(
     for moment_s in tow_s.tolist():
         turns = int(moment_s // 604_800.0)
         there = satellite_positions_m(almanac, moment_s - 604_800.0 * turns, week + turns)
-        above = np.maximum(above, directions(frame.satellites_m(there)).elevation_rad)
+        above = np.maximum(above, directions(frame.local.to_local(there)).elevation_rad)
     return almanac.only(np.flatnonzero(above > np.radians(model.mask_deg) - 0.35))
 
 

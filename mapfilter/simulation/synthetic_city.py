@@ -15,9 +15,16 @@ from shapely.geometry import LineString
 from mapfilter._types import Floats
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.geodesy import Lattice
-from mapfilter.roads.clip import polygons_inside
 from mapfilter.roads.osm import DRIVING_CLASSES
-from mapfilter.roads.ways import Bounds, Buildings, Geometries, Squares, Water, Ways
+from mapfilter.roads.ways import (
+    Bounds,
+    Buildings,
+    Geometries,
+    Squares,
+    Water,
+    Ways,
+    polygons_inside,
+)
 from mapfilter.simulation.city_buildings import houses, inner_ways, used_blocks
 from mapfilter.simulation.city_network import (
     blocks_of,

@@ -1,4 +1,4 @@
-"""Dead reckoning and the noise of inertial measurements: Khalaf-Allah 2007, equations (3)-(10)."""
+"""Dead reckoning, and noise of inertial measurements: Khalaf-Allah 2007, equations (3)-(10)."""
 
 from __future__ import annotations
 
@@ -47,14 +47,10 @@ def dead_reckon(
 
 
 def steps_between(east_m: ArrayLike, north_m: ArrayLike) -> tuple[Floats, Floats]:
-    """Return length and direction of the chords between positions; undoes :func:`dead_reckon`.
+    """Return length and direction of the chords between positions, inverse of :func:`dead_reckon`.
 
     Standing still has no direction: such a step takes the last one before it, else the first one
     after it, and NaN when nothing ever moves.
-
-    Parameters
-    ----------
-    east_m, north_m : array_like, shape (..., T + 1)
 
     Returns
     -------
@@ -99,7 +95,6 @@ def noisy_steps(
         True steps, such as (T,) or (draws, T).
     sigma_trans_m, sigma_orient_rad : float
         Standard deviations.
-    rng : numpy.random.Generator
     translation_noise : {"zero_mean", "as_printed"}
         Equation (7) prints the true step as the mean of the error that equation (5) *adds* to that
         step, which doubles it. "zero_mean" takes this for a misprint.

@@ -1,28 +1,29 @@
-"""The track log: what one journey recorded, as tables of events.
+"""The track log: the recording of one journey, as tables of events.
 
 Missing values stay missing: nothing is dropped because one of its fields is unknown. Rows out of
-order are sorted and exact duplicates dropped, and the log's notes tell of both. Rows of equal time
-are processed in the order motion, gnss and pseudoranges, radio and tdoa: first move, then measure.
+order are sorted and exact duplicates dropped, with a note in the log. Rows of equal time are
+processed in the order motion, gnss and pseudoranges, radio and tdoa: first move, then measure.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats
-from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import projected_crs
-from mapfilter.gnss.almanac import Almanac
-from mapfilter.tracks.satellites import PLACE, place_satellites
-from mapfilter.tracks.schema import TABLES
-from mapfilter.tracks.tidy import tidy_table
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.geodesy import projected_crs, short_crs
+from mapfilter.gnss.orbits import Almanac
+from mapfilter.tracks.satellites import place_satellites
+from mapfilter.tracks.schema import NEIGHBOUR, PLACE, TABLES, tidy_table
+
+Kind = Literal["gnss", "fixes", "pseudoranges", "ta", "tdoa", "neighbours", "radio"]
 
 _APART_S = 600.0
 """Tables may begin this long after another ends."""
@@ -34,20 +35,27 @@ _EARLY_SHARE = 0.1
 _EARLIEST_UTC_S = datetime(1, 1, 1, tzinfo=UTC).timestamp()
 _MOST_S = 1e11
 
+_FEW_ROWS = 10
+_MANY_ROWS = 20
+_FASTEST_MPS = 100.0
+_SLOWEST_MPS = 0.02
+_LONG_S = 60.0
+_MOSTLY = 2 / 3
+_SOMEWHERE_M = 100.0
+_KILO = (100.0, 1200.0)
+"""Between these, positions lie apart by the kilometres of the steps, or a part of them."""
+_FASTEST_KMPS = 0.1
+
+_EXPECTED = "metres moved in each interval"
+
 
 def check_clocks(
     tables: Mapping[str, pd.DataFrame], names: Mapping[str, str], faults: Faults
 ) -> None:
-    """See that the times of a log's tables overlap, and that none lasts about 1000 times as long.
+    """Note tables that do not overlap in time, or last about 1000 times as long as another.
 
-    Parameters
-    ----------
-    tables : mapping of str to pandas.DataFrame
-        With finite ``time_s``, sorted.
-    names : mapping of str to str
-        What messages call a table, and ``log`` the whole.
-    faults : Faults
-        Collects at most one fault, since it takes two tables to disagree.
+    ``tables`` are sorted by finite ``time_s``; ``names`` are those of the tables in messages, and
+    ``log`` of the whole. At most one fault is added, since it takes two tables to disagree.
     """
     times = {
         names.get(table, table): np.unique(rows["time_s"].to_numpy())
@@ -85,7 +93,7 @@ def early_ends(tables: Mapping[str, pd.DataFrame]) -> tuple[str, ...]:
 def check_start(
     start_utc_s: float, tables: Mapping[str, pd.DataFrame], faults: Faults, whole: str = "log"
 ) -> None:
-    """See that a log's start, if it is known, and all its times are dates that calendars show."""
+    """Note a start or times that are no dates within the years 1 to 9999."""
     if np.isnan(start_utc_s):
         return
     where = f"{whole}, start_utc_s"
@@ -103,8 +111,8 @@ def check_start(
 def _milliseconds(times: Mapping[str, Floats]) -> str:
     """Return the hint that one table's times are milliseconds, or an empty text.
 
-    Its duration *and* its typical interval are about 1000 times those of another table: so a
-    burst of a second in a long log, or a table with seldom rows, is not taken for it.
+    Its duration *and* its typical interval must be about 1000 times those of another table, which
+    a burst of a second in a long log, or a table with rare rows, does not fulfil.
     """
     paced = {name: time for name, time in times.items() if len(time) >= 3}
     low, high = _TIMES_MS
@@ -118,36 +126,11 @@ def _milliseconds(times: Mapping[str, Floats]) -> str:
     return ""
 
 
-_FEW_ROWS = 10
-_MANY_ROWS = 20
-_FASTEST_MPS = 100.0
-_SLOWEST_MPS = 0.02
-_LONG_S = 60.0
-_MOSTLY = 2 / 3
-_SOMEWHERE_M = 100.0
-_KILO = (100.0, 1200.0)
-"""Between these, positions lie apart by the kilometres of the steps, or a part of them."""
-_FASTEST_KMPS = 0.1
-
-_EXPECTED = "metres moved in each interval"
-
-
 def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) -> tuple[str, ...]:
-    """See that steps are neither cumulative, nor backwards, nor in another unit.
+    """Note steps that are cumulative, backwards or in another unit; return notes on odd ones.
 
-    Parameters
-    ----------
-    tables : mapping of str to pandas.DataFrame
-        Of a log, with finite times, sorted. Tables of less than ten steps are let pass.
-    where : str
-        What faults call the table of motion.
-    faults : Faults
-        Collects what cannot be.
-
-    Returns
-    -------
-    tuple of str
-        Notes on what is odd, but can be.
+    ``tables`` have finite times, sorted, and ``where`` names the table of motion. Tables of less
+    than ten steps are not checked.
     """
     motion = tables["motion"]
     motion = motion[np.isfinite(motion["step_m"].to_numpy())]
@@ -161,7 +144,11 @@ def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) 
     moving = step_m[step_m != 0]
     extent_m = _extent_m(tables, float(time_s[0]), float(time_s[-1]))
     column = f"{where}, step_m"
-    if _grows(step_m, lasted_s):
+    growth_m = np.diff(step_m)
+    long = len(step_m) >= _MANY_ROWS and lasted_s >= _LONG_S / 3
+    low, high = _KILO
+    if long and np.all(growth_m >= 0) and np.mean(growth_m > 0) > 0.5:
+        # A car that speeds up does not do so for long.
         got = f"steps that only grow, from {step_m[0]:g} to {step_m[-1]:g}"
         faults.add(column, _EXPECTED, got, "distance since the start; give its differences")
     elif typical_mps > _FASTEST_MPS:
@@ -170,26 +157,17 @@ def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) 
     elif moving.size >= _FEW_ROWS and np.mean(moving < 0) > _MOSTLY:
         got = f"{int(np.sum(moving < 0))} negative steps of {moving.size}"
         faults.add(column, f"{_EXPECTED} along its heading", got, "a sign the other way round")
-    elif typical_mps < _FASTEST_KMPS and _in_kilometres(moved_m, extent_m):
+    elif (
+        typical_mps < _FASTEST_KMPS
+        and extent_m > _SOMEWHERE_M
+        and low * moved_m < extent_m <= high * moved_m
+    ):
         got = f"{moved_m:.3g} m in all, while positions lie {extent_m:.0f} m apart"
         faults.add(column, _EXPECTED, got, "kilometres given for metres")
     elif lasted_s >= _LONG_S and 0 < moved_m < _SLOWEST_MPS * lasted_s:
-        return (
-            f"motion, step_m: only {moved_m:.3g} m in {lasted_s:.0f} s; kilometres for metres?",
-        )
+        note = f"motion, step_m: only {moved_m:.3g} m in {lasted_s:.0f} s; kilometres for metres?"
+        return (note,)
     return ()
-
-
-def _in_kilometres(moved_m: float, extent_m: float) -> bool:
-    low, high = _KILO
-    return extent_m > _SOMEWHERE_M and low * moved_m < extent_m <= high * moved_m
-
-
-def _grows(step_m: Floats, lasted_s: float) -> bool:
-    """Tell whether steps never shrink and mostly grow: a car that speeds up for long does not."""
-    growth_m = np.diff(step_m)
-    long = len(step_m) >= _MANY_ROWS and lasted_s >= _LONG_S / 3
-    return bool(long and np.all(growth_m >= 0) and np.mean(growth_m > 0) > 0.5)
 
 
 def _extent_m(tables: Mapping[str, pd.DataFrame], first_s: float, last_s: float) -> float:
@@ -203,9 +181,9 @@ def _extent_m(tables: Mapping[str, pd.DataFrame], first_s: float, last_s: float)
     return max(found)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TrackLog:
-    """What one journey recorded; made by :func:`make_log`, which checks everything.
+    """The recording of one journey; made by :func:`make_log`, which checks everything.
 
     Parameters
     ----------
@@ -220,13 +198,13 @@ class TrackLog:
     radio : pandas.DataFrame
         time_s, role ("serving" or "neighbour"), cell (str or None), arfcn, bsic (nullable
         integers), level_dbm, censored (-1 below the scale, 0 inside, 1 above), timing_advance
-        (nullable): one row for each cell heard.
+        (nullable): one row for each cell received.
     gnss : pandas.DataFrame
         time_s, east_m, north_m, var_east_m2, var_north_m2, cov_east_north_m2.
     pseudoranges : pandas.DataFrame
         time_s, satellite ("G07": its constellation's letter and number), pseudorange_m, sigma_m,
         and where the satellite was, earth-centred: x_m, y_m, z_m. One row for each satellite
-        received. NaN: not measured, not told, or not known.
+        received. NaN: not measured or not known.
     tdoa : pandas.DataFrame
         time_s, cell, reference, difference_m (how much farther the cell is than the reference),
         sigma_m and reference_sigma_m: of each one's time of arrival, as distances.
@@ -246,6 +224,18 @@ class TrackLog:
     truth: pd.DataFrame
     notes: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        """Return CRS, duration, start and the number of rows per table."""
+        began = ""
+        if np.isfinite(self.start_utc_s):
+            start = datetime.fromtimestamp(self.start_utc_s, UTC)
+            began = f" from {start.isoformat(' ', 'seconds').removesuffix('+00:00')} UTC"
+        rows = [f"{table} {n}" for table in TABLES if (n := len(getattr(self, table)))]
+        held = f"rows: {', '.join(rows) or 'none'}"
+        notes = f"; {len(self.notes)} notes" if self.notes else ""
+        crs = short_crs(self.crs)
+        return f"TrackLog({crs}, {self.duration_s:.1f} s{began}; {held}{notes})"
+
     @property
     def duration_s(self) -> float:
         """Seconds from the first to the last row of any table; 0 for an empty log."""
@@ -257,6 +247,45 @@ class TrackLog:
         """Length of the true path, metres; 0 where the truth is unknown."""
         east, north = self.truth["east_m"].to_numpy(), self.truth["north_m"].to_numpy()
         return float(np.sum(np.hypot(np.diff(east), np.diff(north))))
+
+
+def _seconds(
+    given: Mapping[str, Any], start_utc_s: float, names: Mapping[str, str], faults: Faults
+) -> tuple[dict[str, pd.DataFrame], float]:
+    """Return tables with timestamps turned into seconds, and the start in UTC seconds."""
+    tables: dict[str, pd.DataFrame] = {}
+    times: dict[str, pd.Series] = {}
+    for table, rows in given.items():
+        where = names.get(table, table)
+        if not isinstance(rows, pd.DataFrame):
+            faults.add(where, "a pandas.DataFrame", type(rows).__name__)
+            continue
+        if not rows.columns.is_unique:
+            twice = ", ".join(map(str, rows.columns[rows.columns.duplicated()].unique()))
+            faults.add(where, "each column once", f"{twice} more often")
+            continue
+        tables[table] = rows
+        name = "time_s" if "time_s" in rows else "time"
+        time = rows[name].infer_objects() if name in rows else pd.Series(dtype=float)
+        if isinstance(time.dtype, pd.DatetimeTZDtype):
+            tables[table], times[table] = rows.drop(columns=name), time
+        elif pd.api.types.is_datetime64_any_dtype(time.dtype):
+            hint = 'UTC or local time? add it, such as by .dt.tz_localize("UTC")'
+            faults.add(f"{where}, {name}", "timestamps with a time zone", "none", hint)
+            del tables[table]
+    known = [time.min() for time in times.values() if time.notna().any()]
+    if known and np.isnan(start_utc_s):
+        origin, offset_s = min(known), 0.0
+        start_utc_s = origin.timestamp()
+        if plain := [names.get(t, t) for t in tables if t not in times and len(tables[t])]:
+            got, hint = f"seconds in {', '.join(plain)}", "give start_utc_s, UTC seconds at 0"
+            faults.add("log, time_s", "timestamps in every table, or a start", got, hint)
+    else:
+        origin, offset_s = pd.Timestamp(0, tz="UTC"), start_utc_s
+    for table, time in times.items():
+        time_s = (time - origin).dt.total_seconds() - offset_s
+        tables[table] = tables[table].assign(time_s=time_s)
+    return tables, start_utc_s
 
 
 def make_log(
@@ -281,19 +310,21 @@ def make_log(
     crs : str
         Projected CRS in metres, in any form that pyproj knows.
     motion, radio, gnss, truth, pseudoranges, tdoa : pandas.DataFrame, optional
-        With the columns of :class:`TrackLog`; only ``time_s``, ``role`` (radio), ``east_m`` and
-        ``north_m`` (gnss, truth), ``satellite`` (pseudoranges), ``cell`` and ``reference`` (tdoa)
-        must be there. An absent table is an empty one.
+        Tables with the columns of :class:`TrackLog`. Required are only ``time_s``, ``role``
+        (radio), ``east_m`` and ``north_m`` (gnss, truth), ``satellite`` (pseudoranges), ``cell``
+        and ``reference`` (tdoa). Instead of ``time_s`` in seconds there may be timestamps with a
+        time zone, in a column ``time_s`` or ``time``: then the first of all is second 0.
     almanac : Almanac, optional
-        Tells where satellites were whose rows do not; the start must then be known.
+        Gives the places of satellites where their rows have none; requires a known start.
     start_utc_s : float
-        UTC seconds (Unix time) at which ``time_s`` is zero; NaN, the default, where unknown.
+        UTC seconds (Unix time) at which ``time_s`` is zero; NaN where unknown, or given by the
+        timestamps.
     notes : sequence of str
-        What is known already of the tables' past.
+        Earlier notes on the tables.
     names : mapping, optional
-        From table to the name (such as a file's) by which messages call it; ``log`` for the whole.
+        Name of each table (such as its file) in messages; ``log`` for the whole.
     row_numbers : mapping, optional
-        From table to what messages call each of its rows; rows are counted from 1 without.
+        Numbers of each table's rows in messages; counted from 1 by default.
 
     Raises
     ------
@@ -312,39 +343,89 @@ def make_log(
     ([1.4, 1.5], 1.0)
     >>> print(*log.notes, sep="; ")
     motion: 1 exact duplicate rows dropped; motion: out of order in 1 places, sorted by time
+    >>> seen = pd.to_datetime(["2026-05-01 12:00:00+02:00", "2026-05-01 12:00:30+02:00"])
+    >>> make_log("EPSG:32629", motion=pd.DataFrame({"time": seen, "step_m": [30.0, 33.0]}))
+    TrackLog(EPSG:32629, 30.0 s from 2026-05-01 10:00:00 UTC; rows: motion 2)
     """
     faults, called, numbers = Faults(), names or {}, row_numbers or {}
     whole = called.get("log", "log")
     try:
+        if isinstance(crs, pd.DataFrame):
+            hint = "tables are given by name: make_log(crs, motion=…)"
+            raise fail(InputError, f"{whole}, crs", "such as EPSG:32629", "a table", hint)
         crs = projected_crs(crs, f"{whole}, crs")
     except InputError as error:
         faults.found.extend(error.faults)
-    given = {
-        "motion": motion, "radio": radio, "gnss": gnss, "pseudoranges": pseudoranges,
-        "tdoa": tdoa, "truth": truth,
-    }  # fmt: skip
+    every = zip(TABLES, (motion, radio, gnss, pseudoranges, tdoa, truth), strict=True)
+    present = {table: rows for table, rows in every if rows is not None}
+    given, start_utc_s = _seconds(present, float(start_utc_s), called, faults)
     tables: dict[str, pd.DataFrame] = {}
-    told = tuple(notes)
+    every_note = tuple(notes)
     for table in TABLES:
         where = called.get(table, table)
-        rows, news = tidy_table(table, given[table], where, faults, numbers.get(table))
+        rows, more = tidy_table(table, given.get(table), where, faults, numbers.get(table))
         tables[table] = rows
-        told += news
+        every_note += more
     check_start(start_utc_s, tables, faults, whole)
     if not any(fault.where.endswith("time_s") for fault in faults.found):
         check_clocks(tables, called, faults)
-        told += check_steps(tables, called.get("motion", "motion"), faults)
-        told += early_ends(tables)
+        every_note += check_steps(tables, called.get("motion", "motion"), faults)
+        every_note += early_ends(tables)
     faults.raise_if_any(InputError)
     placeless = int(tables["pseudoranges"][list(PLACE)].isna().any(axis=1).sum())
     if almanac is None and placeless:
-        told += (
+        every_note += (
             f"pseudoranges: {placeless} rows without the place of their satellite, of no use "
             "without an almanac beside the log",
         )
     if almanac is not None:
         where = called.get("pseudoranges", "pseudoranges")
-        placed, news = place_satellites(tables["pseudoranges"], almanac, start_utc_s, where)
+        placed, more = place_satellites(tables["pseudoranges"], almanac, start_utc_s, where)
         tables["pseudoranges"] = placed
-        told += news
-    return TrackLog(str(crs), float(start_utc_s), **tables, notes=tuple(dict.fromkeys(told)))
+        every_note += more
+    return TrackLog(str(crs), start_utc_s, **tables, notes=tuple(dict.fromkeys(every_note)))
+
+
+def leave_out(log: TrackLog, kinds: Collection[Kind]) -> TrackLog:
+    """Return a log without some kinds of measurements; its notes count them.
+
+    Parameters
+    ----------
+    kinds : collection of str
+        ``gnss`` (``fixes`` and ``pseudoranges``), ``ta`` (timing advances; their reports stay),
+        ``tdoa``, ``neighbours`` (all cells but the serving one) and ``radio`` (all reports).
+
+    Examples
+    --------
+    >>> from mapfilter.tracks.log import make_log
+    >>> received = pd.DataFrame({"time_s": [0.0, 0.0], "role": ["serving", "neighbour"]})
+    >>> log = make_log("EPSG:32635", radio=received.assign(timing_advance=[1, None]))
+    >>> alone = leave_out(log, ["neighbours", "ta"])
+    >>> alone.radio["role"].tolist(), alone.radio["timing_advance"].isna().all()
+    (['serving'], np.True_)
+    >>> print(*alone.notes, sep="; ")
+    ta: 1 left out; neighbours: 1 left out
+    """
+    radio, gnss, ranges, tdoa = log.radio, log.gnss, log.pseudoranges, log.tdoa
+    left: dict[str, int] = {}
+    if "gnss" in kinds or "fixes" in kinds:
+        left["gnss" if "gnss" in kinds else "fixes"] = len(gnss)
+        gnss = gnss.iloc[:0]
+    if "pseudoranges" in kinds or ("gnss" in kinds and len(ranges)):
+        left["pseudoranges"] = len(ranges)
+        ranges = ranges.iloc[:0]
+    if "ta" in kinds:
+        left["ta"] = int(radio["timing_advance"].notna().sum())
+        radio = radio.assign(timing_advance=pd.array([pd.NA] * len(radio), dtype="Int64"))
+    if "tdoa" in kinds:
+        left["tdoa"] = len(tdoa)
+        tdoa = tdoa.iloc[:0]
+    if "radio" in kinds:
+        left["radio"] = len(radio)
+        radio = radio.iloc[:0]
+    elif "neighbours" in kinds:
+        neighbour = radio["role"] == NEIGHBOUR
+        left["neighbours"] = int(neighbour.sum())
+        radio = radio[~neighbour].reset_index(drop=True)
+    notes = (*log.notes, *(f"{kind}: {count} left out" for kind, count in left.items()))
+    return replace(log, radio=radio, gnss=gnss, pseudoranges=ranges, tdoa=tdoa, notes=notes)

@@ -1,4 +1,4 @@
-"""Satellites of a log: whether their rows make sense, and where an almanac says that they were.
+"""Places of a log's satellites by an almanac.
 
 Positions are earth-centred (ECEF, WGS 84): where a satellite was when it sent, in the frame of the
 moment of reception, since the earth turns on while a signal is under way.
@@ -6,74 +6,39 @@ moment of reception, since the earth turns on while a signal is under way.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats
-from mapfilter.errors import Faults, InputError, fail
-from mapfilter.gnss.almanac import Almanac
-from mapfilter.gnss.orbits import EARTH_RATE_RAD_S, gps_time, satellite_positions_m
-from mapfilter.tracks.schema import SATELLITE
+from mapfilter.errors import InputError, fail
+from mapfilter.gnss.orbits import EARTH_RATE_RAD_S, Almanac, gps_time, satellite_positions_m
+from mapfilter.tracks.schema import PLACE
 
-PLACE = ("x_m", "y_m", "z_m")
 _LIGHT_MPS = 299_792_458.0
-_LOWEST_M, _HIGHEST_M = 2.0e7, 5.5e7
-_SHOWN = 3
 _USUAL_M = 2.25e7
-
-
-def check_satellites(rows: pd.DataFrame, called: Callable[[int], str], faults: Faults) -> None:
-    """See that satellites are called as in RINEX, and are as high as satellites are.
-
-    Parameters
-    ----------
-    rows : pandas.DataFrame
-        Of the table of pseudoranges.
-    called : callable
-        From a row's number to what messages call it.
-    faults : Faults
-    """
-    name = rows["satellite"]
-    wrong = name.notna().to_numpy() & ~name.astype(str).str.fullmatch(SATELLITE).to_numpy(bool)
-    for row in np.flatnonzero(wrong)[:_SHOWN]:
-        hint = "its constellation's letter (G, R, E, C, J, I, S) and two digits"
-        faults.add(f"{called(row)}, satellite", "a name such as G07", repr(name.iloc[row]), hint)
-    place = rows[list(PLACE)].to_numpy(dtype=np.float64)
-    told = np.isfinite(place)
-    away_m = np.sqrt(np.sum(place**2, axis=1))
-    for row in np.flatnonzero(told.any(axis=1) & ~told.all(axis=1))[:_SHOWN]:
-        faults.add(f"{called(row)}, x_m, y_m, z_m", "all three, or none", "some of them")
-    bad = told.all(axis=1) & ~((away_m >= _LOWEST_M) & (away_m <= _HIGHEST_M))
-    for row in np.flatnonzero(bad)[:_SHOWN]:
-        hint = "kilometres for metres, or a receiver's place"
-        expected = "20 000 to 55 000 km from the earth's centre"
-        got = f"{away_m[row] / 1000:.0f} km"
-        faults.add(f"{called(row)}, x_m, y_m, z_m", expected, got, hint)
 
 
 def place_satellites(
     rows: pd.DataFrame, almanac: Almanac, start_utc_s: float, where: str = "pseudoranges"
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    """Give satellites the places that an almanac tells, where their rows tell none.
+    """Give satellites their places by an almanac, where their rows have none.
 
     Parameters
     ----------
     rows : pandas.DataFrame
-        Of the table of pseudoranges, checked.
+        Checked table of pseudoranges.
     almanac : Almanac
         Weeks may be counted modulo 1024. Satellites that are not healthy get no place.
     start_utc_s : float
         UTC seconds at ``time_s`` = 0.
     where : str
-        What messages call the table.
+        Name of the table in messages.
 
     Returns
     -------
     rows : pandas.DataFrame
     notes : tuple of str
-        Satellites that the almanac does not know, or that are not healthy.
+        Satellites that are not in the almanac, or not healthy.
 
     Raises
     ------
@@ -82,7 +47,7 @@ def place_satellites(
 
     Examples
     --------
-    >>> from mapfilter.gnss.almanac import nominal_gps
+    >>> from mapfilter.gnss.orbits import nominal_gps
     >>> start_utc_s = 1_700_000_000.0
     >>> week, _ = gps_time(start_utc_s)
     >>> rows = pd.DataFrame({"time_s": [0.0], "satellite": ["G01"], "pseudorange_m": [2.2e7],
@@ -95,7 +60,7 @@ def place_satellites(
     if not unplaced.any():
         return rows, ()
     if not np.isfinite(start_utc_s):
-        hint = "without it an almanac does not tell where satellites were"
+        hint = "needed for places of satellites by an almanac"
         raise fail(InputError, f"{where}, start_utc_s", "UTC seconds of the start", "none", hint)
     time_s = rows["time_s"].to_numpy(dtype=np.float64)
     week, second = gps_time(start_utc_s + float(time_s[unplaced][0]))
@@ -122,7 +87,6 @@ def sent_from_m(almanac: Almanac, week: int, second: Floats, range_m: Floats) ->
     ----------
     almanac : Almanac
         Of that satellite alone, its weeks counted on.
-    week : int
     second : (K,) array
         Of the week, at reception; may run over its end.
     range_m : (K,) array

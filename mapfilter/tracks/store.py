@@ -2,18 +2,17 @@
 
 ``log.json`` holds the format, its version, the CRS, the start and the checksums of the tables. A
 folder made by hand needs only ``{"crs": "EPSG:…"}`` in it; a table that is absent is empty. An
-almanac beside it (``almanac.txt``, YUMA) tells where satellites were whose rows do not.
+almanac beside it (``almanac.txt``, YUMA) gives the places of satellites whose rows have none.
 """
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Collection
-from dataclasses import dataclass
 from difflib import get_close_matches
 from math import inf, isnan, nan
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -30,7 +29,7 @@ from mapfilter._io import (
 )
 from mapfilter._types import Ints
 from mapfilter.errors import Faults, InputError, MapfilterError, StoreError, fail
-from mapfilter.gnss.almanac import read_yuma
+from mapfilter.gnss.orbits import read_yuma
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.schema import OPTIONAL, SCHEMA, TABLES
 
@@ -38,16 +37,17 @@ HEAD = "log.json"
 ALMANAC = "almanac.txt"
 
 _SUFFIXES = (".parquet", ".csv")
+_SEPARATORS = (",", ";", "\t")
+_LONGEST_ROW_BYTES = 1 << 16
+_DECIMAL_COMMA = r"^\s*([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)\s*$"
+FORMAT = "mapfilter track log"
+VERSION = 1
+_KEYS = ("format", "version", "crs", "start_utc_s", "notes", "parts")
+_ARROW = {"number": pa.float64(), "integer": pa.int64(), "text": pa.string()}
 
 
 def checked_parts(folder: Path, head: dict[str, Any]) -> dict[str, Path]:
-    """Return the tables that the head lists, after a look at their sizes and checksums.
-
-    Raises
-    ------
-    StoreError
-        A table is missing, cut off or changed.
-    """
+    """Return the tables that the head lists, unless one is missing, cut off or changed."""
     faults = Faults()
     paths = {}
     allowed = {f"{table}{suffix}": table for table in TABLES for suffix in _SUFFIXES}
@@ -72,13 +72,7 @@ def checked_parts(folder: Path, head: dict[str, Any]) -> dict[str, Path]:
 
 
 def parts_by_name(folder: Path) -> dict[str, Path]:
-    """Return the tables of a log made by hand.
-
-    Raises
-    ------
-    InputError
-        A table is there twice, or a file is called almost as a table that is missing.
-    """
+    """Return the tables of a log made by hand; InputError for tables present twice or misspelt."""
     faults = Faults()
     paths = {}
     for table in TABLES:
@@ -98,17 +92,13 @@ def parts_by_name(folder: Path) -> dict[str, Path]:
 
 
 def table_files(folder: Path) -> list[Path]:
-    """Return the files of a folder that are called as tables of a log."""
+    """Return the files of a folder that have the name of a table of a log."""
     named = (folder / f"{table}{suffix}" for table in TABLES for suffix in _SUFFIXES)
     return [path for path in named if path.is_file()]
 
 
-def ignored_files(folder: Path, used: Collection[Path]) -> tuple[str, ...]:
-    """Return a note for each file of a log's folder that is not read; hidden ones do not count."""
-    return tuple(f"{path}: not a table of a log, not read" for path in _others(folder, used))
-
-
 def _others(folder: Path, used: Collection[Path]) -> list[Path]:
+    """Return the files of a log's folder that are not read, but for hidden ones."""
     known = {HEAD, ALMANAC, *(path.name for path in used)}
     return [
         path
@@ -117,24 +107,11 @@ def _others(folder: Path, used: Collection[Path]) -> list[Path]:
     ]
 
 
-_SEPARATORS = (",", ";", "\t")
-_LONGEST_ROW_BYTES = 1 << 16
-_DECIMAL_COMMA = r"^\s*([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)\s*$"
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class ReadTable:
+class ReadTable(NamedTuple):
     """A table of a log as it was read.
 
-    Parameters
-    ----------
-    rows : pandas.DataFrame
-        Values; texts where they come from CSV.
-    row_numbers : (N,) integer array
-        What messages call each row: the line of a CSV file, in which the header is line 1 as in
-        editors and spreadsheets; the row of a Parquet file, counted from 1.
-    notes : tuple of str
-        What was mended.
+    ``rows`` are texts where they come from CSV. ``row_numbers`` are for messages: the line of a CSV
+    file, in which the header is line 1 as in editors; the row of a Parquet file, counted from 1.
     """
 
     rows: pd.DataFrame
@@ -143,15 +120,9 @@ class ReadTable:
 
 
 def read_table(table: str, path: Path) -> ReadTable:
-    """Read a table of a log.
+    """Read one of :data:`mapfilter.tracks.schema.TABLES` from CSV or Parquet.
 
     CSV is UTF-8 with commas, semicolons or tabs; decimal commas where commas separate nothing.
-
-    Parameters
-    ----------
-    table : str
-        Out of :data:`mapfilter.tracks.schema.TABLES`.
-    path : Path
 
     Raises
     ------
@@ -220,13 +191,6 @@ def _cut_off(path: Path, separator: str, header: str) -> tuple[str, ...]:
     return (f"{path}: ends within a row, as if cut off",)
 
 
-FORMAT = "mapfilter track log"
-VERSION = 1
-
-_KEYS = ("format", "version", "crs", "start_utc_s", "notes", "parts")
-_ARROW = {"number": pa.float64(), "integer": pa.int64(), "text": pa.string()}
-
-
 def write_log(
     log: TrackLog,
     folder: str | Path,
@@ -236,7 +200,6 @@ def write_log(
 
     Parameters
     ----------
-    log : TrackLog
     folder : str or Path
         Replaced when it is there; must be absent, empty or a log that mapfilter wrote.
     format : {"parquet", "csv"}
@@ -260,14 +223,8 @@ def write_log(
                 rows.to_csv(path, index=False, lineterminator="\n")
             else:
                 pq.write_table(_arrow(table, rows), path, compression="zstd")
-            parts.append(
-                {
-                    "path": path.name,
-                    "sha256": sha256_file(path),
-                    "bytes": path.stat().st_size,
-                    "rows": len(rows),
-                }
-            )
+            part = {"path": path.name, "sha256": sha256_file(path)}
+            parts.append(part | {"bytes": path.stat().st_size, "rows": len(rows)})
         head: dict[str, Any] = {
             "format": FORMAT,
             "version": VERSION,
@@ -294,46 +251,36 @@ def read_log(folder: str | Path) -> TrackLog:
         raise _no_log(folder, f"a track log (a folder with {HEAD})")
     where = str(folder / HEAD)
     head = read_json(folder / HEAD)
-    _check_head(head, where)
+    start_utc_s = _check_head(head, where)
     paths = checked_parts(folder, head) if "parts" in head else parts_by_name(folder)
     tables = {table: read_table(table, path) for table, path in paths.items()}
     notes = [note for read in tables.values() for note in read.notes]
+    others = _others(folder, paths.values())
+    ignored = [f"{path}: not a table of a log, not read" for path in others]
     beside = folder / ALMANAC
     return make_log(
         head.get("crs"),
         **{table: read.rows for table, read in tables.items()},
         almanac=read_yuma(beside) if beside.is_file() else None,
-        start_utc_s=_start_utc_s(head),
-        notes=(*head.get("notes", ()), *ignored_files(folder, paths.values()), *notes),
+        start_utc_s=start_utc_s,
+        notes=(*head.get("notes", ()), *ignored, *notes),
         names={"log": where} | {table: str(path) for table, path in paths.items()},
         row_numbers={table: read.row_numbers for table, read in tables.items()},
     )
 
 
 def is_log(path: str | Path) -> bool:
-    """Tell whether a path is a folder that holds a track log."""
+    """Return whether a path is a folder with a track log."""
     return (Path(path) / HEAD).is_file()
 
 
 def check_log_replaceable(folder: Path) -> None:
-    """See that replacing a folder loses nothing but a log that mapfilter wrote.
-
-    Raises
-    ------
-    OutputError
-        It holds other files, a log made by hand among them.
-    """
+    """Raise OutputError where a folder holds other files than a log that mapfilter wrote."""
     check_replaceable(folder, HEAD, FORMAT)
 
 
 def list_logs(path: str | Path) -> list[Path]:
-    """Return the log that ``path`` is, or the logs that lie in it, by name.
-
-    Raises
-    ------
-    InputError
-        There is none, or a folder in it holds tables without a head.
-    """
+    """Return the log that ``path`` is, or the logs in it, by name; InputError without any."""
     path = Path(path)
     if is_log(path):
         return [path]
@@ -350,7 +297,7 @@ def list_logs(path: str | Path) -> list[Path]:
 
 
 def _no_log(path: Path, expected: str) -> MapfilterError:
-    """Return the error for what is no log, with what would make it one."""
+    """Return the error for a path that is no log, and what it lacks."""
     tables = table_files(path)
     if tables:
         got = f"{tables[0].name} without a {HEAD} beside it"
@@ -367,7 +314,8 @@ def _arrow(table: str, rows: pd.DataFrame) -> pa.Table:
     return pa.Table.from_pandas(rows, schema, preserve_index=False).replace_schema_metadata(None)
 
 
-def _check_head(head: dict[str, Any], where: str) -> None:
+def _check_head(head: dict[str, Any], where: str) -> float:
+    """Check all but the tables of a head, and return its start."""
     if head.get("format", FORMAT) != FORMAT:
         raise fail(StoreError, f"{where}, format", FORMAT, head["format"])
     check_version(f"{where}, version", head.get("version", VERSION), VERSION)
@@ -382,10 +330,6 @@ def _check_head(head: dict[str, Any], where: str) -> None:
     if not (isinstance(notes, list) and all(isinstance(note, str) for note in notes)):
         faults.add(f"{where}, notes", "a list of texts", repr(notes))
     faults.raise_if_any(InputError)
-
-
-def _start_utc_s(head: dict[str, Any]) -> float:
-    start = head.get("start_utc_s")
     try:
         return nan if start is None else float(start)
     except OverflowError:

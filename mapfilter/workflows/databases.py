@@ -11,7 +11,7 @@ from typing import Any
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress
 from mapfilter.database.merge import merge
-from mapfilter.database.store import export_cog, export_geopackage, open_database
+from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, fail
 
 
@@ -65,6 +65,8 @@ def run_export(database: Path, to: Path) -> dict[str, Any]:
     MapfilterError
         The database is missing or damaged, the file's kind is unknown, or it cannot be written.
     """
+    from mapfilter.database.export import export_cog, export_geopackage
+
     kind = to.suffix.lower()
     if kind not in (".gpkg", ".tif", ".tiff"):
         expected = "a name that ends in .gpkg or .tif"

@@ -11,6 +11,7 @@ import numpy as np
 
 from mapfilter._io import ensure_writable_folder, write_json
 from mapfilter._parallel import Progress, local_executor, ordered_results
+from mapfilter._resume import start_or_resume
 from mapfilter.config.sections import Config
 from mapfilter.database.store import open_database
 from mapfilter.errors import InputError, fail
@@ -37,10 +38,9 @@ from mapfilter.experiments.benchmarks.ottawa_table import (
     session_rows,
     write_left_out,
 )
-from mapfilter.experiments.benchmarks.resuming import begin
-from mapfilter.rasters.rxlev_rasters import open_rasters
-from mapfilter.report.canvas import BLUE, GREEN, GREY
-from mapfilter.report.cumulative import Distribution, plot_cumulative
+from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.report.canvas import BLUE, GREEN, GREY, save
+from mapfilter.report.curves import Distribution, plot_cumulative
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.jsonable import to_jsonable
 from mapfilter.workflows.survey import run_survey
@@ -163,7 +163,7 @@ def run_ottawa(
     ]  # fmt: skip
     ensure_writable_folder(out)
     head = {"version": _VERSION, "seed": seed, "runs": runs, "options": repr(chosen)}
-    begin(out / HEAD, head, [task.result for task in tasks], resume=resume)
+    start_or_resume(out / HEAD, head, [task.result for task in tasks], resume=resume)
     todo = [task for task in tasks if not (resume and task.result.is_file())]
     before = len(tasks) - len(todo)
 
@@ -187,7 +187,7 @@ def run_ottawa(
         told += session_rows(found, centroid_m)
         title = f"Ottawa, {part}: real phones, each session on the map of the others"
         picture = out / part / PICTURE
-        plot_cumulative(_curves(every), picture, title=title, most_m=_MOST_M, share=0.95)
+        save(plot_cumulative(_curves(every), title=title, most_m=_MOST_M, share=0.95), picture)
     seconds = time.perf_counter() - began_s
     result = OttawaResult(seed, runs, tuple(rows), tuple(told), seconds, out)
     write_json(out / TABLE, to_jsonable(result))

@@ -28,9 +28,9 @@ from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.msi import read_antennas
+from mapfilter.report.canvas import save
 from mapfilter.report.errors import plot_error_over_distance
-from mapfilter.tracks.leave_out import leave_out
-from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.log import TrackLog, leave_out
 from mapfilter.tracks.store import list_logs, read_log
 from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.jsonable import to_jsonable
@@ -288,9 +288,7 @@ class _Sites:
         truth = Truth.of_table(log.truth)
         if truth is None:
             return ()
-        path = into / "error.png"
-        plot_error_over_distance(track.estimate, truth, path)
-        return (path,)
+        return (save(plot_error_over_distance(track.estimate, truth), into / "error.png"),)
 
     def lack(self, log: TrackLog, estimate: TrackEstimate) -> str:  # noqa: ARG002
         return "" if estimate.converged_at is not None else "too little was measured"

@@ -11,11 +11,11 @@ import pyarrow.compute as pc
 
 from mapfilter._types import Bools, Floats, Floats32, Ints, Ints32
 from mapfilter.database.manifest import POINTS
+from mapfilter.database.parquet import WindowReader
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.database.windows import WindowReader
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, same_crs
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.workflows.area import pixels_on
 
 MOST_PX = 1200

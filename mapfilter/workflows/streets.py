@@ -2,36 +2,30 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-import shapely
 
 from mapfilter.config.sections import Config
 from mapfilter.database.manifest import InputRole
 from mapfilter.errors import ConfigError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.roads.buildings import read_buildings
-from mapfilter.roads.clip import clip_ways
 from mapfilter.roads.corridors import Positions, corridors
+from mapfilter.roads.index import RouteSource
 from mapfilter.roads.landuse import LandUse, read_landuse
-from mapfilter.roads.layers import read_layer_buildings, read_layer_roads
+from mapfilter.roads.layers import read_layer_buildings, read_layer_water
 from mapfilter.roads.maps import resolve_map
-from mapfilter.roads.osm import read_squares, read_ways
-from mapfilter.roads.routable import RouteSource
-from mapfilter.roads.water import read_layer_water, read_water
-from mapfilter.roads.ways import Bounds, Buildings, Squares, Water, Ways
+from mapfilter.roads.osm import read_water
+from mapfilter.roads.routes import Roads, gaps, read_roads, unused_classes, within_reach_m
+from mapfilter.roads.ways import Bounds, Buildings, Water, Ways, clip_ways
 from mapfilter.simulation.synthetic_city import SyntheticCity
 from mapfilter.survey.measurements import Measurements, read_measurements
 from mapfilter.workflows.area import city_of
 
 OSM_ATTRIBUTION = "© OpenStreetMap contributors (ODbL)"
-
-_Roads = tuple[Ways, Squares | None, tuple[str, ...]]
 
 
 @dataclass(frozen=True)
@@ -78,7 +72,7 @@ class Streets:
     @cached_property
     def ways(self) -> Ways:
         """Ways, cut at the edge of the area."""
-        return clip_ways(self._roads[0], self.lattice.bounds_m)
+        return clip_ways(self._roads.ways, self.lattice.bounds_m)
 
     @cached_property
     def landuse(self) -> LandUse | None:
@@ -92,10 +86,9 @@ class Streets:
     def source(self) -> RouteSource:
         """All layers, ready for laying the points of any tile."""
         roads = self.config.roads
-        ways, squares, _ = self._roads
         return RouteSource.of(
-            ways,
-            squares,
+            self._roads.ways,
+            self._roads.squares,
             self.buildings if roads.cut_buildings else None,
             roads.half_width_m,
             half_width_by_class_m=roads.half_width_by_class_m,
@@ -107,8 +100,8 @@ class Streets:
         """What was left out, cut out, resampled or assumed."""
         if self.landuse is not None:
             return self.landuse.notes
-        roads, told = self.config.roads, list(self._roads[2])
-        told += _unused(roads.half_width_by_class_m, self._roads[0].class_names)
+        roads, told = self.config.roads, list(self._roads.notes)
+        told += unused_classes(self._roads.ways, roads.half_width_by_class_m)
         if self.gaps:
             told.append(self.gaps)
         if roads.cut_buildings and len(self.buildings):
@@ -119,26 +112,12 @@ class Streets:
 
     @property
     def gaps(self) -> str:
-        """Which ways are narrower than a pixel, so that their points have gaps; or nothing.
-
-        A corridor as wide as a pixel holds a pixel's centre in each row or column that it crosses.
-        """
-        roads, side_m = self.config.roads, self.lattice.resolution_m
+        """Which ways are narrower than a pixel, so that their points have gaps; or nothing."""
         if self.landuse is not None:
             return ""
-        ways = self.ways
-        default_m, by_class_m = roads.half_width_m, roads.half_width_by_class_m
-        width_m = 2 * np.array([by_class_m.get(name, default_m) for name in ways.class_names])
-        narrow = (width_m > 0) & (width_m < side_m)
-        length_m = shapely.length(ways.geometry)
-        gappy_m = float(length_m[narrow[ways.way_class]].sum())
-        if gappy_m == 0:
-            return ""
-        least_m = width_m[narrow][np.isin(np.flatnonzero(narrow), ways.way_class)].min()
-        return (
-            f"{gappy_m / length_m.sum():.0%} of the ways, down to {least_m:g} m wide, are narrower "
-            f"than the pixels of {side_m:g} m: their points have gaps"
-        )
+        roads = self.config.roads
+        side_m, by_class_m = self.lattice.resolution_m, roads.half_width_by_class_m
+        return gaps(self.ways, side_m, roads.half_width_m, by_class_m)
 
     @property
     def files(self) -> tuple[tuple[InputRole, Path], ...]:
@@ -171,42 +150,30 @@ class Streets:
         return city_of(self.config.area, self.lattice.crs)
 
     @cached_property
-    def _roads(self) -> _Roads:
-        """Ways and squares in and just about the area, and what is told of them.
-
-        Ways outside reach points inside by their half width.
-        """
+    def _roads(self) -> Roads:
         roads, lattice = self.config.roads, self.lattice
-        pad_m = max(roads.half_width_m, *roads.half_width_by_class_m.values(), 0.0)
-        west, south, east, north = lattice.bounds_m
-        bounds_m = west - pad_m, south - pad_m, east + pad_m, north + pad_m
+        by_class_m = roads.half_width_by_class_m
         if roads.tracks.files:
-            found = _corridors(self.config, lattice.crs, bounds_m)
-            return found[0], None, found[1]
-        if roads.layer is not None:
-            layer = read_layer_roads(
-                roads.layer,
-                lattice.crs,
-                bounds_m,
-                layer_name=roads.layer_name,
-                class_column=roads.class_column,
-                id_column=roads.id_column,
-            )
-            left_out = [name for name, m in roads.half_width_by_class_m.items() if m == 0]
-            areas = layer.areas_without(left_out) if roads.squares else None
-            return layer.ways, areas, layer.notes
-        if self._city is not None:
+            wide_m = within_reach_m(lattice.bounds_m, roads.half_width_m, by_class_m)
+            return _corridors(self.config, lattice.crs, wide_m)
+        if roads.layer is None and self._city is not None:
             return _made_roads(self._city, self.config)
-        if not self._has_map and roads.landuse is not None:
-            return Ways.none(lattice.crs), None, ()
-        if not self._has_map:
+        if roads.layer is None and not self._has_map:
+            if roads.landuse is not None:
+                return Roads(Ways.none(lattice.crs))
             expected = "roads without a map: roads.layer or roads.tracks.files"
             raise fail(ConfigError, "roads", expected, "none")
-        squares = None
-        if roads.squares and roads.profile == "walking":
-            squares = read_squares(self.config.area.map, lattice.crs, lattice.bounds_m)
-        ways = read_ways(self.config.area.map, roads.profile, lattice.crs, bounds_m)
-        return ways, squares, ()
+        return read_roads(
+            self.config.area.map if roads.layer is None else roads.layer,
+            lattice,
+            profile=roads.profile,
+            half_width_m=roads.half_width_m,
+            half_width_by_class_m=by_class_m,
+            squares=roads.squares,
+            layer_name=roads.layer_name,
+            class_column=roads.class_column,
+            id_column=roads.id_column,
+        )
 
     @cached_property
     def _water(self) -> Water | None:
@@ -226,13 +193,15 @@ class Streets:
         return Water(crs, np.concatenate([water.geometry for water in waters]))
 
 
-def _made_roads(city: SyntheticCity, config: Config) -> _Roads:
+def _made_roads(city: SyntheticCity, config: Config) -> Roads:
     """Return the ways and squares of a made city that a profile may use."""
     area, roads = config.area, config.roads
     walking = roads.profile == "walking"
     ways = city.ways if walking else city.driving_ways
     squares = city.squares if roads.squares and walking else None
-    return ways, squares, (f"streets of a city that does not exist: {area.map}, seed {area.seed}",)
+    return Roads(
+        ways, squares, (f"streets of a city that does not exist: {area.map}, seed {area.seed}",)
+    )
 
 
 def _parts(path: Path) -> list[Path]:
@@ -243,7 +212,7 @@ def _parts(path: Path) -> list[Path]:
     return [path, table] if path.suffix.lower() == ".shp" and table.is_file() else [path]
 
 
-def _corridors(config: Config, crs: str, bounds_m: Bounds) -> tuple[Ways, tuple[str, ...]]:
+def _corridors(config: Config, crs: str, bounds_m: Bounds) -> Roads:
     """Return the ways that the tracks of measurements make, cut to a box."""
     tracks, survey = config.roads.tracks, config.prediction.survey
     columns = {name: column for name, column in survey.columns if column is not None}
@@ -266,7 +235,7 @@ def _corridors(config: Config, crs: str, bounds_m: Bounds) -> tuple[Ways, tuple[
     if not len(ways):
         expected = "tracks in the area"
         raise fail(ConfigError, "roads.tracks.files", expected, "none", "tracks of another place")
-    return ways, found.notes
+    return Roads(ways, None, found.notes)
 
 
 def _positions(read: Measurements, session: int) -> Positions:
@@ -276,14 +245,3 @@ def _positions(read: Measurements, session: int) -> Positions:
     moved = np.hypot(np.diff(read.east_m[own]), np.diff(read.north_m[own])) > 0
     own = own[np.concatenate([[True], moved])] if own.size else own
     return Positions(read.east_m[own], read.north_m[own], read.accuracy_m[own])
-
-
-def _unused(widths_m: Mapping[str, float], names: tuple[str, ...]) -> list[str]:
-    """Return notes on half widths of classes that no way has."""
-    notes = []
-    for name in widths_m:
-        if name not in names:
-            close = difflib.get_close_matches(name, names, n=1)
-            tail = f"; did you mean {close[0]!r}?" if close else ""
-            notes.append(f"half_width_by_class_m: no way in the area is a {name!r}{tail}")
-    return notes

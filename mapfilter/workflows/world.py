@@ -15,12 +15,12 @@ from mapfilter.geodesy import Lattice
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan, read_cell_plan
 from mapfilter.radio.msi import read_antennas
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.maps import resolve_map
-from mapfilter.roads.routable import route_lattice_from_landuse
+from mapfilter.roads.routes import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings, Ways
 from mapfilter.simulation.layout import lay_out_plan
 from mapfilter.workflows.area import LARGEST_AREA_PX as LARGEST_AREA_PX

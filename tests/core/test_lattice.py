@@ -165,3 +165,11 @@ def test_aligned_means_the_same_to_a_thousandth_of_a_pixel():
         assert not LATTICE.aligned_with(changed), changed
         assert not changed.aligned_with(LATTICE)
     assert LATTICE.aligned_with(replace(LATTICE, crs=pyproj.CRS(CRS).to_wkt()))
+
+
+def test_a_lattice_in_words_names_its_crs_in_short():
+    assert str(Lattice("EPSG:32635", 0.0, 0.0, 5.0, 300, 1000)) == (
+        "300 x 1000 pixels of 5 m (5 x 1.5 km), EPSG:32635"
+    )
+    wkt = pyproj.CRS("+proj=tmerc +lon_0=9 +ellps=WGS84").to_wkt()
+    assert str(Lattice(wkt, 0.0, 0.0, 5.0, 1, 1)).endswith(", unknown")

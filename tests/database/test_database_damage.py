@@ -7,8 +7,9 @@ import pyarrow.parquet
 import pytest
 from small_world import IDS, make_database, make_world
 
+from mapfilter.database.export import export_geopackage
 from mapfilter.database.manifest import levels_folders
-from mapfilter.database.store import export_geopackage, open_database
+from mapfilter.database.store import open_database
 from mapfilter.errors import StoreError
 
 

@@ -19,7 +19,7 @@ from mapfilter.database.manifest import (
 from mapfilter.database.parts import levels_rows, points_table
 from mapfilter.database.radioroutes import fill_field
 from mapfilter.database.sources import check_aligned, overlap, pixels_between
-from mapfilter.database.tiles import TileLevels, TileRows, heard_levels, tile_windows, z_order
+from mapfilter.database.tiles import TileLevels, TileRows, received_levels, tile_windows, z_order
 from mapfilter.errors import InputError, StoreError
 from mapfilter.geodesy import Lattice
 
@@ -67,7 +67,7 @@ def test_what_is_heard_of_four_cells_at_six_points():
             [-69.99, -103.99, NAN, NAN, NAN, -104.004],
         ]
     )
-    heard = heard_levels(level_dbm, -104.0)
+    heard = received_levels(level_dbm, -104.0)
     # At the floor counts; levels are rounded before; of equals the first is the best.
     assert heard.best.tolist() == [3, 0, -1, 0, -1, 0]
     np.testing.assert_allclose(
@@ -80,12 +80,12 @@ def test_what_is_heard_of_four_cells_at_six_points():
         heard.below_best_db, [0.01, 0, 0, 0, 0.01, 6.5, 0.01, 5.01, 0, 33.99, 24.0], atol=1e-5
     )
     np.testing.assert_allclose(heard.level_dbm[-1], -104.0)
-    tied = heard_levels(np.array([[-80.0], [-70.0], [-70.0]]), -104.0)
+    tied = received_levels(np.array([[-80.0], [-70.0], [-70.0]]), -104.0)
     assert (tied.best.tolist(), tied.margin_db.tolist()) == ([1], [0.0])
-    alone = heard_levels(np.array([[-80.0, -105.0]]), -104.0)
+    alone = received_levels(np.array([[-80.0, -105.0]]), -104.0)
     assert alone.best.tolist() == [0, -1]
     assert np.isnan(alone.margin_db).all()
-    none = heard_levels(np.empty((0, 3)), -104.0)
+    none = received_levels(np.empty((0, 3)), -104.0)
     assert none.best.tolist() == [-1, -1, -1]
     assert none.cell.size == 0
     numbered = heard.of_cells((5, 7, 8, 9))
@@ -94,7 +94,7 @@ def test_what_is_heard_of_four_cells_at_six_points():
 
 
 def test_a_tile_comes_back_from_its_bytes_and_is_split_by_cell():
-    heard = heard_levels(np.array([[-70.0, NAN, -90.0], [-72.5, NAN, -88.0]]), -104.0)
+    heard = received_levels(np.array([[-70.0, NAN, -90.0], [-72.5, NAN, -88.0]]), -104.0)
     places = pa.table({name: np.arange(3) + n for n, name in enumerate(("point", "row", "col"))})
     tile = TileRows(places, heard)
     back = TileRows.from_bytes(tile.to_bytes())

@@ -136,3 +136,14 @@ def test_what_a_merge_says_of_where_it_comes_from(database, tmp_path):
     merge([database], tmp_path / "again", progress=lambda *at: seen.append(at))
     assert [done for done, _ in seen] == list(range(1, len(seen) + 1))
     assert {total for _, total in seen} == {len(seen)}
+
+
+def test_what_is_opened_shows_itself_in_two_lines(database):
+    text = repr(database)
+    assert len(text.splitlines()) == 2
+    count = len(database.points())
+    for part in (str(database.path), f"{len(IDS)} cells", f"{count} points", "EPSG:"):
+        assert part in text
+    field = f"{len(database.field().cell_ids)} cells, {count} points; {LATTICE}"
+    assert repr(database.field()) == f"RadioField({field})"
+    assert repr(database.points()).startswith(f"Points({count} of point, row, col, ")

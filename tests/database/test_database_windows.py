@@ -8,9 +8,8 @@ import pyarrow.parquet as pq
 import pytest
 from small_world import CRS
 
-from mapfilter.database.columns import count_rows, read_columns, write_columns
+from mapfilter.database.parquet import WindowReader, count_rows, read_columns, write_columns
 from mapfilter.database.tiles import z_order
-from mapfilter.database.windows import WindowReader
 from mapfilter.errors import StoreError
 from mapfilter.geodesy import Lattice
 

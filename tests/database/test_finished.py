@@ -10,14 +10,16 @@ import shapely
 from small_world import CRS, FLOOR_DBM, LATTICE, levels_of, make_plan, make_routes
 
 from mapfilter._parallel import SerialExecutor
+from mapfilter._resume import FinishedParts
 from mapfilter.database import build as finished
-from mapfilter.database.build import FinishedTiles, build, work_key
+from mapfilter.database.build import build, work_key
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes
 from mapfilter.errors import InputError, OutputError
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.buildings import Buildings
-from mapfilter.roads.routable import RouteSource
-from mapfilter.roads.water import Water
+from mapfilter.roads.index import RouteSource
+from mapfilter.roads.osm import Water
 from mapfilter.roads.ways import Squares, Ways
 
 FINISHED = 3
@@ -215,7 +217,7 @@ def test_the_digest_of_layers_tells_every_layer_apart():
 
 
 def test_tiles_lie_beside_the_database_in_a_folder_named_after_the_key(tmp_path):
-    tiles = FinishedTiles(tmp_path / "db", lambda: "0123456789abcdef" + "f" * 48)
+    tiles = FinishedParts(tmp_path / "db", lambda: "0123456789abcdef" + "f" * 48, name="tile")
     assert tiles.folder == tmp_path / ".db.tiles-0123456789abcdef"
 
 
@@ -225,7 +227,8 @@ def test_tiles_lie_beside_the_database_in_a_folder_named_after_the_key(tmp_path)
      (RuntimeError, True)],
 )  # fmt: skip
 def test_tiles_stay_only_where_going_on_makes_sense(tmp_path, error, kept):
-    with contextlib.suppress(BaseException), FinishedTiles(tmp_path / "db", lambda: "k") as tiles:
+    tiles = FinishedParts(tmp_path / "db", lambda: "k", name="tile")
+    with contextlib.suppress(BaseException), tiles:
         tiles.save(0, b"rows")
         if error is not None:
             raise error(())
@@ -233,12 +236,12 @@ def test_tiles_stay_only_where_going_on_makes_sense(tmp_path, error, kept):
 
 
 def test_who_never_asked_for_tiles_needs_no_key(tmp_path):
-    with FinishedTiles(tmp_path / "db", lambda: pytest.fail("the key was asked for")):
+    with FinishedParts(tmp_path / "db", lambda: pytest.fail("the key was asked for"), name="tile"):
         pass
 
 
 def test_a_tile_that_cannot_be_written_is_an_error(tmp_path):
-    tiles = FinishedTiles(tmp_path / "db", lambda: "k")
+    tiles = FinishedParts(tmp_path / "db", lambda: "k", name="tile")
     tiles.folder.write_bytes(b"a file where the folder should be")
     with pytest.raises(OutputError, match="tile-3"):
         tiles.save(3, b"rows")

@@ -117,10 +117,10 @@ def test_each_case_is_run_with_its_own_sheet():
     world, _ = run(*names)
     for name, (choice, _) in zip(names, world.opened, strict=True):
         assert choice == informed(CHOICE, CASES[name])
-    assert world.opened[2][0].options.smooth
+    assert world.opened[2][0].smooth
     sheetless = frozenset({"heading_sd_rad", "bias_sd_rad"})
     world, _ = run("levels-bias20", fixed=sheetless)
-    motion = world.opened[0][0].options.motion
+    motion = world.opened[0][0].motion
     assert motion.heading_sd_rad == BayesOptions().motion.heading_sd_rad
     assert motion.bias_sd_rad == BayesOptions().motion.bias_sd_rad
     assert motion.scale_sd == 0.1

@@ -14,10 +14,12 @@ from mapfilter.experiments.benchmarks.world import BenchmarkWorld, write_buildin
 from mapfilter.experiments.sweep.world import SweepWorld, write_world
 from mapfilter.geodesy import Lattice
 from mapfilter.positioning.candidate import CandidateFilter
-from mapfilter.propagation.predict import PredictionModel, RealityErrors, predict
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
+from mapfilter.propagation.predict import predict
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.ways import Buildings
 from mapfilter.simulation.imu import ImuErrors
@@ -26,7 +28,9 @@ from mapfilter.simulation.simulate import SimulationSettings
 LATTICE = Lattice(CRS, WEST_M, SOUTH_M + 600.0, 10.0, 60, 60)
 PLAN = CellPlan(CRS, plan().cells[:2])
 MODEL = PredictionModel(model="cost231_hata")
-NONE = RealityErrors(level_error_db=0.0, eirp_error_db=0.0, azimuth_error_deg=0.0, slope_error=0.0)
+NONE = GroundTruthErrors(
+    level_error_db=0.0, eirp_error_db=0.0, azimuth_error_deg=0.0, slope_error=0.0
+)
 ROWS, COLS = np.indices((60, 60))
 PLACES = LATTICE.east_north(ROWS.ravel(), COLS.ravel())
 
@@ -91,7 +95,7 @@ def test_measured_antennas_are_the_ground_truths_too(tmp_path):
 
 
 def test_the_default_ground_truth_is_not_the_prediction(folder):
-    off = received(folder, RealityErrors(), 1) - predicted()
+    off = received(folder, GroundTruthErrors(), 1) - predicted()
     assert off.std() > 4.0
 
 
@@ -121,7 +125,7 @@ def test_the_checksum_is_of_all_that_is_simulated(tmp_path):
     worlds = [
         world,
         replace(world, model=replace(MODEL, environment="suburban")),
-        replace(world, errors=RealityErrors(offset_db=1.0)),
+        replace(world, errors=GroundTruthErrors(offset_db=1.0)),
         replace(world, settings=SimulationSettings(imu=ImuErrors(turns="gyro"))),
         replace(world, settings=SimulationSettings(imu_period_s=2.0)),
     ]

@@ -10,7 +10,7 @@ from mapfilter.experiments.benchmarks import satellites
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.journeys import Walk
 from mapfilter.experiments.benchmarks.satellites import SPOOFED_S, spoofer_of, with_satellites
-from mapfilter.gnss.visibility import Skyline
+from mapfilter.gnss.sky import Skyline
 from mapfilter.simulation.reflections import NlosModel
 from mapfilter.simulation.satellites import ReceptionModel
 from mapfilter.tracks.log import make_log

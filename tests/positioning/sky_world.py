@@ -4,8 +4,7 @@ import numpy as np
 import pandas as pd
 from cross_world import CRS, walk_log
 
-from mapfilter.gnss.almanac import joined, nominal_galileo, nominal_gps
-from mapfilter.gnss.orbits import gps_time
+from mapfilter.gnss.orbits import gps_time, joined, nominal_galileo, nominal_gps
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.simulation.satellites import ReceptionModel, receive
 from mapfilter.tracks.log import make_log

@@ -21,7 +21,7 @@ from mapfilter.positioning.filter import estimate_of, locate
 from mapfilter.testing import ContractError, check_belief_filter
 from mapfilter.tracks.log import make_log
 
-FEW = ParticleOptions(most=4000, searching=2000, least=500)
+FEW = ParticleOptions(max_particles=4000, min_search_particles=2000, min_particles=500)
 READING = RadioReading(0, 0.5, expected=-0.2, length_m=5.0)
 
 

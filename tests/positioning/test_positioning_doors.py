@@ -11,8 +11,7 @@ from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Status
 from mapfilter.filters.hypotheses import BeliefSummary
 from mapfilter.filters.particle import ParticleOptions
-from mapfilter.models.cell_id import ServingWeights
-from mapfilter.models.fingerprint import LevelErrors
+from mapfilter.models.fingerprint import LevelErrors, ServingWeights
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.positioning.bayes.alternative import (
     TRANSITIONS,
@@ -122,7 +121,7 @@ def test_wide_errors_get_more_particles():
     def numbers(bias_sd_deg, scale_sd):
         motion = MotionErrors(bias_sd_rad=radians(bias_sd_deg), scale_sd=scale_sd)
         found = BayesOptions(motion=motion, particles=ParticleOptions(1000, 600, 10))._particles
-        return found.most, found.searching, found.least
+        return found.max_particles, found.min_search_particles, found.min_particles
 
     assert numbers(1.5, 0.015) == (1000, 600, 10)
     assert numbers(0.0, 0.0) == (1000, 600, 10)

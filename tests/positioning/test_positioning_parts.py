@@ -22,8 +22,13 @@ from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
 from mapfilter.positioning.epochs import GnssFix, ReportRow, headed
 from mapfilter.positioning.gnss.gate import FixTerm, widened
 from mapfilter.positioning.kalman.filter import gaussian_radii_m, share_within
-from mapfilter.positioning.kalman.position_filter import filter_fixes
-from mapfilter.positioning.kalman.static_fix import BAD_GEOMETRY, TOO_FEW, StaticFix, static_fix
+from mapfilter.positioning.kalman.static_fix import (
+    BAD_GEOMETRY,
+    TOO_FEW,
+    StaticFix,
+    filter_fixes,
+    static_fix,
+)
 from mapfilter.positioning.matched_way import matched_way
 
 

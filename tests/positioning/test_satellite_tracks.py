@@ -17,7 +17,7 @@ from mapfilter.positioning.filter import estimate_of, locate
 from mapfilter.simulation.satellites import Spoofer
 from mapfilter.tracks.log import make_log
 
-FEW = ParticleOptions(most=2000, searching=1000, least=300)
+FEW = ParticleOptions(max_particles=2000, min_search_particles=1000, min_particles=300)
 LONG = ((EAST, 90.0), (NORTH, 90.0), (SOUTH, 90.0), (EAST, 200.0))
 
 

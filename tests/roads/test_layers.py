@@ -10,9 +10,9 @@ from made_maps import AREA, CRS, ORIGIN, write_pbf
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
-from mapfilter.roads.layers import read_layer_buildings, read_layer_roads
-from mapfilter.roads.routable import route_lattice
-from mapfilter.roads.water import read_layer_water, read_water
+from mapfilter.roads.layers import read_layer_buildings, read_layer_roads, read_layer_water
+from mapfilter.roads.osm import read_water
+from mapfilter.roads.routes import route_lattice
 
 FORMATS = ("roads.shp", "roads.gpkg", "roads.geojson", "roads.fgb", "roads.parquet", "roads.gml",
            "roads.sqlite", "roads.shp.zip")  # fmt: skip
@@ -235,7 +235,7 @@ def test_what_is_no_vector_file(tmp_path):
         ("points.csv", "a layer with geometry"),
         ("a.vrt", "leads to other places"),
         ("folder", "a folder"),
-        ("bomb.zip", "a bomb"),
+        ("bomb.zip", "decompression bomb"),
     ):
         with pytest.raises(InputError, match=message):
             read_layer_roads(tmp_path / name, *AREA)

@@ -13,10 +13,9 @@ from made_maps import AREA, CRS, ORIGIN, write_pbf, write_xml
 
 from mapfilter.geodesy import Lattice
 from mapfilter.roads.buildings import rasterise_heights, read_buildings
-from mapfilter.roads.layers import read_layer_buildings, read_layer_roads
-from mapfilter.roads.osm import read_squares, read_ways
-from mapfilter.roads.routable import route_lattice
-from mapfilter.roads.water import read_layer_water, read_water
+from mapfilter.roads.layers import read_layer_buildings, read_layer_roads, read_layer_water
+from mapfilter.roads.osm import read_squares, read_water, read_ways
+from mapfilter.roads.routes import route_lattice
 
 LATTICE = Lattice.covering(CRS, AREA[1], 5.0)
 

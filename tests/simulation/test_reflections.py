@@ -7,10 +7,8 @@ import shapely
 
 from mapfilter.errors import ConfigError
 from mapfilter.geodesy import unproject
-from mapfilter.gnss.almanac import nominal_gps
-from mapfilter.gnss.orbits import gps_time
-from mapfilter.gnss.sky import ecef_from_lonlat
-from mapfilter.gnss.visibility import Skyline
+from mapfilter.gnss.orbits import gps_time, nominal_gps
+from mapfilter.gnss.sky import Skyline, ecef_from_lonlat
 from mapfilter.simulation.reflections import NlosModel, draw_reflections, held_along
 from mapfilter.simulation.satellites import ReceptionModel, Spoofer, receive
 

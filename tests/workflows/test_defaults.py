@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from mapfilter.config.sections import Config, Journeys
 from mapfilter.errors import ConfigError
 from mapfilter.positioning.candidate import CandidateFilter
-from mapfilter.propagation.predict import PredictionModel, RealityErrors
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.simulation.layout import lay_out_plan
 from mapfilter.simulation.reports import ReportModel
@@ -23,7 +23,7 @@ CONFIG = Config()
 def test_prediction():
     section = CONFIG.prediction
     assert predict.prediction_model(section) == PredictionModel()
-    assert predict.ground_truth_errors(section) == RealityErrors()
+    assert predict.ground_truth_errors(section) == GroundTruthErrors()
 
 
 def test_simulation():

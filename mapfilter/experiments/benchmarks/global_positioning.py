@@ -14,9 +14,9 @@ from typing import Any
 
 from mapfilter._io import read_json, write_json
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
+from mapfilter._resume import start_or_resume
 from mapfilter.experiments.benchmarks.cases import CASES, Case
 from mapfilter.experiments.benchmarks.journeys import displaced_walk, log_of, walk
-from mapfilter.experiments.benchmarks.resuming import begin
 from mapfilter.experiments.benchmarks.satellites import TOWN_HEIGHT, spoofer_of, with_satellites
 from mapfilter.experiments.benchmarks.scores import (
     CaseResult,
@@ -169,7 +169,7 @@ def benchmark(
         "world": world.sha256,
     }
     (out / BATCHES).mkdir(parents=True, exist_ok=True)
-    begin(out / HEAD, head, (out / BATCHES).glob("*.json"), resume=resume)
+    start_or_resume(out / HEAD, head, (out / BATCHES).glob("*.json"), resume=resume)
     tasks, kept = [], dict[int, list[Row]]()
     for first in range(0, runs, ROUTES_PER_BATCH):
         end = min(first + ROUTES_PER_BATCH, runs)

@@ -11,9 +11,8 @@ import pandas as pd
 
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.benchmarks.journeys import Walk
-from mapfilter.gnss.almanac import joined, nominal_galileo, nominal_gps
-from mapfilter.gnss.orbits import gps_time
-from mapfilter.gnss.visibility import Skyline
+from mapfilter.gnss.orbits import gps_time, joined, nominal_galileo, nominal_gps
+from mapfilter.gnss.sky import Skyline
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.simulation.satellites import ReceptionModel, Spoofer, receive
 from mapfilter.tracks.log import TrackLog, make_log

@@ -14,10 +14,11 @@ from typing import Any
 import pandas as pd
 import pyarrow as pa
 
-from mapfilter._io import read_json, sha256_file, write_json
+from mapfilter._io import ensure_writable_folder, sha256_file
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
+from mapfilter._resume import start_or_resume
 from mapfilter.database.store import open_database
-from mapfilter.errors import ConfigError, OutputError, StoreError, fail
+from mapfilter.errors import StoreError, fail
 from mapfilter.evaluation.accuracy import accuracy
 from mapfilter.experiments.sweep import table
 from mapfilter.experiments.sweep.journeys import filter_rng, heard, sensed, true_path, truth_of
@@ -31,6 +32,12 @@ HEAD = "sweep.json"
 UNFINISHED = "unfinished"
 
 _VERSION = 1
+_DETERMINED_BY = {
+    "plan_sha256": "plan",
+    "world_sha256": "world (streets, cells or levels)",
+    "databases_sha256": "database",
+    "version": "version of mapfilter",
+}
 _WORLDS, _LOCATORS, _PATHS = 1, 32, 2
 
 
@@ -134,15 +141,17 @@ def sweep(
         "databases_sha256": manifests,
         "plan": plan.told,
     }
+    batches = unfinished / "batches"
     parts = [
-        (unfinished / "batches" / f"{number:06d}.parquet", first, end)
+        (batches / f"{number:06d}.parquet", first, end)
         for number, (first, end) in enumerate(plan.batches())
     ]
-    if resume and _known(out, head) and table.is_part(out / RUNS, plan.runs):
+    older = [out / RUNS, *(batches.glob("*") if batches.is_dir() else ())]
+    resumed = start_or_resume(out / HEAD, head, older, resume=resume, names=_DETERMINED_BY)
+    if resumed and table.is_part(out / RUNS, plan.runs):
         shutil.rmtree(unfinished, ignore_errors=True)
         return out / RUNS
-    _make_way(out, resume)
-    write_json(out / HEAD, head)
+    ensure_writable_folder(batches)
     todo = [part for part in parts if not table.is_part(part[0], part[2] - part[1])]
     opened = tuple((databases[name], manifests[name]) for name in plan.databases)
     place = unfinished / "world"
@@ -159,37 +168,6 @@ def sweep(
     table.join_parts((path for path, _, _ in parts), out / RUNS)
     shutil.rmtree(unfinished, ignore_errors=True)
     return out / RUNS
-
-
-def _known(out: Path, head: Mapping[str, object]) -> bool:
-    """Tell whether a folder holds a sweep, and see that it is this one."""
-    if not (out / HEAD).is_file():
-        return False
-    found = read_json(out / HEAD)
-    names = {
-        "plan_sha256": "another plan",
-        "world_sha256": "other streets, cells or levels",
-        "databases_sha256": "another database",
-        "version": "another version of mapfilter",
-    }
-    changed = [told for name, told in names.items() if found.get(name) != head[name]]
-    if changed:
-        expected = "a sweep of the same plan over the same world to resume"
-        hint = "settings changed since; sweep without --resume, or into another folder"
-        raise fail(ConfigError, str(out), expected, ", ".join(changed), hint)
-    return True
-
-
-def _make_way(out: Path, resume: bool) -> None:
-    """Remove an older sweep's table, and its batches where they are not wanted."""
-    try:
-        (out / RUNS).unlink(missing_ok=True)
-        if not resume:
-            (out / HEAD).unlink(missing_ok=True)
-            shutil.rmtree(out / UNFINISHED / "batches", ignore_errors=True)
-        (out / UNFINISHED / "batches").mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise fail(OutputError, str(out), "a place to write", error.strerror or error) from error
 
 
 def _journey(run: Run) -> tuple[Radio, float, int]:

@@ -107,8 +107,9 @@ class BayesPositioner(Filter[BayesState]):
             grids = {compass: StreetGrid(self.model, compass) for compass in (True, False)}
             return {compass: GridFilter(grid, known) for compass, grid in grids.items()}
         # Every place times every heading: most of them die out after a few steps.
-        most, searching = _MORE_PARTICLES * known.most, _MORE_SEARCHING * known.searching
-        unknown = replace(known, most=most, searching=searching)
+        most = _MORE_PARTICLES * known.max_particles
+        searching = _MORE_SEARCHING * known.min_search_particles
+        unknown = replace(known, max_particles=most, min_search_particles=searching)
         return {
             True: ParticleFilter(self.model, known),
             False: ParticleFilter(self.model, unknown),
@@ -159,7 +160,7 @@ class BayesPositioner(Filter[BayesState]):
             return
         model, rng = self.model, np.random.default_rng(0)
         west, south = model.area.origin_m
-        small = replace(self, options=replace(self.options, most=64, least=32))
+        small = replace(self, options=replace(self.options, max_particles=64, min_particles=32))
         state = small.begin_at(west, south, 1.0, rng)
         state, _ = small.step(state, Epoch(0.0, (MotionStep(1.0, 0.0),)), rng)
         if state.belief is not None and model.area.cell_ids:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import exp, isfinite, pi, sqrt
+from math import isfinite, pi, sqrt
 
 import numpy as np
 
@@ -18,8 +18,8 @@ from mapfilter._types import Floats, Floats32, Ints32
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.filters.resampling import systematic
-from mapfilter.models import cell_id, fingerprint
-from mapfilter.models.fingerprint import LevelReading
+from mapfilter.models import fingerprint
+from mapfilter.models.fingerprint import LevelReading, RasterFrame
 from mapfilter.models.measured_map import ServingStatistics
 from mapfilter.models.street_motion import (
     BIAS,
@@ -90,7 +90,7 @@ class BayesModel:
 
     @cached_property
     def _serving_table(self) -> Floats32:
-        return cell_id.serving_table(self.evidence.serving)
+        return fingerprint.serving_table(self.evidence.serving)
 
     @cached_property
     def _bound_table(self) -> Floats32:
@@ -181,16 +181,9 @@ class BayesModel:
             noise = np.random.default_rng(int(key)).standard_normal((2, state.shape[1]))
             moved[: NORTH + 1] += (length_m / sqrt(2.0) * noise).astype(np.float32)
         weighed = log_weight.copy()
-        found = np.empty(weighed.size, dtype=np.float32)
-        lattice, weights = self.area.lattice, self.weights
-        step = lattice.resolution_m
-        top_m = _F((lattice.rows - 0.5) * step)
-        interpolate(moved, self.log_map, _F(step / 2), top_m, _F(1 / step), found)
-        on = _F(weights.weight_per_m * length_m)
-        off = _F(exp(-weights.off_cost_per_m * length_m))
-        leave = _F(1 - exp(-weights.leave_per_m * length_m))
-        come_back = _F(1 - exp(-weights.return_per_m * length_m))
-        weigh_by_map(found, moved[OFF], on, off, leave, come_back, weighed)
+        rows, step = self.area.lattice.rows, self.area.lattice.resolution_m
+        found = interpolate(moved, self.log_map, step / 2, (rows - 0.5) * step, 1 / step)
+        weigh_by_map(found, moved[OFF], self.weights.over(length_m), weighed)
         return moved, weighed
 
     def weigh(self, state: Floats32, log_weight: Floats, reading: RadioReading) -> Reason:
@@ -201,20 +194,17 @@ class BayesModel:
         if reading.serving >= 0 or reading.levels is not None or reading.bounds:
             now = self._pixels(state, 0.0, 0.0)
             used = True
-            weight = reading.serving_weight
-            if reading.serving >= 0 and weight > 0:
-                table = self._serving_table
-                cell_id.weigh_by_serving(
+            if reading.serving >= 0 and reading.serving_weight > 0:
+                table, weight = self._serving_table, reading.serving_weight
+                fingerprint.weigh_by_serving(
                     now, flat, bands, reading.serving, table, weight, log_weight
                 )
             if reading.levels is not None:
-                one = reading.levels
-                then = self._pixels(state, one.back_east_m, one.back_north_m)
-                levels = (one.cell, one.offset_db, one.rho, one.scale, one.common, one.weight)
-                fingerprint.weigh_by_levels(now, then, flat, bands, *levels, one.clip, log_weight)
+                levels = reading.levels
+                then = self._pixels(state, levels.back_east_m, levels.back_north_m)
+                fingerprint.weigh_by_levels(now, then, flat, bands, levels, log_weight)
             for bound in reading.bounds:
-                given = (bound.cells, bound.level_dbm, bound.censored, bound.sd_db, bound.weight)
-                fingerprint.weigh_by_bound(now, flat, bands, *given, self._bound_table, log_weight)
+                fingerprint.weigh_by_bound(now, flat, bands, bound, self._bound_table, log_weight)
         for term in reading.terms:
             log_weight += term.log_likelihood(state)
             used = True
@@ -227,10 +217,8 @@ class BayesModel:
     def _pixels(self, state: Floats32, back_east_m: float, back_north_m: float) -> Ints32:
         """Return the pixel of each hypothesis, moved back by a displacement of dead reckoning."""
         lattice, step = self.area.lattice, self.area.lattice.resolution_m
-        pixel = np.empty(state.shape[1], dtype=np.int32)
-        frame = (0.0, lattice.rows * step, 1 / step, lattice.rows, lattice.cols)
-        fingerprint.pixels(state, back_east_m, back_north_m, *frame, pixel)
-        return pixel
+        frame = RasterFrame(0.0, lattice.rows * step, 1 / step, lattice.rows, lattice.cols)
+        return np.asarray(fingerprint.pixels(state, back_east_m, back_north_m, frame))
 
 
 _MIN_VARIANCE = 0.25

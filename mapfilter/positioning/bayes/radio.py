@@ -16,8 +16,7 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.filters.contract import Reason
-from mapfilter.models.cell_id import ServingWeights
-from mapfilter.models.fingerprint import BoundReading, LevelErrors, LevelReading
+from mapfilter.models.fingerprint import BoundReading, LevelErrors, LevelReading, ServingWeights
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import (
     Context,

@@ -8,7 +8,7 @@ from math import cos, isfinite, nan, sin, sqrt
 from typing import Any
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
-from mapfilter.filters.hypotheses import nothing
+from mapfilter.filters.hypotheses import empty_summary
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, EvidenceCusum, MapBelief
 from mapfilter.positioning.bayes.area_map import AreaMap
@@ -104,7 +104,7 @@ def step_output(
     """Summarise the leading belief; ``reason`` tells whether the epoch's report was used."""
     belief, (west, south) = state.leading, area.origin_m
     if belief is None:
-        summary, count, way = nothing(STATES), 0, (0, nan)
+        summary, count, way = empty_summary(STATES), 0, (0, nan)
     else:
         summary, count = belief.summary, belief.log_weight.size
         way = matched_way(area, belief.state[0], belief.state[1], belief.weight)

@@ -18,8 +18,7 @@ from mapfilter._types import Bools, Floats, Floats32
 from mapfilter.filters import rao_blackwell
 from mapfilter.filters.contract import Reason
 from mapfilter.filters.rao_blackwell import MixedBelief, SirOptions
-from mapfilter.gnss.grid_frame import GridFrame
-from mapfilter.gnss.sky import directions
+from mapfilter.gnss.sky import GridFrame, directions
 from mapfilter.models.motion import clock_noise
 from mapfilter.models.ranging import pseudoranges
 from mapfilter.models.state import StateLayout
@@ -292,7 +291,7 @@ def sky_over(
         return None, tuple(unused)
     east, north = middle_m[0] + origin_m[0], middle_m[1] + origin_m[1]
     frame = GridFrame(crs, east, north, options.height_m)
-    local = frame.satellites_m(np.array([row.place_m for row in chosen.values()]))
+    local = frame.local.to_local(np.array([row.place_m for row in chosen.values()]))
     seen = directions(local)
     sky = Sky(
         tuple(chosen),

@@ -1,0 +1,214 @@
+"""Parquet parts whose pages carry checksums, so that a changed byte is an error when it is read."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+from pyproj import CRS
+
+from mapfilter._types import Floats
+from mapfilter.errors import MapfilterError, StoreError, fail
+from mapfilter.geodesy import Lattice
+
+# A damaged footer or page header can ask for absurd amounts of memory or name other columns.
+DAMAGE = (OSError, pa.ArrowException, ValueError, KeyError, MemoryError)
+_WKB_POINT = np.dtype([("order", "u1"), ("kind", "<u4"), ("east", "<f8"), ("north", "<f8")])
+Window = tuple[int, int, int, int]
+"""Row, column, rows and columns on a lattice."""
+
+_EVERYWHERE = (-(2**62), 2**62)
+
+
+def write_columns(
+    table: pa.Table, where: Path | pa.NativeFile, rows_in_a_group: int | None = None
+) -> None:
+    """Write a table as Parquet with page checksums."""
+    with open_writer(table.schema, where) as writer:
+        writer.write_table(table, rows_in_a_group)
+
+
+def open_writer(schema: pa.Schema, where: Path | pa.NativeFile) -> pq.ParquetWriter:
+    """Return a writer that adds row groups as :func:`write_columns` writes them.
+
+    Whole numbers, which differ little from row to row along the Z-order curve, are kept as
+    differences; what else repeats itself, as numbers into a dictionary.
+    """
+    whole = [field.name for field in schema if pa.types.is_integer(field.type)]
+    unique = {*whole, "geometry"}
+    return pq.ParquetWriter(
+        where,
+        schema,
+        compression="zstd",
+        write_page_checksum=True,
+        use_dictionary=[name for name in schema.names if name not in unique],
+        column_encoding=dict.fromkeys(whole, "DELTA_BINARY_PACKED"),
+    )
+
+
+def read_columns(path: Path, columns: Sequence[str]) -> pa.Table:
+    """Read some columns of a part and compare their checksums; StoreError where damaged."""
+    try:
+        with pq.ParquetFile(path, page_checksum_verification=True) as source:
+            table = source.read(list(columns))
+        table.validate(full=True)
+    except DAMAGE as error:
+        raise damaged(path, error) from error
+    if missing := [name for name in columns if name not in table.column_names]:
+        raise fail(StoreError, str(path), f"column {missing[0]}", "none", "damaged")
+    return table.select(list(columns))
+
+
+def check_places(path: Path, table: pa.Table, lattice: Lattice) -> None:
+    """Check that the points of a part lie on the lattice, and are numbered by it."""
+    point, row, col = (table[name].to_numpy() for name in ("point", "row", "col"))
+    numbers = row.astype(np.int64) * lattice.cols + col
+    if not (np.array_equal(point, numbers) and lattice.contains(row, col).all()):
+        expected = "points on the database's lattice"
+        raise fail(StoreError, str(path), expected, "others", "parts mixed up")
+
+
+def count_rows(path: Path) -> int:
+    """Return the number of rows in a part's footer; raise StoreError where it is damaged."""
+    try:
+        return int(pq.read_metadata(path).num_rows)
+    except DAMAGE as error:
+        raise damaged(path, error) from error
+
+
+def damaged(path: Path, error: Exception) -> MapfilterError:
+    """Return the error for a part that cannot be read."""
+    if isinstance(error, FileNotFoundError):
+        return fail(StoreError, str(path), "a part of the database", "no such file")
+    reason = (str(error).splitlines() or [type(error).__name__])[0]
+    return fail(StoreError, str(path), "a whole Parquet file", reason, "damaged")
+
+
+def point_geometry(east_m: Floats, north_m: Floats) -> pa.Array:
+    """Return points as well-known binary, shape (N,).
+
+    Examples
+    --------
+    >>> import shapely
+    >>> shapely.from_wkb(point_geometry(np.array([3.0]), np.array([4.0]))[0].as_py())
+    <POINT (3 4)>
+    """
+    points = np.empty(east_m.size, dtype=_WKB_POINT)
+    points["order"], points["kind"] = 1, 1
+    points["east"], points["north"] = east_m, north_m
+    offsets = np.arange(east_m.size + 1, dtype=np.int32) * np.int32(_WKB_POINT.itemsize)
+    buffers = [None, pa.py_buffer(offsets.tobytes()), pa.py_buffer(points.tobytes())]
+    return pa.Array.from_buffers(pa.binary(), east_m.size, buffers)
+
+
+def point_coordinates(geometry: pa.Array) -> Floats:
+    """Return east and north of points that :func:`point_geometry` made, shape (N, 2).
+
+    Examples
+    --------
+    >>> point_coordinates(point_geometry(np.array([3.0, 5.0]), np.array([4.0, 6.0]))).tolist()
+    [[3.0, 4.0], [5.0, 6.0]]
+    """
+    # Offsets into the bytes show where a slice of a longer array begins.
+    _, offsets, data = geometry.buffers()
+    first = np.frombuffer(offsets, np.int32)[geometry.offset] if len(geometry) else 0
+    points = np.frombuffer(data, _WKB_POINT, len(geometry), int(first))
+    return np.column_stack((points["east"], points["north"]))
+
+
+def geo_metadata(crs: str, bounds_m: tuple[float, float, float, float] | None) -> bytes:
+    """Return the value of the GeoParquet 1.1 key ``geo`` for a ``geometry`` column of points."""
+    column: dict[str, Any] = {
+        "encoding": "WKB",
+        "geometry_types": ["Point"],
+        "crs": CRS.from_user_input(crs).to_json_dict(),
+    }
+    if bounds_m is not None:
+        column["bbox"] = list(bounds_m)
+    geo = {"version": "1.1.0", "primary_column": "geometry", "columns": {"geometry": column}}
+    return json.dumps(geo).encode()
+
+
+def dictionary(codes: NDArray[Any], names: tuple[str, ...]) -> pa.Array:
+    """Return codes into names as a dictionary-encoded column of text."""
+    return pa.DictionaryArray.from_arrays(
+        pa.array(np.asarray(codes, dtype=np.int32)), pa.array(names, type=pa.string())
+    )
+
+
+class WindowReader:
+    """Rows of some parts within windows, columns as asked.
+
+    Points lie along a space-filling curve, so a row group covers a small area. Groups of the window
+    that was read last are kept, as its neighbour needs most of them again.
+
+    Parameters
+    ----------
+    columns : sequence of str
+        Among them ``row`` and ``col``.
+    lattice : Lattice
+        The database's.
+    """
+
+    def __init__(self, parts: Sequence[Path], columns: Sequence[str], lattice: Lattice) -> None:
+        self._parts, self._columns, self._lattice = parts, list(columns), lattice
+        self._groups: list[tuple[Path, int]] = []
+        self._held: dict[int, pa.Table] = {}
+        boxes: list[tuple[int, int, int, int]] = []
+        for part in parts:
+            try:
+                footer = pq.read_metadata(part)
+                names = {footer.schema.column(i).name: i for i in range(footer.num_columns)}
+                for group in range(footer.num_row_groups):
+                    ends = [_ends(footer.row_group(group), names[axis]) for axis in ("row", "col")]
+                    self._groups.append((part, group))
+                    boxes.append((*ends[0], *ends[1]))
+            except DAMAGE as error:
+                raise damaged(part, error) from error
+        self._boxes = np.array(boxes, dtype=np.int64).reshape(-1, 4)
+
+    def read(self, window: Window) -> dict[str, Any]:
+        """Return the rows within a window, column by column: text as Arrow, others as NumPy."""
+        row, col, rows, cols = window
+        low_row, high_row, low_col, high_col = self._boxes.T
+        meets = (low_row < row + rows) & (high_row >= row)
+        meets &= (low_col < col + cols) & (high_col >= col)
+        wanted = np.flatnonzero(meets).tolist()
+        self._held = {i: self._held.get(i, None) or self._group(i) for i in wanted}
+        tables = []
+        for table in self._held.values():
+            at = table["row"].to_numpy(), table["col"].to_numpy()
+            inside = (at[0] >= row) & (at[0] < row + rows)
+            inside &= (at[1] >= col) & (at[1] < col + cols)
+            tables.append(table.filter(pa.array(inside)))
+        if not tables:
+            return {}
+        found = pa.concat_tables(tables)
+        return {
+            name: found[name]
+            if pa.types.is_dictionary(found[name].type)
+            else found[name].to_numpy()
+            for name in self._columns
+        }
+
+    def _group(self, number: int) -> pa.Table:
+        part, group = self._groups[number]
+        try:
+            with pq.ParquetFile(part, page_checksum_verification=True) as source:
+                table = source.read_row_group(group, columns=["point", *self._columns])
+            table.validate(full=True)
+        except DAMAGE as error:
+            raise damaged(part, error) from error
+        check_places(part, table, self._lattice)
+        return table
+
+
+def _ends(group: pq.RowGroupMetaData, column: int) -> tuple[int, int]:
+    known = group.column(column).statistics
+    return (known.min, known.max) if known is not None and known.has_min_max else _EVERYWHERE

@@ -1,0 +1,375 @@
+"""Indexed ways and areas, from which the points of any tile are made.
+
+Distances from points to the straight segments of ways are exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+from numba import njit
+from shapely import STRtree
+
+from mapfilter._types import Bools, Floats, Ints
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.roads.buildings import burn
+from mapfilter.roads.lattice import RouteLattice
+from mapfilter.roads.ways import Buildings, Geometries, Squares, Water, Ways
+
+HALF_WIDTH_M = 6.0
+TILE_PX = 512
+SQUARE_CLASS = "square"
+_NO_WIDTHS: Mapping[str, float] = {}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WayIndex:
+    """Straight segments of ways, in the order of way ids, each with the half width of its way.
+
+    Examples
+    --------
+    >>> line = np.array([shapely.LineString([(0, 0), (10, 0), (10, 10)])])
+    >>> ways = Ways("EPSG:32629", np.array([7]), np.array([0], np.int16), ("path",), line,
+    ...             np.array([False]), np.array([0], np.int8))
+    >>> index = WayIndex.of(ways, 6.0)
+    >>> index.nearest(np.array([4.0]), np.array([3.0]))
+    (array([0]), array([3.]))
+    >>> way, distance_m = index.reaching(Lattice("EPSG:32629", 0.0, 10.0, 5.0, 2, 2))
+    >>> way.tolist(), distance_m.tolist()
+    ([[-1, 0], [0, 0]], [[inf, 2.5], [2.5, 2.5]])
+    """
+
+    ways: Ways
+    tree: STRtree
+    way: Ints
+    ends_m: Floats
+    half_width_m: Floats
+
+    @classmethod
+    def of(
+        cls,
+        ways: Ways,
+        half_width_m: float = HALF_WIDTH_M,
+        by_class_m: Mapping[str, float] = _NO_WIDTHS,
+    ) -> WayIndex:
+        """Index the segments of ways.
+
+        Parameters
+        ----------
+        half_width_m : float
+            How far from its centre line a point still belongs to a way.
+        by_class_m : mapping of str to float
+            The same for some classes; 0 leaves the class out.
+
+        Raises
+        ------
+        InputError
+            A half width is not > 0 (of a class, not >= 0).
+        """
+        faults = Faults()
+        note_half_widths(faults, half_width_m, by_class_m)
+        faults.raise_if_any(InputError)
+        by_code = np.array([by_class_m.get(name, half_width_m) for name in ways.class_names])
+        if by_code.size and not by_code.all():
+            ways = ways.select(by_code[ways.way_class] > 0)
+        return cls._of_lines(ways, ways.geometry, np.arange(len(ways)), by_code)
+
+    @classmethod
+    def _of_lines(cls, ways: Ways, lines: Geometries, way: Ints, by_code: Floats) -> WayIndex:
+        """Index the segments of lines that are parts of the ways with the given indices."""
+        corner, origin = shapely.get_coordinates(lines, return_index=True)
+        joined = (origin[1:] == origin[:-1]) & np.any(corner[1:] != corner[:-1], axis=1)
+        ends_m = np.stack([corner[:-1][joined], corner[1:][joined]], axis=1)
+        of_way = way[origin[:-1][joined]]
+        # The first of equally near segments is kept: that of the smallest way id.
+        order = np.lexsort((of_way, ways.way_id[of_way]))
+        ends_m, of_way = ends_m[order], of_way[order]
+        half_width_m = by_code[ways.way_class[of_way]] if of_way.size else np.empty(0)
+        return cls(ways, STRtree(shapely.linestrings(ends_m)), of_way, ends_m, half_width_m)
+
+    def segments_near(self, window: Lattice, least_m: float = 0.0) -> Ints:
+        """Return the segments that reach a window, or are at most ``least_m`` away from it."""
+        west, south, east, north = window.bounds_m
+        reach_m = max(float(self.half_width_m.max(initial=0.0)), least_m)
+        box = shapely.box(west - reach_m, south - reach_m, east + reach_m, north + reach_m)
+        return np.sort(self.tree.query(box))
+
+    def inside(self, areas: Geometries) -> WayIndex:
+        """Return the index of the parts of the ways that lie in polygons."""
+        segments = shapely.linestrings(self.ends_m)
+        area, segment = STRtree(segments).query(areas, predicate="intersects")
+        parts, pair = shapely.get_parts(
+            shapely.intersection(segments[segment], areas[area]), return_index=True
+        )
+        line = (shapely.get_type_id(parts) == 1) & (shapely.length(parts) > 0)
+        by_code = np.zeros(max(len(self.ways.class_names), 1))
+        by_code[self.ways.way_class[self.way]] = self.half_width_m
+        return self._of_lines(self.ways, parts[line], self.way[segment[pair[line]]], by_code)
+
+    def reaching(self, window: Lattice) -> tuple[Ints, Floats]:
+        """Return, of each pixel of a window, the nearest of the ways that it belongs to.
+
+        Returns
+        -------
+        way : numpy.ndarray of int64, shape (rows, cols)
+            Index into ``ways``, -1 where none reaches the pixel's centre; of equally near ways the
+            one with the smallest id.
+        distance_m : numpy.ndarray, shape (rows, cols)
+            Infinite where ``way`` is -1.
+        """
+        size = (window.rows, window.cols)
+        segment, distance_m = np.full(size, -1, dtype=np.int64), np.full(size, np.inf)
+        if self.way.size:
+            near = self.segments_near(window)
+            _burn(
+                self.ends_m[near],
+                self.half_width_m[near],
+                (window.west_m, window.north_m, window.resolution_m),
+                segment,
+                distance_m,
+            )
+            found = segment >= 0
+            segment[found] = self.way[near[segment[found]]]
+        return segment, distance_m
+
+    def nearest(self, east_m: Floats, north_m: Floats) -> tuple[Ints, Floats]:
+        """Return the nearest way of each position, however far, and its distance.
+
+        Returns
+        -------
+        way : numpy.ndarray of int64, shape (N,)
+            Index into ``ways``, -1 when there are none; of equally near ways the one with the
+            smallest id.
+        distance_m : numpy.ndarray, shape (N,)
+            Infinite where ``way`` is -1.
+        """
+        way = np.full(east_m.size, -1, dtype=np.int64)
+        distance = np.full(east_m.size, np.inf)
+        if self.way.size and east_m.size:
+            (which, segment), found_m = self.tree.query_nearest(
+                shapely.points(east_m, north_m), return_distance=True
+            )
+            order = np.lexsort((segment, which))
+            which, segment, found_m = which[order], segment[order], found_m[order]
+            first = np.flatnonzero(np.diff(which, prepend=-1))
+            way[which[first]], distance[which[first]] = self.way[segment[first]], found_m[first]
+        return way, distance
+
+
+def note_half_widths(faults: Faults, half_width_m: float, by_class_m: Mapping[str, float]) -> None:
+    """Note half widths that are no lengths; that of a class may be 0."""
+    if not (np.isfinite(half_width_m) and half_width_m > 0):
+        faults.add("half_width_m", "metres > 0", half_width_m)
+    for name, width_m in by_class_m.items():
+        if not (np.isfinite(width_m) and width_m >= 0):
+            faults.add(f"half_width_by_class_m, {name}", "metres >= 0", width_m)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AreaIndex:
+    """Polygons in a search tree, to burn those of a tile."""
+
+    geometry: Geometries
+    tree: STRtree
+
+    @classmethod
+    def of(cls, geometry: Geometries) -> AreaIndex:
+        """Index polygons."""
+        return cls(geometry, STRtree(geometry))
+
+    def near(self, window: Lattice) -> AreaIndex:
+        """Return the polygons about a window, in their order."""
+        near = np.sort(self.tree.query(shapely.box(*window.bounds_m)))
+        return AreaIndex.of(self.geometry[near])
+
+    def mask(self, window: Lattice) -> Bools:
+        """Return which pixel centres of a window lie in a polygon, shape (rows, cols)."""
+        near = np.sort(self.tree.query(shapely.box(*window.bounds_m)))
+        return burn(((shape, 1) for shape in self.geometry[near]), window, "uint8").astype(bool)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RouteSource:
+    """What any tile of a route lattice is made from; it can be sent to other processes.
+
+    Parameters
+    ----------
+    crs : str
+        Projected CRS of everything, in metres.
+    bridges : WayIndex or None
+        The parts of the ways that lie in the water, which stay.
+    """
+
+    crs: str
+    ways: WayIndex
+    squares: AreaIndex | None
+    buildings: AreaIndex | None
+    water: AreaIndex | None
+    bridges: WayIndex | None
+
+    @classmethod
+    def of(
+        cls,
+        ways: Ways,
+        squares: Squares | None = None,
+        buildings: Buildings | None = None,
+        half_width_m: float = HALF_WIDTH_M,
+        *,
+        half_width_by_class_m: Mapping[str, float] | None = None,
+        water: Water | None = None,
+    ) -> RouteSource:
+        """Index the layers of an area; the parameters are those of :func:`route_lattice`.
+
+        Raises
+        ------
+        InputError
+            The CRS differ, or a half width is no length.
+        """
+        faults = Faults()
+        note_crs(faults, ways.crs, {"squares": squares, "buildings": buildings, "water": water})
+        faults.raise_if_any(InputError)
+        index = WayIndex.of(ways, half_width_m, half_width_by_class_m or {})
+        return cls(
+            ways.crs,
+            index,
+            AreaIndex.of(squares.geometry) if squares else None,
+            AreaIndex.of(buildings.footprints) if buildings else None,
+            AreaIndex.of(water.geometry) if water else None,
+            index.inside(water.geometry) if water else None,
+        )
+
+    def tile(self, window: Lattice) -> RouteLattice:
+        """Return the route lattice of a window; the same points as on the whole lattice."""
+        on_square = _mask(self.squares, window)
+        way, distance_m = self.ways.reaching(window)
+        allowed = ((way >= 0) | on_square) & ~_mask(self.buildings, window)
+        if self.water is not None and self.bridges is not None:
+            wet = self.water.mask(window)
+            if np.any(wet & allowed):
+                allowed &= ~wet | (self.bridges.reaching(window)[0] >= 0)
+        return described(allowed, window, on_square, self.ways, (way, distance_m), SQUARE_CLASS)
+
+    def over(self, lattice: Lattice, tile_px: int = TILE_PX) -> RouteLattice:
+        """Return the route lattice of a whole area, made tile by tile; at least one point."""
+        tiles = [
+            (row, col, self.tile(lattice.window(row, col, rows, cols)))
+            for row, col, rows, cols in lattice.tiles(tile_px)
+        ]
+        rows = np.concatenate([tile.row + np.int32(top) for top, _, tile in tiles])
+        cols = np.concatenate([tile.col + np.int32(left) for _, left, tile in tiles])
+        order = np.lexsort((cols, rows))
+
+        def joined(column: str) -> Any:
+            return np.concatenate([getattr(tile, column) for _, _, tile in tiles])[order]
+
+        if not order.size:
+            expected = "a point near a way or in a square"
+            hint = "roads and rasters of different areas"
+            raise fail(InputError, "route lattice", expected, "none", hint)
+        return RouteLattice(
+            lattice,
+            rows[order],
+            cols[order],
+            joined("way_id"),
+            joined("way_class"),
+            tiles[0][2].class_names,
+            joined("distance_to_way_m"),
+            joined("on_square"),
+        )
+
+
+def described(
+    allowed: Bools,
+    window: Lattice,
+    on_square: Bools,
+    ways: WayIndex,
+    nearest: tuple[Ints, Floats],
+    other_class: str,
+) -> RouteLattice:
+    """Return the allowed pixels with their ways, or the distance of the nearest that is."""
+    row, col = np.nonzero(allowed)
+    way, distance_m = nearest[0][row, col], nearest[1][row, col]
+    alone = way < 0
+    distance_m[alone] = ways.nearest(*window.east_north(row[alone], col[alone]))[1]
+    names = (*ways.ways.class_names, other_class)
+    way_id = np.zeros(row.size, dtype=np.int64)
+    way_id[~alone] = ways.ways.way_id[way[~alone]]
+    way_class = np.full(row.size, len(names) - 1, dtype=np.int16)
+    way_class[~alone] = ways.ways.way_class[way[~alone]]
+    return RouteLattice(
+        window,
+        row.astype(np.int32),
+        col.astype(np.int32),
+        way_id,
+        way_class,
+        names,
+        distance_m.astype(np.float32),
+        on_square[row, col],
+    )
+
+
+def note_crs(
+    faults: Faults, crs: str, layers: Mapping[str, Ways | Squares | Buildings | Water | None]
+) -> None:
+    """Note layers of another CRS."""
+    for name, layer in layers.items():
+        if layer is not None and not same_crs(layer.crs, crs):
+            faults.add(f"{name}, crs", crs, layer.crs, "layers of different CRS")
+
+
+def _mask(areas: AreaIndex | None, window: Lattice) -> Bools:
+    if areas is None:
+        return np.zeros((window.rows, window.cols), dtype=np.bool_)
+    return areas.mask(window)
+
+
+@njit(cache=True)
+def _burn(
+    ends_m: Floats,
+    half_width_m: Floats,
+    place: tuple[float, float, float],
+    segment: Ints,
+    distance_m: Floats,
+) -> None:  # pragma: no cover
+    """Write the nearest of the segments that reach a pixel centre, and its distance."""
+    west_m, north_m, resolution_m = place
+    rows, cols = segment.shape
+    for k in range(len(ends_m)):
+        ax, ay = ends_m[k, 0]
+        bx, by = ends_m[k, 1]
+        dx, dy = bx - ax, by - ay
+        square = dx * dx + dy * dy
+        if square == 0.0:
+            continue
+        # Rounded outwards; the distance decides.
+        reach = half_width_m[k] + 1e-6 * resolution_m
+        top = np.ceil((north_m - max(ay, by) - reach) / resolution_m - 0.5)
+        bottom = np.floor((north_m - min(ay, by) + reach) / resolution_m - 0.5)
+        for row in range(
+            int(min(max(top, 0.0), rows)), int(max(min(bottom, rows - 1.0), -1.0)) + 1
+        ):
+            y = north_m - (row + 0.5) * resolution_m
+            low, high = 0.0, 1.0
+            if dy != 0.0:
+                # The part of the segment that is within reach of this row.
+                low, high = (y - reach - ay) / dy, (y + reach - ay) / dy
+                if low > high:
+                    low, high = high, low
+                low, high = min(max(low, 0.0), 1.0), min(max(high, 0.0), 1.0)
+            x_low, x_high = ax + low * dx, ax + high * dx
+            left = np.ceil((min(x_low, x_high) - reach - west_m) / resolution_m - 0.5)
+            right = np.floor((max(x_low, x_high) + reach - west_m) / resolution_m - 0.5)
+            for col in range(
+                int(min(max(left, 0.0), cols)), int(max(min(right, cols - 1.0), -1.0)) + 1
+            ):
+                x = west_m + (col + 0.5) * resolution_m
+                along = min(max(((x - ax) * dx + (y - ay) * dy) / square, 0.0), 1.0)
+                distance = np.hypot(x - ax - along * dx, y - ay - along * dy)
+                if distance <= half_width_m[k] and distance < distance_m[row, col]:
+                    distance_m[row, col] = distance
+                    segment[row, col] = k

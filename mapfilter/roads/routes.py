@@ -1,0 +1,308 @@
+"""From maps, vector layers and land use to the route lattice, whole or tile by tile."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from geopandas import GeoDataFrame
+
+from mapfilter._types import Bools
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.geodesy import Lattice
+from mapfilter.roads.buildings import read_buildings
+from mapfilter.roads.index import (
+    HALF_WIDTH_M,
+    TILE_PX,
+    RouteSource,
+    WayIndex,
+    described,
+    note_crs,
+    note_half_widths,
+)
+from mapfilter.roads.landuse import read_landuse
+from mapfilter.roads.lattice import RouteLattice
+from mapfilter.roads.layers import read_layer_buildings, read_layer_roads, read_layer_water
+from mapfilter.roads.maps import is_map
+from mapfilter.roads.osm import Profile, read_squares, read_water, read_ways
+from mapfilter.roads.vector import Layer
+from mapfilter.roads.ways import Bounds, Buildings, Squares, Water, Ways, clip_ways
+
+LANDUSE_CLASS = "land use"
+
+
+def read_routes(
+    roads: Layer | Ways | None,
+    lattice: Lattice,
+    *,
+    profile: Profile = "walking",
+    half_width_m: float = HALF_WIDTH_M,
+    half_width_by_class_m: Mapping[str, float] | None = None,
+    squares: bool = True,
+    buildings: Layer | Buildings | bool = True,
+    water: Layer | Water | bool = True,
+    landuse: tuple[Path | str, Path | str] | None = None,
+    layer_name: str | None = None,
+    class_column: str | None = None,
+    id_column: str | None = None,
+) -> RouteLattice:
+    """Read roads and return the lattice points where one can be.
+
+    Parameters
+    ----------
+    roads : path, GeoDataFrame, Ways or None
+        OpenStreetMap file (``.osm.pbf``, ``.osm``, ``.osm.gz``) or embedded map ("helsinki");
+        vector file of lines and polygons in any CRS, or such a table; or ways, for instance from
+        :func:`mapfilter.roads.corridors.corridors`. None only together with ``landuse``.
+    lattice : Lattice
+        Area and resolution; normally ``rasters.lattice``.
+    profile : {"walking", "driving"}
+        Which ways of an OpenStreetMap file are used, see :mod:`mapfilter.roads.osm`.
+    half_width_m : float
+        Half the width of a way (m, > 0): points at most this far from its centre line belong to it.
+    half_width_by_class_m : mapping of str to float, optional
+        The same for some classes of way, such as ``{"residential": 8.0}``; 0 leaves a class out.
+    squares : bool
+        Include squares and pedestrian areas (of a layer: its polygons).
+    buildings : path, GeoDataFrame, Buildings or bool
+        Footprints to cut out. True takes those of an OpenStreetMap file, and none otherwise.
+    water : path, GeoDataFrame, Water or bool
+        Water to cut out except under bridges. True takes that of an OpenStreetMap file.
+    landuse : (raster, table), optional
+        Classified raster and its CSV table, see :func:`mapfilter.roads.landuse.read_landuse`. The
+        walkable classes alone decide which points there are; roads then only name the ways.
+    layer_name, class_column, id_column : str, optional
+        Layer of a vector file, and its columns with the class and the number of each way.
+
+    Raises
+    ------
+    InputError
+        A file is missing, damaged or of another area, a half width is not a length, or no point is
+        left.
+
+    Examples
+    --------
+    >>> lattice = Lattice.covering("EPSG:32635", (385500.0, 6671500.0, 385700.0, 6671700.0), 10.0)
+    >>> routes = read_routes("helsinki", lattice, half_width_m=8.0)
+    >>> len(routes), routes.mask().shape
+    (166, (20, 20))
+    """
+    by_class_m = half_width_by_class_m or {}
+    if roads is None and landuse is None:
+        raise fail(InputError, "roads", "a map, a layer or ways; or landuse", "none")
+    found = Roads(Ways.none(lattice.crs))
+    if isinstance(roads, Ways):
+        found = Roads(roads)
+    elif roads is not None:
+        found = read_roads(
+            roads,
+            lattice,
+            profile=profile,
+            half_width_m=half_width_m,
+            half_width_by_class_m=by_class_m,
+            squares=squares,
+            layer_name=layer_name,
+            class_column=class_column,
+            id_column=id_column,
+        )
+    if landuse is not None:
+        return route_lattice_from_landuse(
+            read_landuse(*landuse, lattice).walkable,
+            lattice,
+            clip_ways(found.ways, lattice.bounds_m),
+            half_width_m,
+            half_width_by_class_m=by_class_m,
+        )
+    here = lattice.crs, lattice.bounds_m
+    map_file = roads if isinstance(roads, Path | str) and is_map(roads) else None
+    if isinstance(buildings, bool):
+        buildings = read_buildings(map_file, *here) if buildings and map_file else None
+    elif not isinstance(buildings, Buildings):
+        buildings = read_layer_buildings(buildings, *here)
+    if isinstance(water, bool):
+        water = read_water(map_file, *here) if water and map_file else None
+    elif not isinstance(water, Water):
+        water = read_layer_water(water, *here)
+    return route_lattice(
+        found.ways,
+        found.squares,
+        buildings,
+        lattice,
+        half_width_m,
+        half_width_by_class_m=by_class_m,
+        water=water,
+    )
+
+
+class Roads(NamedTuple):
+    """Ways and squares in and just outside an area, and what was left out."""
+
+    ways: Ways
+    squares: Squares | None = None
+    notes: tuple[str, ...] = ()
+
+
+def read_roads(
+    source: Layer,
+    lattice: Lattice,
+    *,
+    profile: Profile = "walking",
+    half_width_m: float = HALF_WIDTH_M,
+    half_width_by_class_m: Mapping[str, float] | None = None,
+    squares: bool = True,
+    layer_name: str | None = None,
+    class_column: str | None = None,
+    id_column: str | None = None,
+) -> Roads:
+    """Read the ways and squares of a map or a vector layer; the parameters of :func:`read_routes`.
+
+    Ways outside the area are kept as far as they reach points inside by their half width.
+
+    Raises
+    ------
+    InputError
+        The file is missing or damaged, or has nothing in the area.
+    """
+    by_class_m = half_width_by_class_m or {}
+    crs, wide_m = lattice.crs, within_reach_m(lattice.bounds_m, half_width_m, by_class_m)
+    if isinstance(source, GeoDataFrame) or layer_name is not None or not is_map(source):
+        layer = read_layer_roads(
+            source,
+            crs,
+            wide_m,
+            layer_name=layer_name,
+            class_column=class_column,
+            id_column=id_column,
+        )
+        left_out = [name for name, width_m in by_class_m.items() if width_m == 0]
+        return Roads(layer.ways, layer.areas_without(left_out) if squares else None, layer.notes)
+    areas = None
+    if squares and profile == "walking":
+        areas = read_squares(source, crs, lattice.bounds_m)
+    return Roads(read_ways(source, profile, crs, wide_m), areas)
+
+
+def within_reach_m(
+    bounds_m: Bounds, half_width_m: float, by_class_m: Mapping[str, float]
+) -> Bounds:
+    """Return a box widened by the largest half width."""
+    west, south, east, north = bounds_m
+    pad_m = max(half_width_m, *by_class_m.values(), 0.0)
+    return west - pad_m, south - pad_m, east + pad_m, north + pad_m
+
+
+def unused_classes(ways: Ways, by_class_m: Mapping[str, float]) -> list[str]:
+    """Return a note for each half width of a class that no way has."""
+    notes = []
+    for name in by_class_m:
+        if name not in ways.class_names:
+            close = difflib.get_close_matches(name, ways.class_names, n=1)
+            tail = f"; did you mean {close[0]!r}?" if close else ""
+            notes.append(f"half_width_by_class_m: no way in the area is a {name!r}{tail}")
+    return notes
+
+
+def gaps(ways: Ways, side_m: float, half_width_m: float, by_class_m: Mapping[str, float]) -> str:
+    """Return a note on ways narrower than a pixel, whose points have gaps; empty without any.
+
+    A corridor as wide as a pixel holds a pixel's centre in each row or column that it crosses.
+    """
+    width_m = 2 * np.array([by_class_m.get(name, half_width_m) for name in ways.class_names])
+    narrow = (width_m > 0) & (width_m < side_m)
+    length_m = shapely.length(ways.geometry)
+    gappy_m = float(length_m[narrow[ways.way_class]].sum())
+    if gappy_m == 0:
+        return ""
+    least_m = width_m[narrow][np.isin(np.flatnonzero(narrow), ways.way_class)].min()
+    return (
+        f"{gappy_m / length_m.sum():.0%} of the ways, down to {least_m:g} m wide, are narrower "
+        f"than the pixels of {side_m:g} m: their points have gaps"
+    )
+
+
+def route_lattice(
+    ways: Ways,
+    squares: Squares | None,
+    buildings: Buildings | None,
+    lattice: Lattice,
+    half_width_m: float = HALF_WIDTH_M,
+    *,
+    half_width_by_class_m: Mapping[str, float] | None = None,
+    water: Water | None = None,
+    tile_px: int = TILE_PX,
+) -> RouteLattice:
+    """Return the lattice points near a way or in a square, outside buildings and water.
+
+    Parameters
+    ----------
+    ways, squares, buildings
+        Of the lattice's area, in its CRS. Ways just outside count for points inside.
+    lattice : Lattice
+        Normally that of the radio rasters.
+    half_width_m : float
+        A point belongs to a way at most this far from its centre line; to the nearest of several.
+    half_width_by_class_m : mapping of str to float, optional
+        The same for some classes of way; 0 leaves the class out.
+    water : Water, optional
+        Cut out except on ways that cross it and within their half width: where a way runs through
+        water there is a bridge, a pier or a ford.
+    tile_px : int
+        Side of the tiles that are processed at a time; it bounds the memory, not the result.
+
+    Raises
+    ------
+    InputError
+        The CRS differ, a half width is no length, or no point is left.
+    """
+    by_class_m = half_width_by_class_m or {}
+    faults = Faults()
+    layers = {"ways": ways, "squares": squares, "buildings": buildings, "water": water}
+    note_crs(faults, lattice.crs, layers)
+    note_half_widths(faults, half_width_m, by_class_m)
+    faults.raise_if_any(InputError)
+    source = RouteSource.of(
+        ways, squares, buildings, half_width_m, half_width_by_class_m=by_class_m, water=water
+    )
+    return source.over(lattice, tile_px)
+
+
+def route_lattice_from_landuse(
+    mask: Bools,
+    lattice: Lattice,
+    ways: Ways | None = None,
+    half_width_m: float = HALF_WIDTH_M,
+    *,
+    half_width_by_class_m: Mapping[str, float] | None = None,
+) -> RouteLattice:
+    """Return the lattice points in walkable classes of land use, the paper's second database.
+
+    Parameters
+    ----------
+    mask : numpy.ndarray of bool, shape (lattice.rows, lattice.cols)
+        Where one can be, such as ``LandUse.walkable``.
+    lattice : Lattice
+        Of the mask.
+    ways : Ways, optional
+        Name the way of points within its half width, and give all points their distance; they
+        add no point.
+    half_width_m, half_width_by_class_m
+        As for :func:`route_lattice`.
+
+    Raises
+    ------
+    InputError
+        The mask has another shape or is empty.
+    """
+    if mask.shape != (lattice.rows, lattice.cols):
+        shape = f"{(lattice.rows, lattice.cols)}"
+        raise fail(InputError, "land-use mask", f"shape {shape}", mask.shape)
+    if not mask.any():
+        raise fail(InputError, "land use", "a walkable point", "none", "no class is walkable")
+    index = WayIndex.of(
+        Ways.none(lattice.crs) if ways is None else ways, half_width_m, half_width_by_class_m or {}
+    )
+    return described(mask, lattice, mask, index, index.reaching(lattice), LANDUSE_CLASS)

@@ -1,0 +1,84 @@
+"""Logs from tables in memory: timestamps, and what is not a table of a log."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mapfilter.errors import InputError
+from mapfilter.tracks.log import make_log
+
+CRS = "EPSG:32635"
+NOON_UTC_S = 1_767_268_800.0
+HOURS = ["2026-01-01 13:00:00.25+01:00", "2026-01-01 12:00:01+00:00"]
+TIMES = pd.to_datetime(HOURS, utc=True, format="ISO8601")
+STEPS = {"step_m": [1.5, 1.4]}
+
+
+@pytest.mark.parametrize("name", ["time", "time_s"])
+@pytest.mark.parametrize("unit", ["ns", "ms"])
+def test_timestamps_become_seconds_since_the_first_of_all(name, unit):
+    walk = pd.DataFrame({name: TIMES.as_unit(unit), **STEPS})
+    fixes = pd.DataFrame({name: TIMES[1:], "east_m": 1e5, "north_m": 2e5})
+    log = make_log(CRS, motion=walk, gnss=fixes)
+    assert log.start_utc_s == NOON_UTC_S + 0.25
+    assert log.motion["time_s"].tolist() == [0.0, 0.75]
+    assert log.gnss["time_s"].tolist() == [0.75]
+    assert not log.notes
+
+
+def test_timestamps_beside_a_start_count_from_it():
+    walk = pd.DataFrame({"time": TIMES, **STEPS})
+    fixes = pd.DataFrame({"time_s": [0.5], "east_m": 1e5, "north_m": 2e5})
+    log = make_log(CRS, motion=walk, gnss=fixes, start_utc_s=NOON_UTC_S)
+    assert log.motion["time_s"].tolist() == [0.25, 1.0]
+    assert log.start_utc_s == NOON_UTC_S
+
+
+def test_timestamps_of_any_zone_and_as_objects():
+    walk = pd.DataFrame({"time": [pd.Timestamp(hour).tz_convert("Asia/Tokyo") for hour in HOURS]})
+    log = make_log(CRS, motion=walk.astype(object).assign(**STEPS))
+    assert log.motion["time_s"].tolist() == [0.0, 0.75]
+
+
+def test_a_missing_timestamp_is_told_by_its_row():
+    walk = pd.DataFrame({"time": [TIMES[0], pd.NaT], **STEPS})
+    with pytest.raises(InputError, match="motion row 2, time_s: expected seconds, found nan"):
+        make_log(CRS, motion=walk)
+
+
+@pytest.mark.parametrize(
+    ("tables", "message"),
+    [
+        ({"motion": {"time": TIMES.tz_localize(None), **STEPS}}, r"motion, time: .*time zone"),
+        (
+            {
+                "motion": {"time": TIMES, **STEPS},
+                "gnss": {"time_s": [1.0], "east_m": 1e5, "north_m": 2e5},
+            },
+            "log, time_s: expected timestamps in every table, or a start, found seconds in gnss",
+        ),
+        ({"motion": {"time_s": ["noon", "later"], **STEPS}}, "motion row 1, time_s: .* noon"),
+        ({"motion": {"time_s": [0.0, 1.0], "step_m": TIMES}}, "motion row 1, step_m: .*metres"),
+        ({"motion": {"time_s": [[0, 1], []], **STEPS}}, "motion row 1, time_s: expected seconds"),
+    ],
+)
+def test_other_times_are_refused(tables, message):
+    with pytest.raises(InputError, match=message):
+        make_log(CRS, **{table: pd.DataFrame(rows) for table, rows in tables.items()})
+
+
+def test_what_is_no_table_is_refused():
+    walk = pd.DataFrame({"time_s": [0.0, 1.0], **STEPS})
+    with pytest.raises(InputError, match=r"log, crs: .* make_log\(crs, motion=…\)"):
+        make_log(walk)
+    with pytest.raises(InputError, match=r"motion: expected a pandas.DataFrame, found dict"):
+        make_log(CRS, motion=dict(walk))
+    twice = pd.DataFrame(np.zeros((2, 2)), columns=["time_s", "time_s"])
+    with pytest.raises(InputError, match="motion: expected each column once, found time_s"):
+        make_log(CRS, motion=twice)
+
+
+def test_a_log_shows_itself_in_a_line():
+    log = make_log(CRS, motion=pd.DataFrame({"time_s": [2.0, 1.0], **STEPS}))
+    assert repr(log) == "TrackLog(EPSG:32635, 1.0 s; rows: motion 2; 1 notes)"
+    assert repr(make_log(CRS)) == "TrackLog(EPSG:32635, 0.0 s; rows: none)"
