@@ -10,7 +10,7 @@ from small_area import HEIGHT_M, ON_WAY, SOUTH_M, WEST_M, WIDTH_M, make_area
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.models.street_motion import MotionErrors
-from mapfilter.positioning.bayes.smoothing import History, Kept, smoothed
+from mapfilter.positioning.bayes.smoothing import BayesSmoother, Kept
 from mapfilter.positioning.estimate import Fix, StepOutput, TrackEstimate
 
 AREA = make_area()
@@ -50,9 +50,9 @@ def forward_pass():
 
 
 def hindsight(*beliefs, paths=200):
-    history = History(kept=list(beliefs), moved=MOVED)
+    smoother = BayesSmoother(AREA, ERRORS, kept=list(beliefs), moved=MOVED)
     rng = np.random.default_rng(2)
-    return smoothed(forward_pass(), history, AREA, ERRORS, rng, paths=paths, jitter=JITTER)
+    return smoother.smoothed(forward_pass(), rng, paths=paths, jitter=JITTER)
 
 
 def places(estimate):
@@ -186,13 +186,13 @@ def at(epoch, state, alternative=None, takeovers=0):
 
 
 def test_beliefs_are_kept_every_few_metres_and_at_the_end():
-    history, before = History(every_m=20.0), at(0, cloud(START))
+    history, before = BayesSmoother(AREA, ERRORS, every_m=20.0), at(0, cloud(START))
     for epoch in range(5):
         after = at(epoch, cloud((20.0 + epoch, 15.0, 0.0, 0.0)))
         history.add(before, after)
         before = after
     assert [k.epoch for k in history.kept] == [0, 3]
-    history.close(before)
+    history.close()
     assert [k.epoch for k in history.kept] == [0, 3, 4]
     assert [float(k.state[0, 0]) for k in history.kept] == [20.0, 23.0, 24.0]
     assert [k.moved_m for k in history.kept] == [MOVED[k][:2] for k in (0, 3, 4)]
@@ -202,7 +202,8 @@ def test_beliefs_are_kept_every_few_metres_and_at_the_end():
 
 @pytest.mark.parametrize("won", [False, True])
 def test_an_alternative_that_took_over_replaces_what_was_kept_since(won):
-    history, main, other = History(every_m=1.0), cloud((1.0, 1.0, 0, 0)), cloud((9.0, 9.0, 0, 0))
+    history = BayesSmoother(AREA, ERRORS, every_m=1.0)
+    main, other = cloud((1.0, 1.0, 0, 0)), cloud((9.0, 9.0, 0, 0))
     rival = SimpleNamespace(
         belief=SimpleNamespace(state=other, log_weight=np.zeros(1)), start_m=6.0
     )

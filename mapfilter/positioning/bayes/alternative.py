@@ -34,7 +34,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from math import exp, hypot, nan
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from mapfilter.filters.contract import Status
 from mapfilter.filters.grid import GridBelief
@@ -98,7 +98,6 @@ class EvidenceCusum:
 
     Parameters
     ----------
-    sum : float
     usual : float
         Ratio of log-likelihood to its expectation; learnt slowly, as the errors of no network are
         exactly those of the model.
@@ -108,15 +107,7 @@ class EvidenceCusum:
     usual: float = _USUAL
 
     def after(self, expected: float, gained: float, length_m: float) -> EvidenceCusum:
-        """Add one reading.
-
-        Parameters
-        ----------
-        expected, gained : float
-            Log-likelihood of the reading: expected on average, and found.
-        length_m : float
-            Distance since the last reading.
-        """
+        """Add a reading by its expected and actual log-likelihood, ``length_m`` after the last."""
         if expected >= 0:
             return self
         total = max(0.0, self.sum + _SLACK * self.usual * expected - gained)
@@ -136,7 +127,6 @@ class AlternativeHypothesis:
 
     Parameters
     ----------
-    belief : MapBelief
     start_m, start_s : float
         Distance travelled and time at its start.
     main_log_evidence : float
@@ -174,46 +164,37 @@ class Outcome(Enum):
     WON = "won"
 
 
-class Cusum(Enum):
-    """CUSUM that goes on."""
-
-    KEPT = "kept"
-    RESET = "reset"
-    OTHERS = "the alternative's"
-
-
 class Transition(NamedTuple):
     """Row of the table.
 
     ``takes_over`` is the status with which the alternative goes on; None where the belief does.
-    ``reported`` is the status to report; None for that of the belief. ``keeps`` is whether the
-    alternative stays beside the belief.
+    ``reported`` is the status to report; None for that of the belief. ``cusum`` is kept, reset or
+    the other's; ``keeps`` is whether the alternative stays beside the belief.
     """
 
     takes_over: Status | None
     reported: Status | None
-    cusum: Cusum
+    cusum: Literal["kept", "reset", "other's"]
     keeps: bool
 
 
 _SEARCHING, _CONVERGED = Status.SEARCHING, Status.CONVERGED
 _TRACKING, _LOST = Status.TRACKING, Status.LOST
-_KEPT, _RESET, _OTHERS = Cusum.KEPT, Cusum.RESET, Cusum.OTHERS
 
 TRANSITIONS: Mapping[tuple[Outcome, bool], Transition] = {
     # Outcome, and whether the belief is still searching.
-    (Outcome.UNDECIDED, True): Transition(None, None, _KEPT, True),
-    (Outcome.UNDECIDED, False): Transition(None, None, _KEPT, True),
-    (Outcome.CONFIRMED, True): Transition(None, None, _RESET, False),
-    (Outcome.CONFIRMED, False): Transition(None, None, _RESET, False),
-    (Outcome.ABANDONED, True): Transition(None, None, _RESET, False),
-    (Outcome.ABANDONED, False): Transition(None, None, _RESET, False),
-    (Outcome.AHEAD, True): Transition(_SEARCHING, _SEARCHING, _RESET, False),
-    (Outcome.AHEAD, False): Transition(None, _LOST, _KEPT, True),
-    (Outcome.SUSPECT, True): Transition(_SEARCHING, _SEARCHING, _OTHERS, False),
-    (Outcome.SUSPECT, False): Transition(_SEARCHING, _LOST, _OTHERS, False),
-    (Outcome.WON, True): Transition(_CONVERGED, _CONVERGED, _RESET, False),
-    (Outcome.WON, False): Transition(_TRACKING, _TRACKING, _RESET, False),
+    (Outcome.UNDECIDED, True): Transition(None, None, "kept", True),
+    (Outcome.UNDECIDED, False): Transition(None, None, "kept", True),
+    (Outcome.CONFIRMED, True): Transition(None, None, "reset", False),
+    (Outcome.CONFIRMED, False): Transition(None, None, "reset", False),
+    (Outcome.ABANDONED, True): Transition(None, None, "reset", False),
+    (Outcome.ABANDONED, False): Transition(None, None, "reset", False),
+    (Outcome.AHEAD, True): Transition(_SEARCHING, _SEARCHING, "reset", False),
+    (Outcome.AHEAD, False): Transition(None, _LOST, "kept", True),
+    (Outcome.SUSPECT, True): Transition(_SEARCHING, _SEARCHING, "other's", False),
+    (Outcome.SUSPECT, False): Transition(_SEARCHING, _LOST, "other's", False),
+    (Outcome.WON, True): Transition(_CONVERGED, _CONVERGED, "reset", False),
+    (Outcome.WON, False): Transition(_TRACKING, _TRACKING, "reset", False),
 }
 
 REPORTED: Mapping[tuple[Status, Status], Status] = {
@@ -246,18 +227,8 @@ def resolve_alternative(
 ) -> Resolution:
     """Apply the table after a belief and its alternative were weighed by the same reading.
 
-    Parameters
-    ----------
-    rules : AlternativeRules
-    before : Status
-        As reported at the last epoch.
-    main : MapBelief
-    cusum : EvidenceCusum
-        Of ``main``.
-    alternative : AlternativeHypothesis or None
-    travelled_m : float
-    cells_only : bool
-        Only serving cells are reported, no levels.
+    ``before`` is the status reported at the last epoch; ``cells_only`` is whether only serving
+    cells are reported, no levels.
     """
     if main.status is _CONVERGED and (
         cusum.sum > rules.converge_cusum
@@ -269,13 +240,13 @@ def resolve_alternative(
         outcome = judge(rules, main, alternative, travelled_m, cells_only=cells_only)
     row = TRANSITIONS[outcome, main.status is _SEARCHING]
     belief, taken_over = main, row.takes_over is not None
-    if row.cusum is Cusum.RESET:
+    if row.cusum == "reset":
         cusum = cusum.reset()
     if row.takes_over and alternative:
         belief = replace(alternative.belief, status=row.takes_over)
         if row.takes_over is _SEARCHING:
             belief = replace(belief, agreement_start_m=nan)
-        if row.cusum is Cusum.OTHERS:
+        if row.cusum == "other's":
             cusum = alternative.cusum
     belief, status = report(before, belief, row.reported or belief.status)
     return Resolution(belief, status, cusum, alternative if row.keeps else None, taken_over)

@@ -1,4 +1,4 @@
-"""What a map filter looks up: levels, ways and distances of an area, ready for compiled kernels."""
+"""Levels, ways and distances of an area, prepared for compiled kernels."""
 
 from __future__ import annotations
 
@@ -21,23 +21,22 @@ _BELOW_FLOOR_DB = 6.0
 class AreaMap:
     """An area in a local frame, whose origin is the lattice's south-western corner.
 
-    Single precision resolves only half a metre of a UTM northing, and micrometres of this.
+    In single precision a UTM northing is resolved to half a metre, a local one to micrometres.
 
     Parameters
     ----------
-    lattice : Lattice
     cell_ids : tuple of str
-        Cells heard somewhere in the area: bands 0 to C - 1.
+        Cells with a level somewhere in the area: bands 0 to C - 1.
     known_ids : frozenset of str
-        All cells of the database, also those not heard here.
+        All cells of the database, also those without a level here.
     level_dbm : ndarray of float32, shape (rows, cols, C + 2)
-        Levels, and the best and the second best of each pixel.
+        Levels, and the strongest and second strongest of each pixel.
     distance_m : ndarray of float32, shape (rows, cols)
         To the nearest way.
     way_id : ndarray of int64, shape (rows, cols)
     on_way : ndarray of bool, shape (rows, cols)
     carriers : mapping
-        Bands of the cells on each (ARFCN, BSIC); with BSIC -1 of all on the carrier.
+        Bands of the cells on each (ARFCN, BSIC); BSIC -1 for all on the carrier.
     floor_dbm : float
         Weaker levels are not in the database.
     sites : mapping of str to tuple of float

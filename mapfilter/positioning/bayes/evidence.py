@@ -53,7 +53,6 @@ class RadioReading:
         Band of the serving cell; -1 where none is used.
     serving_weight : float
         Power of the serving cell's likelihood.
-    levels : LevelReading or None
     bounds : tuple of BoundReading
         Levels at an end of the scale, and levels of one of several candidate cells.
     terms : tuple of Term

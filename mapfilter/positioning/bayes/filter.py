@@ -54,17 +54,8 @@ _MORE_PARTICLES, _MORE_SEARCHING = 12, 8
 class BayesPositioner(Filter[BayesState]):
     """The map filter over an area.
 
-    Parameters
-    ----------
-    model : BayesModel
-    options : ParticleOptions
-    rules : AlternativeRules
-    grid : bool
-        Exact filter on a grid in place of particles.
-    satellites : GnssOptions
-    timing : TimingOptions
-    smooth : bool
-        Smooth positions by the whole log.
+    ``grid`` replaces particles by the exact filter on a grid; ``smooth`` smooths positions by the
+    whole log.
     """
 
     model: BayesModel

@@ -1,4 +1,4 @@
-"""The map filter's model on a grid: the same likelihoods, at the pixels of the area's lattice."""
+"""The map filter's model on a grid: the same likelihoods at the pixels of the area's lattice."""
 
 from __future__ import annotations
 
@@ -23,17 +23,10 @@ _CIRCLE_BINS = 72
 
 @dataclass(frozen=True)
 class StreetGrid:
-    """Streets and radio of an area, on its lattice.
+    """Ways and radio maps of an area on its lattice, times bins of the lasting heading error.
 
-    The step scale is no dimension of the grid: its deviation widens the motion.
-
-    Parameters
-    ----------
-    model : BayesModel
-    compass : bool
-        Without one the heading error may be any.
-    bin_rad : float
-        Width of a bin of the heading error.
+    The step scale is no dimension of the grid: its standard deviation widens the motion. Without a
+    compass the heading error is uniform.
     """
 
     model: BayesModel
@@ -42,7 +35,7 @@ class StreetGrid:
 
     @property
     def bins(self) -> Bins:
-        """The area, in bins of 25 m."""
+        """Bins of 25 m over the area."""
         return self.model.bins
 
     @property
@@ -52,14 +45,14 @@ class StreetGrid:
 
     @cached_property
     def bias_rad(self) -> Floats:
-        """Middles of the bins: three deviations to both sides, or the circle."""
+        """Middles of the bins: three standard deviations to both sides, or the whole circle."""
         if not self.compass:
             return np.asarray(wrap_rad(2 * pi * np.arange(_CIRCLE_BINS) / _CIRCLE_BINS))
         side = ceil(3 * self.model.motion.bias_sd_rad / self.bin_rad)
         return np.asarray(self.bin_rad * np.arange(-side, side + 1), dtype=np.float64)
 
     def start(self, prior: Start) -> tuple[Floats32, Floats32]:
-        """Return mass on the ways and off them by the first report, or about a place."""
+        """Return mass on the ways and off them: by the first evidence, or about a known start."""
         area = self.model.area
         row, col = np.indices(area.on_way.shape).reshape(2, -1)
         state = self.states(row, col, np.zeros(row.size, dtype=np.float32))
@@ -92,7 +85,7 @@ class StreetGrid:
         return state
 
     def transport(self, east_m: float, north_m: float, length_m: float) -> Transport:
-        """Return what a displacement by dead reckoning does to the mass of each bin."""
+        """Return the transport of the mass of each bin by a displacement of dead reckoning."""
         motion, over = self.model.motion, self.model.weights.over(length_m)
         pixel_m = self.model.area.lattice.resolution_m
         stretch = exp(0.5 * motion.heading_sd_rad**2)
@@ -119,7 +112,7 @@ class StreetGrid:
         )
 
     def weigh(self, state: Floats32, log_weight: Floats, reading: RadioReading) -> Reason:
-        """Add the log-likelihood of a report and of a fix, in place."""
+        """Add the log-likelihood of a reading, in place."""
         return self.model.weigh(state, log_weight, reading)
 
     def can_converge(self, summary: BeliefSummary) -> bool:

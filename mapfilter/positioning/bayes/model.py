@@ -1,10 +1,9 @@
-"""The map filter's model: where models meet the filter.
+"""The map filter's model, which the filters of a single belief call.
 
-It moves hypotheses by dead reckoning, weighs them by the map, by the serving cell, by levels and by
-fixes, and draws the first ones.
-
-Serving cells and timing advances are weighed by what was heard before, levels by their map: more
-where the cell was measured, less where only its trend is known.
+:class:`BayesModel` draws the first hypotheses, moves them by dead reckoning, and weighs them by the
+map of ways, by radio reports and by the terms of other sources. :class:`MeasuredMapModel` compares
+serving cells and timing advances with their statistics at each place, and levels with a map whose
+standard deviation varies.
 """
 
 from __future__ import annotations
@@ -46,16 +45,16 @@ _OFF_SHARE, _TRIES = 0.2, 2
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """What the first belief is made of.
+    """Prior of a belief.
 
     Parameters
     ----------
     reading : RadioReading or None
-        The first report, for an unknown start.
+        First evidence.
     compass : bool
-        Whether headings are those of a compass; else the lasting error is uniform.
+        Headings are those of a compass; else their lasting error is uniform.
     east_m, north_m, sd_m : float
-        A known start, in the CRS of the database; NaN for an unknown one.
+        Known start in the CRS of the database; NaN for an unknown one.
     """
 
     reading: RadioReading | None
@@ -67,15 +66,7 @@ class Start:
 
 @dataclass(frozen=True)
 class BayesModel:
-    """Streets and radio of an area, and the errors of what is measured there.
-
-    Parameters
-    ----------
-    area : AreaMap
-    motion : MotionErrors
-    weights : MapWeights
-    evidence : EvidenceOptions
-    """
+    """Ways and radio maps of an area, and the errors of measurements."""
 
     area: AreaMap
     motion: MotionErrors = field(default_factory=MotionErrors)
@@ -89,7 +80,7 @@ class BayesModel:
 
     @cached_property
     def bins(self) -> Bins:
-        """The area, in bins of 25 m."""
+        """Bins of 25 m over the area."""
         return Bins.over((0.0, 0.0, *self.area.size_m))
 
     @cached_property
@@ -106,10 +97,10 @@ class BayesModel:
         return fingerprint.bound_table()
 
     def start(self, prior: Start, most: int, rng: np.random.Generator) -> tuple[Floats32, Floats]:
-        """Draw the first hypotheses: where the first report can be heard, or about a known start.
+        """Draw the first hypotheses: by the first evidence, or about a known start.
 
-        They are spread by their probability over all points where one can be, each anywhere in its
-        pixel.
+        Without a known start they are drawn in proportion to their likelihood from the points on
+        ways and from places anywhere; those on ways are spread over their pixel.
         """
         state = np.zeros((STATES, most), dtype=np.float32)
         log_weight = np.full(most, -np.log(most))
@@ -128,10 +119,13 @@ class BayesModel:
         return state, log_weight
 
     def _spread(
-        self, state: Floats32, log_weight: Floats, reading: RadioReading | None,
+        self,
+        state: Floats32,
+        log_weight: Floats,
+        reading: RadioReading | None,
         rng: np.random.Generator,
-    ) -> None:  # fmt: skip
-        """Fill places on the map and off it, by the first report; more off it than are due."""
+    ) -> None:
+        """Fill places on the map and off it; off it more of them, with smaller weights."""
         resolution_m, size_m = self.area.lattice.resolution_m, np.array(self.area.size_m)
         count = state.shape[1]
         middle = count - int(_OFF_SHARE * count)
@@ -166,10 +160,7 @@ class BayesModel:
         return chosen, float(most + np.log(weight.mean()))
 
     def any_heading(self, state: Floats32, times: int, rng: np.random.Generator) -> Floats32:
-        """Return so many times as many hypotheses, which know nothing of their heading error.
-
-        Each is moved within its pixel, too.
-        """
+        """Return ``times`` copies with uniform heading errors, spread over their pixels."""
         turned = np.tile(state, times)
         resolution_m = _F(self.area.lattice.resolution_m)
         spread = rng.random((2, turned.shape[1]), dtype=np.float32) - _F(0.5)
@@ -185,12 +176,10 @@ class BayesModel:
         if isfinite(motion.heading_rad):
             moved = move(state, motion.step_m, motion.heading_rad, self.motion, key)
         else:
-            # Anywhere on a disc that a step of this length can reach.
-            sd_m = length_m / sqrt(2.0)
-            unknown = MotionErrors(step_sd_m=sd_m, typical_step_m=length_m, heading_sd_rad=0.0)
+            # To all sides; the mean square of the distance is that of the step.
             moved = move(state, 0.0, 0.0, self.motion, key)
             noise = np.random.default_rng(int(key)).standard_normal((2, state.shape[1]))
-            moved[: NORTH + 1] += (unknown.step_sd_m * noise).astype(np.float32)
+            moved[: NORTH + 1] += (length_m / sqrt(2.0) * noise).astype(np.float32)
         weighed = log_weight.copy()
         rows, step = self.area.lattice.rows, self.area.lattice.resolution_m
         found = interpolate(moved, self.log_map, step / 2, (rows - 0.5) * step, 1 / step)
@@ -198,7 +187,7 @@ class BayesModel:
         return moved, weighed
 
     def weigh(self, state: Floats32, log_weight: Floats, reading: RadioReading) -> Reason:
-        """Add the log-likelihood of a report and of a fix, in place."""
+        """Add the log-likelihood of a report, then of each further term, in place."""
         flat = self.area.flat_level_dbm
         bands = len(self.area.cell_ids) + 2
         used = False
@@ -226,39 +215,39 @@ class BayesModel:
         return bool(summary.mean[OFF] < 0.5)
 
     def _pixels(self, state: Floats32, back_east_m: float, back_north_m: float) -> Ints32:
+        """Return the pixel of each hypothesis, moved back by a displacement of dead reckoning."""
         lattice, step = self.area.lattice, self.area.lattice.resolution_m
         frame = RasterFrame(0.0, lattice.rows * step, 1 / step, lattice.rows, lattice.cols)
         return np.asarray(fingerprint.pixels(state, back_east_m, back_north_m, frame))
 
 
-_LEAST_VARIANCE = 0.25
-"""Of an innovation, as a share of the usual one."""
+_MIN_VARIANCE = 0.25
+"""Least variance of an innovation, as a share of the usual one."""
 
 
 @dataclass(frozen=True)
 class MeasuredMapModel(BayesModel):
-    """Streets and radio of an area, with maps of what was heard.
+    """Ways and measured radio maps of an area.
 
     Parameters
     ----------
     heard : ServingStatistics
         On the area's lattice.
     level_sd_db : ndarray of float32, shape (C, P), optional
-        Of a new reading against the map of levels, on the area's lattice; without it that of the
-        evidence's options holds everywhere.
+        Standard deviation of a new reading from the map of levels, on the area's lattice; without
+        it that of the evidence options everywhere.
     """
 
     heard: ServingStatistics | None = None
+    level_sd_db: Floats32 | None = None
 
     @property
     def timed_by_sites(self) -> bool:
-        """Whether timing advances are compared with the distances of sites: with maps if any."""
+        """Whether timing advances are compared with the distances of sites: not with maps."""
         return self.heard is None
 
-    level_sd_db: Floats32 | None = None
-
     def weigh(self, state: Floats32, log_weight: Floats, reading: RadioReading) -> Reason:
-        """Add the log-likelihood of a report and of a fix, in place."""
+        """Add the log-likelihood of a report and of further terms, in place."""
         heard = self.heard
         if heard is None or reading.serving < 0:
             return super().weigh(state, log_weight, reading)
@@ -277,10 +266,10 @@ class MeasuredMapModel(BayesModel):
     def _log_levels(
         self, state: Floats32, now: Ints32, levels: LevelReading, sd_db: Floats32
     ) -> Floats32:
-        """Return the log-likelihood of levels that are more certain at some places than at others.
+        """Return the log-likelihood of levels with a standard deviation for each pixel.
 
-        As :func:`mapfilter.models.fingerprint.weigh_by_levels`, but with errors of different cells
-        that have nothing in common.
+        As :func:`mapfilter.models.fingerprint.weigh_by_levels`, but with independent errors of
+        different cells.
         """
         table = self.area.level_dbm
         table = table.reshape(-1, table.shape[-1])
@@ -292,7 +281,7 @@ class MeasuredMapModel(BayesModel):
         ):
             innovation_db = offset_db - table[now, cell] + rho * table[then, cell]
             more_db2 = sd_db[cell][now] ** 2 - usual.measurement_db**2 - usual.sd_db**2
-            wider = 1 + np.maximum(more_db2 * (1 - rho**2) * scale**2, _LEAST_VARIANCE - 1)
+            wider = 1 + np.maximum(more_db2 * (1 - rho**2) * scale**2, _MIN_VARIANCE - 1)
             square = np.minimum((innovation_db * scale) ** 2 / wider, levels.clip**2)
             found -= np.float32(0.5 * levels.weight) * (square + np.log(wider))
         return found

@@ -40,8 +40,6 @@ class EvidenceOptions:
 
     Parameters
     ----------
-    serving : ServingWeights
-    levels : LevelErrors
     spacing_m : float
         Least distance between two reports that are used.
     first_m : float
@@ -124,14 +122,7 @@ class RadioSource(EvidenceSource):
     ) -> EvidenceUpdate:
         """Prepare a report for the model, and update the history.
 
-        Parameters
-        ----------
-        history : RadioHistory
-        reckoning : DeadReckoning
-            At the epoch.
-        epoch : Epoch
-        particle_spacing_m : float
-            Distance of the hypotheses nearest to the true position from it.
+        The hypotheses nearest to the true position lie up to ``particle_spacing_m`` from it.
         """
         options = self.options
         serving, reason, rows = self._serving(epoch)

@@ -1,15 +1,16 @@
-"""The whole track in hindsight: what came later tells where one was before.
+"""Smoothing: forward filtering, backward simulation.
 
-The forward pass keeps the belief every few metres (and ever more seldom where that would take too
-much memory). Going back from the last one, paths are drawn through the kept hypotheses (backward
-simulation; Godsill, Doucet & West 2004); at each moment they are a sample of what the whole log
-says. Between two kept beliefs a path follows the dead reckoning, bent to end where it must.
+The forward pass keeps the belief every few metres (less often where that would take too much
+memory). Going back from the last one, paths are drawn through the kept hypotheses (Godsill, Doucet
+& West 2004); at each epoch they are a sample of the posterior given the whole log. Between two kept
+beliefs a path follows the dead reckoning, bent to end at the later one.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from math import log
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,23 +25,12 @@ from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.matched_way import matched_way
 
-_MOST_BYTES = 400 * 2**20
+_MAX_BYTES = 400 * 2**20
 _JUMPS = 1e-4
 
 
-@dataclass(frozen=True, eq=False)
-class Kept:
-    """A belief of the forward pass.
-
-    Parameters
-    ----------
-    epoch : int
-    state : ndarray of float32, shape (5, N)
-    log_weight : ndarray of float32, shape (N,)
-    moved_m : (float, float)
-        East and north by dead reckoning since the start, in the frame of its headings.
-    travelled_m : float
-    """
+class Kept(NamedTuple):
+    """A belief of the forward pass: states, shape (5, N), weights, and dead reckoning so far."""
 
     epoch: int
     state: Floats32
@@ -48,30 +38,36 @@ class Kept:
     moved_m: tuple[float, float]
     travelled_m: float
 
-    @property
-    def bytes(self) -> int:
-        """RadioHistory that it takes."""
-        return int(self.state.nbytes + self.log_weight.nbytes)
-
 
 @dataclass(eq=False)
-class History:
-    """Beliefs that are kept on the way; grows as the forward pass goes.
+class BayesSmoother:
+    """Collects beliefs of a forward pass, and smooths the track by them.
 
     Parameters
     ----------
+    errors : MotionErrors
+        Of the forward pass.
     every_m : float
-        Travelled between two that are kept.
+        Distance between two beliefs that are kept; doubles when they take too much memory.
+    kept, alternative : list of Kept
+        Of the main belief and, since its start, of the present alternative.
+    moved : list of (float, float, float)
+        East, north and distance by dead reckoning at each epoch.
+    last : BayesState or None
+        After the last epoch.
     """
 
+    area: AreaMap
+    errors: MotionErrors
     every_m: float = 5.0
     kept: list[Kept] = field(default_factory=list)
     alternative: list[Kept] = field(default_factory=list)
     moved: list[tuple[float, float, float]] = field(default_factory=list)
+    last: BayesState | None = None
 
     def add(self, before: BayesState, after: BayesState) -> None:
-        """Add the state after one more epoch; a takeover replaces what was kept since it began."""
-        now, epoch = after.reckoning, len(self.moved)
+        """Record the states before and after one epoch; a takeover replaces beliefs kept since."""
+        self.last, now = after, after.reckoning
         self.moved.append((now.east_m, now.north_m, now.travelled_m))
         if before.alternative is not None and after.alternative is None:
             if after.takeovers > before.takeovers:
@@ -81,80 +77,78 @@ class History:
         due = not self.kept or now.travelled_m - self.kept[-1].travelled_m >= self.every_m
         if after.belief is None or not due:
             return
-        self.kept.append(_keep(after.belief, epoch, self.moved[-1]))
+        self.kept.append(self._keep(after.belief))
         if after.alternative is not None:
-            self.alternative.append(_keep(after.alternative.belief, epoch, self.moved[-1]))
-        if sum(k.bytes for k in self.kept) > _MOST_BYTES:
+            self.alternative.append(self._keep(after.alternative.belief))
+        if sum(k.state.nbytes + k.log_weight.nbytes for k in self.kept) > _MAX_BYTES:
             self.kept, self.every_m = self.kept[::2], 2 * self.every_m
 
-    def close(self, last: BayesState) -> None:
+    def _keep(self, belief: MapBelief) -> Kept:
+        east_m, north_m, travelled_m = self.moved[-1]
+        weight = belief.log_weight.astype(np.float32)
+        epoch = len(self.moved) - 1
+        return Kept(epoch, belief.state[:STATES], weight, (east_m, north_m), travelled_m)
+
+    def close(self) -> None:
         """Keep the last belief, from which paths go back."""
-        if last.leading is not None and self.kept and self.kept[-1].epoch < len(self.moved) - 1:
-            self.kept.append(_keep(last.leading, len(self.moved) - 1, self.moved[-1]))
+        belief = self.last.leading if self.last is not None else None
+        if belief is not None and self.kept and self.kept[-1].epoch < len(self.moved) - 1:
+            self.kept.append(self._keep(belief))
 
+    def smoothed(
+        self,
+        estimate: TrackEstimate,
+        rng: np.random.Generator,
+        *,
+        paths: int = 200,
+        jitter: tuple[float, ...] = (1.5, 1.5, 0.01, 0.006, 0.0),
+    ) -> TrackEstimate:
+        """Return the estimate with positions, radii and ways given the whole log.
 
-def _keep(belief: MapBelief, epoch: int, moved: tuple[float, float, float]) -> Kept:
-    weight = belief.log_weight.astype(np.float32)
-    return Kept(epoch, belief.state[:STATES], weight, moved[:2], moved[2])
-
-
-def smoothed(
-    estimate: TrackEstimate,
-    history: History,
-    area: AreaMap,
-    errors: MotionErrors,
-    rng: np.random.Generator,
-    *,
-    paths: int = 200,
-    jitter: tuple[float, ...] = (1.5, 1.5, 0.01, 0.006, 0.0),
-) -> TrackEstimate:
-    """Return an estimate whose positions, radii and ways are those in hindsight.
-
-    Parameters
-    ----------
-    estimate : TrackEstimate
-        Of the forward pass; what it says of status and readings stays.
-    history : History
-        Closed.
-    area : AreaMap
-    errors : MotionErrors
-        Of the forward pass.
-    rng : numpy.random.Generator
-    paths : int
-        How many are drawn.
-    jitter : tuple of float
-        How far an ancestor may be off beyond the motion's noise, for each row of the state; not
-        less than the forward pass parts copies by.
-    """
-    kept = history.kept
-    if not kept:
-        return estimate
-    moved = np.array(history.moved)
-    states = _paths(kept, area, errors, rng, paths, jitter)
-    west, south = area.origin_m
-    bins = Bins.over((0.0, 0.0, *area.size_m))
-    weight = np.full(paths, 1 / paths, dtype=np.float32)
-    east_m, north_m = estimate.east_m.copy(), estimate.north_m.copy()
-    covariance_m2, radii_m = estimate.covariance_m2.copy(), estimate.radii_m.copy()
-    mass, way_id = estimate.mass_50m.copy(), estimate.way_id.copy()
-    way_probability = estimate.way_probability.copy()
-    for index in range(kept[0].epoch, len(estimate)):
-        place = _between(kept, states, moved, index)
-        said = summarise(place, weight, bins)
-        east_m[index], north_m[index] = said.mean[0] + west, said.mean[1] + south
-        covariance_m2[index], radii_m[index] = said.covariance_m2, said.radii_m
-        mass[index] = said.mass_50m
-        way_id[index], way_probability[index] = matched_way(area, place[0], place[1], weight)
-    return replace(
-        estimate,
-        east_m=east_m,
-        north_m=north_m,
-        covariance_m2=covariance_m2,
-        radii_m=radii_m,
-        mass_50m=mass,
-        way_id=way_id,
-        way_probability=way_probability,
-    )
+        Parameters
+        ----------
+        estimate : TrackEstimate
+            Of the forward pass; its statuses and unused readings stay.
+        paths : int
+            Number of paths.
+        jitter : tuple of float
+            Standard deviation by which an ancestor may differ beyond the motion's noise, for each
+            row of the state; at least that of the jitter of copies in the forward pass.
+        """
+        self.close()
+        area, kept = self.area, self.kept
+        if not kept:
+            return estimate
+        moved = np.array(self.moved)
+        states = _paths(kept, area, self.errors, rng, paths, jitter)
+        west, south = area.origin_m
+        bins = Bins.over((0.0, 0.0, *area.size_m))
+        weight = np.full(paths, 1 / paths, dtype=np.float32)
+        names = (
+            "east_m",
+            "north_m",
+            "covariance_m2",
+            "radii_m",
+            "mass_50m",
+            "way_id",
+            "way_probability",
+        )
+        new = {name: getattr(estimate, name).copy() for name in names}
+        for index in range(kept[0].epoch, len(estimate)):
+            place = _between(kept, states, moved, index)
+            found = summarise(place, weight, bins)
+            way = matched_way(area, place[0], place[1], weight)
+            values = (
+                found.mean[0] + west,
+                found.mean[1] + south,
+                found.covariance_m2,
+                found.radii_m,
+                found.mass_50m,
+                *way,
+            )
+            for name, value in zip(names, values, strict=True):
+                new[name][index] = value
+        return replace(estimate, **new)
 
 
 def _paths(
@@ -217,31 +211,3 @@ def _reckoned(state: Floats32, moved_m: Floats) -> Floats32:
     east, north = np.float32(moved_m[0]), np.float32(moved_m[1])
     moved = np.stack([east * cosine - north * sine, east * sine + north * cosine])
     return np.asarray(state[:2] + stretch * moved, dtype=np.float32)
-
-
-@dataclass(eq=False)
-class BayesSmoother:
-    """Collects beliefs of a forward pass, and smooths the track by them.
-
-    Parameters
-    ----------
-    area : AreaMap
-    errors : MotionErrors
-        Of the forward pass.
-    """
-
-    area: AreaMap
-    errors: MotionErrors
-    history: History = field(default_factory=History)
-    last: BayesState | None = None
-
-    def add(self, before: BayesState, after: BayesState) -> None:
-        """Record the states before and after one epoch."""
-        self.history.add(before, after)
-        self.last = after
-
-    def smoothed(self, estimate: TrackEstimate, rng: np.random.Generator) -> TrackEstimate:
-        """Return the estimate with positions, radii and ways given the whole log."""
-        if self.last is not None:
-            self.history.close(self.last)
-        return smoothed(estimate, self.history, self.area, self.errors, rng)

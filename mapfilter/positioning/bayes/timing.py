@@ -69,12 +69,7 @@ class TimingTerm:
 class TimingSource(EvidenceSource):
     """Timing advances and time differences, by the distances of sites.
 
-    Parameters
-    ----------
-    area : AreaMap
-    options : TimingOptions
-    advances : bool
-        Use timing advances; False where a measured map of them is used instead.
+    ``advances`` is False where a measured map of timing advances is used instead.
     """
 
     area: AreaMap

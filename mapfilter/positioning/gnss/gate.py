@@ -53,11 +53,7 @@ _FIX_CLIP = 5.0
 class FixTerm:
     """Log-likelihood of a position fix: Gaussian, clipped at five standard deviations.
 
-    Parameters
-    ----------
-    fix : GnssFix
-    origin_m : (float, float)
-        Of the frame of the hypotheses.
+    ``origin_m`` is that of the frame of the hypotheses.
     """
 
     fix: GnssFix
@@ -145,16 +141,7 @@ class GnssComparison(NamedTuple):
 
 @dataclass(frozen=True)
 class GnssGate:
-    """Compares fixes and pseudoranges with beliefs.
-
-    Parameters
-    ----------
-    options : GnssOptions
-    crs : str
-        Of the map.
-    origin_m : (float, float)
-        Of the frame of the hypotheses.
-    """
+    """Compares fixes and pseudoranges with beliefs, in the map's CRS and the hypotheses' frame."""
 
     options: GnssOptions
     crs: str
@@ -170,14 +157,7 @@ class GnssGate:
     ) -> GnssComparison:
         """Compare an epoch's fix and pseudoranges with a belief.
 
-        Parameters
-        ----------
-        belief : MapBelief
-        state : GnssState
-        epoch : Epoch
-        travelled_m : float
-        particle_spacing_m : float
-            Distance of the hypotheses nearest to the true position from it.
+        The hypotheses nearest to the true position lie up to ``particle_spacing_m`` from it.
         """
         state = replace(state, compared_at_s=epoch.time_s, compared_at_m=travelled_m)
         found = GnssComparison(belief, state)

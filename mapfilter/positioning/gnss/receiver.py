@@ -39,20 +39,19 @@ Unused = tuple[str, str, Reason]
 
 @dataclass(frozen=True, eq=False)
 class Sky:
-    """What is received at one moment, in true east, north and up about a place.
+    """Satellites received at one epoch, in true east, north and up about a place.
 
     Parameters
     ----------
     names : tuple of str
     satellites_m : (m, 3) array
     elevation_rad : (m,) array
-    range_m : (m,) array
-        Pseudoranges.
-    sigma_m : (m,) array
-        Deviations of their noise; NaN where not told.
+    range_m, sigma_m : (m,) array
+        Pseudoranges, and standard deviations of their noise; NaN if not reported.
     origin_m : (float, float)
         The place, in the frame of the hypotheses.
     true_from_grid : (2, 2) array
+        Rotation by the grid convergence.
     """
 
     names: tuple[str, ...]
@@ -64,7 +63,7 @@ class Sky:
     true_from_grid: Floats
 
     def only(self, chosen: Bools) -> Sky:
-        """Return some of the satellites."""
+        """Return the chosen satellites."""
         return replace(
             self,
             names=tuple(np.array(self.names)[chosen].tolist()),
@@ -77,15 +76,14 @@ class Sky:
 
 @dataclass(frozen=True, eq=False)
 class Receiver:
-    """Clock and height of a belief, beyond what its hypotheses carry.
+    """Clock and height of a belief; hypotheses carry their differences from it.
 
     Parameters
     ----------
     time_s, travelled_m : float
-        When satellites were last heard, and the distance travelled then.
+        Time and distance travelled at the last comparison.
     mean : (3,) array
-        The clock's error (m) and rate (m/s), and the height over the frame's origin (m), to which
-        the rows of the hypotheses are added.
+        Clock error (m) and rate (m/s), and height over the frame's origin (m).
     covariance : (3, 3) array
         Shared by all hypotheses.
     used_at_m : float
@@ -101,16 +99,16 @@ class Receiver:
 
 @dataclass(frozen=True, eq=False)
 class Weighed:
-    """What pseudoranges make of a belief.
+    """A belief weighed by pseudoranges.
 
     Parameters
     ----------
     gain : (N,) array
         Log-likelihood of each hypothesis, such that the belief's total is 0.
     score : float
-        Logarithm of how probable they were, against what is usual.
+        Log-likelihood of the belief less the usual one.
     rows : (3, N) array
-        What hypotheses carry of clock and height afterwards.
+        Clock and height of the hypotheses afterwards.
     covariance : (3, 3) array
     """
 
@@ -121,7 +119,7 @@ class Weighed:
 
 
 def begun(options: GnssOptions, time_s: float, travelled_m: float) -> Receiver:
-    """Return a receiver of which nothing is known."""
+    """Return a receiver before its first pseudorange."""
     deviations = np.array([options.clock_sd_m, options.drift_sd_mps, options.height_sd_m])
     return Receiver(time_s, travelled_m, np.zeros(LINEAR), np.diag(deviations**2))
 
@@ -129,13 +127,13 @@ def begun(options: GnssOptions, time_s: float, travelled_m: float) -> Receiver:
 def moved(
     options: GnssOptions, receiver: Receiver, rows: Floats, time_s: float, travelled_m: float
 ) -> tuple[Receiver, Floats]:
-    """Let the clock run and the height change since the last time; rows have shape (3, N)."""
+    """Propagate clock and height since the last comparison; rows have shape (3, N)."""
     elapsed_s = max(time_s - receiver.time_s, 0.0)
     gone_m = max(travelled_m - receiver.travelled_m, 0.0)
     run = np.eye(LINEAR)
     run[0, 1] = elapsed_s
     noise = np.zeros((LINEAR, LINEAR))
-    # So much in a second, and in proportion: noise must not depend on how often one looks.
+    # In proportion to time: noise must not depend on how often readings are compared.
     bias, rate = np.diag(clock_noise(1.0)).tolist()
     noise[0, 0] = bias * elapsed_s + rate * elapsed_s**3 / 3
     noise[0, 1] = noise[1, 0] = rate * elapsed_s**2 / 2
@@ -155,7 +153,7 @@ def moved(
 
 
 def clock_reset(options: GnssOptions, receiver: Receiver) -> Receiver:
-    """Return a receiver whose clock may have jumped anywhere; its rate and height stay known."""
+    """Return a receiver with an unknown clock error; rate and height stay."""
     covariance = receiver.covariance.copy()
     covariance[0, :] = covariance[:, 0] = 0.0
     covariance[0, 0] = options.clock_sd_m**2
@@ -163,7 +161,7 @@ def clock_reset(options: GnssOptions, receiver: Receiver) -> Receiver:
 
 
 def centred(receiver: Receiver, rows: Floats, state: Floats32) -> tuple[Receiver, Floats32]:
-    """Return a receiver, and hypotheses that carry what they differ from it by."""
+    """Return the receiver with the mean of the rows added, and hypotheses with the rest."""
     middle = rows.mean(axis=1)
     carrying = np.empty((STATES + LINEAR, state.shape[1]), dtype=np.float32)
     carrying[:STATES] = state[:STATES]
@@ -172,14 +170,14 @@ def centred(receiver: Receiver, rows: Floats, state: Floats32) -> tuple[Receiver
 
 
 def carried(state: Floats32) -> Floats:
-    """Return what hypotheses carry of clock and height, shape (3, N); 0 before the first time."""
+    """Return clock and height of the hypotheses, shape (3, N); 0 before the first pseudorange."""
     if state.shape[0] < STATES + LINEAR:
         return np.zeros((LINEAR, state.shape[1]))
     return state[STATES : STATES + LINEAR].astype(np.float64)
 
 
 def near_clock(sky: Sky, receiver: Receiver) -> Receiver:
-    """Return a receiver whose clock, of which nothing is known, is near what it must be."""
+    """Set an unknown clock to the median difference of pseudoranges and distances."""
     expected_m = np.linalg.norm(sky.satellites_m, axis=1)
     mean = receiver.mean.copy()
     mean[0] = float(np.median(sky.range_m - expected_m))
@@ -187,24 +185,29 @@ def near_clock(sky: Sky, receiver: Receiver) -> Receiver:
 
 
 def weighed(
-    sky: Sky, sigma_m: Floats, receiver: Receiver, place: Floats32, log_weight: Floats,
-    rows: Floats, free: int = 0,
-) -> Weighed:  # fmt: skip
-    """Weigh hypotheses by pseudoranges, the clock and the height integrated out.
+    sky: Sky,
+    sigma_m: Floats,
+    receiver: Receiver,
+    place: Floats32,
+    log_weight: Floats,
+    rows: Floats,
+    free: int = 0,
+) -> Weighed:
+    """Weigh hypotheses by pseudoranges, with clock and height integrated out.
 
     Parameters
     ----------
-    sky : Sky
     sigma_m : (m,) array
+        Standard deviations.
     receiver : Receiver
-        Of the moment.
+        At the time of the pseudoranges.
     place : (2, N) array
         East and north of the hypotheses in their frame.
     log_weight : (N,) array
     rows : (3, N) array
-        What they carry.
+        Clock and height of the hypotheses.
     free : int
-        How many of the readings a clock that may be anywhere explains by itself.
+        Number of readings that an unknown clock explains by itself.
     """
     origin = np.array(sky.origin_m)[:, None]
     state = np.empty((LAYOUT.size, place.shape[1]))
@@ -213,7 +216,7 @@ def weighed(
     covariance = np.zeros((LAYOUT.size, LAYOUT.size))
     covariance[2:, 2:] = receiver.covariance
     total = float(np.logaddexp.reduce(log_weight))
-    # Those of no weight at all count as of hardly any, so that differences stay finite.
+    # Weights of 0 become tiny ones, so that differences stay finite.
     weight = np.maximum(log_weight - total, -700.0)
     before = MixedBelief(state, weight, covariance, np.array([0, 1]))
     model = pseudoranges(LAYOUT, sky.satellites_m, sigma_m)
@@ -232,18 +235,18 @@ def weighed(
 
 
 def agreement(
-    sky: Sky, sigma_m: Floats, receiver: Receiver, place: Floats32, weight: Floats32,
-    rows: Floats, free: int = 0,
-) -> float:  # fmt: skip
-    """Return how well pseudoranges agree with a belief as a whole, taken for one Gaussian.
+    sky: Sky,
+    sigma_m: Floats,
+    receiver: Receiver,
+    place: Floats32,
+    weight: Floats32,
+    rows: Floats,
+    free: int = 0,
+) -> float:
+    """Return the agreement of pseudoranges with a belief taken as one Gaussian.
 
-    Arguments are those of :func:`weighed`, but weights that sum to one.
-
-    Returns
-    -------
-    float
-        Half of the degrees of freedom less the normalised square of the innovation: about 0 where
-        all is well, far below where not.
+    This is half of the degrees of freedom less the normalized innovation squared: about 0 where
+    they agree, far below where not. Arguments are those of :func:`weighed`, but weights sum to one.
     """
     origin = np.array(sky.origin_m)[:, None]
     flat = sky.true_from_grid @ (place.astype(np.float64) - origin)
@@ -268,18 +271,10 @@ def sky_over(
     epoch: Epoch,
     middle_m: tuple[float, float],
 ) -> tuple[Sky | None, tuple[Unused, ...]]:
-    """Return the satellites of an epoch over a place, and those that are left alone.
+    """Return the satellites of an epoch over a place, and the readings left out.
 
-    Parameters
-    ----------
-    options : GnssOptions
-    crs : str
-        Of the map.
-    origin_m : (float, float)
-        Of the frame of the hypotheses.
-    epoch : Epoch
-    middle_m : (float, float)
-        The place in that frame, in the middle of the hypotheses.
+    ``origin_m`` is that of the frame of the hypotheses, in the map's CRS; ``middle_m`` the place,
+    in that frame.
     """
     unused = list[Unused]()
     chosen: dict[str, Pseudorange] = {}
@@ -316,19 +311,10 @@ def sky_over(
 def range_sigma_m(
     options: GnssOptions, sky: Sky, gone_m: float, particle_spacing_m: float
 ) -> Floats:
-    """Return deviations of pseudoranges that follow others after some metres.
+    """Return standard deviations of pseudoranges, ``gone_m`` after the last ones that were used.
 
-    White noise is new each time. Echoes last for metres: readings in a row count as one in so
-    many.
-
-    Parameters
-    ----------
-    options : GnssOptions
-    sky : Sky
-    gone_m : float
-        Since the last ones that were used.
-    particle_spacing_m : float
-        How far the hypotheses nearest to the truth may lie beside it.
+    White noise is independent each time. Echoes last for some metres, over which readings count as
+    one. The hypotheses nearest to the true position lie up to ``particle_spacing_m`` from it.
     """
     by_elevation = options.zenith_m / np.sin(sky.elevation_rad)
     white = np.where(np.isfinite(sky.sigma_m), sky.sigma_m, by_elevation)

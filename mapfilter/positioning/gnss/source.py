@@ -79,12 +79,7 @@ class FirstFix(EvidenceSource):
 class GnssSource(EvidenceSource):
     """Fixes and pseudoranges, with each radio report that is used, or on their own without one.
 
-    Parameters
-    ----------
-    area : AreaMap
-    options : GnssOptions
-    clock : bool
-        Whether hypotheses can carry a clock: those of the grid filter cannot.
+    ``clock`` is whether hypotheses can carry a clock: those of the grid filter cannot.
     """
 
     area: AreaMap
