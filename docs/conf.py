@@ -6,8 +6,8 @@ from pathlib import Path
 from shutil import rmtree
 
 project = "mapfilter"
-author = "the mapfilter authors"
-copyright = "the mapfilter authors, Apache-2.0"  # noqa: A001
+author = "The mapfilter developers"
+copyright = "The mapfilter developers, Apache-2.0"  # noqa: A001
 release = version = installed_version("mapfilter")
 
 extensions = [
@@ -26,13 +26,10 @@ autosummary_generate = True
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_default_options = {"members": True}
-autodoc_type_aliases = {
-    name: name
-    for name in (
-        "ArrayLike", "Bools", "Bounds", "Floats", "Floats32", "Geometries", "Levels", "Progress",
-        "Rows",
-    )
-}  # fmt: skip
+_ALIASES = "ArrayLike Bools Bounds Floats Floats32 Geometries Ints Ints32 Levels Progress Rows"
+autodoc_type_aliases = {name: name for name in _ALIASES.split()}
+# Types in docstrings are short names, of which several packages may have one.
+suppress_warnings = ["ref.python"]
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 # Examples in docstrings are run by pytest, with the names of their modules.

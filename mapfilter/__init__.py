@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from mapfilter.positioning.kalman.filter import KalmanFilter as KalmanFilter
     from mapfilter.radio.cells import CellPlan as CellPlan
     from mapfilter.radio.cells import read_cell_plan as read_cell_plan
-    from mapfilter.rasters.rxlev_rasters import RxLevRasters as RxLevRasters
-    from mapfilter.rasters.rxlev_rasters import open_rasters as open_rasters
+    from mapfilter.rasters.raster_set import RxLevRasters as RxLevRasters
+    from mapfilter.rasters.raster_set import open_rasters as open_rasters
     from mapfilter.roads.lattice import RouteLattice as RouteLattice
     from mapfilter.tracks.log import TrackLog as TrackLog
     from mapfilter.tracks.log import make_log as make_log

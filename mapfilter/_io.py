@@ -18,6 +18,7 @@ import stat
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,9 @@ _RENAME_EXCHANGE = 2
 _NO_PATH = (errno.ENAMETOOLONG, errno.ELOOP)
 _SHOWN = 60
 _WRITE_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
+
+VERSION = version("mapfilter")
+"""Of the program, for the record in what it writes."""
 
 
 def sha256_file(path: Path) -> str:

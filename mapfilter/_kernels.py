@@ -10,7 +10,19 @@ from __future__ import annotations
 from math import pi
 
 import numpy as np
-from numba import njit
+from numba import boolean, float64, int64, njit, void
+
+MEASURE_SIGNATURE = void(
+    float64[:, ::1],
+    int64[::1],
+    float64[:, ::1],
+    float64[::1],
+    float64[:, ::1],
+    float64[:, :, ::1],
+    boolean,
+)
+"""Arguments of a compiled measurement: points (q, W), slots (4,), rows (m, c), patterns (p,), mean
+(m, W) and slope (m, q, W) to be written, and whether the slope is wanted."""
 
 _F = np.float32
 _TWO_PI = _F(2 * pi)

@@ -73,7 +73,8 @@ class Track:
             Where to draw; a new figure when left out.
         """
         from mapfilter.report.track import plot_track
-        from mapfilter.workflows.served import served_points, street_map
+        from mapfilter.workflows.network_pictures import street_map
+        from mapfilter.workflows.served import served_points
 
         base = street_map(self.database, served_points(self.database))
         return plot_track(self.estimate, Truth.of_table(self.log.truth), base, ax=ax)

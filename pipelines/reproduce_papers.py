@@ -7,15 +7,16 @@ The settings are in ``reproduce_papers.toml``::
 
 import sys
 from pathlib import Path
+from typing import Any
 
 from mapfilter.config.sections import Config
 from mapfilter.workflows.pipeline import Stage, run_pipeline
-from mapfilter.workflows.reproduce import ReproduceResult, run_reproduce
+from mapfilter.workflows.reproduce import run_reproduce
 
 WORKERS = 2
 
 
-def khalaf_allah_2007(config: Config) -> ReproduceResult:
+def khalaf_allah_2007(config: Config) -> dict[str, Any]:
     """Repeat Fig. 5 and Table 4, with the plan's seed and its runs in each cell."""
     return run_reproduce(
         "khalaf-allah-2007",

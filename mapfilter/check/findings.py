@@ -1,4 +1,4 @@
-"""Findings of a check: what is wrong, where, by which numbers, and what helps."""
+"""Findings of a check: what is wrong, where, by which numbers, and the remedy."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ REMEDIES = {
     "antenna-invalid": "Correct the pattern file, or take another.",
     "antenna-missing": "Put the pattern file into the folder cells.antennas, or correct the name.",
     "area-invalid": "Correct the area; a box is west, south, east, north in degrees.",
-    "area-outside-map": 'Take a map of the area, correct the area, or say area.map = "none" where '
+    "area-outside-map": 'Take a map of the area, correct the area, or set area.map = "none" where '
     "layers, tracks or land use replace it.",
     "axes-swapped": "Export the rasters anew with rows from north to south and columns from west "
     "to east.",
@@ -30,7 +30,7 @@ REMEDIES = {
     "azimuth-off-lobe": "Correct the azimuth, or take the raster that belongs to the cell.",
     "azimuth-radians": "Turn the azimuths into degrees.",
     "cell-without-raster": "Add the rasters, or take the cells out of the plan.",
-    "crs-mixed": "Say the CRS that the numbers were made in (column crs of the plan, rasters.crs, "
+    "crs-mixed": "Set the CRS that the numbers were made in (column crs of the plan, rasters.crs, "
     "area.crs), or project the file.",
     "degrees-for-metres": "Name columns of degrees lat and lon, or give metres in a projected CRS.",
     "duplicate-id": "Give each cell an id of its own.",
@@ -44,16 +44,16 @@ REMEDIES = {
     "landuse-classes": "Add the classes to the table, or export the raster without blending.",
     "landuse-invalid": "Correct the land-use raster or its table.",
     "landuse-outside": "Take the land-use raster of this area.",
-    "level-as-loss": 'Say rasters.quantity = "level".',
+    "level-as-loss": 'Set rasters.quantity = "level".',
     "levels-above-eirp": "Check the EIRP, or what the rasters hold.",
     "lon-lat-swapped": "Exchange longitude and latitude.",
-    "loss-as-level": 'Say rasters.quantity = "loss"; levels are then taken from the EIRP.',
+    "loss-as-level": 'Set rasters.quantity = "loss"; levels are then taken from the EIRP.',
     "map-invalid": "Correct area.map.",
-    "measurements-invalid": "Correct the files of prediction.survey, or what is said of them.",
+    "measurements-invalid": "Correct the files of prediction.survey, or their settings.",
     "metres-for-degrees": "Name columns of metres east and north, or give degrees.",
-    "nodata-as-level": "Say rasters.nodata, or write the raster with its nodata value.",
+    "nodata-as-level": "Set rasters.nodata, or write the raster with its nodata value.",
     "plan-invalid": "Correct the field.",
-    "quantity-unknown": "Say rasters.quantity: level (dBm) or loss (dB).",
+    "quantity-unknown": "Set rasters.quantity: level (dBm) or loss (dB).",
     "raster-constant": "Export the raster anew.",
     "raster-empty": "Export the raster anew, or take the cell out.",
     "raster-upside-down": "Write row 0 in the north and column 0 in the west.",
@@ -65,7 +65,7 @@ REMEDIES = {
     "roads-outside-rasters": "Take rasters, map and area of the same place; build leaves out roads "
     "without rasters.",
     "rxlev-as-level": "Turn RXLEV into dBm (RXLEV - 110.5), or export levels.",
-    "rxlev-as-loss": "Turn RXLEV into dBm (RXLEV - 110.5) and say quantity level.",
+    "rxlev-as-loss": "Turn RXLEV into dBm (RXLEV - 110.5) and set quantity level.",
     "sector-labels-swapped": "Exchange the labels of the rasters, or the azimuths in the plan.",
     "site-labels-swapped": "Exchange the labels of the rasters, or the positions in the plan.",
     "site-off-peak": "Correct the site's position, or take the raster that belongs to the cell.",
@@ -74,7 +74,7 @@ REMEDIES = {
     "ways-with-gaps": "Raise half widths to half a pixel, or read the rasters on finer pixels "
     "(rasters.resolution_m; of rasters that mapfilter predicts, area.resolution_m).",
 }
-"""What helps, by code."""
+"""Remedies by code."""
 
 _BY_HINT = {
     "longitude and latitude swapped": "lon-lat-swapped",
@@ -93,7 +93,7 @@ _BY_HINT = {
     "a CRS of another region": "crs-mixed",
     "a CRS of another region, or Web Mercator": "crs-mixed",
     "a raster upside down or mirrored": "raster-upside-down",
-    "say quantity = level or loss": "quantity-unknown",
+    "set quantity = level or loss": "quantity-unknown",
     "misspelt, or no folder of antennas": "antenna-missing",
     "a class left out, or colours blended by compression or resampling": "landuse-classes",
     "wrong table": "landuse-classes",
@@ -124,7 +124,6 @@ class Finding:
         File, cells or fields.
     evidence : str
         What was found, in numbers.
-    remedy : str
     """
 
     code: str
@@ -139,15 +138,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class CheckResult:
-    """What a check found.
-
-    Parameters
-    ----------
-    ok : bool
-        Whether no finding is an error.
-    findings : tuple of Finding
-        Errors first.
-    """
+    """The findings of a check, errors first, and whether none of them is an error."""
 
     ok: bool
     findings: tuple[Finding, ...]
@@ -168,15 +159,7 @@ class Findings:
     def add_faults(
         self, error: MapfilterError, otherwise: str, severity: Severity = "error"
     ) -> None:
-        """Note the faults that reading an input told.
-
-        Parameters
-        ----------
-        error : MapfilterError
-        otherwise : str
-            Code of faults that have none of their own.
-        severity : {"error", "warning"}
-        """
+        """Note the faults of reading an input; ``otherwise`` is the code of unspecific ones."""
         for fault in error.faults:
             hint = f" ({fault.hint})" if fault.hint else ""
             evidence = f"Expected {fault.expected}, found {fault.got}{hint}."
@@ -189,9 +172,9 @@ class Findings:
 
 
 def paragraphs(result: CheckResult) -> Iterable[str]:
-    """Yield one paragraph for each finding, or one that says that there is none.
+    """Yield one paragraph for each finding, or a single one when there is none.
 
-    Of many alike, such as the same mistake in each row of a table, only the first few are told.
+    Of many alike, such as the same mistake in each row of a table, only the first few are shown.
     """
     if not result.findings:
         yield "Nothing found that looks wrong."

@@ -1,8 +1,7 @@
-"""Where a raster is strong: how well a place and a boresight explain its levels.
+"""The lobe of a raster: how well boresights explain its levels, and what is wrong with azimuths.
 
 A level is explained by ``a + b log10(distance) + c gain(direction - azimuth)``, fitted to the means
-of rings and directions about a place; the correlation of fit and levels is the measure. Shadowing
-and buildings are noise to it, so that it takes a raster's pixels together, and none alone.
+of rings and directions about a place; the correlation of fit and levels is the measure.
 """
 
 from __future__ import annotations
@@ -15,14 +14,13 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from mapfilter._types import Floats, Floats32, Ints
-from mapfilter.check.plausibility import RasterSample
+from mapfilter.check.raster_checks import RasterSample
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.cells import Cell
 
 STEP_DEG = 5.0
 _DIRECTIONS = round(360 / STEP_DEG)
 _RINGS = 24
-_LEAST_PER_BIN = 1
 _LEAST_BINS = 60
 _LEAST_DIRECTIONS = 0.6
 _MOST_PER_BIN = 20
@@ -35,7 +33,6 @@ class Lobe:
 
     Parameters
     ----------
-    cell_id : str
     azimuth_deg : float
         The boresight that explains it best, in steps of 5°, clockwise from true north.
     contrast_db : float
@@ -65,21 +62,10 @@ class Lobe:
 def find_lobe(
     sample: RasterSample, east_m: float, north_m: float, beamwidth_deg: float
 ) -> Lobe | None:
-    """Find into which direction a raster is strong about a place.
+    """Find the direction in which a raster of levels is strong about a site.
 
-    Parameters
-    ----------
-    sample : RasterSample
-        Of levels; for losses give their negatives.
-    east_m, north_m : float
-        Of the site.
-    beamwidth_deg : float
-        Full width at half power of the lobe looked for.
-
-    Returns
-    -------
-    Lobe or None
-        None where too few directions or pixels are to be seen, as for a site at the raster's edge.
+    ``beamwidth_deg`` is the full width at half power of the lobe looked for. Too few directions or
+    pixels, as for a site at the raster's edge, give None.
     """
     value = sample.values
     distance_m, azimuth_deg = sample.seen_from(east_m, north_m)
@@ -110,55 +96,12 @@ def find_lobe(
     return Lobe(sample.cell_id, best * STEP_DEG, slope * _FRONT_TO_BACK_DB, scores)
 
 
-def falls_with_distance(sample: RasterSample, east_m: float, north_m: float) -> float:
-    """Return the correlation of levels with minus the logarithm of the distance from a place.
-
-    1 is a raster that falls off evenly around it; 0 where nothing is known.
-    """
-    east, north = sample.positions_m()
-    known = ~np.isnan(sample.values)
-    value = sample.values[known].astype(np.float64)
-    least_m = sample.lattice.resolution_m
-    far = -np.log10(np.maximum(np.hypot(east - east_m, north - north_m)[known], least_m))
-    if value.size < 2 or np.ptp(value) == 0 or np.ptp(far) == 0:
-        return 0.0
-    return float(np.corrcoef(value, far)[0, 1])
-
-
-def peak_m(sample: RasterSample) -> tuple[float, float]:
-    """Return east and north of the strongest pixels' middle (the strongest 0.2 %, at least 9)."""
-    value = np.where(np.isnan(sample.values), -np.inf, sample.values).ravel()
-    count = min(max(9, value.size // 500), int(np.isfinite(value).sum()))
-    strongest = np.argpartition(value, -count)[-count:]
-    east, north = sample.positions_m()
-    return float(np.median(east.ravel()[strongest])), float(np.median(north.ravel()[strongest]))
-
-
 def best_labels(lobes: Mapping[str, Lobe], azimuths_deg: Mapping[str, float]) -> dict[str, str]:
-    """Return which cell of a site each raster fits best, every cell taken once.
-
-    Parameters
-    ----------
-    lobes : mapping of cell id to Lobe
-        Of the cells of one site.
-    azimuths_deg : mapping of cell id to float
-        Of the same cells.
-
-    Returns
-    -------
-    dict
-        Id of a raster -> id of the cell whose azimuth it goes with.
-    """
+    """Return the cell of a site that each cell's raster fits best, every cell taken once."""
     ids = list(lobes)
     score = np.array([[lobes[a].score(azimuths_deg[b]) for b in ids] for a in ids])
     rows, cols = linear_sum_assignment(-score)
     return {ids[row]: ids[col] for row, col in zip(rows, cols, strict=True)}
-
-
-def mean_score(lobes: Sequence[Lobe], azimuths_deg: Sequence[float]) -> float:
-    """Return the mean score of one boresight for each of several lobes."""
-    pairs = zip(lobes, azimuths_deg, strict=True)
-    return float(np.mean([lobe.score(azimuth) for lobe, azimuth in pairs]))
 
 
 def _binned(
@@ -170,7 +113,7 @@ def _binned(
     direction = (azimuth_deg // STEP_DEG).astype(np.int64) % _DIRECTIONS
     place, size = ring * _DIRECTIONS + direction, _RINGS * _DIRECTIONS
     count = np.bincount(place, minlength=size)
-    full = np.flatnonzero(count >= _LEAST_PER_BIN)
+    full = np.flatnonzero(count)
     mean = np.bincount(place, weights=value, minlength=size)[full] / count[full]
     far = np.bincount(place, weights=log_m, minlength=size)[full] / count[full]
     weight = np.minimum(count[full], _MOST_PER_BIN).astype(np.float64)
@@ -210,7 +153,6 @@ class AzimuthMistake:
 
     Parameters
     ----------
-    mistake : str
     cells : tuple of str
         Whose azimuths or rasters are concerned.
     reading : str
@@ -235,13 +177,8 @@ def azimuth_mistakes(
 
     A sector counts as wrong where its azimuth is more than 45° from the lobe and explains the
     raster clearly worse. A mistake of the whole plan is preferred where it explains two sites or
-    more, then labels exchanged within a site, then single azimuths.
-
-    Parameters
-    ----------
-    cells : sequence of Cell
-    lobes : mapping of cell id to Lobe
-        Where they could be found; cells without one are passed over.
+    more, then labels exchanged within a site, then single azimuths. Cells without a lobe are
+    skipped.
     """
     usable = [cell for cell in cells if _is_clear(cell, lobes)]
     azimuth = {cell.id: float(cell.azimuth_deg or 0.0) for cell in usable}
@@ -261,14 +198,9 @@ def azimuth_mistakes(
     rest = tuple(cell.id for cell in wrong if cell.id not in explained)
     if not rest:
         return tuple(swaps)
-    alone = AzimuthMistake(
-        "azimuth-off-lobe",
-        rest,
-        ", ".join(f"{i} {azimuth[i]:g}° for {lobes[i].azimuth_deg:g}°" for i in rest[:5]),
-        _median_off(rest, lobes, azimuth),
-        0.0,
-    )
-    return (*swaps, alone)
+    reading = ", ".join(f"{i} {azimuth[i]:g}° for {lobes[i].azimuth_deg:g}°" for i in rest[:5])
+    off_deg = _median_off(rest, lobes, azimuth)
+    return (*swaps, AzimuthMistake("azimuth-off-lobe", rest, reading, off_deg, 0.0))
 
 
 def _is_clear(cell: Cell, lobes: Mapping[str, Lobe]) -> bool:
@@ -299,12 +231,15 @@ def _whole_plan(
     if len(usable) < 2 or 2 * len(wrong) < len(usable):
         return None
     ids = [cell.id for cell in usable]
-    found = [lobes[i] for i in ids]
-    as_given = mean_score(found, [azimuth[i] for i in ids])
+
+    def mean_score(azimuths: Mapping[str, float]) -> float:
+        return float(np.mean([lobes[i].score(azimuths[i]) for i in ids]))
+
+    as_given = mean_score(azimuth)
     best: tuple[float, Mistake, str, dict[str, float]] | None = None
     for mistake, reading, read in _READINGS:
         meant = {i: read(azimuth[i]) % 360 for i in ids}
-        score = mean_score(found, [meant[i] for i in ids])
+        score = mean_score(meant)
         stray = sum(_is_off(lobes[i], meant[i]) for i in ids)
         better = score - as_given > _BETTER and stray <= _STRAY_SHARE * len(ids)
         if better and (best is None or score > best[0]):
@@ -313,13 +248,8 @@ def _whole_plan(
         return None
     _, mistake, reading, meant = best
     concerned = tuple(cell.id for cell in wrong)
-    return AzimuthMistake(
-        mistake,
-        concerned,
-        reading,
-        _median_off(concerned, lobes, azimuth),
-        _median_off(concerned, lobes, meant),
-    )
+    off_deg, read_deg = (_median_off(concerned, lobes, some) for some in (azimuth, meant))
+    return AzimuthMistake(mistake, concerned, reading, off_deg, read_deg)
 
 
 def _swapped(
@@ -335,10 +265,5 @@ def _swapped(
     if not moved or any(_is_off(lobes[i], meant[i]) for i in ids):
         return None
     reading = ", ".join(f"{i} is of {label[i]}" for i in moved)
-    return AzimuthMistake(
-        "sector-labels-swapped",
-        moved,
-        reading,
-        _median_off(moved, lobes, azimuth),
-        _median_off(moved, lobes, meant),
-    )
+    off_deg, read_deg = (_median_off(moved, lobes, some) for some in (azimuth, meant))
+    return AzimuthMistake("sector-labels-swapped", moved, reading, off_deg, read_deg)

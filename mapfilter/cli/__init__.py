@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from mapfilter import __version__
+from mapfilter._io import VERSION
 from mapfilter.cli.databases import bound, build, check, export, info, merge, predict
 from mapfilter.cli.evaluate import evaluate
 from mapfilter.cli.experiments import bench, reproduce, sweep
@@ -49,7 +49,7 @@ def _version(
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ) -> None:
     if version:
-        sys.stdout.write(f"mapfilter {__version__}\n")
+        sys.stdout.write(f"mapfilter {VERSION}\n")
         raise typer.Exit(DONE)
 
 

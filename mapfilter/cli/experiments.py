@@ -20,10 +20,12 @@ from mapfilter.cli.options import (
     WorkersOption,
     find_own_filter,
     numbers,
-    refuse,
     seeded,
 )
+from mapfilter.experiments.papers import PAPERS
 from mapfilter.workflows.terminal import print_result, rate_bar, say
+
+*_FIRST, _LAST = PAPERS
 
 
 def sweep(
@@ -56,10 +58,7 @@ def sweep(
 def reproduce(
     paper: Annotated[
         str,
-        typer.Argument(
-            metavar="PAPER",
-            help="khalaf-allah-2007, fritsche-klein-2009, zhang-2006, tesa or dlr.",
-        ),
+        typer.Argument(metavar="PAPER", help=f"{', '.join(_FIRST)} or {_LAST}."),
     ],
     area_map: Annotated[
         str | None,
@@ -83,54 +82,23 @@ def reproduce(
     as_json: JsonOption = False,
 ) -> None:
     """Repeat a paper's experiments: figure, table, and every reading of what it leaves open."""
-    from mapfilter.workflows.reproduce import run_reproduce
-    from mapfilter.workflows.reproduce_dlr import DLR, run_reproduce_dlr
-    from mapfilter.workflows.reproduce_fusion import FUSION_PAPERS, run_reproduce_fusion
-    from mapfilter.workflows.reproduce_tesa import TESA, run_reproduce_tesa
-    from mapfilter.workflows.sweep import brief
+    from mapfilter.experiments.papers import find_paper
+    from mapfilter.workflows.reproduce import brief_figures, run_reproduce
 
-    if paper in FUSION_PAPERS:
-        with rate_bar("reproduce", "parts") as progress:
-            fused = run_reproduce_fusion(
-                paper,
-                (out or Path("out") / paper).absolute(),
-                layout_file=layout,
-                trials=trials,
-                seed=seed or 0,
-                progress=progress,
-            )
-        print_result(fused, as_json)
-        return
-    if paper in (TESA, DLR):
-        refuse({"--map": area_map, "--bbox": bbox, "--layout": layout}, paper)
-        run = run_reproduce_tesa if paper == TESA else run_reproduce_dlr
-        with rate_bar("reproduce", "trials") as progress:
-            tried = run(
-                (out or Path("out") / paper).absolute(),
-                trials=trials,
-                seed=seed or 0,
-                workers=workers,
-                cluster=cluster,
-                progress=progress,
-            )
-        # The table holds the rows, too.
-        shown = {key: own for key, own in asdict(tried).items() if as_json or key != "rows"}
-        print_result(shown, as_json)
-        return
-    with rate_bar("reproduce", "runs") as progress:
-        result = run_reproduce(
+    with rate_bar("reproduce", find_paper(paper).unit) as progress:
+        found = run_reproduce(
             paper,
             (out or Path("out") / paper).absolute(),
             map_name=area_map,
             bbox=numbers(bbox, 4, "--bbox"),
-            trials=trials or 100,
+            layout_file=layout,
+            trials=trials,
             seed=seed or 0,
             workers=workers,
             cluster=cluster,
             progress=progress,
         )
-    told = asdict(result) | ({} if as_json else {"success": brief(result.success)})
-    print_result(told, as_json)
+    print_result(found if as_json else brief_figures(found), as_json)
 
 
 def bench(

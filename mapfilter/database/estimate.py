@@ -25,7 +25,7 @@ from mapfilter.database.sources import LatticeRoutes, Routes
 from mapfilter.database.store import cells_table
 from mapfilter.database.tiles import read_tile
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.lattice import RouteLattice
 
 _SAMPLED_TILES = 16

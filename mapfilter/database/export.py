@@ -13,11 +13,7 @@ import geopandas as gpd
 import numpy as np
 import pandas as pd
 import pyogrio
-import rasterio
 from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, GeometryError
-from rasterio._err import CPLE_BaseError
-from rasterio.errors import RasterioError
-from rasterio.shutil import copy as copy_raster
 from rasterio.windows import Window as RasterWindow
 
 from mapfilter._io import atomic_file
@@ -26,10 +22,37 @@ from mapfilter.database.parquet import WindowReader, read_columns
 from mapfilter.database.radioroutes import Points, RadioRouteDatabase
 from mapfilter.database.tiles import tile_windows
 from mapfilter.errors import OutputError, fail
+from mapfilter.rasters.geotiff import new_geotiff
 
 BANDS = (("best_server", ""), ("best_level_dbm", "dBm"), ("margin_db", "dB"))
 CELLS_TAG = "CELLS"
 
+<<<<<<< HEAD
+_TILE_PX = 512
+
+
+def write_cog(database: RadioRouteDatabase, path: Path) -> None:
+    """Write a database; see :func:`mapfilter.database.store.export_cog`."""
+    lattice = database.lattice
+    columns = ("row", "col", *(name for name, _ in BANDS))
+    reader = WindowReader([database.path / POINTS], columns, lattice)
+    rank = {cell_id: number for number, cell_id in enumerate(database.cell_ids)}
+    tags = {CELLS_TAG: json.dumps(database.cell_ids, ensure_ascii=False)}
+    if database.attribution:
+        tags["TIFFTAG_COPYRIGHT"] = database.attribution
+    with new_geotiff(path, lattice, BANDS, tags) as target:
+        for window in tile_windows(lattice, _TILE_PX):
+            found = reader.read(window)
+            if not found or not len(found["row"]):
+                continue
+            row, col, rows, cols = window
+            values = np.full((len(BANDS), rows, cols), np.nan, dtype=np.float32)
+            at = np.asarray(found["row"]) - row, np.asarray(found["col"]) - col
+            server = found["best_server"].to_pylist()
+            values[0][at] = [rank[cell_id] for cell_id in server]
+            values[1][at], values[2][at] = found["best_level_dbm"], found["margin_db"]
+            target.write(values, window=RasterWindow(col, row, cols, rows))
+=======
 _BLOCK_PX = 512
 _WRITE_ERRORS = (DataSourceError, DataLayerError, FeatureError, GeometryError)
 # GeoPackages hold the time of writing; a fixed one gives equal bytes for equal databases.
@@ -89,6 +112,7 @@ def export_cog(database: RadioRouteDatabase, path: Path | str) -> None:
             copy_raster(bands, temporary, bigtiff="if_safer", **form)
         except (RasterioError, CPLE_BaseError) as error:
             raise fail(OutputError, str(path), "a place that can be written", error) from error
+>>>>>>> h-b
 
 
 def export_geopackage(

@@ -14,7 +14,7 @@ from mapfilter.database.parquet import Window, dictionary, point_geometry
 from mapfilter.database.sources import RoutePart
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.lattice import RouteLattice
 
 _CELLS_AT_A_TIME = 128

@@ -16,17 +16,11 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import rasterio
 from numba import njit
-from rasterio._err import CPLE_BaseError
-from rasterio.errors import RasterioError
-from rasterio.shutil import copy as copy_raster
 from scipy.spatial import cKDTree
 
-from mapfilter._io import atomic_file
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats, Floats32
-from mapfilter.errors import OutputError, fail
 from mapfilter.evaluation.first_fix import FirstFix, FirstFixOptions, first_fix
 from mapfilter.evaluation.position_bound import PositionBound, position_bound
 from mapfilter.evaluation.radio_map import (
@@ -37,6 +31,7 @@ from mapfilter.evaluation.radio_map import (
     heard_cells,
 )
 from mapfilter.geodesy import Lattice
+from mapfilter.rasters.geotiff import new_geotiff
 
 COMPARED = 500
 
@@ -107,9 +102,14 @@ TWIN_ERROR = 0.3
 """Two places count as twins when they are mistaken for each other with at least this chance."""
 
 BANDS = (
-    ("plane_bound_m", "m"), ("along_bound_m", "m"), ("cell_bits", "bit"), ("level_bits", "bit"),
-    ("cells_to_fix_m", "m"), ("levels_to_fix_m", "m"), ("twin_error", ""),
-)  # fmt: skip
+    ("plane_bound_m", "m"),
+    ("along_bound_m", "m"),
+    ("cell_bits", "bit"),
+    ("level_bits", "bit"),
+    ("cells_to_fix_m", "m"),
+    ("levels_to_fix_m", "m"),
+    ("twin_error", ""),
+)
 """What the raster holds, in the order of its bands, with units."""
 
 
@@ -239,9 +239,6 @@ def _known(values: Floats) -> Floats:
     return np.where(np.isfinite(values), values, np.nan)
 
 
-_BLOCK_PX = 512
-
-
 def write_bound(
     rasters: Mapping[str, Floats32], lattice: Lattice, path: Path, attribution: str = ""
 ) -> None:
@@ -252,25 +249,7 @@ def write_bound(
     OutputError
         The file cannot be written.
     """
-    profile = {
-        "driver": "GTiff", "width": lattice.cols, "height": lattice.rows, "count": len(BANDS),
-        "dtype": "float32", "nodata": np.nan, "crs": lattice.crs, "interleave": "band",
-        "transform": rasterio.Affine.from_gdal(*lattice.gdal_transform), "tiled": True,
-        "blockxsize": _BLOCK_PX, "blockysize": _BLOCK_PX, "bigtiff": "if_safer",
-    }  # fmt: skip
-    with atomic_file(path) as temporary:
-        bands = temporary.with_name("bands.tif")
-        try:
-            with rasterio.open(bands, "w", **profile) as target:
-                if attribution:
-                    target.update_tags(TIFFTAG_COPYRIGHT=attribution)
-                for band, (name, unit) in enumerate(BANDS, start=1):
-                    target.write(rasters[name], band)
-                    target.set_band_description(band, name)
-                    target.set_band_unit(band, unit)
-            copy_raster(
-                bands, temporary, driver="COG", compress="DEFLATE", predictor="YES",
-                blocksize=_BLOCK_PX, overview_resampling="nearest", bigtiff="if_safer",
-            )  # fmt: skip
-        except (RasterioError, CPLE_BaseError) as error:
-            raise fail(OutputError, str(path), "a place that can be written", error) from error
+    tags = {"TIFFTAG_COPYRIGHT": attribution} if attribution else {}
+    with new_geotiff(path, lattice, BANDS, tags) as target:
+        for band, (name, _) in enumerate(BANDS, start=1):
+            target.write(rasters[name], band)

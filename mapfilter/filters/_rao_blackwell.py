@@ -2,38 +2,39 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numba import float64, int64, njit, types
 
-from mapfilter._kernels import hashed, normals
+from mapfilter._kernels import MEASURE_SIGNATURE, hashed, normals
 from mapfilter._types import Floats, Floats32, Ints, Ints32
-from mapfilter.filters._square_root import MEASURE_SIGNATURE
 
 _LANES = 256
 """Particles that are weighed at once: what they need stays in the nearest cache."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
-def move(
-    state: Floats, row: Ints, column: Ints, entry: Floats, gain: Floats, key: np.uint64,
-    moved: Floats,
-) -> None:  # pragma: no cover  # fmt: skip
-    """Write ``x + A x + G ε`` for each particle.
+class Entries(NamedTuple):
+    """A sparse matrix by its entries: row, column and value, (e,) arrays."""
 
-    Parameters
-    ----------
-    state : (n, N) array
-    row, column, entry : (e,) arrays
-        A by its entries.
-    gain : (n, d) array
-        G.
-    key : numpy.uint64
-        ε is counted from it.
-    moved : (n, N) array
-        Written.
+    row: Ints
+    column: Ints
+    value: Floats
+
+    @classmethod
+    def of(cls, matrix: Floats) -> Entries:
+        """Return the entries of a matrix that are not zero."""
+        row, column = (np.ascontiguousarray(index) for index in np.nonzero(matrix))
+        return cls(row, column, np.ascontiguousarray(matrix[row, column]))
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+def move(state: Floats, change: Entries, gain: Floats, key: np.uint64) -> Floats:
+    """Return ``x + A x + G ε`` for each particle of ``state`` (n, N).
+
+    ``change`` holds A, ``gain`` G, (n, d); ε is counted from the key.
     """
+    moved = np.empty_like(state)
     n, count = state.shape
     sources = gain.shape[1]
     half = (sources * _LANES + 1) // 2
@@ -55,17 +56,19 @@ def move(
                     noise = drawn[j * _LANES : j * _LANES + lanes]
                     for k in range(lanes):
                         to[k] += share * noise[k]
-        for e in range(entry.size):
-            to = moved[row[e], begin : begin + lanes]
-            source, value = state[column[e], begin : begin + lanes], entry[e]
+        for e in range(change.value.size):
+            to = moved[change.row[e], begin : begin + lanes]
+            source = state[change.column[e], begin : begin + lanes]
+            value = change.value[e]
             for k in range(lanes):
                 to[k] += value * source[k]
+    return moved
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def propagate(
     covariance: Floats, transition: Floats, process: Floats, sampled: Ints
-) -> tuple[Floats, Floats]:  # pragma: no cover
+) -> tuple[Floats, Floats]:
     """Return the gain G of what is drawn, (n, d), and the covariance that is left, (n, n)."""
     n, d = transition.shape[0], sampled.size
     half, joint = np.zeros((n, n)), process.copy()
@@ -108,19 +111,8 @@ def propagate(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def gains(
-    slope: Floats, covariance: Floats, noise: Floats
-) -> tuple[Floats, Floats, Floats, float]:  # pragma: no cover
-    """Return what a linear reading makes of a covariance.
-
-    Parameters
-    ----------
-    slope : (m, n) array
-        C.
-    covariance : (n, n) array
-        P.
-    noise : (m, m) array
-        R.
+def gains(slope: Floats, covariance: Floats, noise: Floats) -> tuple[Floats, Floats, Floats, float]:
+    """Return what a linear reading, of slope C (m, n) and noise R, makes of a covariance P.
 
     Returns
     -------
@@ -169,44 +161,53 @@ def gains(
     return inverse, gain, updated, log_root
 
 
-@njit(
-    [
-        float64(
-            types.FunctionType(MEASURE_SIGNATURE), int64[::1], int64[::1], float64[:, ::1],
-            float64[::1], float64[::1], float64[:, ::1], int64[::1], float64[:, ::1], int64[::1],
-            int64[::1], float64[::1], float64[:, ::1], float64[::1],
-        )
-    ],
-    cache=True, nogil=True, error_model="numpy", fastmath={"contract"},
-)  # fmt: skip
-def weigh(
-    measure: Any, slots: Ints, uses: Ints, rows: Floats, patterns: Floats, reading: Floats,
-    inverse: Floats, used: Ints, gain: Floats, row: Ints, column: Ints, entry: Floats,
-    state: Floats, log_weight: Floats,
-) -> float:  # pragma: no cover  # fmt: skip
-    """Add the log density of a reading to each weight, and correct the means; both in place.
+class Weighing(NamedTuple):
+    """A reading of m components as :func:`weigh` takes it.
 
     Parameters
     ----------
-    measure, slots, uses, rows, patterns
-        As of :class:`mapfilter.filters.trials.CompiledMeasurement`.
+    slots, uses, rows, patterns
+        As in :class:`mapfilter.filters.trials.CompiledMeasurement`.
     reading : (m,) array
+        All of it present.
     inverse : (m, m) array
         Inverse of the lower Cholesky factor of the reading's covariance.
-    used : (u,) integer array
+    corrected : (u,) integer array
         Components that are corrected.
     gain : (u, m) array
         Their gains for whitened residuals.
-    row, column, entry : (e,) arrays
+    loading : Entries
         What else of the state adds to the reading.
-    state : (n, N) array
-    log_weight : (N,) array
-
-    Returns
-    -------
-    float
-        Smallest normalised square of a residual.
     """
+
+    slots: Ints
+    uses: Ints
+    rows: Floats
+    patterns: Floats
+    reading: Floats
+    inverse: Floats
+    corrected: Ints
+    gain: Floats
+    loading: Entries
+
+
+_VECTOR, _MATRIX, _INDEX, _TYPES = float64[::1], float64[:, ::1], int64[::1], cast(Any, types)
+_ENTRIES = _TYPES.NamedTuple((_INDEX, _INDEX, _VECTOR), Entries)
+_WEIGHING = _TYPES.NamedTuple(
+    (_INDEX, _INDEX, _MATRIX, _VECTOR, _VECTOR, _MATRIX, _INDEX, _MATRIX, _ENTRIES), Weighing
+)
+_SIGNATURE = float64(types.FunctionType(MEASURE_SIGNATURE), _WEIGHING, _MATRIX, _VECTOR)
+
+
+@njit([_SIGNATURE], cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+def weigh(measure: Any, given: Weighing, state: Floats, log_weight: Floats) -> float:
+    """Add the log density of a reading to each weight, and correct the means; both in place.
+
+    ``state`` is (n, N), ``log_weight`` (N,). Return the smallest normalised square of a residual.
+    """
+    slots, uses, rows, patterns = given.slots, given.uses, given.rows, given.patterns
+    reading, inverse, used, gain = given.reading, given.inverse, given.corrected, given.gain
+    row, column, entry = given.loading
     m = reading.size
     count = state.shape[1]
     slope = np.zeros((1, 1, 1))
@@ -249,16 +250,18 @@ def weigh(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def copies(state: Floats, chosen: Ints32, out: Floats) -> None:  # pragma: no cover
-    """Write the chosen particles of ``state`` (n, N) to ``out`` (n, M)."""
+def copies(state: Floats, chosen: Ints32) -> Floats:
+    """Return the chosen particles of ``state`` (n, N), shape (n, M)."""
+    out = np.empty((state.shape[0], chosen.size))
     for i in range(state.shape[0]):
         source, to = state[i], out[i]
         for k in range(chosen.size):
             to[k] = source[np.uint32(chosen[k])]
+    return out
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def means(state: Floats, weight: Floats32) -> Floats:  # pragma: no cover
+def means(state: Floats, weight: Floats32) -> Floats:
     """Return the weighted mean of particles (n, N), counted from the first one of them."""
     mean, total = np.empty(state.shape[0]), 0.0
     for k in range(weight.size):
@@ -273,7 +276,7 @@ def means(state: Floats, weight: Floats32) -> Floats:  # pragma: no cover
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def sums(state: Floats, weight: Floats32) -> tuple[Floats, Floats]:  # pragma: no cover
+def sums(state: Floats, weight: Floats32) -> tuple[Floats, Floats]:
     """Return the weighted mean and covariance of particles (n, N)."""
     n, count = state.shape
     mean, spread, total = means(state, weight), np.zeros((n, n)), 0.0

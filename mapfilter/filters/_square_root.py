@@ -14,16 +14,77 @@ lanes.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
-from numba import boolean, float64, int64, njit, types, void
+from numba import njit
 
 from mapfilter._types import Bools, Floats, Ints
 
 _ROUNDING = 4e-15
+_LOG_TWO_PI = np.log(2 * np.pi)
+
+kernel = njit(cache=True, nogil=True, error_model="numpy")
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def cholesky_lanes(matrix: Floats) -> None:  # pragma: no cover
+class Problem(NamedTuple):
+    """Measurement, method and motion as kernels take them; alike in all lanes and steps.
+
+    Parameters
+    ----------
+    slots, uses, rows, patterns, noise
+        As in :class:`mapfilter.filters.trials.CompiledMeasurement`.
+    diagonal : bool
+        Whether the noise has nothing off its diagonal.
+    iterations : int
+        Of the iterated filter, see :class:`mapfilter.filters.gaussian.Method`.
+    spread, bend_weight : float
+        γ = sqrt(n + λ) and β - α², see :class:`mapfilter.filters.gaussian.SigmaPoints`.
+    phi_row, phi_col, phi : (e,) arrays
+        The entries of Φ that are not zero.
+    process : (n, n) array
+        Q.
+    """
+
+    slots: Ints
+    uses: Ints
+    rows: Floats
+    patterns: Floats
+    noise: Floats
+    diagonal: bool
+    iterations: int
+    spread: float
+    bend_weight: float
+    phi_row: Ints
+    phi_col: Ints
+    phi: Floats
+    process: Floats
+
+
+class Lanes(NamedTuple):
+    """Beliefs of W lanes during an update, which writes to all arrays but the first.
+
+    Parameters
+    ----------
+    lower : (n, n, W) array
+        Cholesky factors of the predictions; only the lower triangles count.
+    mean : (n, W) array
+        Predicted means, which become the updated ones.
+    factor : (n, n, W) array
+        T of the updated covariances.
+    evidence, nis : (W,) arrays
+        Log densities of the readings, and normalised innovations squared.
+    """
+
+    lower: Floats
+    mean: Floats
+    factor: Floats
+    evidence: Floats
+    nis: Floats
+
+
+@kernel
+def cholesky_lanes(matrix: Floats) -> None:
     """Replace the lower triangles of (k, k, W) matrices by their Cholesky factors.
 
     A pivot that is zero but for rounding makes a column of zeros: the matrix may be singular. One
@@ -53,57 +114,65 @@ def cholesky_lanes(matrix: Floats) -> None:  # pragma: no cover
                 target[w] *= inverse[w]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def predict_lanes(
-    mean: Floats, factor: Floats, phi_row: Ints, phi_col: Ints, phi: Floats, noise: Floats,
-    lower: Floats, work: Floats,
-) -> None:  # pragma: no cover  # fmt: skip
-    """Move beliefs: mean becomes Φ·mean, lower the Cholesky factor of ``Φ T Tᵀ Φᵀ + Q``.
-
-    Parameters
-    ----------
-    mean : (n, W) array
-        Changed in place.
-    factor : (n, n, W) array
-        T of the last beliefs.
-    phi_row, phi_col, phi : (e,) arrays
-        The entries of Φ that are not zero.
-    noise : (n, n) array
-        Q.
-    lower : (n, n, W) array
-        Written; above the diagonal it is not touched.
-    work : (n, n, W) array
-        Written.
-    """
+@kernel
+def predict_lanes(problem: Problem, mean: Floats, factor: Floats) -> Floats:
+    """Move means in place; return the Cholesky factors of ``Φ T Tᵀ Φᵀ + Q``, (n, n, W)."""
     size, lanes = mean.shape
-    for i in range(size):
-        for j in range(size):
-            work[i, j, :] = 0.0
+    work, lower = np.zeros((size, size, lanes)), np.empty((size, size, lanes))
     old = mean.copy()
     mean[:, :] = 0.0
-    for e in range(phi.size):
-        value, to, source = phi[e], mean[phi_row[e]], old[phi_col[e]]
+    for e in range(problem.phi.size):
+        row, col, value = problem.phi_row[e], problem.phi_col[e], problem.phi[e]
+        to, source = mean[row], old[col]
         for w in range(lanes):
             to[w] += value * source[w]
         for k in range(size):
-            into, out_of = work[phi_row[e], k], factor[phi_col[e], k]
+            into, out_of = work[row, k], factor[col, k]
             for w in range(lanes):
                 into[w] += value * out_of[w]
     for i in range(size):
         for j in range(i + 1):
             target = lower[i, j]
-            target[:] = noise[i, j]
+            target[:] = problem.process[i, j]
             for k in range(size):
                 left, right = work[i, k], work[j, k]
                 for w in range(lanes):
                     target[w] += left[w] * right[w]
     cholesky_lanes(lower)
+    return lower
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def whiten_lanes(
-    noise_factor: Floats, diagonal: bool, slope: Floats, residual: Floats
-) -> None:  # pragma: no cover
+@kernel
+def noise_lanes(problem: Problem, present: Bools) -> Floats:
+    """Return the noise's Cholesky factor in each lane; absent components are left out of it."""
+    m, lanes = present.shape
+    noise, factor = problem.noise, np.empty((m, m, lanes))
+    for i in range(m):
+        factor[i, i, :] = np.sqrt(noise[i, i]) if problem.diagonal else noise[i, i]
+        if not problem.diagonal:
+            for j in range(i):
+                for w in range(lanes):
+                    there = present[i, w] and present[j, w]
+                    factor[i, j, w] = noise[i, j] if there else 0.0
+    if not problem.diagonal:
+        cholesky_lanes(factor)
+    return factor
+
+
+@kernel
+def drop_absent(present: Bools, slope: Floats, residual: Floats) -> None:
+    """Take absent components out of a measurement: zeros in H and r."""
+    m, columns, lanes = slope.shape
+    for i in range(m):
+        for w in range(lanes):
+            if not present[i, w]:
+                residual[i, w] = 0.0
+                for j in range(columns):
+                    slope[i, j, w] = 0.0
+
+
+@kernel
+def whiten_lanes(noise_factor: Floats, diagonal: bool, slope: Floats, residual: Floats) -> None:
     """Multiply H and r by the inverse of a lower factor of the noise's covariance, in place."""
     m, columns, lanes = slope.shape
     inverse = np.empty(lanes)
@@ -128,44 +197,30 @@ def whiten_lanes(
                 target[w] *= inverse[w]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def through_lanes(
-    slope: Floats, uses: Ints, lower: Floats, seen: Floats
-) -> None:  # pragma: no cover
-    """Write ``A = H L``, where H has entries in the columns ``uses`` only."""
-    lanes = lower.shape[2]
-    for j in range(lower.shape[0]):
-        for i in range(slope.shape[0]):
-            seen[i, j, :] = 0.0
+@kernel
+def through_lanes(slope: Floats, uses: Ints, lower: Floats) -> Floats:
+    """Return ``A = H L``, (m, n, W), where H has entries in the columns ``uses`` only."""
+    m, n, lanes = slope.shape[0], lower.shape[0], lower.shape[2]
+    seen = np.zeros((m, n, lanes))
+    for j in range(n):
         for a in range(uses.size):
             if uses[a] >= j:
                 right = lower[uses[a], j]
-                for i in range(slope.shape[0]):
+                for i in range(m):
                     target, left = seen[i, j], slope[i, a]
                     for w in range(lanes):
                         target[w] += left[w] * right[w]
+    return seen
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def solve_lanes(
-    seen: Floats, residual: Floats, information: Floats, half: Floats, z: Floats
-) -> None:  # pragma: no cover
-    """Solve ``(I + AᵀA) z = Aᵀ r``.
+@kernel
+def solve_lanes(seen: Floats, residual: Floats) -> tuple[Floats, Floats, Floats]:
+    """Solve ``(I + AᵀA) z = Aᵀ r`` for whitened A (m, n, W) and r (m, W).
 
-    Parameters
-    ----------
-    seen : (m, n, W) array
-        A, whitened.
-    residual : (m, W) array
-        r, whitened.
-    information : (n, n, W) array
-        Written: C of ``I + AᵀA = C Cᵀ``, lower triangle.
-    half : (n, W) array
-        Written: ``C⁻¹ Aᵀ r``.
-    z : (n, W) array
-        Written.
+    Returns C of ``I + AᵀA = C Cᵀ``, (n, n, W), lower triangle; ``C⁻¹ Aᵀ r`` and z, (n, W) each.
     """
     m, n, lanes = seen.shape
+    information, half, z = np.empty((n, n, lanes)), np.zeros((n, lanes)), np.empty((n, lanes))
     for i in range(n):
         for j in range(i + 1):
             target = information[i, j]
@@ -179,7 +234,6 @@ def solve_lanes(
                 for w in range(lanes):
                     target[w] += left[w] * right[w]
         target = half[i]
-        target[:] = 0.0
         for k in range(m):
             left, right = seen[k, i], residual[k]
             for w in range(lanes):
@@ -202,19 +256,54 @@ def solve_lanes(
                 target[w] -= left[w] * right[w]
         for w in range(lanes):
             target[w] /= pivot[w]
+    return information, half, z
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def settle_lanes(
-    lower: Floats, information: Floats, z: Floats, mean: Floats, factor: Floats
-) -> None:  # pragma: no cover
+@kernel
+def evidence_lanes(
+    present: Bools,
+    noise_factor: Floats,
+    residual: Floats,
+    information: Floats,
+    half: Floats,
+    lanes: Lanes,
+) -> None:
+    """Write the log density of the readings and the normalised innovations squared.
+
+    ``rᵀ S⁻¹ r = rᵀr - |C⁻¹Aᵀr|²`` and ``log|S| = log|R| + log|G|``, r and A whitened.
+    """
+    evidence, nis = lanes.evidence, lanes.nis
+    volume = np.ones(evidence.size)
+    evidence[:] = 0.0
+    nis[:] = 0.0
+    for i in range(present.shape[0]):
+        for w in range(evidence.size):
+            nis[w] += residual[i, w] ** 2
+            volume[w] *= noise_factor[i, i, w] if present[i, w] else 1.0
+            evidence[w] -= 0.5 * _LOG_TWO_PI if present[i, w] else 0.0
+        # One logarithm is for many factors, as far as their product can be held.
+        if i % 8 == 7:
+            for w in range(evidence.size):
+                evidence[w] -= np.log(volume[w])
+                volume[w] = 1.0
+    for i in range(half.shape[0]):
+        for w in range(evidence.size):
+            nis[w] -= half[i, w] ** 2
+            volume[w] *= information[i, i, w]
+    for w in range(evidence.size):
+        evidence[w] -= np.log(volume[w]) + 0.5 * nis[w]
+
+
+@kernel
+def correct_lanes(information: Floats, z: Floats, lanes: Lanes) -> None:
     """Add ``L z`` to the means and write the factors ``T = L C⁻ᵀ``."""
-    n, lanes = mean.shape
+    lower, mean, factor = lanes.lower, lanes.mean, lanes.factor
+    n, count = mean.shape
     for i in range(n):
         target = mean[i]
         for k in range(i + 1):
             left, right = lower[i, k], z[k]
-            for w in range(lanes):
+            for w in range(count):
                 target[w] += left[w] * right[w]
     for i in range(n):
         for j in range(n):
@@ -226,15 +315,15 @@ def settle_lanes(
                 target[:] = 0.0
             for k in range(j):
                 left, right = information[j, k], factor[i, k]
-                for w in range(lanes):
+                for w in range(count):
                     target[w] -= left[w] * right[w]
             pivot = information[j, j]
-            for w in range(lanes):
+            for w in range(count):
                 target[w] /= pivot[w]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def covariance_lanes(factor: Floats, out: Floats) -> None:  # pragma: no cover
+@kernel
+def covariance_lanes(factor: Floats, out: Floats) -> None:
     """Write ``T Tᵀ`` for factors (n, n, W) as (W, n, n)."""
     n, _, lanes = factor.shape
     for i in range(n):
@@ -245,100 +334,3 @@ def covariance_lanes(factor: Floats, out: Floats) -> None:  # pragma: no cover
                     total += factor[i, k, w] * factor[j, k, w]
                 out[w, i, j] = total
                 out[w, j, i] = total
-
-
-_LOG_TWO_PI = np.log(2 * np.pi)
-
-MEASURE_SIGNATURE = void(
-    float64[:, ::1], int64[::1], float64[:, ::1], float64[::1], float64[:, ::1],
-    float64[:, :, ::1], boolean,
-)  # fmt: skip
-"""What a compiled measurement takes: points (q, W), slots (4,), rows (m, c), patterns (p,), mean
-(m, W) and slope (m, q, W) to be written, and whether the slope is wanted."""
-
-UPDATE_SIGNATURE = void(
-    types.FunctionType(MEASURE_SIGNATURE), int64[::1], int64[::1], float64[:, ::1], float64[::1],
-    float64[:, ::1], boolean, int64, float64, float64, float64[:, ::1], float64[:, :, ::1],
-    float64[:, ::1], float64[:, :, ::1], float64[::1], float64[::1],
-)  # fmt: skip
-"""What a compiled update takes:
-
-- measure, slots (4,), uses (q,), rows (m, c), patterns (p,): the measurement;
-- noise (m, m), diagonal: R, and whether nothing is off its diagonal;
-- iterations, spread, bend_weight: see :class:`mapfilter.filters.gaussian.Method`;
-- reading (m, W): NaN where absent;
-- lower (n, n, W): Cholesky factors of the predictions;
-- mean (n, W): predicted means, changed into updated ones;
-- factor (n, n, W): written, T of the updated covariances;
-- evidence, nis (W,): written, log densities of the readings and normalised innovations squared.
-"""
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def present_lanes(reading: Floats, present: Bools) -> None:  # pragma: no cover
-    """Tell which components of (m, W) readings are there: those that are not NaN."""
-    for i in range(reading.shape[0]):
-        for w in range(reading.shape[1]):
-            present[i, w] = not np.isnan(reading[i, w])
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def drop_absent(present: Bools, slope: Floats, residual: Floats) -> None:  # pragma: no cover
-    """Make absent components say nothing: zeros in H and r."""
-    m, columns, lanes = slope.shape
-    for i in range(m):
-        for w in range(lanes):
-            if not present[i, w]:
-                residual[i, w] = 0.0
-                for j in range(columns):
-                    slope[i, j, w] = 0.0
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def noise_lanes(
-    noise: Floats, diagonal: bool, present: Bools, factor: Floats
-) -> None:  # pragma: no cover
-    """Write the noise's Cholesky factor in each lane; absent components are left out of it."""
-    m, lanes = present.shape
-    for i in range(m):
-        root = np.sqrt(noise[i, i])
-        for w in range(lanes):
-            factor[i, i, w] = root if diagonal else noise[i, i]
-        if not diagonal:
-            for j in range(i):
-                for w in range(lanes):
-                    there = present[i, w] and present[j, w]
-                    factor[i, j, w] = noise[i, j] if there else 0.0
-    if not diagonal:
-        cholesky_lanes(factor)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def evidence_lanes(
-    present: Bools, noise_factor: Floats, residual: Floats, information: Floats, half: Floats,
-    evidence: Floats, nis: Floats,
-) -> None:  # pragma: no cover  # fmt: skip
-    """Write the log density of the readings and the normalised innovations squared.
-
-    ``rᵀ S⁻¹ r = rᵀr - |C⁻¹Aᵀr|²`` and ``log|S| = log|R| + log|G|``, r and A whitened.
-    """
-    lanes = evidence.size
-    volume = np.ones(lanes)
-    evidence[:] = 0.0
-    nis[:] = 0.0
-    for i in range(present.shape[0]):
-        for w in range(lanes):
-            nis[w] += residual[i, w] ** 2
-            volume[w] *= noise_factor[i, i, w] if present[i, w] else 1.0
-            evidence[w] -= 0.5 * _LOG_TWO_PI if present[i, w] else 0.0
-        # One logarithm is for many factors, as far as their product can be held.
-        if i % 8 == 7:
-            for w in range(lanes):
-                evidence[w] -= np.log(volume[w])
-                volume[w] = 1.0
-    for i in range(half.shape[0]):
-        for w in range(lanes):
-            nis[w] -= half[i, w] ** 2
-            volume[w] *= information[i, i, w]
-    for w in range(lanes):
-        evidence[w] -= np.log(volume[w]) + 0.5 * nis[w]

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite, sqrt
+from math import sqrt
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Ge
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats
-from mapfilter.errors import Faults, InputError
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.options import Options, Positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +31,7 @@ class Gaussian:
 
 
 @dataclass(frozen=True, slots=True)
-class SigmaPoints:
+class SigmaPoints(Options):
     """Where sigma points lie, by Wan & van der Merwe (2000).
 
     ``λ = α² (n + κ) - n``; the points are the mean and the mean ± the columns of
@@ -45,18 +48,9 @@ class SigmaPoints:
         More than -n.
     """
 
-    alpha: float = 1e-3
+    alpha: Positive = 1e-3
     beta: float = 2.0
     kappa: float = 0.0
-
-    def __post_init__(self) -> None:
-        faults = Faults()
-        if not (isfinite(self.alpha) and self.alpha > 0):
-            faults.add("sigma points, alpha", "a number above 0", self.alpha)
-        for name in ("beta", "kappa"):
-            if not isfinite(getattr(self, name)):
-                faults.add(f"sigma points, {name}", "a finite number", getattr(self, name))
-        faults.raise_if_any(InputError)
 
     def spread(self, size: int) -> float:
         """Return ``sqrt(n + λ) = α sqrt(n + κ)`` for a state of n components.
@@ -67,9 +61,7 @@ class SigmaPoints:
             n + κ is not positive.
         """
         if size + self.kappa <= 0:
-            faults = Faults()
-            faults.add("sigma points, kappa", f"more than -{size}", self.kappa)
-            faults.raise_if_any(InputError)
+            raise fail(InputError, "sigma points, kappa", f"more than -{size}", self.kappa)
         return self.alpha * sqrt(size + self.kappa)
 
     @property
@@ -101,8 +93,8 @@ centre."""
 
 
 @dataclass(frozen=True, slots=True)
-class Method:
-    """How readings are taken in.
+class Method(Options):
+    """How a Kalman-type filter takes readings in.
 
     Parameters
     ----------
@@ -117,13 +109,7 @@ class Method:
 
     name: str
     sigma: SigmaPoints | None = None
-    iterations: int = 1
-
-    def __post_init__(self) -> None:
-        if self.iterations < 1:
-            faults = Faults()
-            faults.add("method, iterations", "at least 1", self.iterations)
-            faults.raise_if_any(InputError)
+    iterations: Annotated[int, Ge(1)] = 1
 
 
 EKF = Method("ekf")

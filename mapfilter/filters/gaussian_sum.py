@@ -11,21 +11,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
+from numba import float64, njit
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError
-from mapfilter.filters._runs import run_mixture
+from mapfilter.filters._square_root import Problem, kernel
+from mapfilter.filters._updates import BLOCK, INDEX, MATRIX, RUN, TYPES, VECTOR, advance, kernel_of
 from mapfilter.filters.gaussian import Method, factor_of
-from mapfilter.filters.trials import (
-    CompiledMeasurement,
-    checked_sizes,
-    is_diagonal,
-    kernel_of,
-    method_numbers,
-)
+from mapfilter.filters.trials import CompiledMeasurement, checked_sizes, problem_of
+
+_WIDEST = 0.9
+"""Largest deviation of a part, as a share of that of the whole."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +37,7 @@ class Mixture:
     weights : (c,) array
         They sum to one.
     means : (c, n) array
+        Means of the components.
     covariance : (n, n) array
         Of each of them.
     """
@@ -52,15 +53,14 @@ def split(
     """Cut a Gaussian into narrower ones along some components of the state.
 
     Along a component cut into c parts, the parts' means are spaced evenly over ± ``reach``
-    standard deviations, and their deviation is that spacing, at most what it was; weights are such
-    that mean and variance are kept, up to the cut tails. Components must be independent at the
-    start.
+    standard deviations (two parts lie nearer), and their deviation is that spacing, at most 0.9 of
+    what it was; weights are such that mean and variance are kept, up to the cut tails. Components
+    must be independent at the start.
 
     Parameters
     ----------
-    mean : (n,) array_like
-    covariance : (n, n) array_like
-        Without correlation between what is cut and anything else.
+    mean, covariance : (n,) and (n, n) array_like
+        The Gaussian, without correlation between what is cut and anything else.
     parts : mapping of int to int
         Number of parts for each index that is cut.
     reach : float
@@ -93,27 +93,25 @@ def split(
     for index, count in parts.items():
         if count == 1:
             continue
-        places = np.linspace(-reach, reach, count)
-        narrow = min(places[1] - places[0], 0.9) ** 2
+        # Two parts farther out would have more than the whole variance by their means alone.
+        out = min(reach, np.sqrt(1 - _WIDEST**2)) if count == 2 else reach
+        places = np.linspace(-out, out, count)
         # The weights' own variance is 1 - narrow: searched for, as the ends are cut.
+        narrow = min(places[1] - places[0], _WIDEST) ** 2
         share = _shares(places, 1.0 - narrow)
-        kept = 1.0 - float(share @ places**2)
-        deviation = np.sqrt(wide[index, index])
-        axes.append([(index, deviation * place) for place in places])
+        axes.append([(index, np.sqrt(wide[index, index]) * place) for place in places])
         shares.append(share)
-        wide[index, index] *= kept
-    means, weights = [], []
-    for chosen, factors in zip(product(*axes), product(*shares), strict=True):
-        shifted = centre.copy()
+        wide[index, index] *= 1.0 - float(share @ places**2)
+    weights = np.array([np.prod(factors) for factors in product(*shares)])
+    means = np.tile(centre, (weights.size, 1))
+    for shifted, chosen in zip(means, product(*axes), strict=True):
         for index, shift in chosen:
             shifted[index] += shift
-        means.append(shifted)
-        weights.append(np.prod(factors))
-    return Mixture(np.array(weights), np.array(means), wide)
+    return Mixture(weights, means, wide)
 
 
 def _shares(places: Floats, variance: float) -> Floats:
-    """Return normal weights on places, of a variance as near to the one wanted as they can be."""
+    """Return normal weights on places whose variance is the one wanted, as near as possible."""
     low, high = 1e-3, 1e3
     for _ in range(80):
         middle = np.sqrt(low * high)
@@ -123,15 +121,125 @@ def _shares(places: Floats, variance: float) -> Floats:
     return np.asarray(share)
 
 
+@kernel
+def _reweigh(weight: Floats, evidence: Floats) -> float:
+    """Weigh components by their evidence, in place; return the logarithm of the whole's.
+
+    A component whose update failed (NaN) gets no weight, unless all failed: then nothing changes.
+    """
+    most = -np.inf
+    for w in range(weight.size):
+        if weight[w] > 0.0 and evidence[w] > most:
+            most = evidence[w]
+    if not np.isfinite(most):
+        return np.nan
+    total = 0.0
+    for w in range(weight.size):
+        weight[w] *= np.exp(evidence[w] - most) if evidence[w] <= most else 0.0
+        total += weight[w]
+    for w in range(weight.size):
+        weight[w] /= total
+    return float(most + np.log(total))
+
+
+@kernel
+def _moments(
+    weight: Floats, mean: Floats, factor: Floats, centre: Floats, covariance: Floats
+) -> None:
+    """Write the mean and the covariance of a mixture."""
+    n, lanes = mean.shape
+    centre[:] = 0.0
+    covariance[:, :] = 0.0
+    for i in range(n):
+        for w in range(lanes):
+            centre[i] += weight[w] * mean[i, w]
+    for w in range(lanes):
+        if weight[w] > 0.0:
+            for i in range(n):
+                for j in range(i + 1):
+                    total = (mean[i, w] - centre[i]) * (mean[j, w] - centre[j])
+                    for k in range(n):
+                        total += factor[i, k, w] * factor[j, k, w]
+                    covariance[i, j] += weight[w] * total
+    for i in range(n):
+        for j in range(i):
+            covariance[j, i] = covariance[i, j]
+
+
+_FOUND = TYPES.Tuple((MATRIX, BLOCK, VECTOR, INDEX))
+
+
+@njit(
+    [_FOUND(*RUN, MATRIX, MATRIX, BLOCK, VECTOR, float64)],
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def _run_mixture(
+    update: Any,
+    measure: Any,
+    problem: Problem,
+    readings: Floats,
+    mean: Floats,
+    factor: Floats,
+    weight: Floats,
+    least: float,
+) -> tuple[Floats, Floats, Floats, Ints]:
+    """Predict, update and reweigh the components of one belief over all steps.
+
+    Parameters
+    ----------
+    update, measure, problem
+        As :func:`mapfilter.filters._updates.run_lanes` takes them.
+    readings : (K, m) array
+        NaN where absent.
+    mean, factor, weight : (n, W), (n, n, W) and (W,) arrays
+        The first components; changed.
+    least : float
+        Components of less weight are dropped.
+
+    Returns
+    -------
+    means, covariances : (K, n) and (K, n, n) arrays
+        Moments of the mixture.
+    evidence : (K,) array
+        NaN where no component could take the reading.
+    counts : (K,) integer array
+        How many components are left.
+    """
+    n, (steps, m) = mean.shape[0], readings.shape
+    means, covariances = np.empty((steps, n)), np.empty((steps, n, n))
+    evidence, counts = np.empty(steps), np.empty(steps, dtype=np.int64)
+    for k in range(steps):
+        lanes = weight.size
+        reading, own, nis = np.empty((m, lanes)), np.empty(lanes), np.empty(lanes)
+        for i in range(m):
+            reading[i, :] = readings[k, i]
+        advance(update, measure, problem, reading, mean, factor, own, nis)
+        evidence[k] = _reweigh(weight, own)
+        _moments(weight, mean, factor, means[k], covariances[k])
+        left = np.flatnonzero(weight >= least)
+        counts[k] = left.size
+        # Lanes are given up in larger lots, as moving the rest costs as much as a step.
+        if 0 < 4 * left.size <= 3 * lanes:
+            total = 0.0
+            for w in left:
+                total += weight[w]
+            mean, factor = mean[:, left], factor[:, :, left]
+            weight = weight[left] / total
+    return means, covariances, evidence, counts
+
+
 @dataclass(frozen=True, eq=False)
 class MixtureRun:
-    """What Gaussian sums made of T trials of K steps.
+    """Results of Gaussian sums over T trials of K steps.
 
     Parameters
     ----------
     means : (T, K, n) array
         Means of the mixtures.
     covariances : (T, K, n, n) array
+        Covariances of the mixtures.
     evidence : (T, K) array
         Log density of each reading given those before it.
     counts : (T, K) integer array
@@ -179,20 +287,18 @@ def run_mixtures(
     trials, steps = checked_sizes(measurement, transition, readings)
     starts = np.broadcast_to(np.asarray(first_mean, dtype=np.float64), (trials, n))
     factor = factor_of(first.covariance, n)
-    lanes = first.weights.size
-    row, col = np.nonzero(transition)
-    means, evidence = np.empty((trials, steps, n)), np.empty((trials, steps))
-    covariances = np.empty((trials, steps, n, n))
-    counts = np.empty((trials, steps), dtype=np.int64)
+    problem = problem_of(measurement, transition, process, method)
+    means, covariances = np.empty((trials, steps, n)), np.empty((trials, steps, n, n))
+    evidence, counts = np.empty((trials, steps)), np.empty((trials, steps), dtype=np.int64)
     for trial in range(trials):
-        run_mixture(
-            kernel_of(method), measurement.measure, measurement.slots, measurement.uses,
-            measurement.rows, measurement.patterns, measurement.noise,
-            is_diagonal(measurement.noise), *method_numbers(method, n),
-            np.ascontiguousarray(row), np.ascontiguousarray(col), transition[row, col], process,
+        means[trial], covariances[trial], evidence[trial], counts[trial] = _run_mixture(
+            kernel_of(method),
+            measurement.measure,
+            problem,
             np.ascontiguousarray(readings[trial]),
             np.ascontiguousarray((starts[trial] + first.means).T),
-            np.repeat(factor[:, :, None], lanes, axis=2), first.weights.copy(), least_weight,
-            means[trial], covariances[trial], evidence[trial], counts[trial],
-        )  # fmt: skip
+            np.repeat(factor[:, :, None], first.weights.size, axis=2),
+            first.weights.copy(),
+            least_weight,
+        )
     return MixtureRun(means, covariances, evidence, counts)

@@ -18,7 +18,7 @@ from scipy.special import ndtr
 
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
-from mapfilter.filters.hypotheses import BeliefSummary, Bins, nothing, summarise
+from mapfilter.filters.hypotheses import BeliefSummary, Bins, empty_summary, summarise
 from mapfilter.filters.particle import ParticleOptions, switched
 
 _REACH_SD = 4.0
@@ -135,7 +135,7 @@ class GridModel(Protocol[PriorT, ReadingT]):
         """Return what a displacement by dead reckoning, of some length, does."""
 
     def weigh(self, state: Floats32, log_weight: Floats, reading: ReadingT) -> Reason:
-        """Add a reading's log-likelihood to the log weights, in place; say why if it has none."""
+        """Add a reading's log-likelihood to the log weights, in place; return why not, if so."""
 
     def can_converge(self, summary: BeliefSummary) -> bool:
         """Tell whether a belief may count as having converged, if it agrees on a place."""
@@ -205,7 +205,7 @@ class GridBelief:
     def summary(self) -> BeliefSummary:
         """What the belief says."""
         if not self.weight.size:
-            return nothing(self.state.shape[0])
+            return empty_summary(self.state.shape[0])
         return summarise(self.state, self.weight, self.bins)
 
     def __getstate__(self) -> dict[str, object]:

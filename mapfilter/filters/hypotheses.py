@@ -1,4 +1,4 @@
-"""What a cloud of weighted positions says: where it leads, how sure it is, what else there is.
+"""Summary of a cloud of weighted positions: leading hypothesis, uncertainty, runners-up.
 
 The plane is cut into square bins. The leading hypothesis is the neighbourhood of 3 × 3 bins with
 the largest mass, its position the mean of what lies within 50 m of it; the runners-up are what
@@ -8,8 +8,8 @@ so that a belief of two places has a radius that reaches from one to the other.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import ceil, log, nan
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -22,16 +22,17 @@ _RADIUS_BINS = 4096
 _RINGS_PER_SQRT_M = 30.0
 
 
-@dataclass(frozen=True, slots=True)
-class Bins:
+class Bins(NamedTuple):
     """The bins of an area, from its south-western corner.
 
     Parameters
     ----------
     west_m, south_m : float
+        The corner.
     size_m : float
         Side of a bin.
     cols, rows : int
+        Numbers of bins to the east and to the north.
     """
 
     west_m: float
@@ -48,9 +49,8 @@ class Bins:
         return cls(west - size_m, south - size_m, size_m, cols, rows)
 
 
-@dataclass(frozen=True, slots=True)
-class BeliefSummary:
-    """What a belief says.
+class BeliefSummary(NamedTuple):
+    """Leading hypothesis of a belief, its uncertainty, and the runners-up.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class BeliefSummary:
 
 
 def summarise(state: Floats32, weight: Floats32, bins: Bins) -> BeliefSummary:
-    """Return what a cloud says.
+    """Summarise a cloud.
 
     Parameters
     ----------
@@ -91,43 +91,25 @@ def summarise(state: Floats32, weight: Floats32, bins: Bins) -> BeliefSummary:
     weight : ndarray of float32, shape (N,)
         Summing to one.
     bins : Bins
+        The area that holds the cloud; what lies beyond counts to the bins at its edge.
     """
-    rows = state.shape[0]
-    found = np.zeros(rows + 3 + 3 + 1 + 6 + 1)
-    mass = np.zeros((bins.rows, bins.cols), dtype=np.float32)
-    _summarise(state, weight, bins.west_m, bins.south_m, bins.size_m, mass, found)
-    mean, rest = found[:rows], found[rows:]
-    covariance = np.array([[rest[0], rest[2]], [rest[2], rest[1]]])
-    others = rest[7:13].reshape(2, 3)
-    return BeliefSummary(
-        mean, covariance, rest[3:6], float(rest[6]), others[others[:, 2] > 0], float(rest[13])
-    )
+    return BeliefSummary(*_summarise(state, weight, bins))
 
 
+def empty_summary(rows: int) -> BeliefSummary:
+    """Return the summary of an empty belief."""
+    unknown = np.full((2, 2), nan)
+    return BeliefSummary(np.full(rows, nan), unknown, np.full(3, nan), 0.0, np.empty((0, 3)), nan)
+
+
+@njit(error_model="numpy", cache=True)
 def flattened(state: Floats32, weight: Floats32, bins: Bins, power: float) -> Floats32:
     """Return weights, summing to one, that spread over a belief's places more evenly.
 
     Each bin gets its mass to a power; its particles share it by their weights.
     """
-    flat = np.empty_like(weight)
-    mass = np.zeros(bins.rows * bins.cols, dtype=np.float32)
-    _flatten(state, weight, bins.west_m, bins.south_m, bins.size_m, bins.cols, power, mass, flat)
-    return flat
-
-
-@njit(error_model="numpy", cache=True)
-def _flatten(
-    state: Floats32, weight: Floats32, west_m: float, south_m: float, size_m: float, cols: int,
-    power: float, mass: Floats32, flat: Floats32,
-) -> None:  # fmt: skip
-    per_m, w, s = np.float32(1 / size_m), np.float32(west_m), np.float32(south_m)
-    rows = mass.size // cols
-    east, north = state[0], state[1]
-    of_bin = np.empty(weight.size, dtype=np.int32)
+    of_bin, mass = _bin_of(state, bins), np.zeros(bins.rows * bins.cols, dtype=np.float32)
     for i in range(weight.size):
-        col = min(max(int((east[i] - w) * per_m), 0), cols - 1)
-        row = min(max(int((north[i] - s) * per_m), 0), rows - 1)
-        of_bin[i] = row * cols + col
         mass[of_bin[i]] += weight[i]
     total = 0.0
     for at in range(mass.size):
@@ -135,15 +117,23 @@ def _flatten(
             share = float(mass[at]) ** power
             mass[at] = share / mass[at]
             total += share
-    per_share = np.float32(1.0 / total)
+    per_share, flat = np.float32(1.0 / total), np.empty_like(weight)
     for i in range(weight.size):
         flat[i] = weight[i] * mass[of_bin[i]] * per_share
+    return flat
 
 
-def nothing(rows: int) -> BeliefSummary:
-    """Return the summary of a belief that holds nothing."""
-    unknown = np.full((2, 2), nan)
-    return BeliefSummary(np.full(rows, nan), unknown, np.full(3, nan), 0.0, np.empty((0, 3)), nan)
+@njit(error_model="numpy", cache=True)
+def _bin_of(state: Floats32, bins: Bins) -> Ints32:
+    """Return the flat index of each particle's bin."""
+    east, north = state[0], state[1]
+    per_m, w, s = np.float32(1 / bins.size_m), np.float32(bins.west_m), np.float32(bins.south_m)
+    of_bin = np.empty(east.size, dtype=np.int32)
+    for i in range(east.size):
+        col = min(max(int((east[i] - w) * per_m), 0), bins.cols - 1)
+        row = min(max(int((north[i] - s) * per_m), 0), bins.rows - 1)
+        of_bin[i] = row * bins.cols + col
+    return of_bin
 
 
 @njit(error_model="numpy", cache=True)
@@ -163,61 +153,42 @@ def _leader(mass: Floats32, touched: Ints32) -> tuple[int, float]:
 
 
 @njit(error_model="numpy", cache=True)
-def _bin_masses(
-    east: Floats32, north: Floats32, weight: Floats32, west_m: float, south_m: float,
-    size_m: float, mass: Floats32, touched: Ints32,
-) -> int:  # fmt: skip
-    rows, cols = mass.shape
-    per_m, w, s = np.float32(1 / size_m), np.float32(west_m), np.float32(south_m)
-    flat, count = mass.ravel(), 0
-    for i in range(east.size):
-        col = min(max(np.int32((east[i] - w) * per_m), 0), cols - 1)
-        row = min(max(np.int32((north[i] - s) * per_m), 0), rows - 1)
-        at = row * cols + col
-        if flat[at] == 0:
-            touched[count] = at
+def _summarise(
+    state: Floats32, weight: Floats32, bins: Bins
+) -> tuple[Floats, Floats, Floats, float, Floats, float]:
+    mass = np.zeros((bins.rows, bins.cols), dtype=np.float32)
+    flat, of_bin, count = mass.ravel(), _bin_of(state, bins), 0
+    touched = np.empty(weight.size, dtype=np.int32)
+    for i in range(weight.size):
+        if flat[of_bin[i]] == 0:
+            touched[count] = of_bin[i]
             count += 1
         # A weight of zero must not make its bin look untouched.
-        flat[at] += max(weight[i], np.float32(1e-30))
-    return count
-
-
-@njit(error_model="numpy", cache=True)
-def _summarise(
-    state: Floats32, weight: Floats32, west_m: float, south_m: float, size_m: float,
-    mass: Floats32, found: Floats,
-) -> None:  # fmt: skip
-    size, cols = state.shape[0], mass.shape[1]
-    east, north = state[0], state[1]
-    touched = np.empty(weight.size, dtype=np.int32)
-    count = _bin_masses(east, north, weight, west_m, south_m, size_m, mass, touched)
-    touched = touched[:count]
-    flat, entropy = mass.ravel(), 0.0
+        flat[of_bin[i]] += max(weight[i], np.float32(1e-30))
+    touched, entropy = touched[:count], 0.0
     for k in range(count):
         share = float(flat[touched[k]])
         entropy -= share * log(share)
-    place = size + 7
+    others, found = np.empty((2, 3)), 0
     x = y = 0.0
     for hypothesis in range(3):
         best, most = _leader(mass, touched)
         if best < 0 or (hypothesis > 0 and most < 1e-4):
             break
-        cx = west_m + (best % cols + 0.5) * size_m
-        cy = south_m + (best // cols + 0.5) * size_m
+        row, col = best // bins.cols, best % bins.cols
+        cx = bins.west_m + (col + 0.5) * bins.size_m
+        cy = bins.south_m + (row + 0.5) * bins.size_m
         if hypothesis == 0:
             for _ in range(2):
-                cx, cy = _mean_near(east, north, weight, cx, cy)
+                cx, cy = _mean_near(state[0], state[1], weight, cx, cy)
             x, y = cx, cy
         else:
-            found[place], found[place + 1], found[place + 2] = cx, cy, most
-            place += 3
+            others[found, 0], others[found, 1], others[found, 2] = cx, cy, most
+            found += 1
         # What lies in the 5 x 5 bins about it is taken away.
-        row, col = best // cols, best % cols
-        for r in range(max(row - 2, 0), min(row + 3, mass.shape[0])):
-            for c in range(max(col - 2, 0), min(col + 3, cols)):
-                mass[r, c] = 0
-    _moments(state, weight, x, y, found)
-    found[size + 13] = entropy / log(2.0)
+        mass[max(row - 2, 0) : row + 3, max(col - 2, 0) : col + 3] = 0
+    mean, covariance, radii, near = _moments(state, weight, x, y)
+    return mean, covariance, radii, near, others[:found], entropy / log(2.0)
 
 
 @njit(error_model="numpy", fastmath={"contract", "reassoc", "nsz"}, cache=True)
@@ -239,8 +210,10 @@ def _mean_near(
 
 
 @njit(error_model="numpy", fastmath={"contract", "reassoc", "nsz"}, cache=True)
-def _moments(state: Floats32, weight: Floats32, x: float, y: float, found: Floats) -> None:
-    """Fill mean, covariance, radii and the mass near a place."""
+def _moments(
+    state: Floats32, weight: Floats32, x: float, y: float
+) -> tuple[Floats, Floats, Floats, float]:
+    """Return mean and covariance of what lies near a place, radii, and the mass near it."""
     size, count = state.shape[0], weight.size
     east, north = state[0], state[1]
     cx, cy, reach = np.float32(x), np.float32(y), np.float32(NEAR_M**2)
@@ -259,23 +232,27 @@ def _moments(state: Floats32, weight: Floats32, x: float, y: float, found: Float
         yy += w * dy * dy
         xy += w * dx * dy
         ring_of[i] = np.int32(rings * np.sqrt(np.sqrt(square)))
+    mean, radii = np.empty(size), np.empty(3)
     for r in range(size):
         row, total = state[r], 0.0
         for i in range(count):
             total += float(near[i] * row[i])
-        found[r] = total
-    found[size], found[size + 1], found[size + 2] = xx, yy, xy
+        mean[r] = total
     by_radius = np.zeros(_RADIUS_BINS + 1)
     for i in range(count):
         by_radius[min(ring_of[i], _RADIUS_BINS)] += weight[i]
+    covariance = np.array([[xx, xy], [xy, yy]])
     if mass > 0:
-        for r in range(size + 3):
-            found[r] /= mass
+        for r in range(size):
+            mean[r] /= mass
+        for r in range(2):
+            for c in range(2):
+                covariance[r, c] /= mass
     passed, ring = 0.0, 0
     for k in range(3):
         while ring <= _RADIUS_BINS and passed + by_radius[ring] < SHARES[k]:
             passed += by_radius[ring]
             ring += 1
         inside = (SHARES[k] - passed) / by_radius[ring] if ring <= _RADIUS_BINS else 1.0
-        found[size + 3 + k] = ((ring + inside) / _RINGS_PER_SQRT_M) ** 2
-    found[size + 6] = mass
+        radii[k] = ((ring + inside) / _RINGS_PER_SQRT_M) ** 2
+    return mean, covariance, radii, mass

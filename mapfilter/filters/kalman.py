@@ -1,28 +1,24 @@
-"""Kalman-type filters step by step: predict, then update with whatever was measured.
+"""Kalman-type filters step by step: predict, then update with whatever was measured; smoothing.
 
-The arithmetic is that of :mod:`mapfilter.filters.trials`, for one belief.
-
-``G = P Φᵀ M⁻¹``, ``x_s = x + G (x_s⁺ - Φ x)``, with M the covariance predicted. It takes the
-means and covariances of any filter whose motion is linear, and goes backwards over them.
+The arithmetic of a step is that of :mod:`mapfilter.filters.trials`, for one belief.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import isfinite
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats
-from mapfilter.errors import Faults, InputError
+from mapfilter.errors import InputError, fail
 from mapfilter.filters.gaussian import Gaussian, Method, factor_of
 from mapfilter.filters.trials import CompiledMeasurement, run_trials
 
 
-@dataclass(frozen=True, slots=True)
-class Taken:
-    """StepOutput of an update.
+class Taken(NamedTuple):
+    """What an update made of a reading.
 
     Parameters
     ----------
@@ -49,10 +45,11 @@ def predict(
     Parameters
     ----------
     belief : Gaussian
+        Mean m and covariance P.
     transition, process : (n, n) arrays
         Φ and Q.
     shift : (n,) array_like
-        u, such as the way by dead reckoning.
+        u, such as the displacement by dead reckoning.
 
     Examples
     --------
@@ -69,15 +66,7 @@ def predict(
 def update(
     belief: Gaussian, measurement: CompiledMeasurement, reading: ArrayLike, method: Method
 ) -> tuple[Gaussian, Taken]:
-    """Return the belief after a reading, and the news.
-
-    Parameters
-    ----------
-    belief : Gaussian
-    measurement : CompiledMeasurement
-    reading : (m,) array_like
-        NaN where absent.
-    method : Method
+    """Return the belief after a reading (NaN where absent), and what became of the reading.
 
     Raises
     ------
@@ -85,12 +74,11 @@ def update(
         Sizes do not fit, the belief's covariance is none, or the reading is infinite.
     """
     n = belief.mean.size
-    run = run_trials(
-        measurement, np.eye(n), np.zeros((n, n)), method, belief.mean, belief.covariance,
-        np.asarray(reading, dtype=np.float64)[None, None], covariances=True,
-    )  # fmt: skip
-    news = Taken(float(run.evidence[0, 0]), float(run.nis[0, 0]))
-    return (Gaussian(run.means[0, 0], run.covariances[0, 0]) if news.used else belief), news
+    given, still = np.asarray(reading, dtype=np.float64)[None, None], (np.eye(n), np.zeros((n, n)))
+    start = (belief.mean, belief.covariance)
+    run = run_trials(measurement, *still, method, *start, given, covariances=True)
+    taken = Taken(float(run.evidence[0, 0]), float(run.nis[0, 0]))
+    return (Gaussian(run.means[0, 0], run.covariances[0, 0]) if taken.used else belief), taken
 
 
 def as_belief(mean: ArrayLike, covariance: ArrayLike) -> Gaussian:
@@ -106,32 +94,25 @@ def as_belief(mean: ArrayLike, covariance: ArrayLike) -> Gaussian:
     return Gaussian(centre, np.array(covariance, dtype=np.float64))
 
 
-@dataclass(frozen=True, eq=False)
-class Smoothed:
-    """Smoothed beliefs of T trials over K steps.
-
-    Parameters
-    ----------
-    means : (T, K, n) array
-    covariances : (T, K, n, n) array
-    """
+class Smoothed(NamedTuple):
+    """Smoothed beliefs of T trials over K steps: means (T, K, n), covariances (T, K, n, n)."""
 
     means: Floats
     covariances: Floats
 
 
 def smooth(transition: Floats, process: Floats, means: Floats, covariances: Floats) -> Smoothed:
-    """Smooth what a filter found.
+    """Smooth the beliefs of any filter whose motion is linear (Rauch, Tung & Striebel 1965).
 
-    The covariance takes the form ``(I - GΦ) P (I - GΦ)ᵀ + G (P_s⁺ + Q) Gᵀ``, a sum of what cannot
-    be negative.
+    ``x_s = x + G (x_s⁺ - Φ x)`` with ``G = P Φᵀ M⁻¹`` and M the covariance predicted. The
+    covariance takes the form ``(I - GΦ) P (I - GΦ)ᵀ + G (P_s⁺ + Q) Gᵀ``, a sum of what cannot be
+    negative.
 
     Parameters
     ----------
     transition, process : (n, n) or (K - 1, n, n) arrays
         Φ and Q, the same for all steps or from each step to the next.
-    means : (T, K, n) array
-    covariances : (T, K, n, n) array
+    means, covariances : (T, K, n) and (T, K, n, n) arrays
         Of the updated beliefs.
 
     Raises
@@ -141,9 +122,8 @@ def smooth(transition: Floats, process: Floats, means: Floats, covariances: Floa
     """
     trials, steps, n = means.shape
     if covariances.shape != (trials, steps, n, n) or transition.shape[-2:] != (n, n):
-        faults = Faults()
-        faults.add("covariances", f"shape {(trials, steps, n, n)}", covariances.shape)
-        faults.raise_if_any(InputError)
+        expected = f"shape {(trials, steps, n, n)}"
+        raise fail(InputError, "covariances", expected, covariances.shape)
     phi = np.broadcast_to(transition, (max(steps - 1, 0), n, n))
     noise = np.broadcast_to(process, (max(steps - 1, 0), n, n))
     smoothed, spread = means.copy(), covariances.copy()

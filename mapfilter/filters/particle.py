@@ -1,49 +1,53 @@
 """The regularised particle filter, under the common contract.
 
-It knows no equations: a model moves particles and weighs them. The filter keeps weights as
-logarithms, resamples when too few particles carry them, parts the copies by a little noise
-(regularisation; Musso, Oudjane & Le Gland 2001), spends as many particles as the belief is wide,
-and tells when it has found itself.
+It holds no equations: a model moves particles and weighs them. The filter keeps weights as
+logarithms, resamples when too few particles carry them, adds noise to the copies (regularisation;
+Musso, Oudjane & Le Gland 2001), spends as many particles as the belief is wide, and decides when it
+has converged.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isfinite, nan
-from typing import Generic, Protocol, TypeVar
+from typing import Annotated, Generic, Protocol, TypeVar
 
 import numpy as np
+from annotated_types import Ge, Gt, Le
 
 from mapfilter._kernels import draw_key
-from mapfilter._types import Floats, Floats32, Ints32
-from mapfilter.errors import ConfigError, Faults
+from mapfilter._types import Floats, Floats32
+from mapfilter.errors import Faults
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
-from mapfilter.filters.hypotheses import BeliefSummary, Bins, flattened, nothing, summarise
+from mapfilter.filters.hypotheses import BeliefSummary, Bins, empty_summary, flattened, summarise
 from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
+from mapfilter.options import NotNegative, Options, Positive, Probability
+
+_Count = Annotated[int, Ge(1)]
 
 
 @dataclass(frozen=True, slots=True)
-class ParticleOptions:
+class ParticleOptions(Options):
     """Numbers of particles, resampling and the switch rule.
 
     Parameters
     ----------
-    most, least : int
+    max_particles, min_particles : int
         Limits of the number of particles.
-    searching : int
-        Least number until the filter has converged: a place that is improbable at first must keep
+    min_search_particles : int
+        Lower limit until the filter has converged: a place that is improbable at first must keep
         enough of them to be followed.
-    per_bin : float
+    particles_per_bin : float
         Particles for each bin of 25 m that the belief covers (two to the power of its entropy).
     resample_below : float
         Share of the particles that the effective sample size must not fall below.
-    flatten : float
+    mass_exponent : float
         Until the filter has converged, each bin of 25 m gets particles by its mass to this power,
         which keep the rest of it as weights: improbable places stay well covered. 1 for plain
         resampling.
     jitter : tuple of float
-        Standard deviation of the noise that parts copies, for each row of the state.
+        Standard deviation of the noise added to resampled copies, for each row of the state.
     searching_jitter : tuple of float
         The same until the filter has converged: few copies stand for each place then, and must
         cover all headings and step lengths that are possible there.
@@ -54,71 +58,59 @@ class ParticleOptions:
         and has done so for so many metres travelled.
     """
 
-    most: int = 20_000
-    searching: int = 12_000
-    least: int = 1000
-    per_bin: float = 60.0
-    resample_below: float = 0.5
-    flatten: float = 0.5
+    max_particles: _Count = 20_000
+    min_search_particles: _Count = 12_000
+    min_particles: _Count = 1000
+    particles_per_bin: Positive = 60.0
+    resample_below: Probability = 0.5
+    mass_exponent: Annotated[float, Gt(0), Le(1)] = 0.5
     jitter: tuple[float, ...] = (0.2, 0.2, 0.005, 0.003, 0.0)
     searching_jitter: tuple[float, ...] = (1.5, 1.5, 0.015, 0.009, 0.0)
-    switch_mass: float = 0.99
-    switch_hold_m: float = 14.0
+    switch_mass: Probability = 0.99
+    switch_hold_m: NotNegative = 14.0
 
-    def __post_init__(self) -> None:
-        faults = Faults()
-        if not 1 <= self.least <= self.most:
-            got = f"{self.least} and {self.most}"
-            faults.add("particles, least and most", "1 <= least <= most", got)
-        if self.searching < 1:
-            faults.add("particles, searching", ">= 1", self.searching)
-        if not (isfinite(self.per_bin) and self.per_bin > 0):
-            faults.add("particles, per_bin", "a finite number > 0", self.per_bin)
-        if not 0 < self.flatten <= 1:
-            faults.add("particles, flatten", "a power in (0, 1]", self.flatten)
-        for name in ("resample_below", "switch_mass"):
-            if not 0 < getattr(self, name) < 1:
-                faults.add(f"particles, {name}", "a share between 0 and 1", getattr(self, name))
-        if not (isfinite(self.switch_hold_m) and self.switch_hold_m >= 0):
-            faults.add("particles, switch_hold_m", "metres >= 0", self.switch_hold_m)
+    def check(self, faults: Faults) -> None:
+        """Add a lower limit above the upper one, and jitter that is negative or not finite."""
+        if self.min_particles > self.max_particles:
+            found = f"{self.min_particles} and {self.max_particles}"
+            where = "ParticleOptions, min_particles and max_particles"
+            faults.add(where, "min_particles <= max_particles", found)
         for name in ("jitter", "searching_jitter"):
             if not all(isfinite(sd) and sd >= 0 for sd in getattr(self, name)):
-                faults.add(f"particles, {name}", "finite numbers >= 0", getattr(self, name))
-        faults.raise_if_any(ConfigError)
+                faults.add(f"ParticleOptions, {name}", "finite numbers >= 0", getattr(self, name))
 
 
 def switched(
     status: Status, travelled_m: float, agreement_start_m: float, *, agrees: bool, hold_m: float
 ) -> tuple[Status, float]:
-    """Return the status after an update, and since when the switch rule holds.
+    """Return the status after an update, and at which distance the switch rule began to hold.
 
     Parameters
     ----------
     status : Status
-        Before.
+        Before the update.
     travelled_m : float
+        Distance travelled so far.
     agreement_start_m : float
         Distance travelled when the rule began to hold; NaN where it does not.
     agrees : bool
         Whether it holds now.
     hold_m : float
-        For how many metres it must.
+        For how many metres it must hold.
 
     Examples
     --------
     >>> switched(Status.SEARCHING, 100.0, 85.0, agrees=True, hold_m=14.0)
     (<Status.CONVERGED: 'CONVERGED'>, 85.0)
     """
-    if status is Status.CONVERGED:
-        return Status.TRACKING, agreement_start_m
     if status is not Status.SEARCHING:
-        return status, agreement_start_m
+        converged = status is Status.CONVERGED
+        return (Status.TRACKING if converged else status), agreement_start_m
     if not agrees:
         return Status.SEARCHING, nan
     since_m = agreement_start_m if isfinite(agreement_start_m) else travelled_m
-    if travelled_m - since_m >= hold_m:
-        return Status.CONVERGED, since_m
-    return Status.SEARCHING, since_m
+    held = travelled_m - since_m >= hold_m
+    return (Status.CONVERGED if held else Status.SEARCHING), since_m
 
 
 PriorT = TypeVar("PriorT", contravariant=True)
@@ -126,7 +118,7 @@ ReadingT = TypeVar("ReadingT", contravariant=True)
 
 
 class ParticleModel(Protocol[PriorT, ReadingT]):
-    """What a particle filter needs to know of the world."""
+    """Motion, map and measurements, as a particle filter needs them."""
 
     @property
     def bins(self) -> Bins:
@@ -141,28 +133,30 @@ class ParticleModel(Protocol[PriorT, ReadingT]):
         """Return particles and log weights after a step of finite length."""
 
     def weigh(self, state: Floats32, log_weight: Floats, reading: ReadingT) -> Reason:
-        """Add a reading's log-likelihood to the log weights, in place; say why if it has none."""
+        """Add a reading's log-likelihood to the log weights, in place; return why not, if so."""
 
     def can_converge(self, summary: BeliefSummary) -> bool:
-        """Tell whether a belief may count as having converged, if it agrees on a place."""
+        """Return whether a belief may count as having converged, if it agrees on a place."""
 
 
 @dataclass(frozen=True, eq=False)
 class ParticleBelief:
-    """Particles, their weights, and how the filter stands.
+    """Particles, their weights, and the status of the filter.
 
     Parameters
     ----------
     state : ndarray of float32, shape (R, N)
         The first two rows are east and north in the model's frame.
     log_weight : ndarray of float64, shape (N,)
-        After an update they sum to one.
+        Logarithms of weights, which sum to one after an update.
     bins : Bins
+        The area.
     travelled_m : float
         By dead reckoning since the start.
     log_evidence : float
         Log probability of all readings so far.
     status : Status
+        Where the filter stands.
     agreement_start_m : float
         Distance travelled when the switch rule began to hold; NaN where it does not.
     """
@@ -184,9 +178,9 @@ class ParticleBelief:
 
     @cached_property
     def summary(self) -> BeliefSummary:
-        """What the belief says."""
+        """Leading hypothesis, radii and runners-up."""
         if not self.log_weight.size:
-            return nothing(self.state.shape[0])
+            return empty_summary(self.state.shape[0])
         return summarise(self.state, self.weight, self.bins)
 
     def __getstate__(self) -> dict[str, object]:
@@ -200,7 +194,9 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
     Parameters
     ----------
     model : ParticleModel
+        Motion, map and measurements.
     options : ParticleOptions
+        Numbers of particles and the switch rule.
     """
 
     model: ParticleModel[PriorT, ReadingT]
@@ -208,9 +204,8 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
 
     def init(self, prior: PriorT, rng: np.random.Generator) -> ParticleBelief:
         """Draw the first particles."""
-        state, log_weight = self.model.start(prior, self.options.most, rng)
-        weight = np.empty(log_weight.size, dtype=np.float32)
-        log_total, _ = normalise(log_weight, weight)
+        state, log_weight = self.model.start(prior, self.options.max_particles, rng)
+        log_total, _ = normalise(log_weight, np.empty(log_weight.size, dtype=np.float32))
         if not isfinite(log_total):
             log_weight[:] = -np.log(max(log_weight.size, 1))
         return ParticleBelief(state, log_weight, self.model.bins)
@@ -229,102 +224,63 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             return belief, reason
         key = draw_key(rng)
         state, log_weight = self.model.move(belief.state, belief.log_weight, motion, key)
-        moved = ParticleBelief(
-            state,
-            log_weight,
-            belief.bins,
-            belief.travelled_m + abs(motion.step_m),
-            belief.log_evidence,
-            belief.status,
-            belief.agreement_start_m,
-        )
+        travelled_m = belief.travelled_m + abs(motion.step_m)
+        moved = replace(belief, state=state, log_weight=log_weight, travelled_m=travelled_m)
         return moved, reason
 
     def update(
         self, belief: ParticleBelief, reading: ReadingT, rng: np.random.Generator
     ) -> tuple[ParticleBelief, UpdateInfo]:
-        """Weigh all particles, resample where that is due, and look whether they agree."""
-        log_weight = belief.log_weight.copy()
-        reason = self.model.weigh(belief.state, log_weight, reading)
-        if reason is not Reason.USED:
-            return belief, UpdateInfo(reason, belief.status, belief.log_weight.size)
+        """Weigh all particles, apply the switch rule, and resample where that is due."""
+        options, log_weight, state = self.options, belief.log_weight.copy(), belief.state
+        reason = self.model.weigh(state, log_weight, reading)
         weight = np.empty(log_weight.size, dtype=np.float32)
-        log_total, effective = normalise(log_weight, weight)
-        if not isfinite(log_total):
-            return belief, UpdateInfo(
-                Reason.NO_CANDIDATES_LEFT, belief.status, belief.log_weight.size
-            )
-        weighed = ParticleBelief(
-            belief.state,
-            log_weight,
-            belief.bins,
-            belief.travelled_m,
-            belief.log_evidence + log_total,
-        )
-        weighed.__dict__["weight"] = weight
-        said = weighed.summary
+        if reason is Reason.USED:
+            log_total, effective = normalise(log_weight, weight)
+            if not isfinite(log_total):
+                reason = Reason.NO_CANDIDATES_LEFT
+        if reason is not Reason.USED:
+            return belief, UpdateInfo(reason, belief.status, log_weight.size)
+        summary = summarise(state, weight, belief.bins)
         status, agreement_start_m = switched(
             belief.status,
             belief.travelled_m,
             belief.agreement_start_m,
-            agrees=said.mass_50m >= self.options.switch_mass and self.model.can_converge(said),
-            hold_m=self.options.switch_hold_m,
+            agrees=summary.mass_50m >= options.switch_mass and self.model.can_converge(summary),
+            hold_m=options.switch_hold_m,
         )
-        wanted = self._wanted(said, status)
-        state = weighed.state
         searching = status is Status.SEARCHING
-        flat = weight
-        if searching and self.options.flatten < 1:
-            flat = flattened(state, weight, belief.bins, self.options.flatten)
-            effective = 1.0 / float(np.dot(flat, flat))
-        if effective < self.options.resample_below * weight.size or 2 * wanted < weight.size:
-            state, chosen = self._resampled(state, flat, wanted, status, rng)
-            log_weight = _left_over(log_weight[chosen], flat[chosen])
-        now = ParticleBelief(
-            state,
-            log_weight,
-            belief.bins,
-            belief.travelled_m,
-            weighed.log_evidence,
-            status,
-            agreement_start_m,
+        if searching and options.mass_exponent < 1:
+            weight = flattened(state, weight, belief.bins, options.mass_exponent)
+            effective = 1.0 / float(np.dot(weight, weight))
+        least = options.min_search_particles if searching else options.min_particles
+        by_bins = options.particles_per_bin * summary.effective_bins
+        wanted = int(min(max(by_bins, least), options.max_particles))
+        if effective < options.resample_below * weight.size or 2 * wanted < weight.size:
+            chosen = np.empty(wanted, dtype=np.int32)
+            systematic(weight, rng.random(), chosen)
+            sd = np.array(options.searching_jitter if searching else options.jitter, np.float32)
+            copies = np.empty((state.shape[0], wanted), dtype=np.float32)
+            copy_with_jitter(state, chosen, sd, draw_key(rng), copies)
+            # Copies keep the part of their weight that they were not chosen by. Rounding may choose
+            # the last one though its weight is none.
+            chosen_by = np.maximum(weight[chosen], np.finfo(np.float32).tiny)
+            state, log_weight = copies, log_weight[chosen] - np.log(chosen_by)
+            normalise(log_weight, np.empty(wanted, dtype=np.float32))
+        now = replace(
+            belief,
+            state=state,
+            log_weight=log_weight,
+            log_evidence=belief.log_evidence + log_total,
+            status=status,
+            agreement_start_m=agreement_start_m,
         )
         # The summary before resampling is the better one of the same belief.
-        now.__dict__["summary"] = said
-        return now, UpdateInfo(Reason.USED, status, int(now.log_weight.size))
+        now.__dict__["summary"] = summary
+        return now, UpdateInfo(Reason.USED, status, log_weight.size)
 
     def locate(self, belief: ParticleBelief) -> Estimate:
         """Return the leading hypothesis."""
-        said = belief.summary
-        return Estimate(float(said.mean[0]), float(said.mean[1]), said.covariance_m2, said.radii_m)
-
-    def _wanted(self, summary: BeliefSummary, status: Status) -> int:
-        options = self.options
-        least = options.searching if status is Status.SEARCHING else options.least
-        return int(min(max(options.per_bin * summary.effective_bins, least), options.most))
-
-    def _resampled(
-        self,
-        state: Floats32,
-        weight: Floats32,
-        wanted: int,
-        status: Status,
-        rng: np.random.Generator,
-    ) -> tuple[Floats32, Ints32]:
-        chosen = np.empty(wanted, dtype=np.int32)
-        systematic(weight, rng.random(), chosen)
-        copies = np.empty((state.shape[0], wanted), dtype=np.float32)
-        options, searching = self.options, status is Status.SEARCHING
-        jitter = np.asarray(
-            options.searching_jitter if searching else options.jitter, dtype=np.float32
-        )
-        copy_with_jitter(state, chosen, jitter, draw_key(rng), copies)
-        return copies, chosen
-
-
-def _left_over(log_weight: Floats, chosen_by: Floats32) -> Floats:
-    """Return the log weights of copies that were chosen by other weights than their own."""
-    # Rounding may choose the last one though its weight is none.
-    left = log_weight - np.log(np.maximum(chosen_by, np.finfo(np.float32).tiny))
-    normalise(left, np.empty(left.size, dtype=np.float32))
-    return left
+        found = belief.summary
+        east_m, north_m = float(found.mean[0]), float(found.mean[1])
+        return Estimate(east_m, north_m, found.covariance_m2, found.radii_m)

@@ -15,51 +15,56 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite, nan
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Ge, Le
 from numpy.typing import ArrayLike
 
 from mapfilter._kernels import draw_key
 from mapfilter._types import Floats, Floats32, Ints
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.filters._rao_blackwell import copies, gains, means, move, propagate, sums, weigh
+from mapfilter.filters._rao_blackwell import (
+    Entries,
+    Weighing,
+    copies,
+    gains,
+    means,
+    move,
+    propagate,
+    sums,
+    weigh,
+)
 from mapfilter.filters.gaussian import Gaussian, factor_of
 from mapfilter.filters.kalman import Taken
 from mapfilter.filters.resampling import normalise, systematic
 from mapfilter.filters.trials import CompiledMeasurement
+from mapfilter.options import Options, Share
 
 
 @dataclass(frozen=True, slots=True)
-class SirOptions:
-    """How particles are drawn anew.
+class SirOptions(Options):
+    """Resampling of the particles.
 
     Parameters
     ----------
     resample_below : float
-        Share of the effective sample size under which particles are drawn anew; 1 does so at every
+        Share of the effective sample size below which particles are resampled; 1 does so at every
         reading (sampling importance resampling, SIR).
     regularise : float
-        Width of the kernel that parts copies, as a share of the best one for normal beliefs
+        Width of the kernel that jitters copies, as a share of the best one for normal beliefs
         (Musso, Oudjane & Le Gland 2001); 0 for none.
     """
 
-    resample_below: float = 1.0
-    regularise: float = 0.0
-
-    def __post_init__(self) -> None:
-        faults = Faults()
-        if not 0 <= self.resample_below <= 1:
-            faults.add("SIR, resample_below", "a share in 0..1", self.resample_below)
-        if not 0 <= self.regularise <= 2:
-            faults.add("SIR, regularise", "a share in 0..2", self.regularise)
-        faults.raise_if_any(InputError)
+    resample_below: Share = 1.0
+    regularise: Annotated[float, Ge(0), Le(2)] = 0.0
 
 
 SIR = SirOptions()
-"""Drawn anew at every reading."""
+"""Resampled at every reading."""
 
 REGULARISED = SirOptions(0.5, 0.5)
-"""Drawn anew where half of the particles carry the weight, copies parted."""
+"""Resampled where half of the particles carry the weight, copies jittered."""
 
 
 _LOG_TWO_PI = float(np.log(2 * np.pi))
@@ -109,17 +114,7 @@ def init(
     count: int,
     rng: np.random.Generator,
 ) -> MixedBelief:
-    """Draw the first particles from a Gaussian belief.
-
-    Parameters
-    ----------
-    mean : (n,) array_like
-    covariance : (n, n) array_like
-    sampled : sequence of int
-        Components of which particles are drawn.
-    count : int
-        Number of particles.
-    rng : numpy.random.Generator
+    """Draw so many first particles of the sampled components from a Gaussian belief.
 
     Raises
     ------
@@ -148,12 +143,7 @@ def predict(
 ) -> MixedBelief:
     """Return the belief after linear motion, ``x' = Φ x + w``, w normal with covariance Q.
 
-    Parameters
-    ----------
-    belief : MixedBelief
-    transition, process : (n, n) arrays
-        Φ and Q; Q may be singular.
-    rng : numpy.random.Generator
+    Φ and Q are (n, n); Q may be singular.
 
     Raises
     ------
@@ -164,14 +154,10 @@ def predict(
     if transition.shape != (n, n) or process.shape != (n, n):
         expected, got = f"two matrices {n} x {n}", f"{transition.shape}, {process.shape}"
         raise fail(InputError, "motion", expected, got)
-    gain, covariance = propagate(
-        belief.covariance, np.ascontiguousarray(transition), process, belief.sampled
-    )
-    change = transition - np.eye(n)
-    row, column = (np.ascontiguousarray(index) for index in np.nonzero(change))
-    moved = np.empty_like(belief.state)
-    move(belief.state, row, column, change[row, column], gain, draw_key(rng), moved)
-    return MixedBelief(moved, belief.log_weight, covariance, belief.sampled)
+    phi, sampled = np.ascontiguousarray(transition), belief.sampled
+    gain, covariance = propagate(belief.covariance, phi, process, sampled)
+    moved = move(belief.state, Entries.of(transition - np.eye(n)), gain, draw_key(rng))
+    return MixedBelief(moved, belief.log_weight, covariance, sampled)
 
 
 def update(
@@ -182,17 +168,19 @@ def update(
     options: SirOptions = SIR,
     loading: Floats | None = None,
 ) -> tuple[MixedBelief, Taken]:
-    """Return the belief after a reading, and the news.
+    """Return the belief after a reading, and what became of the reading.
 
     Parameters
     ----------
     belief : MixedBelief
+        Before the reading.
     measurement : CompiledMeasurement
         Of the components it depends on, positions are sampled; the clock need not be.
     reading : (m,) array_like
         NaN where absent.
     rng : numpy.random.Generator
     options : SirOptions
+        When to resample.
     loading : (m, n) array, optional
         What else of the components that are not sampled adds to the reading, such as shadowing:
         ``y = h(x) + loading x + v``.
@@ -201,7 +189,7 @@ def update(
     -------
     belief : MixedBelief
         As it was where the reading is empty, or so far off that no particle keeps any weight.
-    news : Taken
+    taken : Taken
         Evidence, and the normalised innovation squared of the particle that explains it best.
 
     Raises
@@ -223,15 +211,20 @@ def update(
     inverse, gain, covariance, log_root = gains(slope, belief.covariance, noise)
     if not isfinite(log_root):
         raise fail(InputError, "measurement, noise", "a positive definite covariance", noise)
-    own = loading if loading is not None else np.zeros((0, 0))
-    row, column = (np.ascontiguousarray(index) for index in np.nonzero(own))
-    used = np.flatnonzero(gain.any(axis=1))
+    corrected = np.flatnonzero(gain.any(axis=1))
+    weighing = Weighing(
+        measurement.slots,
+        measurement.uses,
+        np.ascontiguousarray(rows),
+        measurement.patterns,
+        given,
+        inverse,
+        corrected,
+        np.ascontiguousarray(gain[corrected]),
+        Entries.of(np.zeros((0, 0)) if loading is None else loading),
+    )
     log_weight, state = belief.log_weight.copy(), belief.state.copy()
-    least = weigh(
-        measurement.measure, measurement.slots, measurement.uses, np.ascontiguousarray(rows),
-        measurement.patterns, given, inverse, used, np.ascontiguousarray(gain[used]), row, column,
-        np.ascontiguousarray(own[row, column]), state, log_weight,
-    )  # fmt: skip
+    least = weigh(measurement.measure, weighing, state, log_weight)
     weight = np.empty(log_weight.size, dtype=np.float32)
     total, effective = normalise(log_weight, weight)
     if not isfinite(total):
@@ -239,27 +232,24 @@ def update(
     evidence = total - log_root - 0.5 * given.size * _LOG_TWO_PI
     after = MixedBelief(state, log_weight, covariance, belief.sampled)
     if effective < options.resample_below * log_weight.size:
-        after = _drawn_anew(after, weight, rng, options)
+        after = _resampled(after, weight, rng, options)
     return after, Taken(float(evidence), float(least))
 
 
-def _drawn_anew(
+def _resampled(
     belief: MixedBelief, weight: Floats32, rng: np.random.Generator, options: SirOptions
 ) -> MixedBelief:
     count, sampled = weight.size, belief.sampled
     chosen = np.empty(count, dtype=np.int32)
     systematic(weight, rng.random(), chosen)
-    state = np.empty_like(belief.state)
-    copies(belief.state, chosen, state)
+    state = copies(belief.state, chosen)
     if options.regularise > 0:
         d = sampled.size
         width = options.regularise * (4.0 / (count * (d + 2))) ** (1.0 / (d + 4))
         _, spread = sums(np.ascontiguousarray(belief.state[sampled]), weight)
         gain = np.zeros((belief.state.shape[0], d))
         gain[sampled] = width * factor_of(0.5 * (spread + spread.T), d)
-        moved, none = np.empty_like(state), np.zeros(0, dtype=np.int64)
-        move(state, none, none, np.zeros(0), gain, draw_key(rng), moved)
-        state = moved
+        state = move(state, Entries.of(np.zeros((0, 0))), gain, draw_key(rng))
     return MixedBelief(state, np.full(count, -np.log(count)), belief.covariance, sampled)
 
 
@@ -282,10 +272,9 @@ def _slopes(
     if missing := sorted(set(places.tolist()) - set(belief.sampled.tolist())):
         raise fail(InputError, "sampled", "all components that positions are", f"not {missing}")
     mean, slope = np.empty((m, 1)), np.zeros((m, measurement.uses.size, 1))
-    measurement.measure(
-        np.ascontiguousarray(belief.state[measurement.uses, :1]), measurement.slots,
-        np.ascontiguousarray(measurement.rows), measurement.patterns, mean, slope, True,
-    )  # fmt: skip
+    point = np.ascontiguousarray(belief.state[measurement.uses, :1])
+    rows, patterns = np.ascontiguousarray(measurement.rows), measurement.patterns
+    measurement.measure(point, measurement.slots, rows, patterns, mean, slope, True)
     whole = np.zeros((m, n))
     whole[:, measurement.uses] = slope[:, :, 0]
     if loading is not None:

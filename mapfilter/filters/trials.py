@@ -1,23 +1,22 @@
 """Kalman-type filters over many trials of one experiment, by compiled kernels.
 
 All trials share motion, measurement and noise; each has its own first belief and its own readings,
-of which any component may be absent at any step. What the filters are is told in
-:mod:`mapfilter.filters.kalman` and :mod:`mapfilter.filters.sigma_point`; the arithmetic is the
-same.
+of which any component may be absent at any step. The updates are those of
+:mod:`mapfilter.filters._updates`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError
-from mapfilter.filters._runs import run_lanes
+from mapfilter.filters._square_root import Problem
+from mapfilter.filters._updates import kernel_of, run_lanes
 from mapfilter.filters.gaussian import Method, factor_of
 
 LANES = 64
@@ -32,12 +31,13 @@ class CompiledMeasurement:
     ----------
     measure : callable
         Compiled with the arguments (points, slots, rows, patterns, mean, slope, derive), see
-        :data:`mapfilter.filters._runs.MEASURE_SIGNATURE`.
+        :data:`mapfilter._kernels.MEASURE_SIGNATURE`.
     slots : (4,) integer array
+        Rows of the points that hold east, north, up and the clock's bias; -1 for none.
     uses : (q,) integer array
         Components of the state that it depends on.
-    rows : (m, c) array
-    patterns : (p,) array
+    rows, patterns : (m, c) and (p,) arrays
+        The measurement's own constants.
     noise : (m, m) array
         Covariance of its noise, positive definite.
     """
@@ -52,7 +52,7 @@ class CompiledMeasurement:
 
 @dataclass(frozen=True, eq=False)
 class TrialRun:
-    """What filters made of T trials of K steps.
+    """Results of a filter over T trials of K steps.
 
     Parameters
     ----------
@@ -89,6 +89,7 @@ def run_trials(
     Parameters
     ----------
     measurement : CompiledMeasurement
+        Which readings.
     transition, process : (n, n) arrays
         Φ and Q.
     method : Method
@@ -111,33 +112,47 @@ def run_trials(
     trials, steps = checked_sizes(measurement, transition, readings)
     starts = np.broadcast_to(np.asarray(first_mean, dtype=np.float64), (trials, n))
     factors = factors_of(first_covariance, n, trials)
-    entry = np.nonzero(transition)
-    arguments: tuple[Any, ...] = (
-        kernel_of(method), measurement.measure, measurement.slots, measurement.uses,
-        np.ascontiguousarray(measurement.rows), np.ascontiguousarray(measurement.patterns),
-        np.ascontiguousarray(measurement.noise), is_diagonal(measurement.noise),
-        *method_numbers(method, n), *(np.ascontiguousarray(index) for index in entry),
-        np.ascontiguousarray(transition[entry]),
-        np.ascontiguousarray(process),
-    )  # fmt: skip
-    kept = steps if covariances else 0
-    means, found = np.empty((trials, steps, n)), np.empty((trials, kept, n, n))
+    problem = problem_of(measurement, transition, process, method)
+    means, found = np.empty((trials, steps, n)), np.empty((trials, steps * covariances, n, n))
     evidence, nis = np.empty((trials, steps)), np.empty((trials, steps))
     for first in range(0, trials, LANES):
         block = slice(first, min(first + LANES, trials))
-        lanes = block.stop - first
-        lane_means, lane_found = np.empty((steps, n, lanes)), np.empty((kept, lanes, n, n))
-        lane_evidence, lane_nis = np.empty((steps, lanes)), np.empty((steps, lanes))
-        run_lanes(  # type: ignore[call-arg]
-            *arguments, np.ascontiguousarray(readings[block].transpose(1, 2, 0)),
+        run = run_lanes(
+            kernel_of(method),
+            measurement.measure,
+            problem,
+            np.ascontiguousarray(readings[block].transpose(1, 2, 0)),
             np.array(starts[block].T, order="C"),
             np.array(factors[block].transpose(1, 2, 0), order="C"),
-            lane_means, lane_found, lane_evidence, lane_nis,
-        )  # fmt: skip
-        means[block] = lane_means.transpose(2, 0, 1)
-        found[block] = lane_found.transpose(1, 0, 2, 3)
-        evidence[block], nis[block] = lane_evidence.T, lane_nis.T
+            covariances,
+        )
+        means[block] = run[0].transpose(2, 0, 1)
+        found[block] = run[1].transpose(1, 0, 2, 3)
+        evidence[block], nis[block] = run[2].T, run[3].T
     return TrialRun(means, found, evidence, nis)
+
+
+def problem_of(
+    measurement: CompiledMeasurement, transition: Floats, process: Floats, method: Method
+) -> Problem:
+    """Return measurement, motion and method as the compiled filters take them."""
+    row, col = np.nonzero(transition)
+    iterations, spread, bend_weight = method_numbers(method, transition.shape[0])
+    return Problem(
+        measurement.slots,
+        measurement.uses,
+        np.ascontiguousarray(measurement.rows),
+        np.ascontiguousarray(measurement.patterns),
+        np.ascontiguousarray(measurement.noise),
+        is_diagonal(measurement.noise),
+        iterations,
+        spread,
+        bend_weight,
+        np.ascontiguousarray(row),
+        np.ascontiguousarray(col),
+        np.ascontiguousarray(transition[row, col]),
+        np.ascontiguousarray(process),
+    )
 
 
 def factors_of(covariance: ArrayLike, size: int, trials: int) -> Floats:
@@ -158,18 +173,6 @@ def method_numbers(method: Method, size: int) -> tuple[int, float, float]:
     if method.sigma is not None:
         return 1, method.sigma.spread(size), method.sigma.bend_weight
     return method.iterations, 1.0, 0.0
-
-
-def kernel_of(method: Method) -> Callable[..., None]:
-    """Return the compiled update; each is compiled when it is first wanted."""
-    update: Callable[..., None]
-    if method.sigma is not None:
-        from mapfilter.filters._sigma import by_sigma_points as update
-    elif method.iterations > 1:
-        from mapfilter.filters._iterated import iterated as update
-    else:
-        from mapfilter.filters._linear import linearised as update
-    return update
 
 
 def checked_sizes(

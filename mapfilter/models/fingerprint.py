@@ -1,4 +1,4 @@
-"""Levels of a report: how probable they are at a place, with errors that are correlated in space.
+"""How probable a report is at a place: by its levels and by its serving cell.
 
 The error of a predicted level is a Gauss-Markov process along the path, with the exponential
 autocorrelation of Gudmundson (1991): after d metres it has the correlation ``ρ = exp(-d / d_c)``.
@@ -7,23 +7,32 @@ reported and as predicted now and ' the same at the last report, whose variance 
 ``σ² (1 - ρ²)`` and that of the measurement. The errors of different cells have a common part
 (the phone, the body, the site's surroundings): an equal correlation c between all of them, whose
 inverse is known in closed form. Innovations are clipped, because predictions err by whole houses.
+
+With handover hysteresis and prediction errors the serving cell is often not the one predicted best.
+Its probability is a smooth function of the margin m, its predicted level above the best other
+cell's: ``Φ((m + h) / σ)``, with h the hysteresis in the serving cell's favour. It is never hard.
+
+In the kernels, hypotheses are given by flat pixels, shape (N,), and levels as one flat array of
+shape (pixels * bands,), whose last two bands are the best and the second best level of all cells.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from math import exp
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import ArrayLike
 from scipy.special import log_ndtr
 
 from mapfilter._kernels import cos_sin32, exp32, log32
 from mapfilter._types import Floats, Floats32, Ints32
 
 _F = np.float32
-_STEPS_PER_SD = 32
-_REACH_SD = 8
+_STEPS_PER_SD, _REACH_SD = 32, 8
+_STEPS_PER_DB, _REACH_DB = 4, 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,18 +42,18 @@ class LevelErrors:
     Parameters
     ----------
     sd_db : float
-        Of a prediction's error.
+        Standard deviation of a prediction's error.
     correlation_m : float
         Distance after which its correlation is 1/e.
     measurement_db : float
-        Independent error of each report.
+        Standard deviation of the independent error of each report.
     roughness_db : float
-        How much the prediction itself varies over ``correlation_m``: a hypothesis that lies some
-        metres beside the truth is told the levels of another place.
+        How much the prediction itself varies over ``correlation_m``: a hypothesis some metres
+        beside the true position predicts the levels of another place.
     common : float
         Correlation of the errors of different cells.
     clip_sd : float
-        Innovations beyond it count as this.
+        Innovations beyond so many standard deviations count as this.
     weight : float
         Exponent of the likelihood; below 1 where the model is not trusted to be exact.
     """
@@ -58,13 +67,12 @@ class LevelErrors:
     weight: float = 0.7
 
     def offset_variance_db2(self, particle_spacing_m: float) -> float:
-        """Return the variance of a prediction so far beside the truth."""
+        """Return the variance of a prediction so far beside the true position."""
         return 2 * self.roughness_db**2 * (1 - exp(-particle_spacing_m / self.correlation_m))
 
 
-@dataclass(frozen=True, slots=True)
-class LevelReading:
-    """The levels of one report, as kernels take them; K levels.
+class LevelReading(NamedTuple):
+    """The K levels of one report, as kernels take them.
 
     Parameters
     ----------
@@ -76,9 +84,8 @@ class LevelReading:
         Correlation with the last report; 0 where the cell was not in it.
     scale : ndarray of float32, shape (K,)
         One over the innovation's standard deviation, times the root of the level's weight.
-    common : float
-        c of these levels.
-    weight, clip : float
+    common, weight, clip : float
+        As in :class:`LevelErrors`.
     back_east_m, back_north_m : float
         Displacement by dead reckoning since the last report.
     """
@@ -94,8 +101,7 @@ class LevelReading:
     back_north_m: float
 
 
-@dataclass(frozen=True, slots=True)
-class BoundReading:
+class BoundReading(NamedTuple):
     """A level that is only a bound, or one of a cell that may be any of several.
 
     Parameters
@@ -105,7 +111,10 @@ class BoundReading:
     level_dbm : float
     censored : int
         -1: the level is below; 1: it is above; 0: it is this.
-    sd_db, weight : float
+    sd_db : float
+        Standard deviation of the level's error.
+    weight : float
+        Exponent of the likelihood.
     """
 
     cells: Ints32
@@ -113,6 +122,63 @@ class BoundReading:
     censored: int
     sd_db: float
     weight: float
+
+
+@dataclass(frozen=True, slots=True)
+class ServingWeights:
+    """How the serving cell counts.
+
+    Parameters
+    ----------
+    hysteresis_db : float
+        h, in the serving cell's favour.
+    sd_db : float
+        σ of the margin's error.
+    weight_per_m : float
+        Exponent of the likelihood for each metre travelled, because errors last.
+    """
+
+    hysteresis_db: float = 2.0
+    sd_db: float = 9.0
+    weight_per_m: float = 1 / 22
+
+
+class RasterFrame(NamedTuple):
+    """Where the pixels of a raster lie.
+
+    Parameters
+    ----------
+    west_m, north_m : float
+        Corner of the raster.
+    per_m : float
+        Pixels per metre.
+    rows, cols : int
+    """
+
+    west_m: float
+    north_m: float
+    per_m: float
+    rows: int
+    cols: int
+
+
+def log_serving(margin_db: ArrayLike, weights: ServingWeights) -> Floats:
+    """Return the log-likelihood that a cell serves at a margin over the best other cell.
+
+    Examples
+    --------
+    >>> log_serving([-20.0, -2.0, 20.0], ServingWeights()).round(3).tolist()
+    [-3.783, -0.693, -0.007]
+    """
+    margin = np.asarray(margin_db, dtype=np.float64)
+    return np.asarray(log_ndtr((margin + weights.hysteresis_db) / weights.sd_db))
+
+
+def serving_table(weights: ServingWeights) -> Floats32:
+    """Return the log-likelihood for margins of -64 to 64 dB in quarters, for the kernel."""
+    steps = _REACH_DB * _STEPS_PER_DB
+    margin_db = np.arange(-steps, steps + 1) / _STEPS_PER_DB
+    return log_serving(margin_db, weights).astype(np.float32)
 
 
 def bound_table() -> Floats32:
@@ -123,17 +189,7 @@ def bound_table() -> Floats32:
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
-def pixels(
-    state: Floats32,
-    back_east_m: float,
-    back_north_m: float,
-    west_m: float,
-    north_m: float,
-    per_m: float,
-    rows: int,
-    cols: int,
-    pixel: Ints32,
-) -> None:
+def pixels(state: Floats32, back_east_m: float, back_north_m: float, raster: RasterFrame) -> Ints32:
     """Find the pixel that holds each hypothesis, or held it some displacement ago.
 
     Parameters
@@ -141,18 +197,19 @@ def pixels(
     state : ndarray of float32, shape (5, N)
     back_east_m, back_north_m : float
         The displacement by dead reckoning, turned and scaled by each hypothesis's own errors.
-    west_m, north_m : float
-        Corner of the raster.
-    per_m : float
-        Pixels per metre.
-    rows, cols : int
-    pixel : ndarray of int32, shape (N,)
-        Filled with flat indices; beyond the edge with the edge's.
+    raster : RasterFrame
+
+    Returns
+    -------
+    ndarray of int32, shape (N,)
+        Flat indices; beyond the edge the edge's.
     """
     east, north, bias, scale = state[0], state[1], state[2], state[3]
     be, bn, zero = _F(back_east_m), _F(back_north_m), _F(0.0)
-    w, n, k = _F(west_m), _F(north_m), _F(per_m)
-    last_col, last_row, width = np.int32(cols - 1), np.int32(rows - 1), np.int32(cols)
+    w, n, k = _F(raster.west_m), _F(raster.north_m), _F(raster.per_m)
+    last_col, last_row = np.int32(raster.cols - 1), np.int32(raster.rows - 1)
+    width = np.int32(raster.cols)
+    pixel = np.empty(state.shape[1], dtype=np.int32)
     for i in range(pixel.size):
         cosine, sine = cos_sin32(bias[i])
         stretch = exp32(scale[i])
@@ -164,6 +221,7 @@ def pixels(
         col = col if col < last_col else last_col
         row = row if row < last_row else last_row
         pixel[i] = np.int32(np.int32(row * width) + col)
+    return pixel
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
@@ -172,26 +230,16 @@ def weigh_by_levels(
     before: Ints32,
     level_dbm: Floats32,
     bands: int,
-    cell: Ints32,
-    offset_db: Floats32,
-    rho: Floats32,
-    scale: Floats32,
-    common: float,
-    weight: float,
-    clip: float,
+    levels: LevelReading,
     log_weight: Floats,
 ) -> None:
-    """Add the log-likelihood of levels to weights, in place; see :class:`LevelReading`.
+    """Add the log-likelihood of levels to weights, in place.
 
-    Parameters
-    ----------
-    pixel, before : ndarray of int32, shape (N,)
-        Flat pixels of each hypothesis now and at the last report.
-    level_dbm : ndarray of float32, shape (pixels * bands,)
-    bands : int
+    ``pixel`` and ``before`` hold each hypothesis now and at the last report.
     """
-    count = cell.size
-    high, low = _F(clip), _F(-clip)
+    count, common, weight = levels.cell.size, levels.common, levels.weight
+    cell, offset_db, rho, scale = levels.cell, levels.offset_db, levels.rho, levels.scale
+    high, low = _F(levels.clip), _F(-levels.clip)
     own = _F(-0.5 * weight / (1.0 - common))
     shared = _F(0.5 * weight / (1.0 - common) * common / (1.0 + (count - 1) * common))
     width = np.uint32(bands)
@@ -213,17 +261,17 @@ def weigh_by_bound(
     pixel: Ints32,
     level_dbm: Floats32,
     bands: int,
-    cells: Ints32,
-    reported_dbm: float,
-    censored: int,
-    sd_db: float,
-    weight: float,
+    bound: BoundReading,
     table: Floats32,
     log_weight: Floats,
 ) -> None:
-    """Add the log-likelihood of one bound or ambiguous level to weights; see `BoundReading`."""
-    per_db, w, zero = _F(1.0 / sd_db), _F(weight), _F(0.0)
-    reported, share = _F(reported_dbm), _F(1.0 / cells.size)
+    """Add the log-likelihood of one bound or ambiguous level to weights, in place.
+
+    ``table`` is that of :func:`bound_table`.
+    """
+    cells, censored = bound.cells, bound.censored
+    per_db, w, zero = _F(1.0 / bound.sd_db), _F(bound.weight), _F(0.0)
+    reported, share = _F(bound.level_dbm), _F(1.0 / cells.size)
     middle, last = _F(_REACH_SD * _STEPS_PER_SD), _F(2 * _REACH_SD * _STEPS_PER_SD)
     width = np.uint32(bands)
     for i in range(pixel.size):
@@ -241,3 +289,33 @@ def weigh_by_bound(
                 place = place if place < last else last
                 total += exp32(table[np.int32(place)])
         log_weight[i] += w * log32(total * share)
+
+
+@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+def weigh_by_serving(
+    pixel: Ints32,
+    level_dbm: Floats32,
+    bands: int,
+    cell: int,
+    table: Floats32,
+    weight: float,
+    log_weight: Floats,
+) -> None:
+    """Add the log-likelihood of the serving cell, times a weight, to weights, in place.
+
+    ``cell`` is its band, ``table`` that of :func:`serving_table`.
+    """
+    middle = _F(_REACH_DB * _STEPS_PER_DB)
+    zero, last = _F(0.0), _F(2 * _REACH_DB * _STEPS_PER_DB)
+    per_db, w, half = _F(_STEPS_PER_DB), _F(weight), _F(0.5)
+    own, first, second = np.uint32(cell), np.uint32(bands - 2), np.uint32(bands - 1)
+    width = np.uint32(bands)
+    for i in range(pixel.size):
+        at = np.uint32(np.uint32(pixel[i]) * width)
+        level = level_dbm[at + own]
+        best = level_dbm[at + first]
+        other = level_dbm[at + second] if level >= best else best
+        place = (level - other) * per_db + middle + half
+        place = place if place > zero else zero
+        place = place if place < last else last
+        log_weight[i] += w * table[np.int32(place)]

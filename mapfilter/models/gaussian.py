@@ -26,7 +26,7 @@ class GaussianTerms:
     Parameters
     ----------
     layout : StateLayout
-        What the components of a state are.
+        Meaning of the components of a state.
     rows : (m, 13) array
         One term for each component of the reading.
     noise : (m, m) array
@@ -37,7 +37,7 @@ class GaussianTerms:
     patterns : (p,) array
         Samples of measured antennas.
     names : tuple of str
-        What each component is, for messages.
+        Name of each component, for messages.
     """
 
     layout: StateLayout
@@ -145,14 +145,10 @@ def stack(measurements: Sequence[GaussianTerms]) -> GaussianTerms:
         rows[span] = one.rows
         rows[span, 10] += samples
         at, samples = at + one.size, samples + one.patterns.size
-    return GaussianTerms(
-        layout,
-        rows,
-        noise,
-        np.concatenate([one.step for one in measurements]),
-        np.concatenate([one.patterns for one in measurements]),
-        sum((one.names for one in measurements), ()),
-    )
+    step = np.concatenate([one.step for one in measurements])
+    patterns = np.concatenate([one.patterns for one in measurements])
+    names = sum((one.names for one in measurements), ())
+    return GaussianTerms(layout, rows, noise, step, patterns, names)
 
 
 def places(where: str, given: ArrayLike, faults: Faults) -> Floats:
@@ -210,7 +206,18 @@ def terms(
     return rows
 
 
-def checked(faults: Faults, measurement: GaussianTerms) -> GaussianTerms:
-    """Return the measurement, or raise what was found wrong with it."""
+def independent(
+    faults: Faults,
+    layout: StateLayout,
+    rows: Floats,
+    sigma: Floats,
+    name: str,
+    step: float = 0.0,
+    patterns: Floats | None = None,
+) -> GaussianTerms:
+    """Return a measurement of independent components, or raise what was found wrong with it."""
     faults.raise_if_any(InputError)
-    return measurement
+    names = tuple(f"{name} {index}" for index in range(len(rows)))
+    samples = np.zeros(1) if patterns is None else patterns
+    steps = np.full(len(rows), float(step))
+    return GaussianTerms(layout, rows, np.diag(sigma**2), steps, samples, names)

@@ -1,8 +1,8 @@
 """Linear models of motion: ``x(k+1) = Φ x(k) + w``, w normal with covariance Q.
 
-States are c₀·δt in metres and its rate in metres per second. The process noise comes from the
-Allan variance parameters h0, h-1 and h-2 of the oscillator (Brown & Hwang; Fritsche & Klein 2009,
-section III-B).
+A receiver clock has two components: its bias c₀·δt in metres and the rate of it in metres per
+second. Its process noise comes from the Allan variance parameters h0, h-1 and h-2 of the oscillator
+(Brown & Hwang; Fritsche & Klein 2009, section III-B).
 """
 
 from __future__ import annotations
@@ -17,12 +17,13 @@ from scipy.linalg import block_diag
 
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
+from mapfilter.options import NotNegative, Options
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 
 
 @dataclass(frozen=True, slots=True)
-class Oscillator:
+class Oscillator(Options):
     """Parameters of a clock's Allan variance.
 
     Parameters
@@ -35,17 +36,9 @@ class Oscillator:
         Random walk of the frequency, 1/s.
     """
 
-    h0: float
-    h_minus1: float
-    h_minus2: float
-
-    def __post_init__(self) -> None:
-        faults = Faults()
-        for name in ("h0", "h_minus1", "h_minus2"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0):
-                faults.add(f"oscillator, {name}", "a number >= 0", value)
-        faults.raise_if_any(InputError)
+    h0: NotNegative
+    h_minus1: NotNegative
+    h_minus2: NotNegative
 
 
 QUARTZ = Oscillator(9.4e-20, 1.8e-19, 3.8e-21)
@@ -65,21 +58,16 @@ def clock_noise(
     Parameters
     ----------
     interval_s : float
+        T, above 0.
     oscillator : Oscillator
+        The clock's noise.
     cross_term : {"as_printed", "textbook"}
-        Fritsche & Klein print T³ in Q12, where the dimension asks for T².
-
-    Raises
-    ------
-    InputError
-        The interval is not positive.
+        Fritsche & Klein print T³ in Q12, where the dimension asks for T². As printed, the result
+        is no covariance for long intervals (of :data:`QUARTZ`: 2 s).
     """
-    if not (np.isfinite(interval_s) and interval_s > 0):
-        faults = Faults()
-        faults.add("interval_s", "seconds above 0", interval_s)
-        faults.raise_if_any(InputError)
+    t = _positive("interval_s", interval_s)
     h0, h1, h2 = oscillator.h0, oscillator.h_minus1, oscillator.h_minus2
-    t, power = interval_s, 3 if cross_term == "as_printed" else 2
+    power = 3 if cross_term == "as_printed" else 2
     bias = h0 * t / 2 + 2 * h1 * t**2 + 2 / 3 * np.pi**2 * h2 * t**3
     cross = 2 * h1 * t + np.pi**2 * h2 * t**power
     drift = h0 / (2 * t) + 2 * h1 + 8 / 3 * np.pi**2 * h2 * t
@@ -88,7 +76,7 @@ def clock_noise(
 
 @dataclass(frozen=True, eq=False)
 class LinearMotion:
-    """How a state changes over one interval.
+    """Change of a state over one interval.
 
     Parameters
     ----------
@@ -139,7 +127,7 @@ def constant_velocity(
     Parameters
     ----------
     interval_s : float
-        T.
+        T, above 0.
     sigma_mps2 : float or (dimensions,) array_like
         With ``piecewise`` noise the standard deviation of an acceleration that is constant within
         an interval, ``Q = σ² γγᵀ`` with ``γ = [T²/2, T]`` (Fritsche & Klein 2009, eq. 8; Zhang et
@@ -147,7 +135,9 @@ def constant_velocity(
         acceleration, m/s^1.5: ``Q = σ² [[T³/3, T²/2], [T²/2, T]]`` (Bar-Shalom, Li & Kirubarajan
         2001, eq. 6.2.2-4), whose sum does not depend on how time is cut up.
     dimensions : int
+        Number of positions.
     noise : {"piecewise", "continuous"}
+        Which kind of acceleration.
 
     Examples
     --------
@@ -186,9 +176,19 @@ def clock_motion(
     oscillator: Oscillator = QUARTZ,
     cross_term: Literal["as_printed", "textbook"] = "as_printed",
 ) -> LinearMotion:
-    """Return the motion of a receiver clock's bias (m) and drift (m/s), see :mod:`.clock`."""
-    t = _positive("interval_s", interval_s)
-    return LinearMotion(np.array([[1.0, t], [0.0, 1.0]]), clock_noise(t, oscillator, cross_term))
+    """Return the motion of a receiver clock's bias (m) and drift (m/s), see :func:`clock_noise`.
+
+    Raises
+    ------
+    InputError
+        The interval is not positive, or too long for the cross term as printed.
+    """
+    noise = clock_noise(interval_s, oscillator, cross_term)
+    if cross_term == "as_printed" and noise[0, 1] ** 2 > noise[0, 0] * noise[1, 1] * (1 + 1e-9):
+        expected = "an interval so short that the cross term as printed leaves a covariance"
+        hint = 'T³ where T² is due; take cross_term="textbook"'
+        raise fail(InputError, "interval_s", expected, f"{interval_s} s", hint)
+    return LinearMotion(np.array([[1.0, float(interval_s)], [0.0, 1.0]]), noise)
 
 
 def together(parts: Sequence[LinearMotion]) -> LinearMotion:
@@ -202,13 +202,7 @@ def together(parts: Sequence[LinearMotion]) -> LinearMotion:
 
 
 def scaled(motion: LinearMotion, factor: float) -> LinearMotion:
-    """Return the same motion with its noise times a factor, as filters assume more than there is.
-
-    Raises
-    ------
-    InputError
-        The factor is negative.
-    """
+    """Return the same motion with its noise times a factor >= 0."""
     if not (np.isfinite(factor) and factor >= 0):
         raise fail(InputError, "factor", "a number >= 0", factor)
     return LinearMotion(motion.transition, factor * motion.noise)

@@ -1,12 +1,15 @@
-"""GNSS pseudoranges: distance to a satellite plus the receiver clock's bias.
+"""Measurements of distances and positions: pseudoranges, differences, timing advances, fixes.
 
-``y = |x - s| + c₀ δt + v`` (Fritsche & Klein 2009, eq. 5).
+- Pseudorange: distance to a satellite plus the receiver clock's bias, ``y = |x - s| + c₀ δt + v``
+  (Fritsche & Klein 2009, eq. 5).
+- Difference of distances: ``y_i = |x - b_i| - |x - b_r| + v_i``. All differences share the
+  reference station r, so their noise is correlated: ``C = D Σ Dᵀ`` with the times' own variances in
+  Σ and a row of D for each difference.
+- Timing advance: ``y = |x - b| + v`` (Fritsche & Klein 2009, eq. 4; Zhang et al. 2006, eqs. 3 and
+  4). A step of GSM is half the way of light in one bit, 48/13 µs; of LTE in 16 Ts.
 
-``y_i = |x - b_i| - |x - b_r| + v_i``. All differences share the reference station r, so their noise
-is correlated: ``C = D Σ Dᵀ`` with the times' own variances in Σ and a row of D for each difference.
-
-``y = |x - b| + v`` (Fritsche & Klein 2009, eq. 4; Zhang et al. 2006, eqs. 3 and 4). A step of GSM
-is half the way of light in one bit, 48/13 µs; of LTE in 16 Ts.
+All models take a layout of the state, positions in metres, and the standard deviations of the
+noise, one for all or one each; they raise an InputError with every fault.
 """
 
 from __future__ import annotations
@@ -18,18 +21,25 @@ from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.models.gaussian import (
     GaussianTerms,
-    checked,
     checked_covariance,
     deviations,
+    independent,
     places,
     terms,
 )
+from mapfilter.models.motion import SPEED_OF_LIGHT_MPS
 from mapfilter.models.state import StateLayout
 from mapfilter.models.terms import COMPONENT, DIFFERENCE, RANGE
 
+GSM_STEP_M = SPEED_OF_LIGHT_MPS * 48 / 13 * 1e-6 / 2
+"""About 553 m."""
+
+LTE_STEP_M = SPEED_OF_LIGHT_MPS * 16 / 30.72e6 / 2
+"""About 78 m."""
+
 
 def pseudoranges(layout: StateLayout, satellites_m: ArrayLike, sigma_m: ArrayLike) -> GaussianTerms:
-    """Return the model of pseudoranges to satellites.
+    """Return the model of pseudoranges to satellites, for a state with a clock.
 
     Parameters
     ----------
@@ -39,11 +49,6 @@ def pseudoranges(layout: StateLayout, satellites_m: ArrayLike, sigma_m: ArrayLik
         Positions of the satellites in the frame of the state.
     sigma_m : float or (m,) array_like
         Standard deviations.
-
-    Raises
-    ------
-    InputError
-        The state has no clock, a deviation is not positive, a position not finite.
 
     Examples
     --------
@@ -58,27 +63,11 @@ def pseudoranges(layout: StateLayout, satellites_m: ArrayLike, sigma_m: ArrayLik
     satellites = places("satellites_m", satellites_m, faults)
     sigma = deviations("sigma_m", sigma_m, len(satellites), faults)
     rows = terms(layout, RANGE, satellites, np.ones((len(satellites), 1)))
-    names = tuple(f"pseudorange {index}" for index in range(len(satellites)))
-    return checked(
-        faults,
-        GaussianTerms(layout, rows, np.diag(sigma**2), np.zeros(len(sigma)), names=names),
-    )
+    return independent(faults, layout, rows, sigma, "pseudorange")
 
 
 def difference_covariance(sigma_m: ArrayLike, reference: int) -> Floats:
-    """Return ``D Σ Dᵀ``: the covariance of differences to a reference.
-
-    Parameters
-    ----------
-    sigma_m : (m,) array_like
-        Standard deviation of each station's time of arrival, as a distance.
-    reference : int
-        Which one all others are compared with.
-
-    Returns
-    -------
-    (m - 1, m - 1) array
-        In the order of the stations without the reference.
+    """Return ``D Σ Dᵀ``: the covariance of differences to a reference, (m - 1, m - 1).
 
     Examples
     --------
@@ -98,17 +87,13 @@ def range_differences(
     Parameters
     ----------
     layout : StateLayout
+        Of the states.
     stations_m : (m, 2) or (m, 3) array_like
         At least two, the reference among them.
     sigma_m : float or (m,) array_like
         Standard deviation of each station's time of arrival, as a distance.
     reference : int
         Index of the reference station.
-
-    Raises
-    ------
-    InputError
-        Fewer than two stations, no such reference, a deviation that is not positive.
 
     Examples
     --------
@@ -132,16 +117,7 @@ def range_differences(
     rows = terms(layout, DIFFERENCE, others, np.tile(reference_m, (len(others), 1)))
     names = tuple(f"difference {index}" for index in range(len(stations)) if index != reference)
     noise = difference_covariance(sigma, reference)
-    return checked(faults, GaussianTerms(layout, rows, noise, np.zeros(len(others)), names=names))
-
-
-SPEED_OF_LIGHT_MPS = 299_792_458.0
-
-GSM_STEP_M = SPEED_OF_LIGHT_MPS * 48 / 13 * 1e-6 / 2
-"""About 553 m."""
-
-LTE_STEP_M = SPEED_OF_LIGHT_MPS * 16 / 30.72e6 / 2
-"""About 78 m."""
+    return GaussianTerms(layout, rows, noise, np.zeros(len(others)), names=names)
 
 
 def timing_advances(
@@ -152,6 +128,7 @@ def timing_advances(
     Parameters
     ----------
     layout : StateLayout
+        Of the states.
     sites_m : (m, 2) or (m, 3) array_like
         Positions of the base stations; without heights all is in one plane.
     sigma_m : float or (m,) array_like
@@ -160,11 +137,6 @@ def timing_advances(
         Size of the steps in which a report is drawn: the middle of a step stands for it. 0 for
         a continuous one. What filters take is not changed by it: add ``step²/12`` to the variance
         for the rounding.
-
-    Raises
-    ------
-    InputError
-        A deviation or step is not positive, a position not finite.
 
     Examples
     --------
@@ -179,10 +151,8 @@ def timing_advances(
     sigma = deviations("sigma_m", sigma_m, len(sites), faults)
     if not (np.isfinite(step_m) and step_m >= 0):
         faults.add("step_m", "metres >= 0", step_m)
-    names = tuple(f"timing advance {index}" for index in range(len(sites)))
     rows = terms(layout, RANGE, sites)
-    step = np.full(len(sites), float(step_m))
-    return checked(faults, GaussianTerms(layout, rows, np.diag(sigma**2), step, names=names))
+    return independent(faults, layout, rows, sigma, "timing advance", step_m)
 
 
 def metres_of_steps(steps: ArrayLike, step_m: float = GSM_STEP_M) -> np.ndarray:
@@ -196,16 +166,10 @@ def metres_of_steps(steps: ArrayLike, step_m: float = GSM_STEP_M) -> np.ndarray:
     return (np.asarray(steps, dtype=np.float64) + 0.5) * step_m
 
 
-_NAMES = ("east", "north", "up")
-
-
 def position_fix(layout: StateLayout, covariance_m2: ArrayLike) -> GaussianTerms:
     """Return the model of a fix of east and north, and of up where the covariance is 3 x 3.
 
-    Raises
-    ------
-    InputError
-        The covariance is not symmetric positive definite, or the state has no height.
+    The covariance must be symmetric and positive definite.
 
     Examples
     --------
@@ -219,5 +183,7 @@ def position_fix(layout: StateLayout, covariance_m2: ArrayLike) -> GaussianTerms
     if size == 3 and layout.up is None:
         faults.add("covariance_m2", "2 x 2, as the state has no height", "3 x 3")
     noise = checked_covariance("covariance_m2", covariance_m2, size, faults)
+    faults.raise_if_any(InputError)
     rows = terms(layout, COMPONENT, np.zeros((size, 3)), np.arange(size, dtype=np.float64)[:, None])
-    return checked(faults, GaussianTerms(layout, rows, noise, np.zeros(size), names=_NAMES[:size]))
+    names = ("east", "north", "up")[:size]
+    return GaussianTerms(layout, rows, noise, np.zeros(size), names=names)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
-from mapfilter.models.gaussian import GaussianTerms, checked, deviations, places, terms
+from mapfilter.models.gaussian import GaussianTerms, deviations, independent, places, terms
 from mapfilter.models.state import StateLayout
 from mapfilter.models.terms import LEVEL
 from mapfilter.radio.antenna import MeasuredAntenna, leaning
@@ -42,6 +42,7 @@ def levels(
     Parameters
     ----------
     layout : StateLayout
+        Of the states.
     sites_m : (m, 2) or (m, 3) array_like
         Positions of the antennas; without heights distances are horizontal.
     sigma_db : float or (m,) array_like
@@ -61,6 +62,7 @@ def levels(
     quantity : {"level", "loss"}
         What is measured.
     shortest_distance_m : float
+        Nearer, a level is as at this distance.
 
     Raises
     ------
@@ -100,12 +102,9 @@ def levels(
     columns[:, 4:6] = beamwidth_rad, max_attenuation_db
     columns[:, 7] = samples.size
     columns[:, 8] = shortest_distance_m
-    names = tuple(f"{quantity} {index}" for index in range(size))
     rows = terms(layout, LEVEL, sites, columns)
-    patterns = samples if samples.size else np.zeros(1)
-    return checked(
-        faults, GaussianTerms(layout, rows, np.diag(sigma**2), np.zeros(size), patterns, names)
-    )
+    patterns = samples if samples.size else None
+    return independent(faults, layout, rows, sigma, quantity, patterns=patterns)
 
 
 def sampled_pattern(
@@ -120,6 +119,7 @@ def sampled_pattern(
     Parameters
     ----------
     antenna : MeasuredAntenna
+        With its horizontal and vertical cuts.
     depression_rad : float
         Angle below the horizon at which receivers are.
     downtilt_deg : float or None

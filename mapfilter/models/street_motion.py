@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import exp, radians
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -32,22 +33,24 @@ _F = np.float32
 
 @dataclass(frozen=True, slots=True)
 class MotionErrors:
-    """How wrong dead reckoning is; what lasts is estimated with the position.
+    """Errors of dead reckoning; those that last are estimated with the position.
 
     Parameters
     ----------
     step_sd_m : float
         White noise of a step of ``typical_step_m``; its variance grows with the length.
     typical_step_m : float
+        Length of the step that ``step_sd_m`` is of.
     heading_sd_rad : float
         White noise of a heading.
     bias_sd_rad : float
-        Of the lasting heading error at the start.
+        Standard deviation of the lasting heading error at the start.
     bias_drift_rad_per_sqrt_m : float
-        The lasting heading error walks at random by this.
+        Random walk of the lasting heading error.
     scale_sd : float
-        Of the logarithm of the step scale at the start.
+        Standard deviation of the logarithm of the step scale at the start.
     scale_drift_per_sqrt_m : float
+        Random walk of that logarithm.
     """
 
     step_sd_m: float = 0.3
@@ -59,18 +62,37 @@ class MotionErrors:
     scale_drift_per_sqrt_m: float = 0.0
 
 
+class MapFactors(NamedTuple):
+    """What the map does to a belief over some length.
+
+    Parameters
+    ----------
+    exponent : float
+        Of the map's likelihood.
+    off : float
+        Likelihood off the map.
+    leave, come_back : float
+        Probabilities of leaving the map and of coming back.
+    """
+
+    exponent: float
+    off: float
+    leave: float
+    come_back: float
+
+
 @dataclass(frozen=True, slots=True)
 class MapWeights:
-    """How much the map counts.
+    """Weight of the map in the likelihood.
 
     Parameters
     ----------
     sd_m : float
-        Offset from the centre line of one who is on the map.
+        Standard deviation of the offset from the centre line, for walkers on the map.
     weight_per_m : float
-        Of the logarithm of the map's likelihood.
+        Exponent of the map's likelihood for each metre travelled.
     off_cost_per_m : float
-        What being off the map costs.
+        Negative log-likelihood of each metre off the map.
     leave_per_m, return_per_m : float
         Rates of leaving the map and of coming back.
     """
@@ -80,6 +102,15 @@ class MapWeights:
     off_cost_per_m: float = 0.1
     leave_per_m: float = 1e-3
     return_per_m: float = 1e-2
+
+    def over(self, length_m: float) -> MapFactors:
+        """Return the factors for a length travelled."""
+        return MapFactors(
+            self.weight_per_m * length_m,
+            exp(-self.off_cost_per_m * length_m),
+            1 - exp(-self.leave_per_m * length_m),
+            1 - exp(-self.return_per_m * length_m),
+        )
 
 
 def map_log_likelihood(distance_m: Floats32, sd_m: float) -> Floats32:
@@ -96,13 +127,9 @@ def map_log_likelihood(distance_m: Floats32, sd_m: float) -> Floats32:
 
 
 def move(
-    state: Floats32,
-    step_m: float,
-    heading_rad: float,
-    errors: MotionErrors,
-    key: np.uint64,
+    state: Floats32, step_m: float, heading_rad: float, errors: MotionErrors, key: np.uint64
 ) -> Floats32:
-    """Return all hypotheses after one step; a step of nothing changes nothing.
+    """Return all hypotheses after one step; a step of length 0 changes nothing.
 
     Parameters
     ----------
@@ -114,17 +141,16 @@ def move(
     key : numpy.uint64
         From :func:`mapfilter._kernels.draw_key`.
     """
-    moved = np.empty_like(state)
     length = abs(step_m)
     root = length**0.5
     stretch = exp(0.5 * errors.heading_sd_rad**2)
-    _move(
-        state, _F(step_m * stretch), _F(heading_rad),
+    sds = (
         _F(errors.step_sd_m * (length / errors.typical_step_m) ** 0.5),
-        _F(length * errors.heading_sd_rad), _F(errors.bias_drift_rad_per_sqrt_m * root),
-        _F(errors.scale_drift_per_sqrt_m * root), key, moved,
-    )  # fmt: skip
-    return moved
+        _F(length * errors.heading_sd_rad),
+        _F(errors.bias_drift_rad_per_sqrt_m * root),
+        _F(errors.scale_drift_per_sqrt_m * root),
+    )
+    return np.asarray(_move(state, _F(step_m * stretch), _F(heading_rad), sds, key))
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
@@ -132,13 +158,11 @@ def _move(
     state: Floats32,
     step_m: np.float32,
     heading_rad: np.float32,
-    along_sd_m: np.float32,
-    across_sd_m: np.float32,
-    bias_sd_rad: np.float32,
-    scale_sd: np.float32,
+    sds: tuple[np.float32, np.float32, np.float32, np.float32],
     key: np.uint64,
-    moved: Floats32,
-) -> None:
+) -> Floats32:
+    along_sd_m, across_sd_m, bias_sd_rad, scale_sd = sds
+    moved = np.empty_like(state)
     count = state.shape[1]
     east, north, bias, scale = state[0], state[1], state[2], state[3]
     to_east, to_north, to_bias, to_scale = moved[0], moved[1], moved[2], moved[3]
@@ -155,40 +179,41 @@ def _move(
         to_east[i] = east[i] + (along * cosine - across * sine)
         to_north[i] = north[i] + (along * sine + across * cosine)
     moved[4:] = state[4:]
+    return moved
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def interpolate(
-    state: Floats32,
-    raster: Floats32,
-    west_m: np.float32,
-    north_m: np.float32,
-    per_m: np.float32,
-    found: Floats32,
-) -> None:
+    state: Floats32, raster: Floats32, west_m: float, north_m: float, per_m: float
+) -> Floats32:
     """Look positions up in a raster, bilinear between the pixels' centres.
 
     Parameters
     ----------
     state : ndarray of float32, shape (5, N)
     raster : ndarray of float32, shape (rows, cols)
-    west_m, north_m : float32
+    west_m, north_m : float
         Centre of the first pixel.
-    per_m : float32
+    per_m : float
         Pixels per metre.
-    found : ndarray of float32, shape (N,)
-        Filled; beyond the raster's edge with the edge's.
+
+    Returns
+    -------
+    ndarray of float32, shape (N,)
+        Beyond the raster's edge the edge's values.
     """
     rows, cols = raster.shape
     flat = raster.ravel()
     zero, one = _F(0.0), _F(1.0)
+    west, top, k = _F(west_m), _F(north_m), _F(per_m)
     last_col, last_row = np.int32(cols - 2), np.int32(rows - 2)
     below, width = np.uint32(cols), np.int32(cols)
     east, north = state[0], state[1]
+    found = np.empty(state.shape[1], dtype=np.float32)
     for i in range(state.shape[1]):
         # Plain comparisons vectorise; min and max, which care for NaN, do not.
-        x = (east[i] - west_m) * per_m
-        y = (north_m - north[i]) * per_m
+        x = (east[i] - west) * k
+        y = (top - north[i]) * k
         x = x if x > zero else zero
         y = y if y > zero else zero
         col, row = np.int32(x), np.int32(y)
@@ -201,18 +226,11 @@ def interpolate(
         upper = flat[at] + u * (flat[at + np.uint32(1)] - flat[at])
         under = flat[at + below] + u * (flat[at + below + np.uint32(1)] - flat[at + below])
         found[i] = upper + v * (under - upper)
+    return found
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
-def weigh_by_map(
-    log_map: Floats32,
-    off: Floats32,
-    weight: np.float32,
-    off_cost: np.float32,
-    leave: np.float32,
-    come_back: np.float32,
-    log_weight: Floats,
-) -> None:
+def weigh_by_map(log_map: Floats32, off: Floats32, factors: MapFactors, log_weight: Floats) -> None:
     """Add the map's log-likelihood to weights and update the probability of being off, in place.
 
     Parameters
@@ -221,12 +239,12 @@ def weigh_by_map(
         At the hypotheses.
     off : ndarray of float32, shape (N,)
         Probability of being off the map.
-    weight, off_cost, leave, come_back : float32
-        For the length of the step: the map's exponent, the likelihood off the map, and the
-        probabilities of changing the mode.
+    factors : MapFactors
+        For the length of the step.
     log_weight : ndarray of float64, shape (N,)
     """
-    one = _F(1.0)
+    one, weight, off_cost = _F(1.0), _F(factors.exponent), _F(factors.off)
+    leave, come_back = _F(factors.leave), _F(factors.come_back)
     for i in range(off.size):
         on = exp32(weight * log_map[i])
         before = off[i]
@@ -247,15 +265,11 @@ def draw_ancestors(
     later: Floats32,
     earlier: Floats32,
     log_weight: Floats32,
-    moved_east_m: float,
-    moved_north_m: float,
-    place_var_m2: float,
-    bias_var_rad2: float,
-    scale_var: float,
+    moved_m: tuple[float, float],
+    variances: tuple[float, float, float],
     log_jump: float,
     key: np.uint64,
-    chosen: Ints32,
-) -> None:
+) -> Ints32:
     """Draw one ancestor of each later hypothesis: backward simulation (Godsill et al. 2004, eq. 6).
 
     An earlier hypothesis counts by its weight and by how well its own errors of heading and scale
@@ -267,22 +281,26 @@ def draw_ancestors(
     later : ndarray of float32, shape (5, M)
     earlier : ndarray of float32, shape (5, N)
     log_weight : ndarray of float32, shape (N,)
-    moved_east_m, moved_north_m : float
-        Displacement by dead reckoning in between.
-    place_var_m2, bias_var_rad2, scale_var : float
-        Of what the motion adds in between.
+    moved_m : (float, float)
+        Displacement east and north by dead reckoning in between.
+    variances : (float, float, float)
+        Of place (m²), heading error (rad²) and log scale that the motion adds in between.
     log_jump : float
         Log density of an unmeasured displacement: where no ancestor is nearer than that, the
         weights alone decide.
     key : numpy.uint64
-    chosen : ndarray of int32, shape (M,)
-        Filled.
+
+    Returns
+    -------
+    ndarray of int32, shape (M,)
+        Indices of the ancestors.
     """
+    place_var_m2, bias_var_rad2, scale_var = variances
     count = earlier.shape[1]
     to_east, to_north = np.empty(count, dtype=np.float32), np.empty(count, dtype=np.float32)
     heaviest = np.max(log_weight)
     weight, passed = np.empty(count), np.empty(count)
-    me, mn, total = _F(moved_east_m), _F(moved_north_m), 0.0
+    me, mn, total = _F(moved_m[0]), _F(moved_m[1]), 0.0
     for i in range(count):
         cosine, sine = cos_sin32(earlier[2, i])
         stretch = exp32(earlier[3, i])
@@ -293,8 +311,8 @@ def draw_ancestors(
         passed[i] = total
     # Only what is nearer than this is looked at: beyond, the displacement is likelier.
     reach_m = np.sqrt(2.0 * min(-log_jump, _MOST_NATS) * place_var_m2)
-    west_m, north_m, side_m, rows, cols = _squares(to_east, to_north, reach_m / _PARTS)
-    start, order = _sorted(to_east, to_north, west_m, north_m, side_m, rows, cols)
+    corner_m, side_m, (rows, cols), start, order = _squares(to_east, to_north, reach_m / _PARTS)
+    west_m, north_m = corner_m
     # In the order of the squares they lie side by side in memory.
     to_east, to_north, weight = to_east[order], to_north[order], weight[order]
     bias, scale = earlier[2][order], earlier[3][order]
@@ -302,6 +320,7 @@ def draw_ancestors(
     per_scale, jump = _F(-0.5 / scale_var), _F(log_jump)
     jumped, around = np.float64(exp32(jump)), int(np.ceil(reach_m / side_m))
     near_by, reached = np.empty(count, dtype=np.int32), np.empty(count)
+    chosen = np.empty(later.shape[1], dtype=np.int32)
     for j in range(later.shape[1]):
         x, y, b, s = later[0, j], later[1, j], later[2, j], later[3, j]
         col, row = int((x - west_m) // side_m), int((north_m - y) // side_m)
@@ -327,30 +346,26 @@ def draw_ancestors(
             chosen[j] = order[near_by[np.searchsorted(reached[:found], goal)]]
         else:
             chosen[j] = min(np.searchsorted(passed, (goal - gone) / jumped), count - 1)
+    return chosen
 
 
 @njit(error_model="numpy", cache=True)
 def _squares(
     east_m: Floats32, north_m: Floats32, least_m: float
-) -> tuple[float, float, float, int, int]:
-    """Lay squares over places: the corner, the side, and how many to the south and the east."""
+) -> tuple[tuple[float, float], float, tuple[int, int], Ints32, Ints32]:
+    """Sort places by squares of a side of ``least_m`` or more.
+
+    Returns the north-western corner, the side, the numbers of rows and columns, and ``start`` and
+    ``order``: the places in square q are ``order[start[q]:start[q + 1]]``.
+    """
     west, north = float(east_m.min()), float(north_m.max())
     width, height = float(east_m.max()) - west, north - float(north_m.min())
-    side = max(least_m, max(width, height) / _MOST_SQUARES)
-    return west, north, side, int(height // side) + 1, int(width // side) + 1
-
-
-@njit(error_model="numpy", cache=True)
-def _sorted(
-    east_m: Floats32, north_m: Floats32, west: float, north: float, side_m: float,
-    rows: int, cols: int,
-) -> tuple[Ints32, Ints32]:  # fmt: skip
-    """Sort places by square; those of square q are ``order[start[q]:start[q + 1]]``."""
+    side_m = max(least_m, max(width, height) / _MOST_SQUARES)
+    rows, cols = int(height // side_m) + 1, int(width // side_m) + 1
     square = np.empty(east_m.size, dtype=np.int32)
     start = np.zeros(rows * cols + 1, dtype=np.int32)
     for i in range(east_m.size):
-        col = min(int((east_m[i] - west) // side_m), cols - 1)
-        row = min(int((north - north_m[i]) // side_m), rows - 1)
+        row, col = int((north - north_m[i]) // side_m), int((east_m[i] - west) // side_m)
         square[i] = row * cols + col
         start[square[i] + 1] += 1
     for q in range(rows * cols):
@@ -359,4 +374,4 @@ def _sorted(
     for i in range(east_m.size):
         order[at[square[i]]] = i
         at[square[i]] += 1
-    return start, order
+    return (west, north), side_m, (rows, cols), start, order

@@ -23,8 +23,9 @@ A lane is one state of a batch. The logarithm and the arc tangent are those of F
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64, njit, types, void
+from numba import njit
 
+from mapfilter._kernels import MEASURE_SIGNATURE
 from mapfilter._types import Floats, Ints
 
 _LN2 = 0.6931471805599453
@@ -215,13 +216,6 @@ def _add_level(
                     slope[slot, w] += beyond * delta[axis, w] / squared[w]
     if row[6] != 0.0:
         _add_gain(row, slots, patterns, work, mean, slope, derive)
-
-
-MEASURE_SIGNATURE = void(
-    float64[:, ::1], int64[::1], float64[:, ::1], float64[::1], float64[:, ::1],
-    float64[:, :, ::1], types.boolean,
-)  # fmt: skip
-"""Arguments of :func:`measure`, so that other compiled code can call it by address."""
 
 
 @njit([MEASURE_SIGNATURE], cache=True, nogil=True, error_model="numpy")

@@ -262,7 +262,7 @@ def estimate_of(
 
 
 class _Album:
-    """Hypotheses at chosen epochs: when the status changes, and every 20 m until tracking."""
+    """Hypotheses at chosen epochs until tracking or lost: at a new status, and every 20 m."""
 
     def __init__(self, filter_: Filter[Any]) -> None:
         self.filter, self.travelled_m, self.open = filter_, 0.0, True
@@ -279,8 +279,8 @@ class _Album:
             near = self.travelled_m - last.travelled_m < _SNAPSHOT_EVERY_M
             if fix.status is last.status and near:
                 return
-        self.open = fix.status is not Status.TRACKING
-        if self.open:
+        self.open = fix.status in (Status.SEARCHING, Status.CONVERGED)
+        if fix.status is not Status.TRACKING:
             self.taken.append(
                 Snapshot(
                     fix.time_s,

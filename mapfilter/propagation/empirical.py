@@ -1,18 +1,14 @@
-"""Empirical path loss of cells above the roofs: Okumura-Hata and COST 231 Hata.
+"""Path loss by formula: free space, log-distance, Okumura-Hata, COST 231 Hata, Walfisch-Ikegami.
 
-Sources: M. Hata, *Empirical formula for propagation loss in land mobile radio services*, IEEE
-Transactions on Vehicular Technology 29(3), 1980; COST Action 231, *Digital mobile radio towards
-future generation systems, final report*, EUR 18957 (1999), chapter 4, "COST 231-Hata-Model".
+Distances below 20 m (free space: 1 m) count as that, and roofs less than 1 m above the mobile as
+1 m above it; everything else outside the published ranges is extrapolated by the same equations.
 
-Distances below 20 m count as 20 m; everything else outside the published ranges is extrapolated by
-the same equations.
-
-Source: COST Action 231, *Digital mobile radio towards future generation systems, final report*,
-EUR 18957 (1999), chapter 4, "COST 231-Walfisch-Ikegami-Model". Terms carry the names that the
-report gives them.
-
-Distances below 20 m count as 20 m and roofs less than 1 m above the mobile as 1 m above it;
-everything else outside the published ranges is extrapolated by the same equations.
+References
+----------
+M. Hata, "Empirical formula for propagation loss in land mobile radio services", IEEE Transactions
+on Vehicular Technology 29(3), 1980.
+COST Action 231, "Digital mobile radio towards future generation systems, final report", EUR 18957
+(1999), chapter 4. Terms carry the names of the report.
 """
 
 from __future__ import annotations
@@ -48,7 +44,6 @@ def okumura_hata_db(
     ----------
     distance_m : array_like, any shape
         Horizontal distance.
-    frequency_mhz, base_height_m, mobile_height_m : float
     environment : {"large_city", "city", "suburban", "open"}
         ``"city"`` is a small or medium-sized one; suburbs and open land take its a(h_m).
 
@@ -60,10 +55,8 @@ def okumura_hata_db(
     """
     distance_km = np.maximum(np.asarray(distance_m, dtype=np.float64), SHORTEST_DISTANCE_M) / 1000
     lg_f, lg_base = np.log10(frequency_mhz), np.log10(base_height_m)
-    large = environment == "large_city"
-    mobile_db = (large_city_mobile_db if large else mobile_height_db)(
-        frequency_mhz, mobile_height_m
-    )
+    height_db = large_city_mobile_db if environment == "large_city" else mobile_height_db
+    mobile_db = height_db(frequency_mhz, mobile_height_m)
     constant_db = 69.55 + 26.16 * lg_f - 13.82 * lg_base - mobile_db
     if environment == "suburban":
         constant_db -= 2 * np.log10(frequency_mhz / 28) ** 2 + 5.4
@@ -84,14 +77,6 @@ def cost231_hata_db(
     ``L = 46.3 + 33.9 lg f - 13.82 lg h_b - a(h_m) + (44.9 - 6.55 lg h_b) lg d + C_m``, where a(h_m)
     is that of a medium-sized city and C_m is 3 dB in metropolitan centres, else 0; f in MHz, d in
     km. Published for 1500-2000 MHz, bases of 30-200 m above all roofs, mobiles of 1-10 m, 1-20 km.
-
-    Parameters
-    ----------
-    distance_m : array_like, any shape
-        Horizontal distance.
-    frequency_mhz, base_height_m, mobile_height_m : float
-    metropolitan : bool
-        Metropolitan centre, or medium-sized city and suburbs.
 
     Examples
     --------
@@ -146,11 +131,6 @@ def friis_db(distance_m: ArrayLike, frequency_mhz: float) -> Floats:
     ``L = 20 lg(4 π d f / c)`` (Friis 1946, for antennas of gain 1). Distances below 1 m
     count as 1 m.
 
-    Parameters
-    ----------
-    distance_m : array_like, any shape
-    frequency_mhz : float
-
     Examples
     --------
     >>> friis_db([1000.0, 2000.0], 1800.0).round(2).tolist()
@@ -176,8 +156,6 @@ def log_distance_db(
 
     Parameters
     ----------
-    distance_m : array_like, any shape
-    frequency_mhz : float
     exponent : float
         n: 2 in free space, 2.7 to 5 in towns.
     reference_distance_m : float
@@ -221,9 +199,6 @@ def cost231_walfisch_ikegami_db(
 
     Parameters
     ----------
-    distance_m : array_like
-        Horizontal distance.
-    frequency_mhz, base_height_m, mobile_height_m : float
     roof_height_m : array_like
         Mean height of the roofs around the mobile.
     street_width_m, building_separation_m : float
@@ -232,7 +207,6 @@ def cost231_walfisch_ikegami_db(
         Angle between the street and the direct path, 0..90.
     metropolitan : bool
         Metropolitan centre, or medium-sized city and suburbs.
-    line_of_sight : array_like of bool
 
     Examples
     --------

@@ -1,8 +1,8 @@
-"""The parameters of a prediction, and of the errors that reality adds to it."""
+"""Parameters of a prediction and of its ground truth, and the path loss of the chosen model."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, Literal, get_args
@@ -41,6 +41,7 @@ ModelName = Literal[
 ]
 LineOfSight = Literal["buildings", "probability"]
 Clutter = Literal["own", "shared"]
+Range = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -52,8 +53,8 @@ class PredictionModel:
     model : str
         One of :data:`ModelName`.
     line_of_sight : {"buildings", "probability"}
-        Who sees an antenna: the raster of building heights tells, or the path losses with and
-        without line of sight are averaged by their probability (TR 38.901 only).
+        By the raster of building heights; or the path losses with and without line of sight are
+        averaged by their probability (TR 38.901 only).
     mobile_height_m : float
         Height of the phone above ground.
     environment : {"large_city", "city", "suburban", "open"}
@@ -63,7 +64,7 @@ class PredictionModel:
     street_width_m, building_separation_m : float
         Mean width of the streets, and mean distance between the buildings' centres.
     street_orientation_deg : float
-        Angle between street and direct path, 0..90; 90 where nothing is known.
+        Angle between street and direct path, 0..90.
     default_roof_height_m : float
         Where no building is near, or no building heights are given.
     metropolitan : bool
@@ -71,13 +72,7 @@ class PredictionModel:
     shadowing_db, shadowing_correlation_m, site_share : float
         Random clutter that stands for detail in the levels: deviation, correlation length, and the
         share of its variance that is common to the sectors of a site. A prediction that is used for
-        positioning should have none: what is drawn at random is nowhere in the world.
-    seed : int
-
-    Raises
-    ------
-    ConfigError
-        With every fault.
+        positioning should have none.
     """
 
     model: ModelName = "cost231_walfisch_ikegami"
@@ -105,39 +100,36 @@ class PredictionModel:
                 expected = ", ".join(get_args(allowed))
                 faults.add(f"prediction, {name}", expected, repr(getattr(self, name)))
         if self.line_of_sight == "probability" and not self.model.startswith("tr38901"):
-            expected = "buildings, as only tr38901_uma and tr38901_umi tell a probability"
+            expected = "buildings, as only tr38901_uma and tr38901_umi have a probability"
             faults.add("prediction, line_of_sight", expected, "probability")
-        positive = ["mobile_height_m", "street_width_m", "building_separation_m"]
-        positive += ["default_roof_height_m", "reference_distance_m"]
-        _check(self, "prediction", positive, 1e-3, 1e4, faults)
-        _check(self, "prediction", ["path_loss_exponent"], 0.1, 20, faults)
+        lengths = ["mobile_height_m", "street_width_m", "building_separation_m"]
+        lengths += ["default_roof_height_m", "reference_distance_m"]
+        limits: dict[str, Range] = dict.fromkeys(lengths, (1e-3, 1e4))
+        limits["path_loss_exponent"] = 0.1, 20
         if self.reference_loss_db is not None:
-            _check(self, "prediction", ["reference_loss_db"], 0, 300, faults)
-        _check(self, "prediction", ["street_orientation_deg"], 0, 90, faults)
-        _check(self, "prediction", ["shadowing_db"], 0, 50, faults)
-        _check(self, "prediction", ["shadowing_correlation_m"], 0, 1e5, faults)
-        _check(self, "prediction", ["site_share"], 0, 1, faults)
-        _check(self, "prediction", ["seed"], 0, np.inf, faults)
+            limits["reference_loss_db"] = 0, 300
+        limits |= {"street_orientation_deg": (0, 90), "shadowing_db": (0, 50)}
+        limits |= {"shadowing_correlation_m": (0, 1e5), "site_share": (0, 1), "seed": (0, np.inf)}
+        _check(self, "prediction", limits, faults)
         faults.raise_if_any(ConfigError)
 
 
 @dataclass(frozen=True)
-class RealityErrors:
+class GroundTruthErrors:
     """How the simulated ground truth differs from its prediction.
 
     Parameters
     ----------
     level_error_db, correlation_m : float
-        Deviation and correlation length of a shadowing field of its own.
+        Deviation and correlation length of a shadowing field independent of the prediction's.
     site_share : float
         Share of that field's variance common to the sectors of a site, 0..1.
     eirp_error_db, azimuth_error_deg, slope_error : float
         Each cell's EIRP, azimuth and path-loss slope are off by uniform draws within ± these; the
         last is a fraction.
-    seed : int
     clutter : {"own", "shared"}
-        Whether the prediction's random clutter is drawn anew, with the same deviation, or is the
-        ground truth's too, as if the prediction had known it.
+        Whether the ground truth's random clutter is drawn anew, with the same deviation, or is
+        that of the prediction.
     local_share, local_correlation_m : float
         Share of the shadowing's variance that has another, shorter correlation length.
     model : str or None
@@ -150,11 +142,6 @@ class RealityErrors:
     offset_db : float
         Added to all levels: the mean by which another propagation model differs, which drive tests
         would have taken out of the prediction.
-
-    Raises
-    ------
-    ConfigError
-        With every fault.
     """
 
     level_error_db: float = 7.0
@@ -176,42 +163,30 @@ class RealityErrors:
 
     def __post_init__(self) -> None:
         faults = Faults()
-        _check(self, "reality", ["level_error_db", "eirp_error_db"], 0, 50, faults)
-        _check(self, "reality", ["correlation_m", "local_correlation_m"], 0, 1e5, faults)
-        _check(self, "reality", ["azimuth_error_deg"], 0, 180, faults)
-        _check(self, "reality", ["site_share", "local_share", "slope_error"], 0, 1, faults)
-        _check(self, "reality", ["roof_error"], 0, 1, faults)
-        _check(self, "reality", ["offset_db"], -50, 50, faults)
-        _check(self, "reality", ["seed"], 0, np.inf, faults)
+        limits: dict[str, Range] = {"level_error_db": (0, 50), "eirp_error_db": (0, 50)}
+        limits |= {"correlation_m": (0, 1e5), "local_correlation_m": (0, 1e5)}
+        limits |= dict.fromkeys(("site_share", "local_share", "slope_error", "roof_error"), (0, 1))
+        limits |= {"azimuth_error_deg": (0, 180), "offset_db": (-50, 50), "seed": (0, np.inf)}
+        _check(self, "reality", limits, faults)
         if self.clutter not in get_args(Clutter):
             faults.add("reality, clutter", "own or shared", repr(self.clutter))
         faults.raise_if_any(ConfigError)
 
     def truth_of(self, prediction: PredictionModel) -> PredictionModel:
-        """Return the ground truth's propagation model, for that of a prediction.
-
-        Raises
-        ------
-        ConfigError
-            What differs from the prediction is out of range.
-        """
+        """Return the ground truth's propagation model, for that of a prediction."""
         names = ("model", "street_width_m", "building_separation_m", "default_roof_height_m")
         given = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         return replace(prediction, **given)
 
 
-def _check(
-    owner: Any, section: str, names: Sequence[str], low: float, high: float, faults: Faults
-) -> None:
-    for name in names:
+def _check(owner: Any, section: str, limits: Mapping[str, Range], faults: Faults) -> None:
+    for name, (low, high) in limits.items():
         value = getattr(owner, name)
         if not low <= value <= high:
             hint = "per cent given for a fraction" if high == 1 and 1 < value <= 100 else ""
             expected = f"a number ≥ {low:g}" if high == np.inf else f"{low:g}..{high:g}"
             faults.add(f"{section}, {name}", expected, value, hint)
 
-
-Range = tuple[float, float]
 
 _HATA = {"base_height_m": (30.0, 200.0), "mobile_height_m": (1.0, 10.0)}
 _HATA_DISTANCE = {"distance_m": (1000.0, 20000.0)}
@@ -251,10 +226,8 @@ def path_loss_db(
 
     Parameters
     ----------
-    model : PredictionModel
     distance_m : array_like
         Horizontal distance.
-    frequency_mhz, base_height_m : float
     roof_height_m : array_like
         Mean height of the roofs around the mobile; of use to Walfisch-Ikegami only.
     sight : array_like
@@ -266,10 +239,8 @@ def path_loss_db(
         case "friis":
             return friis_db(distance_m, frequency_mhz)
         case "log_distance":
-            return log_distance_db(
-                distance_m, frequency_mhz, model.path_loss_exponent, model.reference_distance_m,
-                model.reference_loss_db,
-            )  # fmt: skip
+            reference = model.reference_distance_m, model.reference_loss_db
+            return log_distance_db(distance_m, frequency_mhz, model.path_loss_exponent, *reference)
         case "okumura_hata":
             return okumura_hata_db(
                 distance_m, frequency_mhz, base_height_m, mobile_m, model.environment
@@ -277,11 +248,12 @@ def path_loss_db(
         case "cost231_hata":
             return cost231_hata_db(distance_m, frequency_mhz, base_height_m, mobile_m, city)
         case "cost231_walfisch_ikegami":
+            place = distance_m, frequency_mhz, base_height_m, mobile_m, roof_height_m
+            streets = (model.street_width_m, model.building_separation_m)
+            seen = np.asarray(sight) > 0.5
             return cost231_walfisch_ikegami_db(
-                distance_m, frequency_mhz, base_height_m, mobile_m, roof_height_m,
-                model.street_width_m, model.building_separation_m, model.street_orientation_deg,
-                city, np.asarray(sight) > 0.5,
-            )  # fmt: skip
+                *place, *streets, model.street_orientation_deg, city, seen
+            )
         case "tr38901_uma" | "tr38901_umi":
             where = (distance_m, frequency_mhz, base_height_m, mobile_m)
             seen_db = seen_loss_db(_SCENARIOS[model.model], *where)
@@ -323,14 +295,9 @@ def outside_published_range(
     longest_distance_m: float,
     nearest_distance_m: float | None = None,
 ) -> tuple[str, ...]:
-    """Tell in words which values lie outside the range a model was published for.
+    """Return remarks on the values that lie outside the range a model was published for.
 
-    Parameters
-    ----------
-    model : str
-    frequency_mhz, base_height_m, mobile_height_m : float
-    longest_distance_m, nearest_distance_m : float
-        Between which distances it is used; the nearest need not be looked at.
+    ``nearest_distance_m`` and ``longest_distance_m`` limit the distances at which it is used.
 
     Examples
     --------
@@ -348,7 +315,7 @@ def outside_published_range(
         "mobile_height_m": mobile_height_m,
         "distance_m": longest_distance_m,
     }
-    told = [
+    remarks = [
         f"{name} {values[name]:g} is "
         + (f"outside {low:g}..{high:g}" if low < high else f"not {low:g}")
         for name, (low, high) in published.items()
@@ -357,5 +324,7 @@ def outside_published_range(
     if nearest_distance_m is not None and "distance_m" in published:
         low, high = published["distance_m"]
         if nearest_distance_m < low <= longest_distance_m:
-            told.append(f"distance_m from {nearest_distance_m:g} on is outside {low:g}..{high:g}")
-    return tuple(told)
+            remarks.append(
+                f"distance_m from {nearest_distance_m:g} on is outside {low:g}..{high:g}"
+            )
+    return tuple(remarks)

@@ -34,12 +34,10 @@ def correlated_field(
 
     Parameters
     ----------
-    lattice : Lattice
     deviation_db : float
         Standard deviation at every point.
     correlation_m : float
         Distance d_c at which the correlation is 1/e; 0 for white noise.
-    rng : numpy.random.Generator
 
     Returns
     -------
@@ -58,28 +56,18 @@ def correlated_field(
         white = deviation_db * rng.standard_normal((lattice.rows, lattice.cols))
         return np.asarray(white, dtype=np.float32)
     length_px = correlation_m / lattice.resolution_m
-    pad = _pad(lattice, length_px)
+    pad = int(np.ceil(_PAD_LENGTHS * length_px))
+    if (lattice.rows + pad) * (lattice.cols + pad) > _LARGEST_TORUS_PX:
+        side_m = np.sqrt(_LARGEST_TORUS_PX) * lattice.resolution_m
+        expected = f"area and ten correlation lengths within {side_m:.0f} m, to fit into memory"
+        got = f"{correlation_m:g} m, {lattice.rows} x {lattice.cols} pixels"
+        hint = "a correlation length in the wrong unit, or too fine a resolution"
+        raise fail(InputError, "shadowing, correlation_m", expected, got, hint)
     shape = tuple(fft.next_fast_len(n + pad, real=True) for n in (lattice.rows, lattice.cols))
     amplitude = _spectral_amplitude(shape, length_px)
     field = fft.irfft2(amplitude * fft.rfft2(rng.standard_normal(shape)), s=shape)
     cut = field[: lattice.rows, : lattice.cols]
     return np.asarray(deviation_db * cut, dtype=np.float32)
-
-
-def _pad(lattice: Lattice, length_px: float) -> int:
-    """Return by how many pixels the torus is wider than a lattice."""
-    pad_px = np.ceil(_PAD_LENGTHS * length_px)
-    if (lattice.rows + pad_px) * (lattice.cols + pad_px) > _LARGEST_TORUS_PX:
-        correlation_m = length_px * lattice.resolution_m
-        side_m = np.sqrt(_LARGEST_TORUS_PX) * lattice.resolution_m
-        raise fail(
-            InputError,
-            "shadowing, correlation_m",
-            f"area and ten correlation lengths within {side_m:.0f} m, to fit into memory",
-            f"{correlation_m:g} m, {lattice.rows} x {lattice.cols} pixels",
-            "a correlation length in the wrong unit, or too fine a resolution",
-        )
-    return int(pad_px)
 
 
 def site_shadowing(
@@ -100,8 +88,6 @@ def site_shadowing(
 
     Parameters
     ----------
-    plan : CellPlan
-    lattice : Lattice
     deviation_db, correlation_m : float
         As in :func:`correlated_field`.
     site_share : float
@@ -115,11 +101,6 @@ def site_shadowing(
     ------
     (str, ndarray of float32, shape (rows, cols))
         Cell id and field in dB, in the plan's order.
-
-    Raises
-    ------
-    InputError
-        A parameter is out of range.
     """
     _check(deviation_db, correlation_m, site_share, seed)
     waiting = Counter(cell.site for cell in plan.cells)
@@ -163,10 +144,8 @@ def _check(
     deviation_db: float, correlation_m: float, site_share: float = 0.0, seed: int = 0
 ) -> None:
     faults = Faults()
-    for name, value, unit in (
-        ("deviation_db", deviation_db, "dB"),
-        ("correlation_m", correlation_m, "metres"),
-    ):
+    values = ("deviation_db", deviation_db, "dB"), ("correlation_m", correlation_m, "metres")
+    for name, value, unit in values:
         if not (np.isfinite(value) and value >= 0):
             faults.add(f"shadowing, {name}", f"{unit} ≥ 0", value)
     if not 0 <= site_share <= 1:

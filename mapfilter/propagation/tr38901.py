@@ -10,8 +10,7 @@ Distances below 10 m count as 10 m. Heights less than 0.5 m above the effective 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,15 +21,12 @@ Scenario = Literal["uma", "umi"]
 
 SHORTEST_TR38901_DISTANCE_M = 10.0
 """Shorter distances count as this one."""
-LONE_ENVIRONMENT_UP_TO_M = 13.0
-"""Up to this mobile height the effective environment is 1 m high in UMa, too."""
 _SPEED_OF_LIGHT_MPS = 3.0e8
 _ENVIRONMENT_M = 1.0
 _LEAST_EFFECTIVE_M = 0.5
 
 
-@dataclass(frozen=True, slots=True)
-class _Terms:
+class _Terms(NamedTuple):
     """Constants of one scenario's rows of table 7.4.1-1."""
 
     constant_db: float
@@ -87,10 +83,8 @@ def seen_loss_db(
 
     Parameters
     ----------
-    scenario : {"uma", "umi"}
     distance_m : array_like, any shape
         Horizontal distance, d_2D.
-    frequency_mhz, base_height_m, mobile_height_m : float
     environment_height_m : array_like
         Effective environment height, h_E.
 
@@ -125,11 +119,6 @@ def hidden_loss_db(
     ``13.54 + 39.08 lg d_3D + 20 lg f - 0.6 (h_UT - 1.5)``, in UMi
     ``22.4 + 35.3 lg d_3D + 21.3 lg f - 0.3 (h_UT - 1.5)``.
 
-    Parameters
-    ----------
-    scenario, distance_m, frequency_mhz, base_height_m, mobile_height_m, environment_height_m
-        As for :func:`seen_loss_db`.
-
     Examples
     --------
     >>> hidden_loss_db("uma", [100.0, 1000.0], 2000.0, 25.0, 1.5).round(2).tolist()
@@ -152,7 +141,7 @@ def hidden_loss_db(
 def sight_probability(
     scenario: Scenario, distance_m: ArrayLike, mobile_height_m: float = 1.5
 ) -> Floats:
-    """Return the probability that an outdoor mobile sees the base (table 7.4.2-1), 0..1.
+    """Return the probability of line of sight to an outdoor mobile (table 7.4.2-1), 0..1.
 
     1 up to 18 m; beyond, with s = 36 m in UMi and 63 m in UMa,
     ``18 / d + exp(-d / s) (1 - 18 / d)``, in UMa times
@@ -161,7 +150,6 @@ def sight_probability(
 
     Parameters
     ----------
-    scenario : {"uma", "umi"}
     distance_m : array_like, any shape
         Horizontal distance outdoors, d_2D-out.
     mobile_height_m : float
@@ -178,7 +166,7 @@ def sight_probability(
     share = 18.0 / distance
     decay = np.exp(-distance / (36.0 if scenario == "umi" else 63.0))
     probability = share + decay * (1 - share)
-    if scenario == "uma" and mobile_height_m > LONE_ENVIRONMENT_UP_TO_M:
+    if scenario == "uma" and mobile_height_m > 13.0:
         raised = ((min(mobile_height_m, 23.0) - 13.0) / 10.0) ** 1.5
         bulge = 1.25 * (distance / 100) ** 3 * np.exp(-distance / 150)
         probability = np.where(distance > 18.0, probability * (1 + raised * bulge), probability)

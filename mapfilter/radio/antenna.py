@@ -1,4 +1,4 @@
-"""Antenna patterns by formula and by measured cuts: how much weaker a cell is off its boresight.
+"""Antenna patterns by formula and by measured cuts: gain relative to the boresight.
 
 Directions are given by the angle ``offset_rad`` from the boresight's azimuth, counter-clockwise
 seen from above, and by the angle ``depression_rad`` below the horizon.
@@ -15,8 +15,7 @@ from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import wrap_rad
 
-SIDE_LOBE_DB = 20.0
-"""Largest attenuation of the vertical pattern, SLA_V, in TR 36.814; in TR 38.901 it is 30 dB."""
+_SIDE_LOBE_DB = 20.0
 
 
 def sector_gain_db(
@@ -36,11 +35,6 @@ def sector_gain_db(
     max_attenuation_db : float
         Largest attenuation, A_m.
 
-    Raises
-    ------
-    InputError
-        The beamwidth is not positive or the attenuation is negative.
-
     Examples
     --------
     >>> offset_rad = np.radians([0.0, 32.5, 180.0, 720.0])
@@ -56,7 +50,7 @@ def vertical_gain_db(
     depression_rad: ArrayLike,
     downtilt_rad: float,
     beamwidth_rad: float,
-    side_lobe_db: float = SIDE_LOBE_DB,
+    side_lobe_db: float = _SIDE_LOBE_DB,
 ) -> Floats:
     """Return the vertical gain relative to boresight, in dB, -SLA_V or more.
 
@@ -72,12 +66,7 @@ def vertical_gain_db(
     beamwidth_rad : float
         Full width at half power.
     side_lobe_db : float
-        Largest attenuation, SLA_V.
-
-    Raises
-    ------
-    InputError
-        The beamwidth is not positive or the attenuation is negative.
+        Largest attenuation, SLA_V: 20 dB in TR 36.814, 30 dB in TR 38.901.
 
     Examples
     --------
@@ -105,28 +94,16 @@ def combined_gain_db(
     return np.maximum(np.add(horizontal_db, vertical_db), -max_attenuation_db)
 
 
-def omni_gain_db(offset_rad: ArrayLike) -> Floats:
-    """Return the horizontal gain of an omnidirectional antenna: 0 dB everywhere.
-
-    Examples
-    --------
-    >>> omni_gain_db([0.0, 3.0]).tolist()
-    [0.0, 0.0]
-    """
-    return np.zeros(np.shape(offset_rad))
-
-
 def leaning(
     offset_rad: ArrayLike, depression_rad: ArrayLike, mechanical_downtilt_rad: float
 ) -> tuple[Floats, Floats]:
-    """Return the direction as an antenna sees it that leans forward.
+    """Return a direction in the frame of an antenna that leans forward.
 
     The rotation of TR 38.901, eqs. (7.1-7) and (7.1-8), with bearing and slant 0: the beam sinks in
     front, rises behind and stays where it is at the sides.
 
     Parameters
     ----------
-    offset_rad, depression_rad : array_like
     mechanical_downtilt_rad : float
         β of the report.
 
@@ -155,11 +132,10 @@ def leaning(
 
 @dataclass(frozen=True, eq=False)
 class MeasuredAntenna:
-    """An antenna known by its loss along two cuts.
+    """An antenna given by its loss along two cuts.
 
     Parameters
     ----------
-    name : str
     horizontal_deg, horizontal_loss_db : ndarray, shape (N,)
         Angles clockwise from boresight seen from above, rising within [0, 360), and losses against
         the strongest direction, 0 or more.
@@ -172,7 +148,7 @@ class MeasuredAntenna:
     frequency_mhz : float or None
         Frequency at which the cuts were taken.
     notes : tuple of str
-        What a reader had to assume.
+        Assumptions made in reading.
     """
 
     name: str
@@ -203,27 +179,21 @@ class MeasuredAntenna:
             Electrical downtilt wanted: the vertical cut is shifted from its own to this one. None
             leaves it as it was measured.
         """
+        horizontal = self.horizontal_deg, self.horizontal_loss_db
+        vertical = self.vertical_deg, self.vertical_loss_db
         shift_deg = 0.0 if downtilt_deg is None else downtilt_deg - self.downtilt_deg
         around_deg = -np.degrees(wrap_rad(offset_rad))
         down_deg = np.degrees(np.asarray(depression_rad, dtype=np.float64)) - shift_deg
         behind = np.abs(around_deg) / 180.0
-        ahead_db = self._horizontal_db(0.0) - self._vertical_db(down_deg)
-        behind_db = self._horizontal_db(180.0) - self._vertical_db(180.0 - down_deg)
-        loss_db = self._horizontal_db(around_deg) - (1 - behind) * ahead_db - behind * behind_db
+        ahead_db = _at(*horizontal, 0.0) - _at(*vertical, down_deg)
+        behind_db = _at(*horizontal, 180.0) - _at(*vertical, 180.0 - down_deg)
+        loss_db = _at(*horizontal, around_deg) - (1 - behind) * ahead_db - behind * behind_db
         # Cuts that do not meet where they cross could make a direction stronger than boresight.
         return -np.maximum(loss_db, 0.0) + 0.0
 
-    def _horizontal_db(self, angle_deg: ArrayLike) -> Floats:
-        loss: Floats = np.interp(
-            np.asarray(angle_deg), self.horizontal_deg, self.horizontal_loss_db, period=360.0
-        )
-        return loss
 
-    def _vertical_db(self, angle_deg: ArrayLike) -> Floats:
-        loss: Floats = np.interp(
-            np.asarray(angle_deg), self.vertical_deg, self.vertical_loss_db, period=360.0
-        )
-        return loss
+def _at(cut_deg: Floats, loss_db: Floats, angle_deg: ArrayLike) -> Floats:
+    return np.asarray(np.interp(np.asarray(angle_deg), cut_deg, loss_db, period=360.0))
 
 
 def _check(beamwidth_rad: float, max_attenuation_db: float) -> None:

@@ -1,4 +1,4 @@
-"""Cell lists of others: which of their columns are the fields of a cell plan."""
+"""Tables of cells: reading them, and the columns of other layouts that are fields of a plan."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import difflib
 import io
 import math
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -21,18 +21,7 @@ _SEPARATORS = (",", ";", "\t")
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A header and rows of texts; blank lines are left out.
-
-    Parameters
-    ----------
-    path : Path
-    separator : str
-        Comma, semicolon or tab.
-    header : tuple of str
-        Without blanks around the names.
-    rows : tuple of (int, list of str)
-        Line of the file, and its fields.
-    """
+    """The header and the rows of a file, each row with its line; blank lines are left out."""
 
     path: Path
     separator: str
@@ -42,6 +31,17 @@ class Table:
     def number(self, text: str) -> float | None:
         """Return a finite number or None; decimal commas are read where they separate nothing."""
         return number(text, decimal_comma=self.separator != ",")
+
+    def whole_rows(self, columns: int, faults: Faults) -> Iterator[tuple[int, list[str]]]:
+        """Yield the rows that have so many fields; the others are faults."""
+        for line, texts in self.rows:
+            if len(texts) == columns:
+                yield line, texts
+                continue
+            hint = "a decimal comma, or an unquoted separator"
+            if len(texts) < columns:
+                hint = "the line is cut off"
+            faults.add(f"{self.path} row {line}, fields", f"{columns}", f"{len(texts)}", hint)
 
 
 def number(text: str, *, decimal_comma: bool = False) -> float | None:
@@ -62,21 +62,30 @@ def number(text: str, *, decimal_comma: bool = False) -> float | None:
 
 
 def read_table(path: Path, what: str) -> Table:
-    """Read a table whose first line names its columns.
+    """Read a table in UTF-8 whose first line names its columns; commas, semicolons or tabs.
 
     Parameters
     ----------
-    path : Path
-        UTF-8; commas, semicolons or tabs.
     what : str
-        What it should be, for messages, such as ``"a cell plan"``.
+        For messages, such as ``"a cell plan"``.
 
     Raises
     ------
     InputError
         The file is missing, empty, too large or no such text.
     """
-    text = _text(path, what)
+    try:
+        if path.stat().st_size > _LARGEST_BYTES:
+            raise fail(InputError, str(path), f"{what} of at most 64 MiB", "a larger file")
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        got = f"other bytes at offset {error.start}"
+        hint = "saved in a Windows code page, or no text file"
+        raise fail(InputError, str(path), "text in UTF-8", got, hint) from error
+    except OSError as error:
+        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
+    if "\0" in text:
+        raise fail(InputError, str(path), "text in UTF-8", "NUL characters", "no text file")
     head = next((line for line in text.splitlines() if line.strip()), "")
     separator = max(_SEPARATORS, key=head.count)
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
@@ -98,33 +107,17 @@ def read_table(path: Path, what: str) -> Table:
     return Table(path, separator, header, tuple(lines[1:]))
 
 
-def _text(path: Path, what: str) -> str:
-    try:
-        if path.stat().st_size > _LARGEST_BYTES:
-            raise fail(InputError, str(path), f"{what} of at most 64 MiB", "a larger file")
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        got = f"other bytes at offset {error.start}"
-        hint = "saved in a Windows code page, or no text file"
-        raise fail(InputError, str(path), "text in UTF-8", got, hint) from error
-    except OSError as error:
-        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
-    if "\0" in text:
-        raise fail(InputError, str(path), "text in UTF-8", "NUL characters", "no text file")
-    return text
-
-
 Layout = Literal["plan", "atoll", "opencellid"]
 
 Columns = Mapping[str, tuple[str, ...]]
 """By field, the names that its column may have; the first that is there counts."""
 
 COLUMNS = (
-    "cell", "site", "lat", "lon", "height_m", "azimuth_deg", "downtilt_deg",
-    "mechanical_downtilt_deg", "antenna", "beamwidth_deg", "max_attenuation_db",
-    "vertical_beamwidth_deg", "side_lobe_db", "eirp_dbm", "frequency_mhz", "indoor",
-    "penetration_loss_db", "mcc", "mnc", "lac", "ci", "arfcn", "bsic",
-)  # fmt: skip
+    *("cell", "site", "lat", "lon", "height_m", "azimuth_deg", "downtilt_deg"),
+    *("mechanical_downtilt_deg", "antenna", "beamwidth_deg", "max_attenuation_db"),
+    *("vertical_beamwidth_deg", "side_lobe_db", "eirp_dbm", "frequency_mhz", "indoor"),
+    *("penetration_loss_db", "mcc", "mnc", "lac", "ci", "arfcn", "bsic"),
+)
 """Columns of a file that mapfilter writes, in order."""
 ATOLL: Columns = {
     "cell": ("TX_ID", "TX_NAME"),
@@ -156,9 +149,9 @@ OPENCELLID: Columns = {
     "ci": ("cell", "cellid"),
 }
 OPENCELLID_HEADER = (
-    "radio", "mcc", "net", "area", "cell", "unit", "lon", "lat", "range", "samples", "changeable",
-    "created", "updated", "averageSignal",
-)  # fmt: skip
+    *("radio", "mcc", "net", "area", "cell", "unit", "lon", "lat", "range", "samples"),
+    *("changeable", "created", "updated", "averageSignal"),
+)
 """Of the downloads of OpenCellID and of the Mozilla Location Service; the former leave it out."""
 _OWN: Columns = {name: (name,) for name in (*COLUMNS, "east", "north", "crs")}
 LAYOUTS: Mapping[Layout, Columns] = {
@@ -173,18 +166,10 @@ _IDENTITY = ("mcc", "mnc", "lac", "ci")
 
 @dataclass(frozen=True, slots=True)
 class Arranged:
-    """A table with the columns of a cell plan.
+    """A table with the fields of a cell plan as columns.
 
-    Parameters
-    ----------
-    header : tuple of str
-        Fields.
-    rows : tuple of (int, list of str)
-        Line of the file, and its fields.
-    shown : mapping of str to str
-        How messages name a field: with the file's own column.
-    notes : tuple of str
-        Which values were filled in.
+    ``shown`` names fields in messages, with the file's own column; ``notes`` counts the values that
+    were filled in.
     """
 
     header: tuple[str, ...]
@@ -204,7 +189,6 @@ def arrange(
 
     Parameters
     ----------
-    table : Table
     layout : {"plan", "atoll", "opencellid"}
         Names the columns that ``columns`` does not.
     columns : mapping of str to str
@@ -213,26 +197,17 @@ def arrange(
         For fields without a column, or empty ones.
     faults : Faults
         Rows of another length are added, and left out.
-
-    Raises
-    ------
-    InputError
-        A column of ``columns`` is not in the file.
     """
-    header, rows = table.header, table.rows
+    header = table.header
     if layout == "opencellid" and header and header[0].upper() in _RADIOS:
-        header, rows = OPENCELLID_HEADER, ((1, list(table.header)), *rows)
+        table = replace(table, rows=((1, list(header)), *table.rows))
+        header = OPENCELLID_HEADER
     picked = _pick(table, header, layout, columns)
     fields = [*picked, *(name for name in defaults if name not in picked)]
     composed = "cell" not in picked and all(name in picked for name in _IDENTITY)
     filled: Counter[str] = Counter()
     found = []
-    for line, texts in rows:
-        if len(texts) != len(header):
-            more = len(texts) > len(header)
-            hint = "a decimal comma, or an unquoted separator" if more else "the line is cut off"
-            faults.add(f"{table.path} row {line}, fields", f"{len(header)}", f"{len(texts)}", hint)
-            continue
+    for line, texts in table.whole_rows(len(header), faults):
         values = {name: texts[at].strip() for name, at in picked.items()}
         for name, default in defaults.items():
             if not values.get(name):
@@ -242,7 +217,7 @@ def arrange(
             values["cell"] = "-".join(values[name] for name in _IDENTITY)
         found.append((line, list(values.values())))
     notes = tuple(
-        f"{name} = {defaults[name]:g} for {count} of {len(found)} cells that tell none"
+        f"{name} = {defaults[name]:g} for {count} of {len(found)} cells without one"
         for name, count in sorted(filled.items())
     )
     shown = {name: f"{header[at]} ({name})" for name, at in picked.items() if header[at] != name}

@@ -1,9 +1,8 @@
-"""What each field of a cell may hold, and the mistake that a wrong value suggests."""
+"""Allowed values of each field of a cell, and the mistake that a wrong value suggests."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,19 +15,17 @@ ANTENNAS = (*POINTED, "omni")
 _LONGEST_ID = 128
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 
-Hint = Callable[[Any], str]
-
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """An interval that a number must lie in, in words and in numbers; NaN lies in none."""
+    """An interval that a number must lie in, and others that suggest a mistake; NaN is in none."""
 
     low: float
     high: float
     unit: str = ""
     above_low: bool = False
     whole: bool = False
-    hint: Hint = lambda _value: ""
+    mistakes: tuple[tuple[float, float, str], ...] = ()
 
     @property
     def expected(self) -> str:
@@ -38,6 +35,10 @@ class Range:
             return f"{kind} > {self.low:g} and ≤ {self.high:g}"
         return f"{kind} in {self.low:g}..{self.high:g}"
 
+    def hint(self, value: float) -> str:
+        """Return the likely mistake behind a value that is not in the range, if one is known."""
+        return next((text for low, high, text in self.mistakes if low <= value <= high), "")
+
     def holds(self, value: Any) -> bool:
         """Tell whether ``value`` lies in the range."""
         if isinstance(value, bool) or not isinstance(value, int | float | np.number):
@@ -46,47 +47,33 @@ class Range:
         return inside and not (self.whole and value != int(value))
 
 
-def _frequency_hint(value: float) -> str:
-    if value >= 1e8:
-        return "Hz given for MHz"
-    return "GHz given for MHz" if 0.1 <= value <= 7 else ""
-
-
-def _eirp_hint(value: float) -> str:
-    return "watts or milliwatts given for dBm" if value > 80 else ""
-
-
-def _height_hint(value: float) -> str:
-    return "height left out" if value == 0 else ""
-
-
-def _arfcn_hint(value: float) -> str:
-    return "EARFCN given for ARFCN" if value > 1023 else ""
-
-
-def _azimuth_hint(value: float) -> str:
-    return "counted from -180; add 360" if -180 <= value < 0 else ""
-
-
 RANGES: dict[str, Range] = {
     "east_m": Range(-1e8, 1e8, "finite metres"),
     "north_m": Range(-1e8, 1e8, "finite metres"),
-    "height_m": Range(0, 1000, "metres", above_low=True, hint=_height_hint),
-    "azimuth_deg": Range(0, 360, "degrees clockwise from true north", hint=_azimuth_hint),
+    "height_m": Range(0, 1000, "metres", above_low=True, mistakes=((0, 0, "height left out"),)),
+    "azimuth_deg": Range(
+        *(0, 360, "degrees clockwise from true north"),
+        mistakes=((-180, 0, "counted from -180; add 360"),),
+    ),
     "downtilt_deg": Range(-90, 90, "degrees"),
     "mechanical_downtilt_deg": Range(-90, 90, "degrees"),
     "beamwidth_deg": Range(0, 360, "degrees", above_low=True),
     "vertical_beamwidth_deg": Range(0, 180, "degrees", above_low=True),
     "max_attenuation_db": Range(0, 100, "dB"),
     "side_lobe_db": Range(0, 100, "dB"),
-    "eirp_dbm": Range(-30, 80, "dBm", hint=_eirp_hint),
-    "frequency_mhz": Range(100, 7000, "MHz", hint=_frequency_hint),
+    "eirp_dbm": Range(
+        -30, 80, "dBm", mistakes=((80, np.inf, "watts or milliwatts given for dBm"),)
+    ),
+    "frequency_mhz": Range(
+        *(100, 7000, "MHz"),
+        mistakes=((0.1, 7, "GHz given for MHz"), (1e8, np.inf, "Hz given for MHz")),
+    ),
     "penetration_loss_db": Range(0, 100, "dB"),
     "mcc": Range(0, 999, whole=True),
     "mnc": Range(0, 999, whole=True),
     "lac": Range(0, 2**24 - 1, whole=True),
     "ci": Range(0, 2**36 - 1, whole=True),
-    "arfcn": Range(0, 1023, whole=True, hint=_arfcn_hint),
+    "arfcn": Range(0, 1023, whole=True, mistakes=((1023, np.inf, "EARFCN given for ARFCN"),)),
     "bsic": Range(0, 63, whole=True),
 }
 """The range of each numeric field of a cell."""
@@ -100,7 +87,7 @@ OPTIONAL = frozenset(
 def id_fault(value: Any) -> tuple[str, str] | None:
     """Return (expected, found) when ``value`` is no id of a cell or site, else None.
 
-    Ids end up in file names and in tables, so separators, ``..`` and control characters are out.
+    Ids become file names, so separators, ``..`` and control characters are refused.
     """
     expected = f"an id of 1..{_LONGEST_ID} characters without /, \\, .. and control characters"
     if not isinstance(value, str):
@@ -119,10 +106,8 @@ def id_fault(value: Any) -> tuple[str, str] | None:
 def antenna_fault(value: Any) -> tuple[str, str] | None:
     """Return (expected, found) when ``value`` names no antenna, else None.
 
-    A pattern's name becomes a file name, so it has to be what an id has to be.
+    A pattern's name becomes a file name, so the rules of ids hold.
     """
-    if isinstance(value, str) and value in ANTENNAS:
-        return None
     wrong = id_fault(value)
     if wrong is None:
         return None

@@ -1,4 +1,4 @@
-"""Rows of a cell-plan CSV file as typed values; every fault is told by file, row and field."""
+"""Rows of a cell-plan CSV file as typed values; every fault names file, row and field."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _LONGEST_SHOWN = 80
 
 @dataclass(slots=True)
 class Row:
-    """One line of the file: its number, its values by field of a cell, and whether any is wrong."""
+    """A line of the file: its number, its values by field of a cell, and whether any is wrong."""
 
     line: int
     values: dict[str, Any]
@@ -43,7 +43,7 @@ def read_plan(
 ) -> tuple[list[Row], tuple[str, ...]]:
     """Read and check every row of a cell plan, or of a list of another layout.
 
-    What is wrong is added to ``faults``; also returned is what was filled in.
+    Faults of rows are added to ``faults``; also returned are remarks on defaults that were used.
 
     Raises
     ------
@@ -53,10 +53,9 @@ def read_plan(
     table = read_table(path, "a cell plan")
     if layout == "plan" and not columns:
         _check_header(path, table.header, known_only=True)
-        arranged = Arranged(table.header, table.rows, {}, ())
-    else:
-        arranged = arrange(table, layout, columns or {}, defaults or {}, faults)
-        _check_header(path, arranged.header, known_only=False)
+        defaults = None
+    arranged = arrange(table, layout, columns or {}, defaults or {}, faults)
+    _check_header(path, arranged.header, known_only=False)
     if not arranged.rows and not faults.found:
         raise fail(InputError, str(path), "at least one cell", "a header without rows")
     reader = _Reader(path, arranged, crs, table.separator != ",", faults)
@@ -88,8 +87,6 @@ def _check_header(path: Path, header: tuple[str, ...], *, known_only: bool) -> N
 
 
 class _Reader:
-    """Turns the texts of lines into values."""
-
     def __init__(
         self, path: Path, table: Arranged, crs: str, decimal_comma: bool, faults: Faults
     ) -> None:
@@ -99,14 +96,6 @@ class _Reader:
 
     def row(self, line: int, texts: list[str]) -> Row:
         self._row = Row(line, {})
-        if len(texts) != len(self._header):
-            hint = (
-                "a decimal comma, or an unquoted separator"
-                if len(texts) > len(self._header)
-                else "the line is cut off"
-            )
-            self._fault("fields", str(len(self._header)), str(len(texts)), hint)
-            return self._row
         given = {name: text.strip() for name, text in zip(self._header, texts, strict=True)}
         values = self._row.values
         values["id"] = self._identifier("cell", given["cell"])
@@ -118,9 +107,14 @@ class _Reader:
             if name in given:
                 values[name] = self._parse(name, given[name], "a number")
         values.setdefault("azimuth_deg", None)
-        values["indoor"] = self._truth("indoor", given.get("indoor", ""))
-        default = "omni" if not given.get("azimuth_deg") else "sector"
-        values["antenna"] = self._antenna(given.get("antenna", ""), default)
+        indoor = given.get("indoor", "").lower()
+        if indoor not in _TRUE | _FALSE | {""}:
+            self._fault("indoor", "1 or 0, true or false, yes or no", repr(given["indoor"]))
+        values["indoor"] = indoor in _TRUE
+        antenna = given.get("antenna") or ("sector" if given.get("azimuth_deg") else "omni")
+        values["antenna"] = antenna.lower() if antenna.lower() in ANTENNAS else antenna
+        if wrong := antenna_fault(values["antenna"]):
+            self._fault("antenna", *wrong)
         if given.get("crs"):
             try:
                 values["crs"] = projected_crs(given["crs"], f"{self._path} row {line}, crs")
@@ -138,14 +132,6 @@ class _Reader:
         if wrong := id_fault(text):
             self._fault(name, *wrong)
         return text
-
-    def _antenna(self, text: str, default: str) -> str:
-        name = text or default
-        if name.lower() in ANTENNAS:
-            return name.lower()
-        if wrong := antenna_fault(name):
-            self._fault("antenna", *wrong)
-        return name
 
     def _number(self, name: str, text: str) -> None:
         allowed = RANGES[name]
@@ -166,66 +152,36 @@ class _Reader:
     def _parse(self, name: str, text: str, expected: str) -> float | None:
         value = number(text, decimal_comma=self._decimal_comma)
         if value is None:
-            comma = text.replace(",", "", 1).lstrip("-").isdigit()
-            self._fault(
-                name,
-                expected,
-                _shown(text),
-                "a decimal comma" if comma and "," in text else "",
-            )
+            comma = "," in text and text.replace(",", "", 1).lstrip("-").isdigit()
+            got = repr(text[:_LONGEST_SHOWN]) if text else "nothing"
+            if text.lower().lstrip("+-") in ("nan", "inf", "infinity"):
+                got = text
+            self._fault(name, expected, got, "a decimal comma" if comma else "")
         return value
-
-    def _truth(self, name: str, text: str) -> bool:
-        if text.lower() not in _TRUE | _FALSE | {""}:
-            self._fault(name, "1 or 0, true or false, yes or no", repr(text))
-        return text.lower() in _TRUE
-
-
-def _shown(text: str) -> str:
-    if text.lower().lstrip("+-") in ("nan", "inf", "infinity"):
-        return text
-    return repr(text[:_LONGEST_SHOWN]) if text else "nothing"
 
 
 def _place(path: Path, rows: list[Row], crs: str, faults: Faults) -> None:
-    """Give every row its east and north in ``crs``, checking that they lie where the CRS is for."""
-    _project(rows, crs)
-    for row in rows:
-        if {"lat", "lon"} <= row.values.keys():
-            fields, wrong = "lat, lon", _from_degrees(row.values, crs)
-        elif {"east", "north"} <= row.values.keys():
-            fields, wrong = "east, north", _from_metres(row.values, crs)
-        else:
-            row.faulty = True
-            continue
-        if wrong is not None:
-            faults.add(f"{path} row {row.line}, {fields}", *wrong)
-            row.faulty = True
-
-
-def _project(rows: list[Row], crs: str) -> None:
-    """Give rows in degrees their metres, all at once."""
+    """Give every row its east and north in ``crs``, and check that the CRS is used there."""
     some = [row.values for row in rows]
     some = [v for v in some if v.get("lat") is not None and v.get("lon") is not None]
     east_m, north_m = project(crs, [v["lon"] for v in some], [v["lat"] for v in some])
     for values, east, north in zip(some, east_m.tolist(), north_m.tolist(), strict=True):
         values["east_m"], values["north_m"] = east, north
-
-
-def _from_degrees(values: dict[str, Any], crs: str) -> tuple[str, str, str] | None:
-    lat, lon = values["lat"], values["lon"]
-    return None if lat is None or lon is None else _degree_fault(lat, lon, crs)
-
-
-def _from_metres(values: dict[str, Any], crs: str) -> tuple[str, str, str] | None:
-    east, north, own = values["east"], values["north"], values.get("crs", crs)
-    if east is None or north is None:
-        return None
-    values["east_m"], values["north_m"] = east, north
-    if own != crs:
-        east_m, north_m = project(crs, *unproject(own, east, north))
-        values["east_m"], values["north_m"] = float(east_m), float(north_m)
-    return _metre_fault(east, north, own)
+    for row in rows:
+        values, names, wrong = row.values, "lat, lon", None
+        if "lat" in values:
+            if values["lat"] is not None and values["lon"] is not None:
+                wrong = _degree_fault(values["lat"], values["lon"], crs)
+        elif values["east"] is not None and values["north"] is not None:
+            names, own = "east, north", values.get("crs", crs)
+            values["east_m"], values["north_m"] = values["east"], values["north"]
+            if own != crs:
+                moved = project(crs, *unproject(own, values["east"], values["north"]))
+                values["east_m"], values["north_m"] = map(float, moved)
+            wrong = _metre_fault(values["east"], values["north"], own)
+        if wrong is not None:
+            faults.add(f"{path} row {row.line}, {names}", *wrong)
+            row.faulty = True
 
 
 def _metre_fault(east: float, north: float, crs: str) -> tuple[str, str, str] | None:
@@ -246,10 +202,9 @@ def _degree_fault(lat: float, lon: float, crs: str) -> tuple[str, str, str] | No
         return "degrees in -90..90 and -180..180", got, "longitude and latitude swapped"
     if _near(crs, lon, lat):
         return None
-    swapped = abs(lon) <= 90 and _near(crs, lat, lon)
-    hint = (
-        "longitude and latitude swapped" if swapped else "a cell of another place, or another CRS"
-    )
+    hint = "a cell of another place, or another CRS"
+    if abs(lon) <= 90 and _near(crs, lat, lon):
+        hint = "longitude and latitude swapped"
     return f"a place where {crs} is used", got, hint
 
 

@@ -1,4 +1,4 @@
-"""The cell plan: where every cell stands, where it points and what it sends."""
+"""The cell plan: position, antenna, power and identity of every cell."""
 
 from __future__ import annotations
 
@@ -25,95 +25,7 @@ from mapfilter.radio.cell_rules import (
     id_fault,
     looks_like_radians,
 )
-from mapfilter.radio.cell_table import Row, read_plan
-
-
-def check_cells(
-    cells: tuple[Cell, ...],
-    where: Callable[[int, str], str],
-    faults: Faults,
-    *,
-    ranges: bool = True,
-) -> None:
-    """Note what is wrong with cells: each field (unless checked already), and all together."""
-    if not cells and not faults.found:
-        faults.add("cell plan", "at least one cell", "none")
-    first: dict[str, int] = {}
-    for i, cell in enumerate(cells):
-        if ranges:
-            _check_fields(cell, partial(where, i), faults)
-        if cell.antenna in POINTED and cell.azimuth_deg is None:
-            faults.add(
-                where(i, "azimuth_deg"),
-                "an azimuth, as the antenna is a sector",
-                "nothing",
-                "azimuth left out, or the antenna is omni",
-            )
-        if cell.id in first:
-            faults.add(where(i, "cell"), "an id used once", repr(cell.id), "a row given twice")
-        first.setdefault(cell.id, i)
-    azimuths = [cell.azimuth_deg for cell in cells if cell.azimuth_deg is not None]
-    if looks_like_radians(azimuths):
-        shown = ", ".join(f"{azimuth:g}" for azimuth in azimuths[:3])
-        faults.add(
-            where(0, "azimuth_deg"),
-            "degrees in 0..360",
-            f"{shown}, …, none above 2π",
-            "radians given for degrees",
-        )
-
-
-def _check_fields(cell: Cell, where: Callable[[str], str], faults: Faults) -> None:
-    for name in ("id", "site"):
-        if wrong := id_fault(getattr(cell, name)):
-            faults.add(where(name), *wrong)
-    if wrong := antenna_fault(cell.antenna):
-        faults.add(where("antenna"), *wrong)
-    for name, allowed in RANGES.items():
-        value = getattr(cell, name)
-        if not allowed.holds(value) and not (value is None and name in OPTIONAL):
-            hint = allowed.hint(value) if isinstance(value, int | float) else ""
-            faults.add(where(name), allowed.expected, value, hint)
-
-
-def once(rows: list[Row], notes: tuple[str, ...]) -> tuple[list[Row], tuple[str, ...]]:
-    """Return the first row of each cell, and the notes with what was left out."""
-    first: dict[str, Row] = {}
-    for row in rows:
-        first.setdefault(row.values["id"], row)
-    if len(first) < len(rows):
-        notes += (f"{len(rows) - len(first)} rows of cells told already left out",)
-    return list(first.values()), notes
-
-
-def within(
-    rows: list[Row],
-    bounds_m: tuple[float, float, float, float],
-    notes: tuple[str, ...],
-    where: str,
-) -> tuple[list[Row], tuple[str, ...]]:
-    """Return the rows in a box and the notes with what was left out.
-
-    Raises
-    ------
-    InputError
-        There are none.
-    """
-    west, south, east, north = bounds_m
-    inside = [
-        row
-        for row in rows
-        if west <= row.values["east_m"] <= east and south <= row.values["north_m"] <= north
-    ]
-    if rows and not inside:
-        bounds = ", ".join(f"{value:.0f}" for value in bounds_m)
-        raise fail(InputError, where, f"cells in {bounds}", "none", "cells of another area")
-    if len(inside) < len(rows):
-        notes += (f"{len(rows) - len(inside)} of {len(rows)} cells left out: far from the area",)
-    return inside, notes
-
-
-Antenna = str
+from mapfilter.radio.cell_table import read_plan
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +44,6 @@ class Cell:
         Boresight, degrees clockwise from true north; None for an omnidirectional antenna.
     eirp_dbm : float
         Radiated power at boresight, antenna gain included.
-    frequency_mhz : float
     antenna : str
         ``"sector"``, ``"omni"``, ``"3gpp"`` or the name of a pattern file.
     downtilt_deg : float
@@ -151,11 +62,11 @@ class Cell:
     indoor : bool
         Whether the antenna hangs inside a building.
     penetration_loss_db : float
-        What an indoor cell's signal loses on its way out.
+        Loss of an indoor cell's signal on its way out.
     mcc, mnc, lac, ci : int or None
         Global identity.
     arfcn, bsic : int or None
-        BCCH carrier and base station identity code: all that a neighbour report tells.
+        BCCH carrier and base station identity code: all that identifies a reported neighbour.
     """
 
     id: str
@@ -166,7 +77,7 @@ class Cell:
     azimuth_deg: float | None
     eirp_dbm: float
     frequency_mhz: float
-    antenna: Antenna = "sector"
+    antenna: str = "sector"
     downtilt_deg: float = 0.0
     mechanical_downtilt_deg: float = 0.0
     beamwidth_deg: float = 65.0
@@ -213,7 +124,7 @@ class CellPlan:
         except InputError as error:
             faults.found.extend(error.faults)
         object.__setattr__(self, "cells", tuple(self.cells))
-        check_cells(self.cells, lambda i, name: f"cell {self.cells[i].id!r}, {name}", faults)
+        _check_cells(self.cells, lambda i, name: f"cell {self.cells[i].id!r}, {name}", faults)
         faults.raise_if_any(InputError)
 
     @property
@@ -252,13 +163,7 @@ class CellPlan:
         return self.cells[self.index(cell_id)]
 
     def index(self, cell_id: str) -> int:
-        """Return the place of a cell in ``cells``.
-
-        Raises
-        ------
-        InputError
-            The plan has no such cell.
-        """
+        """Return the place of a cell in ``cells``; an unknown id is an InputError."""
         try:
             return self._positions[cell_id]
         except KeyError:
@@ -276,6 +181,47 @@ class CellPlan:
         moved = zip(self.cells, east_m.tolist(), north_m.tolist(), strict=True)
         cells = tuple(replace(c, east_m=e, north_m=n) for c, e, n in moved)
         return CellPlan(target, cells, self.notes)
+
+
+def _check_cells(
+    cells: tuple[Cell, ...],
+    where: Callable[[int, str], str],
+    faults: Faults,
+    *,
+    ranges: bool = True,
+) -> None:
+    """Note the faults of cells: of each field (unless checked already), and of all together."""
+    if not cells and not faults.found:
+        faults.add("cell plan", "at least one cell", "none")
+    first: dict[str, int] = {}
+    for i, cell in enumerate(cells):
+        if ranges:
+            _check_fields(cell, partial(where, i), faults)
+        if cell.antenna in POINTED and cell.azimuth_deg is None:
+            expected = "an azimuth, as the antenna is a sector"
+            hint = "azimuth left out, or the antenna is omni"
+            faults.add(where(i, "azimuth_deg"), expected, "nothing", hint)
+        if cell.id in first:
+            faults.add(where(i, "cell"), "an id used once", repr(cell.id), "a row given twice")
+        first.setdefault(cell.id, i)
+    azimuths = [cell.azimuth_deg for cell in cells if cell.azimuth_deg is not None]
+    if looks_like_radians(azimuths):
+        got = ", ".join(f"{azimuth:g}" for azimuth in azimuths[:3]) + ", …, none above 2π"
+        hint = "radians given for degrees"
+        faults.add(where(0, "azimuth_deg"), "degrees in 0..360", got, hint)
+
+
+def _check_fields(cell: Cell, where: Callable[[str], str], faults: Faults) -> None:
+    for name in ("id", "site"):
+        if wrong := id_fault(getattr(cell, name)):
+            faults.add(where(name), *wrong)
+    if wrong := antenna_fault(cell.antenna):
+        faults.add(where("antenna"), *wrong)
+    for name, allowed in RANGES.items():
+        value = getattr(cell, name)
+        if not allowed.holds(value) and not (value is None and name in OPTIONAL):
+            hint = allowed.hint(value) if isinstance(value, int | float) else ""
+            faults.add(where(name), allowed.expected, value, hint)
 
 
 def read_cell_plan(
@@ -297,19 +243,18 @@ def read_cell_plan(
 
     Parameters
     ----------
-    path : Path or str
     crs : str
         Projected CRS of the plan.
     layout : {"plan", "atoll", "opencellid"}
         Of the columns: as above, those of a planning tool's transmitters, or those of OpenCellID
-        and the Mozilla Location Service, whose bad rows are left out and told. In the latter
-        two columns of other names are passed over.
+        and the Mozilla Location Service, whose bad rows are left out with a note. In the latter
+        two columns of other names are ignored.
     columns : mapping of str to str, optional
-        The file's column by field, where it has another name; others are passed over, then.
+        The file's column by field, where it has another name; other columns are ignored, then.
     defaults : mapping of str to float, optional
         With ``columns`` or another layout: values of fields that have no column or are empty.
     bounds_m : tuple of float, optional
-        West, south, east, north: cells beyond them are left out and told.
+        West, south, east, north: cells beyond them are left out with a note.
 
     Raises
     ------
@@ -326,11 +271,27 @@ def read_cell_plan(
         if faults.found:
             notes += (f"{len(faults.found)} faulty rows left out, such as {faults.found[0]}",)
             faults = Faults()
-        whole, notes = once(whole, notes)
+        first = {row.values["id"]: row for row in reversed(whole)}
+        repeated = len(whole) - len(first)
+        whole = [row for row in whole if first[row.values["id"]] is row]
+        if repeated:
+            notes += (f"{repeated} rows left out: cells listed already",)
     if bounds_m is not None:
-        whole, notes = within(whole, bounds_m, notes, str(path))
+        west, south, east, north = bounds_m
+        inside = [
+            row
+            for row in whole
+            if west <= row.values["east_m"] <= east and south <= row.values["north_m"] <= north
+        ]
+        if whole and not inside:
+            expected = f"cells in {', '.join(f'{value:.0f}' for value in bounds_m)}"
+            raise fail(InputError, str(path), expected, "none", "cells of another area")
+        if len(inside) < len(whole):
+            left_out = len(whole) - len(inside)
+            notes += (f"{left_out} of {len(whole)} cells left out: far from the area",)
+        whole = inside
     cells = tuple(Cell(**{k: v for k, v in row.values.items() if k in known}) for row in whole)
-    check_cells(cells, lambda i, name: f"{path} row {whole[i].line}, {name}", faults, ranges=False)
+    _check_cells(cells, lambda i, name: f"{path} row {whole[i].line}, {name}", faults, ranges=False)
     faults.raise_if_any(InputError)
     return CellPlan(crs, cells, notes)
 

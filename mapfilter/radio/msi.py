@@ -1,4 +1,4 @@
-"""Reads antenna pattern files in the format of MSI Planet (``.msi``, ``.pln``).
+"""Antenna pattern files in the format of MSI Planet (``.msi``, ``.pln``).
 
 One text file holds a header of keywords and two cuts, ``HORIZONTAL n`` and ``VERTICAL n``, each
 followed by n lines of angle and loss. Losses are dB below the strongest direction and positive.
@@ -42,17 +42,7 @@ def read_antennas(folder: Path | str, names: Iterable[str]) -> dict[str, Measure
     """Read the antennas that cells name from one folder.
 
     A name is that of a file in the folder, with or without ``.msi``, ``.pln`` or ``.txt``, in small
-    or capital letters; the names of antennas by formula are passed over.
-
-    Parameters
-    ----------
-    folder : path
-    names : iterable of str
-        As in the ``antenna`` column of a cell plan.
-
-    Returns
-    -------
-    dict of str to MeasuredAntenna
+    or capital letters; the names of antennas by formula are ignored.
 
     Raises
     ------
@@ -95,24 +85,15 @@ def read_antennas(folder: Path | str, names: Iterable[str]) -> dict[str, Measure
 def read_msi(path: Path | str) -> MeasuredAntenna:
     """Read one antenna.
 
-    The electrical downtilt is what ``ELECTRICAL_TILT`` says, else the number after ``TILT``; where
-    ``TILT`` is just the word ``ELECTRICAL``, it is where the vertical cut is strongest. A vertical
-    cut whose beam lies as far above the horizon as that tilt is below was counted upwards: it is
-    turned over, and the antenna's notes say so.
-
-    Parameters
-    ----------
-    path : path
-
-    Returns
-    -------
-    MeasuredAntenna
+    The electrical downtilt is the value of ``ELECTRICAL_TILT``, else the number after ``TILT``;
+    where ``TILT`` is just the word ``ELECTRICAL``, it is where the vertical cut is strongest. A
+    vertical cut whose beam lies as far above the horizon as that tilt is below was counted upwards:
+    it is turned over, with a note.
 
     Raises
     ------
     InputError
-        The file is missing, no such file or damaged; with the row and the likely mistake of every
-        fault.
+        The file is missing or damaged; with the row and the likely mistake of every fault.
     """
     path = Path(path)
     header, cuts = _sections(path)
@@ -127,10 +108,10 @@ def read_msi(path: Path | str) -> MeasuredAntenna:
     if _counted_upwards(vertical, downtilt_deg):
         vertical = _sorted_cut(-vertical[0], vertical[1])
         notes = (f"{path}: the vertical cut counts upwards and was turned over",)
+    name = header.get("NAME") or path.stem
     return MeasuredAntenna(
-        header.get("NAME") or path.stem, *horizontal, *vertical,
-        downtilt_deg, gain_dbi, frequency_mhz, notes,
-    )  # fmt: skip
+        name, *horizontal, *vertical, downtilt_deg, gain_dbi, frequency_mhz, notes=notes
+    )
 
 
 Row = tuple[int, list[str]]
@@ -178,15 +159,15 @@ def _cut(
     if cut is None:
         faults.add(str(path), f"a line {name} 360", "none", "cut off, or no MSI Planet file")
         return empty
-    line, told, rows = cut
+    line, stated, rows = cut
     where = f"{path} row {line}, {name}"
     expected = f"{_FEWEST_POINTS}..{_MOST_POINTS} points"
-    if not re.fullmatch(r"[0-9]{1,5}", told) or not _FEWEST_POINTS <= int(told) <= _MOST_POINTS:
-        faults.add(where, expected, repr(told[:40]))
+    if not re.fullmatch(r"[0-9]{1,5}", stated) or not _FEWEST_POINTS <= int(stated) <= _MOST_POINTS:
+        faults.add(where, expected, repr(stated[:40]))
         return empty
-    if len(rows) != int(told):
-        hint = "the file is cut off" if len(rows) < int(told) else "a wrong count"
-        faults.add(where, f"{told} lines of angle and loss", str(len(rows)), hint)
+    if len(rows) != int(stated):
+        hint = "the file is cut off" if len(rows) < int(stated) else "a wrong count"
+        faults.add(where, f"{stated} lines of angle and loss", str(len(rows)), hint)
         return empty
     before = len(faults.found)
     values = [_pair(f"{path} row {at}", words, faults) for at, words in rows]
@@ -198,9 +179,8 @@ def _cut(
     elif not ((loss_db >= 0) & (loss_db <= _LARGEST_LOSS_DB)).all():
         row = rows[int(np.argmax((loss_db < 0) | (loss_db > _LARGEST_LOSS_DB)))]
         hint = "gains given for losses" if loss_db.min() < 0 else ""
-        faults.add(
-            f"{path} row {row[0]}", f"a loss in 0..{_LARGEST_LOSS_DB:g} dB", row[1][1][:40], hint
-        )
+        expected = f"a loss in 0..{_LARGEST_LOSS_DB:g} dB"
+        faults.add(f"{path} row {row[0]}", expected, row[1][1][:40], hint)
     angle_deg, loss_db = _sorted_cut(angle_deg, loss_db)
     gaps_deg = np.diff(angle_deg, append=angle_deg[0] + 360.0)
     if gaps_deg.max() > _LARGEST_GAP_DEG:

@@ -2,9 +2,9 @@
 
 The table (``.csv`` or ``.txt``) has a column ``TX_NAME`` with the cell's id and ``FILE_NAME`` with
 the raster; ``RESOLUTION``, ``AREA_XMIN``, ``AREA_XMAX``, ``AREA_YMIN``, ``AREA_YMAX`` and ``NBITS``
-are compared with the raster's own header, and stand in for it where there is none. The area's
-limits are outer *edges* of pixels, ``ULXMAP`` and ``ULYMAP`` of a header are a pixel's *centre*:
-taking one for the other shifts everything by half a pixel, so both are compared.
+are compared with the raster's own header, and replace it where there is none. The area's limits
+are outer *edges* of pixels, ``ULXMAP`` and ``ULYMAP`` of a header are a pixel's *centre*: taking
+one for the other shifts everything by half a pixel.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
+
+import numpy as np
 
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
@@ -23,26 +25,16 @@ INDEX_COLUMNS = ("TX_NAME", "FILE_NAME")
 """Columns that make a table an index of rasters."""
 _AREA = ("AREA_XMIN", "AREA_XMAX", "AREA_YMIN", "AREA_YMAX")
 _NUMBERS = ("RESOLUTION", "NBITS", *_AREA)
-_SUFFIXES = (".csv", ".txt")
+INDEX_SUFFIXES = (".csv", ".txt")
 _LONGEST_HEAD_BYTES = 1 << 16
 _SAME_PX = 0.01
-_HALF_PX = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class IndexRow:
-    """A raster as the index tells of it.
+    """A row of an index: ``where`` it is, its cell and raster, and the raster's size and place.
 
-    Parameters
-    ----------
-    where : str
-        Index file and row.
-    cell_id : str
-    path : Path
-        The raster, in the folder of the index or below.
-    resolution_m, bits : float or None
-    area_m : tuple of float or None
-        West, south, east, north edges.
+    ``area_m`` are the western, southern, eastern and northern edges.
     """
 
     where: str
@@ -53,7 +45,7 @@ class IndexRow:
     area_m: tuple[float, float, float, float] | None = None
 
     def header(self) -> GridHeader | None:
-        """Return what stands in for a raster's own header, if the row tells enough."""
+        """Return a header in place of a raster's own, if the row holds enough."""
         if self.area_m is None or self.resolution_m is None or self.bits is None:
             return None
         west, south, east, north = self.area_m
@@ -69,10 +61,7 @@ class IndexRow:
         return GridHeader(self.where, values)
 
     def check(self, lattice: Lattice, bits: int | None, faults: Faults) -> str:
-        """Compare the row with a raster's own header; return what is worth telling.
-
-        Raises nothing: what does not fit is added to ``faults``.
-        """
+        """Compare the row with a raster's own header; return a remark, and add to ``faults``."""
         side_m = lattice.resolution_m
         if self.resolution_m is not None and abs(self.resolution_m - side_m) > 1e-6 * side_m:
             got, hint = f"{side_m:g} in {self.path.name}", "index and rasters of different runs"
@@ -81,45 +70,33 @@ class IndexRow:
         if self.bits is not None and bits is not None and self.bits != bits:
             got = f"{bits} in the header of {self.path.name}"
             faults.add(f"{self.where}, NBITS", f"{self.bits:g}", got, "one of them is wrong")
-        return self._check_area(lattice, faults) if self.area_m is not None else ""
-
-    def _check_area(self, lattice: Lattice, faults: Faults) -> str:
-        assert self.area_m is not None
-        pairs = zip(self.area_m, lattice.bounds_m, strict=True)
-        west, south, east, north = ((told - is_) / lattice.resolution_m for told, is_ in pairs)
-        if max(map(abs, (west, south, east, north))) <= _SAME_PX:
+        if self.area_m is None:
             return ""
-        if _near(west, _HALF_PX, south, _HALF_PX, east, -_HALF_PX, north, -_HALF_PX):
+        off_px = (np.array(self.area_m) - lattice.bounds_m) / side_m
+        west, south = off_px[:2]
+        if np.abs(off_px).max() <= _SAME_PX:
+            return ""
+        if np.abs(off_px - [0.5, 0.5, -0.5, -0.5]).max() <= _SAME_PX:
             return "area limits are centres of pixels in the index"
-        if _near(west, east, south, north):
-            got = f"{self.path.name} shifted by {_told(-west)} pixels east, {_told(-south)} north"
-            half = all(
-                min(abs(shift), abs(abs(shift) - _HALF_PX)) <= _SAME_PX for shift in (west, south)
-            )
-            hint = (
-                "half a pixel: a corner where the header has to hold the pixel's centre"
-                if half
-                else "index and rasters of different runs"
-            )
+        hint = "index and rasters of different runs"
+        if np.abs(off_px[:2] - off_px[2:]).max() <= _SAME_PX:
+            # Adding 0 turns -0.00 into +0.00.
+            right, up = round(-west, 2) + 0.0, round(-south, 2) + 0.0
+            got = f"{self.path.name} shifted by {right:+.2f} pixels east, {up:+.2f} north"
+            if all(min(abs(px), abs(abs(px) - 0.5)) <= _SAME_PX for px in (west, south)):
+                hint = "half a pixel: a corner where the header has to hold the pixel's centre"
             faults.add(f"{self.where}, area", "the area of the raster's header", got, hint)
-        elif min(west, south, -east, -north) < -_SAME_PX:
-            told = ", ".join(f"{value:g}" for value in self.area_m)
+        elif min(*off_px[:2], *-off_px[2:]) < -_SAME_PX:
+            expected = ", ".join(f"{value:g}" for value in self.area_m)
             got = ", ".join(f"{value:g}" for value in lattice.bounds_m)
-            hint = "index and rasters of different runs"
-            faults.add(f"{self.where}, area", told, f"{got} in {self.path.name}", hint)
+            faults.add(f"{self.where}, area", expected, f"{got} in {self.path.name}", hint)
         else:
             return "rasters reach beyond their areas in the index"
         return ""
 
 
 def find_index(folder: Path) -> Path | None:
-    """Return the index in a folder, or None.
-
-    Raises
-    ------
-    InputError
-        There are several.
-    """
+    """Return the index in a folder, or None; several are an error."""
     found = [path for path in sorted(folder.iterdir()) if _is_index(path)]
     if len(found) > 1:
         names = ", ".join(path.name for path in found[:5])
@@ -134,7 +111,7 @@ def read_index(path: Path) -> tuple[IndexRow, ...]:
     ------
     InputError
         With every fault: columns missing, a name that leads out of the folder, a raster that is
-        not there, numbers that are none, an id given twice.
+        not there, numbers that cannot be read, an id given twice.
     """
     table = read_table(path, "an index of rasters")
     header = [name.strip('" ').upper() for name in table.header]
@@ -161,7 +138,7 @@ def read_index(path: Path) -> tuple[IndexRow, ...]:
 
 
 def _is_index(path: Path) -> bool:
-    if path.suffix.lower() not in _SUFFIXES or path.name.startswith(".") or not path.is_file():
+    if path.suffix.lower() not in INDEX_SUFFIXES or path.name.startswith(".") or not path.is_file():
         return False
     try:
         with path.open("rb") as stream:
@@ -175,12 +152,8 @@ def _is_index(path: Path) -> bool:
 def _rows(
     table: Table, header: list[str], names: dict[str, str], faults: Faults
 ) -> Iterator[IndexRow]:
-    for line, texts in table.rows:
+    for line, texts in table.whole_rows(len(header), faults):
         where = f"{table.path} row {line}"
-        if len(texts) != len(header):
-            hint = "a decimal comma, or an unquoted separator"
-            faults.add(where, f"{len(header)} fields", str(len(texts)), hint)
-            continue
         given = dict(zip(header, (text.strip() for text in texts), strict=True))
         if wrong := id_fault(given["TX_NAME"]):
             faults.add(f"{where}, TX_NAME", *wrong)
@@ -211,23 +184,14 @@ def _rows(
 
 
 def _within(folder: Path, name: str, names: dict[str, str]) -> Path | None:
-    """Return a file of the folder or below it; None for names that lead out of it, or are none."""
+    """Return a file of the folder or below it; None for names that lead out of it."""
     place = PurePosixPath(name.replace("\\", "/"))
     if not place.parts or place.is_absolute() or ".." in place.parts or ":" in name or "\0" in name:
         return None
-    # Names from Windows do not tell capitals from small letters.
+    # Names from Windows ignore the case.
     path = folder / (names.get(name.lower(), name) if len(place.parts) == 1 else place)
     try:
         inside = path.resolve().is_relative_to(folder.resolve())
     except (OSError, ValueError):
         return None
     return path if inside and len(str(path)) < 4096 else None
-
-
-def _told(shift_px: float) -> str:
-    return f"{round(shift_px, 2) + 0.0:+.2f}"
-
-
-def _near(*pairs: float) -> bool:
-    values = list(pairs)
-    return all(abs(a - b) <= _SAME_PX for a, b in zip(values[::2], values[1::2], strict=True))

@@ -1,10 +1,12 @@
-"""What one raster file is to a set of them, whatever its format."""
+"""One raster file of a set, whatever its format, and the numbers that it may hold."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
@@ -14,34 +16,74 @@ from mapfilter.geodesy import Lattice
 
 Window = tuple[int, int, int, int]
 """Row, column, rows, columns."""
+Quantity = Literal["level", "loss", "deviation"]
+
+_PLAUSIBLE: dict[Quantity, tuple[float, float, str]] = {
+    "level": (-300.0, 60.0, "path losses, or raw RXLEV, given for levels"),
+    "loss": (0.0, 400.0, "levels given for path losses"),
+    "deviation": (0.0, 100.0, "levels or path losses given for deviations"),
+}
+_LEAST_LOSS_DB = 20.0
+_LEAST_NODATA = 250.0
 
 
-class RasterFile(Protocol):
-    """One file, with one band or several, whose pixels stay in it until they are read."""
+@dataclass(frozen=True, slots=True)
+class Declared:
+    """What a user declares of files that do not state it themselves.
 
-    @property
-    def path(self) -> Path:
-        """The file with the pixels."""
+    Parameters
+    ----------
+    crs : str or None
+        Projected CRS.
+    nodata : float or None
+        A number that means no data, besides the files' own.
+    """
 
-    @property
-    def cell_ids(self) -> tuple[str, ...]:
-        """One per band."""
+    quantity: Quantity | None = None
+    crs: str | None = None
+    nodata: float | None = None
 
-    @property
-    def lattice(self) -> Lattice:
-        """Where the pixels lie."""
 
-    @property
-    def parts(self) -> tuple[Path, ...]:
-        """The file, and those beside it that say what it means."""
+@dataclass(frozen=True, slots=True)
+class RasterFile(ABC):
+    """One file, with one band or several, whose pixels stay in it until they are read.
 
+    Parameters
+    ----------
+    cell_ids : tuple of str
+        One per band.
+    nodata : tuple of float
+        Stored numbers that mean no data, besides those that the driver masks.
+    parts : tuple of Path
+        The file, and those beside it: header, CRS.
+    quantity : {"level", "loss", "deviation"} or None
+        As the file states it.
+    tagged : bool
+        Whether it states the quantity by mapfilter's tag.
+    described : bool
+        Whether the cell ids are band descriptions of the file, not its name.
+    bits : int or None
+        Size of a pixel, where an index of rasters repeats it.
+    """
+
+    path: Path
+    cell_ids: tuple[str, ...]
+    lattice: Lattice
+    nodata: tuple[float, ...]
+    parts: tuple[Path, ...]
+    quantity: Quantity | None = None
+    tagged: bool = False
+    described: bool = False
+    bits: int | None = None
+
+    @abstractmethod
     def read(self, bands: Sequence[int], window: Window) -> Floats32:
         """Read bands, counted from 0, in a window on the file's lattice.
 
         Returns
         -------
         ndarray of float32, shape (bands, rows, cols)
-            Numbers as stored, apart from scales that the file itself tells; NaN without data.
+            Numbers as stored, apart from the file's own scales; NaN without data.
 
         Raises
         ------
@@ -58,38 +100,8 @@ def without_nodata(values: Floats32, nodata: Sequence[float]) -> Floats32:
     return values
 
 
-def existing(*paths: Path | None) -> tuple[Path, ...]:
-    """Return the paths at which there is a file."""
-    return tuple(path for path in paths if path is not None and path.is_file())
-
-
-Quantity = Literal["level", "loss", "deviation"]
-
-QUANTITY_TAG = "MAPFILTER_QUANTITY"
-"""Tag of a file that says which quantity its bands hold."""
-_PLAUSIBLE: dict[Quantity, tuple[float, float, str]] = {
-    "level": (-300.0, 60.0, "path losses, or raw RXLEV, given for levels"),
-    "loss": (0.0, 400.0, "levels given for path losses"),
-    "deviation": (0.0, 100.0, "levels or path losses given for deviations"),
-}
-_LEAST_LOSS_DB = 20.0
-_LEAST_NODATA = 250.0
-
-
-def reason(error: Exception) -> str:
-    """Return the first line of what GDAL said."""
-    text = str(error.__cause__ or error).strip()
-    return text.splitlines()[0] if text else type(error).__name__
-
-
 def check_file(path: Path) -> None:
-    """See that there is a file with something in it.
-
-    Raises
-    ------
-    InputError
-        It is missing, empty or a folder.
-    """
+    """Check that there is a file with something in it."""
     try:
         size = path.stat().st_size
     except OSError as error:
@@ -101,24 +113,28 @@ def check_file(path: Path) -> None:
 
 
 def check_plausible(values: Floats32, quantity: Quantity, path: Path) -> None:
-    """See that numbers can be levels, losses or deviations; NaN is passed over.
+    """Check that numbers can be levels, losses or deviations; NaN is ignored.
 
     Raises
     ------
     InputError
-        They cannot; the likely mistake is told.
+        They cannot; with the likely mistake.
     """
     lowest, highest = (extreme.reduce(values, axis=None) for extreme in (np.fmin, np.fmax))
     if np.isnan(lowest):
         return
-    where = f"{path} pixels"
+    where, got = f"{path} pixels", f"{lowest:g}..{highest:g}"
     low, high, hint = _PLAUSIBLE[quantity]
-    got = f"{lowest:g}..{highest:g}"
     if not (low <= lowest and highest <= high):
         unit = "dBm" if quantity == "level" else "dB"
-        expected = f"a {quantity} in {low:g}..{high:g} {unit}"
         known = values[~np.isnan(values)]
-        raise fail(InputError, where, expected, got, _hint(known, low, high) or hint)
+        wrong = known[(known < low) | (known > high)]
+        alike = wrong.size < known.size and (wrong == wrong[0]).all()
+        if alike and abs(wrong[0]) >= _LEAST_NODATA:
+            hint = f"{wrong[0]:g} means no data, and the file does not state it; set nodata"
+        elif np.abs(wrong).max() > 1000:
+            hint = "factor left out, or the wrong byte order"
+        raise fail(InputError, where, f"a {quantity} in {low:g}..{high:g} {unit}", got, hint)
     if quantity == "level" and highest >= 0 and _most(values >= 0, values):
         got = f"{got}, mostly 0 and above"
         raise fail(InputError, where, "levels in dBm, mostly below 0", got, hint)
@@ -128,14 +144,4 @@ def check_plausible(values: Floats32, quantity: Quantity, path: Path) -> None:
 
 
 def _most(chosen: Bools, values: Floats32) -> bool:
-    """Tell whether more than half of the known values are chosen."""
     return bool(2 * np.count_nonzero(chosen) > np.count_nonzero(~np.isnan(values)))
-
-
-def _hint(known: Floats32, low: float, high: float) -> str:
-    """Return a hint for numbers far beyond what is possible, or nothing."""
-    wrong = known[(known < low) | (known > high)]
-    alike = wrong.size < known.size and (wrong == wrong[0]).all()
-    if alike and abs(wrong[0]) >= _LEAST_NODATA:
-        return f"{wrong[0]:g} means no data, and the file does not say so; say nodata"
-    return "factor left out, or the wrong byte order" if np.abs(wrong).max() > 1000 else ""

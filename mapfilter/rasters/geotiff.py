@@ -1,83 +1,179 @@
-"""GeoTIFF files of radio rasters: one band per cell, named by the band's description."""
+"""GeoTIFF files: reads rasters of cells, and writes bands as a cloud-optimised file."""
 
 from __future__ import annotations
 
 import math
 import warnings
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 import rasterio
+from numpy.typing import NDArray
+from rasterio._err import CPLE_BaseError
 from rasterio.errors import NotGeoreferencedWarning, RasterioError
+from rasterio.io import DatasetWriter
+from rasterio.shutil import copy as copy_raster
 from rasterio.windows import Window as RasterioWindow
 
+from mapfilter._io import atomic_file
 from mapfilter._types import Floats32
-from mapfilter.errors import Faults, InputError, fail
+from mapfilter.errors import Faults, InputError, OutputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
 from mapfilter.radio.cell_rules import id_fault
-from mapfilter.rasters.files import (
-    QUANTITY_TAG,
-    Quantity,
-    Window,
-    check_file,
-    existing,
-    reason,
-    without_nodata,
-)
+from mapfilter.rasters.files import Declared, Quantity, RasterFile, Window, without_nodata
+from mapfilter.rasters.grid_header import GridHeader
 
+QUANTITY_TAG = "MAPFILTER_QUANTITY"
+"""Tag of a file that states which quantity its bands hold."""
 _UNITS: dict[str, Quantity] = {"dbm": "level", "db": "loss"}
 _KINDS: tuple[Quantity, ...] = ("level", "loss", "deviation")
+_BLOCK_PX = 256
 _LEAST_BLOCK_BYTES = 1 << 26
 _INDEX_ENTRY_BYTES = 4
 _MOST_BLOCKS_LOOKED_AT = 20_000
 _SQUARE_TOLERANCE = 1e-6
 
 
-@dataclass(frozen=True, slots=True)
-class GeoTiff:
-    """A GeoTIFF or COG with square, north-up pixels.
+def _reason(error: Exception) -> str:
+    """Return the first line of GDAL's message."""
+    text = str(error.__cause__ or error).strip()
+    return text.splitlines()[0] if text else type(error).__name__
+
+
+@contextmanager
+def new_geotiff(
+    path: Path,
+    lattice: Lattice,
+    bands: Sequence[tuple[str, str]],
+    tags: Mapping[str, str],
+    *,
+    overviews: Literal["average", "nearest"] = "nearest",
+) -> Iterator[DatasetWriter]:
+    """Open a new cloud-optimised GeoTIFF of float32 bands; it is put in place when all is written.
 
     Parameters
     ----------
     path : Path
-    cell_ids : tuple of str
-        One per band.
-    lattice : Lattice
-    nodata : tuple of float
-        Numbers that mean no data, besides the file's own.
-    tagged : bool
-        Whether it says by mapfilter's tag what it holds.
+        Ends in .tif or .tiff.
+    bands : sequence of (str, str)
+        Description and unit of each band.
+    overviews : {"average", "nearest"}
+        How coarser levels are made; numbers that stand for names must not be averaged.
+
+    Yields
+    ------
+    rasterio.io.DatasetWriter
+        For any bands and windows, in any order; what is not written is NaN, the nodata value.
+
+    Raises
+    ------
+    OutputError
+        The name has another suffix, or the file cannot be written.
     """
+    if path.suffix.lower() not in (".tif", ".tiff"):
+        raise fail(OutputError, str(path), "a name that ends in .tif", path.suffix or "no suffix")
+    profile = {
+        "driver": "GTiff",
+        "width": lattice.cols,
+        "height": lattice.rows,
+        "count": len(bands),
+        "dtype": "float32",
+        "nodata": np.nan,
+        "crs": lattice.crs,
+        "transform": rasterio.Affine.from_gdal(*lattice.gdal_transform),
+        "interleave": "band",
+        "tiled": True,
+        "blockxsize": _BLOCK_PX,
+        "blockysize": _BLOCK_PX,
+        "sparse_ok": True,
+        "bigtiff": "if_safer",
+    }
+    cog = {"blocksize": _BLOCK_PX, "compress": "DEFLATE", "predictor": "YES"}
+    cog |= {"overview_resampling": overviews, "bigtiff": "if_safer"}
+    with atomic_file(path) as temporary:
+        unfinished = temporary.with_name("bands.tif")
+        try:
+            with rasterio.open(unfinished, "w", **profile) as target:
+                target.update_tags(**tags)
+                for band, (name, unit) in enumerate(bands, start=1):
+                    target.set_band_description(band, name)
+                    target.set_band_unit(band, unit)
+                yield target
+            copy_raster(unfinished, temporary, driver="COG", **cog)
+        except (RasterioError, CPLE_BaseError) as error:
+            expected = "a raster that can be written"
+            raise fail(OutputError, str(path), expected, _reason(error)) from error
 
-    path: Path
-    cell_ids: tuple[str, ...]
-    lattice: Lattice
-    nodata: tuple[float, ...] = ()
-    tagged: bool = False
 
-    @property
-    def parts(self) -> tuple[Path, ...]:
-        """The file alone."""
-        return existing(self.path)
+def write_rasters(
+    path: Path | str,
+    lattice: Lattice,
+    items: Iterable[tuple[str, NDArray[Any]]],
+    cell_ids: Sequence[str],
+    tags: Mapping[str, str] | None = None,
+    *,
+    quantity: Quantity = "level",
+) -> None:
+    """Write one band per cell, holding one band in memory at a time.
+
+    Values are rounded to 0.01 dB; NaN is nodata. Equal values give equal bytes.
+
+    Parameters
+    ----------
+    path : Path or str
+        Ends in .tif or .tiff.
+    items : iterable of (cell id, array of shape (rows, cols))
+        In the order of ``cell_ids``.
+    cell_ids : sequence of str
+        The band descriptions.
+    tags : mapping of str to str, optional
+        Free text kept in the file, such as how it was predicted.
+
+    Raises
+    ------
+    InputError
+        An item is not the cell that is next, or has another shape.
+    OutputError
+        The file cannot be written.
+    """
+    bands = [(cell_id, "dBm" if quantity == "level" else "dB") for cell_id in cell_ids]
+    tags = {**(tags or {}), QUANTITY_TAG: quantity}
+    count = 0
+    with new_geotiff(Path(path), lattice, bands, tags, overviews="average") as target:
+        for count, (cell_id, values) in enumerate(items, start=1):
+            expected = cell_ids[count - 1] if count <= len(cell_ids) else "no more cells"
+            if cell_id != expected:
+                raise fail(InputError, f"band {count}", repr(expected), repr(cell_id))
+            if values.shape != (lattice.rows, lattice.cols):
+                shape = f"{lattice.rows} x {lattice.cols} pixels"
+                raise fail(InputError, f"band {count} ({cell_id})", shape, values.shape)
+            rounded = np.round(np.asarray(values, dtype=np.float64), 2).astype(np.float32)
+            rounded[~np.isfinite(rounded)] = np.nan
+            target.write(rounded, count)
+        if count < len(cell_ids):
+            raise fail(InputError, "bands", f"{len(cell_ids)} cells", f"{count}")
+
+
+@dataclass(frozen=True, slots=True)
+class GeoTiff(RasterFile):
+    """A GeoTIFF or COG with square, north-up pixels."""
 
     def read(self, bands: Sequence[int], window: Window) -> Floats32:
-        """Read bands in a window; see :class:`~mapfilter.rasters.files.RasterFile`."""
+        """Read bands in a window; see :meth:`RasterFile.read`."""
         row, col, rows, cols = window
         numbers = [band + 1 for band in bands]
         try:
             with rasterio.open(self.path, driver="GTiff") as source:
-                part = RasterioWindow(col, row, cols, rows)
-                values = _masked(source, numbers, part)
-                scales = np.array(source.scales)[bands]
-                offsets = np.array(source.offsets)[bands]
+                values = _masked(source, numbers, RasterioWindow(col, row, cols, rows))
+                scales, offsets = np.array(source.scales)[bands], np.array(source.offsets)[bands]
         except (RasterioError, UnicodeDecodeError) as error:
-            raise fail(
-                InputError, str(self.path), "readable pixels", reason(error), "cut off or damaged"
-            ) from error
+            got, hint = _reason(error), "cut off or damaged"
+            raise fail(InputError, str(self.path), "readable pixels", got, hint) from error
         values = without_nodata(values, self.nodata)
         if (scales != 1).any() or (offsets != 0).any():
             scaled = values * scales[:, None, None] + offsets[:, None, None]
@@ -86,53 +182,36 @@ class GeoTiff:
 
 
 def open_geotiff(
-    path: Path, crs: str | None = None, nodata: float | None = None
-) -> tuple[GeoTiff, Quantity | None]:
-    """Look at the header of a GeoTIFF.
-
-    Parameters
-    ----------
-    path : Path
-        With one band and no description, its name without suffix is the cell's id.
-    crs : str, optional
-        For files without one.
-    nodata : float, optional
-        A number that means no data, besides the file's own.
-
-    Returns
-    -------
-    file : GeoTiff
-    quantity : {"level", "loss", "deviation"} or None
-        What the file says that it holds, by mapfilter's tag or by its unit.
+    path: Path, cell_id: str, declared: Declared, _instead: GridHeader | None = None
+) -> GeoTiff:
+    """Read the header of a GeoTIFF; ``cell_id`` names a single band without a description.
 
     Raises
     ------
     InputError
         With every fault of the file.
     """
-    check_file(path)
     faults = Faults()
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", NotGeoreferencedWarning)
             with rasterio.open(path, driver="GTiff") as source:
                 _check_extent_of_file(path, source, faults)
-                # What a cut-off file says about itself is not worth telling.
+                # Other faults of a file that is cut off are of no use.
                 faults.raise_if_any(InputError)
                 names = tuple(str(name or "") for name in source.descriptions)
-                if len(names) == 1 and not names[0]:
-                    names = (path.stem,)
+                described = names != ("",)
+                names = names if described else (cell_id,)
                 _check_bands(str(path), names, source.dtypes, faults)
-                lattice = _lattice(str(path), source, crs, not caught, faults)
+                lattice = _lattice(str(path), source, declared.crs, not caught, faults)
                 quantity, tagged = _quantity(source), QUANTITY_TAG in source.tags()
     except (RasterioError, UnicodeDecodeError) as error:
-        hint = "cut off, or no raster"
-        raise fail(
-            InputError, str(path), "a raster that GDAL can read", reason(error), hint
-        ) from error
+        got, hint = _reason(error), "cut off, or no raster"
+        raise fail(InputError, str(path), "a raster that GDAL can read", got, hint) from error
     faults.raise_if_any(InputError)
-    empty = () if nodata is None else (nodata,)
-    return GeoTiff(path, names, cast(Lattice, lattice), empty, tagged), quantity
+    nodata = () if declared.nodata is None else (declared.nodata,)
+    place = cast(Lattice, lattice)
+    return GeoTiff(path, names, place, nodata, (path,), quantity, tagged, described)
 
 
 def _masked(source: Any, bands: list[int], window: Any) -> Floats32:
@@ -182,8 +261,8 @@ def _check_pixels(where: str, source: Any, placed: bool, faults: Faults) -> bool
     elif t.b != 0 or t.d != 0:
         faults.add(f"{where}, transform", "rows that run east", "a rotated raster")
     elif t.e >= 0 or t.a <= 0:
-        faults.add(f"{where}, transform", "row 0 in the north, column 0 in the west",
-                   f"pixels of {t.a:g} x {t.e:g}", "a raster upside down or mirrored")  # fmt: skip
+        got, hint = f"pixels of {t.a:g} x {t.e:g}", "a raster upside down or mirrored"
+        faults.add(f"{where}, transform", "row 0 in the north, column 0 in the west", got, hint)
     elif abs(t.a + t.e) > _SQUARE_TOLERANCE * t.a:
         faults.add(f"{where}, transform", "square pixels", f"{t.a:g} m x {-t.e:g} m")
     return len(faults.found) == before
@@ -192,9 +271,8 @@ def _check_pixels(where: str, source: Any, placed: bool, faults: Faults) -> bool
 def _check_bands(where: str, names: tuple[str, ...], dtypes: Sequence[str], faults: Faults) -> None:
     nameless = [str(i) for i, name in enumerate(names, start=1) if not name]
     if nameless:
-        faults.add(
-            f"{where}, band {', '.join(nameless[:10])}", "a cell id as band description", "none"
-        )
+        bands = ", ".join(nameless[:10])
+        faults.add(f"{where}, band {bands}", "a cell id as band description", "none")
     for name in filter(None, names):
         if wrong := id_fault(name):
             faults.add(f"{where}, band {name!r}", *wrong)

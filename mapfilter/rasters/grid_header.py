@@ -1,7 +1,7 @@
 """Headers of plain grids, a key and a value per line: ESRI ASCII grids, HDR files of raw pixels.
 
 Both place the grid by the lower left pixel's corner or centre (``XLLCORNER``, ``XLLCENTER``) or by
-the upper left pixel's centre (``ULXMAP``).
+the upper left pixel's *centre* (``ULXMAP``), whose corner lies half a pixel to the north-west.
 """
 
 from __future__ import annotations
@@ -23,25 +23,20 @@ _MOST_PX = 10_000_000
 _FARTHEST_M = 1e8
 _SQUARE_TOLERANCE = 1e-6
 _DEGREES_STEP = 0.05
+WEST_KEYS = ("ULXMAP", "XLLCORNER", "XLLCENTER", "XLLCENTRE")
+_NORTH_KEYS = ("ULYMAP", "YLLCORNER", "YLLCENTER", "YLLCENTRE")
 
 
 @dataclass(frozen=True, slots=True)
 class GridHeader:
-    """Keys in capitals with their values, as texts.
-
-    Parameters
-    ----------
-    where : str
-        The file.
-    values : mapping of str to str
-    """
+    """The header of the file ``where``: keys in capitals with their values, as texts."""
 
     where: str
     values: Mapping[str, str]
 
     @classmethod
     def of(cls, where: str, lines: Sequence[bytes]) -> GridHeader:
-        """Split the lines of a header; a line without a value, or a comment, is passed over."""
+        """Split the lines of a header; a line without a value, or a comment, is ignored."""
         values: dict[str, str] = {}
         for line in lines:
             words = line.decode("utf-8", "replace").replace("=", " ").split(None, 2)
@@ -51,13 +46,7 @@ class GridHeader:
 
     @classmethod
     def read(cls, path: Path) -> GridHeader:
-        """Read the header file of raw pixels.
-
-        Raises
-        ------
-        InputError
-            The file is missing or too large for a header.
-        """
+        """Read the header file of raw pixels."""
         try:
             with path.open("rb") as stream:
                 data = stream.read(_LARGEST_HEADER_BYTES + 1)
@@ -72,7 +61,7 @@ class GridHeader:
         return next((key for key in keys if key in self.values), None)
 
     def number(self, key: str, faults: Faults) -> float | None:
-        """Return a value as a finite number; a fault is noted when it is none."""
+        """Return a value as a finite number, or None with a fault."""
         text = self.values[key]
         try:
             # A comma can only be a decimal one here: values end at blanks.
@@ -87,33 +76,25 @@ class GridHeader:
     def whole(
         self, key: str, faults: Faults, default: int | None = None, *, low: int = 0
     ) -> int | None:
-        """Return a value as a whole number in ``low`` to 10 million, else note a fault."""
+        """Return a value as a whole number in ``low`` to 10 million, or None with a fault."""
         if key not in self.values:
             if default is None:
                 faults.add(self.where, f"a line {key}", "none", "a header that is cut off")
             return default
         value = self.number(key, faults)
-        if value is None:
-            return None
-        if value != int(value) or not low <= value <= _MOST_PX:
-            expected = f"a whole number in {low}..{_MOST_PX}"
-            faults.add(f"{self.where}, {key}", expected, self.values[key][:_LONGEST_VALUE])
-            return None
-        return int(value)
-
-
-def is_placed(header: GridHeader) -> bool:
-    """Tell whether a header says where its grid lies."""
-    return header.first("ULXMAP", "XLLCORNER", "XLLCENTER", "XLLCENTRE") is not None
+        if value is None or (value == int(value) and low <= value <= _MOST_PX):
+            return None if value is None else int(value)
+        expected = f"a whole number in {low}..{_MOST_PX}"
+        faults.add(f"{self.where}, {key}", expected, self.values[key][:_LONGEST_VALUE])
+        return None
 
 
 def grid_lattice(
     header: GridHeader, crs: str, rows: int | None, cols: int | None, faults: Faults
 ) -> Lattice | None:
-    """Return where a grid lies; what is wrong is added to ``faults``."""
+    """Return where a grid lies, or None with a fault."""
     side_m = _side_m(header, faults)
-    west_key = header.first("ULXMAP", "XLLCORNER", "XLLCENTER", "XLLCENTRE")
-    north_key = header.first("ULYMAP", "YLLCORNER", "YLLCENTER", "YLLCENTRE")
+    west_key, north_key = header.first(*WEST_KEYS), header.first(*_NORTH_KEYS)
     if west_key is None or north_key is None:
         expected = "XLLCORNER and YLLCORNER, their CENTER, or ULXMAP and ULYMAP"
         faults.add(header.where, expected, "not both", "exported without its place")
@@ -141,54 +122,47 @@ def grid_lattice(
 
 
 def _side_m(header: GridHeader, faults: Faults) -> float | None:
-    keys = [key for pair in (("XDIM", "YDIM"), ("DX", "DY"), ("CELLSIZE",)) for key in pair]
+    keys = ("XDIM", "YDIM", "DX", "DY", "CELLSIZE")
     found = [key for key in keys if key in header.values][:2]
     if not found or (len(found) == 1 and found[0] != "CELLSIZE"):
         faults.add(header.where, "the size of a pixel: CELLSIZE, or XDIM and YDIM", "none")
         return None
-    sides_m = [header.number(key, faults) for key in found]
-    known = [side for side in sides_m if side is not None]
-    if len(known) < len(found):
+    sides_m = [side for key in found if (side := header.number(key, faults)) is not None]
+    if len(sides_m) < len(found):
         return None
-    if not 0 < min(known) <= _FARTHEST_M:
-        faults.add(f"{header.where}, {found[0]}", "metres > 0", f"{known[0]:g}")
+    if not 0 < min(sides_m) <= _FARTHEST_M:
+        faults.add(f"{header.where}, {found[0]}", "metres > 0", f"{sides_m[0]:g}")
         return None
-    if max(known) - min(known) > _SQUARE_TOLERANCE * max(known):
-        faults.add(header.where, "square pixels", " x ".join(f"{side:g}" for side in known))
+    if max(sides_m) - min(sides_m) > _SQUARE_TOLERANCE * max(sides_m):
+        faults.add(header.where, "square pixels", " x ".join(f"{side:g}" for side in sides_m))
         return None
-    return known[0]
+    return sides_m[0]
 
 
-def crs_file(path: Path) -> Path | None:
-    """Return the file beside a plain grid that tells its CRS, if there is one."""
-    return next((p for s in (".prj", ".PRJ") if (p := path.with_suffix(s)).is_file()), None)
+def beside(path: Path, *suffixes: str) -> Path | None:
+    """Return the file of the same name with one of some suffixes, if there is one."""
+    return next((p for s in suffixes if (p := path.with_suffix(s)).is_file()), None)
 
 
-def crs_beside(path: Path, declared: str | None) -> str:
-    """Return the CRS of a plain grid: that of the ``.prj`` file beside it, else the declared one.
-
-    Raises
-    ------
-    InputError
-        There is neither, or both and they differ, or the file is wrong and nothing is declared.
-    """
-    found = crs_file(path)
+def grid_crs(path: Path, declared: str | None) -> str:
+    """Return the CRS in the ``.prj`` file beside a plain grid, else the declared one."""
+    found = beside(path, ".prj", ".PRJ")
     if found is None:
         if declared is None:
-            hint = "plain grids do not tell it; say crs in [rasters]"
+            hint = "plain grids have none; set crs in [rasters]"
             raise fail(InputError, f"{path}, CRS", "a projected CRS in metres", "none", hint)
         return declared
     try:
         text = found.read_bytes()[:_LARGEST_HEADER_BYTES].decode("utf-8-sig").strip()
-        told = CRS.from_user_input(text)
+        stated = CRS.from_user_input(text)
     except (CRSError, UnicodeDecodeError, OSError, ValueError) as error:
         if declared is not None:
             return declared
         expected = "a CRS as well-known text"
-        raise fail(InputError, str(found), expected, "none that is known", "say crs") from error
+        raise fail(InputError, str(found), expected, "none that is known", "set crs") from error
     # The dialect of these files names datums in its own way, so that nothing matches exactly.
-    code = told.to_epsg(min_confidence=70)
-    crs = projected_crs(code or told, str(found))
+    code = stated.to_epsg(min_confidence=70)
+    crs = projected_crs(code or stated, str(found))
     if declared is not None and not same_crs(crs, declared):
         hint = "two systems mixed up"
         raise fail(InputError, str(found), f"{declared}, as declared", crs, hint)

@@ -24,7 +24,7 @@ _LARGEST_SOURCE_BYTES = 1 << 30
 def common_lattice(
     files: Sequence[RasterFile], resolution_m: float | None, resampling: Resampling
 ) -> tuple[Lattice, tuple[str, ...]]:
-    """Return one lattice for several files, and in words what is done to those that differ.
+    """Return one lattice for several files, and remarks on those that are resampled.
 
     Its pixels are those of most files of the finest resolution, unless another resolution is
     asked for; it covers all files.
@@ -34,9 +34,13 @@ def common_lattice(
     InputError
         The files are in different systems, or far apart.
     """
-    lattices = [file.lattice for file in files]
+    lattices, faults = [file.lattice for file in files], Faults()
     first = lattices[0]
-    _check_systems(files)
+    for file in files:
+        if not same_crs(file.lattice.crs, first.crs):
+            expected = f"{first.crs}, as in {files[0].path.name}"
+            faults.add(f"{file.path}, CRS", expected, file.lattice.crs, "two systems mixed up")
+    faults.raise_if_any(InputError)
     wanted_m = resolution_m or min(lattice.resolution_m for lattice in lattices)
     if all(lattice.aligned_with(first) for lattice in lattices) and _alike(
         wanted_m, first.resolution_m
@@ -51,11 +55,12 @@ def common_lattice(
     alike = [file for file in off if _alike(file.lattice.resolution_m, lattice.resolution_m)]
     others = [file for file in off if file not in alike]
     if alike:
-        right, up = _off_step(alike[0].lattice, lattice)
+        right = (alike[0].lattice.west_m - lattice.west_m) / lattice.resolution_m
+        up = (alike[0].lattice.north_m - lattice.north_m) / lattice.resolution_m
         notes.append(
-            f"{len(alike)} of {len(files)} rasters lie between the pixels of the lattice (by "
-            f"{right:+.2f} pixels east, {up:+.2f} north), resampled ({resampling}): "
-            f"{_names(alike)}"
+            f"{len(alike)} of {len(files)} rasters lie between the pixels of the lattice "
+            f"(by {right - round(right):+.2f} pixels east, {up - round(up):+.2f} north), "
+            f"resampled ({resampling}): {_names(alike)}"
         )
     if others:
         sides = sorted({file.lattice.resolution_m for file in others})
@@ -93,24 +98,8 @@ def read_on(
     return nearest if resampling == "nearest" else _bilinear(file, bands, row, col, nearest)
 
 
-def _check_systems(files: Sequence[RasterFile]) -> None:
-    faults, first = Faults(), files[0]
-    for file in files:
-        if not same_crs(file.lattice.crs, first.lattice.crs):
-            expected = f"{first.lattice.crs}, as in {first.path.name}"
-            faults.add(f"{file.path}, CRS", expected, file.lattice.crs, "two systems mixed up")
-    faults.raise_if_any(InputError)
-
-
 def _names(files: Sequence[RasterFile]) -> str:
     return ", ".join(file.path.name for file in files[:3]) + (", …" if len(files) > 3 else "")
-
-
-def _off_step(source: Lattice, target: Lattice) -> tuple[float, float]:
-    """Return by which parts of a pixel, east and north, two lattices of one resolution differ."""
-    right = (source.west_m - target.west_m) / target.resolution_m
-    up = (source.north_m - target.north_m) / target.resolution_m
-    return right - round(right), up - round(up)
 
 
 def _alike(a_m: float, b_m: float) -> bool:
@@ -119,21 +108,17 @@ def _alike(a_m: float, b_m: float) -> bool:
 
 def _covering(lattices: Sequence[Lattice], side_m: float, where: str) -> Lattice:
     """Return the lattice over all others, in step with most of those of its resolution."""
-    phases = Counter(
+    alike = [one for one in lattices if _alike(one.resolution_m, side_m)]
+    phases = [
         (round(one.west_m / side_m % 1, 3) % 1, round(one.north_m / side_m % 1, 3) % 1)
-        for one in lattices
-        if _alike(one.resolution_m, side_m)
-    )
-    wanted = phases.most_common(1)[0][0] if phases else None
+        for one in alike
+    ]
     origin_m = (0.0, 0.0)
-    for one in lattices:
-        phase = round(one.west_m / side_m % 1, 3) % 1, round(one.north_m / side_m % 1, 3) % 1
-        if phase == wanted and _alike(one.resolution_m, side_m):
-            origin_m = one.west_m, one.north_m
-            break
+    if alike:
+        one = alike[phases.index(Counter(phases).most_common(1)[0][0])]
+        origin_m = one.west_m, one.north_m
     bounds = np.array([one.bounds_m for one in lattices])
-    west, south = bounds[:, 0].min(), bounds[:, 1].min()
-    east, north = bounds[:, 2].max(), bounds[:, 3].max()
+    (west, south), (east, north) = bounds[:, :2].min(axis=0), bounds[:, 2:].max(axis=0)
     left = np.floor((west - origin_m[0]) / side_m + _ALIGNED_PX)
     right = np.ceil((east - origin_m[0]) / side_m - _ALIGNED_PX)
     top = np.floor((origin_m[1] - north) / side_m + _ALIGNED_PX)

@@ -1,27 +1,46 @@
-"""The map under a picture: extent, streets, local axes, scale bar, north, attribution."""
+"""The map under a picture: extent, streets, scale bar and north; rasters, names and legends on it.
+
+Maps are drawn in metres or kilometres east and north of their south-western corner.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import floor, log10
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
+from matplotlib.image import AxesImage
+from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
 
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
-from mapfilter.report.canvas import BLACK, GREY, STREET
+from mapfilter.geodesy import Lattice
+from mapfilter.report.canvas import BLACK, GREY, STREET, Look, figure_of, new_figure
 
 Bounds = tuple[float, float, float, float]
 
 HALO = (withStroke(linewidth=2.5, foreground="white"),)
 """White rim that keeps text and marks readable on any ground."""
 
+_NAME = Look(ha="center", va="center", fontweight="bold", path_effects=HALO)
+
+OVER_RASTER = "#00000030"
+"""Colour of streets that lie over a raster."""
+
+MAP_IN = 7.0
+"""Width of a single map."""
+
 _KILOMETRE_FROM_M = 1500.0
 _MOST_PX = 2400
+_ROW_IN, _HEADING_IN = 0.205, 0.55
+_MOST_NAMES = 60
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,10 +55,10 @@ class BaseMap:
         Lines as east, north.
     points_m : (n, 2) array or None
         Places where one can be, as east, north, on a lattice; drawn as pale pixels.
-    resolution_m : float
-        Distance between neighbouring points.
     attribution : str
         Whose map it is, such as "© OpenStreetMap contributors"; drawn small in a corner.
+    resolution_m : float
+        Distance between neighbouring points.
 
     Raises
     ------
@@ -64,12 +83,6 @@ class BaseMap:
             faults.add("map resolution", "metres > 0", self.resolution_m)
         faults.raise_if_any(InputError)
 
-    @property
-    def aspect(self) -> float:
-        """Height over width of the extent."""
-        west, south, east, north = self.bounds_m
-        return (north - south) / (east - west)
-
     def zoomed(self, bounds_m: Bounds) -> BaseMap:
         """Return the same map with another extent (and so another local origin)."""
         return replace(self, bounds_m=bounds_m)
@@ -90,10 +103,36 @@ class LocalFrame:
             (np.asarray(north_m, dtype=np.float64) - self.south_m) / self.unit_m,
         )
 
+    def extent(self, bounds_m: Bounds) -> tuple[float, float, float, float]:
+        """Return left, right, bottom, top of an area, as ``imshow`` takes them."""
+        west, south, east, north = bounds_m
+        (left, right), (bottom, top) = self(np.array([west, east]), np.array([south, north]))
+        return float(left), float(right), float(bottom), float(top)
+
+
+def local_frame(base: BaseMap) -> LocalFrame:
+    """Return the frame of a map: metres, of large areas kilometres."""
+    west, south, east, north = base.bounds_m
+    large = max(east - west, north - south) > _KILOMETRE_FROM_M
+    return LocalFrame(west, south, 1000.0 if large else 1.0)
+
 
 def map_height_in(base: BaseMap, width_in: float) -> float:
     """Return the height of a map ``width_in`` wide, kept within what still reads well."""
-    return float(np.clip(width_in * base.aspect, 0.45 * width_in, 1.6 * width_in))
+    west, south, east, north = base.bounds_m
+    height_in = width_in * (north - south) / (east - west)
+    return float(np.clip(height_in, 0.45 * width_in, 1.6 * width_in))
+
+
+def map_axes(given: Axes | None, base: BaseMap, beside_in: float) -> Axes:
+    """Return the axes of one map: those given, or new ones with so much room beside them."""
+    if given is not None:
+        return given
+    axes = new_figure(MAP_IN + beside_in, map_height_in(base, MAP_IN) + 0.85).subplots()
+    # Kept at the left: the layout reckons the room for its labels before the map's shape is
+    # fitted, and a map moved off its labels' room would have them cut off.
+    axes.set_anchor("W")
+    return axes
 
 
 def draw_base(
@@ -101,49 +140,60 @@ def draw_base(
 ) -> LocalFrame:
     """Draw streets and points, set extent and labels, and add scale bar and north arrow.
 
-    Parameters
-    ----------
-    axes : Axes
-        Empty axes.
-    base : BaseMap
-    streets : str
-        Colour of the streets.
-    scale_bar : bool
-        Whether to draw the scale bar and the north arrow.
-
-    Returns
-    -------
-    LocalFrame
-        By which data are put onto the axes.
+    ``streets`` is their colour; ``scale_bar`` whether to draw the bar and the arrow. By the frame
+    that is returned data are put onto the axes.
     """
-    west, south, east, north = base.bounds_m
-    in_km = max(east - west, north - south) > _KILOMETRE_FROM_M
-    frame = LocalFrame(west, south, 1000.0 if in_km else 1.0)
+    frame = local_frame(base)
     if base.points_m is not None and len(base.points_m):
         _draw_points(axes, frame, base.points_m, base.resolution_m)
     lines = [np.column_stack(frame(line[:, 0], line[:, 1])) for line in base.streets]
     if lines:
         axes.add_collection(LineCollection(lines, colors=streets, linewidths=0.6, zorder=1.5))
-    axes.set_xlim(0.0, (east - west) / frame.unit_m)
-    axes.set_ylim(0.0, (north - south) / frame.unit_m)
+    _show_extent(axes, frame, base)
     axes.set_aspect("equal")
-    unit = "km" if in_km else "m"
+    unit = "m" if frame.unit_m == 1.0 else "km"
     axes.set_xlabel(f"east of local origin / {unit}")
     axes.set_ylabel(f"north of local origin / {unit}")
     axes.tick_params(length=3)
     if scale_bar:
-        _draw_scale_bar(axes, east - west)
-        _draw_north(axes)
+        _draw_scale_bar(axes, base.bounds_m[2] - base.bounds_m[0])
+        arrow = Look(arrowstyle="-|>", color=BLACK, linewidth=1.4, shrinkA=1)
+        at = Look(xycoords="axes fraction", textcoords="offset points", arrowprops=arrow)
+        axes.annotate("N", (0.96, 0.985), (0, -38), **at, **_NAME, fontsize=9.5, zorder=19)
     return frame
 
 
 def attribute(axes: Axes, base: BaseMap) -> None:
     """Write whose map it is into the lower right corner."""
     if base.attribution:
-        axes.text(
-            0.992, 0.01, base.attribution, transform=axes.transAxes, ha="right", va="bottom",
-            fontsize=6.5, color=GREY, path_effects=list(HALO), zorder=20,
-        )  # fmt: skip
+        text = axes.text(0.992, 0.01, base.attribution, transform=axes.transAxes, zorder=20)
+        text.set(ha="right", va="bottom", fontsize=6.5, color=GREY, path_effects=HALO)
+
+
+def draw_raster(
+    axes: Axes, base: BaseMap, lattice: Lattice, values: NDArray[Any], **image: Any
+) -> AxesImage:
+    """Draw a raster over the map, pixel by pixel; masked pixels and NaN are left out.
+
+    The map is drawn already by :func:`draw_base`; ``image`` is as of ``axes.imshow``.
+    """
+    frame = local_frame(base)
+    shown = np.ma.masked_invalid(values)
+    given: Look = {
+        "extent": frame.extent(lattice.bounds_m),
+        "interpolation": "nearest",
+        "zorder": 2,
+    }
+    drawn = axes.imshow(shown, **(given | image))
+    # Undoes the zoom of imshow to its own raster.
+    _show_extent(axes, frame, base)
+    return drawn
+
+
+def _show_extent(axes: Axes, frame: LocalFrame, base: BaseMap) -> None:
+    _, right, _, top = frame.extent(base.bounds_m)
+    axes.set_xlim(0.0, right)
+    axes.set_ylim(0.0, top)
 
 
 def _draw_points(axes: Axes, frame: LocalFrame, points_m: Floats, resolution_m: float) -> None:
@@ -154,36 +204,92 @@ def _draw_points(axes: Axes, frame: LocalFrame, points_m: Floats, resolution_m: 
     pixels = np.zeros((int(row.max()) + 1, int(col.max()) + 1, 4), dtype=np.float32)
     pixels[..., :3] = to_rgb(STREET)
     pixels[row, col, 3] = 0.75
-    x, y = frame(*np.transpose([low, low + side_m * np.array(pixels.shape[1::-1])]))
-    axes.imshow(pixels, extent=(x[0], x[1], y[0], y[1]), origin="lower", zorder=1)
+    high = low + side_m * np.array(pixels.shape[1::-1])
+    axes.imshow(pixels, extent=frame.extent((*low, *high)), origin="lower", zorder=1)
 
 
 def _draw_scale_bar(axes: Axes, width_m: float) -> None:
-    length_m = _round_length_m(width_m / 4)
+    # The longest of 1, 2, 5 times a power of ten that is no more than a quarter of the width.
+    power = 10.0 ** floor(log10(width_m / 4))
+    length_m = next(factor * power for factor in (5.0, 2.0, 1.0) if factor * power <= width_m / 4)
     text = f"{length_m / 1000:g} km" if length_m >= 1000 else f"{length_m:g} m"
-    share = length_m / width_m
-    x = np.array([0.04, 0.04 + share])
-    axes.plot(
-        x, [0.045, 0.045], transform=axes.transAxes, color=BLACK, linewidth=2.5,
-        solid_capstyle="butt", path_effects=[withStroke(linewidth=5, foreground="white")],
-        zorder=19,
-    )  # fmt: skip
-    axes.text(
-        float(x.mean()), 0.06, text, transform=axes.transAxes, ha="center", va="bottom",
-        fontsize=8.5, path_effects=list(HALO), zorder=19,
-    )  # fmt: skip
+    x = np.array([0.04, 0.04 + length_m / width_m])
+    (bar,) = axes.plot(x, [0.045, 0.045], color=BLACK, linewidth=2.5, solid_capstyle="butt")
+    rim = [withStroke(linewidth=5, foreground="white")]
+    bar.set(transform=axes.transAxes, path_effects=rim, zorder=19)
+    named = axes.text(float(x.mean()), 0.06, text, transform=axes.transAxes, zorder=19)
+    named.set(ha="center", va="bottom", fontsize=8.5, path_effects=HALO)
 
 
-def _draw_north(axes: Axes) -> None:
-    axes.annotate(
-        "N", xy=(0.96, 0.985), xytext=(0, -38), xycoords="axes fraction",
-        textcoords="offset points", ha="center", va="center", fontsize=9.5, fontweight="bold",
-        arrowprops={"arrowstyle": "-|>", "color": BLACK, "linewidth": 1.4, "shrinkA": 1},
-        path_effects=list(HALO), zorder=19,
-    )  # fmt: skip
+def shape_faults(raster: NDArray[np.generic], lattice: Lattice) -> Faults:
+    """Return a fault if a raster does not have the lattice's size."""
+    faults = Faults()
+    if raster.shape != (lattice.rows, lattice.cols):
+        faults.add("raster", f"{lattice.rows} x {lattice.cols} pixels", raster.shape)
+    return faults
 
 
-def _round_length_m(at_most_m: float) -> float:
-    """Return the largest of 1, 2, 5 times a power of ten that is not longer."""
-    power = 10.0 ** floor(log10(at_most_m))
-    return next(factor * power for factor in (5.0, 2.0, 1.0) if factor * power <= at_most_m)
+def largest(counts: Sequence[int], most: int) -> set[int]:
+    """Return the places of the ``most`` largest counts; of equal ones the first.
+
+    Examples
+    --------
+    >>> sorted(largest([3, 9, 3, 0], 2))
+    [0, 1]
+    """
+    return set(np.argsort(-np.asarray(counts), kind="stable")[:most].tolist())
+
+
+def named_groups(counts: Sequence[int]) -> set[int]:
+    """Return the places of the groups to name on the map: not so many that no name is read."""
+    return {i for i in largest(counts, _MOST_NAMES) if counts[i] > 0}
+
+
+def short_names(names: Sequence[str]) -> list[str]:
+    """Return names without what they all begin with, up to a hyphen, for want of room on a map.
+
+    Examples
+    --------
+    >>> short_names(["302-720-29100-95", "302-720-29100-9"])
+    ['95', '9']
+    >>> short_names(["S1A", "S1B"])
+    ['S1A', 'S1B']
+    """
+    if len(names) < 2:
+        return list(names)
+    # What the first and the last in order share, all share.
+    first, last = min(names), max(names)
+    differ = (i for i, (a, b) in enumerate(zip(first, last, strict=False)) if a != b)
+    cut = first[: next(differ, len(first))].rfind("-") + 1
+    return [name[cut:] or name for name in names]
+
+
+def name_group(axes: Axes, x: Floats, y: Floats, name: str) -> None:
+    """Write a group's name on that one of its points that lies nearest to their median."""
+    middle = int(np.argmin(np.hypot(x - np.median(x), y - np.median(y))))
+    at = float(x[middle]), float(y[middle])
+    axes.text(*at, name, **_NAME, fontsize=8, zorder=12, clip_on=True)
+
+
+def side_legend(
+    axes: Axes,
+    heading: str,
+    groups: Sequence[Line2D],
+    counts: Sequence[int],
+    marks: Sequence[Line2D],
+) -> None:
+    """Put a legend to the right of the map: the largest groups that it has room for, and marks.
+
+    Both are labelled; ``counts`` are the sizes of the groups. Marks are always shown.
+    """
+    figure = figure_of(axes)
+    room = int((figure.get_figheight() - _HEADING_IN) / _ROW_IN) - len(marks)
+    shown = list(groups)
+    if len(groups) > room:
+        kept = largest(counts, max(room - 1, 1))
+        shown = [groups[i] for i in sorted(kept)]
+        left = len(groups) - len(kept)
+        shown.append(Line2D([], [], linestyle="", label=f"and {left} with less"))
+    look = Look(alignment="left", labelspacing=0.4, borderpad=0.9)
+    where = Look(loc="outside right upper", frameon=False)
+    figure.legend(handles=[*shown, *marks], title=heading, **where, **look)

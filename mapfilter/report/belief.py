@@ -1,35 +1,53 @@
-"""A belief of probabilities, from everywhere to one place."""
+"""A belief, from everywhere to one place, at up to six moments: one map each."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from math import sqrt
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from math import ceil, sqrt
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from mapfilter._types import Floats
+from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import Snapshot
-from mapfilter.report.basemap import BaseMap, LocalFrame
-from mapfilter.report.canvas import BLUE, grouped
-from mapfilter.report.panels import plot_panels
+from mapfilter.report.basemap import BaseMap, LocalFrame, attribute, draw_base, map_height_in
+from mapfilter.report.canvas import (
+    BLACK,
+    BLUE,
+    STREET,
+    VERMILLION,
+    Look,
+    bottom_legend,
+    grouped,
+    mark,
+    new_figure,
+    styled,
+)
 
+MAX_PANELS = 6
+
+_PANEL_IN = 4.0
 _SIDE_M, _MOST_SQUARES = 10.0, 200
 _DECADES, _FAINTEST = 2.0, 0.12
+_FAINTEST_CANDIDATE = 0.15
+
+_Draw = Callable[[Axes, LocalFrame, Snapshot], None]
 
 
-def plot_belief(
-    snapshots: Sequence[Snapshot], truth: Truth | None, base: BaseMap, path: Path
-) -> None:
+@styled
+def plot_belief(snapshots: Sequence[Snapshot], truth: Truth | None, base: BaseMap) -> Figure:
     """Draw where a filter believes to be at up to six moments, one panel each.
 
     A square of 10 m (or of half a percent of a larger area) fades with its probability, down to a
-    hundredth of the likeliest square's; squares with less than a thousandth are not drawn.
+    hundredth of the likeliest square's; squares with less than a thousandth are not drawn. Every
+    panel shows the whole area and names the distance travelled, in true metres where the truth is
+    known.
 
     Parameters
     ----------
@@ -39,23 +57,98 @@ def plot_belief(
         The true path, where known.
     base : BaseMap
         The map below.
-    path : Path
-        PNG to write.
 
     Raises
     ------
     InputError
         There is no snapshot, or more than six.
-    OutputError
-        The picture cannot be written.
     """
     west, south, east, north = base.bounds_m
     side_m = max(_SIDE_M, max(east - west, north - south) / _MOST_SQUARES)
 
     def draw(axes: Axes, frame: LocalFrame, snapshot: Snapshot) -> None:
-        _draw(axes, frame, snapshot, side_m)
+        _draw_squares(axes, frame, snapshot, side_m)
 
-    plot_panels(snapshots, truth, base, path, draw=draw, said=_said, marks=_marks())
+    shares = {"likeliest": 1.0, "a tenth of it": 0.1, "a hundredth": 0.01}
+    look = Look(markeredgewidth=0, color=BLUE)
+    marks = [
+        mark(name, "s", 7, alpha=float(fading(np.array(share))), **look)
+        for name, share in shares.items()
+    ]
+    return _plot_panels(snapshots, truth, base, draw, _mass_text, marks)
+
+
+@styled
+def plot_candidates(snapshots: Sequence[Snapshot], truth: Truth | None, base: BaseMap) -> Figure:
+    """Draw the hypotheses at up to six moments, one panel each, with truth and estimate.
+
+    Every panel names the number of hypotheses left; a hypothesis fades with its share of the
+    belief. Parameters and errors are those of :func:`plot_belief`.
+    """
+    dot = mark("candidates", "o", 5, color=BLUE)
+    return _plot_panels(snapshots, truth, base, _draw_candidates, _count_text, [dot])
+
+
+def _plot_panels(
+    snapshots: Sequence[Snapshot],
+    truth: Truth | None,
+    base: BaseMap,
+    draw: _Draw,
+    text: Callable[[Snapshot], str],
+    marks: Sequence[Line2D],
+) -> Figure:
+    count = len(snapshots)
+    if not 1 <= count <= MAX_PANELS:
+        raise fail(InputError, "snapshots", f"1 to {MAX_PANELS}", count)
+    if truth is not None and not truth.time_s.size:
+        truth = None
+    columns = count if count <= 3 else ceil(count / 2)
+    rows = ceil(count / columns)
+    height_in = rows * (map_height_in(base, _PANEL_IN) + 0.45) + 0.9
+    figure = new_figure(columns * (_PANEL_IN + 0.1) + 0.6, height_in)
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for index, (axes, snapshot) in enumerate(zip(panels, snapshots, strict=False)):
+        frame = draw_base(axes, base, scale_bar=index == 0)
+        draw(axes, frame, snapshot)
+        _draw_path(axes, frame, snapshot, truth)
+        travelled = f"{snapshot.travelled_m:.0f} m by dead reckoning"
+        if truth is not None:
+            travelled = f"{float(truth.distance_at(snapshot.time_s)):.0f} m travelled"
+        title = f"({'abcdef'[index]}) {travelled}, {text(snapshot)}"
+        axes.set_title(title, fontsize=10.5)
+        if index % columns:
+            axes.set_ylabel("")
+            axes.set_yticklabels([])
+        if index + columns < count:
+            axes.set_xlabel("")
+            axes.set_xticklabels([])
+    for axes in panels[count:]:
+        axes.set_visible(False)
+    attribute(panels[count - 1], base)
+    handles = [Line2D([], [], color=STREET, linewidth=2, label="where one can be"), *marks]
+    if truth is not None:
+        rim = Look(markerfacecolor="none", markeredgecolor=BLACK, markeredgewidth=1.6)
+        handles.append(Line2D([], [], color=BLACK, linewidth=1.3, label="true path so far"))
+        handles.append(mark("true position", "D", 7, **rim))
+    if any(np.isfinite(s.east_m) for s in snapshots):
+        handles.append(mark("estimate", "*", 13, color=VERMILLION, markeredgecolor="white"))
+    bottom_legend(figure, len(handles), handles)
+    return figure
+
+
+def _draw_path(axes: Axes, frame: LocalFrame, snapshot: Snapshot, truth: Truth | None) -> None:
+    if truth is not None:
+        past = truth.time_s <= snapshot.time_s
+        axes.plot(
+            *frame(truth.east_m[past], truth.north_m[past]), color=BLACK, linewidth=1.3, zorder=5
+        )
+        at = frame(*truth.at(snapshot.time_s))
+        rim = Look(facecolors="none", edgecolors=BLACK, linewidths=1.6)
+        axes.scatter(*at, s=52, marker="D", zorder=7, **rim)
+    if np.isfinite(snapshot.east_m) and np.isfinite(snapshot.north_m):
+        at = frame(np.array([snapshot.east_m]), np.array([snapshot.north_m]))
+        rim = Look(color=VERMILLION, edgecolors="white", linewidths=0.7)
+        axes.scatter(*at, s=150, marker="*", zorder=8, **rim)
 
 
 def fading(share: Floats) -> Floats:
@@ -72,7 +165,7 @@ def fading(share: Floats) -> Floats:
     return np.where(share >= 1e-3, opaque, 0.0)
 
 
-def _draw(axes: Axes, frame: LocalFrame, snapshot: Snapshot, side_m: float) -> None:
+def _draw_squares(axes: Axes, frame: LocalFrame, snapshot: Snapshot, side_m: float) -> None:
     if not snapshot.weight.size:
         return
     at_m = np.array([snapshot.hypothesis_east_m, snapshot.hypothesis_north_m])
@@ -83,16 +176,13 @@ def _draw(axes: Axes, frame: LocalFrame, snapshot: Snapshot, side_m: float) -> N
     pixels = np.empty((*mass.shape, 4))
     pixels[..., :3] = to_rgb(BLUE)
     pixels[..., 3] = fading(mass / mass.max())
-    ends_m = np.transpose([low, low + mass.shape[1::-1]]) * side_m
-    x, y = frame(*ends_m)
-    extent = (float(x[0]), float(x[1]), float(y[0]), float(y[1]))
+    extent = frame.extent((*(low * side_m), *((low + mass.shape[1::-1]) * side_m)))
     limits = axes.get_xlim(), axes.get_ylim()
     axes.imshow(pixels, extent=extent, origin="lower", interpolation="nearest", zorder=4)
-    axes.set_xlim(limits[0])
-    axes.set_ylim(limits[1])
+    axes.set(xlim=limits[0], ylim=limits[1])
 
 
-def _said(snapshot: Snapshot) -> str:
+def _mass_text(snapshot: Snapshot) -> str:
     off_m = np.hypot(
         snapshot.hypothesis_east_m - snapshot.east_m, snapshot.hypothesis_north_m - snapshot.north_m
     )
@@ -102,50 +192,7 @@ def _said(snapshot: Snapshot) -> str:
     return f"{words}: converged" if snapshot.status is Status.CONVERGED else words
 
 
-def _marks() -> list[Line2D]:
-    shares = {"likeliest": 1.0, "a tenth of it": 0.1, "a hundredth": 0.01}
-    return [
-        Line2D(
-            [], [], linestyle="", marker="s", markersize=7, markeredgewidth=0, color=BLUE,
-            alpha=float(fading(np.array(share))), label=name,
-        )
-        for name, share in shares.items()
-    ]  # fmt: skip
-
-
-_FAINTEST_CANDIDATE = 0.15
-
-
-def plot_candidates(
-    snapshots: Sequence[Snapshot], truth: Truth | None, base: BaseMap, path: Path
-) -> None:
-    """Draw the hypotheses at up to six moments, one panel each, with truth and estimate.
-
-    Every panel says how many hypotheses are left; a hypothesis fades with its share of the belief.
-
-    Parameters
-    ----------
-    snapshots : sequence of Snapshot
-        One to six, in the order of the panels.
-    truth : Truth or None
-        The true path, where known.
-    base : BaseMap
-        The map below.
-    path : Path
-        PNG to write.
-
-    Raises
-    ------
-    InputError
-        There is no snapshot, or more than six.
-    OutputError
-        The picture cannot be written.
-    """
-    dot = Line2D([], [], linestyle="", marker="o", markersize=5, color=BLUE, label="candidates")
-    plot_panels(snapshots, truth, base, path, draw=_draw_candidates, said=_left, marks=[dot])
-
-
-def _left(snapshot: Snapshot) -> str:
+def _count_text(snapshot: Snapshot) -> str:
     left = snapshot.hypothesis_east_m.size
     return f"{grouped(left)} {'candidate' if left == 1 else 'candidates'}"
 

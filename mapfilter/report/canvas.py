@@ -1,22 +1,30 @@
-"""Figures and colours that all pictures share.
+"""Figures, colours, legends and files that all pictures share.
 
-Pictures are drawn with matplotlib's object-oriented interface only: no pyplot, no state that
-outlives a call. Equal data give equal bytes.
+Every ``plot_*`` function of this package draws only: on the matplotlib axes that it is given, or
+on a figure of its own, and returns the axes (the figure where it has several panels).
+:func:`save` writes either. Pictures use matplotlib's object-oriented interface: no pyplot, no
+state that outlives a call. Equal data give equal bytes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import matplotlib
+import numpy as np
 from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import ArrayLike
 
 from mapfilter._io import atomic_file
+from mapfilter._types import Bools
+from mapfilter.errors import OutputError, fail
 
 DPI = 150
 """Pixels per inch of every picture."""
@@ -32,10 +40,13 @@ VERMILLION = "#d55e00"
 PURPLE = "#cc79a7"
 YELLOW = "#d9c400"
 
+_OKABE_ITO = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILLION, YELLOW)
 _DISTINCT = (
-    BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILLION, YELLOW, "#12355b", "#7a4b00", "#8c8c8c",
-    "#7b2d63", "#b9b4e8", "#00563f", "#f5a58f", "#87871f",
-)  # fmt: skip
+    *_OKABE_ITO,
+    *("#12355b", "#7a4b00", "#8c8c8c", "#7b2d63", "#b9b4e8", "#00563f", "#f5a58f", "#87871f"),
+)
+_TINTS = ((1.0, 0.5), (0.0, 0.35), (1.0, 0.72))
+"""Grey level that is mixed in, and how much of it, from one round of the colours to the next."""
 
 _STYLE: dict[Any, Any] = {
     "axes.edgecolor": GREY,
@@ -50,6 +61,7 @@ _STYLE: dict[Any, Any] = {
     "legend.framealpha": 0.92,
     "legend.edgecolor": STREET,
     "savefig.bbox": None,
+    "svg.hashsalt": "mapfilter",
     "text.color": BLACK,
     # A cell id may hold a dollar sign.
     "text.parse_math": False,
@@ -62,30 +74,102 @@ _STYLE: dict[Any, Any] = {
     "ytick.labelsize": 9,
 }
 
+Drawn = Axes | Figure
+"""What a ``plot_*`` function returns."""
 
-@contextmanager
-def picture(path: Path, width_in: float, height_in: float) -> Iterator[Figure]:
-    """Give an empty figure; write it to ``path`` as PNG, in one step, when the block succeeds.
+Look = dict[str, Any]
+"""Keywords of artists: ``Look(color=BLUE, linewidth=1.5)``."""
+
+_METADATA: dict[str, dict[str, Any]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None},
+    "pdf": {"CreationDate": None},
+}
+"""Versions and dates are left out of files: they would change the bytes from one to the next."""
+
+styled = matplotlib.rc_context(_STYLE)
+"""Decorator of all functions that draw: fonts, sizes and colours of the package."""
+
+
+def new_figure(width_in: float, height_in: float) -> Figure:
+    """Return an empty figure of a size in inches, at :data:`DPI` pixels each."""
+    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def figure_of(axes: Axes) -> Figure:
+    """Return the figure that axes are part of."""
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    return figure
+
+
+@styled
+def save(drawn: Drawn, path: Path) -> Path:
+    """Write a picture as PNG, SVG or PDF, by the suffix of the path, in one step.
 
     Parameters
     ----------
+    drawn : Axes or Figure
+        What a ``plot_*`` function returned.
     path : Path
-        Where the PNG goes; its folder is made.
-    width_in, height_in : float
-        Size in inches, at :data:`DPI` pixels each.
+        The folder is made where it is missing.
+
+    Returns
+    -------
+    Path
+        ``path``.
 
     Raises
     ------
     OutputError
-        The folder cannot be made or written.
+        The suffix is another one, or the file cannot be written.
     """
-    with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(width_in, height_in), layout="constrained")
-        FigureCanvasAgg(figure)
-        yield figure
-        with atomic_file(path) as temporary:
-            # The library's version in the file would change its bytes from one to the next.
-            figure.savefig(temporary, format="png", dpi=DPI, metadata={"Software": None})
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in _METADATA:
+        raise fail(OutputError, str(path), "a name that ends in .png, .svg or .pdf", path.name)
+    figure = drawn if isinstance(drawn, Figure) else figure_of(drawn)
+    with atomic_file(path) as temporary:
+        figure.savefig(temporary, format=kind, dpi=DPI, metadata=_METADATA[kind])
+    return path
+
+
+def tidy(axes: Axes, *, grid: bool = True) -> None:
+    """Take away the upper and right edge, and draw a pale grid below the data."""
+    axes.spines[["top", "right"]].set_visible(False)
+    if grid:
+        axes.grid(color="#e8e8e8", linewidth=0.7)
+        axes.set_axisbelow(True)
+
+
+def draw_shares(axes: Axes, values: ArrayLike, **line: Any) -> None:
+    """Draw a cumulative distribution in percent, with a line as of ``axes.step``.
+
+    NaN and infinity count as larger than any value: the line then ends below 100 %.
+    """
+    given = np.ravel(np.asarray(values, dtype=np.float64))
+    known = np.sort(given[np.isfinite(given)])
+    share = 100 * np.arange(known.size + 1) / max(given.size, 1)
+    axes.step(np.concatenate([[0.0], known]), share, where="post", **line)
+    axes.set_ylim(0, 101)
+
+
+def mark(label: str, marker: Any, size: float, **style: Any) -> Line2D:
+    """Return a mark for a legend, with its meaning."""
+    return Line2D([], [], linestyle="", marker=marker, markersize=size, label=label, **style)
+
+
+def stretches(where: Bools) -> Iterator[tuple[int, int]]:
+    """Yield the first index of each stretch that is true, and the one after its last.
+
+    Examples
+    --------
+    >>> list(stretches(np.array([True, False, True, True])))
+    [(0, 1), (2, 4)]
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], where, [0]]).astype(np.int8)))
+    yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
 
 
 def bottom_legend(
@@ -93,14 +177,10 @@ def bottom_legend(
 ) -> None:
     """Put a legend under the axes, in as many columns as there is room for.
 
-    Parameters
-    ----------
-    figure : Figure
-        One of :func:`picture`.
-    most_columns : int
-    handles : sequence of Artist, optional
-        What is in it; without, all that is labelled.
+    It shows the handles, or without any all that is labelled, if anything is.
     """
+    if handles is None and not any(ax.get_legend_handles_labels()[0] for ax in figure.axes):
+        return
     given: dict[str, Any] = {} if handles is None else {"handles": handles, "handletextpad": 0.4}
     for columns in range(most_columns, 0, -1):
         legend = figure.legend(loc="outside lower center", ncols=columns, frameon=False, **given)
@@ -109,18 +189,31 @@ def bottom_legend(
         legend.remove()
 
 
+def legend(axes: Axes, given: Axes | None, most_columns: int) -> None:
+    """Put a legend under the axes of a figure of ours, or into axes that were ``given``."""
+    if given is None:
+        bottom_legend(figure_of(axes), most_columns)
+    elif axes.get_legend_handles_labels()[0]:
+        axes.legend()
+
+
 def distinct_colours(count: int) -> list[str]:
     """Return colours that tell ``count`` groups apart, also for the colour-blind.
 
     The first seven are those of Okabe and Ito (2008) with a darker yellow, the next eight differ
-    from them in lightness; then they repeat, which is why maps also name every group in its place.
+    from them in lightness, the next 45 are lighter and darker ones of these; then they repeat,
+    which is why maps also name every group in its place.
 
     Examples
     --------
-    >>> len(set(distinct_colours(15))), len(distinct_colours(30))
-    (15, 30)
+    >>> len(set(distinct_colours(60))), len(distinct_colours(100))
+    (60, 100)
     """
-    return [_DISTINCT[i % len(_DISTINCT)] for i in range(count)]
+    colours = list(_DISTINCT)
+    for grey, share in _TINTS:
+        mixed = (1 - share) * np.array([to_rgb(colour) for colour in _DISTINCT]) + share * grey
+        colours += [to_hex(colour) for colour in mixed]
+    return [colours[i % len(colours)] for i in range(count)]
 
 
 def grouped(count: int) -> str:

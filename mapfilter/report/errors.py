@@ -1,21 +1,16 @@
-"""Error against the distance travelled."""
+"""Errors of tracks along the way or over time, and the evidence of a filter that has any."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from mapfilter._types import Floats
-from mapfilter.evaluation.accuracy import (
-    SUCCESS_RADIUS_M,
-    Accuracy,
-    Truth,
-    accuracy,
-    position_errors_m,
-)
+from mapfilter.errors import InputError, fail
+from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Truth, accuracy, position_errors_m
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.report.basemap import HALO
@@ -27,20 +22,27 @@ from mapfilter.report.canvas import (
     ORANGE,
     PURPLE,
     VERMILLION,
+    Look,
     bottom_legend,
-    distinct_colours,
-    picture,
+    legend,
+    new_figure,
+    stretches,
+    styled,
+    tidy,
 )
 
 _SIZE_IN = (9.0, 4.8)
-_SEARCHING = "#eeeeee"
-_LOST = "#f7d9c9"
+_EVIDENCE_IN = (9.0, 5.6)
+_SHADES = {Status.SEARCHING: "#eeeeee", Status.LOST: "#f7d9c9"}
+_SPANS = (*_SHADES.values(), "#dce9f5")
+_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, VERMILLION, GREY)
 _WIDE, _LEAST_M = 12.0, 0.3
 
 
+@styled
 def plot_error_over_distance(
-    estimate: TrackEstimate, truth: Truth, path: Path, *, title: str = ""
-) -> None:
+    estimate: TrackEstimate, truth: Truth, ax: Axes | None = None, *, title: str = ""
+) -> Axes:
     """Draw the position error over the metres really travelled.
 
     The error's axis is logarithmic where hundreds of metres become few; the filter's own radii are
@@ -53,209 +55,144 @@ def plot_error_over_distance(
         Epochs without a position leave a gap.
     truth : Truth
         The true path, at least one row.
-    path : Path
-        PNG to write.
+    ax : Axes, optional
+        Drawn on; a figure of its own by default.
     title : str
         Above the picture; without one, the filter's name.
-
-    Raises
-    ------
-    OutputError
-        The picture cannot be written.
     """
     distance_m = truth.distance_at(estimate.time_s)
     errors_m = position_errors_m(estimate, truth)
     length_m = max(float(truth.distance_at(truth.time_s[-1])), 1.0)
-    known_m = errors_m[np.isfinite(errors_m)]
     score = accuracy(estimate, truth)
+    known_m = errors_m[np.isfinite(errors_m)]
     most_m = max(float(known_m.max(initial=0.0)), 1.1 * SUCCESS_RADIUS_M)
-    # Hundreds of metres while searching would press what follows flat.
-    wide = score.switched and most_m > _WIDE * score.error_95_m
-    with picture(path, *_SIZE_IN) as figure:
-        axes = figure.subplots()
-        axes.set_xlim(0.0, length_m)
-        if wide:
-            axes.set_yscale("log")
-            axes.set_ylim(_LEAST_M, 2 * most_m)
-            axes.yaxis.set_major_formatter("{x:g}")
-        else:
-            axes.set_ylim(0.0, 1.15 * most_m)
-        shade_searching_and_lost(axes, estimate, distance_m)
-        axes.axhline(
-            SUCCESS_RADIUS_M, color=VERMILLION, linewidth=1.2, linestyle=(0, (5, 3)),
-            label=f"{SUCCESS_RADIUS_M:.0f} m",
-        )  # fmt: skip
-        told_m = estimate.radii_m.T
-        if np.isfinite(told_m[2]).any():
-            for radius_m in told_m:
-                axes.fill_between(distance_m, radius_m, color=ORANGE, alpha=0.16, linewidth=0)
-            axes.plot(
-                distance_m, told_m[2], color=ORANGE, linewidth=1.1,
-                label="50, 67, 95 % radius by the filter",
-            )  # fmt: skip
-        axes.plot(distance_m, errors_m, color=BLUE, linewidth=1.5, label="error")
-        if score.switched:
-            _draw_score(axes, score, length_m)
-        else:
-            axes.text(
-                0.5, 0.55, "never switched to tracking", transform=axes.transAxes, ha="center",
-                color=GREY, fontsize=12, path_effects=list(HALO),
-            )  # fmt: skip
-        axes.set_xlabel("distance travelled / m")
-        axes.set_ylabel("position error / m")
-        axes.set_title(title or f"Filter: {estimate.filter}")
-        axes.spines[["top", "right"]].set_visible(False)
-        figure.legend(loc="outside lower center", ncols=4, frameon=False)
+    axes = new_figure(*_SIZE_IN).subplots() if ax is None else ax
+    axes.set(xlim=(0.0, length_m), ylim=(0.0, 1.15 * most_m))
+    if score.switched and most_m > _WIDE * score.error_95_m:
+        # Hundreds of metres while searching would press what follows flat.
+        axes.set(yscale="log", ylim=(_LEAST_M, 2 * most_m))
+        axes.yaxis.set_major_formatter("{x:g}")
+    _shade(axes, estimate, distance_m)
+    near = Look(color=VERMILLION, linewidth=1.2, linestyle=(0, (5, 3)))
+    axes.axhline(SUCCESS_RADIUS_M, label=f"{SUCCESS_RADIUS_M:.0f} m", **near)
+    radii_m = estimate.radii_m.T
+    if np.isfinite(radii_m[2]).any():
+        for radius_m in radii_m:
+            axes.fill_between(distance_m, radius_m, color=ORANGE, alpha=0.16, linewidth=0)
+        band = Look(color=ORANGE, linewidth=1.1, label="50, 67, 95 % radius by the filter")
+        axes.plot(distance_m, radii_m[2], **band)
+    axes.plot(distance_m, errors_m, color=BLUE, linewidth=1.5, label="error")
+    if score.switched:
+        at_m, error_m = score.switch_distance_m, score.error_at_switch_m
+        star = Look(markersize=15, markeredgecolor="white", zorder=6, clip_on=False)
+        name = f"switch: {error_m:.0f} m off after {at_m:.0f} m"
+        axes.plot([at_m], [error_m], "*", color=VERMILLION, label=name, **star)
+        for figure, after_m, dashes, colour in (
+            ("mean", score.error_mean_m, "-", BLACK),
+            ("67 %", score.error_67_m, (0, (6, 2)), GREEN),
+            ("95 %", score.error_95_m, (0, (1.5, 1.5)), GREY),
+        ):
+            if np.isfinite(after_m):
+                look = Look(color=colour, linestyle=dashes, linewidth=1.4, zorder=5)
+                name = f"{figure} after it: {after_m:.1f} m"
+                axes.plot([at_m, length_m], [after_m, after_m], label=name, **look)
+    else:
+        text = axes.text(0.5, 0.55, "never switched to tracking", transform=axes.transAxes)
+        text.set(ha="center", color=GREY, fontsize=12, path_effects=HALO)
+    axes.set(xlabel="distance travelled / m", ylabel="position error / m")
+    axes.set_title(title or f"Filter: {estimate.filter}")
+    tidy(axes, grid=False)
+    legend(axes, ax, 4)
+    return axes
 
 
-def shade_searching_and_lost(
-    axes: Axes, estimate: TrackEstimate, along: Floats, *, named: bool = True
-) -> None:
-    """Shade the stretches of a track during which the filter was searching or lost.
-
-    Parameters
-    ----------
-    axes : Axes
-    estimate : TrackEstimate
-    along : (N,) array
-        Where each epoch is on the level axis.
-    named : bool
-        Whether the legend names them.
-    """
-    for status, colour in ((Status.SEARCHING, _SEARCHING), (Status.LOST, _LOST)):
-        name = status.lower() if named else None
-        _shade(axes, estimate, along, status, colour, name)
-
-
-def _draw_score(axes: Axes, score: Accuracy, length_m: float) -> None:
-    """Draw the switch, and mean and percentiles from there on."""
-    at_m = score.switch_distance_m
-    axes.plot(
-        [at_m], [score.error_at_switch_m], linestyle="", marker="*", markersize=15,
-        color=VERMILLION, markeredgecolor="white", zorder=6, clip_on=False,
-        label=f"switch: {score.error_at_switch_m:.0f} m off after {at_m:.0f} m",
-    )  # fmt: skip
-    figures = (
-        ("mean", score.error_mean_m, "-", BLACK),
-        ("67 %", score.error_67_m, (0, (6, 2)), GREEN),
-        ("95 %", score.error_95_m, (0, (1.5, 1.5)), GREY),
-    )
-    for name, error_m, dashes, colour in figures:
-        if np.isfinite(error_m):
-            axes.plot(
-                [at_m, length_m], [error_m, error_m], color=colour, linewidth=1.4,
-                linestyle=dashes, zorder=5, label=f"{name} after it: {error_m:.1f} m",
-            )  # fmt: skip
-
-
-def _shade(
-    axes: Axes,
-    estimate: TrackEstimate,
-    along: Floats,
-    status: Status,
-    colour: str,
-    name: str | None,
-) -> None:
-    """Shade the stretches during which the filter had a status."""
-    has = np.array([s is status for s in estimate.status], dtype=bool)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], has, [False]]).astype(np.int8)))
-    for index, (first, end) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
-        last = min(int(end), along.size - 1)
-        axes.axvspan(
-            float(along[first]), float(along[last]), color=colour, linewidth=0,
-            zorder=0, label=name if index == 0 else None,
-        )  # fmt: skip
-
-
-_CURVES_SIZE_IN = (6.4, 4.6)
-_CURVES_LEAST_M, _MOST_M = 1.0, 1000.0
-
-
-def plot_error_curves(errors_m: Mapping[str, Sequence[float]], path: Path, *, title: str) -> None:
-    """Draw the cumulative distribution of each method's errors.
-
-    Parameters
-    ----------
-    errors_m : mapping of str to sequence of float
-        By method; those without any are left out.
-    path : Path
-        PNG to write.
-    title : str
-
-    Raises
-    ------
-    OutputError
-        The picture cannot be written.
-    """
-    known = {name: np.sort(np.asarray(values)) for name, values in errors_m.items() if values}
-    with picture(path, *_CURVES_SIZE_IN) as figure:
-        axes = figure.subplots()
-        for (name, values), colour in zip(known.items(), distinct_colours(len(known)), strict=True):
-            share = 100 * np.arange(1, values.size + 1) / values.size
-            label = f"{name}: median {np.median(values):.0f} m"
-            axes.step(
-                np.maximum(values, _CURVES_LEAST_M), share, where="post", color=colour, label=label
-            )
-        axes.set_xscale("log")
-        axes.set_xlim(_CURVES_LEAST_M, _MOST_M)
-        axes.set_ylim(0, 101)
-        axes.set_xlabel("error / m")
-        axes.set_ylabel("share of the scored fixes / %")
-        axes.grid(color="#e8e8e8", linewidth=0.7)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.set_title(title)
-        if known:
-            bottom_legend(figure, 2)
-
-
-_TIME_SIZE_IN = (9.0, 4.8)
-_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, VERMILLION, GREY)
-_SHADES = ("#eeeeee", "#f7d9c9", "#dce9f5")
-_TIME_LEAST_M = 0.3
-
-
+@styled
 def plot_errors_over_time(
     estimates: Mapping[str, TrackEstimate],
     truth: Truth,
-    path: Path,
+    ax: Axes | None = None,
     *,
     spans: Sequence[tuple[str, float, float]] = (),
     title: str = "",
-) -> None:
+) -> Axes:
     """Draw the position errors of several estimates, on a logarithmic axis.
 
     Parameters
     ----------
     estimates : mapping of str to TrackEstimate
-        By what the legend calls them; up to six.
-    truth : Truth
-    path : Path
-        PNG to write.
+        By their names in the legend; up to six.
+    ax : Axes, optional
+        Drawn on; a figure of its own by default.
     spans : sequence of (str, float, float)
-        Stretches of time to shade: what they are called, begin and end in seconds.
+        Stretches of time to shade: name, begin and end in seconds.
+    """
+    axes = new_figure(*_SIZE_IN).subplots() if ax is None else ax
+    for (name, begin_s, end_s), shade in zip(spans, _SPANS, strict=False):
+        axes.axvspan(begin_s, end_s, color=shade, linewidth=0, zorder=0, label=name)
+    for (name, estimate), colour in zip(estimates.items(), _COLOURS, strict=False):
+        errors_m = position_errors_m(estimate, truth).clip(_LEAST_M)
+        axes.plot(estimate.time_s, errors_m, color=colour, linewidth=1.4, label=name)
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.set_ylim(bottom=_LEAST_M)
+    axes.set_xlim(float(truth.time_s[0]), float(truth.time_s[-1]))
+    axes.set(xlabel="time / s", ylabel="position error / m", title=title)
+    tidy(axes, grid=False)
+    legend(axes, ax, 3)
+    return axes
+
+
+@styled
+def plot_evidence(estimate: TrackEstimate, truth: Truth | None, *, title: str = "") -> Figure:
+    """Draw entropy, the leading hypothesis's and the runner-up's shares, and the status.
+
+    Over the metres really travelled; over seconds where the truth is not known.
+
+    Parameters
+    ----------
+    estimate : TrackEstimate
+        With evidence.
+    truth : Truth or None
+        The true path, where known.
     title : str
+        Above the picture; without one, the filter's name.
 
     Raises
     ------
-    OutputError
-        The picture cannot be written.
+    InputError
+        The filter holds no probabilities, or there is no epoch.
     """
-    with picture(path, *_TIME_SIZE_IN) as figure:
-        axes = figure.subplots()
-        for (name, begin_s, end_s), shade in zip(spans, _SHADES, strict=False):
-            axes.axvspan(begin_s, end_s, color=shade, linewidth=0, zorder=0, label=name)
-        for (name, estimate), colour in zip(estimates.items(), _COLOURS, strict=False):
-            axes.plot(
-                estimate.time_s, position_errors_m(estimate, truth).clip(_TIME_LEAST_M),
-                color=colour, linewidth=1.4, label=name,
-            )  # fmt: skip
-        axes.set_yscale("log")
-        axes.yaxis.set_major_formatter("{x:g}")
-        axes.set_ylim(bottom=_TIME_LEAST_M)
-        axes.set_xlim(float(truth.time_s[0]), float(truth.time_s[-1]))
-        axes.set_xlabel("time / s")
-        axes.set_ylabel("position error / m")
-        axes.set_title(title)
-        axes.spines[["top", "right"]].set_visible(False)
-        figure.legend(loc="outside lower center", ncols=3, frameon=False)
+    evidence = estimate.evidence
+    if evidence is None or not len(estimate):
+        raise fail(InputError, "estimate, evidence", "epochs with probabilities", "none")
+    along, across = estimate.time_s, "time / s"
+    if truth is not None and truth.time_s.size:
+        along, across = truth.distance_at(estimate.time_s), "distance travelled / m"
+    figure = new_figure(*_EVIDENCE_IN)
+    above, below = figure.subplots(2, 1, sharex=True)
+    above.plot(along, evidence.entropy_bits, color=BLUE, linewidth=1.5, label="entropy")
+    above.set_ylabel("entropy over 25 m squares / bit")
+    above.set_ylim(bottom=0.0)
+    within = f"within {SUCCESS_RADIUS_M:.0f} m of the leading hypothesis"
+    below.plot(along, 100 * estimate.mass_50m, color=VERMILLION, linewidth=1.5, label=within)
+    runner_up = 100 * evidence.runner_up_mass
+    below.plot(along, runner_up, color=ORANGE, linewidth=1.2, label="runner-up")
+    below.set(xlabel=across, ylabel="probability / %", ylim=(0.0, 104.0))
+    below.set_xlim(float(along[0]), max(float(np.max(along)), float(along[0]) + 1.0))
+    for axes in (above, below):
+        _shade(axes, estimate, along, named=axes is above)
+        tidy(axes, grid=False)
+    above.set_title(title or f"Filter: {estimate.filter}")
+    bottom_legend(figure, 5)
+    return figure
+
+
+def _shade(axes: Axes, estimate: TrackEstimate, along: Floats, *, named: bool = True) -> None:
+    """Shade the stretches of a track during which the filter was searching or lost."""
+    for status, colour in _SHADES.items():
+        has = np.array([s is status for s in estimate.status], dtype=bool)
+        name = status.lower() if named else None
+        for first, end in stretches(has):
+            ends = float(along[first]), float(along[min(end, along.size - 1)])
+            axes.axvspan(*ends, color=colour, linewidth=0, zorder=0, label=name)
+            name = None

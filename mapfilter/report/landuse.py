@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib.colors import ListedColormap
-from matplotlib.lines import Line2D
+from matplotlib.figure import Figure
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
-from mapfilter.report.basemap import BaseMap, attribute, draw_base, map_height_in
-from mapfilter.report.canvas import BLACK, BLUE, GREY, distinct_colours, picture
-from mapfilter.report.layers import OVER_RASTER, keep_extent, raster_extent, shape_faults
+from mapfilter.report.basemap import (
+    OVER_RASTER,
+    BaseMap,
+    attribute,
+    draw_base,
+    draw_raster,
+    map_height_in,
+    shape_faults,
+)
+from mapfilter.report.canvas import (
+    BLACK,
+    BLUE,
+    GREY,
+    Look,
+    distinct_colours,
+    mark,
+    new_figure,
+    styled,
+)
 from mapfilter.roads.landuse import LandUse
 
 _PANEL_IN = 5.2
@@ -22,27 +36,20 @@ _NOT_WALKABLE = "#ececec"
 _UNKNOWN = "white"
 
 
+@styled
 def plot_landuse(
-    landuse: LandUse,
-    lattice: Lattice,
-    base: BaseMap,
-    path: Path,
-    *,
-    title: str = "Land use",
-) -> None:
+    landuse: LandUse, lattice: Lattice, base: BaseMap, *, title: str = "Land use"
+) -> Figure:
     """Draw the classes beside where one can walk, with each one's share of the area.
 
     Classes that are nowhere in the area are left out of the legend.
 
     Parameters
     ----------
-    landuse : LandUse
     lattice : Lattice
         Where the pixels lie.
     base : BaseMap
         The map below.
-    path : Path
-        PNG to write.
     title : str
         Above the classes.
 
@@ -50,8 +57,6 @@ def plot_landuse(
     ------
     InputError
         The raster does not fit the lattice.
-    OutputError
-        The picture cannot be written.
     """
     shape_faults(landuse.code, lattice).raise_if_any(InputError)
     colours = list(landuse.colours) or distinct_colours(len(landuse.names))
@@ -59,37 +64,28 @@ def plot_landuse(
     there = np.flatnonzero(counts)
     rows = -(-len(there) // _COLUMNS)
     height_in = map_height_in(base, _PANEL_IN) + 1.15 + _LEGEND_ROW_IN * rows
-    walkable = landuse.walkable
-    with picture(path, 2 * _PANEL_IN + 0.9, height_in) as figure:
-        left, right = figure.subplots(1, 2)
-        panels = (
-            (left, np.ma.masked_less(landuse.code, 0), colours or [_UNKNOWN]),
-            (right, np.ma.masked_where(landuse.code < 0, walkable), [_NOT_WALKABLE, BLUE]),
-        )
-        for axes, shown, palette in panels:
-            frame = draw_base(axes, base, streets=OVER_RASTER, scale_bar=axes is left)
-            axes.imshow(
-                shown, extent=raster_extent(lattice, base, frame.unit_m),
-                cmap=ListedColormap(palette), vmin=-0.5, vmax=len(palette) - 0.5,
-                interpolation="nearest", zorder=2,
-            )  # fmt: skip
-            keep_extent(axes, base, frame.unit_m)
-        left.set_title(title)
-        right.set_title(f"Where one can walk: {100 * walkable.mean():.1f} % of the area")
-        right.set_ylabel("")
-        right.set_yticklabels([])
-        attribute(right, base)
-        handles = [
-            Line2D(
-                [], [], linestyle="", marker="s", markersize=8, color=colours[code],
-                markeredgecolor=BLACK if landuse.can_walk[code] else GREY,
-                markeredgewidth=1.0 if landuse.can_walk[code] else 0.4,
-                label=f"{landuse.names[code]}{' (walkable)' if landuse.can_walk[code] else ''}: "
-                f"{100 * counts[code] / landuse.code.size:.1f} %",
-            )
-            for code in there
-        ]  # fmt: skip
-        figure.legend(
-            handles=handles, loc="outside lower center", ncols=_COLUMNS, frameon=False,
-            handletextpad=0.3,
-        )  # fmt: skip
+    figure = new_figure(2 * _PANEL_IN + 0.9, height_in)
+    left, right = figure.subplots(1, 2)
+    walkable = np.ma.masked_where(landuse.code < 0, landuse.walkable)
+    panels = (
+        (left, np.ma.masked_less(landuse.code, 0), colours or [_UNKNOWN]),
+        (right, walkable, [_NOT_WALKABLE, BLUE]),
+    )
+    for axes, shown, palette in panels:
+        draw_base(axes, base, streets=OVER_RASTER, scale_bar=axes is left)
+        limits = (-0.5, len(palette) - 0.5)
+        draw_raster(axes, base, lattice, shown, cmap=ListedColormap(palette), clim=limits)
+    left.set_title(title)
+    right.set_title(f"Where one can walk: {100 * landuse.walkable.mean():.1f} % of the area")
+    right.set_ylabel("")
+    right.set_yticklabels([])
+    attribute(right, base)
+    handles = []
+    for code in there:
+        can_walk, share = landuse.can_walk[code], 100 * counts[code] / landuse.code.size
+        label = f"{landuse.names[code]}{' (walkable)' if can_walk else ''}: {share:.1f} %"
+        rim = (BLACK, 1.0) if can_walk else (GREY, 0.4)
+        handles.append(mark(label, "s", 8, color=colours[code], mec=rim[0], mew=rim[1]))
+    where = Look(loc="outside lower center", frameon=False, handletextpad=0.3)
+    figure.legend(handles=handles, ncols=_COLUMNS, **where)
+    return figure

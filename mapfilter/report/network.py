@@ -1,10 +1,14 @@
-"""Sites, sector azimuths and indoor cells as marks on a map."""
+"""A network on the map: cells, points by cell (Figs. 2 and 4 of Khalaf-Allah 2007), levels, margin.
+
+Plots of rasters take them with the lattice on which their pixels lie, (rows, cols); the plan's
+sites, sector azimuths and indoor cells are marked, those outside the map's extent left out.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from math import cos, hypot, sin
-from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -14,23 +18,47 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from mapfilter._types import Ints
+from mapfilter._types import Floats, Ints
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice, grid_convergence_rad, heading_from_azimuth_rad, unproject
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.report.basemap import HALO, BaseMap, Bounds, LocalFrame, attribute, draw_base
-from mapfilter.report.canvas import BLACK, GREY
-from mapfilter.report.layers import (
+from mapfilter.report.basemap import (
+    HALO,
+    MAP_IN,
     OVER_RASTER,
-    keep_extent,
-    map_picture,
-    raster_extent,
+    BaseMap,
+    Bounds,
+    LocalFrame,
+    attribute,
+    draw_base,
+    draw_raster,
+    local_frame,
+    map_axes,
+    name_group,
+    named_groups,
     shape_faults,
+    short_names,
     side_legend,
 )
+from mapfilter.report.canvas import (
+    BLACK,
+    GREY,
+    Look,
+    distinct_colours,
+    figure_of,
+    grouped,
+    mark,
+    styled,
+)
+
+STEPS_DB = (0.0, 1.0, 3.0, 6.0, 10.0, 15.0, 20.0)
+"""Where the classes of margins begin; the last has no end."""
 
 _ARROW_SHARE = 0.06
 """Length of a sector's arrow, as a share of the extent's diagonal."""
+
+_LEGEND_IN, _WIDE_LEGEND_IN, _BAR_IN = 2.7, 3.4, 1.7
+_ONE_CELL = "#fff7bc"
 
 
 def draw_cells(axes: Axes, frame: LocalFrame, plan: CellPlan, bounds_m: Bounds) -> None:
@@ -41,138 +69,245 @@ def draw_cells(axes: Axes, frame: LocalFrame, plan: CellPlan, bounds_m: Bounds) 
     """
     west, south, east, north = bounds_m
     length_m = _ARROW_SHARE * hypot(east - west, north - south)
+    arrow = Look(arrowstyle="-|>", color=BLACK, linewidth=1.6, shrinkA=0)
     for cell in plan.cells:
         if not (west <= cell.east_m <= east and south <= cell.north_m <= north):
             continue
-        x, y = frame(np.array([cell.east_m]), np.array([cell.north_m]))
+        x, y = (float(at) for at in frame(np.array(cell.east_m), np.array(cell.north_m)))
+        dot = Look(s=62, color=BLACK, edgecolors="white", linewidths=1.2)
         if cell.indoor:
-            axes.scatter(
-                x, y, s=46, marker="s", color="white", edgecolors=BLACK, linewidths=1.6, zorder=11
-            )
-            axes.annotate(
-                cell.id, (float(x[0]), float(y[0])), xytext=(7, 0), textcoords="offset points",
-                va="center", fontsize=8, fontweight="bold", path_effects=list(HALO), zorder=12,
-            )  # fmt: skip
-            continue
-        if cell.azimuth_deg is not None:
+            dot = Look(s=46, marker="s", color="white", edgecolors=BLACK, linewidths=1.6)
+            name = axes.annotate(cell.id, (x, y), (7, 0), textcoords="offset points", zorder=12)
+            name.set(va="center", fontsize=8, fontweight="bold", path_effects=HALO)
+        elif cell.azimuth_deg is not None:
             heading_rad = _heading_rad(plan.crs, cell, cell.azimuth_deg)
-            tip = (
-                float(x[0]) + length_m / frame.unit_m * cos(heading_rad),
-                float(y[0]) + length_m / frame.unit_m * sin(heading_rad),
-            )
-            arrow = axes.annotate(
-                "", xy=tip, xytext=(float(x[0]), float(y[0])), zorder=10, annotation_clip=False,
-                arrowprops={"arrowstyle": "-|>", "color": BLACK, "linewidth": 1.6, "shrinkA": 0},
-            )  # fmt: skip
-            if arrow.arrow_patch is not None:
-                arrow.arrow_patch.set_path_effects([withStroke(linewidth=3.6, foreground="white")])
-        axes.scatter(x, y, s=62, color=BLACK, edgecolors="white", linewidths=1.2, zorder=11)
+            length = length_m / frame.unit_m
+            tip = x + length * cos(heading_rad), y + length * sin(heading_rad)
+            drawn = axes.annotate("", tip, (x, y), arrowprops=arrow, annotation_clip=False)
+            drawn.set_zorder(10)
+            if drawn.arrow_patch is not None:
+                drawn.arrow_patch.set_path_effects([withStroke(linewidth=3.6, foreground="white")])
+        axes.scatter([x], [y], zorder=11, **dot)
 
 
 def network_legend(plan: CellPlan) -> list[Line2D]:
     """Return what the marks of a plan mean; only those that it has."""
+    outdoor = [cell for cell in plan.cells if not cell.indoor]
     handles = []
-    if any(not cell.indoor for cell in plan.cells):
-        handles.append(
-            Line2D([], [], linestyle="", marker="o", markersize=7, color=BLACK, label="site")
-        )
-    if any(not cell.indoor and cell.azimuth_deg is not None for cell in plan.cells):
-        handles.append(
-            Line2D(
-                [], [], linestyle="", marker=(3, 0, -90), markersize=8, color=BLACK,
-                label="sector azimuth",
-            )
-        )  # fmt: skip
-    if any(cell.indoor for cell in plan.cells):
-        handles.append(
-            Line2D(
-                [], [], linestyle="", marker="s", markersize=6, markerfacecolor="white",
-                markeredgecolor=BLACK, markeredgewidth=1.6, label="indoor cell",
-            )
-        )  # fmt: skip
+    if outdoor:
+        handles.append(mark("site", "o", 7, color=BLACK))
+    if any(cell.azimuth_deg is not None for cell in outdoor):
+        handles.append(mark("sector azimuth", (3, 0, -90), 8, color=BLACK))
+    if len(outdoor) < len(plan.cells):
+        rim = Look(markerfacecolor="white", markeredgecolor=BLACK, markeredgewidth=1.6)
+        handles.append(mark("indoor cell", "s", 6, **rim))
     return handles
 
 
-def _heading_rad(crs: str, cell: Cell, azimuth_deg: float) -> float:
-    lon_deg, lat_deg = unproject(crs, cell.east_m, cell.north_m)
-    convergence_rad = grid_convergence_rad(crs, float(lon_deg), float(lat_deg))
-    return float(heading_from_azimuth_rad(azimuth_deg, convergence_rad))
-
-
-STEPS_DB = (0.0, 1.0, 3.0, 6.0, 10.0, 15.0, 20.0)
-"""Where the classes of the picture begin; the last has no end."""
-
-_SIDE_IN = 3.4
-_ONE_CELL = "#fff7bc"
-
-
-def plot_margin(
-    margin_db: NDArray[np.floating],
-    lattice: Lattice,
+@styled
+def plot_points_per_cell(
+    points_by_cell: Mapping[str, tuple[Floats, Floats]],
     plan: CellPlan,
     base: BaseMap,
-    path: Path,
+    ax: Axes | None = None,
     *,
-    title: str = "Margin of the best server over the second",
-) -> None:
-    """Draw the margin in classes, dark where two cells are nearly equal, with each one's share.
+    title: str = "",
+    counts: Sequence[int] | None = None,
+    resolution_m: float = 5.0,
+) -> Axes:
+    """Draw the points that belong to each cell in a colour of its own.
+
+    With the cells of one site this is Fig. 2 of the paper, with all cells Fig. 4. Every group is
+    named on the map and, with its number of points, in the legend.
 
     Parameters
     ----------
-    margin_db : (rows, cols) array
-        Best level above the second best, >= 0; infinite where one cell is heard alone, NaN where
-        none is or where it is not to be drawn, such as beside the ways.
+    points_by_cell : mapping from cell id to (east_m, north_m)
+        Points of each cell, arrays of equal length in the base map's CRS. The order is that of the
+        colours. A point that several cells claim takes the colour of the last.
+    plan, base, ax, title
+        As in :func:`plot_level`.
+    counts : sequence of int, optional
+        Points of each cell, where only some of them are given to be drawn.
+    resolution_m : float
+        Distance between neighbouring points, which sets the size of their marks.
+    """
+    axes = map_axes(ax, base, _LEGEND_IN)
+    frame = draw_base(axes, base)
+    pitch_pt = 72 * MAP_IN * resolution_m / (base.bounds_m[2] - base.bounds_m[0])
+    size = float(np.clip((1.05 * pitch_pt) ** 2, 1.2, 400.0))
+    if counts is None:
+        counts = [len(east_m) for east_m, _ in points_by_cell.values()]
+    groups = _Groups(axes, plan, list(points_by_cell), counts)
+    for index, places_m in enumerate(points_by_cell.values()):
+        x, y = frame(*places_m)
+        axes.scatter(x, y, s=size, color=groups.colours[index], marker="s", linewidths=0, zorder=3)
+        groups.add(index, grouped(counts[index]), (x, y))
+    _finish(axes, base, plan, title)
+    side_legend(axes, "cell: points", groups.handles, counts, network_legend(plan))
+    return axes
+
+
+@styled
+def plot_best_server(
+    best_server: NDArray[np.integer],
+    cell_ids: Sequence[str],
+    lattice: Lattice,
+    plan: CellPlan,
+    base: BaseMap,
+    ax: Axes | None = None,
+    *,
+    title: str = "Best server",
+) -> Axes:
+    """Draw which cell is received best at every pixel, with each cell's share of the area.
+
+    Parameters
+    ----------
+    best_server : (rows, cols) integer array
+        Index into ``cell_ids``; negative where no cell is received.
+    lattice, plan, base, ax, title
+        As in :func:`plot_level`.
+
+    Raises
+    ------
+    InputError
+        The raster does not fit the lattice or the cells.
+    """
+    faults = shape_faults(best_server, lattice)
+    if best_server.size and int(best_server.max()) >= len(cell_ids):
+        faults.add("best server", f"indices below {len(cell_ids)}", int(best_server.max()))
+    faults.raise_if_any(InputError)
+    axes = map_axes(ax, base, _LEGEND_IN)
+    frame = draw_base(axes, base, streets=OVER_RASTER)
+    counts = np.bincount(best_server[best_server >= 0], minlength=len(cell_ids)).tolist()
+    groups = _Groups(axes, plan, cell_ids, counts)
+    shown = np.ma.masked_less(best_server, 0)
+    colours, limits = ListedColormap(groups.colours or "w"), (-0.5, max(len(cell_ids), 1) - 0.5)
+    draw_raster(axes, base, lattice, shown, cmap=colours, clim=limits, alpha=0.85, zorder=1)
+    for index, count in enumerate(counts):
+        places_m = lattice.east_north(*np.nonzero(best_server == index))
+        groups.add(index, f"{100 * count / best_server.size:.1f} %", frame(*places_m))
+    _finish(axes, base, plan, title)
+    side_legend(axes, "cell: share of area", groups.handles, counts, network_legend(plan))
+    return axes
+
+
+class _Groups:
+    """The colours, names and legend of the cells on a map."""
+
+    def __init__(
+        self, axes: Axes, plan: CellPlan, cell_ids: Sequence[str], counts: Sequence[int]
+    ) -> None:
+        self.colours = distinct_colours(len(cell_ids))
+        self.handles: list[Line2D] = []
+        self._axes, self._plan, self._ids = axes, plan, cell_ids
+        self._names, self._named = short_names(cell_ids), named_groups(counts)
+
+    def add(self, index: int, amount: str, at: tuple[Floats, Floats]) -> None:
+        """Add a cell to the legend, and name it amid its places unless its own mark does."""
+        name, colour = self._ids[index], self.colours[index]
+        self.handles.append(mark(f"{name}: {amount}", "s", 7, color=colour))
+        indoor = name in self._plan and self._plan[name].indoor
+        if at[0].size and index in self._named and not indoor:
+            name_group(self._axes, *at, self._names[index])
+
+
+@styled
+def plot_level(
+    level_dbm: NDArray[np.floating],
+    lattice: Lattice,
+    plan: CellPlan,
+    base: BaseMap,
+    ax: Axes | None = None,
+    *,
+    title: str = "Level of the best server",
+    range_dbm: tuple[float, float] = (-110.0, -50.0),
+) -> Axes:
+    """Draw a level raster, of one cell or of the best server.
+
+    Parameters
+    ----------
+    level_dbm : (rows, cols) array
+        Levels in dBm; NaN where nothing is known.
     lattice : Lattice
         Where the pixels lie.
     plan : CellPlan
         Sites, sector azimuths and indoor cells to mark; those outside the extent are left out.
     base : BaseMap
         The map below.
-    path : Path
-        PNG to write.
+    ax : Axes, optional
+        Drawn on; a figure of its own by default.
     title : str
         Above the map.
+    range_dbm : (low, high)
+        Levels at the two ends of the color scale.
+
+    Raises
+    ------
+    InputError
+        The raster does not fit the lattice.
+    """
+    shape_faults(level_dbm, lattice).raise_if_any(InputError)
+    axes = map_axes(ax, base, _BAR_IN)
+    draw_base(axes, base, streets=OVER_RASTER)
+    image = draw_raster(axes, base, lattice, level_dbm, cmap="viridis", clim=range_dbm, zorder=1)
+    look = Look(shrink=0.75, pad=0.02, aspect=32, extend="both")
+    figure_of(axes).colorbar(image, ax=axes, label="level / dBm", **look)
+    _finish(axes, base, plan, title)
+    return axes
+
+
+@styled
+def plot_margin(
+    margin_db: NDArray[np.floating],
+    lattice: Lattice,
+    plan: CellPlan,
+    base: BaseMap,
+    ax: Axes | None = None,
+    *,
+    title: str = "Margin of the best server over the second",
+) -> Axes:
+    """Draw the margin in classes, dark where two cells are nearly equal, with each one's share.
+
+    Parameters
+    ----------
+    margin_db : (rows, cols) array
+        Best level above the second best, >= 0; infinite where one cell is received alone, NaN where
+        none is or where it is not to be drawn, such as beside the ways.
+    lattice, plan, base, ax, title
+        As in :func:`plot_level`.
 
     Raises
     ------
     InputError
         The raster does not fit the lattice, or a margin is negative.
-    OutputError
-        The picture cannot be written.
     """
     faults = shape_faults(margin_db, lattice)
     known = ~np.isnan(margin_db)
     if known.any() and float(margin_db[known].min()) < 0:
         faults.add("margin", "dB >= 0", float(margin_db[known].min()))
     faults.raise_if_any(InputError)
-    counts = np.bincount(_classes(margin_db[known]), minlength=len(STEPS_DB) + 1)
     ramp = matplotlib.colormaps["cividis"](np.linspace(0.0, 0.93, len(STEPS_DB)))
     colours = [*(to_hex(colour) for colour in ramp), _ONE_CELL]
+    counts = np.bincount(_classes(margin_db[known]), minlength=len(colours))
     shown = np.ma.masked_array(np.zeros(margin_db.shape, dtype=np.int64), ~known)
     shown[known] = _classes(margin_db[known])
-    with map_picture(path, base, _SIDE_IN) as (figure, axes):
-        frame = draw_base(axes, base, streets=OVER_RASTER)
-        axes.imshow(
-            shown, extent=raster_extent(lattice, base, frame.unit_m), cmap=ListedColormap(colours),
-            norm=BoundaryNorm(np.arange(-0.5, len(colours)), len(colours)),
-            interpolation="nearest", zorder=2,
-        )  # fmt: skip
-        keep_extent(axes, base, frame.unit_m)
-        draw_cells(axes, frame, plan, base.bounds_m)
-        axes.set_title(title)
-        attribute(axes, base)
-        handles = [
-            Line2D(
-                [], [], linestyle="", marker="s", markersize=8, color=colour,
-                markeredgecolor=GREY, markeredgewidth=0.4, label=f"{name}: {share:.1f} %",
-            )
-            for name, colour, share in zip(
-                _names(), colours, 100 * counts / max(int(counts.sum()), 1), strict=True
-            )
-        ]  # fmt: skip
-        side_legend(
-            figure, "margin: share of pixels", handles, counts.tolist(), network_legend(plan)
+    axes = map_axes(ax, base, _WIDE_LEGEND_IN)
+    draw_base(axes, base, streets=OVER_RASTER)
+    norm = BoundaryNorm(np.arange(-0.5, len(colours)), len(colours))
+    draw_raster(axes, base, lattice, shown, cmap=ListedColormap(colours), norm=norm)
+    _finish(axes, base, plan, title)
+    between = [f"{low:g} to {high:g} dB" for low, high in pairwise(STEPS_DB)]
+    names = [*between, f"{STEPS_DB[-1]:g} dB and more", "one cell alone"]
+    rim = Look(markeredgecolor=GREY, markeredgewidth=0.4)
+    handles = [
+        mark(f"{name}: {share:.1f} %", "s", 8, color=colour, **rim)
+        for name, colour, share in zip(
+            names, colours, 100 * counts / max(counts.sum(), 1), strict=True
         )
+    ]
+    side_legend(axes, "margin: share of pixels", handles, counts.tolist(), network_legend(plan))
+    return axes
 
 
 def _classes(margin_db: NDArray[np.floating]) -> Ints:
@@ -181,6 +316,13 @@ def _classes(margin_db: NDArray[np.floating]) -> Ints:
     return np.where(np.isinf(margin_db), len(STEPS_DB), found)
 
 
-def _names() -> list[str]:
-    between = [f"{low:g} to {high:g} dB" for low, high in pairwise(STEPS_DB)]
-    return [*between, f"{STEPS_DB[-1]:g} dB and more", "one cell alone"]
+def _finish(axes: Axes, base: BaseMap, plan: CellPlan, title: str) -> None:
+    draw_cells(axes, local_frame(base), plan, base.bounds_m)
+    axes.set_title(title)
+    attribute(axes, base)
+
+
+def _heading_rad(crs: str, cell: Cell, azimuth_deg: float) -> float:
+    lon_deg, lat_deg = unproject(crs, cell.east_m, cell.north_m)
+    convergence_rad = grid_convergence_rad(crs, float(lon_deg), float(lat_deg))
+    return float(heading_from_azimuth_rad(azimuth_deg, convergence_rad))

@@ -15,7 +15,7 @@ from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rxlev import quantise_level_dbm
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.tracks.schema import NEIGHBOUR, SERVING
 
 

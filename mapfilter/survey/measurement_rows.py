@@ -1,4 +1,4 @@
-"""Rows of one measurement file, and what was refused of it; all readers end here."""
+"""Rows of one measurement file, and the faults of those that are refused; all readers end here."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ from typing import TextIO
 from mapfilter.errors import Fault, InputError, fail
 from mapfilter.radio.cell_rules import id_fault
 
-LONGEST_LINE = 1 << 16
-_TOLD = 20
-_SHOWN = 3
+_FAULTS_KEPT = 20
+_FAULTS_SHOWN = 3
 _LATEST_S = 4_102_444_800.0
 _UNAVAILABLE = 2_000_000_000.0
 _LEVEL_DBM = (-170.0, -10.0)
@@ -49,9 +48,9 @@ class Rows:
     aside: Counter[str] = field(default_factory=Counter)
 
     def refuse(self, line: int, name: str, expected: str, got: object, hint: str = "") -> None:
-        """Count a bad row and keep what is wrong with the first ones."""
+        """Count a bad row and keep the faults of the first ones."""
         self.refused += 1
-        if len(self.faults) < _TOLD:
+        if len(self.faults) < _FAULTS_KEPT:
             self.faults.append(Fault(f"{self.path} row {line}, {name}", expected, str(got), hint))
 
     def add(
@@ -74,18 +73,20 @@ class Rows:
             self.refuse(line, "cell", *wrong)
             return
         lat_deg, lon_deg, level_dbm = number(place[0]), number(place[1]), number(level)
-        for name, text, value in (
-            ("lat", place[0], lat_deg), ("lon", place[1], lon_deg), ("level_dbm", level, level_dbm)
-        ):  # fmt: skip
+        named = ("lat", place[0], lat_deg), ("lon", place[1], lon_deg)
+        for name, text, value in (*named, ("level_dbm", level, level_dbm)):
             if not math.isfinite(value):
                 self.refuse(line, name, "a number", repr(text[:40]) if text else "nothing")
                 return
-        if (told := place_fault(lat_deg, lon_deg)) is not None:
-            self.refuse(line, "lat, lon", *told)
+        if (misplaced := place_fault(lat_deg, lon_deg)) is not None:
+            self.refuse(line, "lat, lon", *misplaced)
             return
         if not _LEVEL_DBM[0] <= level_dbm <= _LEVEL_DBM[1]:
             expected = f"dBm in {_LEVEL_DBM[0]:g}..{_LEVEL_DBM[1]:g}"
-            self.refuse(line, "level_dbm", expected, level[:40], _level_hint(level_dbm))
+            hint = "RXLEV or ASU given for dBm" if 0 <= level_dbm <= 97 else ""
+            if abs(level_dbm) >= _UNAVAILABLE:
+                hint = "the marker of a level that was not available"
+            self.refuse(line, "level_dbm", expected, level[:40], hint)
             return
         time_s, accuracy_m = unix_seconds(time), number(accuracy)
         if time and math.isnan(time_s):
@@ -98,17 +99,16 @@ class Rows:
         self.level_dbm.append(level_dbm)
         self.accuracy_m.append(accuracy_m if 0 < accuracy_m < _UNAVAILABLE else math.nan)
 
-    def told(self) -> list[str]:
-        """Say how many rows were refused or set aside, and where the first are."""
-        notes = []
+    def notes(self) -> list[str]:
+        """Return remarks on how many rows were refused or set aside, and where the first are."""
+        found = []
         if self.refused:
-            some = "; ".join(str(fault) for fault in self.faults[:_SHOWN])
-            more = "; …" if self.refused > _SHOWN else ""
-            notes.append(
+            some = "; ".join(str(fault) for fault in self.faults[:_FAULTS_SHOWN])
+            more = "; …" if self.refused > _FAULTS_SHOWN else ""
+            found.append(
                 f"{self.path.name}: {self.refused} of {self.read} rows left out: {some}{more}"
             )
-        notes += [f"{self.path.name}: {count} {what}" for what, count in self.aside.items()]
-        return notes
+        return found + [f"{self.path.name}: {count} {what}" for what, count in self.aside.items()]
 
 
 def number(text: str) -> float:
@@ -134,7 +134,7 @@ def whole(text: str) -> int | None:
 
 
 def unix_seconds(text: str) -> float:
-    """Return Unix seconds of an ISO 8601 time (UTC unless it says so) or of s, ms or µs; else NaN.
+    """Return Unix seconds of an ISO 8601 time (UTC by default) or of s, ms or µs; else NaN.
 
     Examples
     --------
@@ -168,13 +168,7 @@ def place_fault(lat_deg: float, lon_deg: float) -> tuple[str, str, str] | None:
 
 
 def open_text(path: Path) -> TextIO:
-    """Open a file as text in which a wrong byte spoils only its own row.
-
-    Raises
-    ------
-    InputError
-        It is missing, empty, a folder, or in UTF-16.
-    """
+    """Open a file as text in which a wrong byte spoils only its own row."""
     try:
         with path.open("rb") as stream:
             head = stream.read(2)
@@ -187,11 +181,3 @@ def open_text(path: Path) -> TextIO:
     if head == b"\x1f\x8b":
         raise fail(InputError, str(path), "text", "a gzip file", "unpack it first")
     return path.open(encoding="utf-8-sig", errors="replace")
-
-
-def _level_hint(level: float) -> str:
-    if abs(level) >= _UNAVAILABLE:
-        return "the marker of a level that was not available"
-    if 0 <= level <= 97:
-        return "RXLEV or ASU given for dBm"
-    return ""

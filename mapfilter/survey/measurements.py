@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
@@ -15,85 +13,14 @@ from mapfilter._types import Bools, Floats, Ints, Ints32
 from mapfilter.errors import Fault, InputError, fail
 from mapfilter.geodesy import project, projected_crs, utm_crs
 from mapfilter.radio.cells import CellPlan
-from mapfilter.survey.measurement_rows import Identity, Rows, open_text, whole
-from mapfilter.survey.measurements_csv import DIALECTS, header_of, mapped, read_csv
-
-FIRST_WORD = "BEGIN"
-"""How a log begins."""
-_LONGEST_LINE = 4096
-_KEY = re.compile(r'(\w[\w ]*)=\s*("[^"]*"|[^,]*)')
-_LEVEL = re.compile(r"^(>?)\s*(-?\d+)\s*dBm$")
-
-
-def read_antennas_log(path: Path) -> Rows:
-    """Read a log: each record has a serving cell, up to six neighbours, and one position.
-
-    A level written with ``>`` is a bound, no level: it is counted and left out.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read.
-    """
-    rows = Rows(path)
-    time, operator = "", ""
-    heard: list[tuple[int, dict[str, str]]] = []
-    with open_text(path) as stream:
-        line = 0
-        while text := stream.readline(_LONGEST_LINE):
-            line += 1
-            kind = text.split(",", 1)[0].strip()
-            values = {key.strip(): value.strip(' "\r\n') for key, value in _KEY.findall(text)}
-            if kind == "Record":
-                _unplaced(rows, heard)
-                time, operator, heard = values.get("Time", ""), values.get("Operator", ""), []
-            elif kind == "ACTIVE GSM" or kind == "GSM":
-                rows.read += 1
-                heard.append((line, values))
-            elif kind == "Best Location":
-                place = values.get("Lat", ""), values.get("Lon", "")
-                for cell_line, cell in heard:
-                    _add(rows, cell_line, cell, place, _iso(time), operator)
-                heard = []
-    _unplaced(rows, heard)
-    return rows
-
-
-def _add(
-    rows: Rows, line: int, cell: dict[str, str], place: tuple[str, str], time: str, operator: str
-) -> None:
-    parts = (whole(operator[:3]), whole(operator[3:]), whole(cell.get("LAC", "")),
-             whole(cell.get("CID", "")))  # fmt: skip
-    mcc, mnc, lac, ci = parts
-    if mcc is None or mnc is None or lac is None or ci is None:
-        rows.aside["rows of cells without identity"] += 1
-        return
-    found = _LEVEL.match(cell.get("Signal", ""))
-    if found is None:
-        rows.refuse(line, "Signal", "a level such as -67dBm", repr(cell.get("Signal", "")[:40]))
-        return
-    if found[1]:
-        rows.aside["levels that are only bounds (>)"] += 1
-        return
-    identity: Identity = (mcc, mnc, lac, ci)
-    name = "-".join(map(str, identity))
-    rows.identities.setdefault(name, identity)
-    rows.add(line, name, place, found[2], time=time)
-
-
-def _unplaced(rows: Rows, heard: list[tuple[int, dict[str, str]]]) -> None:
-    for line, _ in heard:
-        rows.refuse(line, "Best Location", "a position after the cells", "none", "the log cut off")
-
-
-def _iso(time: str) -> str:
-    """Return a time such as ``2014-09-24 19:21:42:61 GMT+05:30`` in ISO 8601, else ''."""
-    text = re.sub(r":(\d{1,3}) GMT", lambda found: f".{found[1]:0>3} ", time)
-    try:
-        return datetime.strptime(text, "%Y-%m-%d %H:%M:%S.%f %z").isoformat()
-    except ValueError:
-        return time
-
+from mapfilter.survey.measurement_files import (
+    DIALECTS,
+    header_of,
+    mapped,
+    read_antennas_log,
+    read_csv,
+)
+from mapfilter.survey.measurement_rows import Identity, Rows
 
 Format = Literal["auto", "csv", "opencellid", "towercollector", "antennas"]
 
@@ -104,7 +31,7 @@ _SUFFIXES = (".csv", ".log", ".tsv")
 
 @dataclass(frozen=True, eq=False)
 class Measurements:
-    """Levels heard at places, with the session that each belongs to.
+    """Levels received at places, with the session that each belongs to.
 
     A session is one drive or walk: what is left out together when a map is validated.
 
@@ -113,18 +40,15 @@ class Measurements:
     crs : str
         Projected CRS of the positions.
     cell_ids : tuple of str
-        Cells heard, sorted.
+        Cells received, sorted.
     identities : mapping of str to (mcc, mnc, lac, ci)
-        Of the cells whose identity the files tell; lac is the tac in LTE.
-    sessions : tuple of str
-        Names of the sessions.
+        Of the cells whose identity is in the files; lac is the tac in LTE.
     cell, session : numpy.ndarray of int32, shape (N,)
         Indices into ``cell_ids`` and ``sessions``.
     time_s : numpy.ndarray, shape (N,)
         Unix seconds, UTC; NaN where unknown.
-    east_m, north_m, level_dbm : numpy.ndarray, shape (N,)
     accuracy_m : numpy.ndarray, shape (N,)
-        Of the position, as the receiver tells it; NaN where unknown.
+        Of the position, as the receiver reported it; NaN where unknown.
     notes : tuple of str
         Which rows were left out, and why.
     """
@@ -147,17 +71,9 @@ class Measurements:
 
     def where(self, kept: Bools, *notes: str) -> Measurements:
         """Return some of the rows; cells and sessions keep their places."""
-        return replace(
-            self,
-            cell=self.cell[kept],
-            session=self.session[kept],
-            time_s=self.time_s[kept],
-            east_m=self.east_m[kept],
-            north_m=self.north_m[kept],
-            level_dbm=self.level_dbm[kept],
-            accuracy_m=self.accuracy_m[kept],
-            notes=(*self.notes, *notes),
-        )
+        columns = ("cell", "session", "time_s", "east_m", "north_m", "level_dbm", "accuracy_m")
+        some = {name: getattr(self, name)[kept] for name in columns}
+        return replace(self, **some, notes=(*self.notes, *notes))
 
     def accurate(self, accuracy_m: float) -> Measurements:
         """Return the rows whose position is at least so accurate, or of unknown accuracy."""
@@ -202,8 +118,7 @@ def read_measurements(
 ) -> Measurements:
     """Read files of measurements; each file, session column and long silence begins a session.
 
-    Bad rows are counted and told in the notes, and lose nothing else. Exact repetitions are left
-    out.
+    Bad rows are counted in the notes, and lose nothing else. Exact repetitions are left out.
 
     Parameters
     ----------
@@ -212,16 +127,17 @@ def read_measurements(
     crs : str, optional
         Projected CRS for the positions; the UTM zone of the measurements when left out.
     format : {"auto", "csv", "opencellid", "towercollector", "antennas"}
-        ``auto`` tells each file by its first line.
+        ``auto`` recognises each file by its first line.
     columns : mapping of str to str, optional
-        For "csv": which column holds which of :data:`~mapfilter.survey.measurements_csv.FIELDS`.
+        For "csv": which column holds which of :data:`~mapfilter.survey.measurement_files.FIELDS`.
     session_gap_s : float
+        A longer silence begins a new session.
 
     Raises
     ------
     InputError
-        A file cannot be read, is of another kind, or none of its rows is any good; with the first
-        faults of each.
+        A file cannot be read, is of another kind, or has no good row; with the first faults of
+        each.
     """
     tables = []
     faults: list[Fault] = []
@@ -233,7 +149,10 @@ def read_measurements(
             continue
         tables.append(table)
         if not table.cell:
-            faults.extend(table.faults or (_nothing(table),))
+            aside = "; ".join(f"{count} {what}" for what, count in table.aside.items())
+            got = f"{table.read} rows" + (f": {aside}" if aside else "")
+            expected = "at least one level with cell and position"
+            faults.extend(table.faults or (Fault(str(path), expected, got),))
     if faults:
         raise InputError(tuple(faults))
     if crs is None:
@@ -244,19 +163,18 @@ def read_measurements(
     return _joined(tables, projected_crs(crs), session_gap_s)
 
 
-def _read(path: Path, wanted: Format, columns: Mapping[str, str] | None) -> Rows:
+def _read(path: Path, kind: Format, columns: Mapping[str, str] | None) -> Rows:
     if columns:
         return read_csv(path, mapped(columns))
-    kind = _kind(header_of(path)) if wanted == "auto" else wanted
+    if kind == "auto":
+        header, kind = header_of(path), "csv"
+        if header[:1] == ["begin"]:
+            kind = "antennas"
+        elif {"cellid", "signal", "lat"} <= set(header):
+            kind = "opencellid"
+        elif {"cell_id", "dbm", "lat"} <= set(header):
+            kind = "towercollector"
     return read_antennas_log(path) if kind == "antennas" else read_csv(path, DIALECTS[kind])
-
-
-def _kind(header: Sequence[str]) -> Literal["csv", "opencellid", "towercollector", "antennas"]:
-    if header[:1] == (FIRST_WORD.lower(),):
-        return "antennas"
-    if {"cellid", "signal", "lat"} <= set(header):
-        return "opencellid"
-    return "towercollector" if {"cell_id", "dbm", "lat"} <= set(header) else "csv"
 
 
 def _expanded(files: Sequence[Path | str]) -> list[Path]:
@@ -272,12 +190,6 @@ def _expanded(files: Sequence[Path | str]) -> list[Path]:
     if not found:
         raise fail(InputError, "measurements", "at least one file", "none")
     return found
-
-
-def _nothing(table: Rows) -> Fault:
-    told = "; ".join(f"{count} {what}" for what, count in table.aside.items())
-    got = f"{table.read} rows" + (f": {told}" if told else "")
-    return Fault(str(table.path), "at least one level with cell and position", got)
 
 
 def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
@@ -307,7 +219,7 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
         north_m,
         np.concatenate([table.level_dbm for table in tables]),
         np.concatenate([table.accuracy_m for table in tables]),
-        tuple(note for table in tables for note in table.told()),
+        tuple(note for table in tables for note in table.notes()),
     )
     placed = np.isfinite(east_m) & np.isfinite(north_m)
     if not placed.all():
@@ -345,3 +257,76 @@ def _once(rows: Measurements) -> Measurements:
     kept = np.zeros(len(rows), dtype=np.bool_)
     kept[first] = True
     return rows.where(kept, f"{len(rows) - len(first)} rows left out: given twice")
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Mean level and position of a cell's readings in each square and session, shape (N,) each.
+
+    Readings of one session in one square count once, however long it stood still there.
+    ``heard_at``, shape (M, 2), is east and north of every reading.
+    """
+
+    cell_id: str
+    east_m: Floats
+    north_m: Floats
+    level_dbm: Floats
+    session: Ints
+    heard_at: Floats
+
+    def __len__(self) -> int:
+        return len(self.level_dbm)
+
+    @property
+    def places(self) -> Floats:
+        """Positions, shape (N, 2)."""
+        return np.column_stack([self.east_m, self.north_m])
+
+    def thinned(self, most: int) -> Points:
+        """Return at most so many of the points, evenly taken."""
+        if len(self) <= most:
+            return self
+        return self.some(np.linspace(0, len(self) - 1, most).astype(np.int64))
+
+    def some(self, kept: Ints | Bools) -> Points:
+        """Return some of the points."""
+        columns = self.east_m[kept], self.north_m[kept], self.level_dbm[kept], self.session[kept]
+        return Points(self.cell_id, *columns, self.heard_at)
+
+
+def points_by_cell(measurements: Measurements, square_m: float, most: int) -> dict[str, Points]:
+    """Return the points of each cell that was received.
+
+    The side of the squares is doubled for a cell until it has at most ``most`` points.
+    """
+    order = np.argsort(measurements.cell, kind="stable")
+    edges = np.searchsorted(measurements.cell[order], np.arange(len(measurements.cell_ids) + 1))
+    found = {}
+    for i, cell_id in enumerate(measurements.cell_ids):
+        own = order[edges[i] : edges[i + 1]]
+        if not own.size:
+            continue
+        columns = measurements.east_m, measurements.north_m, measurements.level_dbm
+        east_m, north_m, level_dbm = (column[own] for column in columns)
+        side_m = square_m
+        while True:
+            keys = [
+                measurements.session[own],
+                np.floor(north_m / side_m),
+                np.floor(east_m / side_m),
+            ]
+            table = np.column_stack(keys).astype(np.int64)
+            squares, which = np.unique(table, axis=0, return_inverse=True)
+            if len(squares) <= most:
+                break
+            side_m *= 2
+        count = np.bincount(which)
+        found[cell_id] = Points(
+            cell_id,
+            np.bincount(which, east_m) / count,
+            np.bincount(which, north_m) / count,
+            np.bincount(which, level_dbm) / count,
+            squares[:, 0],
+            np.column_stack([east_m, north_m]),
+        )
+    return found

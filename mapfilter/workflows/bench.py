@@ -22,7 +22,8 @@ from mapfilter.database.tiles import read_tile
 from mapfilter.errors import ConfigError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.roads.lattice import RouteLattice
 
 if TYPE_CHECKING:

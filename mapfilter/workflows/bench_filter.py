@@ -175,7 +175,7 @@ def make_world(folder: Path, settings: Sequence[str]) -> tuple[Path, Sequence[Pa
 def step_inputs(model: BayesModel, log: TrackLog, count: int) -> tuple[NumpyModel, ParticleBelief]:
     """Return a step's motion and report, and particles about a place of a walk with truth."""
     area, truth = model.area, log.truth.iloc[len(log.truth) // 2]
-    belief = ParticleFilter(model, ParticleOptions(most=count, least=count)).init(
+    belief = ParticleFilter(model, ParticleOptions(max_particles=count, min_particles=count)).init(
         Start(None, True, float(truth["east_m"]), float(truth["north_m"]), 50.0),
         np.random.default_rng(0),
     )
@@ -197,7 +197,7 @@ def _step(model: BayesModel, log: TrackLog, count: int, runs: int) -> StepBench:
     rng = np.random.default_rng(1)
     jitter = np.array(_JITTER)
     wide = np.vstack([belief.state.astype(np.float64), np.zeros(count)])
-    always = ParticleOptions(count, count, count, resample_below=0.999999, flatten=1.0)
+    always = ParticleOptions(count, count, count, resample_below=0.999999, mass_exponent=1.0)
     filter_ = ParticleFilter(model, always)
 
     def own() -> object:

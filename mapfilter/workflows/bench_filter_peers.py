@@ -14,8 +14,7 @@ import numpy as np
 
 from mapfilter._types import Floats, Ints
 from mapfilter.filters.contract import MotionStep
-from mapfilter.models.cell_id import log_serving
-from mapfilter.models.fingerprint import LevelReading
+from mapfilter.models.fingerprint import LevelReading, log_serving
 from mapfilter.models.street_motion import BIAS, EAST, LOG_SCALE, NORTH, OFF
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.model import BayesModel
@@ -99,7 +98,7 @@ class NumpyModel:
         return np.asarray(state[MAP] + served + told)
 
     def _mapped(self, state: Floats, off: Floats, length_m: float) -> tuple[Floats, Floats]:
-        lattice, weights, raster = self.model.area.lattice, self.model.weights, self.model.log_map
+        lattice, raster = self.model.area.lattice, self.model.log_map
         step = lattice.resolution_m
         x = np.maximum((state[EAST] - step / 2) / step, 0)
         y = np.maximum(((lattice.rows - 0.5) * step - state[NORTH]) / step, 0)
@@ -108,13 +107,11 @@ class NumpyModel:
         u, v = np.minimum(x - col, 1), np.minimum(y - row, 1)
         upper = raster[row, col] + u * (raster[row, col + 1] - raster[row, col])
         under = raster[row + 1, col] + u * (raster[row + 1, col + 1] - raster[row + 1, col])
-        on = np.exp(weights.weight_per_m * length_m * (upper + v * (under - upper)))
-        leave = 1 - exp(-weights.leave_per_m * length_m)
-        come_back = 1 - exp(-weights.return_per_m * length_m)
-        away = off * (1 - come_back) + (1 - off) * leave
-        off_cost = exp(-weights.off_cost_per_m * length_m)
-        total = away * off_cost + (1 - away) * on
-        return away * off_cost / total, np.log(total)
+        factors = self.model.weights.over(length_m)
+        on = np.exp(factors.exponent * (upper + v * (under - upper)))
+        away = off * (1 - factors.come_back) + (1 - off) * factors.leave
+        total = away * factors.off + (1 - away) * on
+        return away * factors.off / total, np.log(total)
 
     def _pixels(self, east: Floats, north: Floats) -> tuple[Ints, Ints]:
         lattice = self.model.area.lattice

@@ -14,7 +14,7 @@ from statistics import median
 from mapfilter._parallel import SerialExecutor, cluster_executor, local_executor
 from mapfilter.database.store import open_database
 from mapfilter.evaluation.accuracy import accuracy
-from mapfilter.experiments.papers.khalaf_allah_2007.experiment import ONE_SIGMA_TRANS_M, plans
+from mapfilter.experiments.papers.khalaf_allah_2007 import MAP_SETTINGS, ONE_SIGMA_TRANS_M, plans
 from mapfilter.experiments.sweep.journeys import filter_rng, heard, sensed, true_path, truth_of
 from mapfilter.experiments.sweep.plan import SweepPlan
 from mapfilter.experiments.sweep.run import sweep
@@ -89,7 +89,7 @@ def bench_sweep(*, runs: int = 3, trials: int = 160) -> SweepBench:
 
 
 def _bench(folder: Path, repetitions: int, trials: int) -> SweepBench:
-    config = paper_config(folder, "helsinki", None)
+    config = paper_config(MAP_SETTINGS, folder, "helsinki", None)
     run_predict(config)
     run_build(config)
     whole = plans(trials, 0)[0]

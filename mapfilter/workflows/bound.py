@@ -17,7 +17,8 @@ from mapfilter.evaluation.first_fix import FirstFixOptions
 from mapfilter.evaluation.map_bound import TWIN_ERROR, MapBound, map_bound, on_lattice, write_bound
 from mapfilter.evaluation.radio_map import ErrorModel, radio_map
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.bound import plot_metres_to_fix, plot_position_bound, plot_twins
+from mapfilter.report.bound import plot_point_values, plot_twins
+from mapfilter.report.canvas import save
 
 NOTES = (
     "exact for the error model: the bound from given gradients; bits by the serving cell",
@@ -27,6 +28,9 @@ NOTES = (
     "motion is taken as known without error; a real filter needs longer",
 )
 _DECIMALS = 3
+
+_BOUND_TITLE = "Least position error along the street from one report of levels"
+_FIX_TITLE = "Expected metres until an ideal filter knows where it is"
 
 
 @dataclass(frozen=True)
@@ -111,20 +115,14 @@ def run_bound(
     _write_table(ways, out / "ways.parquet")
     _write_table(twins, out / "twins.parquet")
     base = BaseMap(radio.lattice.bounds_m, attribution=database.attribution)
-    plot_position_bound(
-        rasters["along_bound_m"], radio.lattice, database.plan, base, out / "position-bound.png"
-    )
-    plot_metres_to_fix(
-        rasters["levels_to_fix_m"], radio.lattice, database.plan, base, out / "metres-to-fix.png"
-    )
-    plot_twins(
-        rasters["twin_error"],
-        twins[["east_m", "north_m", "twin_east_m", "twin_north_m"]].to_numpy(),
-        radio.lattice,
-        database.plan,
-        base,
-        out / "twins.png",
-    )
+    on_map = radio.lattice, database.plan, base
+    bound, fix = rasters["along_bound_m"], rasters["levels_to_fix_m"]
+    drawn = plot_point_values(bound, *on_map, title=_BOUND_TITLE, label="bound / m")
+    save(drawn, out / "position-bound.png")
+    drawn = plot_point_values(fix, *on_map, title=_FIX_TITLE, label="metres to convergence / m")
+    save(drawn, out / "metres-to-fix.png")
+    pairs_m = twins[["east_m", "north_m", "twin_east_m", "twin_north_m"]].to_numpy()
+    save(plot_twins(rasters["twin_error"], pairs_m, *on_map), out / "twins.png")
     names = (
         "bound.tif", "ways.parquet", "twins.parquet", "position-bound.png", "metres-to-fix.png",
         "twins.png",

@@ -16,7 +16,7 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.workflows.area import pixels_on
 from mapfilter.workflows.cover import check_cells_near, map_cover, raster_cover
 from mapfilter.workflows.network_pictures import NETWORK_PICTURES, draw_network

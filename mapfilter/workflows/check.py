@@ -12,15 +12,15 @@ from rasterio.errors import RasterioError
 
 from mapfilter._parallel import Progress
 from mapfilter.check.findings import CheckResult, Findings, Severity, listed
-from mapfilter.check.lobe_findings import check_against_sites, check_power
-from mapfilter.check.raster_findings import check_ids, is_surveyed, sampled
+from mapfilter.check.raster_checks import check_ids, is_surveyed, sampled
+from mapfilter.check.site_checks import check_against_sites, check_power
 from mapfilter.config.sections import Config
 from mapfilter.errors import MapfilterError
 from mapfilter.geodesy import Lattice
 from mapfilter.propagation.predict import off_frequency
 from mapfilter.radio.cell_rules import ANTENNAS
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.workflows.check_places import (
     check_pixels,
     check_rasters_place,

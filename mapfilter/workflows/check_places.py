@@ -14,7 +14,7 @@ from mapfilter.config.sections import Area, Config
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice, project, projected_crs, same_crs, unproject, utm_crs
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.maps import box_deg, map_bounds_deg
 from mapfilter.roads.ways import Ways
 from mapfilter.workflows.world import area_lattice

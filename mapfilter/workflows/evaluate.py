@@ -28,7 +28,8 @@ from mapfilter.experiments.benchmarks.world import (
 from mapfilter.experiments.sweep.world import SweepWorld, write_world
 from mapfilter.propagation.predict import predict
 from mapfilter.propagation.shadowing import named_rng
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.reflections import NlosModel
 from mapfilter.simulation.satellites import ReceptionModel

@@ -38,9 +38,9 @@ from mapfilter.experiments.benchmarks.ottawa_table import (
     session_rows,
     write_left_out,
 )
-from mapfilter.rasters.rxlev_rasters import open_rasters
-from mapfilter.report.canvas import BLUE, GREEN, GREY
-from mapfilter.report.cumulative import Distribution, plot_cumulative
+from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.report.canvas import BLUE, GREEN, GREY, save
+from mapfilter.report.curves import Distribution, plot_cumulative
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.jsonable import to_jsonable
 from mapfilter.workflows.survey import run_survey
@@ -187,7 +187,7 @@ def run_ottawa(
         told += session_rows(found, centroid_m)
         title = f"Ottawa, {part}: real phones, each session on the map of the others"
         picture = out / part / PICTURE
-        plot_cumulative(_curves(every), picture, title=title, most_m=_MOST_M, share=0.95)
+        save(plot_cumulative(_curves(every), title=title, most_m=_MOST_M, share=0.95), picture)
     seconds = time.perf_counter() - began_s
     result = OttawaResult(seed, runs, tuple(rows), tuple(told), seconds, out)
     write_json(out / TABLE, to_jsonable(result))

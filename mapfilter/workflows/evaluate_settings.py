@@ -46,9 +46,7 @@ _OF_WALKERS = frozenset(
     for name in ("speed_mps", "beside", "change_side_m", "stop_every_m", "stop_s")
 )
 
-_OF_PARTICLES = frozenset(
-    f"filter.bayes.{name}_particles" for name in ("most", "searching", "least")
-)
+_OF_PARTICLES = frozenset(f"filter.bayes.{name}_particles" for name in ("max", "min_search", "min"))
 
 _OF_THE_CASES: Mapping[str, str] = {
     "prediction.reality.level_error_db": "level_error_db",

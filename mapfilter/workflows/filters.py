@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from mapfilter.config.sections import FilterSection
+from mapfilter.errors import ConfigError, fail
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.filter import FilterOptions
-from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.locators import filter_options
 
 
@@ -16,7 +16,7 @@ def filter_choice(section: FilterSection) -> FilterOptions:
     Raises
     ------
     ConfigError
-        A custom filter cannot be imported.
+        The filter takes no database, or a custom filter cannot be imported.
     """
     match section.name:
         case "candidate":
@@ -28,4 +28,4 @@ def filter_choice(section: FilterSection) -> FilterOptions:
         case name if ":" in name:
             return filter_options(name)
         case name:
-            return KalmanFilter(method=name, smooth=section.smooth)  # type: ignore[arg-type]
+            raise fail(ConfigError, "filter.name", "a filter that takes a database", repr(name))

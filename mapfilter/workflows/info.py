@@ -13,7 +13,8 @@ from mapfilter.database.export import BANDS, CELLS_TAG
 from mapfilter.database.manifest import MANIFEST
 from mapfilter.database.store import info, open_database
 from mapfilter.errors import InputError, fail
-from mapfilter.rasters.rxlev_rasters import is_raster_folder, open_rasters
+from mapfilter.rasters.formats import is_raster_folder
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import is_log, read_log
 

@@ -13,12 +13,11 @@ from mapfilter._io import ensure_writable_folder
 from mapfilter._types import Floats32
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.geodesy import Lattice
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.canvas import BLUE, ORANGE
-from mapfilter.report.coverage import plot_best_server, plot_level, plot_points_per_cell
+from mapfilter.report.canvas import BLUE, ORANGE, save
 from mapfilter.report.landuse import plot_landuse
-from mapfilter.report.network import plot_margin
+from mapfilter.report.network import plot_best_server, plot_level, plot_margin, plot_points_per_cell
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.ways import Buildings
@@ -113,11 +112,11 @@ def draw_network(
     drawn = [folder / name for name in NETWORK_PICTURES[:4]]
     titles = [f"{title}{told}" for title in _TITLES]
     ends_dbm = _ends(best.level_dbm)
-    plot_level(
-        best.level_dbm, lattice, plan, base, drawn[0], title=titles[0], range_dbm=ends_dbm
-    )  # fmt: skip
-    plot_best_server(best.server, plan.ids, lattice, plan, base, drawn[1], title=titles[1])
-    plot_margin(best.margin_db, lattice, plan, base, drawn[2], title=titles[2])
+    on_map = lattice, plan, base
+    level = plot_level(best.level_dbm, *on_map, title=titles[0], range_dbm=ends_dbm)
+    save(level, drawn[0])
+    save(plot_best_server(best.server, plan.ids, *on_map, title=titles[1]), drawn[1])
+    save(plot_margin(best.margin_db, *on_map, title=titles[2]), drawn[2])
     _draw_points(database, points, database.cell_ids, drawn[3], titles[3])
     site, cells = Counter(cell.site for cell in plan.cells).most_common(1)[0]
     if cells > 1:
@@ -134,7 +133,7 @@ def draw_network(
     if classes is not None:
         drawn.append(folder / NETWORK_PICTURES[5])
         below = BaseMap(points.best.lattice.bounds_m, attribution=database.attribution)
-        plot_landuse(classes, points.best.lattice, below, drawn[-1], title=titles[4])
+        save(plot_landuse(classes, points.best.lattice, below, title=titles[4]), drawn[-1])
     return tuple(drawn)
 
 
@@ -201,12 +200,12 @@ def _draw_points(
     title: str,
 ) -> None:
     numbers = [database.plan.index(cell_id) for cell_id in cells]
-    plot_points_per_cell(
+    drawn = plot_points_per_cell(
         {cell_id: points.places(number) for cell_id, number in zip(cells, numbers, strict=True)},
         database.plan,
         street_map(database, points),
-        path,
         title=title,
         counts=points.counts[numbers].tolist(),
         resolution_m=points.best.lattice.resolution_m,
     )
+    save(drawn, path)

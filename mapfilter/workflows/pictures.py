@@ -10,10 +10,9 @@ import numpy as np
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.positioning.estimate import PositionedTrack, Snapshot
-from mapfilter.report.belief import plot_belief, plot_candidates
-from mapfilter.report.errors import plot_error_over_distance
-from mapfilter.report.evidence import plot_evidence
-from mapfilter.report.panels import MAX_PANELS
+from mapfilter.report.belief import MAX_PANELS, plot_belief, plot_candidates
+from mapfilter.report.canvas import save
+from mapfilter.report.errors import plot_error_over_distance, plot_evidence
 from mapfilter.report.track import plot_track
 from mapfilter.tracks.log import TrackLog
 from mapfilter.workflows.network_pictures import street_map
@@ -31,20 +30,18 @@ def draw_track(
     """
     base, truth = street_map(database, served_points(database)), Truth.of_table(log.truth)
     drawn = []
-    evidence = track.estimate.evidence
-    if track.snapshots:
-        drawn.append(folder / ("candidates.png" if evidence is None else "belief.png"))
-        plot = plot_candidates if evidence is None else plot_belief
-        spread = _candidates if evidence is None else _places
-        plot(choose_snapshots(track.snapshots, spread), truth, base, drawn[-1])
-    drawn.append(folder / "track.png")
-    plot_track(track.estimate, truth, base, drawn[-1])
+    estimate, evidence = track.estimate, track.estimate.evidence
+    if track.snapshots and evidence is None:
+        chosen = choose_snapshots(track.snapshots, _candidates)
+        drawn.append(save(plot_candidates(chosen, truth, base), folder / "candidates.png"))
+    elif track.snapshots:
+        chosen = choose_snapshots(track.snapshots, _places)
+        drawn.append(save(plot_belief(chosen, truth, base), folder / "belief.png"))
+    drawn.append(save(plot_track(estimate, truth, base), folder / "track.png"))
     if truth is not None:
-        drawn.append(folder / "error.png")
-        plot_error_over_distance(track.estimate, truth, drawn[-1])
-    if evidence is not None and len(track.estimate):
-        drawn.append(folder / "evidence.png")
-        plot_evidence(track.estimate, truth, drawn[-1])
+        drawn.append(save(plot_error_over_distance(estimate, truth), folder / "error.png"))
+    if evidence is not None and len(estimate):
+        drawn.append(save(plot_evidence(estimate, truth), folder / "evidence.png"))
     return tuple(drawn)
 
 

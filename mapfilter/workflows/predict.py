@@ -1,4 +1,4 @@
-"""``mapfilter predict``: cell plan and buildings to RxLev rasters, and a set that plays reality."""
+"""``mapfilter predict``: cell plan and buildings to RxLev rasters, and simulated ground truth."""
 
 from __future__ import annotations
 
@@ -7,22 +7,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import rasterio
+from rasterio.errors import RasterioError
 
-from mapfilter import __version__
-from mapfilter._io import ensure_writable_folder, sha256_file
+from mapfilter._io import VERSION, ensure_writable_folder, sha256_file
 from mapfilter._parallel import Progress, part_of
 from mapfilter.config.sections import Config, Prediction
-from mapfilter.errors import InputError, fail
+from mapfilter.errors import Faults, InputError, OutputError, fail
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import (
-    PredictionModel,
-    RealityErrors,
     off_frequency,
     outside_validity,
     predict,
-    realise,
+    simulate_ground_truth,
 )
 from mapfilter.radio.cells import write_cell_plan
-from mapfilter.rasters.rxlev_rasters import write_rasters
+from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.workflows.cover import check_cells_near, map_cover
 from mapfilter.workflows.world import World
 
@@ -77,6 +76,31 @@ def check_reality(config: Config) -> None:
         )
 
 
+def check_only_own_replaced(*paths: Path) -> None:
+    """Check that no rasters are replaced that another program made.
+
+    Raises
+    ------
+    OutputError
+        With every path at which there is something else than rasters that mapfilter predicted.
+    """
+    faults = Faults()
+    for path in paths:
+        if not path.exists():
+            continue
+        try:
+            with rasterio.open(path) as source:
+                software = str(source.tags().get("SOFTWARE", ""))
+        except RasterioError:
+            software = ""
+        if not software.startswith("mapfilter"):
+            expected = "nothing yet, or rasters that mapfilter predicted"
+            got = "a folder" if path.is_dir() else f"a file of {software or 'another program'}"
+            hint = "[rasters] names your own export; give the prediction another path, or none"
+            faults.add(str(path), expected, got, hint)
+    faults.raise_if_any(OutputError)
+
+
 if TYPE_CHECKING:
     from mapfilter.workflows.survey import SurveyResult
 
@@ -118,13 +142,16 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     MapfilterError
         The area, map or plan is wrong, or the output cannot be written.
     """
-    name = config.prediction.model
-    if name == "survey":
+    target, reality = config.rasters_path, config.reality_path
+    surveyed, both = config.prediction.model == "survey", config.prediction.reality.write
+    check_only_own_replaced(
+        target, *([config.deviation_path] if surveyed else [reality] if both else [])
+    )
+    if surveyed:
         from mapfilter.workflows.survey import run_survey
 
         return run_survey(config, progress)
     world = World.of(config)
-    target, reality = config.rasters_path, config.reality_path
     for folder in (target.parent, reality.parent, config.output.dir):
         ensure_writable_folder(folder)
     plan, lattice, model = world.plan, world.lattice, prediction_model(config.prediction)
@@ -140,14 +167,14 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     )
     heights_m = world.heights_m
     wanted = 2 if config.prediction.reality.write else 1
-    tags = {"SOFTWARE": f"mapfilter {__version__}", "MODEL": model.model, "MAP": world.map_name}
+    tags = {"SOFTWARE": f"mapfilter {VERSION}", "MODEL": model.model, "MAP": world.map_name}
     levels = predict(
         plan, lattice, heights_m, model, part_of(progress, 0, wanted), antennas=antennas
     )
     write_rasters(target, lattice, levels, plan.ids, tags)
     if wanted == 2:
         errors = ground_truth_errors(config.prediction)
-        real = realise(
+        real = simulate_ground_truth(
             plan, lattice, heights_m, model, errors, part_of(progress, 1, wanted), antennas=antennas
         )
         write_rasters(reality, lattice, real, plan.ids, {**tags, **reality_tags(target)})
@@ -169,6 +196,6 @@ def prediction_model(section: Prediction) -> PredictionModel:
     return PredictionModel(**section.model_dump(exclude={"reality", "survey"}))
 
 
-def ground_truth_errors(section: Prediction) -> RealityErrors:
+def ground_truth_errors(section: Prediction) -> GroundTruthErrors:
     """Return how a configuration's ground truth differs from its prediction."""
-    return RealityErrors(**section.reality.model_dump(exclude={"write"}))
+    return GroundTruthErrors(**section.reality.model_dump(exclude={"write"}))

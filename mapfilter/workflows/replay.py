@@ -28,6 +28,7 @@ from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.msi import read_antennas
+from mapfilter.report.canvas import save
 from mapfilter.report.errors import plot_error_over_distance
 from mapfilter.tracks.log import TrackLog, leave_out
 from mapfilter.tracks.store import list_logs, read_log
@@ -278,9 +279,8 @@ class _Sites:
         """Accept logs in any CRS: the plan is projected to theirs."""
 
     def filter_for(self, log: TrackLog) -> Filter[Any]:
-        options = filter_choice(self.config.filter)
-        if not isinstance(options, KalmanFilter):
-            raise TypeError(options.name)
+        section = self.config.filter
+        options = KalmanFilter(method=section.name, smooth=section.smooth)  # type: ignore[arg-type]
         plan = planned_cells(self.config, log.crs)
         return options.over_sites(plan, _antennas(self.config, plan))
 
@@ -288,9 +288,7 @@ class _Sites:
         truth = Truth.of_table(log.truth)
         if truth is None:
             return ()
-        path = into / "error.png"
-        plot_error_over_distance(track.estimate, truth, path)
-        return (path,)
+        return (save(plot_error_over_distance(track.estimate, truth), into / "error.png"),)
 
     def lack(self, log: TrackLog, estimate: TrackEstimate) -> str:  # noqa: ARG002
         return "" if estimate.converged_at is not None else "too little was measured"

@@ -15,7 +15,7 @@ from mapfilter.database.parquet import WindowReader
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, same_crs
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.workflows.area import pixels_on
 
 MOST_PX = 1200

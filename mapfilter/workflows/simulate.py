@@ -12,7 +12,7 @@ from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, OutputError, fail
 from mapfilter.geodesy import same_crs
-from mapfilter.rasters.rxlev_rasters import check_against_plan, open_rasters
+from mapfilter.rasters.raster_set import check_against_plan, open_rasters
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.journeys import JourneyPlan

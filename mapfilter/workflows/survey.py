@@ -8,19 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
-from mapfilter import __version__
-from mapfilter._io import ensure_writable_folder
+from mapfilter._io import VERSION, ensure_writable_folder
 from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config, SurveySection
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs
 from mapfilter.radio.cells import CellPlan, write_cell_plan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, open_rasters
-from mapfilter.survey.fit import Survey, SurveyOptions, fit_survey
+from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
+from mapfilter.survey.cell_model import Covariate
+from mapfilter.survey.measured_map import Survey, SurveyOptions, Validation, fit_survey, leave_out
 from mapfilter.survey.measurements import Measurements, named_after, read_measurements
-from mapfilter.survey.rasters import predicted_levels, surveyed_plan, write_survey
-from mapfilter.survey.trend import Covariate
-from mapfilter.survey.validation import Validation, leave_out
+from mapfilter.survey.survey_rasters import predicted_levels, surveyed_plan, write_survey
 from mapfilter.workflows.cover import check_cells_near
 from mapfilter.workflows.results import clear_pictures
 from mapfilter.workflows.survey_pictures import SURVEY_PICTURES, SurveyEvidence, draw_survey
@@ -106,7 +104,7 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         deviation,
         fill=section.fill,
         deviation_factor=factor,
-        tags={"SOFTWARE": f"mapfilter {__version__}", "MODEL": f"survey {section.method}"},
+        tags={"SOFTWARE": f"mapfilter {VERSION}", "MODEL": f"survey {section.method}"},
         progress=progress,
     )
     plan_path = config.output.dir / "cells.csv"

@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from mapfilter.errors import InputError, fail
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.report.basemap import BaseMap
+from mapfilter.report.canvas import save
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
+from mapfilter.survey.measured_map import LeftOut
 from mapfilter.survey.measurements import Measurements
-from mapfilter.survey.validation import LeftOut
 from mapfilter.workflows.cover import outside_m
 from mapfilter.workflows.served import thinned_lattice
 
@@ -61,15 +62,18 @@ def draw_survey(survey: SurveyEvidence, folder: Path) -> tuple[Path, ...]:
         A picture cannot be written.
     """
     levels, left_out_levels = (folder / name for name in SURVEY_PICTURES)
-    plot_surveyed_levels(*_surveyed(survey), levels)
+    save(plot_surveyed_levels(*_surveyed(survey)), levels)
     told = survey.left_out
     if told is None or not len(told):
         return (levels,)
-    plot_left_out(
-        told.measured_dbm, told.predicted_dbm, left_out_levels, title=_named(told),
-        trend_dbm=told.trend_dbm, attribution=survey.attribution,
-    )  # fmt: skip
-    return levels, left_out_levels
+    drawn = plot_left_out(
+        told.measured_dbm,
+        told.predicted_dbm,
+        title=_named(told),
+        trend_dbm=told.trend_dbm,
+        attribution=survey.attribution,
+    )
+    return levels, save(drawn, left_out_levels)
 
 
 def _named(left_out: LeftOut) -> str:

@@ -20,6 +20,7 @@ from mapfilter.errors import ConfigError, Faults
 from mapfilter.evaluation.success import COORDINATES, SuccessCell, success_cells
 from mapfilter.experiments.sweep.run import sweep
 from mapfilter.experiments.sweep.table import read_runs
+from mapfilter.report.canvas import save
 from mapfilter.report.success import plot_run_distributions, plot_success_curves, plot_success_map
 from mapfilter.workflows.sweep_plan import sweep_databases, sweep_plan, sweep_world
 
@@ -59,11 +60,11 @@ def draw_group(rows: pd.DataFrame, out: Path, tail: str, title: str) -> list[Pat
     paths = [out / f"{name}{tail}.png" for name in names]
     cells = success_cells(rows)
     by_step = _by_step(cells)
-    plot_success_curves(list(by_step.items())[:_MOST_CURVES], paths[0], title=title)
-    plot_success_map(cells, paths[1], title=title)
+    save(plot_success_curves(list(by_step.items())[:_MOST_CURVES], title=title), paths[0])
+    save(plot_success_map(cells, title=title), paths[1])
     one = rows[rows["sigma_trans_m"] == sorted(rows["sigma_trans_m"].unique())[0]]
     by_heading = [(f"heading {sigma:g}°", some) for sigma, some in one.groupby("sigma_orient_deg")]
-    plot_run_distributions(by_heading[:_MOST_CURVES], paths[2], title=title)
+    save(plot_run_distributions(by_heading[:_MOST_CURVES], title=title), paths[2])
     return paths
 
 
@@ -80,7 +81,7 @@ def _title(at: Mapping[str, object], several: list[str]) -> str:
     name, reading = at["filter"], at["reading"]
     told = [f"{name} filter" if reading == name else f"{name} filter: {reading}"]
     for axis in several:
-        if axis in _UNITS:
+        if axis in _UNITS and pd.notna(at[axis]):
             told.append(_UNITS[axis].format(at[axis]))
         elif axis in ("database", "radio"):
             told.append(str(at[axis]))

@@ -26,7 +26,7 @@ from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.propagation.shadowing import site_shadowing
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, check_against_plan, open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan, open_rasters
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.network import street_network
 from mapfilter.workflows.cover import check_cells_near

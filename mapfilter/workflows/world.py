@@ -15,7 +15,7 @@ from mapfilter.geodesy import Lattice
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan, read_cell_plan
 from mapfilter.radio.msi import read_antennas
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.lattice import RouteLattice

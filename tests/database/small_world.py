@@ -8,7 +8,8 @@ import shapely
 from mapfilter.database.build import build
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.routes import route_lattice
 from mapfilter.roads.ways import Squares, Ways

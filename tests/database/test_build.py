@@ -27,7 +27,8 @@ from mapfilter.database.store import info
 from mapfilter.database.tiles import z_order
 from mapfilter.errors import InputError, OutputError
 from mapfilter.geodesy import Lattice
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,8 @@ from mapfilter.database.sources import LayerRoutes
 from mapfilter.database.store import info
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.index import RouteSource
 from mapfilter.roads.ways import Squares, Ways
 

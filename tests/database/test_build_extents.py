@@ -9,7 +9,8 @@ from small_world import FLOOR_DBM, IDS, LATTICE, make_plan, make_routes, make_wo
 
 from mapfilter.database.build import build
 from mapfilter.geodesy import Lattice
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 
 # row, col, rows, cols of each cell's own raster: none covers the square's middle alone.
 EXTENTS = ((0, 0, 20, 30), (0, 25, 40, 25), (18, 5, 22, 20))

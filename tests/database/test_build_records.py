@@ -14,7 +14,8 @@ from mapfilter.database.build import build
 from mapfilter.database.export import export_geopackage
 from mapfilter.database.manifest import InputFile
 from mapfilter.errors import OutputError
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 
 
 @pytest.fixture(scope="module")

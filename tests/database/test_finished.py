@@ -15,7 +15,8 @@ from mapfilter.database import build as finished
 from mapfilter.database.build import build, work_key
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes
 from mapfilter.errors import InputError, OutputError
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.buildings import Buildings
 from mapfilter.roads.index import RouteSource
 from mapfilter.roads.osm import Water

@@ -26,7 +26,8 @@ from mapfilter.database.store import info, open_database
 from mapfilter.errors import InputError, OutputError, StoreError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 
 
 @pytest.fixture(scope="module")

@@ -26,6 +26,7 @@ from mapfilter.radio.cell_layouts import COLUMNS as PLAN_COLUMNS
 from mapfilter.tracks.schema import SCHEMA
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
+CITATION = DOCS.parent / "CITATION.cff"
 PAGES = sorted(path.relative_to(DOCS) for path in DOCS.rglob("*.rst") if "api" not in path.parts)
 
 
@@ -73,6 +74,15 @@ def test_quickstart_commands_run(tmp_path, monkeypatch):
     assert named_there | {"figures.json", "candidates.png", "track.png", "error.png"} <= found
     drawn = {path.name for path in (tmp_path / "located-bayes").rglob("*.png")}
     assert drawn == {"belief.png", "track.png", "error.png", "evidence.png"}
+
+
+def test_citation_is_of_this_version_and_licence():
+    project = tomllib.loads((DOCS.parent / "pyproject.toml").read_text("utf-8"))["project"]
+    text = CITATION.read_text("utf-8")
+    assert f"\nversion: {project['version']}\n" in text
+    assert f"\nlicense: {project['license']}\n" in text
+    experiments = set(re.findall(r"mapfilter reproduce ([\w-]+)", text))
+    assert experiments == {"khalaf-allah-2007", "fritsche-klein-2009", "zhang-2006", "tesa", "dlr"}
 
 
 def test_conventions_name_every_status_and_reason():

@@ -7,10 +7,9 @@ import pytest
 
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.global_positioning import informed
-from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.models.street_motion import MotionErrors
 from mapfilter.positioning.bayes.options import BayesOptions
-from mapfilter.positioning.locators import FilterChoice
+from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.simulation.imu import ImuErrors
 
 BIASED = [
@@ -29,7 +28,7 @@ DEFAULTS = MotionErrors()
 
 
 def known(name, options=None, fixed=frozenset()):
-    return informed(FilterChoice(options or BayesOptions()), CASES[name], fixed).options
+    return informed(options or BayesOptions(), CASES[name], fixed)
 
 
 def test_all_cases_are_looked_at():
@@ -139,7 +138,7 @@ def test_the_worlds_other_errors_stay_in_every_case(name):
 
 
 def test_the_candidate_filter_takes_no_sheet():
-    choice = FilterChoice(CandidateOptions(), 3.0)
+    choice = CandidateFilter(margin_db=3.0)
     assert all(informed(choice, case) is choice for case in CASES.values())
 
 

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from grid_town import CRS, levels, streets
 
+from mapfilter.experiments.benchmarks import global_positioning
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.global_positioning import Batch, informed, run_batch
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.options import BayesOptions
 from mapfilter.positioning.estimate import Fix, PositionedTrack, TrackEstimate
-from mapfilter.positioning.locators import FilterChoice
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.satellites import ReceptionModel
 from mapfilter.simulation.simulate import SimulationSettings
 
-CHOICE = FilterChoice(BayesOptions())
+CHOICE = BayesOptions()
 WORLD = SimulationSettings(journey=JourneyPlan(length_m=70.0))
 
 
@@ -42,7 +42,7 @@ class RecordedWorld:
     def skyline(self, _case):
         return None
 
-    def locator(self, choice, *, thinned):
+    def filter(self, choice, *, thinned):
         self.opened.append((choice, thinned))
 
         def locate(log, rng):
@@ -59,6 +59,14 @@ class RecordedWorld:
             return PositionedTrack(TrackEstimate.of_fixes(CRS, "bayes", fixes), (), 0.1)
 
         return locate
+
+
+@pytest.fixture(autouse=True)
+def located_by_the_world(monkeypatch):
+    def locate(log, perfect, rng):
+        return perfect(log, rng)
+
+    monkeypatch.setattr(global_positioning, "locate", locate)
 
 
 def run(*cases, world=None, first=0, end=1, choice=CHOICE, seed=3, fixed=frozenset()):
@@ -109,10 +117,10 @@ def test_each_case_is_run_with_its_own_sheet():
     world, _ = run(*names)
     for name, (choice, _) in zip(names, world.opened, strict=True):
         assert choice == informed(CHOICE, CASES[name])
-    assert world.opened[2][0].options.smooth
+    assert world.opened[2][0].smooth
     sheetless = frozenset({"heading_sd_rad", "bias_sd_rad"})
     world, _ = run("levels-bias20", fixed=sheetless)
-    motion = world.opened[0][0].options.motion
+    motion = world.opened[0][0].motion
     assert motion.heading_sd_rad == BayesOptions().motion.heading_sd_rad
     assert motion.bias_sd_rad == BayesOptions().motion.bias_sd_rad
     assert motion.scale_sd == 0.1
@@ -135,7 +143,7 @@ def test_errors_of_the_world_never_reach_the_filter():
 
 def test_options_of_the_filter_never_reach_the_world():
     motion = replace(BayesOptions().motion, step_sd_m=3.0, bias_sd_rad=1.0)
-    other = FilterChoice(replace(BayesOptions(), motion=motion))
+    other = replace(BayesOptions(), motion=motion)
     first, _ = run("levels-6", "levels-nocompass")
     second, _ = run("levels-6", "levels-nocompass", choice=other)
     assert first.opened != second.opened

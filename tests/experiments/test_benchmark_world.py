@@ -9,16 +9,17 @@ from grid_town import CRS, SOUTH_M, WEST_M, network, plan
 
 from mapfilter.database.build import build
 from mapfilter.database.sources import LatticeRoutes
-from mapfilter.experiments.benchmarks import world as module
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.world import BenchmarkWorld, write_buildings
 from mapfilter.experiments.sweep.world import SweepWorld, write_world
 from mapfilter.geodesy import Lattice
-from mapfilter.positioning.locators import FilterChoice
-from mapfilter.propagation.predict import PredictionModel, RealityErrors, predict
+from mapfilter.positioning.candidate import CandidateFilter
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
+from mapfilter.propagation.predict import predict
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.ways import Buildings
 from mapfilter.simulation.imu import ImuErrors
@@ -27,7 +28,9 @@ from mapfilter.simulation.simulate import SimulationSettings
 LATTICE = Lattice(CRS, WEST_M, SOUTH_M + 600.0, 10.0, 60, 60)
 PLAN = CellPlan(CRS, plan().cells[:2])
 MODEL = PredictionModel(model="cost231_hata")
-NONE = RealityErrors(level_error_db=0.0, eirp_error_db=0.0, azimuth_error_deg=0.0, slope_error=0.0)
+NONE = GroundTruthErrors(
+    level_error_db=0.0, eirp_error_db=0.0, azimuth_error_deg=0.0, slope_error=0.0
+)
 ROWS, COLS = np.indices((60, 60))
 PLACES = LATTICE.east_north(ROWS.ravel(), COLS.ravel())
 
@@ -92,7 +95,7 @@ def test_measured_antennas_are_the_ground_truths_too(tmp_path):
 
 
 def test_the_default_ground_truth_is_not_the_prediction(folder):
-    off = received(folder, RealityErrors(), 1) - predicted()
+    off = received(folder, GroundTruthErrors(), 1) - predicted()
     assert off.std() > 4.0
 
 
@@ -122,7 +125,7 @@ def test_the_checksum_is_of_all_that_is_simulated(tmp_path):
     worlds = [
         world,
         replace(world, model=replace(MODEL, environment="suburban")),
-        replace(world, errors=RealityErrors(offset_db=1.0)),
+        replace(world, errors=GroundTruthErrors(offset_db=1.0)),
         replace(world, settings=SimulationSettings(imu=ImuErrors(turns="gyro"))),
         replace(world, settings=SimulationSettings(imu_period_s=2.0)),
     ]
@@ -141,20 +144,20 @@ def test_the_checksum_is_of_all_that_is_simulated(tmp_path):
 def test_another_world_in_the_same_folder_is_read_anew(tmp_path, monkeypatch):
     opened = []
 
-    def open_locator(database, _choice, **_):
+    def over(_options, database, **_):
         opened.append(database)
         return opened
 
-    monkeypatch.setattr(module, "open_locator", open_locator)
+    monkeypatch.setattr(CandidateFilter, "over", over)
     world = lay_out(tmp_path)
     first = world.streets
     assert world.streets is first
     assert len(first.plan) == 2
-    world.locator(FilterChoice(), thinned=False)
-    world.locator(FilterChoice(), thinned=False)
+    world.filter(CandidateFilter(), thinned=False)
+    world.filter(CandidateFilter(), thinned=False)
     assert len(opened) == 1
-    world.locator(FilterChoice(margin_db=9.0), thinned=False)
-    world.locator(FilterChoice(), thinned=True)
+    world.filter(CandidateFilter(margin_db=9.0), thinned=False)
+    world.filter(CandidateFilter(), thinned=True)
     counts = [database.manifest["counts"]["points"] for database in opened]
     assert counts == [1800, 1800, 1200]
     skyline = world.skyline(CASES["satellites-2"])
@@ -163,6 +166,6 @@ def test_another_world_in_the_same_folder_is_read_anew(tmp_path, monkeypatch):
     write_world(SweepWorld(network(), plan(), LATTICE, {}), tmp_path / "streets")
     assert len(world.streets.plan) == 10
     lay_out(tmp_path, height_m=25.0, tile_px=32)
-    world.locator(FilterChoice(), thinned=True)
+    world.filter(CandidateFilter(), thinned=True)
     assert len(opened) == 4
     assert world.skyline(CASES["satellites-2"]) is not skyline

@@ -9,8 +9,10 @@ import pytest
 from mapfilter._parallel import SerialExecutor
 from mapfilter.experiments.papers.dlr import experiment as dlr
 from mapfilter.experiments.papers.dlr import filters, scene
-from mapfilter.experiments.papers.dlr import table as dlr_table
-from mapfilter.experiments.papers.dlr.assumptions import ASSUMPTIONS
+from mapfilter.experiments.papers.dlr import paper as dlr_table
+from mapfilter.experiments.papers.dlr.pictures import over_threshold
+from mapfilter.experiments.papers.dlr.scene import ASSUMPTIONS
+from mapfilter.experiments.papers.paper import PaperSettings
 from mapfilter.models.state import POSITION_CLOCK_3D
 from mapfilter.positioning.kalman.static_fix import TOO_FEW
 
@@ -175,8 +177,10 @@ def test_a_paper_run_and_its_table(monkeypatch):
     monkeypatch.setattr(
         dlr, "errors_over_time", lambda draw, trial, seed: np.full((3, 10), draw + trial + seed)
     )
+    monkeypatch.setattr(dlr, "DRAWS", 2)
     told = []
-    run = dlr.run_paper(3, 5, 2, SerialExecutor(), lambda *done: told.append(done))
+    given = PaperSettings(3, 5, SerialExecutor(), None, lambda *done: told.append(done))
+    run = dlr.run_paper(given)
     assert told == [(1, 5), (2, 5), (3, 5), (4, 5), (5, 5)]
     assert run.shown == 1
     assert run.over_time_m[:, 0, 0].tolist() == [6, 7]
@@ -191,9 +195,9 @@ def test_a_paper_run_and_its_table(monkeypatch):
     assert ratios["edge_over_gnss"].value == pytest.approx(at["ekf_edge"] / at["ekf_gnss"])
     rows = dlr_table.rows(run)
     assert len(rows) == 4 * len(dlr.RUNS)
-    static = next(row for row in rows if row.run == dlr.STATIC and row.epochs == "every")
-    assert static.told == pytest.approx(26 / 30)
-    assert len(dlr_table.over_threshold(run, "edge", run.every)) == len(dlr.THRESHOLDS_DB)
-    assert set(dlr_table.PUBLISHED) == set(found) - {"every_epoch"}
-    for group, names in dlr_table.PUBLISHED.items():
+    static = next(row for row in rows if row["filter"] == "static" and row["epochs"] == "every")
+    assert static["told"] == pytest.approx(26 / 30)
+    assert len(over_threshold(run, "edge")) == len(dlr.THRESHOLDS_DB)
+    assert set(dlr.PUBLISHED) == set(found) - {"every_epoch"}
+    for group, names in dlr.PUBLISHED.items():
         assert set(names) == set(found[group])

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.evaluation.bounds import rmse_over_time
+from mapfilter.evaluation.bounds import bound_of, rmse_over_time
+from mapfilter.experiments.papers import zhang_2006 as zhang
 from mapfilter.experiments.papers.fritsche_klein_2009.experiment import TABLE_III, bound_curves
 from mapfilter.experiments.papers.fritsche_klein_2009.scene import (
     COMBINATIONS,
@@ -13,7 +14,6 @@ from mapfilter.experiments.papers.fritsche_klein_2009.scene import (
     hard_layout,
     scene,
 )
-from mapfilter.experiments.papers.zhang_2006 import experiment as zhang
 from mapfilter.filters.gaussian import EKF, RBUKF
 from mapfilter.filters.gaussian_sum import run_mixtures, split
 from mapfilter.filters.kalman import smooth
@@ -102,7 +102,7 @@ BOUNDS_M = {
 @pytest.mark.parametrize(("sigma_db", "name"), BOUNDS_M)
 def test_bounds_of_zhang_are_those_measured_before(sigma_db, name):
     states = zhang.true_states(100, np.random.default_rng(1))
-    found = zhang.position_bound_m(zhang.bounds(states, name, sigma_db))[[9, 99, 399]]
+    found = bound_of(zhang.bounds(states, name, sigma_db), zhang.POSITION)[[9, 99, 399]]
     # The last digit is printed to 0.1 m.
     np.testing.assert_allclose(found, BOUNDS_M[sigma_db, name], rtol=0.005)
 
@@ -110,15 +110,17 @@ def test_bounds_of_zhang_are_those_measured_before(sigma_db, name):
 def test_filters_of_zhang():
     rng = np.random.default_rng(3)
     states = zhang.true_states(150, rng)
-    fused = zhang.position_bound_m(zhang.bounds(states, "fusion", 4.0))
-    levels_only = zhang.position_bound_m(zhang.bounds(states, "rss", 4.0))
+    fused = bound_of(zhang.bounds(states, "fusion", 4.0), zhang.POSITION)
+    levels_only = bound_of(zhang.bounds(states, "rss", 4.0), zhang.POSITION)
     start = zhang.started_from_fix(150, rng)
-    from_fix = zhang.position_error_m(zhang.run_filter(EKF, states, "fusion", start, rng), states)
+    from_fix = rmse_over_time(
+        zhang.run_filter(EKF, states, "fusion", start, rng), states, zhang.POSITION
+    )
     # 150 trials: a standard error of 4 %; here the mean over the times that count.
     assert (from_fix / fused)[49:].mean() == pytest.approx(1.0, abs=0.08)
     vague = zhang.started_wide(150, rng)
-    plain = zhang.position_error_m(zhang.run_filter(EKF, states, "rss", vague, rng), states)
-    whole = zhang.position_error_m(zhang.run_sum(states, "rss", vague, rng), states)
+    plain = rmse_over_time(zhang.run_filter(EKF, states, "rss", vague, rng), states, zhang.POSITION)
+    whole = rmse_over_time(zhang.run_sum(states, "rss", vague, rng), states, zhang.POSITION)
     assert plain[399] > 3 * levels_only[399]
     assert whole[399] < 1.5 * levels_only[399]
     assert whole[9] < 1.5 * levels_only[9]

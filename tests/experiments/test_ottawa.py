@@ -30,7 +30,7 @@ from mapfilter.models.fingerprint import LevelReading
 from mapfilter.models.measured_map import HeardOptions, HeardRows, ServingStatistics
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.rasters.rxlev_rasters import open_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.workflows.evaluate_ottawa import Task, find_left_out, run_ottawa
 
 CRS = "EPSG:32618"
@@ -39,7 +39,10 @@ ANTENNAS = {1: (-60.0, 40.0), 2: (300.0, 460.0), 3: (520.0, -40.0)}
 STEP_M, SPEED_MPS = 20.0, 4.0
 CHOSEN = OttawaOptions()
 QUICK = replace(
-    CHOSEN, filter=replace(CHOSEN.filter, particles=ParticleOptions(most=2000, searching=1500))
+    CHOSEN,
+    filter=replace(
+        CHOSEN.filter, particles=ParticleOptions(max_particles=2000, min_search_particles=1500)
+    ),
 )
 """A fifteenth of the particles."""
 

@@ -41,7 +41,7 @@ def test_the_options_that_were_chosen():
     }  # fmt: skip
     assert options.filter.map.sd_m == 16.0
     particles, evidence = options.filter.particles, options.filter.evidence
-    assert (particles.most, particles.searching) == (10_000, 7_000)
+    assert (particles.max_particles, particles.min_search_particles) == (10_000, 7_000)
     assert evidence.serving.weight_per_m == 1 / 150
     levels = evidence.levels
     assert (levels.sd_db, levels.correlation_m, levels.measurement_db) == (5.0, 100.0, 3.0)

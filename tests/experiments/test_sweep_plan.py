@@ -19,13 +19,12 @@ from mapfilter.experiments.sweep.plan import (
     SweepPlan,
     noise_grid,
 )
-from mapfilter.filters.candidate import CandidateOptions
-from mapfilter.positioning.locators import FilterChoice
+from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.walking import WalkerModel
 
-SET = Reading("set", FilterChoice(CandidateOptions(), 0.0), 22.0)
-LIST = Reading("list", FilterChoice(CandidateOptions(duplicates="list", threshold=10)), 22.0)
+SET = Reading("set", CandidateFilter(margin_db=0.0), 22.0)
+LIST = Reading("list", CandidateFilter(duplicates="list", threshold=10), 22.0)
 
 
 def plan(**changed):
@@ -159,7 +158,7 @@ def test_digest_changes_with_everything_that_changes_runs():
         {"draws": 3},
         {"length_m": 900.0},
         {"readings": (SET,)},
-        {"readings": (replace(SET, choice=FilterChoice(CandidateOptions(threshold=2), 0.0)), LIST)},
+        {"readings": (replace(SET, choice=CandidateFilter(threshold=2, margin_db=0.0)), LIST)},
         {"imu": ImuErrors(translation_noise="as_printed")},
         {"imu": ImuErrors(turns="gyro")},
         {"walker": WalkerModel(beside="pavement")},

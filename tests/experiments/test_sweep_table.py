@@ -18,11 +18,11 @@ from mapfilter.experiments.sweep.table import (
     to_table,
     write_part,
 )
-from mapfilter.positioning.locators import FilterChoice
+from mapfilter.positioning.candidate import CandidateFilter
 
 NEVER = Accuracy(False, False, nan, nan, nan, nan, nan, nan, 0)
 RIGHT = Accuracy(True, True, 60.0, 84.0, 3.0, 4.0, 5.0, 9.0, 10)
-PLAN = SweepPlan((Reading("set", FilterChoice()),), draws=25)
+PLAN = SweepPlan((Reading("set", CandidateFilter()),), draws=25)
 
 
 def rows(first, end, score=RIGHT):

@@ -298,7 +298,7 @@ def test_literal_tracking_matches_at_every_call_also_standing():
 
 def test_bad_options_are_told_together():
     with pytest.raises(ConfigError) as caught:
-        CandidateOptions(resolution_m=-1, update_length_m=nan, threshold=0)
+        CandidateOptions(tracking_length_m=-1, update_length_m=nan, threshold=0)
     assert len(caught.value.faults) == 3
 
 
@@ -359,7 +359,7 @@ def test_equals_the_pseudo_code_line_by_line(world):
         Event(float(i), MotionStep(trans, theta), cell)
         for i, (trans, theta, cell) in enumerate(calls)
     ]
-    expected = table_2(cells, calls, options.threshold, options.resolution_m)
+    expected = table_2(cells, calls, options.threshold, filter_.resolution_m)
     belief = filter_.init(calls[0][2], RNG)
     for told, taken in zip(expected, run(filter_, belief, events, RNG), strict=True):
         if taken.belief.mode is Mode.POSITION_TRACKING:

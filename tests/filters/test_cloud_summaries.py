@@ -5,7 +5,7 @@ from math import log2
 import numpy as np
 import pytest
 
-from mapfilter.filters.hypotheses import NEAR_M, SHARES, Bins, flattened, nothing, summarise
+from mapfilter.filters.hypotheses import NEAR_M, SHARES, Bins, empty_summary, flattened, summarise
 from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
 
 BINS = Bins(0.0, 0.0, 25.0, 40, 30)
@@ -118,7 +118,7 @@ def test_a_bin_of_no_weight_is_no_place():
 
 
 def test_nothing_is_unknown():
-    said = nothing(3)
+    said = empty_summary(3)
     assert (said.mean.shape, said.covariance_m2.shape, said.radii_m.shape) == ((3,), (2, 2), (3,))
     for found in (said.mean, said.covariance_m2, said.radii_m, said.entropy_bits):
         assert np.isnan(found).all()

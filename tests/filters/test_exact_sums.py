@@ -66,7 +66,9 @@ def exact(change, readings=READINGS):
 
 def options(count, **given):
     still = {"jitter": (0.0, 0.0), "searching_jitter": (0.0, 0.0)}
-    return ParticleOptions(most=count, searching=count, least=count, **still, **given)
+    return ParticleOptions(
+        max_particles=count, min_search_particles=count, min_particles=count, **still, **given
+    )
 
 
 def shares(belief):
@@ -97,13 +99,15 @@ def rng_of(seed):
     return np.random.default_rng(seed)
 
 
-@pytest.mark.parametrize(("flatten", "believable"), [(1.0, False), (0.5, False), (0.5, True)])
-def test_log_evidence_and_belief_are_those_of_the_sum_on_average(flatten, believable):
+@pytest.mark.parametrize(("mass_exponent", "believable"), [(1.0, False), (0.5, False), (0.5, True)])
+def test_log_evidence_and_belief_are_those_of_the_sum_on_average(mass_exponent, believable):
     """The mean over runs lies within four standard errors of it, known from the runs."""
     steps, runs, count = exact(CHANGE), 60, 1500
     beliefs, log_evidence = oracle.forward(PRIOR, steps)
     model = Chain(CHANGE, believable)
-    given = options(count, flatten=flatten, resample_below=0.9, switch_mass=0.3, switch_hold_m=15.0)
+    given = options(
+        count, mass_exponent=mass_exponent, resample_below=0.9, switch_mass=0.3, switch_hold_m=15.0
+    )
     filter_, ratio, found = ParticleFilter(model, given), [], []
     for seed in range(runs):
         rng = rng_of(seed)
@@ -139,7 +143,7 @@ def test_motion_and_readings_of_nothing_leave_the_log_evidence():
 def test_resampling_by_flattened_weights_keeps_the_mass_of_places():
     """More copies where little mass is, and each of them with less of it."""
     model, count = Chain(STAY), 3000
-    filter_ = ParticleFilter(model, options(count, flatten=0.5, resample_below=0.999))
+    filter_ = ParticleFilter(model, options(count, mass_exponent=0.5, resample_below=0.999))
     prior, rng = np.array([0.9, 0.0999, 0.0001]), rng_of(1)
     before = filter_.init(prior, rng)
     after, _ = filter_.update(before, "a", rng)

@@ -31,16 +31,27 @@ from mapfilter.filters.trials import factors_of, is_diagonal, method_numbers
 
 def test_the_usual_options():
     assert asdict(ParticleOptions()) == {
-        "most": 20_000, "searching": 12_000, "least": 1000, "per_bin": 60.0,
-        "resample_below": 0.5, "flatten": 0.5, "jitter": (0.2, 0.2, 0.005, 0.003, 0.0),
-        "searching_jitter": (1.5, 1.5, 0.015, 0.009, 0.0), "switch_mass": 0.99,
+        "max_particles": 20_000,
+        "min_search_particles": 12_000,
+        "min_particles": 1000,
+        "particles_per_bin": 60.0,
+        "resample_below": 0.5,
+        "mass_exponent": 0.5,
+        "jitter": (0.2, 0.2, 0.005, 0.003, 0.0),
+        "searching_jitter": (1.5, 1.5, 0.015, 0.009, 0.0),
+        "switch_mass": 0.99,
         "switch_hold_m": 14.0,
-    }  # fmt: skip
+    }
     assert asdict(CandidateOptions()) == {
-        "resolution_m": 5.0, "update_length_m": 22.0, "tracking_length_m": None,
-        "prediction": "displacement", "duplicates": "set", "threshold": 1,
-        "at_threshold": "switch", "switch_check": "same_call", "when_empty": "fail",
-    }  # fmt: skip
+        "update_length_m": 22.0,
+        "tracking_length_m": None,
+        "prediction": "displacement",
+        "duplicates": "set",
+        "threshold": 1,
+        "at_threshold": "switch",
+        "switch_check": "same_call",
+        "when_empty": "fail",
+    }
     assert SirOptions() == SIR == SirOptions(1.0, 0.0)
     assert SirOptions(0.5, 0.5) == REGULARISED
     assert SigmaPoints() == SigmaPoints(1e-3, 2.0, 0.0)
@@ -133,72 +144,99 @@ def test_what_switches():
 
 
 def test_what_lies_on_the_border_is_taken():
-    one = ParticleOptions(most=1, least=1, searching=1, flatten=1.0, switch_hold_m=0.0)
-    assert one.most == 1
-    still = ParticleOptions(jitter=(0.0,), searching_jitter=(), per_bin=1e-9)
+    one = ParticleOptions(
+        max_particles=1,
+        min_particles=1,
+        min_search_particles=1,
+        mass_exponent=1.0,
+        switch_hold_m=0.0,
+    )
+    assert one.max_particles == 1
+    still = ParticleOptions(jitter=(0.0,), searching_jitter=(), particles_per_bin=1e-9)
     assert still.jitter == (0.0,)
-    near = ParticleOptions(resample_below=1e-9, switch_mass=1 - 1e-9, flatten=1e-9)
-    assert near.flatten == 1e-9
+    near = ParticleOptions(resample_below=1e-9, switch_mass=1 - 1e-9, mass_exponent=1e-9)
+    assert near.mass_exponent == 1e-9
     assert SirOptions(0.0, 2.0) != SirOptions(1.0, 0.0)
     assert SirOptions(0.0, 0.0).resample_below == 0.0
     assert SigmaPoints(1e-9, -1.0, -1.0).spread(2) == 1e-9
-    options = CandidateOptions(resolution_m=0.1, update_length_m=0.0, tracking_length_m=0.0)
+    options = CandidateOptions(update_length_m=0.0, tracking_length_m=0.0)
     assert options.tracking_length_m == 0.0
     assert Method("one", iterations=1).iterations == 1
     assert init(np.zeros(2), np.eye(2), [1], 2, np.random.default_rng(0)).state.shape == (2, 2)
     assert split([0.0, 0.0], np.eye(2), {1: 3}).means.shape == (3, 2)
 
 
+def test_two_parts_keep_mean_and_variance():
+    cut = split([1.0, 5.0], np.diag([4.0, 9.0]), {0: 2, 1: 2})
+    for index, (mean, variance) in enumerate([(1.0, 4.0), (5.0, 9.0)]):
+        off = cut.means[:, index] - mean
+        assert cut.weights @ off == pytest.approx(0.0, abs=1e-12)
+        assert cut.weights @ off**2 + cut.covariance[index, index] == pytest.approx(variance)
+    np.testing.assert_allclose(np.diagonal(cut.covariance), 0.81 * np.array([4.0, 9.0]))
+
+
 P, C, S = ParticleOptions, CandidateOptions, SirOptions
 ODD = np.array([[1.0, 0.5], [0.5 * (1 + 1.5e-9), 1.0]])
 DOORS = {
-    "least and most": (lambda: P(least=0, most=5), ConfigError),
-    "least and most: expected 1 <= least": (lambda: P(least=6, most=5), ConfigError),
-    "particles, searching": (lambda: P(searching=0), ConfigError),
-    "particles, per_bin": (lambda: P(per_bin=0.0), ConfigError),
-    "particles, per_bin: expected a finite": (lambda: P(per_bin=inf), ConfigError),
-    "particles, flatten": (lambda: P(flatten=0.0), ConfigError),
-    "particles, flatten: expected a power": (lambda: P(flatten=1.01), ConfigError),
-    "particles, resample_below": (lambda: P(resample_below=0.0), ConfigError),
-    "particles, resample_below: expected": (lambda: P(resample_below=1.0), ConfigError),
-    "particles, switch_mass": (lambda: P(switch_mass=1.0), ConfigError),
-    "particles, switch_mass: expected a": (lambda: P(switch_mass=0.0), ConfigError),
-    "particles, switch_hold_m": (lambda: P(switch_hold_m=-0.1), ConfigError),
-    "particles, switch_hold_m: exp": (lambda: P(switch_hold_m=inf), ConfigError),
-    "particles, jitter": (lambda: P(jitter=(1.0, -1.0)), ConfigError),
-    "particles, jitter: exp": (lambda: P(jitter=(inf, 1.0)), ConfigError),
-    "particles, searching_jitter": (lambda: P(searching_jitter=(nan,)), ConfigError),
-    "resolution_m": (lambda: C(resolution_m=0.0), ConfigError),
-    "resolution_m: expected": (lambda: C(resolution_m=inf), ConfigError),
+    "ParticleOptions, min_particles: expected a whole number >= 1, found 0": (
+        lambda: P(min_particles=0, max_particles=5),
+        ConfigError,
+    ),
+    "max_particles: expected min_particles <= max_particles, found 6 and 5": (
+        lambda: P(min_particles=6, max_particles=5),
+        ConfigError,
+    ),
+    "ParticleOptions, min_search_particles": (lambda: P(min_search_particles=0), ConfigError),
+    "particles_per_bin": (lambda: P(particles_per_bin=0.0), ConfigError),
+    "particles_per_bin: expected a number > 0": (lambda: P(particles_per_bin=inf), ConfigError),
+    "mass_exponent": (lambda: P(mass_exponent=0.0), ConfigError),
+    "mass_exponent: expected a number > 0 and <= 1": (lambda: P(mass_exponent=1.01), ConfigError),
+    "resample_below": (lambda: P(resample_below=0.0), ConfigError),
+    "resample_below: expected a number > 0 and < 1": (
+        lambda: P(resample_below=1.0),
+        ConfigError,
+    ),
+    "switch_mass": (lambda: P(switch_mass=1.0), ConfigError),
+    "switch_mass: expected a": (lambda: P(switch_mass=0.0), ConfigError),
+    "switch_hold_m": (lambda: P(switch_hold_m=-0.1), ConfigError),
+    "switch_hold_m: exp": (lambda: P(switch_hold_m=inf), ConfigError),
+    "ParticleOptions, jitter": (lambda: P(jitter=(1.0, -1.0)), ConfigError),
+    "ParticleOptions, jitter: exp": (lambda: P(jitter=(inf, 1.0)), ConfigError),
+    "ParticleOptions, searching_jitter": (lambda: P(searching_jitter=(nan,)), ConfigError),
     "update_length_m": (lambda: C(update_length_m=-0.1), ConfigError),
     "update_length_m: expected": (lambda: C(update_length_m=inf), ConfigError),
     "tracking_length_m": (lambda: C(tracking_length_m=-0.1), ConfigError),
     "threshold": (lambda: C(threshold=0), ConfigError),
-    "SIR, resample_below": (lambda: S(-0.01), InputError),
-    "SIR, resample_below: expected": (lambda: S(1.01), InputError),
-    "SIR, regularise": (lambda: S(1.0, -0.01), InputError),
-    "SIR, regularise: expected": (lambda: S(1.0, 2.01), InputError),
-    "sigma points, alpha": (lambda: SigmaPoints(0.0), InputError),
-    "sigma points, alpha: expected": (lambda: SigmaPoints(inf), InputError),
-    "sigma points, beta": (lambda: SigmaPoints(1.0, nan), InputError),
-    "sigma points, kappa": (lambda: SigmaPoints(1.0, 2.0, inf), InputError),
+    "SirOptions, resample_below": (lambda: S(-0.01), ConfigError),
+    "SirOptions, resample_below: expected a number in 0..1": (lambda: S(1.01), ConfigError),
+    "SirOptions, regularise": (lambda: S(1.0, -0.01), ConfigError),
+    "SirOptions, regularise: expected a number in 0..2": (lambda: S(1.0, 2.01), ConfigError),
+    "SigmaPoints, alpha": (lambda: SigmaPoints(0.0), ConfigError),
+    "SigmaPoints, alpha: expected a number > 0": (lambda: SigmaPoints(inf), ConfigError),
+    "SigmaPoints, beta": (lambda: SigmaPoints(1.0, nan), ConfigError),
+    "SigmaPoints, kappa": (lambda: SigmaPoints(1.0, 2.0, inf), ConfigError),
     "kappa: expected more than -2": (lambda: SigmaPoints(1.0, 2.0, -2.0).spread(2), InputError),
     "kappa: expected more than -3": (lambda: SigmaPoints(1.0, 2.0, -3.5).weights(3), InputError),
-    "method, iterations": (lambda: Method("none", iterations=0), InputError),
+    "Method, iterations: expected a whole number >= 1": (
+        lambda: Method("none", iterations=0),
+        ConfigError,
+    ),
     "covariance: expected shape .2, 2.": (lambda: factor_of(np.eye(3), 2), InputError),
     "there: expected shape": (lambda: factor_of(1.0, 1, "there"), InputError),
     "covariance: expected finite": (lambda: factor_of([[nan]], 1), InputError),
     "covariance: expected a symmetric": (lambda: factor_of(ODD, 2), InputError),
     "covariance: expected variances >= 0": (lambda: factor_of(np.diag([1, -1.0]), 2), InputError),
     "covariance: expected no negative eigenvalue": (
-        lambda: factor_of([[1.0, 1 + 2.5e-9], [1 + 2.5e-9, 1.0]], 2), InputError,
+        lambda: factor_of([[1.0, 1 + 2.5e-9], [1 + 2.5e-9, 1.0]], 2),
+        InputError,
     ),
     "covariance: expected shape": (lambda: kalman.as_belief([1.0], np.eye(2)), InputError),
     "parts": (lambda: split([0.0, 0.0], np.eye(2), {2: 2}), InputError),
     "parts: expected indices below 2": (lambda: split([0.0, 0.0], np.eye(2), {-1: 2}), InputError),
     "parts: expected indices below 2 and": (lambda: split([0, 0], np.eye(2), {1: 0}), InputError),
     "covariance, row 0: expected no correlation": (
-        lambda: split([0.0] * 2, [[1.0, 0.1], [0.1, 1.0]], {0: 2}), InputError,
+        lambda: split([0.0] * 2, [[1.0, 0.1], [0.1, 1.0]], {0: 2}),
+        InputError,
     ),
     "sampled: expected indices in 0..1": (lambda: drawn([-1]), InputError),
     "sampled: expected indices in 0..1, found": (lambda: drawn([0, 2]), InputError),
@@ -211,7 +249,7 @@ DOORS = {
         lambda: smooth(np.eye(3), np.eye(3), np.zeros((1, 2, 2)), np.zeros((1, 2, 2, 2))),
         InputError,
     ),
-}  # fmt: skip
+}
 
 
 def drawn(sampled, count=5):
@@ -227,7 +265,13 @@ def test_what_lies_beyond_is_told(said, door):
 
 def test_faults_of_particles_are_told_one_by_one():
     with pytest.raises(ConfigError) as told:
-        P(searching=0, flatten=2.0, switch_mass=nan, switch_hold_m=nan, jitter=(nan,))
+        P(
+            min_search_particles=0,
+            mass_exponent=2.0,
+            switch_mass=nan,
+            switch_hold_m=nan,
+            jitter=(nan,),
+        )
     assert len(told.value.faults) == 5
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mapfilter.filters.hypotheses import Bins, nothing, summarise
+from mapfilter.filters.hypotheses import Bins, empty_summary, summarise
 
 BINS = Bins.over((0.0, 0.0, 3000.0, 2000.0))
 
@@ -59,6 +59,6 @@ def test_positions_beyond_the_area_are_counted_at_its_edge():
 
 
 def test_nothing_says_nothing():
-    said = nothing(5)
+    said = empty_summary(5)
     assert np.isnan(said.mean).all()
     assert said.mass_50m == 0

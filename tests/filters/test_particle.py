@@ -12,9 +12,14 @@ from mapfilter.filters.particle import ParticleFilter, ParticleOptions
 
 PRIOR_SD, STEP_SD, FIX_SD = 20.0, 3.0, 8.0
 PLAIN = ParticleOptions(
-    most=60_000, searching=60_000, least=60_000, flatten=1.0, jitter=(0.0, 0.0),
-    searching_jitter=(0.0, 0.0), switch_hold_m=5.0,
-)  # fmt: skip
+    max_particles=60_000,
+    min_search_particles=60_000,
+    min_particles=60_000,
+    mass_exponent=1.0,
+    jitter=(0.0, 0.0),
+    searching_jitter=(0.0, 0.0),
+    switch_hold_m=5.0,
+)
 
 
 @dataclass(frozen=True)
@@ -68,10 +73,10 @@ def kalman(motions, fixes, mean):
         yield mean, variance
 
 
-@pytest.mark.parametrize("flatten", [1.0, 0.5])
-def test_a_linear_case_agrees_with_the_kalman_filter(flatten):
+@pytest.mark.parametrize("mass_exponent", [1.0, 0.5])
+def test_a_linear_case_agrees_with_the_kalman_filter(mass_exponent):
     motions, fixes = walk()
-    filter_ = ParticleFilter(LinearModel(), replace(PLAIN, flatten=flatten))
+    filter_ = ParticleFilter(LinearModel(), replace(PLAIN, mass_exponent=mass_exponent))
     rng = np.random.default_rng(0)
     start = np.array([490.0, 515.0])
     belief = filter_.init(tuple(start), rng)
@@ -87,7 +92,13 @@ def test_a_linear_case_agrees_with_the_kalman_filter(flatten):
 
 
 def test_the_number_follows_the_belief_and_the_switch_rule():
-    options = replace(PLAIN, most=8000, searching=4000, least=200, per_bin=60.0)
+    options = replace(
+        PLAIN,
+        max_particles=8000,
+        min_search_particles=4000,
+        min_particles=200,
+        particles_per_bin=60.0,
+    )
     filter_, rng = ParticleFilter(LinearModel(), options), np.random.default_rng(1)
     belief = filter_.init((500.0, 500.0), rng)
     statuses, motions, fixes = [], *walk()
@@ -113,5 +124,11 @@ def test_a_belief_that_is_not_credible_never_converges():
 
 def test_options_are_checked_together():
     with pytest.raises(ConfigError) as told:
-        ParticleOptions(most=10, least=20, flatten=0.0, switch_mass=1.5, per_bin=-1.0)
+        ParticleOptions(
+            max_particles=10,
+            min_particles=20,
+            mass_exponent=0.0,
+            switch_mass=1.5,
+            particles_per_bin=-1.0,
+        )
     assert len(told.value.faults) == 4

@@ -44,14 +44,16 @@ STILL = {"jitter": (0.0,), "searching_jitter": (0.0,)}
 
 
 def updated(reading, **given):
-    options = ParticleOptions(**STILL | {"most": 64, "searching": 64, "least": 4} | given)
+    options = ParticleOptions(
+        **STILL | {"max_particles": 64, "min_search_particles": 64, "min_particles": 4} | given
+    )
     filter_, rng = ParticleFilter(Two(), options), np.random.default_rng(0)
     return filter_.update(filter_.init(0.0, rng), reading, rng)
 
 
 def test_particles_are_drawn_anew_where_too_few_carry_the_weight():
     def kept(log_gain, below):
-        after, info = updated(log_gain, flatten=1.0, resample_below=below)
+        after, info = updated(log_gain, mass_exponent=1.0, resample_below=below)
         assert info.hypotheses == after.log_weight.size == 64
         return not np.allclose(after.log_weight, -log(64))
 
@@ -59,19 +61,37 @@ def test_particles_are_drawn_anew_where_too_few_carry_the_weight():
     assert kept(log(2.0), 0.89)
     assert not kept(log(2.0), 0.91)
     # All alike are 64 of 64: no fewer than any share.
-    assert updated(0.0, flatten=1.0, resample_below=0.999)[0].weight[0] == 1 / 64
+    assert updated(0.0, mass_exponent=1.0, resample_below=0.999)[0].weight[0] == 1 / 64
 
 
 def test_the_number_of_particles_follows_the_bins_that_are_covered():
     # Two bins of one half each: ten for each of two bins.
-    after, info = updated(0.0, flatten=1.0, searching=4, per_bin=10.0)
+    after, info = updated(0.0, mass_exponent=1.0, min_search_particles=4, particles_per_bin=10.0)
     assert (after.state.shape, info.hypotheses) == ((3, 20), 20)
     # Half of what there is is not drawn anew: 32 wanted of 64.
-    assert updated(0.0, flatten=1.0, searching=4, per_bin=16.0)[1].hypotheses == 64
-    assert updated(0.0, flatten=1.0, searching=4, per_bin=15.6)[1].hypotheses == 31
-    assert updated(0.0, flatten=1.0, searching=9, per_bin=0.1)[1].hypotheses == 9
+    assert (
+        updated(0.0, mass_exponent=1.0, min_search_particles=4, particles_per_bin=16.0)[
+            1
+        ].hypotheses
+        == 64
+    )
+    assert (
+        updated(0.0, mass_exponent=1.0, min_search_particles=4, particles_per_bin=15.6)[
+            1
+        ].hypotheses
+        == 31
+    )
+    assert (
+        updated(0.0, mass_exponent=1.0, min_search_particles=9, particles_per_bin=0.1)[1].hypotheses
+        == 9
+    )
     # Once it has converged the least number counts.
-    options = {"switch_mass": 0.4, "switch_hold_m": 0.0, "flatten": 1.0, "per_bin": 0.1}
+    options = {
+        "switch_mass": 0.4,
+        "switch_hold_m": 0.0,
+        "mass_exponent": 1.0,
+        "particles_per_bin": 0.1,
+    }
     after, info = updated(0.0, **options)
     assert (info.status, info.hypotheses) == (Status.CONVERGED, 4)
     assert after.status is Status.CONVERGED
@@ -81,8 +101,13 @@ def test_the_number_of_particles_follows_the_bins_that_are_covered():
 
 
 def test_which_jitter_parts_copies():
-    given = {"flatten": 1.0, "per_bin": 5.0, "searching": 4, "jitter": (0.0, 2.0),
-             "searching_jitter": (0.0, 0.0, 3.0)}  # fmt: skip
+    given = {
+        "mass_exponent": 1.0,
+        "particles_per_bin": 5.0,
+        "min_search_particles": 4,
+        "jitter": (0.0, 2.0),
+        "searching_jitter": (0.0, 0.0, 3.0),
+    }
     searching, _ = updated(0.0, **given)
     assert searching.state[1].tolist() == [0.0] * 10
     assert searching.state[2].std() > 1.0
@@ -93,7 +118,10 @@ def test_which_jitter_parts_copies():
 
 
 def test_particles_without_any_weight():
-    filter_, rng = ParticleFilter(Two(), ParticleOptions(most=8, least=4)), np.random.default_rng(0)
+    filter_, rng = (
+        ParticleFilter(Two(), ParticleOptions(max_particles=8, min_particles=4)),
+        np.random.default_rng(0),
+    )
     start = filter_.init(-np.inf, rng)
     np.testing.assert_allclose(start.log_weight, -log(8))
     after, info = filter_.update(replace(start, log_weight=np.full(8, -np.inf)), 0.0, rng)
@@ -104,9 +132,11 @@ def test_particles_without_any_weight():
     assert (info.reason, info.status, info.hypotheses) == (Reason.NO_READING, Status.SEARCHING, 8)
     empty = replace(start, state=start.state[:, :0], log_weight=np.empty(0))
     assert np.isnan(filter_.locate(empty).east_m)
-    for motion, why in ((MotionStep(nan, 0.0), Reason.NO_STEP),
-                        (MotionStep(0.0, nan), Reason.NO_HEADING),
-                        (MotionStep(0.0, 1.0), Reason.USED)):  # fmt: skip
+    for motion, why in (
+        (MotionStep(nan, 0.0), Reason.NO_STEP),
+        (MotionStep(0.0, nan), Reason.NO_HEADING),
+        (MotionStep(0.0, 1.0), Reason.USED),
+    ):
         same, reason = filter_.predict(start, motion, rng)
         assert same is start
         assert reason is why

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mapfilter.errors import InputError
+from mapfilter.errors import ConfigError, InputError
 from mapfilter.filters import kalman
 from mapfilter.filters import rao_blackwell as rb
 from mapfilter.filters.gaussian import EKF, Gaussian
@@ -202,13 +202,18 @@ def test_regularising_keeps_the_spread():
         (lambda rng: rb.update(START, LINEAR, np.zeros(5), rng, SIR, np.zeros((2, 2))), "loading"),
         (lambda rng: rb.update(START, compiled(pseudoranges(MOVING_CLOCK, AWAY, 1.0)),
                                np.zeros(5), rng), "a state of 4"),
-        (lambda _: SirOptions(2.0), "resample_below"),
-        (lambda _: SirOptions(1.0, np.nan), "regularise"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_told(call, told):
     with pytest.raises(InputError, match=told):
         call(np.random.default_rng(1))
+
+
+def test_options_out_of_range_are_refused():
+    with pytest.raises(ConfigError, match="resample_below"):
+        SirOptions(2.0)
+    with pytest.raises(ConfigError, match="regularise"):
+        SirOptions(1.0, np.nan)
 
 
 LINEAR = Linear(POSITION_CLOCK_3D).compiled

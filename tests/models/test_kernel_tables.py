@@ -6,9 +6,17 @@ from math import atan2, erfc, exp, log, pi, radians, sqrt
 import numpy as np
 import pytest
 
-from mapfilter.models import cell_id, fingerprint
-from mapfilter.models.cell_id import ServingWeights, log_serving, serving_table
-from mapfilter.models.fingerprint import LevelErrors, bound_table
+from mapfilter.models import fingerprint
+from mapfilter.models.fingerprint import (
+    BoundReading,
+    LevelErrors,
+    LevelReading,
+    RasterFrame,
+    ServingWeights,
+    bound_table,
+    log_serving,
+    serving_table,
+)
 from mapfilter.models.street_motion import (
     BIAS,
     EAST,
@@ -18,7 +26,6 @@ from mapfilter.models.street_motion import (
     STATES,
     MapWeights,
     MotionErrors,
-    _sorted,
     _squares,
     draw_ancestors,
     move,
@@ -84,7 +91,7 @@ def test_a_margin_is_looked_up_at_the_nearest_quarter():
     # The second best is worth its name where there are three cells: the other two are at 0.
     level[:, 4] = np.where(np.array(MARGINS_DB) > 0, 0.0, level[:, 4])
     found, pixel = np.zeros(len(MARGINS_DB)), np.arange(len(MARGINS_DB), dtype=np.int32)
-    cell_id.weigh_by_serving(pixel, level.ravel(), 5, 1, marked(), 1.0, found)
+    fingerprint.weigh_by_serving(pixel, level.ravel(), 5, 1, marked(), 1.0, found)
     np.testing.assert_array_equal(found, PLACES)
 
 
@@ -95,18 +102,17 @@ def test_a_bound_is_looked_up_at_the_nearest_thirty_second():
     for censored, seen in ((-1, deviations), (1, -deviations)):
         level = (-3.0 * seen).astype(np.float32)
         found, pixel = np.zeros(seen.size), np.arange(seen.size, dtype=np.int32)
-        fingerprint.weigh_by_bound(
-            pixel, level, 1, np.zeros(1, dtype=np.int32), 0.0, censored, 3.0, 1.0, table, found
-        )
+        bound = BoundReading(np.zeros(1, dtype=np.int32), 0.0, censored, 3.0, 1.0)
+        fingerprint.weigh_by_bound(pixel, level, 1, bound, table, found)
         np.testing.assert_allclose(np.exp(found), places + 1, rtol=1e-5)
 
 
 def test_corners_of_a_raster_have_their_own_pixels():
     places = np.array([[0.5, 29.5], [49.5, 29.5], [0.5, 0.5], [49.5, 0.5], [-99, 99], [99, -99],
                        [10.5, 19.5]])  # fmt: skip
-    state, pixel = np.zeros((5, 7), dtype=np.float32), np.empty(7, dtype=np.int32)
+    state = np.zeros((5, 7), dtype=np.float32)
     state[:2] = places.T + np.array([[200.0], [-70.0]])
-    fingerprint.pixels(state, 0.0, 0.0, 200.0, -40.0, 0.1, 3, 5, pixel)
+    pixel = fingerprint.pixels(state, 0.0, 0.0, RasterFrame(200.0, -40.0, 0.1, 3, 5))
     assert pixel.tolist() == [0, 4, 10, 14, 0, 14, 6]
 
 
@@ -114,9 +120,8 @@ def test_clipped_innovations_count_as_the_clip_on_both_sides():
     level = np.array([-50.0, 50.0, 1.0], dtype=np.float32)
     found, pixel = np.zeros(3), np.arange(3, dtype=np.int32)
     one, none = np.ones(1, dtype=np.float32), np.zeros(1, dtype=np.float32)
-    fingerprint.weigh_by_levels(
-        pixel, pixel, level, 1, none.astype(np.int32), none, none, one, 0.3, 0.5, 2.0, found
-    )
+    levels = LevelReading(none.astype(np.int32), none, none, one, 0.3, 0.5, 2.0, 0.0, 0.0)
+    fingerprint.weigh_by_levels(pixel, pixel, level, 1, levels, found)
     # With one level the common part does not matter: half of weight times square.
     np.testing.assert_allclose(found, [-1.0, -1.0, -0.25], rtol=1e-6)
 
@@ -169,24 +174,24 @@ def test_a_step_of_nothing_changes_nothing():
 
 def test_squares_cover_places_with_at_most_400_a_side():
     east, north = np.array([3.0, 103.0, 5.0], "f4"), np.array([20.0, 70.0, 30.0], "f4")
-    assert _squares(east, north, 10.0) == (3.0, 70.0, 10.0, 6, 11)
-    assert _squares(east, north, 0.01) == (3.0, 70.0, 0.25, 201, 401)
-    assert _squares(north, east, 0.01) == (20.0, 103.0, 0.25, 401, 201)
+    assert _squares(east, north, 10.0)[:3] == ((3.0, 70.0), 10.0, (6, 11))
+    assert _squares(east, north, 0.01)[:3] == ((3.0, 70.0), 0.25, (201, 401))
+    assert _squares(north, east, 0.01)[:3] == ((20.0, 103.0), 0.25, (401, 201))
 
 
 def test_places_are_sorted_by_their_square():
     east, north = np.array([25.0, 0.0, 5.0, 30.0, 9.0], "f4"), np.array([0, 20, 11, 20, 1], "f4")
-    start, order = _sorted(east, north, 0.0, 20.0, 10.0, 2, 3)
-    # Square 0 holds two, 2 the one on the eastern edge, 3 and 5 those on the southern one.
-    assert start.tolist() == [0, 2, 2, 3, 4, 4, 5]
+    corner_m, side_m, shape, start, order = _squares(east, north, 10.0)
+    assert (corner_m, side_m, shape) == ((0.0, 20.0), 10.0, (3, 4))
+    # Square 0 holds two, 3 the one on the eastern edge, 4 and 10 those farther south.
+    assert start.tolist() == [0, 2, 2, 2, 3, 4, 4, 4, 4, 4, 4, 5, 5]
     assert order.tolist() == [1, 2, 3, 4, 0]
 
 
 def drawn(later, earlier, log_weight, key=5, log_jump=-6.0):
-    chosen = np.empty(later.shape[1], dtype=np.int32)
-    draw_ancestors(later, earlier, log_weight, 0.0, 0.0, 4.0, 0.01, 0.01, log_jump,
-                   np.uint64(key), chosen)  # fmt: skip
-    return chosen
+    variances = (4.0, 0.01, 0.01)
+    moved_m = (0.0, 0.0)
+    return draw_ancestors(later, earlier, log_weight, moved_m, variances, log_jump, np.uint64(key))
 
 
 def test_an_ancestor_three_deviations_away_is_seen_in_a_wide_cloud():

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from mapfilter.errors import InputError
+from mapfilter.errors import ConfigError, InputError
 from mapfilter.models.motion import (
     QUARTZ,
     SPEED_OF_LIGHT_MPS,
@@ -131,13 +131,20 @@ DOORS = {
     "factor: expected a number >= 0, found -1": lambda: scaled(random_walk(1.0, 1.0), -1.0),
     "factor.*inf": lambda: scaled(random_walk(1.0, 1.0), INF),
     "motion: expected at least one part": lambda: together([]),
-    "oscillator, h0: expected a number >= 0": lambda: Oscillator(-1.0, 0.0, 0.0),
-    "oscillator, h_minus1": lambda: Oscillator(0.0, INF, 0.0),
-    "oscillator, h_minus2": lambda: Oscillator(0.0, 0.0, -1e-30),
+    "Oscillator, h0: expected a number >= 0": lambda: Oscillator(-1.0, 0.0, 0.0),
+    "Oscillator, h_minus1": lambda: Oscillator(0.0, INF, 0.0),
+    "Oscillator, h_minus2": lambda: Oscillator(0.0, 0.0, -1e-30),
 }
 
 
 @pytest.mark.parametrize(("said", "make"), DOORS.items(), ids=range(len(DOORS)))
 def test_what_lies_beyond_is_told(said, make):
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(ConfigError if "Oscillator" in said else InputError, match=said):
         make()
+
+
+def test_a_clock_as_printed_is_refused_where_its_noise_is_no_covariance():
+    assert np.linalg.eigvalsh(clock_motion(1.9).noise)[0] > 0
+    with pytest.raises(InputError, match=r'found 2.5 s \(likely: .*cross_term="textbook"'):
+        clock_motion(2.5)
+    assert np.linalg.eigvalsh(clock_motion(2.5, cross_term="textbook").noise)[0] > 0

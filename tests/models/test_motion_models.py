@@ -5,7 +5,7 @@ import pytest
 from fusion_world import CASES
 from scipy.linalg import expm
 
-from mapfilter.errors import InputError
+from mapfilter.errors import ConfigError, InputError
 from mapfilter.models.motion import (
     QUARTZ,
     LinearMotion,
@@ -80,7 +80,6 @@ BAD = {
     "an indefinite noise": lambda: LinearMotion(np.eye(2), np.array([[1.0, 2.0], [2.0, 1.0]])),
     "a lopsided noise": lambda: LinearMotion(np.eye(2), np.array([[1.0, 0.5], [0.0, 1.0]])),
     "sizes": lambda: LinearMotion(np.eye(2), np.eye(3)),
-    "a bad oscillator": lambda: Oscillator(-1.0, 0.0, 0.0),
 }
 
 
@@ -88,3 +87,8 @@ BAD = {
 def test_what_is_wrong_is_said(make):
     with pytest.raises(InputError, match="expected"):
         make()
+
+
+def test_a_bad_oscillator_is_said():
+    with pytest.raises(ConfigError, match="h0: expected a number >= 0"):
+        Oscillator(-1.0, 0.0, 0.0)

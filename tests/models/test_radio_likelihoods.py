@@ -4,9 +4,14 @@ import numpy as np
 import pytest
 import scalar_oracle as oracle
 
-from mapfilter.models import cell_id, fingerprint
-from mapfilter.models.cell_id import ServingWeights
-from mapfilter.models.fingerprint import LevelErrors
+from mapfilter.models import fingerprint
+from mapfilter.models.fingerprint import (
+    BoundReading,
+    LevelErrors,
+    LevelReading,
+    RasterFrame,
+    ServingWeights,
+)
 
 ROWS, COLS, CELLS, RESOLUTION_M = 6, 9, 4, 10.0
 BANDS = CELLS + 2
@@ -25,8 +30,8 @@ EVERY = np.arange(ROWS * COLS, dtype=np.int32)
 
 def by_serving(table, cell, weights, weight=1.0):
     found = np.zeros(EVERY.size)
-    cell_id.weigh_by_serving(
-        EVERY, table.reshape(-1), BANDS, cell, cell_id.serving_table(weights), weight, found
+    fingerprint.weigh_by_serving(
+        EVERY, table.reshape(-1), BANDS, cell, fingerprint.serving_table(weights), weight, found
     )
     return found
 
@@ -54,8 +59,8 @@ def test_a_serving_weight_is_an_exponent_and_adds_to_what_is_there():
     table, weights = raster(), ServingWeights()
     once = by_serving(table, 2, weights)
     found = np.full(EVERY.size, -1.0)
-    cell_id.weigh_by_serving(
-        EVERY, table.reshape(-1), BANDS, 2, cell_id.serving_table(weights), 0.25, found
+    fingerprint.weigh_by_serving(
+        EVERY, table.reshape(-1), BANDS, 2, fingerprint.serving_table(weights), 0.25, found
     )
     np.testing.assert_allclose(found, -1.0 + 0.25 * once, rtol=1e-6)
 
@@ -84,11 +89,10 @@ def innovations(table, before, reading):
 def by_levels(table, before, reading, errors):
     cell, now, then, rho, sd = (np.array(column) for column in zip(*reading, strict=True))
     found = np.zeros(EVERY.size)
-    fingerprint.weigh_by_levels(
-        EVERY, before, table.reshape(-1), BANDS, cell.astype(np.int32),
-        (now - rho * then).astype(np.float32), rho.astype(np.float32),
-        (1 / sd).astype(np.float32), errors.common, errors.weight, errors.clip_sd, found,
-    )  # fmt: skip
+    offset_db, rho, scale = (one.astype(np.float32) for one in (now - rho * then, rho, 1 / sd))
+    options = (errors.common, errors.weight, errors.clip_sd)
+    levels = LevelReading(cell.astype(np.int32), offset_db, rho, scale, *options, 0.0, 0.0)
+    fingerprint.weigh_by_levels(EVERY, before, table.reshape(-1), BANDS, levels, found)
     return found
 
 
@@ -124,10 +128,9 @@ def test_an_error_that_all_cells_share_costs_less_than_opposite_ones():
 
 def by_bound(table, cells, level_dbm, censored, sd_db=9.0, weight=1.0):
     found = np.zeros(EVERY.size)
-    fingerprint.weigh_by_bound(
-        EVERY, table.reshape(-1), BANDS, np.array(cells, dtype=np.int32), level_dbm, censored,
-        sd_db, weight, fingerprint.bound_table(), found,
-    )  # fmt: skip
+    bound = BoundReading(np.array(cells, dtype=np.int32), level_dbm, censored, sd_db, weight)
+    table, bounds = table.reshape(-1), fingerprint.bound_table()
+    fingerprint.weigh_by_bound(EVERY, table, BANDS, bound, bounds, found)
     return found
 
 
@@ -174,11 +177,8 @@ def test_an_ambiguous_level_far_from_all_candidates_counts_as_four_deviations():
 
 
 def pixels(state, back_m=(0.0, 0.0)):
-    found = np.empty(state.shape[1], dtype=np.int32)
-    fingerprint.pixels(
-        state, *back_m, 0.0, ROWS * RESOLUTION_M, 1 / RESOLUTION_M, ROWS, COLS, found
-    )
-    return found
+    frame = RasterFrame(0.0, ROWS * RESOLUTION_M, 1 / RESOLUTION_M, ROWS, COLS)
+    return fingerprint.pixels(state, *back_m, frame)
 
 
 def hypotheses(count=400, seed=5):

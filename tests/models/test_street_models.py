@@ -1,6 +1,6 @@
 """Motion over streets against the scalar oracle: signs, moments, the map, and going back."""
 
-from math import exp, log, pi
+from math import log, pi
 
 import numpy as np
 import pytest
@@ -123,11 +123,8 @@ def test_what_moved_came_from_where_it_was():
     after = move(before, 23.0, 0.9, EXACT, KEY)
 
     def found(state, back_east_m, back_north_m):
-        pixel = np.empty(300, dtype=np.int32)
-        fingerprint.pixels(
-            state, back_east_m, back_north_m, 0.0, rows * side_m, 1 / side_m, rows, cols, pixel
-        )
-        return pixel
+        frame = fingerprint.RasterFrame(0.0, rows * side_m, 1 / side_m, rows, cols)
+        return fingerprint.pixels(state, back_east_m, back_north_m, frame)
 
     back = found(after, 23.0 * np.cos(0.9), 23.0 * np.sin(0.9))
     np.testing.assert_array_equal(back, found(before, 0.0, 0.0))
@@ -145,11 +142,7 @@ def test_a_raster_is_read_between_the_middles_of_its_pixels():
     raster, side_m = rng.normal(0, 5, (5, 7)).astype(np.float32), 8.0
     state = np.zeros((STATES, 300), dtype=np.float32)
     state[EAST], state[NORTH] = rng.uniform(-10, 66, 300), rng.uniform(-10, 50, 300)
-    found = np.empty(300, dtype=np.float32)
-    interpolate(
-        state, raster, np.float32(side_m / 2), np.float32(4.5 * side_m), np.float32(1 / side_m),
-        found,
-    )  # fmt: skip
+    found = interpolate(state, raster, side_m / 2, 4.5 * side_m, 1 / side_m)
     expected = [oracle.bilinear(raster, float(x), float(y), side_m) for x, y in state[:2].T]
     np.testing.assert_allclose(found, expected, atol=2e-5)
 
@@ -161,14 +154,7 @@ def test_being_off_the_map_is_a_hidden_mode_that_is_summed_out(length_m):
     log_map = -rng.uniform(0.0, 5.0, 80).astype(np.float32)
     off = np.concatenate([[0.0, 1.0], rng.random(78)]).astype(np.float32)
     after, log_weight = off.copy(), np.full(80, -3.0)
-    weigh_by_map(
-        log_map, after,
-        *(np.float32(x) for x in (
-            weights.weight_per_m * length_m, exp(-weights.off_cost_per_m * length_m),
-            1 - exp(-weights.leave_per_m * length_m), 1 - exp(-weights.return_per_m * length_m),
-        )),
-        log_weight,
-    )  # fmt: skip
+    weigh_by_map(log_map, after, weights.over(length_m), log_weight)
     for i in range(80):
         gained, expected = oracle.map_step(float(log_map[i]), float(off[i]), length_m, weights)
         assert log_weight[i] == pytest.approx(-3.0 + gained, abs=1e-4)
@@ -186,11 +172,8 @@ def test_ancestors_with_large_biases_are_reached_by_the_oracle():
     log_weight = rng.normal(0, 0.7, count).astype(np.float32)
     aim = oracle.moved(200.0, 200.0, pi, log(1.3), *_polar(moved_m))
     later = np.array([*aim, -3.1, log(1.25), 0.0], dtype=np.float32)
-    chosen = np.empty(draws, dtype=np.int32)
-    draw_ancestors(
-        np.repeat(later[:, None], draws, axis=1), earlier, log_weight, *moved_m, *variances,
-        -12.0, KEY, chosen,
-    )  # fmt: skip
+    many = np.repeat(later[:, None], draws, axis=1)
+    chosen = draw_ancestors(many, earlier, log_weight, moved_m, variances, -12.0, KEY)
     expected = oracle.ancestor_probabilities(later, earlier, log_weight, moved_m, variances, -12.0)
     counted = np.bincount(chosen, minlength=count) / draws
     # Five standard errors.

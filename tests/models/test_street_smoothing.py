@@ -39,10 +39,8 @@ def test_ancestors_are_drawn_by_their_probability(width_m, log_jump):
     few[0, 2] = -900.0
     draws = 20_000
     later = np.repeat(few, draws, axis=1)
-    chosen = np.empty(3 * draws, dtype=np.int32)
-    draw_ancestors(
-        later, earlier, log_weight, 5.0, 1.0, PLACE, BIAS, SCALE, log_jump, np.uint64(9), chosen
-    )
+    variances, key = (PLACE, BIAS, SCALE), np.uint64(9)
+    chosen = draw_ancestors(later, earlier, log_weight, (5.0, 1.0), variances, log_jump, key)
     expected = probabilities(few, earlier, log_weight, (5.0, 1.0), log_jump)
     for one in range(3):
         counted = np.bincount(chosen[one * draws : (one + 1) * draws], minlength=60) / draws
@@ -55,10 +53,8 @@ def test_the_same_key_draws_the_same():
     earlier, later = world(rng, 500, 100.0), world(rng, 50, 100.0)
     found = []
     for key in (5, 5, 6):
-        chosen = np.empty(50, dtype=np.int32)
         weight = np.zeros(500, dtype=np.float32)
-        draw_ancestors(
-            later, earlier, weight, 1.0, 1.0, 4.0, 1.0, 1.0, -20.0, np.uint64(key), chosen
-        )
+        motion = ((1.0, 1.0), (4.0, 1.0, 1.0))
+        chosen = draw_ancestors(later, earlier, weight, *motion, -20.0, np.uint64(key))
         found.append(chosen.tolist())
     assert found[0] == found[1] != found[2]

@@ -13,7 +13,8 @@ import pandas as pd
 from mapfilter.database.build import build
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.tracks.log import make_log
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from mapfilter.database.radioroutes import RadioField
 from mapfilter.geodesy import Lattice
-from mapfilter.models.cell_id import ServingWeights
-from mapfilter.models.fingerprint import LevelErrors
+from mapfilter.models.fingerprint import LevelErrors, ServingWeights
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import EvidenceOptions
 from mapfilter.radio.cells import Cell, CellPlan

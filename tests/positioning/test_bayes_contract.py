@@ -21,7 +21,7 @@ from mapfilter.positioning.filter import estimate_of, locate
 from mapfilter.testing import ContractError, check_belief_filter
 from mapfilter.tracks.log import make_log
 
-FEW = ParticleOptions(most=4000, searching=2000, least=500)
+FEW = ParticleOptions(max_particles=4000, min_search_particles=2000, min_particles=500)
 READING = RadioReading(0, 0.5, expected=-0.2, length_m=5.0)
 
 
@@ -63,8 +63,9 @@ def test_a_filter_that_breaks_the_contract_is_found(area):
         )
 
 
-def found(positioner, log, seed=0, **options):
-    return locate(log, positioner, np.random.default_rng(seed), **options).estimate
+def found(positioner, log, seed=0, *, smooth=False):
+    bound = replace(positioner, smooth=smooth)
+    return locate(log, bound, np.random.default_rng(seed)).estimate
 
 
 def test_live_gives_the_bytes_of_the_replay(positioner):

@@ -53,10 +53,10 @@ def positioner(area, *, grid, count=100_000):
     evidence = EvidenceOptions(levels=levels, spacing_m=4.0)
     model = BayesModel(area, ERRORS, MapWeights(), evidence)
     options = ParticleOptions(
-        most=count,
-        searching=count,
-        least=count,
-        flatten=1.0,
+        max_particles=count,
+        min_search_particles=count,
+        min_particles=count,
+        mass_exponent=1.0,
         jitter=(0.0,) * 5,
         searching_jitter=(0.0,) * 5,
     )

@@ -15,7 +15,7 @@ from mapfilter.positioning.bayes.options import BayesOptions, open_area
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.filter import locate
 
-FEW = ParticleOptions(most=4000, searching=2000, least=500)
+FEW = ParticleOptions(max_particles=4000, min_search_particles=2000, min_particles=500)
 
 
 @pytest.fixture(scope="module")

@@ -127,7 +127,7 @@ def test_a_fifth_of_the_first_hypotheses_lie_anywhere_off_the_map():
 
 
 def test_the_belief_of_the_filter_keeps_five_in_a_hundred_off_the_map():
-    given = ParticleOptions(most=COUNT, searching=COUNT, least=1000)
+    given = ParticleOptions(max_particles=COUNT, min_search_particles=COUNT, min_particles=1000)
     belief = ParticleFilter(MODEL, given).init(Start(None), np.random.default_rng(3))
     assert belief.state.shape == (5, COUNT)
     assert float(belief.weight @ belief.state[OFF]) == pytest.approx(0.05, abs=1e-5)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from fusion_world import FIRST, FIRST_COVARIANCE, PHI, Q, hybrid_readings, linear_problem
 
-from mapfilter.errors import InputError
+from mapfilter.errors import ConfigError, InputError
 from mapfilter.filters.gaussian import EKF, METHODS, UKF, Method, SigmaPoints, factor_of
 from mapfilter.filters.gaussian_sum import run_mixtures, split
 from mapfilter.filters.kalman import smooth
@@ -159,11 +159,11 @@ def test_infinite_readings_and_wrong_sizes_are_said():
         run_trials(compiled(model), PHI, Q, EKF, FIRST, FIRST_COVARIANCE, readings + np.inf)
     with pytest.raises(InputError, match="readings"):
         run_trials(compiled(model), PHI, Q, EKF, FIRST, FIRST_COVARIANCE, readings[..., :3])
-    with pytest.raises(InputError, match="alpha"):
+    with pytest.raises(ConfigError, match="alpha"):
         SigmaPoints(0.0)
     with pytest.raises(InputError, match="kappa"):
         SigmaPoints(1.0, 2.0, -6.0).spread(6)
-    with pytest.raises(InputError, match="iterations"):
+    with pytest.raises(ConfigError, match="iterations"):
         Method("none", iterations=0)
 
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from mapfilter.positioning.kalman.replay import position_by_fusion
 
 from mapfilter.errors import InputError
 from mapfilter.filters.contract import Reason
@@ -15,7 +14,9 @@ from mapfilter.filters.trials import run_trials
 from mapfilter.models.motion import constant_velocity
 from mapfilter.models.ranging import position_fix
 from mapfilter.models.state import MOVING, POSITION
+from mapfilter.positioning.filter import locate
 from mapfilter.positioning.kalman.belief import SumBelief
+from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.kalman.models import FusionOptions, SiteModels, compiled
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import Cell, CellPlan
@@ -77,8 +78,9 @@ def drive(seed, *, steps=120, speed=1.5, named=True, plan=PLAN):
 
 
 def located(log, method=EKF, plan=PLAN, **more):
-    sites = SiteModels(plan, FusionOptions(), more.pop("antennas", None))
-    return position_by_fusion(sites, CRS, log, method, **more).estimate
+    antennas = more.pop("antennas", None)
+    bound = KalmanFilter(method=method.name, **more).over_sites(plan, antennas)
+    return locate(log, bound, np.random.default_rng(0)).estimate
 
 
 def unheard(estimate):
@@ -260,7 +262,8 @@ def test_a_reading_that_cannot_be_taken_in_is_labelled():
     """β far below 0 makes the covariance of the readings indefinite."""
     log, truth = drive(2, steps=5)
     wild = Method("wild", SigmaPoints(1.0, -1e9, 0.0))
-    found = located(log, wild)
+    bound = replace(KalmanFilter().over_sites(PLAN), method=wild)
+    found = locate(log, bound, np.random.default_rng(0)).estimate
     assert {str(reason) for reason in found.reason} == {"update_failed"}
     assert np.isfinite(errors_m(found, truth)).all()
 

@@ -5,14 +5,14 @@ from math import cos, hypot, inf, log10, nan, pi, sin
 
 import numpy as np
 import pytest
-from mapfilter.positioning.kalman.replay import _Walk
 
-from mapfilter.errors import InputError
+from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.gaussian import EKF
-from mapfilter.models.state import POSITION
+from mapfilter.models.state import MOVING, POSITION
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
-from mapfilter.positioning.kalman.belief import FusionHistory, SumBelief
+from mapfilter.positioning.kalman.belief import SumBelief
+from mapfilter.positioning.kalman.filter import KalmanSmoother, KalmanState, _Step
 from mapfilter.positioning.kalman.models import FusionOptions, SiteModels
 from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
 from mapfilter.radio.cells import Cell, CellPlan
@@ -36,8 +36,8 @@ SITES = SiteModels(PLAN, FusionOptions())
 NOTHING = SiteReadings((), (), (), (), ())
 
 
-def walk(*, reckoned=True, sites=SITES, history=None):
-    return _Walk(sites, EKF, reckoned=reckoned, history=history)
+def walk(*, reckoned=True, sites=SITES):
+    return _Step(sites, EKF, KalmanState(POSITION if reckoned else MOVING))
 
 
 def started(reckoned=True, **more):
@@ -54,13 +54,13 @@ def test_the_usual_options():
         "timing_sigma_m": 200.0, "level_memory_m": 100.0, "timing_memory_m": 500.0,
         "fix_sigma_m": 10.0, "acceleration": 0.7, "speed_sigma_mps": 8.0, "step_sigma_m": 0.3,
         "heading_sigma_rad": 0.2, "drift_m": 0.3, "start_sigma_m": 1500.0, "start_parts": 11,
-        "start_spacing_m": 600.0, "reach_m": 35_000.0, "settled_m": 1000.0,
+        "start_spacing_m": 600.0, "reach_m": 35_000.0, "converged_radius_m": 1000.0,
     }  # fmt: skip
     for name in asdict(FusionOptions()):
         for value in (0, -1.0, inf, nan):
-            with pytest.raises(InputError, match=f"fusion, {name}: expected a number above 0"):
+            with pytest.raises(ConfigError, match=f"FusionOptions, {name}: expected a .*number >"):
                 FusionOptions(**{name: value})
-        assert getattr(FusionOptions(**{name: 0.5}), name) == 0.5
+        assert getattr(FusionOptions(**{name: 7}), name) == 7
 
 
 def test_steps_shift_and_spread():
@@ -115,14 +115,14 @@ def test_without_dead_reckoning_one_keeps_going():
 
 def test_before_the_start_nothing_moves():
     made = walk()
-    fix = made.take(Epoch(3.0, (MotionStep(1.0, 0.0),) * 2), {})
+    fix = made.take(Epoch(3.0, (MotionStep(1.0, 0.0),) * 2))
     assert [one.reason for one in made.unused] == [Reason.NOT_STARTED] * 2
     assert (fix.status, fix.hypotheses, fix.reason) == (Status.SEARCHING, 0, Reason.NO_READING)
     assert (fix.way_id, np.isnan(fix.east_m), np.isnan(fix.mass_50m)) == (0, True, True)
     assert made.time_s == 3.0
     heard = (ReportRow("serving", "Z", None, None, -70.0, 0),)
-    assert made.take(Epoch(4.0, heard=heard), {}).reason is Reason.UNKNOWN_CELL
-    assert made.take(Epoch(5.0, fix=GnssFix(nan, 1.0)), {}).reason is Reason.NO_READING
+    assert made.take(Epoch(4.0, heard=heard)).reason is Reason.UNKNOWN_CELL
+    assert made.take(Epoch(5.0, fix=GnssFix(nan, 1.0))).reason is Reason.NO_READING
     assert made.unused[-1].kind == "gnss"
     assert made.belief is None
 
@@ -214,18 +214,19 @@ def test_statuses():
 
 
 def test_an_epoch_is_moved_and_then_measured():
-    history = FusionHistory()
-    made = walk(history=history)
-    heard = (ReportRow("serving", "A", None, None, -70.0, 0),)
-    first = made.take(Epoch(0.0, heard=heard), {"A": 1})
-    assert (first.reason, made.moved_m, len(history.beliefs)) == (Reason.USED, 0.0, 1)
+    made, smoother = walk(), KalmanSmoother()
+    heard = (ReportRow("serving", "A", None, None, -70.0, 0, 1.0),)
+    first = made.take(Epoch(0.0, heard=heard))
+    assert (first.reason, made.moved_m) == (Reason.USED, 0.0)
+    smoother.add(None, made.state)
     assert first.hypotheses == made.belief.weights.size > 1
     assert 0.0 < first.mass_50m < made.belief.weights.max()
-    made.take(Epoch(1.0, (MotionStep(30.0, 0.0),)), {})
+    made.take(Epoch(1.0, (MotionStep(30.0, 0.0),)))
     assert made.moved_m == 30.0
-    np.testing.assert_array_equal(history.shifts[1], [30.0, 0.0])
+    smoother.add(None, made.state)
+    np.testing.assert_array_equal(smoother.history.shifts[1], [30.0, 0.0])
     at = GnssFix(EAST + 700.0, NORTH, 4.0, 4.0)
-    fix = made.take(Epoch(2.0, fix=at), {})
+    fix = made.take(Epoch(2.0, fix=at))
     assert (fix.status, fix.reason, made.moved_m) == (Status.CONVERGED, Reason.USED, 30.0)
     assert hypot(fix.east_m - EAST - 700.0, fix.north_m - NORTH) < 2.0
     assert fix.mass_50m == pytest.approx(1.0, abs=1e-6)
@@ -238,11 +239,11 @@ def test_which_rows_are_taken():
         ReportRow("neighbour", None, 601, None, -81.0, 0),
         ReportRow("neighbour", None, 700, 1, -82.0, 0),
         ReportRow("neighbour", "C", None, None, -110.0, -1),
-        ReportRow("neighbour", "Z", 1, 1, -83.0, 0),
+        ReportRow("neighbour", "Z", 1, 1, -83.0, 0, 5.0),
         ReportRow("neighbour", None, None, None, -84.0, 0),
-        ReportRow("serving", "B", None, None, nan, 0),
+        ReportRow("serving", "B", None, None, nan, 0, 4.0),
     )
-    found = site_readings(SITES, Epoch(3.0, heard=rows), {"B": 4, "Z": 5})
+    found = site_readings(SITES, Epoch(3.0, heard=rows))
     assert (found.cells, found.levels_dbm) == (("A", "B"), (-70.0, -80.0))
     assert (found.timed, found.steps) == (("B",), (4,))
     assert [(one.kind, one.what, one.reason) for one in found.unused] == [

@@ -22,17 +22,17 @@ from hypothesis import strategies as st
 
 from mapfilter.errors import InputError
 from mapfilter.evaluation.accuracy import Truth, accuracy, position_errors_m
-from mapfilter.filters.candidate import CandidateOptions, CandidateSearch, Mode
+from mapfilter.filters.candidate import CandidateSearch, Mode
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.candidate import cell_points, position_by_candidates
-from mapfilter.positioning.epochs import serving_events
+from mapfilter.positioning import filter as filters
+from mapfilter.positioning.candidate import CandidateFilter, cell_points
+from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.estimate import TrackEstimate, UnusedReading
 from mapfilter.positioning.estimate_store import write_estimate
-from mapfilter.testing import run, step
 from mapfilter.tracks.log import make_log
 
 # 16 steps of 1.25 m: every match lands on a lattice point, so the walk is followed exactly.
-OPTIONS = CandidateOptions(update_length_m=20.0)
+OPTIONS = CandidateFilter(update_length_m=20.0)
 S, C, T, L = Status.SEARCHING, Status.CONVERGED, Status.TRACKING, Status.LOST
 
 
@@ -47,10 +47,10 @@ def cross_points(cross_database):
 
 
 @pytest.fixture(scope="module")
-def locate(cross_database, cross_points):
+def locate(cross_database):
     def located(log, options=OPTIONS):
         rng = np.random.default_rng(0)
-        return position_by_candidates(cross_database, cross_points, log, options, rng)
+        return filters.locate(log, options.over(cross_database), rng, snapshots=True)
 
     return located
 
@@ -154,32 +154,34 @@ def assert_same_belief(a, b):
         assert np.array_equal(x, y, equal_nan=True), column.name
 
 
-def test_a_live_stream_gives_the_same_beliefs_as_a_replay(locate, cross_points):
+def test_a_live_stream_gives_the_same_as_a_replay(locate, cross_database, cross_points):
     log = walk_log()
-    filter_ = CandidateSearch(cross_points, OPTIONS)
-    events, rng = serving_events(log).events, np.random.default_rng(0)
-    first = filter_.init("W", rng)
-    replayed = list(run(filter_, first, events, rng))
-    live, rng = first, np.random.default_rng(0)
+    tracker, search = OPTIONS.over(cross_database), CandidateSearch(cross_points, OPTIONS)
+    state, rng = tracker.begin(), np.random.default_rng(0)
+    belief = search.init("W", rng)
     estimate = locate(log).estimate
-    for index, (event, expected) in enumerate(zip(events, replayed, strict=True)):
-        taken = step(filter_, live, event, rng)
-        live = taken.belief
-        assert_same_belief(live, expected.belief)
-        assert (taken.info, taken.motion_reason) == (expected.info, expected.motion_reason)
-        located = filter_.locate(live)
+    for index, epoch in enumerate(epochs(log)):
+        state, output = tracker.step(state, epoch, rng)
         assert np.array_equal(
-            [located.east_m, located.north_m],
+            [output.fix.east_m, output.fix.north_m],
             [estimate.east_m[index], estimate.north_m[index]],
             equal_nan=True,
         )
+        assert (output.fix.status, output.fix.reason) == (
+            estimate.status[index],
+            estimate.reason[index],
+        )
+        for motion in epoch.motion:
+            belief, _ = search.predict(belief, motion, rng)
+        for row in epoch.heard:
+            belief, _ = search.update(belief, row.cell, rng)
+        assert_same_belief(state.belief, belief)
 
 
 def test_the_same_input_gives_the_same_bytes(locate, cross_database, tmp_path):
     for name in "ab":
-        fresh = cell_points(cross_database)
         rng = np.random.default_rng(ord(name))
-        track = position_by_candidates(cross_database, fresh, walk_log(), OPTIONS, rng)
+        track = filters.locate(walk_log(), OPTIONS.over(cross_database), rng)
         write_estimate(track.estimate, tmp_path / name)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
     write_estimate(
@@ -207,7 +209,7 @@ def test_cells_that_do_not_help_before_the_start_are_labelled_one_by_one(locate)
     assert reasons(track, "motion") == [(t, "", Reason.NOT_STARTED) for t in (1.0, 2, 3, 4)]
     estimate = track.estimate
     assert estimate.reason[:4] == (
-        Reason.UNKNOWN_CELL, Reason.NO_POINTS_IN_CELL, Reason.NO_READING, Reason.NO_READING,
+        Reason.UNKNOWN_CELL, Reason.NO_POINTS_IN_CELL, Reason.NO_SERVING_CELL, Reason.NO_READING,
     )  # fmt: skip
     assert estimate.status[:5] == (S,) * 5
     assert estimate.hypotheses[:5].tolist() == [0, 0, 0, 0, 92]
@@ -345,9 +347,11 @@ def test_a_cell_of_one_point_is_a_position_at_once(cross_database):
 
     log = walk_log(((EAST, 12.5), (NORTH, 10.0)))
     rng = np.random.default_rng(0)
-    track = position_by_candidates(cross_database, lambda _: One(), log, OPTIONS, rng)
+    tracker = OPTIONS.over(cross_database)
+    one = replace(tracker, filter=CandidateSearch(lambda _: One(), OPTIONS))
+    track = filters.locate(log, one, rng, snapshots=True)
     assert track.estimate.status[:3] == (C, T, T)
-    assert [s.status for s in track.snapshots] == [S, C]
+    assert [s.status for s in track.snapshots] == [C]
 
 
 def test_a_log_in_another_system_is_refused(locate):
@@ -419,9 +423,10 @@ def test_whatever_comes_every_reading_is_used_or_told(locate, rows, when_empty):
     assert estimate.status.count(C) <= 1
 
 
-def test_the_filter_is_in_tracking_mode_when_the_track_says_so(cross_points):
-    filter_ = CandidateSearch(cross_points, OPTIONS)
-    rng = np.random.default_rng(0)
-    steps = run(filter_, filter_.init("W", rng), serving_events(walk_log()).events, rng)
-    modes = [taken.belief.mode for taken in steps]
+def test_the_filter_is_in_tracking_mode_when_the_track_says_so(cross_database):
+    tracker, rng = OPTIONS.over(cross_database), np.random.default_rng(0)
+    state, modes = tracker.begin(), []
+    for epoch in epochs(walk_log()):
+        state, _ = tracker.step(state, epoch, rng)
+        modes.append(state.belief.mode)
     assert modes[79:81] == [Mode.GLOBAL_POSITIONING, Mode.POSITION_TRACKING]

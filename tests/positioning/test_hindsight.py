@@ -10,8 +10,8 @@ from small_area import HEIGHT_M, ON_WAY, SOUTH_M, WEST_M, WIDTH_M, make_area
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.models.street_motion import MotionErrors
-from mapfilter.positioning.bayes.smoothing import History, Kept, settled, smoothed
-from mapfilter.positioning.estimate import Fix, TrackEstimate
+from mapfilter.positioning.bayes.smoothing import History, Kept, smoothed
+from mapfilter.positioning.estimate import Fix, StepOutput, TrackEstimate
 
 AREA = make_area()
 ERRORS = MotionErrors(
@@ -214,8 +214,16 @@ def test_a_challenger_that_won_takes_the_place_of_what_was_kept_since(won):
 
 
 def test_a_fix_is_settled_where_it_tracks_within_ten_metres():
-    estimate = forward_pass()
-    estimate.radii_m[:, 2] = [10.0, 10.1, 5.0, nan, 9.0]
-    status = (*[Status.TRACKING] * 2, Status.CONVERGED, *[Status.TRACKING] * 2)
-    told = SimpleNamespace(status=status, radii_m=estimate.radii_m)
-    assert settled(told).tolist() == [True, False, False, False, True]
+    tracking, converged = Status.TRACKING, Status.CONVERGED
+    cases = [(10.0, tracking), (10.1, tracking), (5.0, converged), (nan, tracking), (9.0, tracking)]
+    outputs = [
+        StepOutput(
+            Fix(float(k), 0.0, 0.0, np.eye(2), np.array([1.0, 2.0, radius_m]), status, 1, 1.0, 0,
+                nan, Reason.USED),
+            (nan, nan, 0.0, 1.0, -1.0),
+        )
+        for k, (radius_m, status) in enumerate(cases)
+    ]  # fmt: skip
+    found = TrackEstimate.of_outputs("EPSG:32629", "bayes", outputs).evidence
+    assert found.settled.tolist() == [True, False, False, False, True]
+    assert found.entropy_bits.tolist() == [1.0] * 5

@@ -108,3 +108,9 @@ def test_what_is_wrong_is_said():
         static_fix(GNSS, Y[:5], [np.nan, 0, 0, 0])
     with pytest.raises(InputError, match="reading"):
         static_fix(GNSS, Y[:5] * np.inf, START)
+
+
+@pytest.mark.parametrize("count", [4, 6])
+def test_readings_of_another_length_are_refused(count):
+    with pytest.raises(InputError, match=rf"reading: expected shape \(5,\), found \({count},\)"):
+        static_fix(GNSS, np.resize(Y, count), START)

@@ -1,5 +1,5 @@
 # ruff: noqa: ARG002
-"""A filter of one's own: found by its name, refused at the door, run over a log."""
+"""Custom filters: imported by name, refused at the door, run over a log."""
 
 import sys
 from dataclasses import dataclass
@@ -12,13 +12,8 @@ from sky_world import sky_log
 
 from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
-from mapfilter.positioning.custom_filter import (
-    CustomFilter,
-    custom_filter,
-    make_filter,
-    position_by_own,
-)
-from mapfilter.positioning.locators import FilterChoice, open_locator
+from mapfilter.positioning.custom_filter import CustomFilter, adapted, custom_filter
+from mapfilter.positioning.filter import locate
 from mapfilter.tracks.log import make_log
 
 HERE = __name__
@@ -84,8 +79,8 @@ def test_a_filter_follows_a_log_from_its_first_known_cell(tmp_path):
     log = walk_log()
     radio = log.radio.assign(cell=log.radio["cell"].where(log.radio["time_s"] > 3, "elsewhere"))
     log = make_log(log.crs, motion=log.motion, radio=radio, truth=log.truth)
-    choice = FilterChoice(custom_filter(f"{HERE}:Counting"))
-    found = open_locator(database, choice)(log, np.random.default_rng(0)).estimate
+    choice = custom_filter(f"{HERE}:Counting")
+    found = locate(log, choice.over(database), np.random.default_rng(0)).estimate
     assert found.filter == choice.name == f"{HERE}:Counting"
     assert [isnan(east) for east in found.east_m[:6]] == [True] * 4 + [False] * 2
     assert found.reason[0] is Reason.UNKNOWN_CELL
@@ -95,7 +90,8 @@ def test_a_filter_follows_a_log_from_its_first_known_cell(tmp_path):
     told = {(one.kind, one.reason) for one in found.unused}
     assert told == {("motion", Reason.NOT_STARTED), ("serving", Reason.UNKNOWN_CELL)}
     assert found.way_id[-1] > 0
-    without = open_locator(database, choice, ways=False)(log, np.random.default_rng(0)).estimate
+    bound = choice.over(database, ways=False)
+    without = locate(log, bound, np.random.default_rng(0)).estimate
     assert not without.way_id.any()
 
 
@@ -104,9 +100,8 @@ def test_it_may_start_from_a_fix(tmp_path):
     gnss = log.truth.iloc[[5]].assign(var_east_m2=4.0, var_north_m2=4.0)
     log = make_log(log.crs, motion=log.motion, gnss=gnss)
     database = make_database(tmp_path)
-    found = position_by_own(
-        database, Counting(database), log, np.random.default_rng(0), name="a:b"
-    ).estimate
+    own = adapted(Counting(database), database, "a:b")
+    found = locate(log, own, np.random.default_rng(0)).estimate
     assert np.flatnonzero(np.isfinite(found.east_m))[0] == np.searchsorted(found.time_s, 5.0)
 
 
@@ -119,7 +114,7 @@ def test_it_may_start_from_a_fix(tmp_path):
         ),
         (f"{HERE}:Missing", "has no attribute 'Missing'"),
         (f"{HERE}:NOT_CALLED", "expected a class, or a function .+ found float"),
-        (f"{HERE}:Half", "init, predict, update, locate, found no update, locate"),
+        (f"{HERE}:Half", "init, predict, update, locate \\(or begin and step\\), found no update"),
     ],
 )
 def test_what_is_no_filter_is_refused_at_the_door(name, told):
@@ -140,7 +135,7 @@ def test_a_module_that_cannot_be_imported_is_told(text, tmp_path, monkeypatch):
 def test_what_a_function_makes_is_looked_at_too(tmp_path):
     made = custom_filter(f"{HERE}:half_made")
     with pytest.raises(ConfigError, match="found no update, locate"):
-        make_filter(made, make_database(tmp_path))
+        made.over(make_database(tmp_path))
 
 
 @pytest.mark.parametrize(
@@ -152,9 +147,9 @@ def test_what_a_function_makes_is_looked_at_too(tmp_path):
     ],
 )
 def test_what_goes_wrong_in_it_is_told_with_its_place(name, told, tmp_path):
-    locate = open_locator(make_database(tmp_path), FilterChoice(CustomFilter(f"{HERE}:{name}")))
+    bound = CustomFilter(f"{HERE}:{name}").over(make_database(tmp_path))
     with pytest.raises(ConfigError, match=told) as caught:
-        locate(walk_log(), np.random.default_rng(0))
+        locate(walk_log(), bound, np.random.default_rng(0))
     assert isinstance(caught.value.__cause__, ValueError | TypeError)
 
 
@@ -181,7 +176,7 @@ def test_steps_reach_it_as_they_were_logged(tmp_path):
     log = walk_log()
     log = make_log(log.crs, motion=log.motion.assign(heading_rad=nan), radio=log.radio)
     database = make_database(tmp_path)
-    position_by_own(database, Watching(database), log, np.random.default_rng(0), name="a:b")
+    locate(log, adapted(Watching(database), database, "a:b"), np.random.default_rng(0))
     assert len(seen) == len(log.motion)
     assert all(isinstance(step, MotionStep) and isnan(step.heading_rad) for step in seen)
 
@@ -198,7 +193,7 @@ def test_satellites_alone_reach_it(tmp_path):
     first = log.radio[log.radio["time_s"] == 0]
     log = make_log(log.crs, motion=log.motion, radio=first, pseudoranges=log.pseudoranges)
     database = make_database(tmp_path)
-    position_by_own(database, Watching(database), log, np.random.default_rng(0), name="a:b")
+    locate(log, adapted(Watching(database), database, "a:b"), np.random.default_rng(0))
     assert len(seen) > 10
     assert seen[0] == (1, 2)
     assert set(seen[1:]) == {(0, 2)}

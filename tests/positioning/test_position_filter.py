@@ -10,8 +10,7 @@ from mapfilter.models.motion import clock_motion, constant_velocity, together
 from mapfilter.models.ranging import pseudoranges
 from mapfilter.models.state import MOVING, MOVING_CLOCK_3D, POSITION_CLOCK_3D, StateLayout
 from mapfilter.positioning.kalman.models import compiled
-from mapfilter.positioning.kalman.position_filter import filter_fixes
-from mapfilter.positioning.kalman.static_fix import StaticFix, static_fix
+from mapfilter.positioning.kalman.static_fix import StaticFix, filter_fixes, static_fix
 
 MOVING_UP = StateLayout(6, 0, 2, 4)
 

@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import ConfigError
-from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.filters.contract import Status
 from mapfilter.filters.hypotheses import BeliefSummary
 from mapfilter.filters.particle import ParticleOptions
-from mapfilter.models.cell_id import ServingWeights
-from mapfilter.models.fingerprint import LevelErrors
+from mapfilter.models.fingerprint import LevelErrors, ServingWeights
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.positioning.bayes.alternative import (
     AlternativeHypothesis,
@@ -23,11 +21,11 @@ from mapfilter.positioning.bayes.alternative import (
     resolve_alternative,
 )
 from mapfilter.positioning.bayes.evidence import EvidenceOptions, RadioHistory, RadioReading
-from mapfilter.positioning.bayes.options import BayesOptions
+from mapfilter.positioning.bayes.options import BayesFilter, BayesOptions, GridFilter
 from mapfilter.positioning.bayes.state import BayesTrack
+from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.state import NO_GNSS_STATE, GnssState
-from mapfilter.positioning.locators import FilterChoice
 
 
 def test_the_usual_options():
@@ -115,7 +113,7 @@ def test_wide_errors_get_more_particles():
     def numbers(bias_sd_deg, scale_sd):
         motion = MotionErrors(bias_sd_rad=radians(bias_sd_deg), scale_sd=scale_sd)
         found = BayesOptions(motion=motion, particles=ParticleOptions(1000, 600, 10))._particles
-        return found.most, found.searching, found.least
+        return found.max_particles, found.min_search_particles, found.min_particles
 
     assert numbers(1.5, 0.015) == (1000, 600, 10)
     assert numbers(0.0, 0.0) == (1000, 600, 10)
@@ -126,11 +124,13 @@ def test_wide_errors_get_more_particles():
 
 
 def test_the_names_of_filters():
-    assert FilterChoice().name == "candidate"
-    assert FilterChoice().options == CandidateOptions()
-    assert FilterChoice().margin_db is None
-    assert FilterChoice(BayesOptions()).name == "bayes"
-    assert FilterChoice(BayesOptions(grid=True)).name == "grid"
+    assert CandidateFilter().name == "candidate"
+    assert CandidateFilter().margin_db is None
+    assert (BayesOptions().name, BayesFilter().name) == ("bayes", "bayes")
+    assert (BayesOptions(grid=True).name, GridFilter().name) == ("grid", "grid")
+    timing = TimingOptions(step_m=553.5)
+    assert BayesFilter().options == BayesOptions(timing=timing)
+    assert GridFilter().options == BayesOptions(timing=timing, grid=True)
 
 
 POSITIVE = ("zenith_m", "echo_memory_m", "fix_memory_m", "clock_sd_m", "trust_grows_s")

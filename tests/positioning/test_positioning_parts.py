@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import scalar_oracle as oracle
 import small_area
-from mapfilter.positioning.kalman.replay import gaussian_radii_m, share_within
 from scipy.special import ndtr
 
 from mapfilter.errors import InputError
@@ -22,8 +21,14 @@ from mapfilter.positioning.bayes.model import BayesModel, Start
 from mapfilter.positioning.bayes.state import BayesTrack, name_of, particle_spacing_of
 from mapfilter.positioning.epochs import GnssFix, ReportRow, headed
 from mapfilter.positioning.gnss.readings import FixEvidence, widened
-from mapfilter.positioning.kalman.position_filter import filter_fixes
-from mapfilter.positioning.kalman.static_fix import BAD_GEOMETRY, TOO_FEW, StaticFix, static_fix
+from mapfilter.positioning.kalman.filter import gaussian_radii_m, share_within
+from mapfilter.positioning.kalman.static_fix import (
+    BAD_GEOMETRY,
+    TOO_FEW,
+    StaticFix,
+    filter_fixes,
+    static_fix,
+)
 from mapfilter.positioning.matched_way import matched_way
 
 

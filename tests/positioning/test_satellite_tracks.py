@@ -17,7 +17,7 @@ from mapfilter.positioning.filter import estimate_of, locate
 from mapfilter.simulation.satellites import Spoofer
 from mapfilter.tracks.log import make_log
 
-FEW = ParticleOptions(most=2000, searching=1000, least=300)
+FEW = ParticleOptions(max_particles=2000, min_search_particles=1000, min_particles=300)
 LONG = ((EAST, 90.0), (NORTH, 90.0), (SOUTH, 90.0), (EAST, 200.0))
 
 
@@ -214,7 +214,7 @@ def test_hindsight_and_turns_alone_take_satellites_too(positioner):
     motion = log.motion.assign(heading_rad=np.nan, turn_rad=(turn + np.pi) % (2 * np.pi) - np.pi)
     for one, smooth in ((log, True), (replace(log, motion=motion), False)):
         rng = np.random.default_rng(1)
-        estimate = locate(one, positioner, rng, smooth=smooth).estimate
+        estimate = locate(one, replace(positioner, smooth=smooth), rng).estimate
         assert off_m(log, estimate)[-30:].mean() < 12
 
 

@@ -1,6 +1,9 @@
-"""A log's tables merged into one stream: order, what is used and what is told."""
+"""What of a log reaches a filter of serving cells: order, what is used and what is labelled."""
+# ruff: noqa: ARG002
 
+from dataclasses import dataclass, field
 from math import nan
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -9,11 +12,37 @@ from cross_world import CRS
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.positioning.epochs import serving_events
+from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
+from mapfilter.positioning.belief_tracker import BeliefTracker
+from mapfilter.positioning.epochs import serving_cell
 from mapfilter.positioning.estimate import UnusedReading
-from mapfilter.testing import Event
+from mapfilter.positioning.filter import locate
 from mapfilter.tracks.log import make_log
+
+NOWHERE = Estimate(0.0, 0.0, np.zeros((2, 2)), np.zeros(3))
+
+
+@dataclass
+class Recording:
+    """Writes down what it is given."""
+
+    prior: list = field(default_factory=list)
+    events: list = field(default_factory=list)
+
+    def init(self, prior, rng):
+        self.prior.append(prior)
+        return 0
+
+    def predict(self, belief, motion, rng):
+        self.events.append(motion)
+        return belief, Reason.USED
+
+    def update(self, belief, reading, rng):
+        self.events.append(reading)
+        return belief, UpdateInfo(Reason.USED, Status.SEARCHING, 1)
+
+    def locate(self, belief):
+        return NOWHERE
 
 
 def motion(*rows):
@@ -25,83 +54,114 @@ def radio(*rows):
 
 
 def merged(**tables):
-    return serving_events(make_log(CRS, **tables))
+    """Return what reached the filter, and the estimate."""
+    recording = Recording()
+    database = SimpleNamespace(lattice=SimpleNamespace(crs=CRS))
+    tracker = BeliefTracker(
+        recording,
+        database,
+        lambda _: Reason.USED,
+        serving_cell,
+        "recording",
+        takes=("motion", "serving"),
+        ways=False,
+    )
+    log = make_log(CRS, **tables)
+    return recording, locate(log, tracker, np.random.default_rng(0)).estimate
 
 
-def test_motion_and_report_of_one_time_are_one_event_and_others_keep_their_own():
-    found = merged(
+def test_one_moves_first_and_measures_then():
+    found, estimate = merged(
         motion=motion((1, 1.5, 0.25, 0.1), (2, 1.25, -0.5, 0), (4, 2, 1, 0)),
         radio=radio((0.5, "serving", "A"), (2, "serving", "B"), (3, "serving", "A")),
     )
-    assert found.unused == ()
-    assert found.events == (
-        Event(0.5, None, "A"),
-        Event(1.0, MotionStep(1.5, 0.25, 0.1), None),
-        Event(2.0, MotionStep(1.25, -0.5, 0.0), "B"),
-        Event(3.0, None, "A"),
-        Event(4.0, MotionStep(2.0, 1.0, 0.0), None),
-    )
-
-
-def test_of_several_motions_at_one_time_the_last_carries_the_report():
-    found = merged(
-        motion=motion((1, 1.0, 0, 0), (1, 2.0, 0, 0), (1, 3.0, 0, 0)),
-        radio=radio((1, "serving", "A")),
-    )
-    assert [(e.motion.step_m, e.reading) for e in found.events] == [
-        (1.0, None), (2.0, None), (3.0, "A"),
+    assert estimate.unused == ()
+    assert found.prior == ["A"]
+    assert found.events == [
+        "A", MotionStep(1.5, 0.25, 0.1), MotionStep(1.25, -0.5, 0.0), "B", "A",
+        MotionStep(2.0, 1.0, 0.0),
     ]  # fmt: skip
+    assert estimate.time_s.tolist() == [0.5, 1.0, 2.0, 3.0, 4.0]
+    assert estimate.reason == (Reason.USED, Reason.NO_READING, Reason.USED, Reason.USED,
+                               Reason.NO_READING)  # fmt: skip
 
 
-def test_a_second_serving_cell_is_told_and_the_first_is_used():
-    found = merged(radio=radio((1, "serving", "A"), (1, "serving", "B"), (2, "serving", "B")))
-    assert [(e.time_s, e.reading) for e in found.events] == [(1.0, "A"), (2.0, "B")]
-    assert found.unused == (UnusedReading(1.0, "serving", "B", Reason.SECOND_SERVING_CELL),)
-
-
-def test_reports_without_a_serving_cell_are_told_and_make_no_event():
-    found = merged(
-        motion=motion((1, 1.0, 0, 0)),
-        radio=radio((1, "serving", None), (2, "neighbour", "N"), (3, "serving", None)),
+def test_of_several_motions_at_one_time_all_come_before_the_report():
+    found, estimate = merged(
+        motion=motion((1, 1.0, 0, 0), (1, 2.0, 0, 0), (1, 3.0, 0, 0)),
+        radio=radio((0, "serving", "B"), (1, "serving", "A")),
     )
-    assert found.events == (Event(1.0, MotionStep(1.0, 0.0, 0.0), None),)
-    assert [(u.time_s, u.kind, u.reason) for u in found.unused] == [
+    steps = [getattr(event, "step_m", event) for event in found.events]
+    assert steps == ["B", 1.0, 2.0, 3.0, "A"]
+    assert len(estimate) == 2
+
+
+def test_what_was_travelled_before_the_start_is_labelled():
+    found, estimate = merged(
+        motion=motion((1, 1.0, 0, 0), (2, 2.0, 0, 0), (3, 3.0, 0, 0)),
+        radio=radio((2, "serving", "A")),
+    )
+    assert [getattr(event, "step_m", event) for event in found.events] == ["A", 3.0]
+    assert estimate.unused == tuple(
+        UnusedReading(time_s, "motion", "", Reason.NOT_STARTED) for time_s in (1.0, 2.0)
+    )
+
+
+def test_a_second_serving_cell_is_labelled_and_the_first_is_used():
+    found, estimate = merged(
+        radio=radio((1, "serving", "A"), (1, "serving", "B"), (2, "serving", "B"))
+    )
+    assert found.events == ["A", "B"]
+    assert estimate.unused == (UnusedReading(1.0, "serving", "B", Reason.SECOND_SERVING_CELL),)
+
+
+def test_reports_without_a_serving_cell_are_labelled_and_have_a_fix_all_the_same():
+    found, estimate = merged(
+        motion=motion((1, 1.0, 0, 0)),
+        radio=radio((0, "serving", "A"), (1, "serving", None), (2, "neighbour", "N"),
+                    (3, "serving", None)),
+    )  # fmt: skip
+    assert found.events == ["A", MotionStep(1.0, 0.0, 0.0)]
+    assert [(u.time_s, u.kind, u.reason) for u in estimate.unused] == [
         (1.0, "serving", Reason.NO_SERVING_CELL),
+        (2.0, "neighbour", Reason.NOT_USED_BY_FILTER),
         (2.0, "serving", Reason.NO_SERVING_CELL),
         (3.0, "serving", Reason.NO_SERVING_CELL),
-        (2.0, "neighbour", Reason.NOT_USED_BY_FILTER),
     ]
+    assert estimate.reason[1:] == (Reason.NO_SERVING_CELL,) * 3
 
 
 def test_a_named_serving_cell_beside_an_unnamed_one_is_used():
-    found = merged(radio=radio((1, "serving", None), (1, "serving", "A")))
-    assert [e.reading for e in found.events] == ["A"]
-    assert found.unused == ()
+    found, estimate = merged(radio=radio((1, "serving", None), (1, "serving", "A")))
+    assert found.events == ["A"]
+    assert estimate.unused == ()
 
 
-def test_neighbours_and_fixes_are_told_once_with_their_number():
+def test_neighbours_and_fixes_are_labelled_once_with_their_number():
     fixes = pd.DataFrame({"time_s": [4.0, 5.0, 6.0], "east_m": 5.3e5, "north_m": 4.5e6})
-    found = merged(
+    found, estimate = merged(
         radio=radio((1, "serving", "A"), (1, "neighbour", None), (2, "neighbour", "A"),
                     (2, "serving", "A")),
         gnss=fixes,
     )  # fmt: skip
-    assert [e.time_s for e in found.events] == [1.0, 2.0]
-    assert found.unused == (
+    assert found.events == ["A", "A"]
+    assert estimate.time_s.tolist() == [1.0, 2.0]
+    assert estimate.unused == (
         UnusedReading(1.0, "neighbour", "2 rows", Reason.NOT_USED_BY_FILTER),
         UnusedReading(4.0, "gnss", "3 rows", Reason.NOT_USED_BY_FILTER),
     )
 
 
-def test_missing_steps_and_headings_stay_in_the_stream():
-    (event,) = merged(motion=motion((1, nan, nan, nan))).events
-    assert np.isnan([event.motion.step_m, event.motion.heading_rad, event.motion.turn_rad]).all()
+def test_missing_steps_and_headings_reach_the_filter():
+    found, _ = merged(motion=motion((1, nan, nan, nan)), radio=radio((0, "serving", "A")))
+    event = found.events[-1]
+    assert np.isnan([event.step_m, event.heading_rad, event.turn_rad]).all()
 
 
-def test_an_empty_log_has_no_events():
-    assert merged() == serving_events(make_log(CRS, radio=radio()))
-    assert merged().events == ()
-    assert merged().unused == ()
+def test_an_empty_log_has_no_epochs():
+    for tables in ({}, {"radio": radio()}):
+        found, estimate = merged(**tables)
+        assert (found.prior, found.events, len(estimate), estimate.unused) == ([], [], 0, ())
 
 
 TIMES = st.sampled_from([0.0, 0.48, 0.96, 1.0, 2.0])
@@ -115,21 +175,24 @@ TIMES = st.sampled_from([0.0, 0.48, 0.96, 1.0, 2.0])
         unique=True,
     ),
 )
-def test_every_row_is_an_event_or_is_told(moves, reports):
-    found = merged(
+def test_every_row_is_used_or_labelled(moves, reports):
+    found, estimate = merged(
         motion=motion(*((t, s, h, 0.0) for t, s, h in moves)),
         radio=radio(*reports).astype({"time_s": float}),
     )
-    times = [event.time_s for event in found.events]
-    assert times == sorted(times)
-    told = [event.motion.step_m for event in found.events if event.motion is not None]
-    assert told == [s for _, s, _ in sorted(moves, key=lambda move: move[0])]
-    used = [event for event in found.events if event.reading is not None]
-    second = [u for u in found.unused if u.reason is Reason.SECOND_SERVING_CELL]
-    assert len(used) + len(second) == sum(role == "serving" for _, role, _ in reports)
-    assert len({event.time_s for event in used}) == len(used)
-    nothing = {u.time_s for u in found.unused if u.reason is Reason.NO_SERVING_CELL}
-    assert nothing == {t for t, _, _ in reports} - {event.time_s for event in used}
+    reasons = [u.reason for u in estimate.unused]
+    steps = [event.step_m for event in found.events if isinstance(event, MotionStep)]
+    in_order = [s for _, s, _ in sorted(moves, key=lambda move: move[0])]
+    early = reasons.count(Reason.NOT_STARTED)
+    assert steps == in_order[early:]
+    used = [event for event in found.events if isinstance(event, str)]
+    second = reasons.count(Reason.SECOND_SERVING_CELL)
+    assert len(used) + second == sum(role == "serving" for _, role, _ in reports)
+    nothing = {u.time_s for u in estimate.unused if u.reason is Reason.NO_SERVING_CELL}
+    assert nothing == {t for t, _, _ in reports} - {
+        t for t, role, _ in reports if role == "serving"
+    }
+    assert estimate.time_s.tolist() == sorted({row[0] for row in (*moves, *reports)})
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -137,5 +200,7 @@ def test_the_order_of_the_rows_in_the_file_does_not_matter(seed):
     rng = np.random.default_rng(seed)
     moves = motion(*((t, 1.0 + t, 0.0, 0.0) for t in range(6)))
     reports = radio(*((float(t), "serving", "AB"[t % 2]) for t in range(6)))
-    shuffled = merged(motion=moves.iloc[rng.permutation(6)], radio=reports.iloc[rng.permutation(6)])
-    assert shuffled == merged(motion=moves, radio=reports)
+    shuffled, _ = merged(
+        motion=moves.iloc[rng.permutation(6)], radio=reports.iloc[rng.permutation(6)]
+    )
+    assert shuffled == merged(motion=moves, radio=reports)[0]

@@ -108,7 +108,7 @@ def test_times_of_arrival_shorten_the_search(area):
         for cell in ("E", "NW")
     ]  # fmt: skip
     with_them = replace(log, tdoa=make_log(CRS, tdoa=pd.concat(rows)).tdoa)
-    few = ParticleOptions(most=2000, searching=1000, least=300)
+    few = ParticleOptions(max_particles=2000, min_search_particles=1000, min_particles=300)
     positioner = BayesOptions(particles=few).over_area(area)
     switch = [
         locate(one, positioner, np.random.default_rng(1)).estimate.converged_at
@@ -133,6 +133,6 @@ def test_differences_between_reports_of_levels_do_not_make_it_a_log_of_cells(
     rows = pd.DataFrame({"time_s": log.truth["time_s"], "cell": "E", "reference": "W"})
     radio = log.radio.assign(level_dbm=level_dbm)
     told = make_log(CRS, motion=log.motion, radio=radio, tdoa=rows.assign(difference_m=0.0))
-    few = ParticleOptions(most=500, searching=300, least=100)
+    few = ParticleOptions(max_particles=500, min_search_particles=300, min_particles=100)
     locate(told, BayesOptions(particles=few).over_area(area), np.random.default_rng(1))
     assert seen == {np.isnan(level_dbm)}

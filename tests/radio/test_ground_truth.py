@@ -11,7 +11,8 @@ import pytest
 from mapfilter.errors import ConfigError
 from mapfilter.geodesy import Lattice
 from mapfilter.propagation import predict as module
-from mapfilter.propagation.predict import PredictionModel, RealityErrors, predict, realise
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
+from mapfilter.propagation.predict import predict, simulate_ground_truth
 from mapfilter.radio.cells import Cell, CellPlan
 
 CRS = "EPSG:32635"
@@ -28,7 +29,9 @@ PLAN = CellPlan(
 ONE = CellPlan(CRS, PLAN.cells[:1])
 MODEL = PredictionModel(model="cost231_hata")
 CLUTTERED = replace(MODEL, shadowing_db=6.0)
-NONE = RealityErrors(level_error_db=0.0, eirp_error_db=0.0, azimuth_error_deg=0.0, slope_error=0.0)
+NONE = GroundTruthErrors(
+    level_error_db=0.0, eirp_error_db=0.0, azimuth_error_deg=0.0, slope_error=0.0
+)
 SEEDS = range(30)
 
 
@@ -41,7 +44,7 @@ def predicted(model=MODEL, plan=PLAN, heights=None, lattice=LATTICE):
 
 
 def real(errors, model=MODEL, plan=PLAN, heights=None, lattice=LATTICE):
-    return levels(realise(plan, lattice, heights, model, errors))
+    return levels(simulate_ground_truth(plan, lattice, heights, model, errors))
 
 
 def drawn(errors, model=MODEL, plan=ONE):
@@ -62,7 +65,7 @@ def test_without_errors_it_is_the_prediction():
 
 def test_the_whole_error_is_what_its_parts_imply():
     """Uniform draws within ± a have the variance a² / 3; the slope counts by the decades."""
-    errors = RealityErrors(
+    errors = GroundTruthErrors(
         level_error_db=7.0, eirp_error_db=6.0, slope_error=0.2, azimuth_error_deg=5.0
     )
     difference = drawn(errors)[:, 0]
@@ -138,7 +141,7 @@ def test_shared_clutter_is_the_predictions():
     errors = replace(NONE, clutter="shared", seed=5)
     np.testing.assert_allclose(real(errors, CLUTTERED), predicted(CLUTTERED), atol=1e-4)
     with pytest.raises(ConfigError, match="own or shared"):
-        RealityErrors(clutter="none")  # type: ignore[arg-type]
+        GroundTruthErrors(clutter="none")  # type: ignore[arg-type]
 
 
 def test_every_part_is_drawn_by_the_seed():
@@ -193,7 +196,11 @@ def test_roofs_are_off_by_a_factor_that_neighbours_share(monkeypatch):
 
     monkeypatch.setattr(module.Surroundings, "of", record)
     for seed in range(60):
-        next(realise(ONE, LATTICE, heights, MODEL, replace(NONE, roof_error=0.2, seed=seed)))
+        next(
+            simulate_ground_truth(
+                ONE, LATTICE, heights, MODEL, replace(NONE, roof_error=0.2, seed=seed)
+            )
+        )
     factor = np.log(np.array(seen)[:, :, :60] / 20.0) / 0.2
     assert not np.array(seen)[:, :, 60:].any()
     assert_mean((factor**2).mean(axis=(1, 2)), 1.0, 0.3)
@@ -203,5 +210,5 @@ def test_roofs_are_off_by_a_factor_that_neighbours_share(monkeypatch):
 
 
 def test_adding_a_cell_changes_no_other():
-    errors = RealityErrors(level_error_db=7.0, local_share=0.5)
+    errors = GroundTruthErrors(level_error_db=7.0, local_share=0.5)
     np.testing.assert_array_equal(real(errors, CLUTTERED)[:1], real(errors, CLUTTERED, ONE))

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapfilter.errors import InputError
-from mapfilter.radio.antenna import omni_gain_db, sector_gain_db, vertical_gain_db
+from mapfilter.radio.antenna import sector_gain_db, vertical_gain_db
 
 BEAM_RAD = float(np.radians(65.0))
 
@@ -42,11 +42,6 @@ def test_vertical_pattern_peaks_at_the_downtilt_and_ends_in_side_lobes() -> None
     depression_rad = np.radians([6.0, 2.5, 9.5, 60.0, -60.0])
     gain = vertical_gain_db(depression_rad, np.radians(6.0), np.radians(7.0))
     np.testing.assert_allclose(gain, [0, -3, -3, -20, -20], atol=1e-12)
-
-
-def test_omni_keeps_the_shape() -> None:
-    assert omni_gain_db(np.ones((2, 3))).shape == (2, 3)
-    assert not omni_gain_db(np.ones((2, 3))).any()
 
 
 def test_beamwidth_in_degrees_is_told() -> None:

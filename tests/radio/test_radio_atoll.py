@@ -10,7 +10,7 @@ from raster_files import HDR, INDEX_HEADER, index_row, write_bil
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 6, 8)
@@ -107,8 +107,8 @@ def test_a_raster_may_reach_beyond_its_area(tmp_path: Path) -> None:
         ("A;C:\\a.bil;5;385000;385040;6672970;6673000;16", "FILE_NAME: expected the name"),
         ("A;;5;385000;385040;6672970;6673000;16", "FILE_NAME: expected the name"),
         ("../A;a.bil;5;385000;385040;6672970;6673000;16", "TX_NAME: expected an id"),
-        ("A;a.bil;5;385000", "expected 8 fields, found 4"),
-        ("A;a.bil;;;;;\nA;a.bil;;;;;", "expected 8 fields, found 7"),
+        ("A;a.bil;5;385000", "fields: expected 8, found 4"),
+        ("A;a.bil;;;;;\nA;a.bil;;;;;", "fields: expected 8, found 7"),
         ("A;a.bil;;;;;;\nA;a.bil;;;;;;", "row 3, TX_NAME: expected each cell once"),
     ],
 )

@@ -51,8 +51,8 @@ def test_transmitters_of_a_planning_tool(tmp_path: Path) -> None:
     assert (first.eirp_dbm, first.arfcn, first.bsic) == (50.3, 612, 17)
     assert (second.antenna, second.eirp_dbm, second.bsic) == ("sector", 52.0, None)
     assert plan.notes == (
-        "eirp_dbm = 52 for 1 of 2 cells that tell none",
-        "frequency_mhz = 1800 for 2 of 2 cells that tell none",
+        "eirp_dbm = 52 for 1 of 2 cells without one",
+        "frequency_mhz = 1800 for 2 of 2 cells without one",
     )
 
 
@@ -116,7 +116,7 @@ def test_bad_rows_of_public_lists_are_told_and_lose_nothing_else(tmp_path: Path)
     plan = _read(tmp_path, MLS + bad + again, layout="opencellid")
     assert plan.ids == ("244-91-801-1001", "244-5-33-70657")
     assert "3 faulty rows left out, such as" in plan.notes[-2]
-    assert plan.notes[-1] == "1 rows of cells told already left out"
+    assert plan.notes[-1] == "1 rows left out: cells listed already"
     said = _complaint(tmp_path, MLS.splitlines()[0] + "\n" + bad, layout="opencellid")
     assert "cell (ci): expected a whole number" in said
 

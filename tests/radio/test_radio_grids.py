@@ -12,7 +12,7 @@ from raster_files import HDR, write_ascii, write_bil
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
-from mapfilter.rasters.rxlev_rasters import RxLevRasters, open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 2.5, 5, 7)
@@ -142,7 +142,7 @@ def test_the_crs_lies_beside_the_grid(tmp_path: Path) -> None:
         (("-82", "1e39"), ""),
         (("ncols", "what"), "no ASCII grid"),
         (("-79", "120"), "path losses, or raw RXLEV, given for levels"),
-        (("-79", "-999"), "-999 means no data, and the file does not say so"),
+        (("-79", "-999"), "-999 means no data, and the file does not state it"),
     ],
 )
 def test_ascii_grids_that_are_wrong(tmp_path: Path, change: tuple[str, str], said: str) -> None:

@@ -6,13 +6,18 @@ import pytest
 from mapfilter.check.lobes import (
     azimuth_mistakes,
     best_labels,
-    falls_with_distance,
     find_lobe,
-    peak_m,
 )
-from mapfilter.check.plausibility import RasterSample, above_free_space_db, nodata_taken_as_level
+from mapfilter.check.raster_checks import (
+    RasterSample,
+    above_free_space_db,
+    falls_with_distance,
+    nodata_taken_as_level,
+)
+from mapfilter.check.site_checks import peak_m
 from mapfilter.geodesy import Lattice, heading_from_azimuth_rad
-from mapfilter.propagation.predict import PredictionModel, RealityErrors, realise
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
+from mapfilter.propagation.predict import simulate_ground_truth
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.cells import Cell, CellPlan
 
@@ -135,7 +140,7 @@ def test_levels_tell_an_eirp_that_is_forty_db_off(model):
     """Of six cells of any model, with the shadowing of prediction and reality together."""
     cells = [Cell(f"{n}", f"{n}", *SITE, 30.0, 60.0 * n, 43.0, 1800.0) for n in range(6)]
     plan, wanted = CellPlan(LATTICE.crs, tuple(cells)), PredictionModel(model=model)
-    real = dict(realise(plan, LATTICE, None, wanted, RealityErrors()))
+    real = dict(simulate_ground_truth(plan, LATTICE, None, wanted, GroundTruthErrors()))
     samples = [RasterSample(cell.id, LATTICE, real[cell.id], "") for cell in cells]
     above_db = np.median([above_free_space_db(s, c) for s, c in zip(samples, cells, strict=True)])
     assert above_db < 10 < above_db + 40

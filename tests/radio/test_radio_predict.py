@@ -5,25 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from one_cell import predict_cell, predict_steep_cell
 from pyproj import Geod
 
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import Lattice, project, unproject
 from mapfilter.propagation.empirical import cost231_hata_db, cost231_walfisch_ikegami_db
-from mapfilter.propagation.predict import (
-    PredictionModel,
-    RealityErrors,
-    outside_validity,
-    predict,
-    predict_cell,
-    realise,
-)
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
+from mapfilter.propagation.predict import outside_validity, predict, simulate_ground_truth
 from mapfilter.radio.cells import Cell, CellPlan
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 10.0, 120, 110)
 PLAIN = PredictionModel(shadowing_db=0.0)
-NO_ERRORS = RealityErrors(0.0, 50.0, 0.5, 0.0, 0.0, 0.0)
+NO_ERRORS = GroundTruthErrors(0.0, 50.0, 0.5, 0.0, 0.0, 0.0)
 CENTRE = LATTICE.east_north(60, 55)
 OMNI = Cell("A", "S", *CENTRE, 30.0, None, 50.0, 1800.0, "omni")
 SECTOR = replace(OMNI, id="B", azimuth_deg=90.0, antenna="sector")
@@ -114,7 +109,7 @@ def test_an_indoor_cell_loses_its_penetration_outdoors_only() -> None:
 
 def test_slope_stretches_the_loss_about_100_m() -> None:
     plain = predict_cell(OMNI, LATTICE, None, PLAIN)
-    steep = predict_cell(OMNI, LATTICE, None, PLAIN, slope_factor=1.05)
+    steep = predict_steep_cell(OMNI, LATTICE, None, PLAIN, 1.05)
     # The stretched distance, too, counts as 20 m when it is shorter.
     far = _distance_m(OMNI) > 25.0
     expected = 0.05 * 38.0 * np.log10(_distance_m(OMNI)[far] / 100.0)
@@ -130,8 +125,12 @@ def test_cells_do_not_depend_on_each_other() -> None:
     for cell in plan.cells:
         np.testing.assert_array_equal(levels[cell.id], predict_cell(cell, LATTICE, heights, model))
         assert levels[cell.id].dtype == np.float32
-    real = dict(realise(plan, LATTICE, heights, model, RealityErrors(seed=3)))
-    fewer = dict(realise(CellPlan(CRS, (SECTOR,)), LATTICE, heights, model, RealityErrors(seed=3)))
+    real = dict(simulate_ground_truth(plan, LATTICE, heights, model, GroundTruthErrors(seed=3)))
+    fewer = dict(
+        simulate_ground_truth(
+            CellPlan(CRS, (SECTOR,)), LATTICE, heights, model, GroundTruthErrors(seed=3)
+        )
+    )
     np.testing.assert_array_equal(real["B"], fewer["B"])
 
 
@@ -147,14 +146,18 @@ def test_progress_is_told() -> None:
     told: list[tuple[int, int]] = []
     plan = CellPlan(CRS, (OMNI, SECTOR))
     list(predict(plan, LATTICE, None, PLAIN, lambda done, total: told.append((done, total))))
-    list(realise(plan, LATTICE, None, PLAIN, NO_ERRORS, lambda *step: told.append(step)))
+    list(
+        simulate_ground_truth(
+            plan, LATTICE, None, PLAIN, NO_ERRORS, lambda *step: told.append(step)
+        )
+    )
     assert told == [(1, 2), (2, 2)] * 2
 
 
-def _difference(errors: RealityErrors, cell: Cell = SECTOR) -> NDArray[np.float32]:
+def _difference(errors: GroundTruthErrors, cell: Cell = SECTOR) -> NDArray[np.float32]:
     plan, model = CellPlan(CRS, (cell,)), PredictionModel(seed=1)
     ((_, predicted),) = predict(plan, LATTICE, None, model)
-    ((_, real),) = realise(plan, LATTICE, None, model, errors)
+    ((_, real),) = simulate_ground_truth(plan, LATTICE, None, model, errors)
     return real - predicted
 
 
@@ -196,7 +199,7 @@ def test_shadowing_of_reality_has_its_deviation_and_is_not_the_predictions() -> 
     squares, products = [], []
     for seed in range(40):
         errors = replace(NO_ERRORS, level_error_db=7.0, seed=seed, clutter="shared")
-        ((_, real),) = realise(plan, LATTICE, None, model, errors)
+        ((_, real),) = simulate_ground_truth(plan, LATTICE, None, model, errors)
         error = (real - predict_cell(OMNI, LATTICE, None, model)).astype(np.float64)
         squares.append((error**2).mean())
         products.append((error * clutter).mean())
@@ -223,7 +226,7 @@ def test_wrong_models_are_told_together() -> None:
     for part in ("model", "street_width_m", "shadowing_db", "per cent", "mobile_height_m", "seed"):
         assert part in text
     with pytest.raises(ConfigError, match="per cent given for a fraction"):
-        RealityErrors(slope_error=5.0)
+        GroundTruthErrors(slope_error=5.0)
 
 
 def test_what_is_extrapolated_is_told_by_cell() -> None:

@@ -6,19 +6,14 @@ import numpy as np
 import pytest
 from msi_files import panel_losses
 from numpy.typing import NDArray
+from one_cell import predict_cell, predict_steep_cell
 
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.propagation.empirical import friis_db, log_distance_db, okumura_hata_db
 from mapfilter.propagation.line_of_sight import line_of_sight
-from mapfilter.propagation.predict import (
-    PredictionModel,
-    RealityErrors,
-    off_frequency,
-    predict,
-    predict_cell,
-    realise,
-)
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
+from mapfilter.propagation.predict import off_frequency, predict, simulate_ground_truth
 from mapfilter.propagation.tr38901 import hidden_loss_db, seen_loss_db, sight_probability
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import Cell, CellPlan
@@ -103,7 +98,7 @@ def test_slope_error_is_the_same_share_of_the_slope_in_every_model() -> None:
         sight = np.ones(DISTANCE_M.shape, dtype=np.float32)
         heights = np.zeros_like(sight)
         plain = predict_cell(OMNI, LATTICE, heights, model)
-        steep = predict_cell(OMNI, LATTICE, heights, model, slope_factor=1.01)
+        steep = predict_steep_cell(OMNI, LATTICE, heights, model, 1.01)
         far = DISTANCE_M > 250.0
         change = (plain - steep)[far] / np.log10(DISTANCE_M[far] / 100.0) / 0.01
         np.testing.assert_allclose(change, per_decade_db, rtol=0.25 if "umi" in name else 0.002)
@@ -182,7 +177,7 @@ def test_antennas_that_are_not_there_are_told_together() -> None:
     text = str(caught.value)
     assert all(part in text for part in ("'x.msi'", "'sectr'", "'c', azimuth_deg", "misspelt"))
     with pytest.raises(InputError, match="no folder of antennas"):
-        next(iter(realise(plan, LATTICE, None, PLAIN, RealityErrors())))
+        next(iter(simulate_ground_truth(plan, LATTICE, None, PLAIN, GroundTruthErrors())))
 
 
 def test_a_measured_omni_needs_no_azimuth() -> None:
@@ -197,8 +192,8 @@ def test_a_measured_omni_needs_no_azimuth() -> None:
 
 def test_reality_turns_measured_antennas_too() -> None:
     plan, antennas = CellPlan(CRS, (replace(NORTH, antenna="p"),)), {"p": _panel()}
-    errors = RealityErrors(0.0, 50.0, 0.5, 0.0, 5.0, 0.0)
-    ((_, real),) = realise(plan, LATTICE, None, PLAIN, errors, antennas=antennas)
+    errors = GroundTruthErrors(0.0, 50.0, 0.5, 0.0, 5.0, 0.0)
+    ((_, real),) = simulate_ground_truth(plan, LATTICE, None, PLAIN, errors, antennas=antennas)
     ((_, predicted),) = predict(plan, LATTICE, None, PLAIN, antennas=antennas)
     assert 0.1 < np.abs(real - predicted).max() < 5
 

@@ -10,9 +10,14 @@ from rasterio import Affine
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters import geotiff
-from mapfilter.rasters.files import QUANTITY_TAG
-from mapfilter.rasters.geotiff import _check_extent_of_file, _check_pixels, _quantity
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.geotiff import (
+    QUANTITY_TAG,
+    _check_extent_of_file,
+    _check_pixels,
+    _quantity,
+    write_rasters,
+)
+from mapfilter.rasters.raster_set import open_rasters
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 6, 8)
@@ -173,7 +178,7 @@ def test_windows_on_the_lattice(rasters, window, fits):
 
 
 def test_reads_of_four_gibibytes_are_the_largest(rasters, monkeypatch):
-    monkeypatch.setattr("mapfilter.rasters.rxlev_rasters._LARGEST_READ_BYTES", 4 * 48)
+    monkeypatch.setattr("mapfilter.rasters.raster_set._LARGEST_READ_BYTES", 4 * 48)
     assert rasters.read(cells=["B"]).shape == (1, 6, 8)
     with pytest.raises(InputError, match="at most 4 GiB at a time"):
         rasters.read()

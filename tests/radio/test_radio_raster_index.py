@@ -9,7 +9,7 @@ from raster_files import INDEX_HEADER, write_bil
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters.atoll import IndexRow, find_index, read_index
-from mapfilter.rasters.grid_header import grid_lattice
+from mapfilter.rasters.plain_grids import grid_lattice
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 6, 8)

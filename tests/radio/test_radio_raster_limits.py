@@ -6,10 +6,9 @@ from raster_files import write_ascii, write_bil
 
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice
-from mapfilter.rasters.esri_ascii import open_ascii_grid
-from mapfilter.rasters.files import check_plausible, without_nodata
-from mapfilter.rasters.grid_header import GridHeader, grid_lattice
-from mapfilter.rasters.rxlev_rasters import open_rasters
+from mapfilter.rasters.files import Declared, check_plausible, without_nodata
+from mapfilter.rasters.plain_grids import GridHeader, grid_lattice, open_ascii_grid
+from mapfilter.rasters.raster_set import open_rasters
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 6, 8)
@@ -170,7 +169,7 @@ def ascii_text(rows, head=None):
 def test_rows_of_text(tmp_path, rows, values):
     path = tmp_path / "a.asc"
     path.write_text(ascii_text(rows))
-    grid = open_ascii_grid(path, "a", CRS)
+    grid = open_ascii_grid(path, "a", Declared(crs=CRS))
     np.testing.assert_array_equal(grid.read([0], (0, 0, 2, 2))[0], np.array(values, "f4"))
     np.testing.assert_array_equal(grid.read([0, 0], (1, 1, 1, 1))[1], [[-83]])
 
@@ -182,34 +181,35 @@ def test_rows_of_text_that_are_more_or_fewer(tmp_path, rows):
     path = tmp_path / "a.asc"
     path.write_text(ascii_text(rows + " " * 20))
     with pytest.raises(InputError):
-        open_ascii_grid(path, "a", CRS).read([0], (0, 0, 2, 2))
+        open_ascii_grid(path, "a", Declared(crs=CRS)).read([0], (0, 0, 2, 2))
 
 
 def test_the_shortest_text_that_can_hold_the_numbers(tmp_path):
     path = tmp_path / "a.asc"
     path.write_text(ascii_text("1 2\n3 4"))
-    assert open_ascii_grid(path, "a", CRS).read([0], (0, 0, 2, 2))[0].tolist() == [[1, 2], [3, 4]]
+    grid = open_ascii_grid(path, "a", Declared(crs=CRS))
+    assert grid.read([0], (0, 0, 2, 2))[0].tolist() == [[1, 2], [3, 4]]
     path.write_text(ascii_text("1 2\n3 "))
     with pytest.raises(InputError, match="at least 7 bytes for 2 x 2 numbers"):
-        open_ascii_grid(path, "a", CRS)
+        open_ascii_grid(path, "a", Declared(crs=CRS))
 
 
 def test_numbers_that_mean_no_data_in_text_are_the_headers_and_the_given_one(tmp_path):
     path = write_ascii(tmp_path / "a.asc", LATTICE, np.full((6, 8), 7.0), nodata="7")
-    assert open_ascii_grid(path, "a", CRS).nodata == (7.0,)
-    assert open_ascii_grid(path, "a", CRS, nodata=8.0).nodata == (7.0, 8.0)
+    assert open_ascii_grid(path, "a", Declared(crs=CRS)).nodata == (7.0,)
+    assert open_ascii_grid(path, "a", Declared(crs=CRS, nodata=8.0)).nodata == (7.0, 8.0)
     write_ascii(path, LATTICE, np.full((6, 8), 7.0))
-    assert open_ascii_grid(path, "a", CRS).nodata == (-9999.0,)
+    assert open_ascii_grid(path, "a", Declared(crs=CRS)).nodata == (-9999.0,)
 
 
 def test_a_million_columns_of_text_are_the_most(tmp_path):
     path = tmp_path / "a.asc"
     head = "ncols {}\nnrows 1\nxllcorner 385000\nyllcorner 6673000\ncellsize 5\n"
     path.write_text(head.format(1_000_000) + "1 " * 1_000_000)
-    assert open_ascii_grid(path, "a", CRS).lattice.cols == 1_000_000
+    assert open_ascii_grid(path, "a", Declared(crs=CRS)).lattice.cols == 1_000_000
     path.write_text(head.format(1_000_001) + "1 " * 1_000_001)
     with pytest.raises(InputError, match="NCOLS: expected at most 1000000"):
-        open_ascii_grid(path, "a", CRS)
+        open_ascii_grid(path, "a", Declared(crs=CRS))
 
 
 def test_raw_pixels_may_lack_the_padding_of_the_last_row_and_no_more(tmp_path):

@@ -9,8 +9,8 @@ import pytest
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters import resampling as _resampling
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.rasters.resampling import common_lattice, read_on
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 6, 8)

@@ -14,7 +14,8 @@ from raster_files import write_ascii, write_bil
 from mapfilter._io import sha256_file
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 
 CRS = "EPSG:32635"
 FINE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 12, 16)
@@ -96,7 +97,7 @@ def test_what_is_declared_must_not_contradict_the_file(tmp_path: Path) -> None:
     assert "found level and loss" in _complaint(tmp_path, quantity=None)
     (tmp_path / "B.tif").unlink()
     _geotiff(tmp_path / "B.tif", FINE, _values(FINE))
-    assert "say quantity = level or loss" in _complaint(tmp_path, quantity=None)
+    assert "set quantity = level or loss" in _complaint(tmp_path, quantity=None)
 
 
 def test_a_crs_is_declared_for_files_without(tmp_path: Path) -> None:

@@ -17,7 +17,8 @@ from rasterio.errors import NotGeoreferencedWarning
 from mapfilter.errors import InputError, OutputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.rxlev_rasters import check_against_plan, open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import check_against_plan, open_rasters
 
 LATTICE = Lattice("EPSG:32635", 385000.0, 6673000.0, 5.0, 300, 280)
 IDS = ("A", "B", "C")

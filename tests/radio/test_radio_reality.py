@@ -7,7 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from mapfilter.geodesy import Lattice
-from mapfilter.propagation.predict import PredictionModel, RealityErrors, predict, realise
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
+from mapfilter.propagation.predict import predict, simulate_ground_truth
 from mapfilter.radio.cells import Cell, CellPlan
 
 LATTICE = Lattice("EPSG:32635", 385000.0, 6673000.0, 10.0, 80, 80)
@@ -21,7 +22,7 @@ PLAN = CellPlan(
 )
 SEEDS = range(25)
 MODEL = PredictionModel(model="cost231_hata", shadowing_db=6.0, shadowing_correlation_m=50.0)
-ERRORS = RealityErrors(
+ERRORS = GroundTruthErrors(
     level_error_db=7.0,
     eirp_error_db=0.0,
     azimuth_error_deg=0.0,
@@ -40,7 +41,7 @@ def fields() -> tuple[Fields, Fields]:
     for seed in SEEDS:
         model, errors = replace(MODEL, seed=seed), replace(ERRORS, seed=seed)
         predicted = dict(predict(PLAN, LATTICE, None, model))
-        real = dict(realise(PLAN, LATTICE, None, model, errors))
+        real = dict(simulate_ground_truth(PLAN, LATTICE, None, model, errors))
         clutter.append([predicted[cell] - plain[cell] for cell in PLAN.ids])
         error.append([real[cell] - predicted[cell] for cell in PLAN.ids])
     return np.array(clutter, dtype=np.float64), np.array(error, dtype=np.float64)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from test_radio_lobes import LATTICE, SITE, sector
 
-from mapfilter.check.plausibility import RasterSample
-from mapfilter.check.site_positions import best_place, in_squares, place_fit
+from mapfilter.check.raster_checks import RasterSample
+from mapfilter.check.site_checks import best_place, in_squares, place_fit
 
 
 def test_squares_are_means_at_their_middles():

@@ -7,17 +7,16 @@ from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.propagation.shadowing import correlated_field
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.survey.fit import SurveyOptions, fit_survey
-from mapfilter.survey.measurements import Measurements
-from mapfilter.survey.residuals import (
+from mapfilter.survey.cell_model import (
+    DistanceLoss,
     GaussianField,
-    Points,
+    Prior,
     Shadowing,
+    fit_trend,
     learn_shadowing,
-    points_by_cell,
 )
-from mapfilter.survey.trend import DistanceLoss, Prior, fit_trend
-from mapfilter.survey.validation import cross_validate
+from mapfilter.survey.measured_map import SurveyOptions, fit_survey, leave_out
+from mapfilter.survey.measurements import Measurements, Points, points_by_cell
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385_000.0, 6_673_000.0, 5.0, 160, 160)
@@ -78,7 +77,7 @@ def test_the_trend_is_the_posterior_of_generalised_least_squares():
     by_hand = 25 * np.exp(-distance / 60) + 16 * np.eye(30)
     np.testing.assert_allclose(covariance, by_hand, rtol=1e-9)
     loss = DistanceLoss(*ANTENNA)
-    trend = fit_trend(loss, east_m, north_m, level, covariance, prior)
+    trend = fit_trend(loss, points, covariance, prior)
     values = loss(east_m, north_m)
     design = np.column_stack([np.ones(30), values - values.mean()])
     inverse = np.linalg.inv(by_hand)
@@ -92,7 +91,7 @@ def test_the_trend_is_the_posterior_of_generalised_least_squares():
     left = level - design @ [-80.0, 3.5]
     minus_two_log = left @ np.linalg.solve(total, left) + np.linalg.slogdet(total)[1]
     other = Prior(-75.0, 3.0)
-    again = fit_trend(loss, east_m, north_m, level, covariance, other)
+    again = fit_trend(loss, points, covariance, other)
     left = level - design @ [-75.0, 3.0]
     expected = left @ np.linalg.solve(total, left) + np.linalg.slogdet(total)[1]
     assert again.cost - trend.cost == pytest.approx(expected - minus_two_log, rel=1e-9)
@@ -102,9 +101,8 @@ def test_the_gaussian_field_is_one_gaussian_process_with_an_uncertain_trend():
     east_m, north_m = somewhere(25)
     level = law(east_m, north_m) + np.random.default_rng(3).normal(0, 4, 25)
     points, shadowing, prior = points_of(east_m, north_m, level), Shadowing(), Prior(-80.0)
-    trend = fit_trend(
-        DistanceLoss(*ANTENNA), east_m, north_m, level, shadowing.covariance_db2(points), prior
-    )
+    covariance = shadowing.covariance_db2(points)
+    trend = fit_trend(DistanceLoss(*ANTENNA), points, covariance, prior)
     at = somewhere(9, seed=4)
     mean, deviation = GaussianField(points, trend, shadowing).predict(*at)
     everywhere = np.column_stack([np.r_[east_m, at[0]], np.r_[north_m, at[1]]])
@@ -155,14 +153,14 @@ def test_shadowing_is_learnt_from_all_cells_together():
 
 def test_nothing_is_learnt_from_single_points():
     points = points_of(*(np.array([v]) for v in (385_000.0, 6_672_500.0, -80.0)))
-    trend = fit_trend(None, points.east_m, points.north_m, points.level_dbm, np.eye(1), Prior(-80))
+    trend = fit_trend(None, points, np.eye(1), Prior(-80))
     assert learn_shadowing([points], [trend], Shadowing()) == Shadowing()
 
 
 @pytest.mark.parametrize("method", ["gp", "knn"])
 def test_residuals_tell_more_than_the_trend_and_their_deviations_are_true(method):
     rows, _ = shadowed()
-    found = cross_validate(rows, SurveyOptions(method=method))
+    found = leave_out(rows, SurveyOptions(method=method)).validation
     assert (found.folds, found.by_session, found.measurements) == (4, True, 600)
     assert found.predicted > 590
     assert found.rmse_db < 0.85 * found.trend_rmse_db
@@ -175,7 +173,7 @@ def test_residuals_tell_more_than_the_trend_and_their_deviations_are_true(method
 
 def test_the_trend_alone_is_told_as_the_trend():
     rows, _ = shadowed()
-    found = cross_validate(rows, SurveyOptions(method="trend"))
+    found = leave_out(rows, SurveyOptions(method="trend")).validation
     assert found.rmse_db == pytest.approx(found.trend_rmse_db, rel=1e-12)
     assert found.within_1_deviation == pytest.approx(0.68, abs=0.06)
 
@@ -185,7 +183,7 @@ def test_left_out_sessions_leave_no_trace():
     east_m, north_m = somewhere(40)
     session = np.repeat([0, 1], 20)
     rows = measured(east_m, north_m, law(east_m, north_m), session, session, ("A", "B"))
-    found = cross_validate(rows, SurveyOptions())
+    found = leave_out(rows, SurveyOptions()).validation
     assert found.predicted == 0
     assert np.isnan(found.rmse_db)
     assert found.deviation_factor == 1.0
@@ -193,14 +191,14 @@ def test_left_out_sessions_leave_no_trace():
 
 def test_one_session_is_left_out_part_by_part():
     rows, _ = shadowed(drives=1, per_drive=200)
-    found = cross_validate(rows, SurveyOptions())
+    found = leave_out(rows, SurveyOptions()).validation
     assert (found.folds, found.by_session) == (5, False)
     assert found.predicted > 150
 
 
 def test_more_than_twenty_sessions_are_left_out_together():
     rows, _ = shadowed(drives=25, per_drive=8)
-    assert cross_validate(rows, SurveyOptions(trend="mean", method="knn")).folds == 20
+    assert leave_out(rows, SurveyOptions(trend="mean", method="knn")).validation.folds == 20
 
 
 def test_calibration_finds_offset_and_slope_of_a_prediction():
@@ -243,7 +241,7 @@ def test_few_points_are_left_out_or_take_the_mean():
     survey = fit_survey(rows, SurveyOptions())
     assert list(survey.cells) == ["B"]
     assert survey.cells["B"].antenna is None
-    assert survey.notes[0] == "1 cells left out: heard in fewer than 3 squares"
+    assert survey.notes[0] == "1 cells left out: received in fewer than 3 squares"
     assert "1 antennas not located (fewer than 15 squares)" in survey.notes[1]
     with pytest.raises(InputError, match="heard in at least 9 squares, found 2 cells, none"):
         fit_survey(rows, SurveyOptions(min_points=9))

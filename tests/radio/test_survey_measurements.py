@@ -8,9 +8,9 @@ from fuzz import fuzz
 
 from mapfilter.errors import InputError
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.survey.measurement_files import DIALECTS, read_antennas_log, read_csv
 from mapfilter.survey.measurement_rows import unix_seconds
-from mapfilter.survey.measurements import named_after, read_antennas_log, read_measurements
-from mapfilter.survey.measurements_csv import DIALECTS, read_csv
+from mapfilter.survey.measurements import named_after, read_measurements
 
 OPENCELLID = """\
 mcc,mnc,lac,cellid,lat,lon,signal,measured_at,rating,speed,direction,act,ta,psc,tac,pci,sid,nid,bid

@@ -6,13 +6,12 @@ import shapely
 
 from mapfilter.database.build import build
 from mapfilter.geodesy import Lattice
-from mapfilter.rasters.rxlev_rasters import open_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.routes import route_lattice
 from mapfilter.roads.ways import Ways
-from mapfilter.survey.fit import SurveyOptions, fit_survey
+from mapfilter.survey.measured_map import SurveyOptions, fit_survey, leave_out
 from mapfilter.survey.measurements import read_measurements
-from mapfilter.survey.rasters import surveyed_plan, write_survey
-from mapfilter.survey.validation import cross_validate
+from mapfilter.survey.survey_rasters import surveyed_plan, write_survey
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +41,7 @@ def test_real_logs_of_neighbours_are_read(shared_data):
 @pytest.mark.parametrize("method", ["gp", "knn"])
 def test_residuals_tell_left_out_sessions_better_than_path_loss(walks, rides, method):
     for rows, worst_db in ((walks, 4.7), (rides, 4.9)):
-        found = cross_validate(rows, SurveyOptions(method=method))
+        found = leave_out(rows, SurveyOptions(method=method)).validation
         assert found.by_session
         assert found.predicted > 0.7 * found.measurements
         assert found.rmse_db < worst_db

@@ -10,9 +10,10 @@ from test_survey_fit import ANTENNA, CRS, LATTICE, law, measured, shadowed, some
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.rxlev_rasters import check_against_plan, open_rasters, write_rasters
-from mapfilter.survey.fit import SurveyOptions, fit_survey
-from mapfilter.survey.rasters import predicted_levels, surveyed_plan, write_survey
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import check_against_plan, open_rasters
+from mapfilter.survey.measured_map import SurveyOptions, fit_survey
+from mapfilter.survey.survey_rasters import predicted_levels, surveyed_plan, write_survey
 
 
 def along_a_street(count=120, cell_ids=("A",)):
@@ -58,7 +59,7 @@ def test_pixels_that_nobody_measured_are_marked(tmp_path):
 
 
 def test_filled_rasters_keep_the_trend_and_still_mark(tmp_path, monkeypatch):
-    monkeypatch.setattr("mapfilter.survey.rasters._FIELD_LENGTHS", 0.0)
+    monkeypatch.setattr("mapfilter.survey.survey_rasters._FIELD_LENGTHS", 0.0)
     survey = fit_survey(along_a_street(), SurveyOptions(reach_m=60.0))
     _, mean, deviation = written(tmp_path, survey, fill=True)
     level, off = mean.read()[0], deviation.read()[0]
@@ -72,7 +73,7 @@ def test_filled_rasters_keep_the_trend_and_still_mark(tmp_path, monkeypatch):
 def test_strips_and_threads_change_no_byte(tmp_path, monkeypatch):
     survey = fit_survey(shadowed(drives=2)[0], SurveyOptions())
     written(tmp_path / "one", survey)
-    monkeypatch.setattr("mapfilter.survey.rasters._LARGEST_WINDOW_PX", 1000)
+    monkeypatch.setattr("mapfilter.survey.survey_rasters._LARGEST_WINDOW_PX", 1000)
     again = fit_survey(shadowed(drives=2)[0], SurveyOptions())
     written(tmp_path / "two", again)
     names = "rxlev.tif", "rxlev-deviation.tif"

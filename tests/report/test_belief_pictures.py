@@ -13,9 +13,8 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import Fix, Snapshot, TrackEstimate, TrackEvidence
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.belief import plot_belief
-from mapfilter.report.canvas import BLUE
-from mapfilter.report.errors import plot_error_over_distance
-from mapfilter.report.evidence import plot_evidence
+from mapfilter.report.canvas import BLUE, save
+from mapfilter.report.errors import plot_error_over_distance, plot_evidence
 from mapfilter.workflows.pictures import choose_snapshots
 
 STREET = np.array([[0.0, 100.0], [400.0, 100.0]])
@@ -55,7 +54,7 @@ def estimate() -> TrackEstimate:
 def test_a_belief_fades_as_it_narrows(tmp_path):
     blue = []
     for width_m in (150.0, 60.0, 20.0):
-        plot_belief([snapshot(width_m)], TRUTH, BASE, tmp_path / "belief.png")
+        save(plot_belief([snapshot(width_m)], TRUTH, BASE), tmp_path / "belief.png")
         blue.append(blue_pixels(tmp_path / "belief.png"))
     assert blue[0] > 1.5 * blue[1] > 2 * blue[2] > 0
 
@@ -63,29 +62,29 @@ def test_a_belief_fades_as_it_narrows(tmp_path):
 def test_the_same_belief_gives_the_same_bytes(tmp_path):
     shown = [snapshot(150.0), snapshot(10.0, 60.0, Status.CONVERGED)]
     for name in ("a.png", "b.png"):
-        plot_belief(shown, None, BASE, tmp_path / name)
+        save(plot_belief(shown, None, BASE), tmp_path / name)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
 @pytest.mark.parametrize("count", [0, 7])
 def test_one_to_six_moments(tmp_path, count):
     with pytest.raises(InputError, match="1 to 6"):
-        plot_belief([snapshot(10.0)] * count, TRUTH, BASE, tmp_path / "belief.png")
+        save(plot_belief([snapshot(10.0)] * count, TRUTH, BASE), tmp_path / "belief.png")
 
 
 @pytest.mark.parametrize("truth", [TRUTH, None])
 def test_evidence_with_and_without_truth(tmp_path, truth):
-    plot_evidence(estimate(), truth, tmp_path / "evidence.png")
+    save(plot_evidence(estimate(), truth), tmp_path / "evidence.png")
     assert blue_pixels(tmp_path / "evidence.png") > 300
 
 
 def test_no_evidence_no_picture(tmp_path):
     with pytest.raises(InputError, match="probabilities"):
-        plot_evidence(replace(estimate(), evidence=None), TRUTH, tmp_path / "evidence.png")
+        save(plot_evidence(replace(estimate(), evidence=None), TRUTH), tmp_path / "evidence.png")
 
 
 def test_small_errors_after_large_ones_are_seen(tmp_path):
-    plot_error_over_distance(estimate(), TRUTH, tmp_path / "error.png")
+    save(plot_error_over_distance(estimate(), TRUTH), tmp_path / "error.png")
     rows, _ = np.nonzero(
         np.abs(imread(tmp_path / "error.png")[:-250, ..., :3] - to_rgb(BLUE)).max(axis=2) < 0.01
     )

@@ -6,11 +6,18 @@ import shapely
 from matplotlib.figure import Figure
 
 from mapfilter.evaluation.track_percentiles import Percentile
-from mapfilter.report import cumulative
-from mapfilter.report.canvas import BLUE, ORANGE
-from mapfilter.report.cumulative import Distribution, OverThreshold, plot_cumulative
-from mapfilter.report.fusion import Curve, Panel, plot_error_panels
-from mapfilter.report.visible_sky import SeenMap, plot_seen_satellites
+from mapfilter.report.canvas import BLUE, ORANGE, save
+from mapfilter.report.curves import (
+    Curve,
+    Distribution,
+    OverThreshold,
+    Panel,
+    SeenMap,
+    plot_cumulative,
+    plot_error_panels,
+    plot_over_threshold,
+    plot_seen_satellites,
+)
 
 CURVES = [
     Distribution("some fail", np.array([[1.0, np.nan], [3.0, 2.0]]), BLUE, claim_m=2.5),
@@ -22,22 +29,36 @@ MADE = Percentile(10.0, 8.0, 12.0, 100)
 @pytest.mark.parametrize(
     "draw",
     [
-        lambda path: plot_cumulative(CURVES, path, title="errors", most_m=5.0),
-        lambda path: cumulative.plot_over_threshold(
-            [OverThreshold("edge", (-20.0, -17.0), [MADE, MADE], MADE, "three", BLUE)], path,
-            title="thresholds", chosen_db=-17.0, bound=("satellites", 15.0),
+        lambda path: save(plot_cumulative(CURVES, title="errors", most_m=5.0), path),
+        lambda path: save(
+            plot_over_threshold(
+                [OverThreshold("edge", (-20.0, -17.0), [MADE, MADE], MADE, "three", BLUE)],
+                title="thresholds",
+                chosen_db=-17.0,
+                bound=("satellites", 15.0),
+            ),
+            path,
         ),
-        lambda path: plot_seen_satellites(
-            [SeenMap("GPS", np.array([[1.0, np.nan], [3.0, 0.0]]), (0.0, 20.0, 0.0, 20.0))],
-            [shapely.box(10, 10, 20, 20)], [np.array([[1.0, 1.0], [1.0, 9.0]])], path, title="sky",
+        lambda path: save(
+            plot_seen_satellites(
+                [SeenMap("GPS", np.array([[1.0, np.nan], [3.0, 0.0]]), (0.0, 20.0, 0.0, 20.0))],
+                [shapely.box(10, 10, 20, 20)],
+                [np.array([[1.0, 1.0], [1.0, 9.0]])],
+                title="sky",
+            ),
+            path,
         ),
-        lambda path: plot_error_panels(
-            [Panel("", "error / m", [Curve("EKF", np.arange(5.0), BLUE)])], path, title="shaded",
-            shaded=("few", np.array([True, False, True, True, False])),
+        lambda path: save(
+            plot_error_panels(
+                [Panel("", "error / m", [Curve("EKF", np.arange(5.0), BLUE)])],
+                title="shaded",
+                shaded=("few", np.array([True, False, True, True, False])),
+            ),
+            path,
         ),
     ],
     ids=["cumulative", "thresholds", "sky", "shaded"],
-)  # fmt: skip
+)
 def test_equal_data_give_equal_bytes(draw, tmp_path):
     first, again = tmp_path / "a.png", tmp_path / "b.png"
     draw(first)
@@ -48,9 +69,8 @@ def test_equal_data_give_equal_bytes(draw, tmp_path):
 
 def test_epochs_without_a_position_keep_curves_below_all():
     axes = Figure().subplots()
-    for curve in CURVES:
-        cumulative._draw(axes, curve)
-    some, none = axes.lines
+    assert plot_cumulative(CURVES, axes, title="errors", most_m=5.0) is axes
+    some, none, *_ = axes.lines
     np.testing.assert_allclose(some.get_xdata(), [0.0, 1.0, 2.0, 3.0])
     np.testing.assert_allclose(some.get_ydata(), [0.0, 25.0, 50.0, 75.0])
     assert none.get_xdata().tolist() == [0.0]

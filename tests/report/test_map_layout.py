@@ -7,7 +7,8 @@ from matplotlib.image import imread
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.coverage import plot_best_server
+from mapfilter.report.canvas import save
+from mapfilter.report.network import plot_best_server
 from mapfilter.report.survey import plot_left_out
 
 CRS = "EPSG:25832"
@@ -25,7 +26,7 @@ def test_the_label_at_the_left_is_whole(rows, cols, name, tmp_path):
     )
     server = np.add.outer(np.arange(rows), np.arange(cols)) % 6
     plan, ids, path = CellPlan(CRS, cells), [cell.id for cell in cells], tmp_path / "map.png"
-    plot_best_server(server, ids, lattice, plan, BaseMap(lattice.bounds_m), path)
+    save(plot_best_server(server, ids, lattice, plan, BaseMap(lattice.bounds_m)), path)
     assert (imread(path)[:, :3, :3] == 1.0).all()
 
 
@@ -34,7 +35,7 @@ def test_no_bias_has_no_sign(tmp_path, monkeypatch):
     monkeypatch.setattr("matplotlib.axes.Axes.text", lambda *args, **_: told.append(args[3]))
     measured = np.array([-80.0, -70.0, -60.0, -50.0])
     predicted = measured + 0.005
-    plot_left_out(measured, predicted, tmp_path / "left-out.png")
+    save(plot_left_out(measured, predicted), tmp_path / "left-out.png")
     assert "bias 0.0 dB" in told[0]
-    plot_left_out(measured, predicted + 1.0, tmp_path / "left-out.png")
+    save(plot_left_out(measured, predicted + 1.0), tmp_path / "left-out.png")
     assert "bias \N{MINUS SIGN}1.0 dB" in told[1]

@@ -11,11 +11,11 @@ from mapfilter.database.build import build
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
-from mapfilter.report.basemap import BaseMap, draw_base
-from mapfilter.report.canvas import BLUE, ORANGE
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.report.basemap import BaseMap, draw_base, largest
+from mapfilter.report.canvas import BLUE, ORANGE, save
 from mapfilter.report.landuse import plot_landuse
-from mapfilter.report.layers import largest
 from mapfilter.report.network import plot_margin
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.routes import route_lattice_from_landuse
@@ -34,11 +34,19 @@ def plan_of(*ids: str) -> CellPlan:
     return CellPlan(
         CRS,
         tuple(
-            Cell(cell_id, cell_id[:2], west + 60.0 + 40 * i, south + 90.0, 30.0, 90.0 * i, 55.0,
-                 1800.0)
+            Cell(
+                cell_id,
+                cell_id[:2],
+                west + 60.0 + 40 * i,
+                south + 90.0,
+                30.0,
+                90.0 * i,
+                55.0,
+                1800.0,
+            )
             for i, cell_id in enumerate(ids)
         ),
-    )  # fmt: skip
+    )
 
 
 def pixels_near(path, colour: str) -> int:
@@ -54,9 +62,9 @@ def draw_each(folder):
     code = np.arange(2000).reshape(40, 50) % 4 - 1
     names = ("margin", "landuse")
     paths = [folder / f"{name}.png" for name in names]
-    plot_margin(margin_db, LATTICE, plan_of("S1A", "S1B"), BASE, paths[0])
+    save(plot_margin(margin_db, LATTICE, plan_of("S1A", "S1B"), BASE), paths[0])
     classes = LandUse(code, ("street", "park", "house"), (True, True, False))
-    plot_landuse(classes, LATTICE, BASE, paths[1])
+    save(plot_landuse(classes, LATTICE, BASE), paths[1])
     return paths
 
 
@@ -73,14 +81,14 @@ def test_margin_is_dark_where_cells_are_equal(tmp_path):
     path, plan = tmp_path / "m.png", plan_of("S1A")
     margin_db = np.full((40, 50), np.nan)
     margin_db[:, :20], margin_db[:, 20:30] = 0.5, np.inf
-    plot_margin(margin_db, LATTICE, plan, BASE, path)
+    save(plot_margin(margin_db, LATTICE, plan, BASE), path)
     dark, alone = (pixels_near(path, colour) for colour in ("#00224e", "#fff7bc"))
     # Twenty and ten of fifty columns of a map of some 1050 x 840 pixels, less its marks.
     assert np.allclose([dark, alone], [0.4 * 1050 * 840, 0.2 * 1050 * 840], rtol=0.1)
     with pytest.raises(InputError, match="dB >= 0"):
-        plot_margin(np.full((40, 50), -1.0), LATTICE, plan, BASE, path)
+        save(plot_margin(np.full((40, 50), -1.0), LATTICE, plan, BASE), path)
     with pytest.raises(InputError, match="40 x 50 pixels"):
-        plot_margin(np.zeros((50, 40)), LATTICE, plan, BASE, path)
+        save(plot_margin(np.zeros((50, 40)), LATTICE, plan, BASE), path)
 
 
 def test_land_use_shows_classes_and_where_one_can_walk(tmp_path):
@@ -88,7 +96,7 @@ def test_land_use_shows_classes_and_where_one_can_walk(tmp_path):
     code = np.where(np.arange(50) < 25, 0, 1) * np.ones((40, 1), dtype=int)
     classes = LandUse(code, ("street", "house"), (True, False), (ORANGE, "#8c8c8c"))
     assert classes.walkable.sum() == 1000
-    plot_landuse(classes, LATTICE, BASE, path)
+    save(plot_landuse(classes, LATTICE, BASE), path)
     # Half of one panel each; a panel is some 780 x 624 pixels.
     halves = [pixels_near(path, colour) for colour in (ORANGE, BLUE, "#8c8c8c")]
     assert np.allclose(halves, 780 * 624 / 2, rtol=0.15)
@@ -247,7 +255,7 @@ def test_pictures_show_where_nearly_all_points_lie(drive, most_px, tmp_path, mon
     assert points.counts.sum() >= 0.96 * 3631
     titles = []
     monkeypatch.setattr(
-        network_pictures, "plot_level", lambda *_, title, **__: titles.append(title)
+        network_pictures, "plot_level", lambda *_, title, **__: titles.append(title) or Figure()
     )
     landuse = LandUse(np.zeros((400, 500), np.int16), ("town",), (True,))
     assert len(draw_network(rasters, database, tmp_path, landuse=landuse)) == 6
@@ -278,8 +286,13 @@ def test_a_network_gets_its_pictures(network, tmp_path):
     (tmp_path / "land-use.png").write_text("of an older database")
     drawn = draw_network(rasters, database, tmp_path, buildings=buildings)
     assert [path.stem for path in drawn] == [
-        "coverage", "best-server", "margin", "points-per-cell", "points-of-one-site", "land-use",
-    ]  # fmt: skip
+        "coverage",
+        "best-server",
+        "margin",
+        "points-per-cell",
+        "points-of-one-site",
+        "land-use",
+    ]
     assert all(path.is_file() for path in drawn)
     assert len(draw_network(rasters, database, tmp_path)) == 5
     assert not (tmp_path / "land-use.png").exists()

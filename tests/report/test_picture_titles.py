@@ -9,6 +9,7 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import Fix, Snapshot, TrackEstimate
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.belief import plot_candidates
+from mapfilter.report.canvas import save
 from mapfilter.report.track import plot_track
 
 CRS = "EPSG:32635"
@@ -53,23 +54,27 @@ SEARCHING, CONVERGED, TRACKING, LOST = Status
 @pytest.mark.parametrize(
     ("estimate", "truth", "title"),
     [
-        (track(SEARCHING, SEARCHING), TRUTH, "never switched"),
-        (track(SEARCHING, LOST), TRUTH, "never switched; lost at the end"),
-        (track(SEARCHING, CONVERGED), None, "switched after 50 s"),
-        (track(SEARCHING, CONVERGED), NOTHING, "switched after 50 s"),
-        (track(CONVERGED, TRACKING, error_m=7.2), TRUTH, "success, 7 m off at the switch"),
+        (track(SEARCHING, SEARCHING), TRUTH, "did not converge"),
+        (track(SEARCHING, LOST), TRUTH, "did not converge; lost at the end"),
+        (track(SEARCHING, CONVERGED), None, "converged after 50 s"),
+        (track(SEARCHING, CONVERGED), NOTHING, "converged after 50 s"),
+        (
+            track(CONVERGED, TRACKING, error_m=7.2),
+            TRUTH,
+            "converged after 0 s, 7 m off; mean error then 7.2 m",
+        ),
         (
             track(CONVERGED, LOST, error_m=80.0),
             TRUTH,
-            "wrong, 80 m off at the switch; lost at the end",
+            "converged after 0 s, 80 m off (wrong); mean error then 80.0 m; lost at the end",
         ),
-        (track(*[SEARCHING] * 5, CONVERGED), TRUTH, "switched after 250 s"),
-        (track(), TRUTH, "never switched"),
+        (track(*[SEARCHING] * 5, CONVERGED), TRUTH, "converged after 250 s"),
+        (track(), TRUTH, "did not converge"),
     ],
 )
 def test_a_track_says_what_came_of_it(estimate, truth, title, titles, tmp_path):
-    plot_track(estimate, truth, BASE, tmp_path / "track.png")
-    assert titles == [f"candidate: {title}"]
+    save(plot_track(estimate, truth, BASE), tmp_path / "track.png")
+    assert titles == [f"candidate filter: {title}"]
 
 
 @pytest.mark.parametrize(
@@ -85,5 +90,5 @@ def test_panels_say_true_metres_where_they_are_known(truth, title, titles, tmp_p
     seen = Snapshot(
         100.0, 153.0, east_m, north_m, np.full(2, 0.5), np.nan, np.nan, Status.SEARCHING
     )
-    plot_candidates([seen], truth, BASE, tmp_path / "candidates.png")
+    save(plot_candidates([seen], truth, BASE), tmp_path / "candidates.png")
     assert titles == [title]

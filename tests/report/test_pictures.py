@@ -18,10 +18,9 @@ from mapfilter.positioning.estimate import Fix, Snapshot, TrackEstimate
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.report.basemap import BaseMap, draw_base
 from mapfilter.report.belief import plot_candidates
-from mapfilter.report.canvas import BLUE, DPI, ORANGE, VERMILLION
-from mapfilter.report.coverage import plot_best_server, plot_level, plot_points_per_cell
+from mapfilter.report.canvas import BLUE, DPI, ORANGE, VERMILLION, save
 from mapfilter.report.errors import plot_error_over_distance
-from mapfilter.report.network import draw_cells
+from mapfilter.report.network import draw_cells, plot_best_server, plot_level, plot_points_per_cell
 from mapfilter.report.track import plot_track
 
 CRS = "EPSG:32635"
@@ -115,12 +114,12 @@ def draw_all(area: Area, folder: Path) -> list[Path]:
     names = ("candidates", "points", "best", "level", "error", "track")
     paths = [folder / f"{name}.png" for name in names]
     snapshots = [snapshot(area, n, 20.0 * n, located=n == 1) for n in (60, 30, 9, 1)]
-    plot_candidates(snapshots, area.truth, area.base, paths[0])
-    plot_points_per_cell(groups, area.plan, area.base, paths[1], title="Points")
-    plot_best_server(best, ("S1A", "S1$B$"), area.lattice, area.plan, area.base, paths[2])
-    plot_level(level_dbm, area.lattice, area.plan, area.base, paths[3])
-    plot_error_over_distance(estimate(area, 100.0), area.truth, paths[4])
-    plot_track(estimate(area, 100.0), area.truth, area.base, paths[5])
+    save(plot_candidates(snapshots, area.truth, area.base), paths[0])
+    save(plot_points_per_cell(groups, area.plan, area.base, title="Points"), paths[1])
+    save(plot_best_server(best, ("S1A", "S1$B$"), area.lattice, area.plan, area.base), paths[2])
+    save(plot_level(level_dbm, area.lattice, area.plan, area.base), paths[3])
+    save(plot_error_over_distance(estimate(area, 100.0), area.truth), paths[4])
+    save(plot_track(estimate(area, 100.0), area.truth, area.base), paths[5])
     return paths
 
 
@@ -134,7 +133,7 @@ def test_same_data_give_same_bytes(area, tmp_path):
 
 def test_sizes_follow_the_extent(area, tmp_path):
     path = tmp_path / "new" / "folder" / "points.png"
-    plot_points_per_cell({}, area.plan, area.base, path)
+    save(plot_points_per_cell({}, area.plan, area.base), path)
     width, height = png_size(path)
     assert width == pytest.approx((7.0 + 2.7) * DPI, abs=1)
     # The area is 500 m by 400 m.
@@ -143,16 +142,16 @@ def test_sizes_follow_the_extent(area, tmp_path):
 
 def test_drawing_leaves_no_settings_behind(area, tmp_path):
     before = dict(matplotlib.rcParams)
-    plot_error_over_distance(estimate(area, None), area.truth, tmp_path / "e.png")
+    save(plot_error_over_distance(estimate(area, None), area.truth), tmp_path / "e.png")
     with pytest.raises(InputError):
-        plot_candidates([], area.truth, area.base, tmp_path / "c.png")
+        save(plot_candidates([], area.truth, area.base), tmp_path / "c.png")
     assert dict(matplotlib.rcParams) == before
 
 
 def test_more_candidates_more_blue(area, tmp_path):
     blue = []
     for count in (0, 3, 200):
-        plot_candidates([snapshot(area, count)], None, area.base, tmp_path / "c.png")
+        save(plot_candidates([snapshot(area, count)], None, area.base), tmp_path / "c.png")
         blue.append(pixels_near(tmp_path / "c.png", BLUE))
     assert blue[0] < blue[1] < blue[2]
 
@@ -160,9 +159,11 @@ def test_more_candidates_more_blue(area, tmp_path):
 def test_candidates_fade_with_their_weight(area, tmp_path):
     path = tmp_path / "c.png"
     even = snapshot(area, 40)
-    plot_candidates([even], None, area.base, path)
+    save(plot_candidates([even], None, area.base), path)
     full = pixels_near(path, BLUE)
-    plot_candidates([replace(even, weight=np.array([1.0] + [0.0] * 39))], None, area.base, path)
+    save(
+        plot_candidates([replace(even, weight=np.array([1.0] + [0.0] * 39))], None, area.base), path
+    )
     assert pixels_near(path, BLUE) < full / 4
 
 
@@ -170,22 +171,22 @@ def test_candidates_fade_with_their_weight(area, tmp_path):
 def test_number_of_panels(area, tmp_path, count):
     path = tmp_path / "c.png"
     with pytest.raises(InputError, match="1 to 6"):
-        plot_candidates([snapshot(area, 5)] * count, area.truth, area.base, path)
+        save(plot_candidates([snapshot(area, 5)] * count, area.truth, area.base), path)
     assert not path.exists()
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 6])
 def test_each_number_of_panels_fits(area, tmp_path, count):
     path = tmp_path / "c.png"
-    plot_candidates([snapshot(area, 5)] * count, area.truth, area.base, path)
+    save(plot_candidates([snapshot(area, 5)] * count, area.truth, area.base), path)
     columns = count if count <= 3 else (count + 1) // 2
     assert png_size(path)[0] == pytest.approx((columns * 4.1 + 0.6) * DPI, abs=1)
 
 
 def test_never_switched(area, tmp_path):
-    plot_error_over_distance(estimate(area, None), area.truth, tmp_path / "e.png")
-    plot_track(estimate(area, None), area.truth, area.base, tmp_path / "t.png")
-    plot_error_over_distance(estimate(area, 100.0), area.truth, tmp_path / "e2.png")
+    save(plot_error_over_distance(estimate(area, None), area.truth), tmp_path / "e.png")
+    save(plot_track(estimate(area, None), area.truth, area.base), tmp_path / "t.png")
+    save(plot_error_over_distance(estimate(area, 100.0), area.truth), tmp_path / "e2.png")
     star = pixels_near(tmp_path / "e2.png", VERMILLION) - pixels_near(
         tmp_path / "e.png", VERMILLION
     )
@@ -194,16 +195,21 @@ def test_never_switched(area, tmp_path):
 
 def test_track_without_epochs(area, tmp_path):
     nothing = TrackEstimate.of_fixes(CRS, "candidate", [])
-    plot_error_over_distance(nothing, area.truth, tmp_path / "e.png")
-    plot_track(nothing, area.truth, area.base, tmp_path / "t.png")
-    plot_track(nothing, None, area.base, tmp_path / "u.png")
+    save(plot_error_over_distance(nothing, area.truth), tmp_path / "e.png")
+    save(plot_track(nothing, area.truth, area.base), tmp_path / "t.png")
+    save(plot_track(nothing, None, area.base), tmp_path / "u.png")
     for name in ("e", "t", "u"):
         assert min(png_size(tmp_path / f"{name}.png")) > 300
 
 
 def test_track_tells_near_from_far(area, tmp_path):
-    plot_track(estimate(area, 100.0, error_m=10.0), area.truth, area.base, tmp_path / "near.png")
-    plot_track(estimate(area, 100.0, error_m=60.0), area.truth, area.base, tmp_path / "far.png")
+    save(
+        plot_track(estimate(area, 100.0, error_m=10.0), area.truth, area.base),
+        tmp_path / "near.png",
+    )
+    save(
+        plot_track(estimate(area, 100.0, error_m=60.0), area.truth, area.base), tmp_path / "far.png"
+    )
     assert pixels_near(tmp_path / "near.png", ORANGE) == 0
     assert pixels_near(tmp_path / "near.png", BLUE) > 0
     assert pixels_near(tmp_path / "far.png", ORANGE) > 0
@@ -214,34 +220,37 @@ def test_error_plot_shows_lost_and_radius(area, tmp_path):
     good = estimate(area, 100.0)
     status = tuple(Status.LOST if 30 <= i < 40 else s for i, s in enumerate(good.status))
     told = replace(good, status=status, radii_m=np.full((len(good), 3), 25.0))
-    plot_error_over_distance(told, area.truth, tmp_path / "e.png")
+    save(plot_error_over_distance(told, area.truth), tmp_path / "e.png")
     assert pixels_near(tmp_path / "e.png", ORANGE) > 100
     assert pixels_near(tmp_path / "e.png", "#f7d9c9") > 1000
 
 
 def test_points_without_streets(area, tmp_path):
     bare = BaseMap(area.base.bounds_m, points_m=np.array([[WEST_M + 100.0, NORTH_M - 100.0]] * 3))
-    plot_candidates([snapshot(area, 3)], area.truth, bare, tmp_path / "c.png")
+    save(plot_candidates([snapshot(area, 3)], area.truth, bare), tmp_path / "c.png")
     empty = BaseMap(area.base.bounds_m, points_m=np.empty((0, 2)))
-    plot_candidates([snapshot(area, 3)], area.truth, empty, tmp_path / "c.png")
+    save(plot_candidates([snapshot(area, 3)], area.truth, empty), tmp_path / "c.png")
 
 
 def test_rasters_are_checked(area, tmp_path):
     path = tmp_path / "r.png"
     with pytest.raises(InputError, match="80 x 100 pixels"):
-        plot_level(np.zeros((100, 80)), area.lattice, area.plan, area.base, path)
+        save(plot_level(np.zeros((100, 80)), area.lattice, area.plan, area.base), path)
     with pytest.raises(InputError, match="indices below 1"):
-        plot_best_server(
-            np.ones((80, 100), dtype=int), ("S1A",), area.lattice, area.plan, area.base, path
+        save(
+            plot_best_server(
+                np.ones((80, 100), dtype=int), ("S1A",), area.lattice, area.plan, area.base
+            ),
+            path,
         )
     assert not path.exists()
 
 
 def test_no_cell_heard_anywhere(area, tmp_path):
     nothing = np.full((80, 100), -1)
-    plot_best_server(nothing, (), area.lattice, area.plan, area.base, tmp_path / "b.png")
+    save(plot_best_server(nothing, (), area.lattice, area.plan, area.base), tmp_path / "b.png")
     dark = np.full((80, 100), np.nan)
-    plot_level(dark, area.lattice, area.plan, area.base, tmp_path / "l.png")
+    save(plot_level(dark, area.lattice, area.plan, area.base), tmp_path / "l.png")
 
 
 @pytest.mark.parametrize(
@@ -255,7 +264,9 @@ def test_bad_extent(bounds):
 def test_folder_that_cannot_be_written(area, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError):
-        plot_error_over_distance(estimate(area, None), area.truth, tmp_path / "file" / "e.png")
+        save(
+            plot_error_over_distance(estimate(area, None), area.truth), tmp_path / "file" / "e.png"
+        )
 
 
 def test_sector_arrow_points_along_its_azimuth(area):

@@ -6,14 +6,14 @@ import pandas as pd
 import pytest
 
 from mapfilter.evaluation.success import SuccessCell
+from mapfilter.report.canvas import save
 from mapfilter.report.success import (
-    Claim,
     plot_run_distributions,
     plot_success_curves,
     plot_success_map,
 )
 
-CLAIMS = (Claim(3.0, 0.8), Claim(6.0, 0.65))
+CLAIMS = ((3.0, 0.8), (6.0, 0.65))
 
 
 def cell(sigma_deg, sigma_m, success):
@@ -49,45 +49,48 @@ def inked(path):
 def test_curves(tmp_path, curves, claims):
     path = tmp_path / "curves.png"
     drawn = [(f"reading {n}", grid(6, 1)) for n in range(curves)]
-    plot_success_curves(drawn, path, title="a town", claims=claims, claimant="paper")
+    save(plot_success_curves(drawn, title="a town", claims=claims, claimant="paper"), path)
     assert inked(path) > 0.005
 
 
 def test_a_legend_of_long_names_stays_within_the_picture(tmp_path):
     path = tmp_path / "curves.png"
     names = [f"set, 1 Hz, projected along the last heading, {n}" for n in range(11)]
-    plot_success_curves([(name, grid(6, 1)) for name in names], path, title="a town", claims=CLAIMS)
+    save(
+        plot_success_curves([(name, grid(6, 1)) for name in names], title="a town", claims=CLAIMS),
+        path,
+    )
     assert (matplotlib.image.imread(path)[:, [0, 1, -2, -1], :3] == 1.0).all()
 
 
 def test_equal_curves_give_equal_bytes(tmp_path):
-    for name in ("a", "b"):
-        plot_success_curves([("set", grid())], tmp_path / name, title="a town", claims=CLAIMS)
-    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+    for name in ("a.png", "b.png"):
+        save(plot_success_curves([("set", grid())], title="a town", claims=CLAIMS), tmp_path / name)
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
 @pytest.mark.parametrize(("orient", "trans"), [(1, 1), (6, 6), (12, 2)])
 def test_map_of_numbers(tmp_path, orient, trans):
     path = tmp_path / "map.png"
-    plot_success_map(grid(orient, trans), path, title="a town")
+    save(plot_success_map(grid(orient, trans), title="a town"), path)
     assert inked(path) > 0.2
 
 
 def test_map_with_a_hole(tmp_path):
     path = tmp_path / "map.png"
-    plot_success_map(grid()[:-1], path, title="a town")
+    save(plot_success_map(grid()[:-1], title="a town"), path)
     assert path.is_file()
 
 
 @pytest.mark.parametrize("groups", [[], [("heading 3°", 40)], [(f"{n}°", 7) for n in range(8)]])
 def test_distributions(tmp_path, groups):
     path = tmp_path / "cdf.png"
-    plot_run_distributions([(name, runs(n)) for name, n in groups], path, title="a town")
+    save(plot_run_distributions([(name, runs(n)) for name, n in groups], title="a town"), path)
     assert inked(path) > 0.005
 
 
 def test_distributions_of_runs_that_never_switched(tmp_path):
     path = tmp_path / "cdf.png"
     groups = [("never", runs(9, switched=False)), ("some", runs(9))]
-    plot_run_distributions(groups, path, title="a town")
+    save(plot_run_distributions(groups, title="a town"), path)
     assert path.is_file()

@@ -2,16 +2,23 @@
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from mapfilter.errors import InputError, OutputError
 from mapfilter.geodesy import Lattice
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.report.basemap import BaseMap
+from mapfilter.report.canvas import save
 from mapfilter.report.survey import SurveyedLevels, plot_left_out, plot_surveyed_levels
-from mapfilter.survey.fit import SurveyOptions, fit_survey
+from mapfilter.survey.measured_map import (
+    LeftOut,
+    SurveyOptions,
+    fit_survey,
+    leave_out,
+)
 from mapfilter.survey.measurements import Measurements
-from mapfilter.survey.rasters import write_survey
-from mapfilter.survey.validation import LeftOut, cross_validate, leave_out
+from mapfilter.survey.survey_rasters import write_survey
 from mapfilter.workflows import served, survey_pictures
 from mapfilter.workflows.survey_pictures import SurveyEvidence, draw_survey
 
@@ -27,9 +34,14 @@ def surveyed(cell_id: str = "A", lattice: Lattice = LATTICE) -> SurveyedLevels:
     places = np.array([25, 30, 35])
     east_m, north_m = LATTICE.east_north(places, places)
     return SurveyedLevels(
-        cell_id, lattice, np.where(row > 20, level_dbm, np.nan), deviation_db, east_m, north_m,
+        cell_id,
+        lattice,
+        np.where(row > 20, level_dbm, np.nan),
+        deviation_db,
+        east_m,
+        north_m,
         -70.0 - 0.5 * places,
-    )  # fmt: skip
+    )
 
 
 def test_same_data_give_same_bytes(tmp_path):
@@ -39,11 +51,13 @@ def test_same_data_give_same_bytes(tmp_path):
     for name in "ab":
         folder = tmp_path / name
         cells = [surveyed("A"), surveyed("B")]
-        plot_surveyed_levels(cells, BASE, folder / "levels.png")
-        plot_left_out(
-            measured_dbm, predicted_dbm, folder / "left-out.png", trend_dbm=measured_dbm + 6.0,
-            attribution="somebody's",
-        )  # fmt: skip
+        save(plot_surveyed_levels(cells, BASE), folder / "levels.png")
+        save(
+            plot_left_out(
+                measured_dbm, predicted_dbm, trend_dbm=measured_dbm + 6.0, attribution="somebody's"
+            ),
+            folder / "left-out.png",
+        )
     for picture in ("levels.png", "left-out.png"):
         one, other = ((tmp_path / name / picture).read_bytes() for name in "ab")
         assert one[:8] == b"\x89PNG\r\n\x1a\n"
@@ -55,18 +69,18 @@ def test_survey_pictures_are_checked(tmp_path):
     path = tmp_path / "s.png"
     for cells in ([], [surveyed()] * 5):
         with pytest.raises(InputError, match="1 to 4"):
-            plot_surveyed_levels(cells, BASE, path)
+            save(plot_surveyed_levels(cells, BASE), path)
     small = Lattice(CRS, 0.0, 0.0, 5.0, 4, 5)
     with pytest.raises(InputError, match="4 x 5 pixels"):
-        plot_surveyed_levels([surveyed("A", small)], BASE, path)
+        save(plot_surveyed_levels([surveyed("A", small)], BASE), path)
     with pytest.raises(InputError, match="3 of them"):
-        plot_left_out(np.zeros(3), np.zeros(2), path)
+        save(plot_left_out(np.zeros(3), np.zeros(2)), path)
     for bad in (np.empty(0), np.array([np.nan])):
         with pytest.raises(InputError, match="finite levels"):
-            plot_left_out(bad, bad, path)
+            save(plot_left_out(bad, bad), path)
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError):
-        plot_left_out(np.zeros(3), np.zeros(3), tmp_path / "file" / "s.png")
+        save(plot_left_out(np.zeros(3), np.zeros(3)), tmp_path / "file" / "s.png")
     assert not path.exists()
 
 
@@ -80,9 +94,18 @@ def walks(sessions: int) -> Measurements:
     level_dbm = -60.0 - 0.3 * col - 10.0 * cell + rng.normal(0, 3, count)
     session = (np.arange(count) * sessions // count).astype(np.int32)
     return Measurements(
-        CRS, ("A", "B"), {}, tuple(str(i) for i in range(sessions)), cell, session,
-        np.arange(count, dtype=float), east_m, north_m, level_dbm, np.full(count, 5.0),
-    )  # fmt: skip
+        CRS,
+        ("A", "B"),
+        {},
+        tuple(str(i) for i in range(sessions)),
+        cell,
+        session,
+        np.arange(count, dtype=float),
+        east_m,
+        north_m,
+        level_dbm,
+        np.full(count, 5.0),
+    )
 
 
 @pytest.mark.parametrize(("sessions", "folds"), [(1, 5), (3, 3)])
@@ -92,7 +115,7 @@ def test_a_survey_gets_its_pictures(sessions, folds, tmp_path):
     paths = tmp_path / "mean.tif", tmp_path / "deviation.tif"
     write_survey(survey, LATTICE, *paths)
     left_out = leave_out(measured, options)
-    told = cross_validate(measured, options)
+    told = leave_out(measured, options).validation
     assert told == left_out.validation
     assert (len(left_out), left_out.folds) == (told.predicted, folds)
     error_db = left_out.measured_dbm - left_out.predicted_dbm
@@ -117,7 +140,7 @@ def test_readings_beside_the_lattice_are_drawn_and_large_areas_thinned(tmp_path,
     monkeypatch.setattr(served, "MOST_PX", 20)
     drawn = []
     monkeypatch.setattr(
-        survey_pictures, "plot_surveyed_levels", lambda cells, *_: drawn.extend(cells)
+        survey_pictures, "plot_surveyed_levels", lambda cells, *_: drawn.extend(cells) or Figure()
     )
     rasters = [open_rasters(path) for path in paths]
     draw_survey(SurveyEvidence(measured, options.reach_m, *rasters), tmp_path / "out")

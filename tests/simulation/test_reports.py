@@ -10,7 +10,8 @@ from hypothesis.extra.numpy import arrays
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.rxlev import resolve_neighbours
-from mapfilter.rasters.rxlev_rasters import open_rasters, write_rasters
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.simulation.reports import (
     ReportModel,
     array_sampler,

@@ -24,14 +24,14 @@ REFUSED = {
 
 OF_THE_CANDIDATE = {
     "margin_db": (3.5, "margin_db"),
-    "update_length_m": (17.0, "options.update_length_m"),
-    "tracking_length_m": (9.0, "options.tracking_length_m"),
-    "prediction": ("last_heading", "options.prediction"),
-    "duplicates": ("list", "options.duplicates"),
-    "threshold": (7, "options.threshold"),
-    "at_threshold": ("stall", "options.at_threshold"),
-    "switch_check": ("next_call", "options.switch_check"),
-    "when_empty": ("reinitialise", "options.when_empty"),
+    "update_length_m": (17.0, "update_length_m"),
+    "tracking_length_m": (9.0, "tracking_length_m"),
+    "prediction": ("last_heading", "prediction"),
+    "duplicates": ("list", "duplicates"),
+    "threshold": (7, "threshold"),
+    "at_threshold": ("stall", "at_threshold"),
+    "switch_check": ("next_call", "switch_check"),
+    "when_empty": ("reinitialise", "when_empty"),
 }
 
 # Name of the setting: its value, the option, and the option's value where it has another unit.
@@ -49,9 +49,9 @@ OF_BAYES = {
     "level_correlation_m": (70.0, "evidence.levels.correlation_m"),
     "level_weight": (0.6, "evidence.levels.weight"),
     "report_spacing_m": (9.0, "evidence.spacing_m"),
-    "max_particles": (15000, "particles.most"),
-    "min_search_particles": (9000, "particles.searching"),
-    "min_particles": (700, "particles.least"),
+    "max_particles": (15000, "particles.max_particles"),
+    "min_search_particles": (9000, "particles.min_search_particles"),
+    "min_particles": (700, "particles.min_particles"),
     "switch_mass": (0.9, "particles.switch_mass"),
     "switch_hold_m": (11.0, "particles.switch_hold_m"),
     "satellite_sd_m": (3.0, "satellites.zenith_m"),

@@ -9,7 +9,8 @@ import rasterio
 from rasterio.transform import Affine
 
 from mapfilter.geodesy import Lattice, unproject
-from mapfilter.propagation.predict import PredictionModel, predict
+from mapfilter.propagation.models import PredictionModel
+from mapfilter.propagation.predict import predict
 from mapfilter.radio.cells import Cell, CellPlan
 
 CRS = "EPSG:32635"

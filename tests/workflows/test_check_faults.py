@@ -7,8 +7,8 @@ from check_world import base_levels, box_deg, make_world, shifted
 from command_line import mapfilter
 from rasterio.transform import Affine
 
-from mapfilter.check import lobe_findings as check_peaks
-from mapfilter.check.site_positions import place_fit
+from mapfilter.check import site_checks as check_peaks
+from mapfilter.check.site_checks import place_fit
 from mapfilter.geodesy import Lattice
 
 
@@ -194,7 +194,8 @@ def test_of_many_sites_only_those_about_the_best_place_are_tried(world, monkeypa
     )
     exchange_sites(world)
     assert [f["code"] for f in check(world)] == ["site-labels-swapped"]
-    assert len(tried) == 2 * len(world.rows)
+    on_a_grid_and_at_the_peak = 10 * 10 + 1
+    assert len(tried) == (on_a_grid_and_at_the_peak + 2) * len(world.rows)
 
 
 def test_nothing_is_found_in_a_clean_world(world):

@@ -9,7 +9,8 @@ from check_world import CRS, LATTICE, SITES, base_levels, box_deg, make_world, w
 from command_line import mapfilter
 
 from mapfilter.geodesy import unproject
-from mapfilter.propagation.predict import PredictionModel, predict
+from mapfilter.propagation.models import PredictionModel
+from mapfilter.propagation.predict import predict
 from mapfilter.radio.cells import Cell, CellPlan
 
 OWN_LIST = [f"244-5-1-{number}" for number in (1, 2, 3)]

@@ -104,3 +104,31 @@ def test_antennas_that_are_not_there_are_refused(small, tmp_path):
     file = small("gone.msi", folder='antennas = "nowhere"\n')
     assert_refused(mapfilter("predict", "-c", file), "nowhere", "a folder")
     assert not (tmp_path / "out" / "rxlev.tif").exists()
+
+
+def test_rasters_of_another_program_are_not_overwritten(small, tmp_path):
+    file = small("omni")
+    assert_done(mapfilter("predict", "-c", file))
+    export = tmp_path / "export.tif"
+    with rasterio.open(tmp_path / "out" / "rxlev.tif") as source:
+        profile, values = source.profile, source.read()
+    with rasterio.open(export, "w", **profile) as target:
+        target.write(values)
+    before = export.read_bytes()
+    text = file.read_text(encoding="utf-8")
+    for key, write in (("path", "false"), ("reality", "true")):
+        changed = text.replace("write = false", f"write = {write}")
+        file.write_text(f'{changed}[rasters]\n{key} = "export.tif"\n', encoding="utf-8")
+        expected = "export.tif: expected nothing yet, or rasters that mapfilter predicted"
+        outcome = mapfilter("predict", "-c", file)
+        assert_refused(outcome, expected, "[rasters] names your own export")
+        assert export.read_bytes() == before
+
+
+def test_own_rasters_are_predicted_anew(small, tmp_path):
+    file = small("omni")
+    text = file.read_text(encoding="utf-8")
+    file.write_text(f'{text}[rasters]\npath = "mine.tif"\n', encoding="utf-8")
+    for _ in range(2):
+        assert_done(mapfilter("predict", "-c", file))
+        assert (tmp_path / "mine.tif").is_file()

@@ -11,8 +11,8 @@ from command_line import ONE, assert_done, change, contents, mapfilter, put
 from mapfilter.config.load import load_config
 from mapfilter.filters.contract import Reason
 from mapfilter.geodesy import unproject
-from mapfilter.positioning.candidate import position_by_candidates
 from mapfilter.positioning.estimate_store import read_estimate
+from mapfilter.positioning.filter import locate
 from mapfilter.tracks.store import read_log, write_log
 from mapfilter.workflows.replay import run_replay
 
@@ -187,11 +187,11 @@ def test_a_log_with_a_header_and_no_rows(log, replay):
 def test_a_logs_randomness_depends_on_its_name_not_on_its_neighbours(world, tmp_path, monkeypatch):
     drawn = {}
 
-    def position(database, points_of, log, options, rng, *, ways):
+    def drawing(log, filter_, rng, **options):
         drawn.setdefault(log.truth_length_m, []).append(rng.integers(2**62))
-        return position_by_candidates(database, points_of, log, options, rng, ways=ways)
+        return locate(log, filter_, rng, **options)
 
-    monkeypatch.setattr("mapfilter.positioning.locators.position_by_candidates", position)
+    monkeypatch.setattr("mapfilter.workflows.replay.locate", drawing)
     settings = ["output.pictures=none", f"database.path={world.database}"]
     for path in (world.journeys, world.journeys / "journey-0001-draw-000"):
         config = load_config(world.toml, [*settings, f"track.path={path}"])

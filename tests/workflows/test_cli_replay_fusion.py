@@ -1,6 +1,7 @@
 """``mapfilter replay`` with Kalman-type filters: a cell plan and a log, no map."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -12,8 +13,9 @@ from mapfilter.errors import ConfigError, InputError
 from mapfilter.filters.gaussian import EKF, METHODS
 from mapfilter.models.state import POSITION
 from mapfilter.positioning.estimate_store import read_estimate
+from mapfilter.positioning.filter import locate
+from mapfilter.positioning.kalman.filter import KalmanFilter, gaussian_radii_m
 from mapfilter.positioning.kalman.models import FusionOptions, SiteModels
-from mapfilter.positioning.kalman.replay import gaussian_radii_m, position_by_fusion
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.store import write_log
@@ -81,7 +83,8 @@ def walk(seed=1, steps=200, *, motion=False, gnss=False, timing=True, levels=Tru
 
 
 def errors_m(log, truth, method=EKF):
-    track = position_by_fusion(SiteModels(PLAN, FusionOptions()), CRS, log, method)
+    bound = KalmanFilter(method=method.name).over_sites(PLAN)
+    track = locate(log, bound, np.random.default_rng(0))
     found = track.estimate
     return np.hypot(found.east_m - truth[:, 0], found.north_m - truth[:, 1]), found
 
@@ -153,8 +156,9 @@ def test_fixes_with_a_broken_covariance_count_as_of_usual_quality():
 
 def test_a_log_of_another_zone_is_refused():
     log, _ = walk()
+    elsewhere = KalmanFilter().over_sites(replace(PLAN, crs="EPSG:32630"))
     with pytest.raises(InputError, match="another area or zone"):
-        position_by_fusion(SiteModels(PLAN, FusionOptions()), "EPSG:32630", log, EKF)
+        locate(log, elsewhere, np.random.default_rng(0))
 
 
 def test_radii_hold_their_shares():

@@ -9,7 +9,6 @@ from typer.testing import CliRunner
 
 from mapfilter.cli import app
 from mapfilter.experiments.papers.dlr import experiment as dlr
-from mapfilter.workflows import reproduce_dlr
 
 
 def made(trial, seed):
@@ -28,7 +27,7 @@ def made_again(draw, trial, seed):
 def test_dlr(tmp_path, monkeypatch):
     monkeypatch.setattr(dlr, "track_errors", made)
     monkeypatch.setattr(dlr, "errors_over_time", made_again)
-    monkeypatch.setattr(reproduce_dlr, "DRAWS", 2)
+    monkeypatch.setattr(dlr, "DRAWS", 2)
     words = ["reproduce", "dlr", "--trials", "3", "--json", "--out", str(tmp_path)]
     result = CliRunner().invoke(app, words, catch_exceptions=False)
     assert result.exit_code == 0, result.output
@@ -51,7 +50,7 @@ def test_dlr(tmp_path, monkeypatch):
     assert (found["trials"], found["epochs"]) == (3, 870)
     assert any("geometry only" in one for one in found["assumptions"])
     names = {path.name for path in tmp_path.iterdir()}
-    assert names == {"errors.csv"} | {
+    assert names == {"errors.csv", "errors.tex"} | {
         f"figure-{name}.png" for name in ("1", "6", "7", "8", "9", "9-thresholds", "10", "11", "12")
     }
     with (tmp_path / "errors.csv").open(encoding="utf-8", newline="") as stream:

@@ -6,6 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mapfilter.cli import app
+from mapfilter.experiments.papers.fritsche_klein_2009 import experiment
 from mapfilter.workflows import bench_fusion as bench
 
 QUANTITIES = {"location_m", "velocity_mps", "bias_m", "drift_mps"}
@@ -18,9 +19,7 @@ def told(words):
 
 
 def test_fritsche_and_klein(tmp_path, monkeypatch):
-    from mapfilter.experiments.papers.fritsche_klein_2009 import experiment as fritsche_klein_2009
-
-    monkeypatch.setattr(fritsche_klein_2009, "SUM_PARTS", {0: 3, 2: 3})
+    monkeypatch.setattr(experiment, "SUM_PARTS", {0: 3, 2: 3})
     (tmp_path / "mine.toml").write_text("steps = 20\nserving = 1\n", encoding="utf-8")
     found = told([
         "reproduce", "fritsche-klein-2009", "--trials", "6", "--out", str(tmp_path / "a"),

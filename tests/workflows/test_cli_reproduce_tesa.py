@@ -45,7 +45,7 @@ def test_tesa(tmp_path, monkeypatch):
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {
         "figure-4.png", "figure-6.png", "figure-7.png", "figure-8.png", "outage.png",
-        "halt.png", "scenarios.csv",
+        "halt.png", "scenarios.csv", "scenarios.tex",
     }  # fmt: skip
     table = (tmp_path / "scenarios.csv").read_text(encoding="utf-8").splitlines()
     assert table[0].startswith("scenario,motion,beta_db,mean_m,mean_m_low,mean_m_high")

@@ -8,7 +8,7 @@ import rasterio
 from command_line import assert_done, assert_refused, contents, mapfilter, settings
 
 from mapfilter.geodesy import unproject
-from mapfilter.rasters.rxlev_rasters import open_rasters
+from mapfilter.rasters.raster_set import open_rasters
 
 HEADER = "cell,lat,lon,level_dbm,time,accuracy_m\n"
 
@@ -169,7 +169,7 @@ def test_what_cannot_be_surveyed_is_told(survey, tmp_path):
     refused("absent.csv", "a readable file", prediction__survey__files="absent.csv")
     refused("method", "'gp', 'knn' or 'trend'", prediction__survey__method="svm")
     refused("positions accurate to 1 m", prediction__survey__max_accuracy_m=1.0)
-    refused("heard in at least 900 squares", prediction__survey__min_points=900)
+    refused("received in at least 900 squares", prediction__survey__min_points=900)
     refused("measurements", "some in the area", area__bbox="24.99,60.19,25.0,60.2")
     refused("longitude and latitude swapped", area__bbox="60.166,24.942,60.1697,24.9495")
     far = tmp_path / "far.csv"

@@ -8,9 +8,8 @@ from pydantic import ValidationError
 
 from mapfilter.config.sections import Config, Journeys
 from mapfilter.errors import ConfigError
-from mapfilter.filters.candidate import CandidateOptions
-from mapfilter.positioning.locators import FilterChoice
-from mapfilter.propagation.predict import PredictionModel, RealityErrors
+from mapfilter.positioning.candidate import CandidateFilter
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.simulation.layout import lay_out_plan
 from mapfilter.simulation.reports import ReportModel
@@ -24,7 +23,7 @@ CONFIG = Config()
 def test_prediction():
     section = CONFIG.prediction
     assert predict.prediction_model(section) == PredictionModel()
-    assert predict.ground_truth_errors(section) == RealityErrors()
+    assert predict.ground_truth_errors(section) == GroundTruthErrors()
 
 
 def test_simulation():
@@ -33,7 +32,7 @@ def test_simulation():
 
 
 def test_filter():
-    assert filter_choice(CONFIG.filter, 5.0) == FilterChoice(CandidateOptions(resolution_m=5.0))
+    assert filter_choice(CONFIG.filter) == CandidateFilter()
 
 
 def test_buildings_and_cells():

@@ -9,7 +9,7 @@ from command_line import assert_done, assert_refused, mapfilter, settings
 
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.scores import CaseResult
-from mapfilter.propagation.predict import PredictionModel, RealityErrors
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
@@ -23,7 +23,7 @@ from mapfilter.workflows.world import World
 
 EASY = (
     PredictionModel(shadowing_db=6.0),
-    RealityErrors(level_error_db=7.0, correlation_m=50.0, clutter="shared"),
+    GroundTruthErrors(level_error_db=7.0, correlation_m=50.0, clutter="shared"),
     ImuErrors(sigma_trans_m=0.2),
     ReportModel(fading_db=1.0),
     WalkerModel(),

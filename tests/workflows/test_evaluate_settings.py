@@ -25,7 +25,7 @@ from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.global_positioning import informed
-from mapfilter.positioning.locators import FilterChoice
+from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.workflows.evaluate import _world as prepare_world
 from mapfilter.workflows.evaluate_settings import _refused, load_benchmark
@@ -154,11 +154,11 @@ def test_options_of_the_bayes_filter(name, entry):
     value, path, *other = entry
     key = f"filter.bayes.{name}"
     config, fixed = load({key: value})
-    choice = filter_choice(config.filter, config.area.resolution_m)
+    choice = filter_choice(config.filter)
     expected = pytest.approx(other[0] if other else value)
     for case in ("levels-bias20", "satellites-2", "levels-6"):
-        assert at(informed(choice, CASES[case], fixed).options, path) == expected
-    usual = filter_choice(load({})[0].filter, 5.0)
+        assert at(informed(choice, CASES[case], fixed), path) == expected
+    usual = filter_choice(load({})[0].filter)
     assert at(usual.options, path) != expected
     with pytest.raises(ConfigError, match="candidate has no such option"):
         load({key: value, "filter.name": "candidate"})
@@ -169,16 +169,16 @@ def test_a_grid_has_no_particles(name):
     with pytest.raises(ConfigError, match="grid has no such option"):
         load({f"filter.bayes.{name}": 5000, "filter.name": "grid"})
     config, _ = load({"filter.bayes.switch_mass": 0.9, "filter.name": "grid"})
-    assert filter_choice(config.filter, 5.0).options.particles.switch_mass == 0.9
+    assert filter_choice(config.filter).options.particles.switch_mass == 0.9
 
 
 @pytest.mark.parametrize(("name", "entry"), OF_THE_CANDIDATE.items())
 def test_options_of_the_candidate_filter(name, entry):
     value, path = entry
     config, _ = load({f"filter.{name}": value, "filter.name": "candidate"})
-    choice = filter_choice(config.filter, config.area.resolution_m)
+    choice = filter_choice(config.filter)
     assert at(choice, path) == value
-    assert at(FilterChoice(), path) != value
+    assert at(CandidateFilter(), path) != value
     for other in ("bayes", "grid", "mine:Filter"):
         with pytest.raises(ConfigError, match="has no such option"):
             load({f"filter.{name}": value, "filter.name": other})
@@ -186,11 +186,11 @@ def test_options_of_the_candidate_filter(name, entry):
 
 def test_the_filters_name():
     names = [
-        filter_choice(load({"filter.name": name})[0].filter, 5.0).name
+        filter_choice(load({"filter.name": name})[0].filter).name
         for name in ("candidate", "grid", "bayes")
     ]
     assert names == ["candidate", "grid", "bayes"]
-    assert filter_choice(load({})[0].filter, 5.0).name == "bayes"
+    assert filter_choice(load({})[0].filter).name == "bayes"
 
 
 @pytest.mark.parametrize(("key", "entry"), OF_JOURNEYS.items())

@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from mapfilter.config.sections import Config
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError
-from mapfilter.propagation.predict import PredictionModel, RealityErrors
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.simulation.imu import ImuErrors
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
@@ -64,7 +64,7 @@ def test_the_plain_world_is_what_it_says():
     """Sizes as its file gives them with their sources."""
     config, _ = load_benchmark("plain", None, [])
     assert prediction_model(config.prediction) == PredictionModel(shadowing_db=0.0)
-    assert ground_truth_errors(config.prediction) == RealityErrors(
+    assert ground_truth_errors(config.prediction) == GroundTruthErrors(
         level_error_db=5.0,
         correlation_m=100.0,
         site_share=0.5,
@@ -102,7 +102,7 @@ def test_the_easy_world_is_the_one_of_before():
     config, _ = load_benchmark("easy", None, [])
     assert prediction_model(config.prediction) == PredictionModel(shadowing_db=6.0)
     errors = ground_truth_errors(config.prediction)
-    assert errors == RealityErrors(level_error_db=7.0, correlation_m=50.0, clutter="shared")
+    assert errors == GroundTruthErrors(level_error_db=7.0, correlation_m=50.0, clutter="shared")
     settings = simulation_settings(config)
     assert settings.imu == ImuErrors(sigma_trans_m=0.2)
     assert settings.reports == ReportModel(fading_db=1.0)
@@ -156,7 +156,7 @@ def off_db(world):
     rows, cols = np.indices((streets.lattice.rows, streets.lattice.cols))
     places = streets.lattice.east_north(rows.ravel(), cols.ravel())
     exact = replace(
-        world, errors=RealityErrors(0.0, 50.0, 0.5, 0.0, 0.0, 0.0, clutter="shared")
+        world, errors=GroundTruthErrors(0.0, 50.0, 0.5, 0.0, 0.0, 0.0, clutter="shared")
     ).ground_truth(0)(*places)
     return np.array([world.ground_truth(seed)(*places) - exact for seed in range(8)])
 

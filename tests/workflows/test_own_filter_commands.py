@@ -11,7 +11,7 @@ from command_line import assert_done, assert_refused, mapfilter, settings
 from mapfilter.config.fields import FUSION_FILTERS
 from mapfilter.experiments.sweep.table import read_runs
 from mapfilter.positioning.estimate_store import read_estimate
-from mapfilter.workflows.replay import FUSION_FILTERS as REPLAYED
+from mapfilter.workflows.replay import SITE_FILTERS as REPLAYED
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "howto" / "own-filter.rst"
 MINE = "my_filter_of_the_docs:MyFilter"

@@ -26,8 +26,7 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
 )
 from mapfilter.filters.contract import Status
 from mapfilter.filters.particle import ParticleOptions
-from mapfilter.models.cell_id import ServingWeights
-from mapfilter.models.fingerprint import LevelErrors
+from mapfilter.models.fingerprint import LevelErrors, ServingWeights
 from mapfilter.models.measured_map import HeardOptions, HeardRows, ServingStatistics
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.positioning.bayes.area_map import AreaMap
@@ -38,7 +37,7 @@ from mapfilter.positioning.bayes.options import BayesOptions, open_area
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.filter import locate
 from mapfilter.propagation.shadowing import named_rng
-from mapfilter.rasters.rxlev_rasters import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.tracks.log import TrackLog
 
 PARTS = ("lacolyoc", "uottawa", "carling")
@@ -82,7 +81,7 @@ class OttawaOptions:
                 scale_drift_per_sqrt_m=0.005,
             ),
             map=MapWeights(sd_m=16.0),
-            particles=ParticleOptions(most=10_000, searching=7_000),
+            particles=ParticleOptions(max_particles=10_000, min_search_particles=7_000),
             evidence=EvidenceOptions(
                 serving=ServingWeights(weight_per_m=1 / 150),
                 levels=LevelErrors(sd_db=5.0, correlation_m=100.0, measurement_db=3.0),

@@ -21,7 +21,10 @@ from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.sweep.world import SweepWorld, open_world
 from mapfilter.gnss.sky import Skyline
 from mapfilter.positioning.filter import Filter, FilterOptions
-from mapfilter.propagation.predict import PredictionModel, RealityErrors, realise
+from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
+from mapfilter.propagation.predict import (
+    simulate_ground_truth,
+)
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.ways import Buildings, Ways
@@ -44,7 +47,7 @@ class BenchmarkWorld:
         that lacks some.
     model : PredictionModel
         That the databases were predicted with.
-    errors : RealityErrors
+    errors : GroundTruthErrors
         How the ground truth differs; its seed is drawn anew for each ground truth.
     settings : SimulationSettings
         How one walks, what is reported, and the errors of dead reckoning.
@@ -56,7 +59,7 @@ class BenchmarkWorld:
 
     folder: Path
     model: PredictionModel
-    errors: RealityErrors = field(default_factory=RealityErrors)
+    errors: GroundTruthErrors = field(default_factory=GroundTruthErrors)
     settings: SimulationSettings = field(default_factory=SimulationSettings)
     antennas: Mapping[str, MeasuredAntenna] = field(default_factory=dict)
     reception: ReceptionModel = field(default_factory=ReceptionModel)
@@ -100,7 +103,7 @@ class BenchmarkWorld:
         if level_error_db is not None:
             errors = replace(errors, level_error_db=level_error_db)
         streets = self.streets
-        cells = realise(
+        cells = simulate_ground_truth(
             streets.plan,
             streets.lattice,
             streets.heights_m,

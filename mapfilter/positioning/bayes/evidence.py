@@ -16,8 +16,7 @@ import numpy as np
 
 from mapfilter._types import Floats, Floats32, Ints32
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.models.cell_id import ServingWeights
-from mapfilter.models.fingerprint import BoundReading, LevelErrors, LevelReading
+from mapfilter.models.fingerprint import BoundReading, LevelErrors, LevelReading, ServingWeights
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.tracks.schema import SERVING

@@ -94,7 +94,9 @@ class BayesPositioner(Filter[BayesTrack]):
             known = self.options
             # Every place times every heading: most of them are gone after a few steps.
             unknown = replace(
-                known, most=_MOST_TIMES * known.most, searching=_SEARCHING_TIMES * known.searching
+                known,
+                max_particles=_MOST_TIMES * known.max_particles,
+                min_search_particles=_SEARCHING_TIMES * known.min_search_particles,
             )
             return {
                 True: ParticleFilter(self.model, known),
@@ -166,7 +168,7 @@ class BayesPositioner(Filter[BayesTrack]):
             return
         model, rng = self.model, np.random.default_rng(0)
         west, south = model.area.origin_m
-        small = replace(self, options=replace(self.options, most=64, least=32))
+        small = replace(self, options=replace(self.options, max_particles=64, min_particles=32))
         track = small.begin_at(west, south, 1.0, rng)
         track, _ = small.step(track, Epoch(0.0, (MotionStep(1.0, 0.0),)), rng)
         if track.belief is not None and model.area.cell_ids:

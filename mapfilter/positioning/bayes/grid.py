@@ -93,7 +93,7 @@ class StreetGrid:
 
     def transport(self, east_m: float, north_m: float, length_m: float) -> Transport:
         """Return what a displacement by dead reckoning does to the mass of each bin."""
-        motion, weights = self.model.motion, self.model.weights
+        motion, over = self.model.motion, self.model.weights.over(length_m)
         pixel_m = self.model.area.lattice.resolution_m
         stretch = exp(0.5 * motion.heading_sd_rad**2)
         cosine, sine = np.cos(self.bias_rad), np.sin(self.bias_rad)
@@ -112,10 +112,10 @@ class StreetGrid:
             np.sqrt(east_var) / pixel_m,
             np.sqrt(north_var) / pixel_m,
             motion.bias_drift_rad_per_sqrt_m * length_m**0.5 / width_rad,
-            np.exp(weights.weight_per_m * length_m * self.model.log_map),
-            exp(-weights.off_cost_per_m * length_m),
-            1 - exp(-weights.leave_per_m * length_m),
-            1 - exp(-weights.return_per_m * length_m),
+            np.exp(over.exponent * self.model.log_map),
+            over.off,
+            over.leave,
+            over.come_back,
         )
 
     def weigh(self, state: Floats32, log_weight: Floats, reading: RadioReading) -> Reason:

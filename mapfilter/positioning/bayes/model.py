@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import exp, isfinite, pi, sqrt
+from math import isfinite, pi, sqrt
 
 import numpy as np
 
@@ -19,8 +19,8 @@ from mapfilter._types import Floats, Floats32, Ints32
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.filters.resampling import systematic
-from mapfilter.models import cell_id, fingerprint
-from mapfilter.models.fingerprint import LevelReading
+from mapfilter.models import fingerprint
+from mapfilter.models.fingerprint import LevelReading, RasterFrame
 from mapfilter.models.measured_map import ServingStatistics
 from mapfilter.models.street_motion import (
     BIAS,
@@ -99,7 +99,7 @@ class BayesModel:
 
     @cached_property
     def _serving_table(self) -> Floats32:
-        return cell_id.serving_table(self.evidence.serving)
+        return fingerprint.serving_table(self.evidence.serving)
 
     @cached_property
     def _bound_table(self) -> Floats32:
@@ -192,18 +192,9 @@ class BayesModel:
             noise = np.random.default_rng(int(key)).standard_normal((2, state.shape[1]))
             moved[: NORTH + 1] += (unknown.step_sd_m * noise).astype(np.float32)
         weighed = log_weight.copy()
-        found = np.empty(weighed.size, dtype=np.float32)
-        lattice, weights = self.area.lattice, self.weights
-        step = lattice.resolution_m
-        interpolate(
-            moved, self.log_map, _F(step / 2), _F((lattice.rows - 0.5) * step), _F(1 / step), found
-        )
-        weigh_by_map(
-            found, moved[OFF], _F(weights.weight_per_m * length_m),
-            _F(exp(-weights.off_cost_per_m * length_m)),
-            _F(1 - exp(-weights.leave_per_m * length_m)),
-            _F(1 - exp(-weights.return_per_m * length_m)), weighed,
-        )  # fmt: skip
+        rows, step = self.area.lattice.rows, self.area.lattice.resolution_m
+        found = interpolate(moved, self.log_map, step / 2, (rows - 0.5) * step, 1 / step)
+        weigh_by_map(found, moved[OFF], self.weights.over(length_m), weighed)
         return moved, weighed
 
     def weigh(self, state: Floats32, log_weight: Floats, reading: RadioReading) -> Reason:
@@ -215,22 +206,16 @@ class BayesModel:
             now = self._pixels(state, 0.0, 0.0)
             used = True
             if reading.serving >= 0 and reading.serving_weight > 0:
-                cell_id.weigh_by_serving(
-                    now, flat, bands, reading.serving, self._serving_table,
-                    reading.serving_weight, log_weight,
-                )  # fmt: skip
+                table, weight = self._serving_table, reading.serving_weight
+                fingerprint.weigh_by_serving(
+                    now, flat, bands, reading.serving, table, weight, log_weight
+                )
             if reading.levels is not None:
                 levels = reading.levels
                 then = self._pixels(state, levels.back_east_m, levels.back_north_m)
-                fingerprint.weigh_by_levels(
-                    now, then, flat, bands, levels.cell, levels.offset_db, levels.rho,
-                    levels.scale, levels.common, levels.weight, levels.clip, log_weight,
-                )  # fmt: skip
+                fingerprint.weigh_by_levels(now, then, flat, bands, levels, log_weight)
             for bound in reading.bounds:
-                fingerprint.weigh_by_bound(
-                    now, flat, bands, bound.cells, bound.level_dbm, bound.censored, bound.sd_db,
-                    bound.weight, self._bound_table, log_weight,
-                )  # fmt: skip
+                fingerprint.weigh_by_bound(now, flat, bands, bound, self._bound_table, log_weight)
         if reading.fix is not None:
             log_weight += FixEvidence(reading.fix, self.area.origin_m).log_likelihood(state)
             used = True
@@ -244,14 +229,9 @@ class BayesModel:
         return bool(summary.mean[OFF] < 0.5)
 
     def _pixels(self, state: Floats32, back_east_m: float, back_north_m: float) -> Ints32:
-        lattice = self.area.lattice
-        pixel = np.empty(state.shape[1], dtype=np.int32)
-        step = lattice.resolution_m
-        fingerprint.pixels(
-            state, back_east_m, back_north_m, 0.0, lattice.rows * step, 1 / step, lattice.rows,
-            lattice.cols, pixel,
-        )  # fmt: skip
-        return pixel
+        lattice, step = self.area.lattice, self.area.lattice.resolution_m
+        frame = RasterFrame(0.0, lattice.rows * step, 1 / step, lattice.rows, lattice.cols)
+        return np.asarray(fingerprint.pixels(state, back_east_m, back_north_m, frame))
 
 
 _LEAST_VARIANCE = 0.25

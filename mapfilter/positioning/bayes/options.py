@@ -91,7 +91,11 @@ class BayesOptions:
         motion, given = self.motion, self.particles
         width = (motion.bias_sd_rad / _NARROW_BIAS_RAD) * (motion.scale_sd / _NARROW_SCALE)
         times = min(max(width**0.5, 1.0), _MOST_TIMES)
-        return replace(given, most=int(times * given.most), searching=int(times * given.searching))
+        return replace(
+            given,
+            max_particles=int(times * given.max_particles),
+            min_search_particles=int(times * given.min_search_particles),
+        )
 
 
 def open_area(database: RadioRouteDatabase) -> AreaMap:
@@ -211,9 +215,9 @@ class BayesFilter(Options):
                 use_levels=self.levels,
             ),
             ParticleOptions(
-                most=self.max_particles,
-                searching=self.min_search_particles,
-                least=self.min_particles,
+                max_particles=self.max_particles,
+                min_search_particles=self.min_search_particles,
+                min_particles=self.min_particles,
                 switch_mass=self.switch_mass,
                 switch_hold_m=self.switch_hold_m,
             ),

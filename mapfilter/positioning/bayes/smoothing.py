@@ -180,13 +180,20 @@ def _paths(
         steps = length_m / errors.typical_step_m
         across = errors.typical_step_m * errors.heading_sd_rad
         place_var = steps * max(errors.step_sd_m, across) ** 2 + jitter[0] ** 2
-        draw_ancestors(
-            states[-1], earlier.state, earlier.log_weight,
-            later.moved_m[0] - earlier.moved_m[0], later.moved_m[1] - earlier.moved_m[1],
-            place_var, errors.bias_drift_rad_per_sqrt_m**2 * length_m + jitter[2] ** 2,
-            errors.scale_drift_per_sqrt_m**2 * length_m + jitter[3] ** 2,
-            log(_JUMPS * place_var / (width_m * height_m)), draw_key(rng), chosen,
-        )  # fmt: skip
+        bias_var = errors.bias_drift_rad_per_sqrt_m**2 * length_m + jitter[2] ** 2
+        scale_var = errors.scale_drift_per_sqrt_m**2 * length_m + jitter[3] ** 2
+        moved_m = (later.moved_m[0] - earlier.moved_m[0], later.moved_m[1] - earlier.moved_m[1])
+        variances = (place_var, bias_var, scale_var)
+        log_jump = log(_JUMPS * place_var / (width_m * height_m))
+        chosen = draw_ancestors(
+            states[-1],
+            earlier.state,
+            earlier.log_weight,
+            moved_m,
+            variances,
+            log_jump,
+            draw_key(rng),
+        )
         states.append(earlier.state[:, chosen])
     return states[::-1]
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from math import inf, isfinite, nan, sqrt
 
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.filters.hypotheses import BeliefSummary, nothing
+from mapfilter.filters.hypotheses import BeliefSummary, empty_summary
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, EvidenceCusum, MapBelief
 from mapfilter.positioning.bayes.area_map import AreaMap
@@ -86,7 +86,7 @@ def news_of(
     """
     belief, (west, south) = track.leading, area.origin_m
     if belief is None:
-        said, count, way = nothing(STATES), 0, (0, nan)
+        said, count, way = empty_summary(STATES), 0, (0, nan)
     else:
         said, count = belief.summary, belief.log_weight.size
         way = matched_way(area, belief.state[0], belief.state[1], belief.weight)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from mapfilter._parallel import Progress, ordered_results
+from mapfilter._parallel import ordered_results
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.experiments.papers.dlr import filters
 from mapfilter.experiments.papers.dlr.scene import (
@@ -26,6 +25,7 @@ from mapfilter.experiments.papers.dlr.scene import (
     draw_readings,
     draw_track,
 )
+from mapfilter.experiments.papers.paper import PaperSettings
 from mapfilter.models.state import POSITION_CLOCK_3D, StateLayout
 
 Name = Literal["static", "pkf", "ekf", "pf"]
@@ -34,24 +34,29 @@ Systems = Literal["none", "gps", "gps+galileo"]
 FEW = 4
 """Fewer satellites than this are a critical situation."""
 
+DRAWS = 40
+"""Draws of the readings of the one track of Fig. 12."""
+
+SHARE = 0.9
+"""Share of the epochs whose largest error is compared."""
+
+PUBLISHED: dict[str, dict[str, float | None]] = {
+    "all": {"static": 40.0, "pkf": 27.0, "ekf": 9.0, "pf": None},
+    "tdoa_only": {"ekf_edge": None, "pf_edge": 40.0, "pf_near": None},
+    "hybrid": {"ekf_gnss": 17.0, "ekf_edge": 10.0, "ekf_near": None, "fixed3_edge": None},
+    "critical": {"gps": 30.0, "gps_galileo": 18.0, "near": 15.0, "edge": 11.0},
+}
+"""The paper's 90 % errors in metres, where its text prints them (Figs. 7 to 10)."""
+
 THRESHOLDS_DB = (-8.0, -11.0, -14.0, -17.0, -20.0, -23.0, -26.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
+class Run(NamedTuple):
     """One filter on one kind of measurements.
 
-    Parameters
-    ----------
-    filter : {"static", "pkf", "ekf", "pf"}
-    satellites : {"none", "gps", "gps+galileo"}
-    where : {"edge", "near"} or None
-        Where in the network time differences are measured; None without them.
-    above_db : float or None
-        SINR below which stations are dropped; None for the three best ones.
-    open_sky : bool
-        Without houses and echoes.
-    mobility : {"diagonal", "discretised"}
+    Time differences are measured ``where`` in the network (None: they are not), of the stations
+    with a SINR above ``above_db`` (None: of the three best ones). Under the open sky there are
+    neither houses nor echoes.
     """
 
     filter: Name
@@ -70,31 +75,24 @@ FIXED_EDGE, FIXED_NEAR = Run("ekf", where=EDGE), Run("ekf", where=NEAR)
 TDOA_STATIC, TDOA_PKF = Run("static", "none", EDGE), Run("pkf", "none", EDGE)
 TDOA_EKF, TDOA_PF = Run("ekf", "none", EDGE), Run("pf", "none", EDGE)
 TDOA_EKF_NEAR, TDOA_PF_NEAR = Run("ekf", "none", NEAR), Run("pf", "none", NEAR)
+_SYSTEMS: tuple[Systems, ...] = ("gps", "gps+galileo")
 RUNS = (
-    STATIC, PKF, EKF, PF,
-    Run("static", "gps"), GPS,
-    *(Run(name, systems, open_sky=True) for systems in ("gps", "gps+galileo")
-      for name in ("static", "ekf")),
-    TDOA_STATIC, TDOA_PKF, TDOA_EKF, TDOA_PF, TDOA_EKF_NEAR, TDOA_PF_NEAR,
-    FIXED_EDGE, FIXED_NEAR,
+    *(STATIC, PKF, EKF, PF, Run("static", "gps"), GPS),
+    *(Run(name, one, open_sky=True) for one in _SYSTEMS for name in ("static", "ekf")),
+    *(TDOA_STATIC, TDOA_PKF, TDOA_EKF, TDOA_PF, TDOA_EKF_NEAR, TDOA_PF_NEAR),
+    *(FIXED_EDGE, FIXED_NEAR),
     *(Run("ekf", where=where, above_db=above) for where in (EDGE, NEAR) for above in THRESHOLDS_DB),
     Run("ekf", mobility="discretised"),
     Run("ekf", where=EDGE, above_db=THRESHOLD_DB, mobility="discretised"),
-)  # fmt: skip
+)
 OVER_TIME = (EKF, AT_NEAR, AT_EDGE)
 """What Fig. 12 compares."""
 
 
-@dataclass(frozen=True, eq=False)
-class TrackErrors:
-    """What came of one track.
+class TrackErrors(NamedTuple):
+    """The errors of all filters on one track, (runs, K); NaN where there is no static fix.
 
-    Parameters
-    ----------
-    errors_m : (runs, K) array
-        East and north; NaN where a static fix is none.
-    satellites, gps : (K,) integer arrays
-        Seen at each epoch: of both systems, and of GPS.
+    Satellites seen at each epoch, (K,), are those of both systems, and those of GPS.
     """
 
     errors_m: Floats
@@ -112,29 +110,29 @@ def errors_of(
     particles: int = filters.PARTICLES,
 ) -> Floats:
     """Return a filter's error at each epoch, (K,); ``about_m`` is where its belief begins."""
-    layout = filters.FLAT if run.satellites == "none" else filters.HYBRID
+    no_clock = run.satellites == "none"
     if run.filter in ("static", "pkf"):
-        solved = filters.PLACE if run.satellites == "none" else POSITION_CLOCK_3D
-        fixes = filters.run_static(solved, _epochs(run, solved, scene, track, readings))
-        if run.filter == "static":
-            told = np.array([fix.state[:2] for fix in fixes])
-        else:
-            smooth = filters.FLAT if run.satellites == "none" else filters.FIXES
-            told = filters.run_pkf(smooth, fixes, about_m)
+        layout = filters.PLACE if no_clock else POSITION_CLOCK_3D
     else:
-        epochs = _epochs(run, layout, scene, track, readings)
-        told = (
-            filters.run_ekf(layout, epochs, about_m, run.mobility)
-            if run.filter == "ekf"
-            else filters.run_pf(layout, epochs, about_m, rng, particles)
-        )
-    return np.asarray(np.hypot(*(told - track.place_m[:, :2]).T))
+        layout = filters.FLAT if no_clock else filters.HYBRID
+    epochs = _epochs(run, layout, scene, track, readings)
+    match run.filter:
+        case "static":
+            found = np.array([fix.state[:2] for fix in filters.run_static(layout, epochs)])
+        case "pkf":
+            fixes = filters.run_static(layout, epochs)
+            found = filters.run_pkf(filters.FLAT if no_clock else filters.FIXES, fixes, about_m)
+        case "ekf":
+            found = filters.run_ekf(layout, epochs, about_m, run.mobility)
+        case "pf":
+            found = filters.run_pf(layout, epochs, about_m, rng, particles)
+    return np.asarray(np.hypot(*(found - track.place_m[:, :2]).T))
 
 
 def _epochs(
     run: Run, layout: StateLayout, scene: Scene, track: Track, readings: Readings
 ) -> list[filters.Epoch]:
-    seen = []
+    seen: list[filters.Epoch] = []
     if run.satellites != "none":
         used = track.gps if run.satellites == "gps" else np.ones_like(track.gps)
         ranges = readings.open_m if run.open_sky else readings.ranges_m
@@ -142,37 +140,35 @@ def _epochs(
         seen = filters.satellites(layout, track.satellites_m[used], sigma[used], ranges[:, used])
     if run.where is None:
         return seen
-    heard = filters.differences(
-        layout, scene.stations_m[run.where], track.sinr_db[run.where], readings.times_m[run.where],
-        run.above_db,
-    )  # fmt: skip
-    return filters.joined(seen, heard) if seen else heard
+    stations, sinr = scene.stations_m[run.where], track.sinr_db[run.where]
+    times = readings.times_m[run.where]
+    received = filters.differences(layout, stations, sinr, times, run.above_db)
+    return filters.joined(seen, received) if seen else received
 
 
 def track_errors(
     trial: int, seed: int, particles: int = filters.PARTICLES, runs: Sequence[Run] = RUNS
 ) -> TrackErrors:
     """Draw a track and its readings, and run all filters over it."""
-    scene, track, rng = _scene(), *_track(trial, seed)
+    scene, (track, rng) = _scene(), _track(trial, seed)
     drawn, first, *streams = rng.spawn(2 + len(runs))
     readings = draw_readings(scene, track, drawn)
     about = track.place_m[0, :2] + filters.FIRST_M * first.standard_normal(2)
-    found = np.array([
+    found = [
         errors_of(run, scene, track, readings, about, own, particles)
         for run, own in zip(runs, streams, strict=True)
-    ])  # fmt: skip
-    return TrackErrors(found, track.seen.sum(axis=1), (track.seen & track.gps).sum(axis=1))
+    ]
+    of_gps = track.seen & track.gps
+    return TrackErrors(np.array(found), track.seen.sum(axis=1), of_gps.sum(axis=1))
 
 
 def errors_over_time(draw: int, trial: int, seed: int) -> Floats:
     """Draw the readings of a track once more; return errors of :data:`OVER_TIME`, (3, K)."""
-    scene, track, _ = _scene(), *_track(trial, seed)
+    scene, (track, _) = _scene(), _track(trial, seed)
     rng = np.random.default_rng([seed, trial, 1 + draw])
     readings = draw_readings(scene, track, rng)
     about = track.place_m[0, :2] + filters.FIRST_M * rng.standard_normal(2)
-    return np.array([
-        errors_of(run, scene, track, readings, about, rng) for run in OVER_TIME
-    ])  # fmt: skip
+    return np.array([errors_of(run, scene, track, readings, about, rng) for run in OVER_TIME])
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,9 +181,11 @@ class PaperRun:
         By run, (T, K).
     satellites, gps : (T, K) integer arrays
     shown : int
-        The track over whose time errors are told.
+        The track whose errors are shown over time.
     over_time_m : (draws, 3, K) array
         Errors of :data:`OVER_TIME` on it.
+    walks_m : list of (K, 2) arrays
+        Where each track goes, east and north.
     """
 
     errors_m: dict[Run, Floats]
@@ -195,6 +193,7 @@ class PaperRun:
     gps: Ints
     shown: int
     over_time_m: Floats
+    walks_m: list[Floats]
 
     @property
     def every(self) -> Bools:
@@ -212,41 +211,24 @@ class PaperRun:
         return self.satellites < FEW
 
 
-def run_paper(
-    trials: int, seed: int, draws: int, executor: Executor, progress: Progress | None = None
-) -> PaperRun:
+def run_paper(settings: PaperSettings) -> PaperRun:
     """Run all filters over all tracks, and some of them over many draws of one track.
 
-    Parameters
-    ----------
-    trials : int
-        Tracks.
-    seed : int
-    draws : int
-        Of the readings of the one track; the one of which a quarter of the epochs is critical, or
-        nearest to it.
-    executor : concurrent.futures.Executor
-    progress : callable, optional
-        Called with tasks done and tasks in all, tracks and draws.
+    That track is the one of which a quarter of the epochs is critical, or nearest to it.
     """
-    total = trials + draws
+    seed, trials, progress = settings.seed, settings.trials, settings.progress
+    total = trials + DRAWS
     first = None if progress is None else lambda done, _: progress(done, total)
     then = None if progress is None else lambda done, _: progress(trials + done, total)
-    tracks = list(ordered_results(
-        executor, partial(track_errors, seed=seed), range(trials), progress=first
-    ))  # fmt: skip
-    satellites = np.array([track.satellites for track in tracks])
+    one_track, executor = partial(track_errors, seed=seed), settings.executor
+    tracks = list(ordered_results(executor, one_track, range(trials), progress=first))
+    errors, satellites, gps = (np.array(values) for values in zip(*tracks, strict=True))
     shown = int(np.argmin(np.abs((satellites < FEW).mean(axis=1) - 0.25)))
     again = partial(errors_over_time, trial=shown, seed=seed)
-    over_time = np.array(list(ordered_results(executor, again, range(draws), progress=then)))
-    errors = np.stack([track.errors_m for track in tracks], axis=1)
-    gps = np.array([track.gps for track in tracks])
-    return PaperRun(dict(zip(RUNS, errors, strict=True)), satellites, gps, shown, over_time)
-
-
-def paper_track(trial: int, seed: int) -> Track:
-    """Return a track as it was drawn."""
-    return _track(trial, seed)[0]
+    over_time = np.array(list(ordered_results(executor, again, range(DRAWS), progress=then)))
+    by_run = dict(zip(RUNS, errors.swapaxes(0, 1), strict=True))
+    walks = [_track(trial, seed)[0].place_m[:, :2] for trial in range(trials)]
+    return PaperRun(by_run, satellites, gps, shown, over_time, walks)
 
 
 @lru_cache(maxsize=1)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -18,8 +17,7 @@ from mapfilter.models.motion import LinearMotion, constant_velocity, random_walk
 from mapfilter.models.ranging import pseudoranges, range_differences
 from mapfilter.models.state import StateLayout
 from mapfilter.positioning.kalman.models import compiled
-from mapfilter.positioning.kalman.position_filter import filter_fixes
-from mapfilter.positioning.kalman.static_fix import TOO_FEW, StaticFix, static_fix
+from mapfilter.positioning.kalman.static_fix import TOO_FEW, StaticFix, filter_fixes, static_fix
 
 Mobility = Literal["diagonal", "discretised"]
 
@@ -41,16 +39,8 @@ FIRST_M, FIRST_UP_M, FIRST_MPS, FIRST_UP_MPS, FIRST_CLOCK_M = 10.0, 2.0, 1.0, 0.
 THREE = 3
 
 
-@dataclass(frozen=True, eq=False)
-class Epoch:
-    """What a filter takes in at one moment.
-
-    Parameters
-    ----------
-    model : GaussianTerms or None
-        None where nothing is measured.
-    reading : (m,) array
-    """
+class Epoch(NamedTuple):
+    """What a filter takes in at one moment; without a model nothing is measured."""
 
     model: GaussianTerms | None
     reading: Floats
@@ -105,15 +95,10 @@ def differences(
     times_m: Floats,
     above_db: float | None = None,
 ) -> list[Epoch]:
-    """Return each epoch's time differences; the best station is the reference.
+    """Return each epoch's time differences of stations, (K, B); the best one is the reference.
 
-    Parameters
-    ----------
-    layout : StateLayout
-    stations_m : (B, 3) array
-    sinr_db, times_m : (K, B) arrays
-    above_db : float, optional
-        Stations below it are dropped; without it the three best are taken, however bad.
+    Stations with a SINR below ``above_db`` are dropped; without it the three best are taken,
+    however bad.
     """
     found = []
     for sinr, times in zip(sinr_db, times_m, strict=True):
@@ -139,10 +124,7 @@ def joined(first: Sequence[Epoch], second: Sequence[Epoch]) -> list[Epoch]:
 
 
 def run_static(layout: StateLayout, epochs: Sequence[Epoch]) -> list[StaticFix]:
-    """Solve each epoch by itself: for position and clock, or for east and north.
-
-    It starts from the middle of the scene.
-    """
+    """Solve each epoch from the middle of the scene: position and clock, or east and north."""
     begin = np.array([0.0, 0.0, scene.HEIGHT_M, 0.0])[: layout.size]
     unknown = np.full((layout.size, layout.size), np.nan)
     nothing = StaticFix(np.full(layout.size, np.nan), unknown, False, 0, TOO_FEW)
@@ -153,7 +135,7 @@ def run_static(layout: StateLayout, epochs: Sequence[Epoch]) -> list[StaticFix]:
 
 
 def run_pkf(layout: StateLayout, fixes: Sequence[StaticFix], about_m: Floats) -> Floats:
-    """Filter static fixes; return what it tells, (K, 2)."""
+    """Filter static fixes; return positions, (K, 2)."""
     first, moving = start(layout, about_m), motion(layout)
     track = filter_fixes(layout, moving, first.mean, first.covariance, fixes)
     return track.means[:, [0, 2]]
@@ -162,15 +144,15 @@ def run_pkf(layout: StateLayout, fixes: Sequence[StaticFix], about_m: Floats) ->
 def run_ekf(
     layout: StateLayout, epochs: Sequence[Epoch], about_m: Floats, mobility: Mobility = "diagonal"
 ) -> Floats:
-    """Filter measurements by an extended Kalman filter; return what it tells, (K, 2)."""
+    """Filter measurements by an extended Kalman filter; return positions, (K, 2)."""
     belief, moving = start(layout, about_m), motion(layout, mobility)
-    told = np.empty((len(epochs), 2))
+    found = np.empty((len(epochs), 2))
     for k, epoch in enumerate(epochs):
         belief = predict(belief, moving.transition, moving.noise)
         if epoch.model is not None:
             belief, _ = update(belief, compiled(epoch.model), epoch.reading, EKF)
-        told[k] = belief.mean[[0, 2]]
-    return told
+        found[k] = belief.mean[[0, 2]]
+    return found
 
 
 def run_pf(
@@ -182,15 +164,15 @@ def run_pf(
 ) -> Floats:
     """Filter measurements by particles of the position, drawn anew at every reading (SIR).
 
-    Velocity and clock are Gaussians given a particle's path; returns what it tells, (K, 2).
+    Velocity and clock are Gaussians given a particle's path; returns positions, (K, 2).
     """
     first, moving = start(layout, about_m), motion(layout)
     sampled = (0, 2) if layout.up is None else (0, 2, 4)
     belief = rao_blackwell.init(first.mean, first.covariance, sampled, particles, rng)
-    told = np.empty((len(epochs), 2))
+    found = np.empty((len(epochs), 2))
     for k, epoch in enumerate(epochs):
         belief = rao_blackwell.predict(belief, moving.transition, moving.noise, rng)
         if epoch.model is not None:
             belief, _ = rao_blackwell.update(belief, compiled(epoch.model), epoch.reading, rng)
-        told[k] = belief.mean()[[0, 2]]
-    return told
+        found[k] = belief.mean()[[0, 2]]
+    return found

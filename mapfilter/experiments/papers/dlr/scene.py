@@ -1,13 +1,13 @@
 """The scene of DLR's hybrid positioning: a street canyon, satellites, and LTE base stations.
 
 The paper's ray-traced city is not published. Here houses block satellites and stations by geometry
-alone, and echoes and detours are drawn; :mod:`.dlr_assumptions` lists all that is chosen.
+alone, and echoes and detours are drawn; :data:`ASSUMPTIONS` lists all that is chosen.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import shapely
@@ -65,20 +65,52 @@ RADIO = LteRadio()
 ARRIVAL = ArrivalModel()
 
 THRESHOLD_DB = -17.0
+"""SINR above which the paper uses stations."""
+
+ASSUMPTIONS = (
+    "geometry only: the paper's ray-traced Munich is not published; satellites and stations are "
+    "seen or not by rays past the houses, echoes and detours are drawn",
+    "canyon: blocks of 80 m, streets 22 m (east-west) and 25 m wide, houses of 26 m; pedestrians "
+    "walk in the 340 x 330 m in its middle, 0.8 to 1.6 m/s, 1.5 m high, up the gradient of a gas "
+    "from one random target after another; 290 steps of 1 s",
+    "nominal GPS 24 and Galileo 27 over 48.14 N 11.58 E, above 5°, at a random time of day, still "
+    "during a track; only satellites in line of sight are measured",
+    "pseudoranges: deviation 1.2 m / sin(elevation), new at each epoch; in the canyon echoes of "
+    "3 m on the average, exponential, correlated over 10 m of the way; one clock for both systems",
+    "clock: random walk of 2 m in a second, with which the filters reckon; as in the paper, no "
+    "drift is estimated",
+    "network: sites 1500 m apart, 19 of them, 30 m high, three sectors of 70° and 43 dBm + 14 dBi, "
+    "2 GHz, all sending; turned by 17° against the streets; losses of 3GPP TR 38.901 UMa with or "
+    "without line of sight past the canyon's houses, shadowing of 6 dB over 50 m, correlated by "
+    "half between sites",
+    "edge: the canyon's middle is where three cells meet, 866 m from their sites; near: 200 m from "
+    "a site",
+    "times of arrival: of each site's best sector; Cramér-Rao bound of 62 carriers of 15 kHz over "
+    "40 symbols (the synchronisation channels of 100 ms) at the SINR, with 3 m at the least; a "
+    "wrong peak anywhere within 3 km as probable as noise makes it at the SINR, which is often "
+    "below -25 dB",
+    "detours without line of sight: 15 m on the average, exponential, correlated over 5 m of the "
+    "way and by half between stations",
+    "filters know the SINR and the deviations, not the means: 3 m for echoes, 15 m for detours; "
+    "they take all noise for normal and new at each epoch",
+    "mobility: eq. 21 with a diagonal Q of 0.3 m and 0.3 m/s a second in all three directions; "
+    "'discretised': white acceleration of 0.3 m/s in a second",
+    "filters start within 10 m of the truth, 2 m in height; time differences alone are solved in "
+    "two dimensions at the known height",
+    "PF: 10 000 particles of the position, drawn anew at every reading; velocity and clock are "
+    "Gaussian given a particle's path",
+    "errors are those of east and north; static fixes are weighted Gauss-Newton for position and "
+    "clock, none is refused for its geometry; 'all' compares on epochs with a static fix, "
+    "'every_epoch' counts epochs without one as failures",
+    "critical: fewer than four satellites of both systems in line of sight ('gps_critical': of "
+    "GPS)",
+)
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """What all tracks share.
+class Scene(NamedTuple):
+    """What all tracks share: houses, the ground where pedestrians walk, and stations (S, 3).
 
-    Parameters
-    ----------
-    houses : (B,) array of shapely.Polygon
-    skyline : Skyline
-    ground : GasGround
-        Where pedestrians walk.
-    stations_m : dict
-        By where the canyon lies in the network, (S, 3) in its own frame.
+    Stations are in the canyon's frame, by where it lies in the network.
     """
 
     houses: NDArray[np.object_]
@@ -89,7 +121,7 @@ class Scene:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """A walk, the sky over it, and how base stations are heard on the way.
+    """A walk, the sky over it, and how base stations are received on the way.
 
     Parameters
     ----------
@@ -117,18 +149,11 @@ class Track:
     sinr_db: dict[Where, Floats]
 
 
-@dataclass(frozen=True, eq=False)
-class Readings:
+class Readings(NamedTuple):
     """One draw of all measurements of a track.
 
-    Parameters
-    ----------
-    ranges_m : (K, S) array
-        Pseudoranges in the canyon; NaN behind houses.
-    open_m : (K, S) array
-        The same without houses and echoes.
-    times_m : dict
-        By where the canyon lies, times of arrival as distances, (K, B).
+    Pseudoranges (K, S) in the canyon, NaN behind houses; the same without houses and echoes; times
+    of arrival as distances (K, B), by where the canyon lies.
     """
 
     ranges_m: Floats
@@ -155,10 +180,8 @@ def dlr_scene() -> Scene:
         where: np.hstack([turned(grid - centre, TURN_DEG), heights])
         for where, centre in ((EDGE, corner), (NEAR, beside))
     }
-    return Scene(
-        houses, Skyline(list(houses), np.full(len(houses), ROOF_M)), GasGround(lattice, free),
-        stations,
-    )  # fmt: skip
+    skyline = Skyline(list(houses), np.full(len(houses), ROOF_M))
+    return Scene(houses, skyline, GasGround(lattice, free), stations)
 
 
 def draw_track(scene: Scene, rng: np.random.Generator, steps: int = STEPS) -> Track:
@@ -176,16 +199,12 @@ def draw_track(scene: Scene, rng: np.random.Generator, steps: int = STEPS) -> Tr
         own = directions(stations, place[:, None])
         stations_seen[where] = scene.skyline.seen(place, own)
         shadow = SHADOW_DB * sites_along(travelled, len(stations), SHADOW_M, SHARED, rng)
-        levels = sector_levels_dbm(
-            RADIO, stations[:, :2], np.array(BORESIGHTS_DEG) + TURN_DEG, flat,
-            stations_seen[where], shadow,
-        )  # fmt: skip
+        sectors = stations[:, :2], np.array(BORESIGHTS_DEG) + TURN_DEG
+        levels = sector_levels_dbm(RADIO, *sectors, flat, stations_seen[where], shadow)
         sinr[where] = site_sinr_db(levels, RADIO.noise_dbm)
-    return Track(
-        place, travelled, satellites, gps,
-        elevation_sigma_m(toward.elevation_rad, ZENITH_SIGMA_M),
-        scene.skyline.seen(place, toward), stations_seen, sinr,
-    )  # fmt: skip
+    sigma = elevation_sigma_m(toward.elevation_rad, ZENITH_SIGMA_M)
+    seen = scene.skyline.seen(place, toward)
+    return Track(place, travelled, satellites, gps, sigma, seen, stations_seen, sinr)
 
 
 def sky(tow_s: float) -> tuple[Floats, Bools]:
@@ -209,8 +228,7 @@ def draw_readings(scene: Scene, track: Track, rng: np.random.Generator) -> Readi
     for where, stations in scene.stations_m.items():
         distance = np.linalg.norm(stations - track.place_m[:, None], axis=2)
         hidden = ~track.stations_seen[where]
-        detour = detour_m(
-            track.travelled_m, hidden, rng, mean_m=DETOUR_M, correlation_m=ALONG_M, shared=SHARED
-        )  # fmt: skip
+        law = {"mean_m": DETOUR_M, "correlation_m": ALONG_M, "shared": SHARED}
+        detour = detour_m(track.travelled_m, hidden, rng, **law)
         times[where] = distance + detour + arrival_errors_m(ARRIVAL, track.sinr_db[where], rng)
     return Readings(np.where(track.seen, free + echo, np.nan), free, times)

@@ -5,13 +5,12 @@ Beyond the paper are the smoothed GSM track and a layout in which linearised fil
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
-from mapfilter._parallel import Progress
 from mapfilter._types import Floats
 from mapfilter.evaluation.bounds import (
     bound_of,
@@ -27,9 +26,11 @@ from mapfilter.experiments.papers.fritsche_klein_2009.scene import (
     Trials,
     draw,
     hard_layout,
+    read_layout,
     scene,
 )
-from mapfilter.filters.gaussian import CKF, EKF, IEKF, RBUKF, UKF
+from mapfilter.experiments.papers.paper import PaperSettings
+from mapfilter.filters.gaussian import CKF, EKF, IEKF, RBUKF, UKF, Method
 from mapfilter.filters.gaussian_sum import run_mixtures, split
 from mapfilter.filters.kalman import smooth
 from mapfilter.filters.trials import run_trials
@@ -72,24 +73,17 @@ ASSUMPTIONS = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class CombinationRun:
-    """What filters and the bound make of one combination of measurements.
+class CombinationRun(NamedTuple):
+    """Root mean square errors by filter or bound and quantity, (K,), and how many went astray.
 
-    Parameters
-    ----------
-    curves : dict
-        By ``rbukf``, ``ekf``, ``pcrlb``, ... the root mean square error of each quantity at each
-        step.
-    astray : dict
-        By filter the share of trials more than 500 m off at the end.
+    ``astray`` is the share of trials more than 500 m off at the end.
     """
 
     curves: dict[str, Curves]
     astray: dict[str, float]
 
     def averages(self, name: str) -> dict[str, float | None]:
-        """Return the averages over time, as in Table III; None for what there is not."""
+        """Return the averages over time, as in Table III; None for a state without a clock."""
         own = self.curves[name]
         return {
             quantity: float(own[quantity].mean()) if quantity in own else None
@@ -97,21 +91,10 @@ class CombinationRun:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class PaperRun:
-    """Everything that is drawn and told.
+class PaperRun(NamedTuple):
+    """Filters by combination and in the hard layout (GSM), and true positions (K, 2) of a trial."""
 
-    Parameters
-    ----------
-    layout, hard_layout : Layout
-    nominal : dict
-        By combination.
-    hard : CombinationRun
-        The hard layout, GSM.
-    track : (K, 2) array
-        True positions of one trial.
-    """
-
+    trials: int
     layout: Layout
     hard_layout: Layout
     nominal: dict[str, CombinationRun]
@@ -119,34 +102,26 @@ class PaperRun:
     track: Floats
 
 
-def run_paper(layout: Layout, trials: int, seed: int, progress: Progress | None = None) -> PaperRun:
-    """Run all filters over all combinations.
-
-    Parameters
-    ----------
-    layout : Layout
-    trials : int
-        500 in the paper.
-    seed : int
-    progress : callable, optional
-        Called with parts done and parts in all.
-    """
-    streams = np.random.default_rng(seed).spawn(len(COMBINATIONS) + 1)
-    nominal: dict[str, CombinationRun] = {}
+def run_paper(settings: PaperSettings) -> PaperRun:
+    """Run all filters over all combinations, and over the hard layout."""
+    layout, hard = Layout(), hard_layout()
+    if settings.layout_file is not None:
+        layout = read_layout(settings.layout_file)
+    given = [scene(name, layout) for name in COMBINATIONS] + [scene("gsm", hard)]
+    methods = [(RBUKF, EKF)] * len(COMBINATIONS) + [(EKF, RBUKF, IEKF, CKF, UKF)]
+    streams = np.random.default_rng(settings.seed).spawn(len(given))
     track = np.zeros((0, 2))
-    for done, (name, rng) in enumerate(zip(COMBINATIONS, streams, strict=False)):
-        given = scene(name, layout)
-        drawn = draw(given, trials, layout.steps, rng)
-        nominal[name] = _nominal(given, drawn)
-        track = drawn.states[0][:, [0, 2]]
-        if progress is not None:
-            progress(done + 1, len(COMBINATIONS) + 1)
-    hard = hard_layout()
-    given = scene("gsm", hard)
-    found = _hard(given, draw(given, trials, hard.steps, streams[-1]))
-    if progress is not None:
-        progress(len(COMBINATIONS) + 1, len(COMBINATIONS) + 1)
-    return PaperRun(layout, hard, nominal, found, track)
+    found: list[CombinationRun] = []
+    for one, used, rng in zip(given, methods, streams, strict=True):
+        is_hard = len(found) == len(COMBINATIONS)
+        drawn = draw(one, settings.trials, (hard if is_hard else layout).steps, rng)
+        found.append(_run_filters(one, drawn, used, with_sum=is_hard))
+        if not is_hard:
+            track = drawn.states[0][:, [0, 2]]
+        if settings.progress is not None:
+            settings.progress(len(found), len(given))
+    nominal: dict[str, CombinationRun] = dict(zip(COMBINATIONS, found, strict=False))
+    return PaperRun(settings.trials, layout, hard, nominal, found[-1], track)
 
 
 def bound_curves(given: Scene, states: Floats) -> Curves:
@@ -160,51 +135,35 @@ def bound_curves(given: Scene, states: Floats) -> Curves:
     return {name: bound_of(covariance, own) for name, own in quantities(given.layout).items()}
 
 
-def _nominal(given: Scene, drawn: Trials) -> CombinationRun:
-    curves, astray = {"pcrlb": bound_curves(given, drawn.states)}, {}
-    motion = given.assumed
-    for method in (RBUKF, EKF):
-        # Smoothing is shown for one filter of the three states: all sit on the bound.
-        smoothing = method is EKF
-        run = run_trials(
-            compiled(given.measurement), motion.transition, motion.noise, method,
-            drawn.first_means, given.first_covariance, drawn.readings, covariances=smoothing,
-        )  # fmt: skip
-        curves[method.name] = _curves(given, run.means, drawn.states)
-        astray[method.name] = _astray(run.means, drawn.states)
-        if smoothing:
-            later = smooth(motion.transition, motion.noise, run.means, run.covariances)
-            curves["smoothed"] = _curves(given, later.means, drawn.states)
-    return CombinationRun(curves, astray)
+def _run_filters(
+    given: Scene, drawn: Trials, methods: Sequence[Method], *, with_sum: bool
+) -> CombinationRun:
+    """Run filters and a Gaussian sum if wanted; smooth the sum, or else the EKF.
 
+    Without the sum, in the nominal layout, all filters sit on the bound: one smoothed track does.
+    """
+    parts = quantities(given.layout)
+    moving = given.assumed.transition, given.assumed.noise
+    model, starts = compiled(given.measurement), drawn.first_means
+    found = CombinationRun({"pcrlb": bound_curves(given, drawn.states)}, {})
 
-def _hard(given: Scene, drawn: Trials) -> CombinationRun:
-    curves, astray = {"pcrlb": bound_curves(given, drawn.states)}, {}
-    motion = given.assumed
-    for method in (EKF, RBUKF, IEKF, CKF, UKF):
-        run = run_trials(
-            compiled(given.measurement), motion.transition, motion.noise, method,
-            drawn.first_means, given.first_covariance, drawn.readings,
-        )  # fmt: skip
-        curves[method.name] = _curves(given, run.means, drawn.states)
-        astray[method.name] = _astray(run.means, drawn.states)
-    first = split(np.zeros(given.layout.size), given.first_covariance, SUM_PARTS)
-    total = run_mixtures(
-        compiled(given.measurement), motion.transition, motion.noise, EKF, first,
-        drawn.first_means, drawn.readings,
-    )  # fmt: skip
-    curves["gaussian_sum"] = _curves(given, total.means, drawn.states)
-    astray["gaussian_sum"] = _astray(total.means, drawn.states)
-    later = smooth(motion.transition, motion.noise, total.means, total.covariances)
-    curves["gaussian_sum_smoothed"] = _curves(given, later.means, drawn.states)
-    return CombinationRun(curves, astray)
+    def add(name: str, means: Floats, covariances: Floats | None, smoothed: str) -> None:
+        shown = {name: means}
+        off = means[:, -1][:, [0, 2]] - drawn.states[:, -1][:, [0, 2]]
+        found.astray[name] = float(np.mean(np.hypot(*off.T) > FAR_M))
+        if covariances is not None:
+            shown[smoothed] = smooth(*moving, means, covariances).means
+        for key, own in shown.items():
+            errors = {q: rmse_over_time(own, drawn.states, at) for q, at in parts.items()}
+            found.curves[key] = errors
 
-
-def _curves(given: Scene, means: Floats, states: Floats) -> Curves:
-    own = quantities(given.layout)
-    return {name: rmse_over_time(means, states, parts) for name, parts in own.items()}
-
-
-def _astray(means: Floats, states: Floats) -> float:
-    off = means[:, -1][:, [0, 2]] - states[:, -1][:, [0, 2]]
-    return float(np.mean(np.hypot(*off.T) > FAR_M))
+    for method in methods:
+        keep = method is EKF and not with_sum
+        begin = starts, given.first_covariance
+        run = run_trials(model, *moving, method, *begin, drawn.readings, covariances=keep)
+        add(method.name, run.means, run.covariances if keep else None, "smoothed")
+    if with_sum:
+        first = split(np.zeros(given.layout.size), given.first_covariance, SUM_PARTS)
+        total = run_mixtures(model, *moving, EKF, first, starts, drawn.readings)
+        add("gaussian_sum", total.means, total.covariances, "gaussian_sum_smoothed")
+    return found

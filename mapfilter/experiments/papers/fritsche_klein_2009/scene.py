@@ -6,13 +6,15 @@ paper (Fig. 1), not printed. The default layout is a choice that brings out its 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+import tomllib
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from mapfilter._types import Floats
-from mapfilter.errors import Faults, InputError
+from mapfilter.errors import Faults, InputError, fail
 from mapfilter.models.gaussian import GaussianTerms, stack
 from mapfilter.models.motion import (
     LinearMotion,
@@ -44,7 +46,9 @@ BIAS_HALF_M, DRIFT_HALF_MPS = 300e3, 10.0
 MOTION_FACTOR, CLOCK_FACTOR = 100.0, 5.0
 """How much more noise than there is the filters assume."""
 
-
+SITES_EAST_M = (750.0, 957.0, 1523.0, 1730.0, 1164.0, 391.0, 184.0)
+SITES_NORTH_M = (1000.0, 1773.0, 1207.0, 1980.0, 2545.0, 2338.0, 1566.0)
+SITES_M = tuple(zip(SITES_EAST_M, SITES_NORTH_M, strict=True))
 MOST_STEPS = 10_000
 
 
@@ -59,7 +63,7 @@ class Layout:
     boresights_deg : tuple of float
         Their directions, counter-clockwise from east.
     serving : int
-        Which one tells the timing advance.
+        Index of the site that measures the timing advance.
     satellite_azimuths_deg : tuple of float
         Clockwise from north; the first is that of Hybrid 1.
     satellite_elevation_deg, satellite_distance_m : float
@@ -67,10 +71,7 @@ class Layout:
         Of 0.48 s each.
     """
 
-    sites_m: tuple[tuple[float, float], ...] = (
-        (750.0, 1000.0), (957.0, 1773.0), (1523.0, 1207.0), (1730.0, 1980.0), (1164.0, 2545.0),
-        (391.0, 2338.0), (184.0, 1566.0),
-    )  # fmt: skip
+    sites_m: tuple[tuple[float, float], ...] = SITES_M
     boresights_deg: tuple[float, ...] = (270.0, 270.0, 270.0, 150.0, 30.0, 30.0, 270.0)
     serving: int = 0
     satellite_azimuths_deg: tuple[float, ...] = (12.0, 190.0)
@@ -113,6 +114,35 @@ def _whole(value: object) -> bool:
     return isinstance(value, int) and not isinstance(value, bool)
 
 
+def read_layout(path: Path) -> Layout:
+    """Read a layout from TOML; fields left out are as by default.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, is no TOML, or holds what is no layout.
+    """
+    try:
+        given: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise fail(InputError, str(path), "TOML", error) from error
+    known = [field.name for field in fields(Layout)]
+    if unknown := sorted(set(given) - set(known)):
+        raise fail(InputError, str(path), f"keys among {', '.join(known)}", ", ".join(unknown))
+    try:
+        if "sites_m" in given:
+            given["sites_m"] = tuple((float(e), float(n)) for e, n in given["sites_m"])
+        for name in ("boresights_deg", "satellite_azimuths_deg"):
+            if name in given:
+                given[name] = tuple(float(value) for value in given[name])
+        return Layout(**given)
+    except (TypeError, ValueError) as error:
+        expected = "numbers, and pairs of them for sites_m"
+        raise fail(InputError, str(path), expected, error) from error
+
+
 def hard_layout(distance_m: float = 1000.0) -> Layout:
     """Return a layout in which linearisation fails: all antennas look at the serving station.
 
@@ -129,22 +159,12 @@ def hard_layout(distance_m: float = 1000.0) -> Layout:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """A method's state, motion and measurements.
+class Scene(NamedTuple):
+    """State, motion and measurements of a combination.
 
-    Parameters
-    ----------
-    layout : StateLayout
-        4 components for GSM, 6 with satellites.
-    truth : LinearMotion
-        How the car and its clock really move.
-    assumed : LinearMotion
-        What filters assume, with 100 and 5 times the noise.
-    measurement : GaussianTerms
-        Pseudoranges, timing advance, levels, in this order.
-    first_covariance : (n, n) array
-        P(0|0).
+    ``truth`` is how the car and its clock really move, ``assumed`` what filters assume, with 100
+    and 5 times the noise; measured are pseudoranges, timing advance and levels, in this order; the
+    covariance is P(0|0).
     """
 
     layout: StateLayout
@@ -169,42 +189,34 @@ def scene(
         clock = clock_motion(INTERVAL_S, cross_term=cross_term)
         truth, assumed = [*truth, clock], [*assumed, scaled(clock, CLOCK_FACTOR)]
         first = np.append(first, np.array([BIAS_HALF_M, DRIFT_HALF_MPS]) ** 2 / 3)
-    return Scene(
-        state,
-        together(truth),
-        together(assumed),
-        measurements(state, layout, satellites),
-        np.diag(first),
-    )
+    measured = measurements(state, layout, satellites)
+    return Scene(state, together(truth), together(assumed), measured, np.diag(first))
 
 
 def measurements(state: StateLayout, layout: Layout, satellites: int) -> GaussianTerms:
     """Return pseudoranges, the serving station's timing advance and all levels."""
     serving = [layout.sites_m[layout.serving]]
-    parts = [
-        timing_advances(state, serving, SIGMA_TA_M),
-        levels(
-            state, layout.sites_m, SIGMA_RSS_DB, loss_at_km_db=LOSS_AT_KM_DB, exponent=EXPONENT,
-            eirp_dbm=EIRP_DBM, boresight_rad=np.radians(layout.boresights_deg),
-            beamwidth_rad=BEAMWIDTH_RAD, max_attenuation_db=MAX_ATTENUATION_DB,
-        ),
-    ]  # fmt: skip
+    received = levels(
+        state,
+        layout.sites_m,
+        SIGMA_RSS_DB,
+        loss_at_km_db=LOSS_AT_KM_DB,
+        exponent=EXPONENT,
+        eirp_dbm=EIRP_DBM,
+        boresight_rad=np.radians(layout.boresights_deg),
+        beamwidth_rad=BEAMWIDTH_RAD,
+        max_attenuation_db=MAX_ATTENUATION_DB,
+    )
+    parts = [timing_advances(state, serving, SIGMA_TA_M), received]
     if satellites:
         parts.insert(0, pseudoranges(state, layout.satellites_m(satellites), SIGMA_PR_M))
     return stack(parts)
 
 
-@dataclass(frozen=True, eq=False)
-class Trials:
-    """Drawn trials of one method.
+class Trials(NamedTuple):
+    """Drawn trials: true states (T, K, n) and readings (T, K, m) at k = 1 ... K, and first guesses.
 
-    Parameters
-    ----------
-    states : (T, K, n) array
-        True states at k = 1 ... K.
-    readings : (T, K, m) array
-    first_means : (T, n) array
-        The filters' first guesses.
+    Guesses, (T, n), are where filters begin.
     """
 
     states: Floats

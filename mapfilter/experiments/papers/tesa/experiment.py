@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor
-from dataclasses import dataclass
 from functools import lru_cache, partial
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import stdtrit
 
-from mapfilter._parallel import Progress, ordered_results
+from mapfilter._parallel import ordered_results
 from mapfilter._types import Floats
+from mapfilter.experiments.papers.paper import PaperSettings
 from mapfilter.experiments.papers.tesa.models import Motion, assumed, loading, measurements
 from mapfilter.experiments.papers.tesa.scene import (
     BETA_DB,
@@ -29,17 +29,10 @@ PARTICLES = 10_000
 AVAILABLE_M = 100.0
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
-    """One filter over one scenario.
+class Run(NamedTuple):
+    """One filter over one scenario; ``beta_db``, the shadowing, is None for satellites alone.
 
-    Parameters
-    ----------
-    scenario : int
-        1: satellites all the way; 2: none during the outage; 3: as 2, with a halt in the outage.
-    motion : {"velocity", "identity", "known-bearing"}
-    beta_db : float or None
-        Shadowing; None for satellites alone.
+    Scenario 1: satellites all the way; 2: none during the outage; 3: as 2, with a halt in it.
     """
 
     scenario: int
@@ -106,73 +99,41 @@ def trial_errors_m(
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class PaperRun:
-    """Errors of all trials.
-
-    Parameters
-    ----------
-    scene : Scene
-    errors_m : dict
-        By run, shape (T, K).
-    """
+class PaperRun(NamedTuple):
+    """Errors of all trials: by run, (T, K)."""
 
     scene: Scene
     errors_m: dict[Run, Floats]
 
 
-@dataclass(frozen=True, slots=True)
-class Estimate:
-    """A mean over trials, and its interval.
-
-    Parameters
-    ----------
-    value : float
-    low, high : float
-        95 % interval, by Student's t over trials.
-    """
+class Estimate(NamedTuple):
+    """A mean over trials, and its 95 % interval by Student's t."""
 
     value: float
     low: float
     high: float
 
-    def within(self, least: float, most: float) -> Estimate:
-        """Return the estimate with the interval cut to what is possible."""
-        return Estimate(self.value, max(self.low, least), min(self.high, most))
 
-
-def estimate(values: Floats) -> Estimate:
-    """Return the mean over trials of (T,) values, and its 95 % interval.
+def estimate(values: Floats, least: float = -np.inf, most: float = np.inf) -> Estimate:
+    """Return the mean over trials of (T,) values, its interval cut to what is possible.
 
     Examples
     --------
-    >>> found = estimate(np.array([1.0, 3.0]))
-    >>> found.value, round(found.low, 2), round(found.high, 2)
-    (2.0, -10.71, 14.71)
+    >>> found = estimate(np.array([1.0, 3.0]), least=0.0)
+    >>> found.value, found.low, round(found.high, 2)
+    (2.0, 0.0, 14.71)
     """
-    mean = float(np.mean(values))
-    if values.size < 2:
-        return Estimate(mean, mean, mean)
-    factor = float(stdtrit(values.size - 1, 0.975))
-    half = factor * float(np.std(values, ddof=1)) / float(np.sqrt(values.size))
-    return Estimate(mean, mean - half, mean + half)
+    mean, half = float(np.mean(values)), 0.0
+    if values.size > 1:
+        factor = float(stdtrit(values.size - 1, 0.975))
+        half = factor * float(np.std(values, ddof=1)) / float(np.sqrt(values.size))
+    return Estimate(mean, max(mean - half, least), min(mean + half, most))
 
 
-def run_paper(
-    trials: int, seed: int, executor: Executor, progress: Progress | None = None
-) -> PaperRun:
-    """Run all filters over all trials.
-
-    Parameters
-    ----------
-    trials : int
-    seed : int
-    executor : concurrent.futures.Executor
-    progress : callable, optional
-        Called with trials done and trials in all.
-    """
-    one = partial(trial_errors_m, seed=seed)
-    found = ordered_results(executor, one, range(trials), progress=progress)
+def run_paper(settings: PaperSettings) -> PaperRun:
+    """Run all filters over all trials."""
+    one, trials = partial(trial_errors_m, seed=settings.seed), range(settings.trials)
+    found = ordered_results(settings.executor, one, trials, progress=settings.progress)
     errors = np.stack(list(found), axis=1)
     return PaperRun(_scene(False), dict(zip(RUNS, errors, strict=True)))
 

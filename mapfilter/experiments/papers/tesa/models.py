@@ -8,7 +8,7 @@ states, takes the bearing of the road from it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -54,15 +54,8 @@ RECEIVER_SIGMA_DB = 0.29
 class Assumed:
     """State, motion and initial uncertainty that a filter assumes.
 
-    Parameters
-    ----------
-    layout : StateLayout
-    motion : LinearMotion
-    first_covariance : (n, n) array
-    sampled : tuple of int
-        Components with particles: east, north, up.
-    shadowing : tuple of int
-        Components that are the shadowing of the stations in dB; empty where it is taken as white.
+    ``sampled`` are the components with particles (east, north, up), ``shadowing`` those that are
+    the shadowing of the stations in dB; none where it is taken as white.
     """
 
     layout: StateLayout
@@ -135,12 +128,8 @@ def measurements(
     received = []
     if beta_db is not None:
         sigma = RECEIVER_SIGMA_DB if known.shadowing else assumed_sigma_db(beta_db)
-        received = [
-            levels(
-                known.layout, scene.stations_m, sigma, loss_at_km_db=loss_at_km_db(),
-                exponent=2.0, eirp_dbm=EIRP_DBM,
-            )
-        ]  # fmt: skip
+        law: dict[str, Any] = {"loss_at_km_db": loss_at_km_db(), "exponent": 2.0}
+        received = [levels(known.layout, scene.stations_m, sigma, eirp_dbm=EIRP_DBM, **law)]
     return tuple(
         compiled(stack([pseudoranges(known.layout, place, sigma), *received]))
         for place, sigma in zip(scene.satellites_m, scene.range_sigma_m, strict=True)

@@ -6,7 +6,7 @@ in :data:`ASSUMPTIONS`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -71,18 +71,10 @@ ASSUMPTIONS = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """What all trials share.
+class Scene(NamedTuple):
+    """What all trials share: satellites (K, 5, 3), stations (7, 3), epochs without satellites (K,).
 
-    Parameters
-    ----------
-    drive : Drive
-    satellites_m : (K, 5, 3) array
-    range_sigma_m : (K, 5) array
-    stations_m : (7, 3) array
-    outage : (K,) array of bool
-        Epochs without satellites in scenario 2.
+    The outage is that of scenarios 2 and 3.
     """
 
     drive: Drive

@@ -1,0 +1,324 @@
+"""Whether rasters hold what they should: levels or losses of the cells of the plan."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import rasterio
+from rasterio.errors import RasterioError
+
+from mapfilter._types import Floats, Floats32
+from mapfilter.check.findings import Findings, listed
+from mapfilter.errors import InputError
+from mapfilter.geodesy import (
+    Lattice,
+    azimuth_from_heading_deg,
+    grid_convergence_rad,
+    unproject,
+)
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.rasters.resampling import read_on
+
+Kind = Literal["level", "loss", "rxlev", "empty", "unclear"]
+
+MOST_PX = 1 << 22
+"""Larger rasters are looked at in a square of so many pixels about the site."""
+_SAMPLED_SIDE_PX = 600
+_HIGHEST_RXLEV = 63
+_LEAST_LOSS_DB = 20.0
+_NO_LEVEL_BELOW = -300.0
+_NO_LEVEL_ABOVE = 60.0
+_TELLING_SHARE = 0.01
+_MOST_SHARE = 0.5
+_NEAR_ZERO = 1.0
+_MANY_TIMES = 10
+_PHONE_M = 1.5
+_NEAREST_RING_M = 64.0
+_LEAST_IN_RING = 50
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RasterSample:
+    """Some pixels of one cell's raster, in equal steps over the raster or about the site.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        Where the sampled pixels lie; its pixels are the sampled ones grown to the step.
+    values : ndarray of float32, shape (rows, cols) of the lattice
+        As stored, times the declared factor; NaN without data.
+    checksum : str
+        Of all pixels looked at, before sampling.
+    """
+
+    cell_id: str
+    lattice: Lattice
+    values: Floats32
+    checksum: str
+
+    @property
+    def known(self) -> Floats32:
+        """The values that are not NaN."""
+        return self.values[~np.isnan(self.values)]
+
+    def positions_m(self) -> tuple[Floats, Floats]:
+        """Return east and north of every sampled pixel, shape (rows, cols) each."""
+        rows, cols = np.mgrid[: self.lattice.rows, : self.lattice.cols]
+        east_m, north_m = self.lattice.east_north(rows, cols)
+        return east_m, north_m
+
+    def seen_from(self, east_m: float, north_m: float) -> tuple[Floats, Floats]:
+        """Return distance (m) and azimuth (degrees from true north) of every sampled pixel."""
+        east, north = self.positions_m()
+        lon, lat = unproject(self.lattice.crs, east_m, north_m)
+        convergence_rad = grid_convergence_rad(self.lattice.crs, float(lon), float(lat))
+        heading_rad = np.arctan2(north - north_m, east - east_m)
+        distance_m = np.hypot(east - east_m, north - north_m)
+        return distance_m, azimuth_from_heading_deg(heading_rad, convergence_rad)
+
+
+def sample_raster(rasters: RxLevRasters, cell_id: str, cell: Cell | None) -> RasterSample:
+    """Read a sample of one cell's raster, of a large one about its site or else its middle."""
+    file = next(file for file in rasters.files if cell_id in file.cell_ids)
+    band = file.cell_ids.index(cell_id)
+    window = _window(rasters.lattice, cell)
+    values = read_on(file, [band], rasters.lattice, window, rasters.resampling)[0]
+    checksum = hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
+    step = max(1, -(-max(values.shape) // _SAMPLED_SIDE_PX))
+    first = step // 2
+    values = values[first::step, first::step] if min(values.shape) > first else values
+    part = rasters.lattice.window(*window)
+    side_m = part.resolution_m
+    # Sampled pixels keep their centres.
+    shift_m = (first + 0.5 - step / 2) * side_m
+    lattice = Lattice(
+        part.crs, part.west_m + shift_m, part.north_m - shift_m, side_m * step, *values.shape
+    )
+    return RasterSample(cell_id, lattice, values * np.float32(rasters.factor), checksum)
+
+
+def kind_of(values: Floats32) -> Kind:
+    """Return what numbers most likely are; NaN is ignored.
+
+    Levels (dBm) are mostly below 0, path losses (dB) mostly above 20, and raw RXLEV are whole
+    numbers in 0..63 (3GPP TS 45.008, 8.1.4).
+
+    Examples
+    --------
+    >>> kind_of(np.float32([-60.5, -101.2])), kind_of(np.float32([88.1, 120.4]))
+    ('level', 'loss')
+    >>> kind_of(np.float32([0, 17, 63])), kind_of(np.float32([np.nan]))
+    ('rxlev', 'empty')
+    """
+    known = values[np.isfinite(values)]
+    known = known[(known >= _NO_LEVEL_BELOW) & (known <= -_NO_LEVEL_BELOW)]
+    if not known.size:
+        return "empty"
+    if (known < 0).mean() > _MOST_SHARE:
+        return "level"
+    whole = bool((known == np.round(known)).all())
+    if whole and known.min() >= 0 and known.max() <= _HIGHEST_RXLEV:
+        return "rxlev"
+    return "loss" if np.median(known) > _LEAST_LOSS_DB else "unclear"
+
+
+def nodata_taken_as_level(values: Floats32) -> tuple[float, float] | None:
+    """Return the number that means no data though the file does not state it, and its share.
+
+    That is one and the same number, beyond all levels (such as -9999), or exactly 0 among levels
+    that are below it.
+
+    Examples
+    --------
+    >>> nodata_taken_as_level(np.float32([-80.5, -91.25, -9999, -9999]))
+    (-9999.0, 0.5)
+    >>> nodata_taken_as_level(np.float32([-80.5, 0, 0, -70]))
+    (0.0, 0.5)
+    >>> nodata_taken_as_level(np.float32([-80.5, -70]))
+    """
+    known = values[~np.isnan(values)]
+    beyond = known[(known < _NO_LEVEL_BELOW) | (known > _NO_LEVEL_ABOVE)]
+    inside = known.size - beyond.size
+    if beyond.size and (beyond == beyond[0]).all() and (inside == 0 or (known < 0).any()):
+        return float(beyond[0]), beyond.size / known.size
+    zero, others = int((known == 0).sum()), known[known != 0]
+    if not known.size or zero < _TELLING_SHARE * known.size:
+        return None
+    # Zero means no data where nothing comes near it.
+    near = int((np.abs(others) < _NEAR_ZERO).sum())
+    apart = bool((others < 0).all() or (others >= _LEAST_LOSS_DB).all())
+    return (0.0, zero / known.size) if apart and zero > _MANY_TIMES * near else None
+
+
+def falls_with_distance(sample: RasterSample, east_m: float, north_m: float) -> float:
+    """Return the correlation of levels with minus the logarithm of the distance from a place.
+
+    1 is a raster that falls off evenly around it; 0 where nothing is known.
+    """
+    east, north = sample.positions_m()
+    known = ~np.isnan(sample.values)
+    value = sample.values[known].astype(np.float64)
+    least_m = sample.lattice.resolution_m
+    far = -np.log10(np.maximum(np.hypot(east - east_m, north - north_m)[known], least_m))
+    if value.size < 2 or np.ptp(value) == 0 or np.ptp(far) == 0:
+        return 0.0
+    return float(np.corrcoef(value, far)[0, 1])
+
+
+def above_free_space_db(sample: RasterSample, cell: Cell) -> float:
+    """Return by how much levels in the main lobe exceed those of free space.
+
+    Levels of ``EIRP - 32.44 - 20 log10(d / km) - 20 log10(f / MHz)`` (Friis 1946; ITU-R P.525) are
+    exceeded here and there by reflections and shadowing, but by the median of a whole ring about
+    the site only where the EIRP is another. Rings are octaves of the distance from 64 m on, as
+    obstacles cost the less the nearer they are; the one that exceeds most counts. Minus infinity
+    where too few pixels are to be seen.
+    """
+    ground_m, azimuth_deg = sample.seen_from(cell.east_m, cell.north_m)
+    used = ~np.isnan(sample.values) & (ground_m >= _NEAREST_RING_M)
+    if cell.azimuth_deg is not None:
+        off_deg = (azimuth_deg - cell.azimuth_deg + 180.0) % 360.0 - 180.0
+        used &= np.abs(off_deg) <= cell.beamwidth_deg / 2
+    ground_m = ground_m[used]
+    distance_km = np.hypot(ground_m, cell.height_m - _PHONE_M) / 1000
+    loss_db = 32.44 + 20 * np.log10(distance_km) + 20 * np.log10(cell.frequency_mhz)
+    above_db = sample.values[used] - cell.eirp_dbm + loss_db
+    ring = np.log2(ground_m).astype(np.int64)
+    rings = (above_db[ring == number] for number in np.unique(ring))
+    medians_db = [float(np.median(some)) for some in rings if some.size >= _LEAST_IN_RING]
+    return max(medians_db, default=-np.inf)
+
+
+def _window(lattice: Lattice, cell: Cell | None) -> tuple[int, int, int, int]:
+    """Return the whole lattice, or a square about a cell where it is too large."""
+    rows, cols = lattice.rows, lattice.cols
+    if rows * cols <= MOST_PX:
+        return 0, 0, rows, cols
+    side = int(np.sqrt(MOST_PX))
+    row, col = rows // 2, cols // 2
+    if cell is not None:
+        there = lattice.row_col(cell.east_m, cell.north_m)
+        row, col = there if lattice.contains(*there) else (row, col)
+    high, wide = min(side, rows), min(side, cols)
+    top = int(np.clip(row - high // 2, 0, rows - high))
+    left = int(np.clip(col - wide // 2, 0, cols - wide))
+    return top, left, high, wide
+
+
+_MISREAD: dict[tuple[str, Kind], str] = {
+    ("level", "loss"): "loss-as-level",
+    ("level", "rxlev"): "rxlev-as-level",
+    ("loss", "level"): "level-as-loss",
+    ("loss", "rxlev"): "rxlev-as-loss",
+    ("level", "unclear"): "values-implausible",
+    ("loss", "unclear"): "values-implausible",
+}
+_FALLS = 0.3
+
+
+def is_surveyed(rasters: RxLevRasters) -> bool:
+    """Tell whether rasters were made of measurements, not predicted."""
+    if not rasters.path.is_file():
+        return False
+    try:
+        with rasterio.open(rasters.path) as source:
+            return str(source.tags().get("MODEL", "")).startswith("survey")
+    except RasterioError:
+        return False
+
+
+def check_ids(rasters: RxLevRasters, plan: CellPlan, where: str, findings: Findings) -> None:
+    """Check that rasters and plan hold the same cells."""
+    held = set(rasters.cell_ids)
+    missing = [cell_id for cell_id in plan.ids if cell_id not in held]
+    unknown = [cell_id for cell_id in rasters.cell_ids if cell_id not in plan]
+    if missing:
+        evidence = f"{len(missing)} of {len(plan)} cells have no raster: {listed(missing)}."
+        findings.add("cell-without-raster", f"{where} and {rasters.path}", evidence)
+    if unknown:
+        evidence = f"{len(unknown)} of {len(held)} rasters have no cell: {listed(unknown)}."
+        findings.add("raster-without-cell", f"{rasters.path} and {where}", evidence)
+
+
+def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) -> list[RasterSample]:
+    """Read a sample of each raster, and check that its numbers are of the declared kind.
+
+    Returns
+    -------
+    list of RasterSample
+        Levels, or losses with a minus sign, without what stands for no data; those of rasters
+        without anything to look at are left out.
+    """
+    kinds: dict[Kind, list[RasterSample]] = {}
+    nodata: list[tuple[str, float, float]] = []
+    constant, empty = [], []
+    for cell_id in rasters.cell_ids:
+        cell = plan[cell_id] if plan is not None and cell_id in plan else None
+        try:
+            sample = sample_raster(rasters, cell_id, cell)
+        except InputError as error:
+            findings.add_faults(error, "rasters-invalid")
+            continue
+        if (taken := nodata_taken_as_level(sample.values)) is not None:
+            nodata.append((cell_id, *taken))
+            kept = np.where(sample.values == np.float32(taken[0]), np.nan, sample.values)
+            sample = replace(sample, values=kept.astype(np.float32))
+            if not sample.known.size:
+                continue
+        kind = kind_of(sample.values)
+        if not sample.known.size:
+            empty.append(cell_id)
+        elif np.ptp(sample.known) == 0:
+            constant.append(f"{cell_id} {sample.known[0]:g}")
+        else:
+            kinds.setdefault(kind, []).append(sample)
+    where = str(rasters.path)
+    if nodata:
+        worst = max(nodata, key=lambda one: one[2])
+        ids = listed([one[0] for one in nodata])
+        evidence = f"{worst[1]:g} stands in up to {worst[2]:.1%} of the pixels, as a number."
+        findings.add("nodata-as-level", f"{where}, cells {ids}", evidence)
+    if empty:
+        cells = f"{where}, cells {listed(empty)}"
+        findings.add("raster-empty", cells, "No pixel has data.", "warning")
+    if constant:
+        evidence = f"One number in all pixels: {listed(constant)}."
+        findings.add("raster-constant", where, evidence)
+    useful: list[RasterSample] = []
+    for kind, samples in kinds.items():
+        by_sum: dict[tuple[str, Lattice], list[str]] = {}
+        for sample in samples:
+            by_sum.setdefault((sample.checksum, sample.lattice), []).append(sample.cell_id)
+        for same in by_sum.values():
+            if len(same) > 1:
+                evidence = f"The same numbers in all pixels of {len(same)} rasters."
+                findings.add("identical-rasters", f"{where}, cells {listed(same)}", evidence)
+        falls = kind == "loss" and _falls_away(samples, plan)
+        code = "field-strength" if falls else _MISREAD.get((rasters.quantity, kind))
+        if code is not None:
+            numbers = np.concatenate([sample.known for sample in samples])
+            low, middle, high = np.percentile(numbers, [1, 50, 99])
+            evidence = (
+                f"Declared {rasters.quantity}; {len(samples)} of {len(rasters.cell_ids)} rasters "
+                f"hold {low:.5g}..{high:.5g}, median {middle:.5g}"
+            )
+            evidence += ", which become less away from the sites." if falls else "."
+            ids = listed([sample.cell_id for sample in samples])
+            findings.add(code, f"{where}, cells {ids}", evidence)
+        negative = kind == "loss" and not falls
+        useful += [replace(s, values=-s.values) for s in samples] if negative else samples
+    return useful
+
+
+def _falls_away(samples: Sequence[RasterSample], plan: CellPlan | None) -> bool:
+    """Tell whether numbers above 0 fall with the distance, as no path loss does."""
+    if plan is None:
+        return False
+    known = [(s, plan[s.cell_id]) for s in samples if s.cell_id in plan]
+    falls = [falls_with_distance(s, cell.east_m, cell.north_m) for s, cell in known]
+    return bool(falls) and float(np.median(falls)) > _FALLS

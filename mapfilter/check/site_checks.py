@@ -1,0 +1,395 @@
+"""Checks that each raster is strong about its site, in its direction, and as its EIRP allows.
+
+A level is explained by a constant, the logarithm of the distance from the place, and two harmonics
+of the direction, which draw any lobe: no azimuth has to be right. The share of the levels' variance
+that is explained compares places over the same pixels.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence, Set
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from mapfilter._types import Floats, Floats32
+from mapfilter.check.findings import Findings, listed
+from mapfilter.check.lobes import (
+    AzimuthMistake,
+    Lobe,
+    azimuth_mistakes,
+    find_lobe,
+)
+from mapfilter.check.raster_checks import RasterSample, above_free_space_db, falls_with_distance
+from mapfilter.radio.cells import Cell, CellPlan
+
+_SIDE = 40
+_LEAST_SQUARES = 60
+_HARMONICS = 2
+_PLACES = 10
+
+
+class MeanLevels(NamedTuple):
+    """Mean levels of a raster in coarse squares with data, and the squares' middles, (n,) each."""
+
+    east_m: Floats
+    north_m: Floats
+    level_db: Floats
+    side_m: float
+
+
+def in_squares(sample: RasterSample) -> MeanLevels | None:
+    """Average a raster in at most 40 x 40 squares; None where there is too little data."""
+    values = sample.values.astype(np.float64)
+    step = max(1, -(-max(values.shape) // _SIDE))
+    rows, cols = values.shape[0] // step, values.shape[1] // step
+    whole = values[: rows * step, : cols * step].reshape(rows, step, cols, step)
+    count = (~np.isnan(whole)).sum(axis=(1, 3))
+    known = count > 0
+    if known.sum() < _LEAST_SQUARES:
+        return None
+    level_db = np.nansum(whole, axis=(1, 3))[known] / count[known]
+    if np.ptp(level_db) == 0:
+        return None
+    middle = np.arange(max(rows, cols)) * step + (step - 1) / 2
+    row, col = np.nonzero(known)
+    east_m, north_m = sample.lattice.east_north(middle[row], middle[col])
+    return MeanLevels(east_m, north_m, level_db, step * sample.lattice.resolution_m)
+
+
+def place_fit(squares: MeanLevels, east_m: float, north_m: float) -> float:
+    """Return how well a place explains levels: the multiple correlation, 0..1.
+
+    Levels that become stronger with the distance count as not depending on it.
+    """
+    east, north = squares.east_m - east_m, squares.north_m - north_m
+    distance_m = np.hypot(east, north)
+    direction_rad = np.arctan2(north, east)
+    # What lies in the place's own square has no direction.
+    near = np.minimum(distance_m / squares.side_m, 1.0)
+    columns = [np.log10(np.maximum(distance_m, squares.side_m / 2))]
+    for order in range(1, _HARMONICS + 1):
+        columns += [near * np.cos(order * direction_rad), near * np.sin(order * direction_rad)]
+    causes = np.column_stack(columns)
+    causes -= causes.mean(axis=0)
+    level_db = squares.level_db - squares.level_db.mean()
+    factors = np.linalg.lstsq(causes, level_db, rcond=None)[0]
+    if factors[0] > 0:
+        causes = causes[:, 1:]
+        factors = np.linalg.lstsq(causes, level_db, rcond=None)[0]
+    explained = causes @ factors
+    return float(np.sqrt((explained @ explained) / (level_db @ level_db)))
+
+
+def peak_m(sample: RasterSample) -> tuple[float, float]:
+    """Return east and north of the strongest pixels' middle (the strongest 0.2 %, at least 9)."""
+    value = np.where(np.isnan(sample.values), -np.inf, sample.values).ravel()
+    count = min(max(9, value.size // 500), int(np.isfinite(value).sum()))
+    strongest = np.argpartition(value, -count)[-count:]
+    east, north = sample.positions_m()
+    return float(np.median(east.ravel()[strongest])), float(np.median(north.ravel()[strongest]))
+
+
+def best_place(squares: MeanLevels, sample: RasterSample) -> tuple[float, tuple[float, float]]:
+    """Return the best fit and its place, among a grid over the raster and its peak."""
+    west, south, east, north = sample.lattice.bounds_m
+    along = (np.arange(_PLACES) + 0.5) / _PLACES
+    places = [
+        (float(x), float(y))
+        for x in west + along * (east - west)
+        for y in south + along * (north - south)
+    ]
+    places.append(peak_m(sample))
+    fits = [place_fit(squares, *place) for place in places]
+    best = int(np.argmax(fits))
+    return fits[best], places[best]
+
+
+_FAR_PX, _FAR_M = 10.0, 150.0
+_SITES = 16
+_CLEARLY_BETTER = 0.1
+_BETTER = 0.05
+_MILDLY_BETTER = 0.02
+_FITS = 0.65
+
+
+class _Fit(NamedTuple):
+    """How well a raster is explained by its site, by those about the best place, and by that."""
+
+    own: float
+    by_site: Mapping[str, float]
+    best: float
+    away_m: float
+    far: bool
+
+    def gain(self, site: str) -> float:
+        return self.by_site.get(site, 0.0) - self.own
+
+
+def check_peaks(
+    seen: Sequence[RasterSample], plan: CellPlan, where: str, findings: Findings
+) -> frozenset[str]:
+    """Find rasters that another place than their site explains better.
+
+    Labels of rasters count as exchanged between sites only where rasters went both ways; else it
+    is the site that is wrong. Returned are all cells of the sites concerned: where a site is wrong
+    its azimuths cannot be judged.
+    """
+    fits = _fits(seen, plan)
+    site_of = {cell_id: plan[cell_id].site for cell_id in fits}
+    moved = _exchanged(fits, site_of)
+    if moved:
+        pairs = ", ".join(f"{cell_id} about {site}" for cell_id, site in list(moved.items())[:8])
+        evidence = f"These rasters are strong about the site of another cell: {pairs}."
+        findings.add("site-labels-swapped", f"{where}, cells {listed(list(moved))}", evidence)
+    off = _off(fits, site_of, moved)
+    if off:
+        worst = fits[max(off, key=lambda cell_id: fits[cell_id].best - fits[cell_id].own)]
+        evidence = (
+            f"Distance and direction from the site explain the levels with a correlation of "
+            f"{worst.own:.2f}, and from a place {worst.away_m:.0f} m away with {worst.best:.2f}."
+        )
+        findings.add("site-off-peak", f"{where}, cells {listed(off)}", evidence)
+    sites = {site_of[cell_id] for cell_id in (*moved, *off)}
+    return frozenset(cell.id for cell in plan.cells if cell.site in sites)
+
+
+def _fits(seen: Sequence[RasterSample], plan: CellPlan) -> dict[str, _Fit]:
+    site_at = {cell.site: (cell.east_m, cell.north_m) for cell in reversed(plan.cells)}
+    names, places_m = list(site_at), np.array(list(site_at.values()))
+    found = {}
+    for sample in seen:
+        squares = in_squares(sample)
+        if squares is None:
+            continue
+        cell = plan[sample.cell_id]
+        best, (east_m, north_m) = best_place(squares, sample)
+        off_m = np.hypot(*(places_m - (east_m, north_m)).T)
+        about = [names[index] for index in np.argsort(off_m, kind="stable")[:_SITES]]
+        away_m = float(np.hypot(east_m - cell.east_m, north_m - cell.north_m))
+        own = place_fit(squares, cell.east_m, cell.north_m)
+        found[cell.id] = _Fit(
+            own,
+            {site: place_fit(squares, *site_at[site]) for site in about} | {cell.site: own},
+            best,
+            away_m,
+            away_m >= max(_FAR_M, _FAR_PX * sample.lattice.resolution_m),
+        )
+    return found
+
+
+def _exchanged(fits: Mapping[str, _Fit], site_of: Mapping[str, str]) -> dict[str, str]:
+    """Return the site that each exchanged raster belongs to."""
+    sites = set(site_of.values())
+    moved = _both_ways(_reassigned(_drawn(fits, site_of, sites, _BETTER), fits, site_of), site_of)
+    # Where two sites exchanged some labels, rasters that prove less by themselves came along.
+    along = _drawn(fits, site_of, set(moved.values()), _MILDLY_BETTER)
+    return _both_ways(_reassigned(along, fits, site_of), site_of)
+
+
+def _drawn(
+    fits: Mapping[str, _Fit], site_of: Mapping[str, str], sites: Set[str], least: float
+) -> list[str]:
+    """Return the rasters of sites that another of those sites explains better."""
+    return [
+        cell_id
+        for cell_id, fit in fits.items()
+        if site_of[cell_id] in sites and any(fit.gain(site) > least for site in sites)
+    ]
+
+
+def _reassigned(
+    ids: Sequence[str], fits: Mapping[str, _Fit], site_of: Mapping[str, str]
+) -> dict[str, str]:
+    """Return the sites that rasters go to when labels are exchanged among them for the best."""
+    if not ids:
+        return {}
+    gain = np.array([[fits[a].gain(site_of[b]) for b in ids] for a in ids])
+    rows, cols = linear_sum_assignment(-gain)
+    return {
+        ids[row]: site_of[ids[col]]
+        for row, col in zip(rows, cols, strict=True)
+        if site_of[ids[row]] != site_of[ids[col]] and gain[row, col] > _MILDLY_BETTER
+    }
+
+
+def _both_ways(moved: Mapping[str, str], site_of: Mapping[str, str]) -> dict[str, str]:
+    """Return the rasters that went to sites from which others came, and the other way round."""
+    kept = dict(moved)
+    while True:
+        left, reached = {site_of[cell_id] for cell_id in kept}, set(kept.values())
+        inner = {i: site for i, site in kept.items() if site in left and site_of[i] in reached}
+        if len(inner) == len(kept):
+            return inner
+        kept = inner
+
+
+def _off(
+    fits: Mapping[str, _Fit], site_of: Mapping[str, str], moved: Mapping[str, str]
+) -> list[str]:
+    """Return the rasters, not exchanged, that a place far from their site explains better."""
+    better = {
+        cell_id: fit.best - fit.own
+        for cell_id, fit in fits.items()
+        if cell_id not in moved and fit.far and fit.best > _FITS and fit.best - fit.own > _BETTER
+    }
+    # Two rasters of a site are as good as one that is clear.
+    count = Counter(site_of[cell_id] for cell_id in better)
+    sites = {
+        site_of[cell_id]
+        for cell_id, gain in better.items()
+        if gain > _CLEARLY_BETTER or count[site_of[cell_id]] > 1
+    }
+    return [cell_id for cell_id in better if site_of[cell_id] in sites]
+
+
+_TURNED_BETTER, _TURNED_FITS = 0.25, 0.4
+_TURNED_SLIGHTLY, _LOBES_BETTER = 0.1, 0.3
+_ABOVE_DB, _ONE_ABOVE_DB = 10.0, 18.0
+_SMALL_EIRP_DBM, _MAST_M = 25.0, 10.0
+
+_TURNS: tuple[tuple[str, Callable[[Floats32], Floats32]], ...] = (
+    ("rows and columns exchanged", lambda v: v.T),
+    ("rows from south to north", lambda v: v[::-1]),
+    ("columns from east to west", lambda v: v[:, ::-1]),
+    ("rows and columns both reversed", lambda v: v[::-1, ::-1]),
+    ("a quarter turn", lambda v: v.T[::-1]),
+    ("a quarter turn the other way", lambda v: v.T[:, ::-1]),
+)
+"""How exporters turn rasters, as what undoes it."""
+
+
+def check_against_sites(
+    samples: Sequence[RasterSample],
+    plan: CellPlan,
+    outside: frozenset[str],
+    where: str,
+    findings: Findings,
+) -> list[RasterSample]:
+    """Check that each raster is strong about its own site, and in its own direction.
+
+    Cells in ``outside`` have their site off the rasters and are skipped; the plan is in the CRS of
+    the rasters. Returned are the samples that are strong about their own site.
+    """
+    seen = [s for s in samples if s.cell_id in plan and s.cell_id not in outside]
+    if not seen or _check_turned(seen, plan, where, findings):
+        return []
+    off = check_peaks(seen, plan, where, findings)
+    in_place = [s for s in seen if s.cell_id not in off]
+    lobes = _lobes(in_place, plan)
+    held = {sample.cell_id for sample in in_place}
+    cells = [cell for cell in plan.cells if cell.id in held]
+    for mistake in azimuth_mistakes(cells, lobes):
+        findings.add(mistake.mistake, f"{where}, cells {listed(mistake.cells)}", _evidence(mistake))
+    return in_place
+
+
+def check_power(
+    samples: Sequence[RasterSample], plan: CellPlan, where: str, findings: Findings
+) -> None:
+    """Check that levels are possible with the EIRP of the plan, and the EIRP with a mast."""
+    cells = [
+        cell
+        for cell in plan.cells
+        if cell.azimuth_deg is not None and not cell.indoor and cell.height_m >= _MAST_M
+    ]
+    small = [cell for cell in cells if 0 < cell.eirp_dbm <= _SMALL_EIRP_DBM]
+    above_db = {
+        s.cell_id: above_free_space_db(s, plan[s.cell_id])
+        for s in samples
+        if s.cell_id in plan and not plan[s.cell_id].indoor
+    }
+    # One cell may have reflections and shadowing on its side, but not most of them.
+    most = bool(above_db) and float(np.median(list(above_db.values()))) > _ABOVE_DB
+    watts = {cell.id for cell in small}
+    too_high = {
+        i: db
+        for i, db in above_db.items()
+        if db > (_ABOVE_DB if most or i in watts else _ONE_ABOVE_DB)
+    }
+    if too_high:
+        ids = list(too_high)
+        evidence = (
+            f"Levels into the main lobe are up to {max(too_high.values()):.0f} dB above those of "
+            f"free space with the plan's EIRP (median of a ring about the site)."
+        )
+        if watts & set(ids):
+            cell = next(cell for cell in small if cell.id in too_high)
+            evidence += f" {_as_watts(cell)}"
+            findings.add("eirp-watts", f"{where}, cells {listed(ids)}", evidence)
+        else:
+            findings.add("levels-above-eirp", f"{where}, cells {listed(ids)}", evidence, "warning")
+    elif small and 2 * len(small) > len(cells):
+        evidence = f"That is little for a sector on a mast. {_as_watts(small[0])}"
+        ids = [cell.id for cell in small]
+        findings.add("eirp-watts", f"{where}, cells {listed(ids)}", evidence, "warning")
+
+
+def _evidence(mistake: AzimuthMistake) -> str:
+    seen = f"Azimuths and lobes of the rasters differ by {mistake.offset_deg:.0f}° (median)"
+    if mistake.mistake == "azimuth-off-lobe":
+        return f"{seen}: {mistake.reading}."
+    how = "if" if mistake.mistake == "sector-labels-swapped" else "if azimuths are"
+    return f"{seen}; by {mistake.offset_read_deg:.0f}° {how} {mistake.reading}."
+
+
+def _check_turned(
+    seen: Sequence[RasterSample], plan: CellPlan, where: str, findings: Findings
+) -> bool:
+    """Find rasters that fit their sites much better when they are turned."""
+    given = _mean_fall(seen, plan)
+    best: tuple[float, str] | None = None
+    for words, turn in _TURNS:
+        turned = []
+        for sample in seen:
+            values = turn(sample.values)
+            lattice = replace(sample.lattice, rows=values.shape[0], cols=values.shape[1])
+            turned.append(replace(sample, values=values, lattice=lattice))
+        fit = _mean_fall(turned, plan)
+        if fit < _TURNED_FITS or fit - given < _TURNED_SLIGHTLY or (best and fit < best[0]):
+            continue
+        if (
+            fit - given > _TURNED_BETTER
+            or _mean_score(turned, plan) - _mean_score(seen, plan) > _LOBES_BETTER
+        ):
+            best = fit, words
+    if best is None:
+        return False
+    evidence = (
+        f"Levels and nearness to the sites correlate by {given:.2f} (mean of {len(seen)} "
+        f"cells), and by {best[0]:.2f} if the file holds {best[1]}."
+    )
+    findings.add("axes-swapped", where, evidence)
+    return True
+
+
+def _mean_fall(samples: Sequence[RasterSample], plan: CellPlan) -> float:
+    pairs = ((sample, plan[sample.cell_id]) for sample in samples)
+    return float(np.mean([falls_with_distance(s, c.east_m, c.north_m) for s, c in pairs]))
+
+
+def _mean_score(samples: Sequence[RasterSample], plan: CellPlan) -> float:
+    """Return how well the plan's azimuths explain the rasters, on average."""
+    lobes = _lobes(samples, plan)
+    scores = [lobe.score(plan[cell_id].azimuth_deg or 0.0) for cell_id, lobe in lobes.items()]
+    return float(np.mean(scores)) if scores else 0.0
+
+
+def _lobes(samples: Sequence[RasterSample], plan: CellPlan) -> dict[str, Lobe]:
+    found = {}
+    for sample in samples:
+        cell = plan[sample.cell_id]
+        if cell.azimuth_deg is None or cell.indoor:
+            continue
+        lobe = find_lobe(sample, cell.east_m, cell.north_m, cell.beamwidth_deg)
+        if lobe is not None:
+            found[cell.id] = lobe
+    return found
+
+
+def _as_watts(cell: Cell) -> str:
+    dbm = 10 * np.log10(1000 * cell.eirp_dbm)
+    return f"{cell.id} has {cell.eirp_dbm:g}, which as watts would be {dbm:.0f} dBm."

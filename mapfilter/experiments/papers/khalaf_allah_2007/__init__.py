@@ -1,1 +1,0 @@
-"""Khalaf-Allah (2007): global positioning by the candidate filter."""

@@ -1,0 +1,90 @@
+"""What all papers share: how one is run, and what comes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import pandas as pd
+
+from mapfilter._parallel import Progress
+from mapfilter.experiments.sweep.plan import SweepPlan
+from mapfilter.report.canvas import Drawn
+
+Run = TypeVar("Run")
+
+Picture = tuple[str, Drawn]
+"""Name of the file, without a suffix, and what is drawn."""
+
+
+@dataclass(frozen=True)
+class PaperSettings:
+    """What a paper's experiments are run with.
+
+    Parameters
+    ----------
+    trials : int
+        Trials, or runs in each cell of a grid.
+    executor : concurrent.futures.Executor
+        Does the independent parts of the work.
+    sweep : callable
+        Predicts and builds the map that settings (``section.key=value``) describe, runs sweeps over
+        it, and returns the map's name and the rows of all runs.
+    progress : callable, optional
+        Called with parts of the work done and parts in all.
+    layout_file : Path, optional
+        TOML of a scene other than the paper's, for papers that take one.
+    """
+
+    trials: int
+    seed: int
+    executor: Executor
+    sweep: Callable[[Sequence[str], Sequence[SweepPlan]], tuple[str, pd.DataFrame]]
+    progress: Progress | None = None
+    layout_file: Path | None = None
+
+
+@dataclass(frozen=True)
+class Paper(Generic[Run]):
+    """A paper whose experiments can be repeated.
+
+    Parameters
+    ----------
+    name, title : str
+        As on the command line; author, year and subject.
+    trials : int
+        By default.
+    run : callable
+        Runs all experiments.
+    summary : callable
+        Returns the figures of a run by name, ready for JSON; documents them. ``rows``, where there
+        are any, are also in a table. ``outputs``, where it is among them, keeps the place of the
+        files.
+    tables : callable
+        Returns the tables of a run by name.
+    pictures : callable
+        Draws a run, picture by picture, each with its name.
+    unit : str
+        What ``progress`` counts.
+    trial_limits : (int, int or None)
+        Least and most trials.
+    why : str
+        Why others are refused.
+    options : tuple of str
+        Options of the command line that not all papers take.
+    """
+
+    name: str
+    title: str
+    trials: int
+    run: Callable[[PaperSettings], Run]
+    summary: Callable[[Run], dict[str, Any]]
+    tables: Callable[[Run], Mapping[str, pd.DataFrame]]
+    pictures: Callable[[Run], Iterator[Picture]]
+    unit: str = "trials"
+    trial_limits: tuple[int, int | None] = (1, None)
+    why: str = ""
+    options: tuple[str, ...] = ()

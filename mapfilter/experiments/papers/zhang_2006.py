@@ -1,0 +1,337 @@
+"""Zhang, Knedlik & Loffeld (2006): bounds for timing advance and levels in GSM, and filters.
+
+The paper prints neither the positions of its three base stations nor how filters were started
+exactly; the defaults here are stated with the results.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from mapfilter._types import Floats
+from mapfilter.evaluation.bounds import (
+    bound_of,
+    expected_information,
+    posterior_bound,
+    rmse_over_time,
+)
+from mapfilter.experiments.papers.paper import Paper, PaperSettings, Picture
+from mapfilter.filters.gaussian import EKF, IEKF, UKF, Method
+from mapfilter.filters.gaussian_sum import run_mixtures, split
+from mapfilter.filters.trials import run_trials
+from mapfilter.models.gaussian import GaussianTerms, stack
+from mapfilter.models.motion import LinearMotion, constant_velocity
+from mapfilter.models.ranging import timing_advances
+from mapfilter.models.signal_strength import levels
+from mapfilter.models.state import MOVING
+from mapfilter.positioning.kalman.models import compiled
+from mapfilter.positioning.kalman.static_fix import static_fix
+from mapfilter.report.canvas import BLACK, BLUE, GREY, ORANGE, PURPLE, SKY, VERMILLION
+from mapfilter.report.curves import Curve, Panel, curves_of, plot_error_panels
+
+Combination = Literal["fusion", "ta", "rss"]
+COMBINATIONS: tuple[Combination, ...] = ("fusion", "ta", "rss")
+
+INTERVAL_S, ACCELERATION_MPS2 = 0.48, 0.1
+START = (0.0, 15.0, 3000.0, 0.0)
+SIGMA_TA_M, SIGMA_RSS_DB = 288.0, 4.0
+LOSS_AT_KM_DB, EXPONENT = 132.85, 3.8
+PRIOR_POSITION_M, PRIOR_VELOCITY_MPS = 5000.0, 50.0
+SITES_M = ((0.0, 0.0), (6000.0, 0.0), (3000.0, 6000.0))
+"""Not in the paper: a triangle around the road."""
+
+SIGMAS_DB = (0.4, 4.0, 40.0)
+STEPS = 400
+FAR_M = 1000.0
+POSITION = (0, 2)
+VELOCITY = (1, 3)
+
+MOST_TRIALS = 20_000
+"""All are in memory at once."""
+
+AT = (10, 100, 400)
+OVER_AT = (50, 100, 200, 400)
+
+PUBLISHED = (
+    "Fig. 1: fusion is better than either kind alone",
+    "Fig. 2: fusion gains most where levels are noisy",
+    "Fig. 3: the EKF started from a timing advance attains the bound",
+)
+"""What the paper claims; it prints no values."""
+
+ASSUMPTIONS = (
+    "base stations at (0, 0), (6000, 0) and (3000, 6000) m, which the paper does not print",
+    "400 steps of 0.48 s; the bound at k holds the readings of steps 1 to k and the prior, not "
+    "the timing advances that filters are started from",
+    "filters are started from a fix by the three timing advances at k = 0, by least squares with "
+    "its covariance, and a velocity drawn with 50 m/s about the truth",
+    "wide starts are drawn with 5 km and 50 m/s about the truth, as P(0) says",
+    "filters know the true process noise; timing advance is not rounded",
+)
+
+
+def motion() -> LinearMotion:
+    """Return the paper's motion (eqs. 1 and 2)."""
+    return constant_velocity(INTERVAL_S, ACCELERATION_MPS2)
+
+
+def measurement(combination: Combination, sigma_db: float = SIGMA_RSS_DB) -> GaussianTerms:
+    """Return timing advances, losses, or both (eq. 4)."""
+    advances = timing_advances(MOVING, SITES_M, SIGMA_TA_M)
+    law: dict[str, Any] = {"loss_at_km_db": LOSS_AT_KM_DB, "exponent": EXPONENT}
+    losses = levels(MOVING, SITES_M, sigma_db, quantity="loss", **law)
+    return stack({"fusion": [advances, losses], "ta": [advances], "rss": [losses]}[combination])
+
+
+def prior_covariance() -> Floats:
+    """Return P(0) of section 4."""
+    return np.diag(np.square([PRIOR_POSITION_M, PRIOR_VELOCITY_MPS] * 2))
+
+
+def true_states(trials: int, rng: np.random.Generator, steps: int = STEPS) -> Floats:
+    """Draw true states at k = 1 ... K, shape (T, K, 4)."""
+    states, model = np.empty((trials, steps, 4)), motion()
+    now = np.tile(np.array(START), (trials, 1))
+    for k in range(steps):
+        now = model.sample(now, rng)
+        states[:, k] = now
+    return states
+
+
+def bounds(states: Floats, combination: Combination, sigma_db: float) -> Floats:
+    """Return the bound on the covariance at each step, shape (K, 4, 4)."""
+    information = expected_information(measurement(combination, sigma_db), states)
+    model = motion()
+    return posterior_bound(model.transition, model.noise, prior_covariance(), information)
+
+
+class Started(NamedTuple):
+    """Where filters begin: means (T, 4), and a covariance of each trial (T, 4, 4) or of all."""
+
+    means: Floats
+    covariance: Floats
+
+
+def started_from_fix(trials: int, rng: np.random.Generator) -> Started:
+    """Draw one reading of the timing advances at k = 0 in each trial and solve for its position."""
+    model, start = measurement("ta"), np.array(START)
+    readings = model.sample(np.tile(start, (trials, 1)), rng)
+    middle = np.append(np.mean(SITES_M, axis=0), 0.0)[[0, 2, 1, 2]]
+    means = np.empty((trials, 4))
+    covariance = np.zeros((trials, 4, 4))
+    for trial, reading in enumerate(readings):
+        fix = static_fix(model, reading, middle, POSITION)
+        means[trial] = fix.state
+        covariance[trial][np.ix_(POSITION, POSITION)] = fix.covariance
+    means[:, VELOCITY] = start[list(VELOCITY)]
+    means[:, VELOCITY] += PRIOR_VELOCITY_MPS * rng.standard_normal((trials, 2))
+    covariance[:, VELOCITY, VELOCITY] = PRIOR_VELOCITY_MPS**2
+    return Started(means, covariance)
+
+
+def started_wide(trials: int, rng: np.random.Generator) -> Started:
+    """Draw starts from P(0) about the truth."""
+    covariance = prior_covariance()
+    drawn = rng.standard_normal((trials, 4)) * np.sqrt(np.diagonal(covariance))
+    return Started(np.array(START) + drawn, covariance)
+
+
+def run_filter(
+    method: Method,
+    states: Floats,
+    combination: Combination,
+    start: Started,
+    rng: np.random.Generator,
+) -> Floats:
+    """Draw readings at σ_l 4 dB and run a filter over them; return its means, (T, K, 4)."""
+    given, model = measurement(combination), motion()
+    readings = given.sample(states, rng)
+    first = start.means, start.covariance
+    moving = model.transition, model.noise
+    return run_trials(compiled(given), *moving, method, *first, readings).means
+
+
+def run_sum(
+    states: Floats,
+    combination: Combination,
+    start: Started,
+    rng: np.random.Generator,
+    parts: int = 9,
+) -> Floats:
+    """Run a Gaussian sum of EKFs from a wide start, cut into ``parts`` along east and north."""
+    given, model = measurement(combination), motion()
+    readings = given.sample(states, rng)
+    first = split(np.zeros(4), start.covariance, {0: parts, 2: parts})
+    moving = model.transition, model.noise
+    return run_mixtures(compiled(given), *moving, EKF, first, start.means, readings).means
+
+
+@dataclass(frozen=True, eq=False)
+class PaperRun:
+    """Curves over k = 1 ... 400; the first index of each is k = 1.
+
+    Parameters
+    ----------
+    trials : int
+    bounds : dict
+        By σ_l in dB, then by combination, the bound's covariances (K, 4, 4).
+    from_fix, velocity_from_fix : dict
+        By combination the position and the velocity error of the EKF started from a fix.
+    wide : dict
+        By combination, then filter, the position error from the wide start.
+    astray : dict
+        By combination, then filter, the share of trials more than 1 km off at the end of that.
+    """
+
+    trials: int
+    bounds: dict[float, dict[str, Floats]]
+    from_fix: dict[str, Floats]
+    velocity_from_fix: dict[str, Floats]
+    wide: dict[str, dict[str, Floats]]
+    astray: dict[str, dict[str, float]]
+
+
+def run_paper(settings: PaperSettings) -> PaperRun:
+    """Run bounds and filters of all figures, and the wide starts."""
+    trials, progress = settings.trials, settings.progress
+    truth_rng, rng = np.random.default_rng(settings.seed).spawn(2)
+    states = true_states(trials, truth_rng)
+    found: dict[float, dict[str, Floats]] = {
+        sigma: {name: bounds(states, name, sigma) for name in COMBINATIONS} for sigma in SIGMAS_DB
+    }
+    start, vague = started_from_fix(trials, rng), started_wide(trials, rng)
+    run = PaperRun(trials, found, {}, {}, {}, {})
+    for done, name in enumerate(COMBINATIONS, start=1):
+        means = run_filter(EKF, states, name, start, rng)
+        run.from_fix[name] = rmse_over_time(means, states, POSITION)
+        run.velocity_from_fix[name] = rmse_over_time(means, states, VELOCITY)
+        wide = {one.name: run_filter(one, states, name, vague, rng) for one in (EKF, IEKF, UKF)}
+        wide["gaussian_sum"] = run_sum(states, name, vague, rng)
+        run.wide[name] = {
+            one: rmse_over_time(means, states, POSITION) for one, means in wide.items()
+        }
+        off_m = {one: (means - states)[:, -1][:, list(POSITION)] for one, means in wide.items()}
+        run.astray[name] = {
+            one: float(np.mean(np.hypot(*off.T) > FAR_M)) for one, off in off_m.items()
+        }
+        if progress is not None:
+            progress(done, len(COMBINATIONS))
+    return run
+
+
+def summary(run: PaperRun) -> dict[str, Any]:
+    """Return bounds and what filters reach of them; indices are k.
+
+    ``bound_m``: by σ_l in dB, combination and k, the bound on the position. ``ekf_over_bound``: by
+    k, the position error of the EKF started from a fix, over the bound; TA and RSS.
+    ``single_over_fusion_bound``: the same of filters with one kind of measurement, over the bound
+    of both (Fig. 3). ``wide_over_bound``: by combination, filter and k, from the start known to
+    5 km, over the combination's bound. ``wide_astray``: by combination and filter, the share of
+    trials more than 1 km off at the end of that.
+    """
+    bound = _position_bounds(run)
+    own_bound = bound[SIGMA_RSS_DB]
+    over = {kind: _at(own / own_bound["fusion"], OVER_AT) for kind, own in run.from_fix.items()}
+    return {
+        "bound_m": {
+            f"{sigma:g}": {kind: _at(own, AT) for kind, own in kinds.items()}
+            for sigma, kinds in bound.items()
+        },
+        "ekf_over_bound": over["fusion"],
+        "single_over_fusion_bound": {kind: over[kind] for kind in ("ta", "rss")},
+        "wide_over_bound": {
+            kind: {name: _at(error / own_bound[kind], AT) for name, error in filters.items()}
+            for kind, filters in run.wide.items()
+        },
+        "wide_astray": run.astray,
+        "claims": PUBLISHED,
+        "trials": run.trials,
+        "assumptions": ASSUMPTIONS,
+    }
+
+
+def tables(run: PaperRun) -> dict[str, pd.DataFrame]:
+    """Return the bounds on the position by σ_l and combination."""
+    rows = [
+        {"sigma_l_db": f"{sigma:g}", "method": kind}
+        | {f"bound_m_{k}": value for k, value in _at(own, AT).items()}
+        for sigma, kinds in _position_bounds(run).items()
+        for kind, own in kinds.items()
+    ]
+    return {"bounds": pd.DataFrame(rows)}
+
+
+def _position_bounds(run: PaperRun) -> dict[float, dict[str, Floats]]:
+    return {
+        sigma: {kind: bound_of(own, POSITION) for kind, own in kinds.items()}
+        for sigma, kinds in run.bounds.items()
+    }
+
+
+def _at(curve: Floats, indices: Iterable[int]) -> dict[str, float]:
+    return {str(k): float(curve[k - 1]) for k in indices}
+
+
+_KINDS = {"fusion": ("TA + RSS", BLUE), "ta": ("TA", ORANGE), "rss": ("RSS", VERMILLION)}
+_FILTERS = {
+    "ekf": ("EKF", VERMILLION, "-"),
+    "iekf": ("iterated EKF", PURPLE, "-"),
+    "ukf": ("UKF, α = 1", SKY, "-"),
+    "gaussian_sum": ("Gaussian sum", BLUE, "-"),
+}
+
+
+def pictures(run: PaperRun) -> Iterator[Picture]:
+    """Draw Figs. 1 to 3, and what filters make of a start known to 5 km."""
+    found = run.bounds[SIGMA_RSS_DB]
+
+    def bound(own: dict[str, Floats], kind: str, parts: tuple[int, ...] = POSITION) -> Curve:
+        name, colour = _KINDS[kind]
+        return Curve(f"PCRB, {name}", bound_of(own[kind], parts), colour, "--")
+
+    of = (("position", "m", POSITION), ("velocity", "(m/s)", VELOCITY))
+    panels = [
+        Panel(title, f"bound / {unit}", [bound(found, kind, parts) for kind in _KINDS], True)
+        for title, unit, parts in of
+    ]
+    yield "figure-1", plot_error_panels(panels, title="Fig. 1: bounds, σ_d 288 m, σ_l 4 dB")
+    label = "bound on position / m"
+    panels = [
+        Panel(f"σ_l = {sigma:g} dB", label, [bound(own, kind) for kind in ("fusion", "rss")], True)
+        for sigma, own in run.bounds.items()
+    ]
+    title = "Fig. 2: bounds and the noise of levels"
+    yield "figure-2", plot_error_panels(panels, title=title, columns=3)
+    panels = []
+    for (title, unit, parts), errors in zip(of, (run.from_fix, run.velocity_from_fix), strict=True):
+        curves = [Curve(f"EKF, {name}", errors[kind], col) for kind, (name, col) in _KINDS.items()]
+        curves.append(Curve("PCRB, TA + RSS", bound_of(found["fusion"], parts), BLACK, "--"))
+        panels.append(Panel(title, f"RMSE / {unit}", curves, True))
+    title = f"Fig. 3: EKF started from a timing advance, {run.trials} trials"
+    yield "figure-3", plot_error_panels(panels, title=title)
+    panels = []
+    for kind, own in run.wide.items():
+        limit = Curve("PCRB", bound_of(found[kind], POSITION), GREY, "--")
+        curves = [*curves_of(own, _FILTERS), limit]
+        panels.append(Panel(_KINDS[kind][0], "position RMSE / m", curves, True))
+    title = f"Started within 5 km, σ_l 4 dB, {run.trials} trials"
+    yield "wide-start", plot_error_panels(panels, title=title, columns=3)
+
+
+PAPER = Paper(
+    name="zhang-2006",
+    title="Zhang, Knedlik & Loffeld (2006): timing advances and levels of GSM",
+    trials=1000,
+    trial_limits=(1, MOST_TRIALS),
+    why="all trials are in memory at once",
+    unit="parts",
+    run=run_paper,
+    summary=summary,
+    tables=tables,
+    pictures=pictures,
+)

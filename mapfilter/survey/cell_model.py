@@ -1,0 +1,319 @@
+"""How the level of one cell depends on the place: a trend and residuals about it.
+
+A trend is ``offset + slope * covariate``: the covariate is the loss over distance, a prediction, or
+nothing. It is fitted by generalised least squares, because neighbouring levels err together, with
+normal priors, because a cell may have been received along one street only. Residuals are those of a
+Gaussian process, or of nearest neighbours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.optimize import minimize
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+from sklearn.neighbors import NearestNeighbors
+
+from mapfilter._types import Floats, Ints
+from mapfilter.survey.measurements import Points
+
+Covariate = Callable[[Floats, Floats], Floats]
+"""From east and north (m) to a value for each place."""
+
+EXPONENT, EXPONENT_DEVIATION = 3.5, 0.7
+"""Prior of the path-loss exponent: between free space and a dense city."""
+OFFSET_DEVIATION_DB = 12.0
+"""Prior deviation of a cell's mean level from that of all cells."""
+
+_SEARCH_BEYOND_M = 800.0
+_GRID = 25
+_ROUNDS = 4
+_ANTENNA_ABOVE_PHONE_M = 25.0
+
+
+@dataclass(frozen=True)
+class DistanceLoss:
+    """``-10 log10 d``, d the slant distance from an antenna: its factor is the exponent."""
+
+    east_m: float
+    north_m: float
+    above_phone_m: float = _ANTENNA_ABOVE_PHONE_M
+
+    def __call__(self, east_m: Floats, north_m: Floats) -> Floats:
+        """Return the covariate at places."""
+        return _distance_loss(east_m - self.east_m, north_m - self.north_m, self.above_phone_m)
+
+
+@dataclass(frozen=True, eq=False)
+class Trend:
+    """A fitted trend: ``offset_dbm + slope * (covariate - centre)``.
+
+    Without a covariate it is a mean level alone. ``covariance`` (2, 2) is that of offset and slope,
+    ``cost`` minus twice the log marginal likelihood, up to a constant.
+    """
+
+    covariate: Covariate | None
+    offset_dbm: float
+    slope: float
+    centre: float
+    covariance: Floats
+    cost: float
+
+    def design(self, east_m: Floats, north_m: Floats) -> Floats:
+        """Return the factors of offset and slope at places, shape (N, 2)."""
+        if self.covariate is None:
+            return np.column_stack([np.ones_like(east_m), np.zeros_like(east_m)])
+        return np.column_stack(
+            [np.ones_like(east_m), self.covariate(east_m, north_m) - self.centre]
+        )
+
+    def level_dbm(self, east_m: Floats, north_m: Floats) -> Floats:
+        """Return the trend's level at places."""
+        return np.asarray(self.design(east_m, north_m) @ np.array([self.offset_dbm, self.slope]))
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Normal prior of offset and slope."""
+
+    offset_dbm: float
+    slope: float = EXPONENT
+    slope_deviation: float = EXPONENT_DEVIATION
+    offset_deviation_db: float = OFFSET_DEVIATION_DB
+
+
+def fit_trend(
+    covariate: Covariate | None, points: Points, covariance_db2: Floats, prior: Prior
+) -> Trend:
+    """Fit offset and slope of a covariate to levels with a covariance of errors (N, N)."""
+    east_m, level_dbm = points.east_m, points.level_dbm
+    values = np.zeros_like(east_m) if covariate is None else covariate(east_m, points.north_m)
+    centre = float(values.mean())
+    root = cholesky(covariance_db2, lower=True)
+    offset, slope, spread, cost = _profile(root, level_dbm, (values - centre)[:, None], prior)
+    return Trend(
+        covariate, float(offset[0]), float(slope[0]), centre, spread[:, :, 0], float(cost[0])
+    )
+
+
+def locate_antenna(points: Points, covariance_db2: Floats, prior: Prior) -> DistanceLoss:
+    """Estimate where a cell's antenna is from levels with a covariance of errors (N, N).
+
+    The place with the largest marginal likelihood of the levels under the path-loss trend, offset
+    and exponent integrated out, on a grid that is refined about the best point of each round.
+    """
+    east_m, north_m, level_dbm = points.east_m, points.north_m, points.level_dbm
+    root = cholesky(covariance_db2, lower=True)
+    centre = np.array([(east_m.min() + east_m.max()) / 2, (north_m.min() + north_m.max()) / 2])
+    half_m = max(np.ptp(east_m), np.ptp(north_m)) / 2 + _SEARCH_BEYOND_M
+    for _ in range(_ROUNDS):
+        steps = np.linspace(-half_m, half_m, _GRID)
+        grid = np.stack(np.meshgrid(centre[0] + steps, centre[1] + steps), axis=-1).reshape(-1, 2)
+        values = _distance_loss(
+            east_m[:, None] - grid[:, 0], north_m[:, None] - grid[:, 1], _ANTENNA_ABOVE_PHONE_M
+        )
+        cost = _profile(root, level_dbm, values - values.mean(axis=0), prior)[3]
+        centre = grid[cost.argmin()]
+        half_m *= 4.0 / _GRID
+    return DistanceLoss(float(centre[0]), float(centre[1]))
+
+
+def _distance_loss(east_m: Floats, north_m: Floats, above_m: float) -> Floats:
+    return np.asarray(-5.0 * np.log10(east_m**2 + north_m**2 + above_m**2))
+
+
+def _profile(
+    root: Floats, level_dbm: Floats, values: Floats, prior: Prior
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Fit many covariates at once, ``values`` (N, M): offset, slope, their covariance, cost (M)."""
+    white = solve_triangular(
+        root, np.column_stack([np.ones(len(values)), level_dbm - prior.offset_dbm]), lower=True
+    )
+    ones, level = white[:, :1], white[:, 1:]
+    values = solve_triangular(root, values, lower=True)
+    weight = 1 / prior.offset_deviation_db**2, 1 / prior.slope_deviation**2
+    a = (ones**2).sum(axis=0) + weight[0]
+    b = (ones * values).sum(axis=0)
+    c = (values**2).sum(axis=0) + weight[1]
+    right_a = (ones * level).sum(axis=0)
+    right_c = (values * level).sum(axis=0) + weight[1] * prior.slope
+    determinant = a * c - b**2
+    offset = (c * right_a - b * right_c) / determinant
+    slope = (a * right_c - b * right_a) / determinant
+    cost = (
+        (level**2).sum()
+        + weight[1] * prior.slope**2
+        - offset * right_a
+        - slope * right_c
+        + np.log(determinant)
+    )
+    spread = np.array([[c, -b], [-b, np.broadcast_to(a, c.shape)]]) / determinant
+    return offset + prior.offset_dbm, slope, spread, cost
+
+
+_CHUNK = 4096
+_LEARNT_FROM = 250
+_LEARNT_FROM_CELLS = 40
+_BOUNDS = np.log([[1.0, 400.0], [10.0, 1000.0], [0.5, 200.0]])
+_SOFTENING_M = 20.0
+_PRIOR_WEIGHT = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class Shadowing:
+    """Variances and correlation length of the levels about their trend.
+
+    The correlation falls as ``exp(-distance / correlation_m)`` (Gudmundson, Electronics Letters 27,
+    1991); the noise is what a second reading at the same spot would differ by.
+    """
+
+    variance_db2: float = 25.0
+    correlation_m: float = 60.0
+    noise_db2: float = 16.0
+
+    @property
+    def kernel(self) -> object:
+        """As a kernel of scikit-learn."""
+        shadow = ConstantKernel(self.variance_db2) * Matern(self.correlation_m, nu=0.5)
+        return shadow + WhiteKernel(self.noise_db2)
+
+    def covariance_db2(self, points: Points) -> Floats:
+        """Return the covariance of levels, shape (N, N)."""
+        return np.asarray(self.kernel(points.places))  # type: ignore[operator]
+
+
+def learn_shadowing(
+    points: Sequence[Points], trends: Sequence[Trend], start: Shadowing
+) -> Shadowing:
+    """Return the shadowing under which the levels of all cells together are likeliest.
+
+    There are one of ``points`` and ``trends`` per cell; the 40 cells with the most points are
+    taken. ``start`` is also returned where no cell has two points.
+    """
+    processes = []
+    pairs = [pair for pair in zip(points, trends, strict=True) if len(pair[0]) > 1]
+    pairs.sort(key=lambda pair: -len(pair[0]))
+    for some, trend in pairs[:_LEARNT_FROM_CELLS]:
+        thin = some.thinned(_LEARNT_FROM)
+        residual_db = thin.level_dbm - trend.level_dbm(thin.east_m, thin.north_m)
+        process = GaussianProcessRegressor(start.kernel, optimizer=None)
+        processes.append(process.fit(thin.places, residual_db))
+    if not processes:
+        return start
+
+    def cost(theta: Floats) -> tuple[float, Floats]:
+        value, slope = 0.0, np.zeros(3)
+        for process in processes:
+            likelihood, gradient = process.log_marginal_likelihood(theta, eval_gradient=True)
+            value -= likelihood
+            slope -= gradient
+        return value, slope
+
+    first = np.log([start.variance_db2, start.correlation_m, start.noise_db2])
+    best = minimize(cost, first, jac=True, method="L-BFGS-B", bounds=_BOUNDS)
+    return Shadowing(*np.exp(best.x).tolist())
+
+
+class GaussianField:
+    """A Gaussian process about a trend; the trend's own uncertainty is in the deviation.
+
+    With offset and slope uncertain this is universal kriging: the process is also asked how much of
+    the design it explains, and what it does not explain carries the trend's covariance
+    (Rasmussen & Williams 2006, eq. 2.42).
+    """
+
+    def __init__(self, points: Points, trend: Trend, shadowing: Shadowing) -> None:
+        design = trend.design(points.east_m, points.north_m)
+        residual_db = points.level_dbm - design @ [trend.offset_dbm, trend.slope]
+        process = GaussianProcessRegressor(shadowing.kernel, optimizer=None)
+        self._process = process.fit(points.places, np.column_stack([residual_db, design]))
+        self._trend = trend
+
+    def predict(self, east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
+        """Return the mean level and the deviation of a new reading at places."""
+        mean_dbm, deviation_db = np.empty(len(east_m)), np.empty(len(east_m))
+        for first in range(0, len(east_m), _CHUNK):
+            some = slice(first, first + _CHUNK)
+            places = np.column_stack([east_m[some], north_m[some]])
+            found, own = self._process.predict(places, return_std=True)
+            design = self._trend.design(east_m[some], north_m[some])
+            unexplained = design - found[:, 1:]
+            spread = np.einsum("ni,ij,nj->n", unexplained, self._trend.covariance, unexplained)
+            mean_dbm[some] = design @ [self._trend.offset_dbm, self._trend.slope] + found[:, 0]
+            deviation_db[some] = np.sqrt(own[:, 0] ** 2 + spread)
+        return mean_dbm, deviation_db
+
+
+class NeighbourField:
+    """The distance-weighted mean of the nearest points' residuals about a trend.
+
+    The deviation is the error with which those points are predicted by their neighbours of other
+    sessions, drawn towards that of all points where there are few.
+    """
+
+    def __init__(self, points: Points, trend: Trend, shadowing: Shadowing, neighbours: int) -> None:
+        self._trend = trend
+        self._residual_db = points.level_dbm - trend.level_dbm(points.east_m, points.north_m)
+        self._near = _Nearest(points.places, self._residual_db, neighbours)
+        overall_db2 = shadowing.variance_db2 + shadowing.noise_db2
+        self._squared_db2 = np.full(len(points), overall_db2, dtype=np.float64)
+        sessions = np.unique(points.session)
+        for session in sessions if len(sessions) > 1 else ():
+            out = points.session == session
+            others = _Nearest(points.places[~out], self._residual_db[~out], neighbours)
+            error_db = self._residual_db[out] - others.mean(points.places[out])[0]
+            self._squared_db2[out] = error_db**2
+        if len(sessions) == 1 and len(points) > 1:
+            self._squared_db2 = (self._residual_db - self._near.mean(None)[0]) ** 2
+        self._overall_db2 = float(self._squared_db2.mean())
+
+    def predict(self, east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
+        """Return the mean level and the deviation of a new reading at places."""
+        mean_dbm = self._trend.level_dbm(east_m, north_m)
+        if not len(east_m):
+            return mean_dbm, mean_dbm
+        near_db, index, weights = self._near.mean(np.column_stack([east_m, north_m]))
+        own_db2 = np.average(self._squared_db2[index], axis=1, weights=weights)
+        count = index.shape[1]
+        total_db2 = count * own_db2 + _PRIOR_WEIGHT * self._overall_db2
+        return mean_dbm + near_db, np.sqrt(total_db2 / (count + _PRIOR_WEIGHT))
+
+
+class _Nearest:
+    def __init__(self, places: Floats, values: Floats, neighbours: int) -> None:
+        count = min(neighbours, len(places))
+        self._search = NearestNeighbors(n_neighbors=count).fit(places)
+        self._values = values
+
+    def mean(self, places: Floats | None) -> tuple[Floats, Ints, Floats]:
+        """Return weighted means, and the neighbours and weights behind them.
+
+        Without places: at each of its own points, from the others.
+        """
+        most = len(self._values) - (places is None)
+        count = min(self._search.n_neighbors, most)
+        distance_m, index = self._search.kneighbors(places, n_neighbors=count)
+        weights = 1 / (distance_m + _SOFTENING_M)
+        return np.average(self._values[index], axis=1, weights=weights), index, weights
+
+
+class TrendField:
+    """The trend alone."""
+
+    def __init__(self, trend: Trend, shadowing: Shadowing) -> None:
+        self._trend = trend
+        self._variance_db2 = shadowing.variance_db2 + shadowing.noise_db2
+
+    def predict(self, east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
+        """Return the mean level and the deviation of a new reading at places."""
+        design = self._trend.design(east_m, north_m)
+        spread = np.einsum("ni,ij,nj->n", design, self._trend.covariance, design)
+        level_dbm = design @ [self._trend.offset_dbm, self._trend.slope]
+        return level_dbm, np.sqrt(self._variance_db2 + spread)
+
+
+ResidualField = GaussianField | NeighbourField | TrendField

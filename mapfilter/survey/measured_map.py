@@ -1,0 +1,413 @@
+"""Measured maps: levels with positions become mean and deviation at every place near them.
+
+Each cell's levels are a trend (path loss from its antenna, or a calibrated prediction) and
+residuals about it: a Gaussian process, or nearest neighbours. An antenna of unknown place is
+located from the levels. Maps are validated where sessions were left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.spatial import cKDTree
+from threadpoolctl import threadpool_limits
+
+from mapfilter._parallel import Progress
+from mapfilter._types import Bools, Floats, Ints
+from mapfilter.errors import ConfigError, Faults, InputError, fail
+from mapfilter.radio.cells import CellPlan
+from mapfilter.survey.cell_model import (
+    Covariate,
+    DistanceLoss,
+    GaussianField,
+    NeighbourField,
+    Prior,
+    ResidualField,
+    Shadowing,
+    Trend,
+    TrendField,
+    fit_trend,
+    learn_shadowing,
+    locate_antenna,
+)
+from mapfilter.survey.measurements import Measurements, Points, points_by_cell
+
+_ROUNDS = 2
+_LOCATED_FROM = 300
+_PHONE_HEIGHT_M = 1.5
+_CALIBRATION = {"slope": 1.0, "slope_deviation": 0.2}
+
+
+@dataclass(frozen=True)
+class SurveyOptions:
+    """How measurements become a map.
+
+    Parameters
+    ----------
+    method : {"gp", "knn", "trend"}
+        Gaussian process, nearest neighbours, or the trend alone.
+    trend : {"path_loss", "mean"}
+        Path loss from the antenna, or the cell's mean level. Not used where a prediction is
+        calibrated.
+    reach_m : float
+        Places farther than this from every reading of a cell count as not measured.
+    min_points : int
+        Cells received in fewer squares are left out.
+    min_points_to_locate : int
+        An antenna of unknown place is located from at least so many; with fewer the trend is the
+        mean.
+    neighbours : int
+        For "knn".
+    square_m : float
+        Readings of one session in one such square count once.
+    most_points : int
+        Larger squares are taken for a cell until it has at most so many points.
+    """
+
+    method: Literal["gp", "knn", "trend"] = "gp"
+    trend: Literal["path_loss", "mean"] = "path_loss"
+    reach_m: float = 100.0
+    min_points: int = 3
+    min_points_to_locate: int = 15
+    neighbours: int = 8
+    square_m: float = 10.0
+    most_points: int = 1500
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        if self.method not in ("gp", "knn", "trend"):
+            faults.add("survey, method", "gp, knn or trend", repr(self.method))
+        if self.trend not in ("path_loss", "mean"):
+            faults.add("survey, trend", "path_loss or mean", repr(self.trend))
+        least = {"reach_m": 1.0, "min_points": 1, "min_points_to_locate": 3}
+        least |= {"neighbours": 1, "square_m": 0.1, "most_points": 10}
+        for name, low in least.items():
+            value = getattr(self, name)
+            if not low <= value < np.inf:
+                faults.add(f"survey, {name}", f"a number ≥ {low:g}", value)
+        faults.raise_if_any(ConfigError)
+
+
+@dataclass(frozen=True, eq=False)
+class SurveyedCell:
+    """The map of one cell.
+
+    Parameters
+    ----------
+    field : ResidualField
+        Trend and residuals.
+    antenna : (float, float) or None
+        Known or estimated place, east and north (m).
+    estimated : bool
+        Whether the place was estimated from the levels.
+    heard : scipy.spatial.cKDTree
+        Places of all readings.
+    """
+
+    points: Points
+    trend: Trend
+    field: ResidualField
+    antenna: tuple[float, float] | None
+    estimated: bool
+    heard: cKDTree
+
+    def distance_m(self, east_m: Floats, north_m: Floats, beyond_m: float = np.inf) -> Floats:
+        """Return how far places are from the nearest reading; infinite beyond ``beyond_m``."""
+        # The bound itself must still count.
+        bound_m = np.nextafter(beyond_m, np.inf)
+        places = np.column_stack([east_m, north_m])
+        return np.asarray(self.heard.query(places, distance_upper_bound=bound_m)[0])
+
+    def predict(self, east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
+        """Return the mean level (dBm) and the deviation (dB) of a new reading at places."""
+        # Threads make small matrices slower, and their sums depend on how many there are.
+        with threadpool_limits(1):
+            return self.field.predict(east_m, north_m)
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """The maps of all cells.
+
+    Parameters
+    ----------
+    shadowing : Shadowing
+        Learnt from all cells together.
+    cells : mapping of str to SurveyedCell
+        In the order of their ids.
+    notes : tuple of str
+        What was left out or estimated.
+    """
+
+    crs: str
+    options: SurveyOptions
+    shadowing: Shadowing
+    cells: Mapping[str, SurveyedCell]
+    notes: tuple[str, ...]
+
+
+def fit_survey(
+    measurements: Measurements,
+    options: SurveyOptions,
+    *,
+    plan: CellPlan | None = None,
+    predicted: Mapping[str, Covariate] | None = None,
+) -> Survey:
+    """Make the maps of all cells that were received often enough.
+
+    Parameters
+    ----------
+    plan : CellPlan, optional
+        Where antennas are, for the cells it names; the others are located from their levels.
+    predicted : mapping of str to callable, optional
+        Calibrate predictions: for each cell a function from east and north (m) to the predicted
+        level (dBm, NaN where there is none). Offset, slope and residuals are fitted about it.
+        Cells that were not predicted are left out.
+
+    Raises
+    ------
+    InputError
+        No cell was received often enough.
+    """
+    found = points_by_cell(measurements, options.square_m, options.most_points)
+    notes = []
+    if predicted is not None:
+        strange = [cell_id for cell_id in found if cell_id not in predicted]
+        if strange:
+            notes.append(f"{len(strange)} cells left out: not in the prediction")
+        found = {
+            cell_id: some.some(np.isfinite(predicted[cell_id](some.east_m, some.north_m)))
+            for cell_id, some in found.items()
+            if cell_id in predicted
+        }
+    points = [some for some in found.values() if len(some) >= options.min_points]
+    if len(points) < len(found):
+        few = len(found) - len(points)
+        notes.append(f"{few} cells left out: received in fewer than {options.min_points} squares")
+    if not points:
+        hint = "cells named differently than in the prediction" if predicted else ""
+        expected = f"a cell received in at least {options.min_points} squares"
+        raise fail(InputError, "measurements", expected, f"{len(found)} cells, none of them", hint)
+    level_dbm = float(np.mean([some.level_dbm.mean() for some in points]))
+    plan = plan.to_crs(measurements.crs) if plan is not None else None
+    shadowing = Shadowing()
+    cells = {}
+    # Threads make small matrices slower, and their sums depend on how many there are.
+    with threadpool_limits(1):
+        for _ in range(_ROUNDS):
+            trends = [_trend(p, options, level_dbm, shadowing, plan, predicted) for p in points]
+            shadowing = learn_shadowing(points, trends, shadowing)
+        for some in points:
+            trend = _trend(some, options, level_dbm, shadowing, plan, predicted)
+            antenna = trend.covariate if isinstance(trend.covariate, DistanceLoss) else None
+            cells[some.cell_id] = SurveyedCell(
+                some,
+                trend,
+                _field(some, trend, shadowing, options),
+                (antenna.east_m, antenna.north_m) if antenna is not None else None,
+                antenna is not None and not (plan is not None and some.cell_id in plan),
+                cKDTree(some.heard_at),
+            )
+    located = sum(cell.estimated for cell in cells.values())
+    if located:
+        notes.append(f"{located} antennas located from their levels")
+    unknown = sum(cell.antenna is None for cell in cells.values())
+    if unknown and predicted is None and options.trend == "path_loss":
+        notes.append(
+            f"{unknown} antennas not located (fewer than {options.min_points_to_locate} squares): "
+            "the trend is their mean level"
+        )
+    return Survey(measurements.crs, options, shadowing, cells, tuple(notes))
+
+
+def _trend(
+    points: Points,
+    options: SurveyOptions,
+    level_dbm: float,
+    shadowing: Shadowing,
+    plan: CellPlan | None,
+    predicted: Mapping[str, Covariate] | None,
+) -> Trend:
+    prior = Prior(level_dbm)
+    covariate: Covariate | None = None
+    if predicted is not None:
+        prior = Prior(level_dbm, **_CALIBRATION)
+        covariate = predicted[points.cell_id]
+    elif options.trend == "path_loss" and plan is not None and points.cell_id in plan:
+        cell = plan[points.cell_id]
+        above_m = max(cell.height_m - _PHONE_HEIGHT_M, 1.0)
+        covariate = DistanceLoss(cell.east_m, cell.north_m, above_m)
+    elif options.trend == "path_loss" and len(points) >= options.min_points_to_locate:
+        some = points.thinned(_LOCATED_FROM)
+        covariate = locate_antenna(some, shadowing.covariance_db2(some), prior)
+    return fit_trend(covariate, points, shadowing.covariance_db2(points), prior)
+
+
+def _field(
+    points: Points, trend: Trend, shadowing: Shadowing, options: SurveyOptions
+) -> ResidualField:
+    if options.method == "gp":
+        return GaussianField(points, trend, shadowing)
+    if options.method == "knn":
+        return NeighbourField(points, trend, shadowing, options.neighbours)
+    return TrendField(trend, shadowing)
+
+
+_MOST_FOLDS = 20
+_PARTS_OF_ONE_SESSION = 5
+_WITHIN_1 = 0.6827
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Errors at measurements that were left out, over all folds.
+
+    Parameters
+    ----------
+    folds : int
+        Times that the map was made anew.
+    by_session : bool
+        Whether whole sessions were left out, or parts in time of the only one.
+    measurements, predicted : int
+        Left out in all, and how many of them the map predicts: cell known, within reach.
+    rmse_db, trend_rmse_db, mean_rmse_db : float
+        Root mean square error of the map, of its trend alone, and of each cell's mean level.
+    bias_db : float
+        Mean of measured less predicted.
+    within_1_deviation, within_2_deviations : float
+        Share of the errors within so many predicted deviations; 0.68 and 0.95 when they are right.
+    deviation_factor : float
+        By which the predicted deviations are to be multiplied so that 68 % of the errors are within
+        one; 1 where nothing was predicted.
+    """
+
+    folds: int
+    by_session: bool
+    measurements: int
+    predicted: int
+    rmse_db: float
+    trend_rmse_db: float
+    mean_rmse_db: float
+    bias_db: float
+    within_1_deviation: float
+    within_2_deviations: float
+    deviation_factor: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LeftOut:
+    """Levels measured in what was left out, and their predictions by the map of the rest.
+
+    Parameters
+    ----------
+    folds, sessions, measurements : int
+        Maps that were made, sessions of the measurements, and measurements left out in all.
+    measured_dbm : numpy.ndarray, shape (N,)
+        Of the measurements that the map predicts: cell known, within reach.
+    predicted_dbm, deviation_db : numpy.ndarray, shape (N,)
+        By the map of the rest.
+    trend_dbm, mean_dbm : numpy.ndarray, shape (N,)
+        By its trend alone, and by each cell's mean level.
+    """
+
+    folds: int
+    sessions: int
+    measurements: int
+    measured_dbm: Floats
+    predicted_dbm: Floats
+    deviation_db: Floats
+    trend_dbm: Floats
+    mean_dbm: Floats
+
+    def __len__(self) -> int:
+        return len(self.measured_dbm)
+
+    @property
+    def validation(self) -> Validation:
+        """The errors in a few figures."""
+        error_db = self.measured_dbm - self.predicted_dbm
+        relative = np.abs(error_db) / self.deviation_db
+        return Validation(
+            self.folds,
+            self.sessions > 1,
+            self.measurements,
+            len(self),
+            _rms(error_db),
+            _rms(self.measured_dbm - self.trend_dbm),
+            _rms(self.measured_dbm - self.mean_dbm),
+            _mean(error_db),
+            _mean(relative <= 1),
+            _mean(relative <= 2),
+            float(np.quantile(relative, _WITHIN_1)) if len(self) else 1.0,
+        )
+
+
+def leave_out(
+    measurements: Measurements,
+    options: SurveyOptions,
+    *,
+    plan: CellPlan | None = None,
+    predicted: Mapping[str, Covariate] | None = None,
+    progress: Progress | None = None,
+) -> LeftOut:
+    """Leave each session out, make the map of the others, and predict the levels left out.
+
+    Everything is learnt anew for each fold, the shadowing and the antennas' places too. With more
+    than 20 sessions several are left out together. ``progress`` is called with (folds done, folds
+    in all), the other arguments are those of :func:`fit_survey`.
+    """
+    fold, sessions = _folds(measurements)
+    count = int(fold.max()) + 1 if len(fold) else 0
+    found = [np.empty((0, 5))]
+    for number in range(count):
+        out = fold == number
+        try:
+            others = fit_survey(measurements.where(~out), options, plan=plan, predicted=predicted)
+        except InputError:
+            # The other sessions alone are too little for any cell.
+            pass
+        else:
+            found.extend(_predictions(others, measurements.where(out)))
+        if progress is not None:
+            progress(number + 1, count)
+    table = np.concatenate(found)
+    table = table[np.isfinite(table).all(axis=1)]
+    return LeftOut(count, sessions, len(measurements), *table.T)
+
+
+def _folds(measurements: Measurements) -> tuple[Ints, int]:
+    """Return the fold of each measurement, and the number of sessions."""
+    sessions, which = np.unique(measurements.session, return_inverse=True)
+    if len(sessions) > 1:
+        return which % _MOST_FOLDS, len(sessions)
+    order = np.argsort(measurements.time_s, kind="stable")
+    fold = np.empty(len(order), dtype=np.int64)
+    fold[order] = np.arange(len(order)) * _PARTS_OF_ONE_SESSION // max(len(order), 1)
+    return fold, len(sessions)
+
+
+def _predictions(survey: Survey, left_out: Measurements) -> list[Floats]:
+    """Return for each cell the columns of :class:`LeftOut`, a row per measurement in reach."""
+    reach_m, found = survey.options.reach_m, []
+    for index in np.unique(left_out.cell):
+        cell = survey.cells.get(left_out.cell_ids[index])
+        if cell is None:
+            continue
+        some = left_out.where(left_out.cell == index)
+        near = cell.distance_m(some.east_m, some.north_m, reach_m) <= reach_m
+        place = some.east_m[near], some.north_m[near]
+        mean_dbm = np.full(len(place[0]), cell.points.level_dbm.mean())
+        predicted = *cell.predict(*place), cell.trend.level_dbm(*place), mean_dbm
+        found.append(np.column_stack((some.level_dbm[near], *predicted)))
+    return found
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
+
+
+def _mean(values: Floats | Bools) -> float:
+    return float(np.mean(values)) if values.size else float("nan")

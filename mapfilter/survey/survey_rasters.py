@@ -1,0 +1,196 @@
+"""A survey on a lattice: rasters of mean and deviation, the plan of its cells, and calibration."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapfilter._parallel import Progress
+from mapfilter._types import Floats, Ints
+from mapfilter.errors import InputError, fail
+from mapfilter.geodesy import Lattice
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.survey.cell_model import Covariate
+from mapfilter.survey.measured_map import Survey, SurveyedCell
+from mapfilter.survey.measurement_rows import Identity
+
+_FIELD_LENGTHS = 4.0
+_LARGEST_WINDOW_PX = 1_000_000
+_STRONGEST = 0.25
+
+
+def write_survey(
+    survey: Survey,
+    lattice: Lattice,
+    mean_path: Path,
+    deviation_path: Path,
+    *,
+    fill: bool = False,
+    deviation_factor: float = 1.0,
+    tags: Mapping[str, str] | None = None,
+    progress: Progress | None = None,
+) -> tuple[str, ...]:
+    """Write the mean levels and their deviations, one band per cell, and return the cells' ids.
+
+    Pixels farther from every reading of a cell than the survey's reach are NaN in both files; with
+    ``fill`` the first has the trend (the calibrated prediction) there, and the NaN of the second
+    still marks them. Cells not measured on the lattice, in the survey's CRS, are left out.
+    ``deviation_factor`` multiplies the deviations.
+
+    Raises
+    ------
+    InputError
+        No cell was measured on the lattice.
+    """
+    ids: list[str] = []
+    with tempfile.TemporaryFile() as spool:
+        for done, (cell_id, cell) in enumerate(survey.cells.items(), start=1):
+            found = _on_lattice(survey, cell, lattice, fill)
+            if found is not None:
+                ids.append(cell_id)
+                pixels, levels = found
+                levels[1] *= deviation_factor
+                np.save(spool, pixels)
+                np.save(spool, levels.astype(np.float32))
+            if progress is not None:
+                progress(done, len(survey.cells))
+        if not ids:
+            bounds = ", ".join(f"{value:.0f}" for value in lattice.bounds_m)
+            raise fail(InputError, "measurements", f"some in the area {bounds}", "none")
+        for path, row, quantity in ((mean_path, 0, "level"), (deviation_path, 1, "deviation")):
+            bands = _bands(spool, ids, row, lattice)
+            write_rasters(path, lattice, bands, ids, tags, quantity=quantity)  # type: ignore[arg-type]
+    return tuple(ids)
+
+
+def surveyed_plan(
+    survey: Survey,
+    ids: Sequence[str],
+    identities: Mapping[str, Identity],
+    plan: CellPlan | None,
+    *,
+    height_m: float,
+    eirp_dbm: float,
+    frequency_mhz: float,
+) -> CellPlan:
+    """Return a plan of surveyed cells: as given, else with the antenna where it was located.
+
+    An antenna that could not be located is put amid the strongest quarter of its readings.
+    """
+    known = plan.to_crs(survey.crs) if plan is not None else None
+    cells = []
+    for cell_id in ids:
+        if known is not None and cell_id in known:
+            cells.append(known[cell_id])
+            continue
+        place = survey.cells[cell_id].antenna or _amid_strongest(survey.cells[cell_id])
+        mcc, mnc, lac, ci = identities.get(cell_id, (None, None, None, None))
+        cell = Cell(cell_id, cell_id, *place, height_m, None, eirp_dbm, frequency_mhz, "omni")
+        cells.append(replace(cell, mcc=mcc, mnc=mnc, lac=lac, ci=ci))
+    return CellPlan(survey.crs, tuple(cells))
+
+
+@dataclass(frozen=True)
+class PredictedLevel:
+    """The predicted level of one cell at places, read from rasters where it is asked for."""
+
+    rasters: RxLevRasters
+    plan: CellPlan | None
+    cell_id: str
+
+    def __call__(self, east_m: Floats, north_m: Floats) -> Floats:
+        """Return dBm at places in the rasters' CRS; NaN beyond the rasters."""
+        lattice = self.rasters.lattice
+        row, col = lattice.row_col(east_m, north_m)
+        on = np.asarray(lattice.contains(row, col))
+        level_dbm = np.full(len(row), np.nan)
+        if not on.any():
+            return level_dbm
+        top, left = int(row[on].min()), int(col[on].min())
+        window = (top, left, int(row[on].max()) - top + 1, int(col[on].max()) - left + 1)
+        if self.plan is None or self.rasters.quantity == "level":
+            values = self.rasters.read(window, (self.cell_id,))[0]
+        else:
+            values = self.rasters.read_levels_dbm(self.plan, window, (self.cell_id,))[0]
+        level_dbm[on] = values[row[on] - top, col[on] - left]
+        return level_dbm
+
+
+def predicted_levels(rasters: RxLevRasters, plan: CellPlan | None) -> dict[str, Covariate]:
+    """Return each cell's predicted level as a function of place, for a survey to calibrate.
+
+    The plan is needed for losses only.
+    """
+    return {cell_id: PredictedLevel(rasters, plan, cell_id) for cell_id in rasters.cell_ids}
+
+
+def _on_lattice(
+    survey: Survey, cell: SurveyedCell, lattice: Lattice, fill: bool
+) -> tuple[Ints, Floats] | None:
+    """Return the pixels with a value, and mean and deviation there; None if none was measured."""
+    reach_m = survey.options.reach_m
+    field_m = max(reach_m, _FIELD_LENGTHS * survey.shadowing.correlation_m) if fill else reach_m
+    pixels, levels, measured = [], [], False
+    for row, col, rows, cols in _windows(cell, lattice, reach_m, fill):
+        grid = np.mgrid[row : row + rows, col : col + cols].reshape(2, -1)
+        east_m, north_m = lattice.east_north(grid[0], grid[1])
+        distance_m = cell.distance_m(east_m, north_m, field_m)
+        level = np.full((2, len(east_m)), np.nan)
+        near = distance_m <= field_m
+        level[:, near] = cell.predict(east_m[near], north_m[near])
+        if fill:
+            level[0, ~near] = cell.trend.level_dbm(east_m[~near], north_m[~near])
+        level[1, distance_m > reach_m] = np.nan
+        some = np.isfinite(level[0])
+        measured = measured or bool(np.isfinite(level[1]).any())
+        pixels.append((grid[0] * lattice.cols + grid[1])[some])
+        levels.append(level[:, some])
+    if not measured:
+        return None
+    return np.concatenate(pixels), np.concatenate(levels, axis=1)
+
+
+def _windows(
+    cell: SurveyedCell, lattice: Lattice, reach_m: float, fill: bool
+) -> Iterator[tuple[int, int, int, int]]:
+    """Yield strips of the lattice that hold every pixel in reach of a cell's readings."""
+    top, left, bottom, right = 0, 0, lattice.rows - 1, lattice.cols - 1
+    if not fill:
+        west, south = cell.points.heard_at.min(axis=0) - reach_m
+        east, north = cell.points.heard_at.max(axis=0) + reach_m
+        first_row, first_col = lattice.row_col(west, north)
+        last_row, last_col = lattice.row_col(east, south)
+        top, left = max(top, first_row), max(left, first_col)
+        bottom, right = min(bottom, last_row), min(right, last_col)
+    cols = right - left + 1
+    if cols < 1:
+        return
+    step = max(_LARGEST_WINDOW_PX // cols, 1)
+    for row in range(top, bottom + 1, step):
+        yield row, left, min(step, bottom + 1 - row), cols
+
+
+def _bands(
+    spool: IO[bytes], ids: Sequence[str], which: int, lattice: Lattice
+) -> Iterator[tuple[str, NDArray[Any]]]:
+    spool.seek(0)
+    for cell_id in ids:
+        pixels, levels = np.load(spool), np.load(spool)
+        band = np.full(lattice.rows * lattice.cols, np.nan, dtype=np.float32)
+        band[pixels] = levels[which]
+        yield cell_id, band.reshape(lattice.rows, lattice.cols)
+
+
+def _amid_strongest(cell: SurveyedCell) -> tuple[float, float]:
+    points = cell.points
+    strongest = np.argsort(-points.level_dbm, kind="stable")
+    east_m, north_m = points.places[strongest[: max(int(len(points) * _STRONGEST), 1)]].mean(axis=0)
+    return float(east_m), float(north_m)
