@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import geopandas as gpd
 import numpy as np
@@ -27,33 +26,7 @@ from mapfilter.rasters.geotiff import new_geotiff
 BANDS = (("best_server", ""), ("best_level_dbm", "dBm"), ("margin_db", "dB"))
 CELLS_TAG = "CELLS"
 
-<<<<<<< HEAD
 _TILE_PX = 512
-
-
-def write_cog(database: RadioRouteDatabase, path: Path) -> None:
-    """Write a database; see :func:`mapfilter.database.store.export_cog`."""
-    lattice = database.lattice
-    columns = ("row", "col", *(name for name, _ in BANDS))
-    reader = WindowReader([database.path / POINTS], columns, lattice)
-    rank = {cell_id: number for number, cell_id in enumerate(database.cell_ids)}
-    tags = {CELLS_TAG: json.dumps(database.cell_ids, ensure_ascii=False)}
-    if database.attribution:
-        tags["TIFFTAG_COPYRIGHT"] = database.attribution
-    with new_geotiff(path, lattice, BANDS, tags) as target:
-        for window in tile_windows(lattice, _TILE_PX):
-            found = reader.read(window)
-            if not found or not len(found["row"]):
-                continue
-            row, col, rows, cols = window
-            values = np.full((len(BANDS), rows, cols), np.nan, dtype=np.float32)
-            at = np.asarray(found["row"]) - row, np.asarray(found["col"]) - col
-            server = found["best_server"].to_pylist()
-            values[0][at] = [rank[cell_id] for cell_id in server]
-            values[1][at], values[2][at] = found["best_level_dbm"], found["margin_db"]
-            target.write(values, window=RasterWindow(col, row, cols, rows))
-=======
-_BLOCK_PX = 512
 _WRITE_ERRORS = (DataSourceError, DataLayerError, FeatureError, GeometryError)
 # GeoPackages hold the time of writing; a fixed one gives equal bytes for equal databases.
 _WRITTEN = "2000-01-01T00:00:00.000Z"
@@ -70,49 +43,25 @@ def export_cog(database: RadioRouteDatabase, path: Path | str) -> None:
     OutputError
         The file cannot be written.
     """
-    path = Path(path)
-    if path.suffix.lower() not in (".tif", ".tiff"):
-        raise fail(OutputError, str(path), "a name that ends in .tif", path.suffix or "no suffix")
     lattice = database.lattice
-    transform = rasterio.Affine.from_gdal(*lattice.gdal_transform)
-    size = {"width": lattice.cols, "height": lattice.rows, "count": len(BANDS)}
-    pixels = {"dtype": "float32", "nodata": np.nan, "interleave": "band", "sparse_ok": True}
-    tiles = {"tiled": True, "blockxsize": _BLOCK_PX, "blockysize": _BLOCK_PX}
-    place = {"crs": lattice.crs, "transform": transform, "bigtiff": "if_safer"}
     columns = ("row", "col", *(name for name, _ in BANDS))
     reader = WindowReader([database.path / POINTS], columns, lattice)
     rank = {cell_id: number for number, cell_id in enumerate(database.cell_ids)}
-    with atomic_file(path) as temporary:
-        bands = temporary.with_name("bands.tif")
-        try:
-            with rasterio.open(
-                bands, "w", driver="GTiff", **size, **pixels, **tiles, **place
-            ) as target:
-                tags = {CELLS_TAG: json.dumps(database.cell_ids, ensure_ascii=False)}
-                if database.attribution:
-                    tags["TIFFTAG_COPYRIGHT"] = database.attribution
-                target.update_tags(**tags)
-                for band, (name, unit) in enumerate(BANDS, start=1):
-                    target.set_band_description(band, name)
-                    target.set_band_unit(band, unit)
-                for window in tile_windows(lattice, _BLOCK_PX):
-                    found = reader.read(window)
-                    if not found or not len(found["row"]):
-                        continue
-                    row, col, rows, cols = window
-                    values = np.full((len(BANDS), rows, cols), np.nan, dtype=np.float32)
-                    at = np.asarray(found["row"]) - row, np.asarray(found["col"]) - col
-                    server = found["best_server"].to_pylist()
-                    values[0][at] = [rank[cell_id] for cell_id in server]
-                    values[1][at], values[2][at] = found["best_level_dbm"], found["margin_db"]
-                    target.write(values, window=RasterWindow(col, row, cols, rows))
-            # Overviews of numbers of cells must not average them.
-            form: dict[str, Any] = {"driver": "COG", "compress": "DEFLATE", "predictor": "YES"}
-            form |= {"blocksize": _BLOCK_PX, "overview_resampling": "nearest"}
-            copy_raster(bands, temporary, bigtiff="if_safer", **form)
-        except (RasterioError, CPLE_BaseError) as error:
-            raise fail(OutputError, str(path), "a place that can be written", error) from error
->>>>>>> h-b
+    tags = {CELLS_TAG: json.dumps(database.cell_ids, ensure_ascii=False)}
+    if database.attribution:
+        tags["TIFFTAG_COPYRIGHT"] = database.attribution
+    with new_geotiff(Path(path), lattice, BANDS, tags) as target:
+        for window in tile_windows(lattice, _TILE_PX):
+            found = reader.read(window)
+            if not found or not len(found["row"]):
+                continue
+            row, col, rows, cols = window
+            values = np.full((len(BANDS), rows, cols), np.nan, dtype=np.float32)
+            at = np.asarray(found["row"]) - row, np.asarray(found["col"]) - col
+            server = found["best_server"].to_pylist()
+            values[0][at] = [rank[cell_id] for cell_id in server]
+            values[1][at], values[2][at] = found["best_level_dbm"], found["margin_db"]
+            target.write(values, window=RasterWindow(col, row, cols, rows))
 
 
 def export_geopackage(
