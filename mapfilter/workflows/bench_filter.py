@@ -87,9 +87,9 @@ class FilterBench:
     track_s : float
         A walk from an unknown start; median over walks and repetitions.
     challenged : int
-        Walks with 300 m that nobody measured in their middle, and a challenger because of it.
+        Walks with 300 m that nobody measured in their middle, and an alternative because of it.
     challenged_track_s : float or None
-        These walks; None where no challenger came.
+        These walks; None where none did.
     loaded_memory_bytes, peak_memory_bytes, smoothing_peak_memory_bytes : int
         Of a process that opens the database and locates a walk: its libraries alone, and in all.
     """
@@ -253,14 +253,14 @@ def whole_step(
 
 
 def _track(positioner: BayesPositioner, log: TrackLog) -> tuple[float, int]:
-    """Return the seconds that a walk takes, and how many challengers it had."""
+    """Return the seconds that a walk takes, and how many alternatives were started."""
     rng, merged = np.random.default_rng(2), epochs(log)
     track, challenges = positioner.begin(), 0
     began_s = time.process_time()
     for epoch in merged:
-        before = track.challenger
+        before = track.alternative
         track, _ = positioner.step(track, epoch, rng)
-        challenges += before is None and track.challenger is not None
+        challenges += before is None and track.alternative is not None
     return time.process_time() - began_s, challenges
 
 

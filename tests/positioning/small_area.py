@@ -10,7 +10,7 @@ from mapfilter.database.radioroutes import RadioField
 from mapfilter.geodesy import Lattice
 from mapfilter.models.fingerprint import LevelErrors, ServingWeights
 from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.evidence import EvidenceOptions
+from mapfilter.positioning.bayes.radio import EvidenceOptions
 from mapfilter.radio.cells import Cell, CellPlan
 
 ROWS, COLS, PIXEL_M = 7, 9, 10.0

@@ -33,9 +33,9 @@ from mapfilter.models.street_motion import (
     MapWeights,
     MotionErrors,
 )
-from mapfilter.positioning.bayes.evidence import RadioHistory, reading_of
 from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel, Start
+from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.epochs import Epoch, ReportRow
 
 AREA = make_area()
@@ -59,10 +59,7 @@ def first_reading():
         ReportRow("serving", "B", None, None, -75.0, 0),
         ReportRow("neighbour", "D", None, None, -90, 0),
     )
-    _, reading, _, _ = reading_of(
-        AREA, OPTIONS, RadioHistory.empty(len(BANDS)), Epoch(0.0, heard=heard), 5.0
-    )
-    return reading
+    return RadioSource(AREA, OPTIONS).first(Epoch(0.0, heard=heard)).radio
 
 
 def likelihoods():

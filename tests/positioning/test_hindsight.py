@@ -171,13 +171,17 @@ def test_positions_ways_and_masses_are_those_of_the_paths():
     assert places(estimate)[4].tolist() == pytest.approx([45.0, 25.0 - 20.0 / 3], abs=0.1)
 
 
-def at(epoch, state, challenger=None, wins=0):
-    """A forward pass's track after an epoch, as far as the history looks at it."""
+def at(epoch, state, alternative=None, takeovers=0):
+    """The part of the filter's state after an epoch that the history uses."""
     east_m, north_m, travelled_m = MOVED[epoch]
-    memory = SimpleNamespace(east_m=east_m, north_m=north_m, travelled_m=travelled_m)
+    reckoning = SimpleNamespace(east_m=east_m, north_m=north_m, travelled_m=travelled_m)
     belief = SimpleNamespace(state=state, log_weight=np.zeros(state.shape[1]))
     return SimpleNamespace(
-        memory=memory, belief=belief, leading=belief, challenger=challenger, wins=wins
+        reckoning=reckoning,
+        belief=belief,
+        leading=belief,
+        alternative=alternative,
+        takeovers=takeovers,
     )
 
 
@@ -197,20 +201,20 @@ def test_beliefs_are_kept_every_few_metres_and_at_the_end():
 
 
 @pytest.mark.parametrize("won", [False, True])
-def test_a_challenger_that_won_takes_the_place_of_what_was_kept_since(won):
+def test_an_alternative_that_took_over_replaces_what_was_kept_since(won):
     history, main, other = History(every_m=1.0), cloud((1.0, 1.0, 0, 0)), cloud((9.0, 9.0, 0, 0))
     rival = SimpleNamespace(
-        belief=SimpleNamespace(state=other, log_weight=np.zeros(1)), began_at_m=6.0
+        belief=SimpleNamespace(state=other, log_weight=np.zeros(1)), start_m=6.0
     )
     then = other if won else main
     tracks = [at(0, main), at(1, main, rival), at(2, main, rival)]
-    tracks += [at(3, then, wins=int(won)), at(4, then, wins=int(won))]
+    tracks += [at(3, then, takeovers=int(won)), at(4, then, takeovers=int(won))]
     for before, after in zip([tracks[0], *tracks], tracks, strict=False):
         history.add(before, after)
     assert [k.epoch for k in history.kept] == [0, 1, 2, 3, 4]
     expected = [1.0, 9.0, 9.0, 9.0, 9.0] if won else [1.0] * 5
     assert [float(k.state[0, 0]) for k in history.kept] == expected
-    assert history.challenging == []
+    assert history.alternative == []
 
 
 def test_a_fix_is_settled_where_it_tracks_within_ten_metres():

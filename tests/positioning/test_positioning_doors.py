@@ -1,10 +1,11 @@
-"""What positioning assumes unless told otherwise, and where it stops taking input."""
+"""Defaults of positioning, limits of its options, and thresholds of its decisions."""
 
 from dataclasses import asdict, dataclass
 from math import inf, nan, radians
 
 import numpy as np
 import pytest
+import small_area
 
 from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Status
@@ -13,19 +14,23 @@ from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.fingerprint import LevelErrors, ServingWeights
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.positioning.bayes.alternative import (
+    TRANSITIONS,
     AlternativeHypothesis,
     AlternativeRules,
     EvidenceCusum,
-    Verdict,
+    Outcome,
     judge,
+    report,
     resolve_alternative,
 )
-from mapfilter.positioning.bayes.evidence import EvidenceOptions, RadioHistory, RadioReading
+from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.options import BayesFilter, BayesOptions, GridFilter
-from mapfilter.positioning.bayes.state import BayesTrack
+from mapfilter.positioning.bayes.radio import EvidenceOptions, RadioHistory
+from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
+from mapfilter.positioning.bayes.timing import TimingState
 from mapfilter.positioning.candidate import CandidateFilter
+from mapfilter.positioning.gnss.gate import GnssState
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
-from mapfilter.positioning.gnss.state import NO_GNSS_STATE, GnssState
 
 
 def test_the_usual_options():
@@ -42,16 +47,16 @@ def test_the_usual_options():
         "clip_sd": 3.0, "height_m": 1.5,
     }  # fmt: skip
     assert asdict(AlternativeRules()) == {
-        "doubt": 5.0,
-        "doubt_of_cells": 2.5,
-        "ahead": 4.0,
-        "lost": 10.0,
-        "lost_of_cells": 6.0,
-        "confirmed_mass": 0.9,
+        "start_cusum": 5.0,
+        "start_cusum_cells": 2.5,
+        "search_threshold": 4.0,
+        "lost_threshold": 10.0,
+        "lost_threshold_cells": 6.0,
+        "confirm_mass": 0.9,
         "abandon_threshold": -25.0,
         "abandon_after_m": 800.0,
-        "converge_below": 2.5,
-        "converge_behind": 2.0,
+        "converge_cusum": 2.5,
+        "converge_threshold": 2.0,
     }
     evidence = EvidenceOptions()
     assert (evidence.spacing_m, evidence.first_m, evidence.use_levels) == (5.0, 25.0, True)
@@ -67,46 +72,49 @@ def test_the_usual_options():
     assert (reading.serving, reading.serving_weight, reading.levels, reading.bounds) == (
         -1, 0.0, None, (),
     )  # fmt: skip
-    assert (reading.fix, reading.expected, reading.length_m, reading.also) == (None, 0.0, 0.0, ())
+    assert (reading.expected, reading.length_m, reading.terms) == (0.0, 0.0, ())
     assert np.isnan(reading.timing_advance)
 
 
-def test_what_is_known_at_the_start():
-    memory = RadioHistory.empty(3)
-    np.testing.assert_array_equal(memory.level_dbm, [nan] * 3)
-    np.testing.assert_array_equal(memory.heard_at_m, [-inf] * 3)
-    zeros = (memory.travelled_m, memory.east_m, memory.north_m, memory.back_east_m,
-             memory.back_north_m)  # fmt: skip
-    assert zeros == (0.0,) * 5
-    assert memory.used_at_m == -inf
-    track = BayesTrack(memory)
-    assert (track.belief, track.compass, track.status, track.doubt) == (
-        None, True, Status.SEARCHING, EvidenceCusum(0.0, 0.8),
-    )  # fmt: skip
-    assert (track.challenger, track.wins, track.sky, track.timed_at_m) == (
-        None, 0, NO_GNSS_STATE, (-inf, -inf),
-    )  # fmt: skip
-    assert np.isnan(track.heading_rad)
-    assert track.leading is None
-    assert (NO_GNSS_STATE.receiver, NO_GNSS_STATE.fix_at_m, NO_GNSS_STATE.heard_at_m) == (
-        None,
-        -inf,
-        -inf,
-    )
-    assert (NO_GNSS_STATE.heard_at_s, NO_GNSS_STATE.until_s, NO_GNSS_STATE.rejects) == (
-        -inf,
-        -inf,
-        False,
-    )
-    assert GnssState(since_s=3.0).rejects
+def test_the_state_before_the_first_epoch():
+    history = RadioHistory.empty(3)
+    np.testing.assert_array_equal(history.level_dbm, [nan] * 3)
+    np.testing.assert_array_equal(history.received_at_m, [-inf] * 3)
+    assert history.used is None
+    assert DeadReckoning() == DeadReckoning(travelled_m=0.0, east_m=0.0, north_m=0.0)
+    state = BayesState()
+    assert (state.belief, state.compass, state.status) == (None, True, Status.SEARCHING)
+    assert (state.cusum, state.reckoning) == (EvidenceCusum(0.0, 0.8), DeadReckoning())
+    assert (state.alternative, state.takeovers, state.sources) == (None, 0, {})
+    assert np.isnan(state.heading_rad)
+    assert state.leading is None
+    assert TimingState() == (-inf, -inf)
+    gnss = GnssState()
+    assert (gnss.receiver, gnss.fix_used_at_m, gnss.compared_at_m) == (None, -inf, -inf)
+    assert (gnss.compared_at_s, gnss.probation_until_s, gnss.rejecting) == (-inf, -inf, False)
+    assert GnssState(rejected_since_s=3.0).rejecting
 
 
-def test_when_satellites_are_listened_to_again():
-    heard, options = GnssState(heard_at_m=100.0, heard_at_s=50.0), GnssOptions()
-    assert not heard.due(options, 59.9, 109.9)
-    assert heard.due(options, 59.9, 110.0)
-    assert heard.due(options, 60.0, 100.0)
-    assert NO_GNSS_STATE.due(options, 0.0, 0.0)
+def test_each_source_of_evidence_begins_with_its_own_state():
+    positioner = BayesOptions().over_area(small_area.make_area())
+    assert [source.name for source in positioner.sources] == [
+        "gnss",
+        "timing",
+        "first fix",
+        "radio",
+    ]
+    begun = positioner.begin().sources
+    assert isinstance(begun["gnss"], GnssState)
+    assert (begun["timing"], begun["first fix"]) == (TimingState(), None)
+    assert begun["radio"].received_at_m.size == len(positioner.area.cell_ids)
+
+
+def test_when_satellites_are_compared_again():
+    compared, options = GnssState(compared_at_m=100.0, compared_at_s=50.0), GnssOptions()
+    assert not compared.due(options, 59.9, 109.9)
+    assert compared.due(options, 59.9, 110.0)
+    assert compared.due(options, 60.0, 100.0)
+    assert GnssState().due(options, 0.0, 0.0)
 
 
 def test_wide_errors_get_more_particles():
@@ -138,48 +146,48 @@ NUMBERS = tuple(asdict(GnssOptions()))
 
 
 @pytest.mark.parametrize("name", NUMBERS)
-def test_options_of_satellites_are_finite_and_not_negative(name):
+def test_gnss_options_are_finite_and_not_negative(name):
     for value in (nan, inf, -1e-9 if name != "height_m" else 10_001.0):
-        with pytest.raises(ConfigError, match=f"satellites, {name}: expected a finite number"):
+        with pytest.raises(ConfigError, match=f"GnssOptions, {name}: expected a"):
             GnssOptions(**{name: value})
     if name in POSITIVE:
-        with pytest.raises(ConfigError, match=f"satellites, {name}: expected a number above 0"):
+        with pytest.raises(ConfigError, match=f"GnssOptions, {name}: expected a number > 0"):
             GnssOptions(**{name: 0.0})
     else:
         assert getattr(GnssOptions(**{name: 0.0}), name) == 0.0
     assert getattr(GnssOptions(**{name: 0.5}), name) == 0.5
 
 
-def test_borders_of_angles_shares_and_heights():
+def test_limits_of_angles_shares_and_heights():
     assert GnssOptions(height_m=-10_000.0).height_m == -10_000.0
     assert GnssOptions(mask_deg=89.9).mask_deg == 89.9
     with pytest.raises(ConfigError, match="mask_deg"):
         GnssOptions(mask_deg=90.0)
     with pytest.raises(ConfigError, match="outliers"):
         GnssOptions(outliers=1.0)
-    with pytest.raises(ConfigError) as told:
+    with pytest.raises(ConfigError) as caught:
         GnssOptions(gate=-1.0, zenith_m=0.0, mask_deg=95.0)
-    assert len(told.value.faults) == 3
+    assert len(caught.value.faults) == 3
 
 
 @pytest.mark.parametrize("name", tuple(asdict(TimingOptions())))
-def test_options_of_timing_are_above_0(name):
+def test_timing_options_are_above_0(name):
     for value in (0.0, -1.0, inf, nan):
-        with pytest.raises(ConfigError, match=f"timing, {name}: expected a number above 0"):
+        with pytest.raises(ConfigError, match=f"TimingOptions, {name}: expected a number > 0"):
             TimingOptions(**{name: value})
     assert getattr(TimingOptions(**{name: 0.5}), name) == 0.5
 
 
-def test_doubt_by_hand():
+def test_the_cusum_by_hand():
     calm = EvidenceCusum()
-    # 1.5 · 0.8 · (-2) - (-2) = -0.4: none.
+    # 1.5 · 0.8 · (-2) - (-2) = -0.4: no shortfall.
     after = calm.after(-2.0, -2.0, 300.0)
     share = 1 - np.exp(-1.0)
     assert after.sum == 0.0
     assert after.usual == pytest.approx(0.8 + share * 0.2)
     worse = calm.after(-2.0, -5.0, 300.0)
     assert worse.sum == pytest.approx(5.0 - 2.4)
-    # In doubt nothing is learnt.
+    # With a shortfall nothing is learnt.
     assert worse.usual == 0.8
     again = worse.after(-2.0, -1.0, 10.0)
     assert again.sum == pytest.approx(2.6 - 1.4)
@@ -188,12 +196,12 @@ def test_doubt_by_hand():
         9 + share * (2.0 - 9)
     )
     assert calm.after(0.0, -50.0, 10.0) is calm
-    assert EvidenceCusum(3.0, 1.1).none() == EvidenceCusum(0.0, 1.1)
+    assert EvidenceCusum(3.0, 1.1).reset() == EvidenceCusum(0.0, 1.1)
 
 
 @dataclass(frozen=True)
 class Belief:
-    """As much of a belief as a decision looks at."""
+    """The part of a belief that decisions depend on."""
 
     status: Status
     log_evidence: float
@@ -210,76 +218,99 @@ def belief(status, evidence=0.0, east_m=0.0, mass=1.0):
 S, C, T, L = Status.SEARCHING, Status.CONVERGED, Status.TRACKING, Status.LOST
 
 
-def verdict(main, ahead, *, status=S, east_m=500.0, mass=0.5, gone_m=0.0, doubt=0.0, cells=False):
+def outcome(main, lead, *, status=S, east_m=500.0, mass=0.5, gone_m=0.0, cusum=0.0, cells=False):
     other = AlternativeHypothesis(
-        belief(status, ahead, east_m, mass), 100.0, 0.0, doubt=EvidenceCusum(doubt)
+        belief(status, lead, east_m, mass), 100.0, 0.0, cusum=EvidenceCusum(cusum)
     )
     return judge(AlternativeRules(), belief(main), other, 100.0 + gone_m, cells_only=cells)
 
 
-def test_verdicts_on_their_borders():
-    assert verdict(T, 0.0) is Verdict.OPEN
-    assert verdict(T, 0.0, east_m=50.0, mass=0.9) is Verdict.CONFIRMED
-    assert verdict(T, 0.0, east_m=50.1, mass=0.9) is Verdict.OPEN
-    assert verdict(T, 0.0, east_m=50.0, mass=0.89) is Verdict.OPEN
-    assert (verdict(S, 4.0), verdict(S, 3.9)) == (Verdict.AHEAD, Verdict.OPEN)
-    assert (verdict(T, 10.0), verdict(T, 9.9)) == (Verdict.AHEAD, Verdict.OPEN)
-    assert (verdict(T, 6.0, cells=True), verdict(T, 5.9, cells=True)) == (
-        Verdict.AHEAD, Verdict.OPEN,
+def test_outcomes_at_their_thresholds():
+    assert outcome(T, 0.0) is Outcome.UNDECIDED
+    assert outcome(T, 0.0, east_m=50.0, mass=0.9) is Outcome.CONFIRMED
+    assert outcome(T, 0.0, east_m=50.1, mass=0.9) is Outcome.UNDECIDED
+    assert outcome(T, 0.0, east_m=50.0, mass=0.89) is Outcome.UNDECIDED
+    assert (outcome(S, 4.0), outcome(S, 3.9)) == (Outcome.AHEAD, Outcome.UNDECIDED)
+    assert (outcome(T, 10.0), outcome(T, 9.9)) == (Outcome.AHEAD, Outcome.UNDECIDED)
+    assert (outcome(T, 6.0, cells=True), outcome(T, 5.9, cells=True)) == (
+        Outcome.AHEAD, Outcome.UNDECIDED,
     )  # fmt: skip
-    assert verdict(S, 5.0, cells=True) is Verdict.AHEAD
-    assert verdict(T, 10.0, status=C) is verdict(T, 10.0, status=T) is Verdict.WON
-    assert verdict(T, 10.0, status=C, doubt=2.5) is Verdict.WON
-    assert verdict(T, 10.0, status=C, doubt=2.6) is Verdict.AHEAD
-    assert (verdict(T, -25.0), verdict(T, -24.9)) == (Verdict.GAVE_UP, Verdict.OPEN)
-    assert (verdict(T, 0.0, gone_m=800.0), verdict(T, 0.0, gone_m=799.0)) == (
-        Verdict.GAVE_UP, Verdict.OPEN,
+    assert outcome(S, 5.0, cells=True) is Outcome.AHEAD
+    assert outcome(T, 10.0, status=C) is outcome(T, 10.0, status=T) is Outcome.WON
+    assert outcome(T, 10.0, status=C, cusum=2.5) is Outcome.WON
+    assert outcome(T, 10.0, status=C, cusum=2.6) is Outcome.AHEAD
+    assert outcome(T, 10.0, status=C, cusum=4.9) is Outcome.AHEAD
+    assert outcome(T, 10.0, status=C, cusum=5.0) is Outcome.SUSPECT
+    assert (outcome(T, -25.0), outcome(T, -24.9)) == (Outcome.ABANDONED, Outcome.UNDECIDED)
+    assert (outcome(T, 0.0, gone_m=800.0), outcome(T, 0.0, gone_m=799.0)) == (
+        Outcome.ABANDONED, Outcome.UNDECIDED,
     )  # fmt: skip
 
 
-def settled(main, ahead, doubt=0.0, own=0.0, cells=False, before=None):
+def resolved(main, lead, cusum=0.0, own=0.0, cells=False, before=None):
     other = AlternativeHypothesis(
-        belief(S, ahead, 500.0, 0.5), 100.0, 0.0, doubt=EvidenceCusum(own, 1.2)
+        belief(S, lead, 500.0, 0.5), 100.0, 0.0, cusum=EvidenceCusum(own, 1.2)
     )
     return resolve_alternative(
         AlternativeRules(),
-        before or main,
+        before or (S if main is C else main),
         belief(main),
-        EvidenceCusum(doubt, 0.9),
+        EvidenceCusum(cusum, 0.9),
         other,
         200.0,
         cells_only=cells,
     )
 
 
-def test_settlements_on_their_borders():
-    # No belief converges in doubt, nor beside a challenger that is hardly behind.
+def test_resolutions_at_their_thresholds():
+    # No belief converges with a large CUSUM, nor with an alternative close behind.
     alone = resolve_alternative(
         AlternativeRules(), S, belief(C), EvidenceCusum(2.5), None, 0.0, cells_only=False
     )
-    assert (alone.status, alone.challenger, alone.taken_over) == (C, None, False)
-    assert settled(C, -2.0).status is C
-    assert settled(C, -1.9).status is S
-    assert settled(T, 12.0, own=4.9).taken_over is False
-    over = settled(T, 12.0, doubt=9.0, own=5.0)
-    assert (over.taken_over, over.status, over.doubt) == (True, L, EvidenceCusum(5.0, 1.2))
+    assert (alone.status, alone.alternative, alone.taken_over) == (C, None, False)
+    assert resolved(C, -2.0).status is C
+    assert resolved(C, -1.9).status is S
+    assert resolved(T, 12.0, own=4.9).taken_over is False
+    over = resolved(T, 12.0, cusum=9.0, own=5.0)
+    assert (over.taken_over, over.status, over.cusum) == (True, L, EvidenceCusum(5.0, 1.2))
     assert np.isnan(over.belief.agreement_start_m)
-    assert settled(T, 12.0, own=2.5, cells=True).taken_over is True
-    assert settled(T, 12.0, own=2.4, cells=True).taken_over is False
-    search = settled(S, 5.0, doubt=9.0, own=1.0)
-    assert (search.taken_over, search.status, search.doubt) == (True, S, EvidenceCusum(0.0, 0.9))
+    assert resolved(T, 12.0, own=2.5, cells=True).taken_over is True
+    assert resolved(T, 12.0, own=2.4, cells=True).taken_over is False
+    search = resolved(S, 5.0, cusum=9.0, own=1.0)
+    assert (search.taken_over, search.status, search.cusum) == (True, S, EvidenceCusum(0.0, 0.9))
     assert search.belief.status is S
-    kept = settled(T, 12.0, doubt=9.0, own=1.0)
-    assert (kept.status, kept.doubt, kept.challenger.doubt.sum) == (L, EvidenceCusum(9.0, 0.9), 1.0)
-    other = AlternativeHypothesis(belief(S, 3.0), 0.0, against=-4.0, by_satellites=0.5)
-    assert other.ahead(belief(T, 2.0)) == 3.0 - (2.0 + 4.0) + 0.5
-    assert np.isnan(other.began_s)
-    assert other.sky is NO_GNSS_STATE
+    kept = resolved(T, 12.0, cusum=9.0, own=1.0)
+    assert (kept.status, kept.cusum, kept.alternative.cusum.sum) == (
+        L,
+        EvidenceCusum(9.0, 0.9),
+        1.0,
+    )
+    other = AlternativeHypothesis(
+        belief(S, 3.0), 0.0, main_log_evidence=-4.0, gnss_log_bayes_factor=0.5
+    )
+    assert other.log_bayes_factor(belief(T, 2.0)) == 3.0 - (2.0 + 4.0) + 0.5
+    assert np.isnan(other.start_s)
+    assert other.sources == {}
 
 
-def test_whom_to_go_by():
-    main, rival = belief(T), AlternativeHypothesis(belief(S), 0.0, 0.0)
-    memory = RadioHistory.empty(0)
-    assert BayesTrack(memory, main, status=T, challenger=rival).leading is main
-    assert BayesTrack(memory, main, status=L, challenger=rival).leading is rival.belief
-    assert BayesTrack(memory, main, status=L).leading is main
+def test_every_outcome_has_a_transition():
+    assert set(TRANSITIONS) == {(one, searching) for one in Outcome for searching in (True, False)}
+    for (_, _), row in TRANSITIONS.items():
+        # An alternative that takes over is not kept beside itself.
+        assert row.takes_over is None or not row.keeps
+
+
+def test_converged_lasts_for_one_epoch_and_lost_until_convergence():
+    for before in Status:
+        for found in (S, T, L):
+            _, status = report(before, belief(found), found)
+            assert status is (L if (before, found) == (L, S) else found)
+        now, status = report(before, belief(C), C)
+        assert now.status is status is (C if before in (S, T) else T)
+
+
+def test_the_leading_belief():
+    main, other = belief(T), AlternativeHypothesis(belief(S), 0.0, 0.0)
+    assert BayesState(main, T, alternative=other).leading is main
+    assert BayesState(main, L, alternative=other).leading is other.belief
+    assert BayesState(main, L).leading is main

@@ -15,12 +15,12 @@ from mapfilter.models.motion import random_walk
 from mapfilter.models.ranging import pseudoranges, timing_advances
 from mapfilter.models.state import MOVING_3D, POSITION, POSITION_CLOCK_3D
 from mapfilter.models.street_motion import MapWeights, MotionErrors
-from mapfilter.positioning.bayes.evidence import RadioHistory
 from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel, Start
-from mapfilter.positioning.bayes.state import BayesTrack, name_of, particle_spacing_of
+from mapfilter.positioning.bayes.radio import name_of
+from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
 from mapfilter.positioning.epochs import GnssFix, ReportRow, headed
-from mapfilter.positioning.gnss.readings import FixEvidence, widened
+from mapfilter.positioning.gnss.gate import FixTerm, widened
 from mapfilter.positioning.kalman.filter import gaussian_radii_m, share_within
 from mapfilter.positioning.kalman.static_fix import (
     BAD_GEOMETRY,
@@ -36,7 +36,7 @@ def fix_at(dx, dy, **variances):
     """Log-likelihood of a place that lies (dx, dy) from a fix."""
     fix = GnssFix(510.0, 720.0, **variances)
     state = np.array([[10.0 + dx], [20.0 + dy], [0.0]], dtype=np.float32)
-    return FixEvidence(fix, (500.0, 700.0)).log_likelihood(state)[0]
+    return FixTerm(fix, (500.0, 700.0)).log_likelihood(state)[0]
 
 
 def test_a_fix_is_a_clipped_gaussian():
@@ -105,16 +105,14 @@ def test_headings_of_a_phone_without_a_compass():
     assert headed(unknown, 2.0) == (unknown, 2.0)
 
 
-def test_the_memory_of_dead_reckoning():
-    memory = RadioHistory(np.zeros(2), np.ones(2), 10.0, 1.0, 2.0, 4.0, 5.0, 6.0)
-    assert memory.moved(MotionStep(nan, 0.0)) is memory
-    moved = memory.moved(MotionStep(-2.0, pi / 2))
+def test_dead_reckoning_adds_up():
+    start = DeadReckoning(10.0, 1.0, 2.0)
+    assert start.moved(MotionStep(nan, 0.0)) is start
+    moved = start.moved(MotionStep(-2.0, pi / 2))
     assert moved.travelled_m == 12.0
-    found = (moved.east_m, moved.north_m, moved.back_east_m, moved.back_north_m)
-    assert found == pytest.approx((1.0, 0.0, 5.0, 4.0))
-    assert (moved.used_at_m, moved.heard_at_m is memory.heard_at_m) == (4.0, True)
+    assert (moved.east_m, moved.north_m) == pytest.approx((1.0, 0.0))
     # Without a heading, along that of the frame.
-    assert memory.moved(MotionStep(2.0, nan)).east_m == 3.0
+    assert start.moved(MotionStep(2.0, nan)).east_m == 3.0
 
 
 def test_the_way_that_holds_the_largest_share():
@@ -138,12 +136,12 @@ def test_the_way_that_holds_the_largest_share():
         assert one == (ids[at], 1.0)
 
 
-def test_names_of_rows_and_the_grain_before_the_start():
+def test_names_of_rows_and_the_spacing_before_the_start():
     assert name_of(ReportRow("serving", "A", 60, 1, -70.0, 0)) == "A"
     assert name_of(ReportRow("neighbour", None, 60, 1, -70.0, 0)) == "ARFCN 60, BSIC 1"
     assert name_of(ReportRow("neighbour", None, 60, None, -70.0, 0)) == "ARFCN 60, BSIC unknown"
     assert name_of(ReportRow("neighbour", None, None, None, -70.0, 0)) == ""
-    assert particle_spacing_of(BayesTrack(RadioHistory.empty(0))) == 5.0
+    assert BayesState().particle_spacing_m == 5.0
 
 
 SITES = np.array([[0.0, 0.0], [1000.0, 0.0], [0.0, 1000.0]])

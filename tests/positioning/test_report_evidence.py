@@ -1,4 +1,4 @@
-"""What of a report becomes evidence, and how much of it: by hand and by the scalar oracle."""
+"""Evidence of radio reports and fixes, by hand and by the scalar oracle."""
 
 from math import cos, exp, hypot, inf, isnan, nan, pi, sin, sqrt
 
@@ -8,13 +8,17 @@ import scalar_oracle as oracle
 from small_area import BANDS, COLS, LEVEL_DBM, OPTIONS, PIXEL_M, ROWS, SOUTH_M, WEST_M, make_area
 
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.positioning.bayes.evidence import EvidenceOptions, RadioHistory, reading_of
+from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.radio import EvidenceOptions, RadioSource, name_of
+from mapfilter.positioning.bayes.state import DeadReckoning
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
+from mapfilter.positioning.estimate import UnusedReading
+from mapfilter.positioning.gnss.source import FirstFix
 
 AREA = make_area()
 A, B, C, D = BANDS.values()
-GRAIN_M = 3.0
+SPACING_M = 3.0
 
 
 def serving(cell, level_dbm=nan, censored=0, timing_advance=nan):
@@ -29,9 +33,19 @@ def carrier(arfcn, bsic, level_dbm, censored=0):
     return ReportRow("neighbour", None, arfcn, bsic, level_dbm, censored)
 
 
-def read(*rows, memory=None, options=OPTIONS, fix=None):
-    memory = RadioHistory.empty(len(BANDS)) if memory is None else memory
-    return reading_of(AREA, options, memory, Epoch(0.0, heard=rows, fix=fix), GRAIN_M)
+START = DeadReckoning()
+
+
+def read(*rows, history=None, moved=START, options=OPTIONS):
+    """Read a report after a history, and as many metres as were moved."""
+    source = RadioSource(AREA, options)
+    history = source.begin() if history is None else history
+    update = source.read(history, moved, Epoch(0.0, heard=rows), SPACING_M)
+    return update.state, update.radio, update.reason, update.unused
+
+
+def unknown_cells(*rows, why=Reason.UNKNOWN_CELL):
+    return [UnusedReading(0.0, row.role, name_of(row), why) for row in rows]
 
 
 def inside(reading):
@@ -46,7 +60,7 @@ def others(reading):
 def test_neighbours_become_evidence_by_what_is_known_of_them():
     unknown, elsewhere = carrier(99, 3, -70.0), named("E", -70.0)
     nameless = carrier(None, None, -70.0)
-    memory, reading, reason, unplaced = read(
+    history, reading, reason, unused = read(
         serving("A", -70.0), carrier(61, 4, -80.0), carrier(61, 2, -85.0), carrier(61, None, -90.0),
         named("B", -75.0), unknown, elsewhere, nameless, carrier(61, 4, nan),
     )  # fmt: skip
@@ -56,16 +70,16 @@ def test_neighbours_become_evidence_by_what_is_known_of_them():
     assert inside(reading) == {A: -70.0, D: -80.0, B: -75.0}
     # One code of two cells; without a code all cells of the carrier.
     assert others(reading) == [([B, C], -85.0, 0), ([B, C, D], -90.0, 0)]
-    assert unplaced == [(row, Reason.UNKNOWN_CELL) for row in (unknown, elsewhere, nameless)]
-    assert memory.level_dbm[[A, B, D]].tolist() == [-70.0, -75.0, -80.0]
-    assert isnan(memory.level_dbm[C])
-    assert memory.heard_at_m.tolist() == [0.0, 0.0, -inf, 0.0]
+    assert unused == unknown_cells(unknown, elsewhere, nameless)
+    assert history.level_dbm[[A, B, D]].tolist() == [-70.0, -75.0, -80.0]
+    assert isnan(history.level_dbm[C])
+    assert history.received_at_m.tolist() == [0.0, 0.0, -inf, 0.0]
 
 
 def test_a_serving_cell_is_none_of_its_neighbours():
-    _, reading, _, unplaced = read(serving("B", -70.0), carrier(61, 2, -80.0), carrier(60, 1, -85))
+    _, reading, _, unused = read(serving("B", -70.0), carrier(61, 2, -80.0), carrier(60, 1, -85))
     assert inside(reading) == {B: -70.0, C: -80.0, A: -85.0}
-    assert (reading.bounds, unplaced) == ((), [])
+    assert (reading.bounds, unused) == ((), [])
 
 
 def test_a_cell_reported_twice_counts_once():
@@ -75,7 +89,7 @@ def test_a_cell_reported_twice_counts_once():
 
 @pytest.mark.parametrize("side", [-1, 1])
 def test_levels_at_an_end_of_the_scale_are_bounds_on_their_side(side):
-    memory, reading, _, _ = read(
+    history, reading, _, _ = read(
         serving("A", -110.5, side), named("C", -47.5, -side), carrier(61, 2, -110.5, side)
     )
     assert reading.levels is None
@@ -85,7 +99,7 @@ def test_levels_at_an_end_of_the_scale_are_bounds_on_their_side(side):
         assert bound.sd_db == pytest.approx(hypot(errors.sd_db, errors.measurement_db))
         # What is new in a level after the metres that the first report counts for.
         assert bound.weight == pytest.approx(0.6 * (1 - exp(-20.0 / 40.0) ** 2))
-    assert memory.heard_at_m.tolist() == [-inf] * 4
+    assert history.received_at_m.tolist() == [-inf] * 4
 
 
 @pytest.mark.parametrize(
@@ -100,9 +114,9 @@ def test_neighbours_count_where_the_serving_cell_is_unknown(cell, expected):
 
 def test_only_the_first_serving_cell_serves():
     second = serving("B", -60.0, 0, 5.0)
-    _, reading, reason, unplaced = read(serving("A", -70.0, 0, 3.0), second)
+    _, reading, reason, unused = read(serving("A", -70.0, 0, 3.0), second)
     assert (reading.serving, inside(reading), reason) == (A, {A: -70.0}, Reason.USED)
-    assert unplaced == [(second, Reason.SECOND_SERVING_CELL)]
+    assert unused == unknown_cells(second, why=Reason.SECOND_SERVING_CELL)
     assert reading.timing_advance == 3.0
 
 
@@ -119,25 +133,23 @@ def test_without_levels_only_the_serving_cell_counts():
 def test_a_report_counts_by_the_metres_since_the_last_one():
     weights = {}
     for gone_m in (6.0, 12.0, 50.0):
-        memory, first, _, _ = read(serving("A"))
-        memory = memory.moved(MotionStep(gone_m, 0.3))
-        memory, reading, _, _ = read(serving("A"), memory=memory)
+        history, first, _, _ = read(serving("A"))
+        moved = START.moved(MotionStep(gone_m, 0.3))
+        history, reading, _, _ = read(serving("A"), history=history, moved=moved)
         weights[gone_m] = reading.serving_weight
         assert reading.length_m == gone_m
-        assert (memory.used_at_m, memory.back_east_m, memory.back_north_m) == (gone_m, 0.0, 0.0)
+        assert history.used is moved
     assert weights == pytest.approx({6.0: 0.24, 12.0: 0.48, 50.0: 0.8})
     assert (first.serving_weight, first.length_m) == (pytest.approx(0.8), 0.0)
 
 
-def test_a_report_too_soon_leaves_what_is_known():
-    memory, _, _, _ = read(serving("A", -70.0))
-    memory = memory.moved(MotionStep(5.9, 0.0))
-    fix = GnssFix(WEST_M, SOUTH_M)
-    after, reading, reason, _ = read(serving("A", -71.0), memory=memory, fix=fix)
-    assert after is memory
+def test_a_report_too_soon_leaves_the_history():
+    history, _, _, _ = read(serving("A", -70.0))
+    moved = START.moved(MotionStep(5.9, 0.0))
+    after, reading, reason, _ = read(serving("A", -71.0), history=history, moved=moved)
+    assert after is history
     assert reason is Reason.NOT_MOVED_ENOUGH
-    assert (reading.fix, reading.serving, reading.levels) == (fix, -1, None)
-    assert read(serving("A", -71.0), memory=memory)[1] is None
+    assert reading is None
 
 
 def three_reports():
@@ -145,7 +157,7 @@ def three_reports():
 
     Bounds lie within the eight deviations that their table holds.
     """
-    memory, found = RadioHistory.empty(len(BANDS)), []
+    history, moved, found = None, START, []
     ways = [(), (MotionStep(9.0, 0.2), MotionStep(7.0, 1.9)), (MotionStep(8.0, -2.8),)]
     rows = [
         (serving("A", -70.25), carrier(61, 4, -80.5), carrier(61, 2, -85.0),
@@ -165,9 +177,9 @@ def three_reports():
     ]  # fmt: skip
     for way, report in zip(ways, rows, strict=True):
         for step in way:
-            memory = memory.moved(step)
+            moved = moved.moved(step)
         back_m = [sum(s.step_m * f(s.heading_rad) for s in way) for f in (cos, sin)]
-        memory, reading, _, _ = read(*report, memory=memory)
+        history, reading, _, _ = read(*report, history=history, moved=moved)
         found.append((back_m, reading))
     return [(*one, report) for one, report in zip(found, by_hand, strict=True)]
 
@@ -202,7 +214,7 @@ def test_a_whole_report_has_the_likelihood_of_the_oracle(index):
             oracle.pixel_of(*place, PIXEL_M, ROWS, COLS) for place in ((east, north), before)
         )
         expected = oracle.report_log_likelihood(
-            LEVEL_DBM, now, then, report, OPTIONS, counted_m, GRAIN_M
+            LEVEL_DBM, now, then, report, OPTIONS, counted_m, SPACING_M
         )
         # An ambiguous level counts as four deviations at most: exp(-8) beside the others.
         assert found == pytest.approx(expected, rel=2e-4, abs=4e-4)
@@ -212,12 +224,13 @@ def test_a_whole_report_has_the_likelihood_of_the_oracle(index):
 
 def test_the_innovation_of_a_slow_error_is_small_and_sharp():
     """The closer the last report, the less a lasting error counts, and the rest by its variance."""
-    memory, _, _, _ = read(serving("A", -70.0))
-    _, reading, _, _ = read(serving("A", -75.0), memory=memory.moved(MotionStep(10.0, 0.0)))
+    history, _, _, _ = read(serving("A", -70.0))
+    moved = START.moved(MotionStep(10.0, 0.0))
+    _, reading, _, _ = read(serving("A", -75.0), history=history, moved=moved)
     rho, errors = exp(-10.0 / 40.0), OPTIONS.levels
     assert reading.levels.rho.tolist() == pytest.approx([rho])
     assert inside(reading)[A] == pytest.approx(-75.0 + 70.0 * rho)
-    deviation = sqrt(oracle.innovation_variance(errors, rho, GRAIN_M))
+    deviation = sqrt(oracle.innovation_variance(errors, rho, SPACING_M))
     assert reading.levels.scale.tolist() == pytest.approx([1 / deviation])
     assert (reading.levels.back_east_m, reading.levels.back_north_m) == (10.0, 0.0)
 
@@ -232,7 +245,8 @@ def test_the_innovation_of_a_slow_error_is_small_and_sharp():
 def test_a_fix_is_a_clipped_gaussian_about_its_place(fix, covariance):
     state, expected = hypotheses(50), []
     log_weight = np.zeros(50)
-    _, reading, _, _ = read(fix=fix)
+    update = FirstFix(AREA.origin_m).first(Epoch(0.0, fix=fix))
+    reading = RadioReading(terms=update.terms)
     assert BayesModel(AREA).weigh(state, log_weight, reading) is Reason.USED
     for east, north in state[:2].T.astype(float):
         off = np.array([east - 40.0, north - 30.0])

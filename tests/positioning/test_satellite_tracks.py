@@ -115,7 +115,7 @@ def test_a_spoofed_fix_is_rejected_too(positioner):
 
 
 def test_honest_satellites_find_a_filter_that_is_lost(positioner):
-    """A belief that is sure of a wrong place rejects them, and is replaced by a challenger."""
+    """A belief that is sure of a wrong place rejects them, and is replaced by the alternative."""
     log = sky_log(most=4, legs=LONG)
     merged, rng = epochs(log), np.random.default_rng(2)
     west, south, _, north = LATTICE.bounds_m
@@ -125,7 +125,7 @@ def test_honest_satellites_find_a_filter_that_is_lost(positioner):
         track, news = positioner.step(track, epoch, rng)
         told.append(news)
     estimate = estimate_of(positioner, told)
-    assert track.wins >= 1
+    assert track.takeovers >= 1
     assert off_m(log, estimate)[-60:].mean() < 8
     assert south < estimate.north_m[-1] < north
 

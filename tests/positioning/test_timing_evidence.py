@@ -12,7 +12,7 @@ from mapfilter.filters.contract import Reason
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.positioning.bayes import filter as bayes
 from mapfilter.positioning.bayes.options import BayesOptions, open_area
-from mapfilter.positioning.bayes.timing import NEVER, is_timed, with_timing
+from mapfilter.positioning.bayes.timing import TimingSource, TimingState
 from mapfilter.positioning.epochs import Difference, Epoch, ReportRow
 from mapfilter.positioning.filter import locate
 from mapfilter.positioning.gnss.options import TimingOptions
@@ -33,63 +33,64 @@ def state(*places):
     return found
 
 
-def told(area, epoch, timed=NEVER, travelled_m=0.0, options=LTE):
-    return with_timing(area, options, epoch, None, timed, travelled_m)
+def read(area, epoch, before=(), travelled_m=0.0, options=LTE):
+    return TimingSource(area, options).read(TimingState(*before), epoch, travelled_m)
 
 
 def test_a_timing_advance_is_a_ring(area):
     epoch = Epoch(0.0, heard=(ReportRow("serving", "W", None, None, nan, 0, 1.0),))
-    reading, timed, unused = told(area, epoch)
-    assert (timed, unused) == ((0.0, -inf), [])
+    update = read(area, epoch)
+    assert (update.state, update.unused) == ((0.0, -inf), [])
     # Cell W stands at (0, 150) and 28.5 m above the phone: 1.5 steps are 117.15 m.
     places = state((100.0, 150.0), (0.0, 263.6), (300.0, 150.0))
-    gain = reading.also[0].log_likelihood(places)
+    gain = update.terms[0].log_likelihood(places)
     sigma = np.hypot(30.0, 78.1 / 12**0.5)
     away = np.hypot([100.0, 113.6, 300.0], 28.5)
     expected = -0.5 * np.minimum(((117.15 - away) / sigma) ** 2, 9.0)
     np.testing.assert_allclose(gain, expected, atol=1e-6)
-    assert reading.expected == pytest.approx(-0.5)
+    assert update.expected == pytest.approx(-0.5)
 
 
 def test_errors_that_last_count_once(area):
     epoch = Epoch(0.0, heard=(ReportRow("serving", "W", None, None, nan, 0, 1.0),))
-    soon, _, _ = told(area, epoch, (0.0, -inf), 5.0)
+    soon = read(area, epoch, (0.0, -inf), 5.0)
     place = state((300.0, 150.0))
-    whole = told(area, epoch)[0].also[0].log_likelihood(place)
+    whole = read(area, epoch).terms[0].log_likelihood(place)
     share = 1 - np.exp(-2 * 5.0 / 50.0)
-    np.testing.assert_allclose(soon.also[0].log_likelihood(place), share * whole)
-    still, timed, _ = told(area, epoch, (0.0, -inf), 0.0)
-    assert still is None
-    assert timed == (0.0, -inf)
+    np.testing.assert_allclose(soon.terms[0].log_likelihood(place), share * whole)
+    still = read(area, epoch, (0.0, -inf), 0.0)
+    assert (still.terms, still.expected) == ((), 0)
+    assert still.state == (0.0, -inf)
 
 
 def test_differences_share_the_error_of_their_reference(area):
     rows = (Difference("E", "W", 120.0, 5.0, 8.0), Difference("NW", "W", -40.0, 12.0, 8.0))
-    reading, timed, unused = told(area, Epoch(0.0, differences=rows))
-    assert (timed, unused) == ((-inf, 0.0), [])
+    update = read(area, Epoch(0.0, differences=rows))
+    assert (update.state, update.unused) == ((-inf, 0.0), [])
     place = state((150.0, 150.0))
     sites = np.array([[400.0, 150.0], [0.0, 300.0]])
     away = np.sqrt(np.sum((sites - 150.0) ** 2, axis=1) + 28.5**2)
     off = np.array([120.0, -40.0]) - (away - np.hypot(150.0, 28.5))
     noise = np.diag([25.0, 144.0]) + 64.0
     square = min(float(off @ np.linalg.solve(noise, off)), 2 * 9.0)
-    np.testing.assert_allclose(reading.also[0].log_likelihood(place), -0.5 * square, rtol=1e-5)
+    np.testing.assert_allclose(update.terms[0].log_likelihood(place), -0.5 * square, rtol=1e-5)
 
 
-def test_what_nobody_can_place_is_told(area):
+def test_readings_of_unknown_cells_are_reported_unused(area):
     rows = (
         Difference("E", "??", 10.0), Difference("E", "W", nan), Difference("E", "W", 3.0),
         Difference("E", "W", 4.0), Difference("W", "W", 0.0),
     )  # fmt: skip
     heard = (ReportRow("serving", "??", None, None, nan, 0, 2.0),)
-    reading, _, unused = told(area, Epoch(0.0, heard=heard, differences=rows))
-    assert len(reading.also) == 1
-    assert [(u.kind, u.what, u.reason) for u in unused] == [
+    update = read(area, Epoch(0.0, heard=heard, differences=rows))
+    assert len(update.terms) == 1
+    assert [(u.kind, u.what, u.reason) for u in update.unused] == [
         ("ta", "??", Reason.UNKNOWN_CELL),
         ("tdoa", "??", Reason.UNKNOWN_CELL),
         ("tdoa", "E", Reason.SECOND_READING),
     ]
-    assert not is_timed(Epoch(0.0, heard=(ReportRow("serving", "W", None, None, nan, 0),)))
+    untimed = Epoch(0.0, heard=(ReportRow("serving", "W", None, None, nan, 0),))
+    assert read(area, untimed) == (TimingState(), (), None, 0, [], None, None, False, None, None)
 
 
 def test_times_of_arrival_shorten_the_search(area):

@@ -30,10 +30,10 @@ from mapfilter.models.fingerprint import LevelErrors, ServingWeights
 from mapfilter.models.measured_map import HeardOptions, HeardRows, ServingStatistics
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.evidence import EvidenceOptions
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import MeasuredMapModel
 from mapfilter.positioning.bayes.options import BayesOptions, open_area
+from mapfilter.positioning.bayes.radio import EvidenceOptions
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.filter import locate
 from mapfilter.propagation.shadowing import named_rng

@@ -1,177 +1,236 @@
-"""Noticing that a belief is wrong, and finding the way again without throwing a right one away.
+"""Detecting that a belief is wrong, and replacing it only by a better one.
 
-Each reading has a log probability under the belief, and one that it should have on average if the
-belief is right. What is missing adds up, less a slack (the CUSUM of Page, 1954): that is the doubt.
-When it is large a *challenger* starts from scratch beside the belief. Both then predict the same
-readings, and the difference of their log evidence is the logarithm of the Bayes factor between
-"one is where I thought" and "one is anywhere". The belief is LOST when the challenger is far ahead,
-and is replaced only once the challenger has converged; it is confirmed when both are at one place.
-A challenger is in doubt of itself, too: then it goes on in the lost belief's place, and is
-challenged in its turn.
-A belief that still searches is in doubt when the true place has died out of it: it does not
-converge, and a challenger that is ahead goes on in its place.
+Each reading has a log-likelihood under the belief, and an expected one if the belief is right. The
+shortfall, less a slack, feeds a CUSUM (Page, 1954). When that is large, an *alternative* starts
+from scratch beside the belief. Both then predict the same readings; the difference of their log
+evidence is the logarithm of the Bayes factor between "the position is anywhere" and "the position
+is where the belief has it". The alternative has a CUSUM, too: one that fails itself is *suspect*.
+
+After each reading, the alternative has one outcome, and a table gives what follows. Searching or
+found is the status of the belief that was there first:
+
+===============  =========  ================  =========  =======  ===========
+Outcome          Belief     Goes on, as       Reported   CUSUM    Alternative
+===============  =========  ================  =========  =======  ===========
+none, undecided  any        belief            its own    kept     kept
+confirmed        any        belief            its own    reset    dropped
+abandoned        any        belief            its own    reset    dropped
+ahead            searching  other, SEARCHING  SEARCHING  reset    took over
+ahead            found      belief            LOST       kept     kept
+ahead, suspect   searching  other, SEARCHING  SEARCHING  other's  took over
+ahead, suspect   found      other, SEARCHING  LOST       other's  took over
+won              searching  other, CONVERGED  CONVERGED  reset    took over
+won              found      other, TRACKING   TRACKING   reset    took over
+===============  =========  ================  =========  =======  ===========
+
+Then, by the status reported before: ``LOST`` stays while the belief searches and becomes
+``TRACKING`` when it converges; ``CONVERGED`` lasts for one epoch. A belief does not converge while
+its CUSUM is large or the alternative close behind, as the true position may have died out of it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from math import exp, hypot, nan
+from typing import Any, NamedTuple
 
 from mapfilter.filters.contract import Status
 from mapfilter.filters.grid import GridBelief
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.positioning.gnss.state import NO_GNSS_STATE, GnssState
 
 MapBelief = ParticleBelief | GridBelief
 
-_USUAL, _LEAST_USUAL, _MOST_USUAL = 0.8, 0.5, 2.0
+_USUAL, _MIN_USUAL, _MAX_USUAL = 0.8, 0.5, 2.0
 _SLACK = 1.5
 _LEARNT_OVER_M = 300.0
 
 
 @dataclass(frozen=True, slots=True)
 class AlternativeRules:
-    """When a challenger starts, wins and gives up.
+    """Thresholds for starting, preferring and abandoning an alternative.
+
+    Log Bayes factors are in favour of the alternative.
 
     Parameters
     ----------
-    doubt, doubt_of_cells : float
-        Missing log probability at which it starts; and where only serving cells are told.
-    ahead : float
+    start_cusum, start_cusum_cells : float
+        CUSUM at which an alternative starts; the second where only serving cells are reported.
+    search_threshold : float
         Log Bayes factor from which a belief that still searches is replaced.
-    lost, lost_of_cells : float
-        And from which one that had converged is LOST, and may be replaced: nobody is often carried
-        away. The second where only serving cells are told.
-    confirmed_mass : float
-        The belief is confirmed when so much of the challenger lies within 50 m of a place that is
-        at most 50 m away.
+    lost_threshold, lost_threshold_cells : float
+        Log Bayes factor from which a belief that had converged is LOST and may be replaced: being
+        carried away unmeasured is rare. The second where only serving cells are reported.
+    confirm_mass : float
+        Share of the alternative within 50 m of its leading position, at most 50 m from that of the
+        belief, at which the belief is confirmed.
     abandon_threshold : float
-        A challenger that is so far behind gives up,
+        Log Bayes factor at which an alternative is abandoned.
     abandon_after_m : float
-        or one that has neither won nor lost after so many metres.
-    converge_below : float
-        No belief converges while the doubt of it is larger,
-    converge_behind : float
-        or its challenger less than so far behind.
+        Distance after which an undecided alternative is abandoned.
+    converge_cusum : float
+        Largest CUSUM with which a belief converges, or an alternative wins.
+    converge_threshold : float
+        Lead over its alternative, as a log Bayes factor, that a belief needs to converge.
     """
 
-    doubt: float = 5.0
-    doubt_of_cells: float = 2.5
-    ahead: float = 4.0
-    lost: float = 10.0
-    lost_of_cells: float = 6.0
-    confirmed_mass: float = 0.9
+    start_cusum: float = 5.0
+    start_cusum_cells: float = 2.5
+    search_threshold: float = 4.0
+    lost_threshold: float = 10.0
+    lost_threshold_cells: float = 6.0
+    confirm_mass: float = 0.9
     abandon_threshold: float = -25.0
     abandon_after_m: float = 800.0
-    converge_below: float = 2.5
-    converge_behind: float = 2.0
+    converge_cusum: float = 2.5
+    converge_threshold: float = 2.0
+
+    def alarms(self, cusum: EvidenceCusum, *, cells_only: bool) -> bool:
+        """Tell whether a CUSUM is large enough to start an alternative."""
+        return cusum.sum >= (self.start_cusum_cells if cells_only else self.start_cusum)
 
 
 @dataclass(frozen=True, slots=True)
 class EvidenceCusum:
-    """How much less probable readings were than they should have been.
+    """Shortfall of the log-likelihood of readings against its expectation.
 
     Parameters
     ----------
     sum : float
-        Missing log probability.
     usual : float
-        Log probability of a reading as a multiple of what the model expects; learnt slowly,
-        because no network's errors are quite those of the model.
+        Ratio of log-likelihood to its expectation; learnt slowly, as the errors of no network are
+        exactly those of the model.
     """
 
     sum: float = 0.0
     usual: float = _USUAL
 
     def after(self, expected: float, gained: float, length_m: float) -> EvidenceCusum:
-        """Take one reading in.
+        """Add one reading.
 
         Parameters
         ----------
         expected, gained : float
-            Log probability of the reading that the model expects on average, and what it has.
+            Log-likelihood of the reading: expected on average, and found.
         length_m : float
-            Travelled since the last one.
+            Distance since the last reading.
         """
         if expected >= 0:
             return self
         total = max(0.0, self.sum + _SLACK * self.usual * expected - gained)
-        # What is learnt while in doubt would make a wrong belief usual.
+        # Learning during a shortfall would make a wrong belief usual.
         share = 0.0 if total > 0 else 1.0 - exp(-length_m / _LEARNT_OVER_M)
-        ratio = min(max(gained / expected, _LEAST_USUAL), _MOST_USUAL)
+        ratio = min(max(gained / expected, _MIN_USUAL), _MAX_USUAL)
         return EvidenceCusum(total, self.usual + share * (ratio - self.usual))
 
-    def none(self) -> EvidenceCusum:
-        """Return no doubt, with what was learnt."""
+    def reset(self) -> EvidenceCusum:
+        """Return a sum of 0, with the ratio learnt."""
         return replace(self, sum=0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class AlternativeHypothesis:
-    """A second belief, from scratch.
+    """A second belief, started from scratch.
 
     Parameters
     ----------
     belief : MapBelief
-    began_at_m : float
-        Distance travelled when it started.
-    against : float
-        Log evidence of the first belief then.
-    began_s : float
-        Time when it started.
-    sky : GnssState
-    by_satellites : float
-        What satellites add to the logarithm of the Bayes factor; bounded, as all of them may be
-        faulty.
-    doubt : EvidenceCusum
-        Of itself.
+    start_m, start_s : float
+        Distance travelled and time at its start.
+    main_log_evidence : float
+        Log evidence of the main belief at its start.
+    sources : mapping of str to object
+        State of the sources of evidence that depends on the belief.
+    gnss_log_bayes_factor : float
+        Contribution of rejected satellites to the log Bayes factor; bounded, as all may be faulty.
+    cusum : EvidenceCusum
+        Of the alternative itself.
     """
 
     belief: MapBelief
-    began_at_m: float
-    against: float
-    began_s: float = nan
-    sky: GnssState = NO_GNSS_STATE
-    by_satellites: float = 0.0
-    doubt: EvidenceCusum = field(default_factory=EvidenceCusum)
+    start_m: float
+    main_log_evidence: float
+    start_s: float = nan
+    sources: Mapping[str, Any] = field(default_factory=dict)
+    gnss_log_bayes_factor: float = 0.0
+    cusum: EvidenceCusum = field(default_factory=EvidenceCusum)
 
-    def ahead(self, main: MapBelief) -> float:
-        """Return the logarithm of the Bayes factor in its favour."""
-        by_radio = self.belief.log_evidence - (main.log_evidence - self.against)
-        return by_radio + self.by_satellites
+    def log_bayes_factor(self, main: MapBelief) -> float:
+        """Return the logarithm of the Bayes factor in favour of the alternative."""
+        by_readings = self.belief.log_evidence - (main.log_evidence - self.main_log_evidence)
+        return by_readings + self.gnss_log_bayes_factor
 
 
-class Verdict(Enum):
-    """What became of a challenge so far."""
+class Outcome(Enum):
+    """Outcome of the test of an alternative against a belief; the module's docstring has more."""
 
-    OPEN = "open"
-    AHEAD = "ahead"
-    WON = "won"
+    UNDECIDED = "undecided"
     CONFIRMED = "confirmed"
-    GAVE_UP = "gave up"
+    ABANDONED = "abandoned"
+    AHEAD = "ahead"
+    SUSPECT = "ahead, suspect"
+    WON = "won"
 
 
-@dataclass(frozen=True, slots=True)
-class Resolution:
-    """What became of a belief and its challenger by one reading.
+class Cusum(Enum):
+    """CUSUM that goes on."""
 
-    Parameters
-    ----------
-    belief : MapBelief
-    status : Status
-        For the user: LOST until something is found again.
-    doubt : EvidenceCusum
-    challenger : AlternativeHypothesis or None
-    taken_over : bool
-        Whether the belief is the challenger's.
+    KEPT = "kept"
+    RESET = "reset"
+    OTHERS = "the alternative's"
+
+
+class Transition(NamedTuple):
+    """Row of the table.
+
+    ``takes_over`` is the status with which the alternative goes on; None where the belief does.
+    ``reported`` is the status to report; None for that of the belief. ``keeps`` is whether the
+    alternative stays beside the belief.
     """
+
+    takes_over: Status | None
+    reported: Status | None
+    cusum: Cusum
+    keeps: bool
+
+
+_SEARCHING, _CONVERGED = Status.SEARCHING, Status.CONVERGED
+_TRACKING, _LOST = Status.TRACKING, Status.LOST
+_KEPT, _RESET, _OTHERS = Cusum.KEPT, Cusum.RESET, Cusum.OTHERS
+
+TRANSITIONS: Mapping[tuple[Outcome, bool], Transition] = {
+    # Outcome, and whether the belief is still searching.
+    (Outcome.UNDECIDED, True): Transition(None, None, _KEPT, True),
+    (Outcome.UNDECIDED, False): Transition(None, None, _KEPT, True),
+    (Outcome.CONFIRMED, True): Transition(None, None, _RESET, False),
+    (Outcome.CONFIRMED, False): Transition(None, None, _RESET, False),
+    (Outcome.ABANDONED, True): Transition(None, None, _RESET, False),
+    (Outcome.ABANDONED, False): Transition(None, None, _RESET, False),
+    (Outcome.AHEAD, True): Transition(_SEARCHING, _SEARCHING, _RESET, False),
+    (Outcome.AHEAD, False): Transition(None, _LOST, _KEPT, True),
+    (Outcome.SUSPECT, True): Transition(_SEARCHING, _SEARCHING, _OTHERS, False),
+    (Outcome.SUSPECT, False): Transition(_SEARCHING, _LOST, _OTHERS, False),
+    (Outcome.WON, True): Transition(_CONVERGED, _CONVERGED, _RESET, False),
+    (Outcome.WON, False): Transition(_TRACKING, _TRACKING, _RESET, False),
+}
+
+REPORTED: Mapping[tuple[Status, Status], Status] = {
+    # Status reported before, and found now; others are reported as found.
+    (_LOST, _SEARCHING): _LOST,
+    (_LOST, _CONVERGED): _TRACKING,
+    (_CONVERGED, _CONVERGED): _TRACKING,
+}
+
+
+class Resolution(NamedTuple):
+    """Belief, status and alternative after one reading."""
 
     belief: MapBelief
     status: Status
-    doubt: EvidenceCusum
-    challenger: AlternativeHypothesis | None = None
+    cusum: EvidenceCusum
+    alternative: AlternativeHypothesis | None = None
     taken_over: bool = False
 
 
@@ -179,92 +238,79 @@ def resolve_alternative(
     rules: AlternativeRules,
     before: Status,
     main: MapBelief,
-    doubt: EvidenceCusum,
-    challenger: AlternativeHypothesis | None,
+    cusum: EvidenceCusum,
+    alternative: AlternativeHypothesis | None,
     travelled_m: float,
     *,
     cells_only: bool,
 ) -> Resolution:
-    """Decide after a belief and its challenger have seen the same reading.
+    """Apply the table after a belief and its alternative were weighed by the same reading.
 
     Parameters
     ----------
     rules : AlternativeRules
     before : Status
-        What the user was told last.
+        As reported at the last epoch.
     main : MapBelief
-    doubt : EvidenceCusum
-    challenger : AlternativeHypothesis or None
+    cusum : EvidenceCusum
+        Of ``main``.
+    alternative : AlternativeHypothesis or None
     travelled_m : float
     cells_only : bool
-        Whether only serving cells are told.
+        Only serving cells are reported, no levels.
     """
-    if main.status is Status.CONVERGED and not _may_converge(rules, main, doubt, challenger):
-        # All agree, and what is heard does not: the truth may have died out.
-        main = replace(main, status=Status.SEARCHING)
-    if challenger is None:
-        return _told(before, Resolution(main, main.status, doubt))
-    verdict = judge(rules, main, challenger, travelled_m, cells_only=cells_only)
-    if verdict in (Verdict.CONFIRMED, Verdict.GAVE_UP):
-        return _told(before, Resolution(main, main.status, doubt.none()))
-    searching, other = main.status is Status.SEARCHING, challenger.belief
-    if verdict is Verdict.WON:
-        found = Status.CONVERGED if searching else Status.TRACKING
-        return _told(
-            before, Resolution(replace(other, status=found), found, doubt.none(), None, True)
-        )
-    doubted = challenger.doubt.sum >= (rules.doubt_of_cells if cells_only else rules.doubt)
-    if verdict is Verdict.AHEAD and (searching or doubted):
-        # Nothing found yet can be lost: whoever is ahead goes on with the search at once. So it
-        # does in doubt of itself, and is challenged in its turn.
-        status = Status.SEARCHING if searching else Status.LOST
-        left = challenger.doubt if doubted else doubt.none()
-        other = replace(other, status=Status.SEARCHING, agreement_start_m=nan)
-        return _told(before, Resolution(other, status, left, None, True))
-    lost = verdict is Verdict.AHEAD and not searching
-    return _told(before, Resolution(main, Status.LOST if lost else main.status, doubt, challenger))
+    if main.status is _CONVERGED and (
+        cusum.sum > rules.converge_cusum
+        or (alternative and alternative.log_bayes_factor(main) > -rules.converge_threshold)
+    ):
+        main = replace(main, status=_SEARCHING)
+    outcome = Outcome.UNDECIDED
+    if alternative is not None:
+        outcome = judge(rules, main, alternative, travelled_m, cells_only=cells_only)
+    row = TRANSITIONS[outcome, main.status is _SEARCHING]
+    belief, taken_over = main, row.takes_over is not None
+    if row.cusum is Cusum.RESET:
+        cusum = cusum.reset()
+    if row.takes_over and alternative:
+        belief = replace(alternative.belief, status=row.takes_over)
+        if row.takes_over is _SEARCHING:
+            belief = replace(belief, agreement_start_m=nan)
+        if row.cusum is Cusum.OTHERS:
+            cusum = alternative.cusum
+    belief, status = report(before, belief, row.reported or belief.status)
+    return Resolution(belief, status, cusum, alternative if row.keeps else None, taken_over)
 
 
-def _told(before: Status, now: Resolution) -> Resolution:
-    """Return what the user is told: once lost, one is LOST until found, and then TRACKING."""
-    if before is not Status.LOST or now.status in (Status.LOST, Status.TRACKING):
-        return now
-    if now.status is Status.SEARCHING:
-        return replace(now, status=Status.LOST)
-    belief = replace(now.belief, status=Status.TRACKING)
-    return replace(now, belief=belief, status=Status.TRACKING)
-
-
-def _may_converge(
-    rules: AlternativeRules,
-    main: MapBelief,
-    doubt: EvidenceCusum,
-    challenger: AlternativeHypothesis | None,
-) -> bool:
-    rivalled = challenger is not None and challenger.ahead(main) > -rules.converge_behind
-    return doubt.sum <= rules.converge_below and not rivalled
+def report(before: Status, belief: MapBelief, found: Status) -> tuple[MapBelief, Status]:
+    """Return the status to report, and the belief with it where it has converged before."""
+    status = REPORTED.get((before, found), found)
+    if found is _CONVERGED and status is _TRACKING:
+        belief = replace(belief, status=_TRACKING)
+    return belief, status
 
 
 def judge(
     rules: AlternativeRules,
     main: MapBelief,
-    challenger: AlternativeHypothesis,
+    alternative: AlternativeHypothesis,
     travelled_m: float,
     *,
     cells_only: bool,
-) -> Verdict:
-    """Compare a belief and its challenger after both have seen the same readings."""
-    ahead, other = challenger.ahead(main), challenger.belief.summary
-    said = main.summary
-    apart_m = hypot(other.mean[0] - said.mean[0], other.mean[1] - said.mean[1])
-    if apart_m <= NEAR_M and other.mass_50m >= rules.confirmed_mass:
-        return Verdict.CONFIRMED
-    needed = rules.lost_of_cells if cells_only else rules.lost
-    if ahead >= (rules.ahead if main.status is Status.SEARCHING else needed):
-        agreed = challenger.belief.status in (Status.CONVERGED, Status.TRACKING)
-        sure = agreed and challenger.doubt.sum <= rules.converge_below
-        return Verdict.WON if sure else Verdict.AHEAD
-    gone_m = travelled_m - challenger.began_at_m
-    if ahead <= rules.abandon_threshold or gone_m >= rules.abandon_after_m:
-        return Verdict.GAVE_UP
-    return Verdict.OPEN
+) -> Outcome:
+    """Compare a belief and its alternative after the same readings."""
+    log_bayes_factor = alternative.log_bayes_factor(main)
+    other, mean = alternative.belief.summary, main.summary.mean
+    apart_m = hypot(other.mean[0] - mean[0], other.mean[1] - mean[1])
+    if apart_m <= NEAR_M and other.mass_50m >= rules.confirm_mass:
+        return Outcome.CONFIRMED
+    needed = rules.lost_threshold_cells if cells_only else rules.lost_threshold
+    if log_bayes_factor >= (rules.search_threshold if main.status is _SEARCHING else needed):
+        converged = alternative.belief.status in (_CONVERGED, _TRACKING)
+        if converged and alternative.cusum.sum <= rules.converge_cusum:
+            return Outcome.WON
+        suspect = rules.alarms(alternative.cusum, cells_only=cells_only)
+        return Outcome.SUSPECT if suspect else Outcome.AHEAD
+    gone_m = travelled_m - alternative.start_m
+    if log_bayes_factor <= rules.abandon_threshold or gone_m >= rules.abandon_after_m:
+        return Outcome.ABANDONED
+    return Outcome.UNDECIDED

@@ -1,8 +1,8 @@
-"""Global positioning by the Bayes map filter: one epoch after another, live or in replay.
+"""Global positioning by the Bayes map filter, one epoch after another, live or in replay.
 
-:meth:`BayesPositioner.advance` takes what is known after one epoch and the next epoch, and returns
-what is known then and the news. A replay calls it for every epoch of a log, a live application for
-every one that comes in: equal epochs give equal bytes.
+:meth:`BayesPositioner.step` moves the beliefs by dead reckoning, asks each source of evidence
+(:mod:`mapfilter.positioning.bayes.evidence`) for the epoch's log-likelihood terms, starts a belief
+or weighs it with them, and reports. Equal epochs and seeds give equal bytes.
 """
 
 from __future__ import annotations
@@ -23,29 +23,35 @@ from mapfilter.positioning.bayes.alternative import (
     AlternativeHypothesis,
     AlternativeRules,
     MapBelief,
+    report,
     resolve_alternative,
 )
 from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.evidence import RadioHistory, RadioReading, reading_of
+from mapfilter.positioning.bayes.evidence import (
+    Context,
+    EvidenceSource,
+    EvidenceUpdate,
+    RadioReading,
+    joined,
+)
 from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel, Start
+from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.bayes.smoothing import BayesSmoother
-from mapfilter.positioning.bayes.state import BayesTrack as BayesTrack
-from mapfilter.positioning.bayes.state import name_of, news_of, particle_spacing_of
-from mapfilter.positioning.bayes.timing import NEVER, is_timed, with_timing
+from mapfilter.positioning.bayes.state import BayesState, step_output
+from mapfilter.positioning.bayes.timing import TimingSource
 from mapfilter.positioning.epochs import Epoch, headed
 from mapfilter.positioning.estimate import StepOutput, UnusedReading
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind
-from mapfilter.positioning.gnss.gate import GnssGate
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
-from mapfilter.positioning.gnss.satellites import GnssUpdate, Satellites
-from mapfilter.positioning.gnss.state import GnssState
+from mapfilter.positioning.gnss.source import FirstFix, GnssSource
 
-_MOST_TIMES, _SEARCHING_TIMES = 12, 8
+_MORE_PARTICLES, _MORE_SEARCHING = 12, 8
+"""Factors of the numbers of particles where headings are unknown."""
 
 
 @dataclass(frozen=True)
-class BayesPositioner(Filter[BayesTrack]):
+class BayesPositioner(Filter[BayesState]):
     """The map filter over an area.
 
     Parameters
@@ -54,11 +60,11 @@ class BayesPositioner(Filter[BayesTrack]):
     options : ParticleOptions
     rules : AlternativeRules
     grid : bool
-        The exact filter on a grid in place of particles.
+        Exact filter on a grid in place of particles.
     satellites : GnssOptions
     timing : TimingOptions
     smooth : bool
-        Whether positions are smoothed by the whole log.
+        Smooth positions by the whole log.
     """
 
     model: BayesModel
@@ -76,91 +82,86 @@ class BayesPositioner(Filter[BayesTrack]):
 
     @property
     def area(self) -> AreaMap:
-        """The area's map."""
+        """Map of the area."""
         return self.model.area
 
     @property
     def name(self) -> str:
-        """The filter's name."""
+        """Name of the filter."""
         return "grid" if self.grid else "bayes"
 
+    @cached_property
+    def sources(self) -> tuple[EvidenceSource, ...]:
+        """Kinds of measurement, in the order in which their unused readings are reported."""
+        area = self.area
+        return (
+            GnssSource(area, self.satellites, clock=not self.grid),
+            TimingSource(area, self.timing, self.model.timed_by_sites),
+            FirstFix(area.origin_m),
+            self._radio,
+        )
+
+    @cached_property
+    def _radio(self) -> RadioSource:
+        return RadioSource(self.area, self.model.evidence)
+
     def filter_for(self, compass: bool) -> BeliefFilter[Start, MapBelief, RadioReading]:
-        """Return the filter by itself, for headings with or without a compass."""
+        """Return the filter of a single belief, for headings with or without a compass."""
         return self._filters[compass]
 
     @cached_property
     def _filters(self) -> dict[bool, BeliefFilter[Start, Any, RadioReading]]:
-        if not self.grid:
-            known = self.options
-            # Every place times every heading: most of them are gone after a few steps.
-            unknown = replace(
-                known,
-                max_particles=_MOST_TIMES * known.max_particles,
-                min_search_particles=_SEARCHING_TIMES * known.min_search_particles,
-            )
-            return {
-                True: ParticleFilter(self.model, known),
-                False: ParticleFilter(self.model, unknown),
-            }
-        grids = {compass: StreetGrid(self.model, compass) for compass in (True, False)}
-        return {compass: GridFilter(grid, self.options) for compass, grid in grids.items()}
+        known = self.options
+        if self.grid:
+            grids = {compass: StreetGrid(self.model, compass) for compass in (True, False)}
+            return {compass: GridFilter(grid, known) for compass, grid in grids.items()}
+        # Every place times every heading: most of them die out after a few steps.
+        most = _MORE_PARTICLES * known.max_particles
+        searching = _MORE_SEARCHING * known.min_search_particles
+        unknown = replace(known, max_particles=most, min_search_particles=searching)
+        return {
+            True: ParticleFilter(self.model, known),
+            False: ParticleFilter(self.model, unknown),
+        }
 
-    @cached_property
-    def _sky(self) -> Satellites:
-        area, (width_m, height_m) = self.area, self.area.size_m
-        listener = GnssGate(self.satellites, area.lattice.crs, area.origin_m)
-        return Satellites(listener, (width_m / 2, height_m / 2), not self.grid)
-
-    def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> BayesTrack:  # noqa: ARG002
+    def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> BayesState:  # noqa: ARG002
         """Return the state before the first epoch."""
-        return BayesTrack(RadioHistory.empty(len(self.area.cell_ids)))
+        return BayesState(sources={source.name: source.begin() for source in self.sources})
 
     def begin_at(
         self, east_m: float, north_m: float, sd_m: float, rng: np.random.Generator
-    ) -> BayesTrack:
-        """Return what is known at a known start, in the CRS of the database."""
+    ) -> BayesState:
+        """Return the state at a known start, in the CRS of the database."""
         belief = self.filter_for(True).init(Start(None, True, east_m, north_m, sd_m), rng)
         belief = replace(belief, status=Status.TRACKING)
         return replace(self.begin(), belief=belief, status=Status.TRACKING)
 
     def step(
-        self, track: BayesTrack, epoch: Epoch, rng: np.random.Generator
-    ) -> tuple[BayesTrack, StepOutput]:
-        """Take one epoch in."""
-        fix = epoch.fix
-        if fix is not None and not (isfinite(fix.east_m) and isfinite(fix.north_m)):
+        self, state: BayesState, epoch: Epoch, rng: np.random.Generator
+    ) -> tuple[BayesState, StepOutput]:
+        """Process one epoch."""
+        if epoch.fix and not (isfinite(epoch.fix.east_m) and isfinite(epoch.fix.north_m)):
             epoch = replace(epoch, fix=None)
-        particle_spacing_m, converged = particle_spacing_of(track), track.status is Status.CONVERGED
-        track, unused = self._move(track, epoch, rng)
-        track, sky = self._sky.hear(track, epoch, particle_spacing_m, self.model.evidence.spacing_m)
-        known = track.belief is not None and epoch.fix is not None
-        report = replace(epoch, fix=None) if known else epoch
-        memory, reading, reason, unplaced = reading_of(
-            self.area, self.model.evidence, track.memory, report, particle_spacing_m
-        )
-        track, reading, untimed = self._timed(track, epoch, reading)
-        unused += [*sky.unused, *untimed]
-        unused += [
-            UnusedReading(epoch.time_s, row.role, name_of(row), why) for row, why in unplaced
-        ]
-        belief = track.belief
-        if belief is None:
-            reading = self._sky.first(reading, epoch)
-            if reading is not None:
-                belief, heard = self._start(track, reading, epoch, rng)
-                track = replace(track, belief=belief, sky=heard)
-        elif reading is not None or sky.says:
-            track, why = self._weigh(track, belief, reading or RadioReading(), sky, epoch, rng)
+        before, spacing_m = state.status, state.particle_spacing_m
+        state, unused = self._moved(state, epoch, rng)
+        state, updates = self._collected(state, epoch, spacing_m)
+        unused += [reading for update in updates for reading in update.unused]
+        reason = next(update.reason for update in updates if update.reason is not None)
+        if state.belief is None:
+            started = self._started(updates, state, epoch, rng)
+            if started is not None:
+                belief, sources = started
+                state = replace(state, belief=belief, sources={**state.sources, **sources})
+        else:
+            state, why = self._weighed(state, state.belief, updates, epoch, rng)
             reason = reason if why is Reason.USED else why
-        if converged and track.status is Status.CONVERGED and track.belief is not None:
-            # CONVERGED is one epoch, also where nothing that counts is heard in the next.
-            following = replace(track.belief, status=Status.TRACKING)
-            track = replace(track, belief=following, status=Status.TRACKING)
+            if state.belief is not None:
+                belief, status = report(before, state.belief, state.status)
+                state = replace(state, belief=belief, status=status)
         if reason not in (Reason.USED, Reason.NOT_MOVED_ENOUGH, Reason.NO_READING):
             cell = next((str(row.cell) for row in epoch.heard if row.cell is not None), "")
             unused.append(UnusedReading(epoch.time_s, "serving", cell, reason))
-        after = track if memory is track.memory else replace(track, memory=memory)
-        return after, news_of(self.area, after, epoch.time_s, reason, tuple(unused))
+        return state, step_output(self.area, state, epoch.time_s, reason, tuple(unused))
 
     def warm_up(self, merged: Sequence[Epoch]) -> None:  # noqa: ARG002
         """Load the compiled kernels, and prepare the area."""
@@ -169,17 +170,17 @@ class BayesPositioner(Filter[BayesTrack]):
         model, rng = self.model, np.random.default_rng(0)
         west, south = model.area.origin_m
         small = replace(self, options=replace(self.options, max_particles=64, min_particles=32))
-        track = small.begin_at(west, south, 1.0, rng)
-        track, _ = small.step(track, Epoch(0.0, (MotionStep(1.0, 0.0),)), rng)
-        if track.belief is not None and model.area.cell_ids:
-            small.filter_for(True).update(track.belief, _every_kind(), rng)
+        state = small.begin_at(west, south, 1.0, rng)
+        state, _ = small.step(state, Epoch(0.0, (MotionStep(1.0, 0.0),)), rng)
+        if state.belief is not None and model.area.cell_ids:
+            small.filter_for(True).update(state.belief, _every_kind(), rng)
 
     def smoother(self) -> BayesSmoother | None:
-        """Return a new smoother where positions shall be smoothed."""
+        """Return a new smoother if positions are to be smoothed."""
         return BayesSmoother(self.area, self.model.motion) if self.smooth else None
 
-    def hypotheses(self, state: BayesTrack) -> Hypotheses | None:
-        """Return the hypotheses of the belief that leads."""
+    def hypotheses(self, state: BayesState) -> Hypotheses | None:
+        """Return the hypotheses of the leading belief."""
         belief, (west, south) = state.leading, self.area.origin_m
         if belief is None:
             return None
@@ -189,125 +190,150 @@ class BayesPositioner(Filter[BayesTrack]):
             belief.weight.astype(np.float64),
         )
 
-    def _weigh(
-        self,
-        track: BayesTrack,
-        before: MapBelief,
-        reading: RadioReading,
-        sky: GnssUpdate,
-        epoch: Epoch,
-        rng: np.random.Generator,
-    ) -> tuple[BayesTrack, Reason]:
-        """Weigh the belief, and its challenger, which may start, win or give up."""
-        told = sky.for_main(reading)
-        belief, info = self.filter_for(track.compass).update(before, told, rng)
-        if info.reason is not Reason.USED:
-            return replace(track, belief=belief), info.reason
-        gained = belief.log_evidence - before.log_evidence
-        doubt = track.doubt.after(reading.expected, gained, reading.length_m)
-        cells_only = reading.levels is None and not reading.bounds
-        if reading.serving < 0 and np.isfinite(track.memory.heard_at_m).any():
-            # Satellites or times of arrival between two reports: levels are told all the same.
-            cells_only = False
-        challenger, wins, heard = track.challenger, track.wins, track.sky
-        if challenger is not None:
-            told = sky.for_other(reading)
-            other, _ = self.filter_for(track.compass).update(challenger.belief, told, rng)
-            gained = other.log_evidence - challenger.belief.log_evidence
-            own = challenger.doubt.after(reading.expected, gained, reading.length_m)
-            challenger = replace(challenger, belief=other, doubt=own)
-        now = resolve_alternative(
-            self.rules, track.status, belief, doubt, challenger, track.memory.travelled_m,
-            cells_only=cells_only,
-        )  # fmt: skip
-        if now.taken_over and challenger is not None:
-            wins, heard = wins + 1, challenger.sky
-        most = self.rules.doubt_of_cells if cells_only else self.rules.doubt
-        challenger = now.challenger
-        if (
-            track.challenger is None
-            and now.status is not Status.CONVERGED
-            and (now.doubt.sum >= most or sky.disputed)
-        ):
-            challenger = self._challenger(track, now.belief, epoch, rng)
-        after = BayesTrack(
-            track.memory, now.belief, track.heading_rad, track.compass, now.status, now.doubt,
-            challenger, wins, heard, track.timed_at_m,
-        )  # fmt: skip
-        return after, Reason.USED
-
-    def _challenger(
-        self, track: BayesTrack, main: MapBelief, epoch: Epoch, rng: np.random.Generator
-    ) -> AlternativeHypothesis | None:
-        """Start from scratch: from the report alone, as if it were the first."""
-        empty = RadioHistory.empty(len(self.area.cell_ids))
-        _, reading, _, _ = reading_of(self.area, self.model.evidence, empty, epoch)
-        _, reading, _ = self._timed(replace(track, timed_at_m=NEVER), epoch, reading)
-        reading = self._sky.first(reading, epoch)
-        if reading is None:
-            return None
-        belief, heard = self._start(track, reading, epoch, rng)
-        travelled_m = track.memory.travelled_m
-        return AlternativeHypothesis(
-            belief, travelled_m, main.log_evidence, epoch.time_s, heard, doubt=track.doubt.none()
-        )
-
-    def _start(
-        self, track: BayesTrack, reading: RadioReading, epoch: Epoch, rng: np.random.Generator
-    ) -> tuple[MapBelief, GnssState]:
-        belief = self.filter_for(track.compass).init(Start(reading, track.compass), rng)
-        return self._sky.begin(belief, epoch, track.memory.travelled_m)
-
-    def _timed(
-        self, track: BayesTrack, epoch: Epoch, reading: RadioReading | None
-    ) -> tuple[BayesTrack, RadioReading | None, list[UnusedReading]]:
-        """Add what times of arrival tell to a report."""
-        if not is_timed(epoch):
-            return track, reading, []
-        reading, timed_at_m, unused = with_timing(
-            self.area, self.timing, epoch, reading, track.timed_at_m, track.memory.travelled_m,
-            advances=self.model.timed_by_sites,
-        )  # fmt: skip
-        return replace(track, timed_at_m=timed_at_m), reading, unused
-
-    def _move(
-        self, track: BayesTrack, epoch: Epoch, rng: np.random.Generator
-    ) -> tuple[BayesTrack, list[UnusedReading]]:
+    def _moved(
+        self, state: BayesState, epoch: Epoch, rng: np.random.Generator
+    ) -> tuple[BayesState, list[UnusedReading]]:
+        """Move the beliefs by the epoch's dead reckoning."""
         unused: list[UnusedReading] = []
-        belief, memory, heading_rad = track.belief, track.memory, track.heading_rad
-        compass, challenger = track.compass, track.challenger
         for raw in epoch.motion:
-            step, heading_rad = headed(raw, heading_rad)
+            step, heading_rad = headed(raw, state.heading_rad)
+            belief, compass, alternative = state.belief, state.compass, state.alternative
+            reckoning, why = state.reckoning, Reason.NOT_STARTED
             if belief is None:
-                unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.NOT_STARTED))
                 compass = isfinite(raw.heading_rad)
-                continue
-            if compass and not isfinite(raw.heading_rad) and memory.travelled_m == 0:
-                # Nothing has moved yet: headings can still become those of no compass.
-                compass = False
-                belief = self._without_compass(belief, rng)
-            belief, why = self.filter_for(track.compass).predict(belief, step, rng)
-            memory = memory.moved(step)
-            if challenger is not None:
-                other, _ = self.filter_for(track.compass).predict(challenger.belief, step, rng)
-                challenger = replace(challenger, belief=other)
+            else:
+                if compass and not isfinite(raw.heading_rad) and reckoning.travelled_m == 0:
+                    # Nothing has moved yet, so headings can still be relative to the first one.
+                    compass, belief = False, self._without_compass(belief, rng)
+                predict = self.filter_for(compass).predict
+                belief, why = predict(belief, step, rng)
+                reckoning = reckoning.moved(step)
+                if alternative is not None:
+                    other, _ = predict(alternative.belief, step, rng)
+                    alternative = replace(alternative, belief=other)
             if why is not Reason.USED:
                 unused.append(UnusedReading(epoch.time_s, "motion", "", why))
-        moved = BayesTrack(
-            memory,
-            belief,
-            heading_rad,
-            compass,
-            track.status,
-            track.doubt,
-            challenger,
-            track.wins,
-            track.sky,
-            track.timed_at_m,
+            state = replace(
+                state,
+                belief=belief,
+                reckoning=reckoning,
+                heading_rad=heading_rad,
+                compass=compass,
+                alternative=alternative,
+            )
+        return state, unused
+
+    def _collected(
+        self, state: BayesState, epoch: Epoch, particle_spacing_m: float
+    ) -> tuple[BayesState, list[EvidenceUpdate]]:
+        """Ask all sources for their evidence; return the state with theirs, and the evidence."""
+        history = state.sources[self._radio.name]
+        due = bool(epoch.heard) and self._radio.due(history, state.reckoning.travelled_m)
+        context, updates = Context(particle_spacing_m, due), []
+        for source in self.sources:
+            if state.belief is None:
+                update = source.first(epoch)
+            else:
+                update = source.update(state, epoch, context)
+            updates.append(update)
+            state = replace(
+                state,
+                sources={**state.sources, source.name: update.state},
+                belief=update.belief or state.belief,
+                alternative=update.alternative or state.alternative,
+            )
+        return state, updates
+
+    def _started(
+        self,
+        updates: list[EvidenceUpdate],
+        state: BayesState,
+        epoch: Epoch,
+        rng: np.random.Generator,
+    ) -> tuple[MapBelief, dict[str, Any]] | None:
+        """Start a belief from evidence; also return the states of sources that depend on it."""
+        reading = joined(updates)
+        if reading is None:
+            return None
+        belief = self.filter_for(state.compass).init(Start(reading, state.compass), rng)
+        states = {}
+        for source in self.sources:
+            belief, own = source.start(belief, epoch, state.reckoning.travelled_m)
+            if own is not None:
+                states[source.name] = own
+        return belief, states
+
+    def _weighed(
+        self,
+        state: BayesState,
+        before: MapBelief,
+        updates: list[EvidenceUpdate],
+        epoch: Epoch,
+        rng: np.random.Generator,
+    ) -> tuple[BayesState, Reason]:
+        """Weigh the belief and its alternative; start, prefer or drop the alternative."""
+        reading = joined(updates)
+        if reading is None:
+            return state, Reason.USED
+        update = self.filter_for(state.compass).update
+        belief, info = update(before, reading, rng)
+        if info.reason is not Reason.USED:
+            return replace(state, belief=belief), info.reason
+        gained = belief.log_evidence - before.log_evidence
+        cusum = state.cusum.after(reading.expected, gained, reading.length_m)
+        sources, alternative = state.sources, state.alternative
+        if alternative is not None:
+            terms = joined(updates, alternative=True) or RadioReading()
+            other, _ = update(alternative.belief, terms, rng)
+            gained = other.log_evidence - alternative.belief.log_evidence
+            own = alternative.cusum.after(reading.expected, gained, reading.length_m)
+            alternative = replace(alternative, belief=other, cusum=own)
+        travelled_m = state.reckoning.travelled_m
+        cells_only = self._radio.cells_only(reading, sources[self._radio.name])
+        now = resolve_alternative(
+            self.rules, state.status, belief, cusum, alternative, travelled_m, cells_only=cells_only
         )
-        return moved, unused
+        if now.taken_over and alternative is not None:
+            sources = {**sources, **alternative.sources}
+        alternative = now.alternative
+        disputed = any(one.disputed for one in updates)
+        if (
+            state.alternative is None
+            and now.status is not Status.CONVERGED
+            and (self.rules.alarms(now.cusum, cells_only=cells_only) or disputed)
+        ):
+            alternative = self._alternative(state, now.belief, epoch, rng)
+        after = replace(
+            state,
+            belief=now.belief,
+            status=now.status,
+            sources=sources,
+            cusum=now.cusum,
+            alternative=alternative,
+            takeovers=state.takeovers + now.taken_over,
+        )
+        return after, Reason.USED
+
+    def _alternative(
+        self, state: BayesState, main: MapBelief, epoch: Epoch, rng: np.random.Generator
+    ) -> AlternativeHypothesis | None:
+        """Start an alternative from this epoch's evidence alone, as if it were the first."""
+        updates = [source.first(epoch) for source in self.sources]
+        started = self._started(updates, state, epoch, rng)
+        if started is None:
+            return None
+        belief, sources = started
+        return AlternativeHypothesis(
+            belief,
+            state.reckoning.travelled_m,
+            main.log_evidence,
+            epoch.time_s,
+            sources,
+            cusum=state.cusum.reset(),
+        )
 
     def _without_compass(self, belief: MapBelief, rng: np.random.Generator) -> MapBelief:
+        """Spread a belief over all headings."""
         if isinstance(belief, GridBelief):
             grid = StreetGrid(self.model, compass=False)
             count = grid.bias_rad.size
@@ -316,8 +342,8 @@ class BayesPositioner(Filter[BayesTrack]):
                 for mass in (belief.on, belief.off)
             )
             return replace(belief, on=on, off=off, model=grid)
-        state = self.model.any_heading(belief.state, _MOST_TIMES, rng)
-        log_weight = np.tile(belief.log_weight, _MOST_TIMES) - np.log(_MOST_TIMES)
+        state = self.model.any_heading(belief.state, _MORE_PARTICLES, rng)
+        log_weight = np.tile(belief.log_weight, _MORE_PARTICLES) - np.log(_MORE_PARTICLES)
         return replace(belief, state=state, log_weight=log_weight)
 
 

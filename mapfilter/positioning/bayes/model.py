@@ -36,8 +36,8 @@ from mapfilter.models.street_motion import (
     weigh_by_map,
 )
 from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.evidence import EvidenceOptions, RadioReading
-from mapfilter.positioning.gnss.readings import FixEvidence
+from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.radio import EvidenceOptions
 
 _F = np.float32
 OFF_AT_START = 0.05
@@ -216,11 +216,8 @@ class BayesModel:
                 fingerprint.weigh_by_levels(now, then, flat, bands, levels, log_weight)
             for bound in reading.bounds:
                 fingerprint.weigh_by_bound(now, flat, bands, bound, self._bound_table, log_weight)
-        if reading.fix is not None:
-            log_weight += FixEvidence(reading.fix, self.area.origin_m).log_likelihood(state)
-            used = True
-        for evidence in reading.also:
-            log_weight += evidence.log_likelihood(state)
+        for term in reading.terms:
+            log_weight += term.log_likelihood(state)
             used = True
         return Reason.USED if used else Reason.NO_READING
 

@@ -15,9 +15,9 @@ from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.options import Below1, NotNegative, Options, Positive, Probability
 from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.evidence import EvidenceOptions
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.radio import EvidenceOptions
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 
 _NARROW_BIAS_RAD, _NARROW_SCALE = radians(1.5), 0.015

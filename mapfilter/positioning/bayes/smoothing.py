@@ -20,7 +20,7 @@ from mapfilter.filters.resampling import systematic
 from mapfilter.models.street_motion import STATES, MotionErrors, draw_ancestors
 from mapfilter.positioning.bayes.alternative import MapBelief
 from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.state import BayesTrack
+from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.matched_way import matched_way
 
@@ -66,34 +66,31 @@ class History:
 
     every_m: float = 5.0
     kept: list[Kept] = field(default_factory=list)
-    challenging: list[Kept] = field(default_factory=list)
+    alternative: list[Kept] = field(default_factory=list)
     moved: list[tuple[float, float, float]] = field(default_factory=list)
 
-    def add(self, before: BayesTrack, after: BayesTrack) -> None:
-        """Take in what is known after one more epoch."""
-        memory, epoch = after.memory, len(self.moved)
-        self.moved.append((memory.east_m, memory.north_m, memory.travelled_m))
-        if before.challenger is not None and after.challenger is None:
-            if after.wins > before.wins:
-                began_m = before.challenger.began_at_m
-                self.kept = [k for k in self.kept if k.travelled_m < began_m] + self.challenging
-            self.challenging = []
-        if after.belief is None or not _due(self.kept, memory.travelled_m, self.every_m):
+    def add(self, before: BayesState, after: BayesState) -> None:
+        """Add the state after one more epoch; a takeover replaces what was kept since it began."""
+        now, epoch = after.reckoning, len(self.moved)
+        self.moved.append((now.east_m, now.north_m, now.travelled_m))
+        if before.alternative is not None and after.alternative is None:
+            if after.takeovers > before.takeovers:
+                start_m = before.alternative.start_m
+                self.kept = [k for k in self.kept if k.travelled_m < start_m] + self.alternative
+            self.alternative = []
+        due = not self.kept or now.travelled_m - self.kept[-1].travelled_m >= self.every_m
+        if after.belief is None or not due:
             return
         self.kept.append(_keep(after.belief, epoch, self.moved[-1]))
-        if after.challenger is not None:
-            self.challenging.append(_keep(after.challenger.belief, epoch, self.moved[-1]))
+        if after.alternative is not None:
+            self.alternative.append(_keep(after.alternative.belief, epoch, self.moved[-1]))
         if sum(k.bytes for k in self.kept) > _MOST_BYTES:
             self.kept, self.every_m = self.kept[::2], 2 * self.every_m
 
-    def close(self, last: BayesTrack) -> None:
+    def close(self, last: BayesState) -> None:
         """Keep the last belief, from which paths go back."""
         if last.leading is not None and self.kept and self.kept[-1].epoch < len(self.moved) - 1:
             self.kept.append(_keep(last.leading, len(self.moved) - 1, self.moved[-1]))
-
-
-def _due(kept: list[Kept], travelled_m: float, every_m: float) -> bool:
-    return not kept or travelled_m - kept[-1].travelled_m >= every_m
 
 
 def _keep(belief: MapBelief, epoch: int, moved: tuple[float, float, float]) -> Kept:
@@ -236,9 +233,9 @@ class BayesSmoother:
     area: AreaMap
     errors: MotionErrors
     history: History = field(default_factory=History)
-    last: BayesTrack | None = None
+    last: BayesState | None = None
 
-    def add(self, before: BayesTrack, after: BayesTrack) -> None:
+    def add(self, before: BayesState, after: BayesState) -> None:
         """Record the states before and after one epoch."""
         self.history.add(before, after)
         self.last = after

@@ -1,13 +1,14 @@
-"""Timing advances and time differences of arrival as evidence of places.
+"""Timing advances and time differences of arrival as evidence.
 
-Their errors last: readings in a row, some metres apart, count as one over the distance at which
-errors part.
+Their errors last for some distance: readings in a row count as one over the distance at which the
+errors become independent.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import exp, hypot, inf, isfinite, nan
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -17,20 +18,23 @@ from mapfilter.models.gaussian import GaussianTerms
 from mapfilter.models.ranging import range_differences, timing_advances
 from mapfilter.models.state import StateLayout
 from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.evidence import Context, EvidenceSource, EvidenceUpdate
+from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Difference, Epoch
 from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.gnss.options import TimingOptions
 
-Timed = tuple[float, float]
-"""Distance travelled when timing advances and differences were last used."""
 
-NEVER: Timed = (-inf, -inf)
+class TimingState(NamedTuple):
+    """Distances travelled when timing advances and differences were last used."""
+
+    advance_m: float = -inf
+    difference_m: float = -inf
 
 
 @dataclass(frozen=True, eq=False)
-class TimingEvidence:
-    """What distances, or differences of them, say of places.
+class TimingTerm:
+    """Log-likelihood of distances, or of differences of them.
 
     Parameters
     ----------
@@ -38,8 +42,9 @@ class TimingEvidence:
         Of east and north in the frame of the hypotheses.
     reading_m : (m,) array
     weight : float
-        How much of it is new, 0 to 1.
+        Share of the reading that is new, 0 to 1.
     clip_sd : float
+        Largest innovation in standard deviations; outliers count as this.
     """
 
     model: GaussianTerms
@@ -48,7 +53,7 @@ class TimingEvidence:
     clip_sd: float
 
     def log_likelihood(self, state: Floats32) -> Floats:
-        """Return it for each hypothesis; outliers count no more than readings at the clip."""
+        """Return the log-likelihood of each hypothesis."""
         off = self.reading_m - self.model.mean(state[:2].T.astype(np.float64))
         white = np.linalg.solve(np.linalg.cholesky(self.model.noise), off.T)
         square = np.minimum(np.sum(white**2, axis=0), self.clip_sd**2 * self.reading_m.size)
@@ -56,126 +61,110 @@ class TimingEvidence:
 
     @property
     def expected(self) -> float:
-        """Log-likelihood on average where the place is right."""
+        """Expected log-likelihood at the true position."""
         return -0.5 * self.weight * self.reading_m.size
 
 
-def with_timing(
-    area: AreaMap,
-    options: TimingOptions,
-    epoch: Epoch,
-    reading: RadioReading | None,
-    timed: Timed,
-    travelled_m: float,
-    *,
-    advances: bool = True,
-) -> tuple[RadioReading | None, Timed, list[UnusedReading]]:
-    """Add timing advances and time differences of an epoch to its report.
+@dataclass(frozen=True)
+class TimingSource(EvidenceSource):
+    """Timing advances and time differences, by the distances of sites.
 
     Parameters
     ----------
     area : AreaMap
-        Knows the sites.
     options : TimingOptions
-    epoch : Epoch
-    reading : RadioReading or None
-        What else the epoch's report says, if anything.
-    timed : Timed
-    travelled_m : float
     advances : bool
-        Whether timing advances are compared with the sites' distances.
-
-    Returns
-    -------
-    reading : RadioReading or None
-    timed : Timed
-    unused : list of UnusedReading
+        Use timing advances; False where a measured map of them is used instead.
     """
-    unused: list[UnusedReading] = []
-    found: list[TimingEvidence] = []
-    share = _new(travelled_m - timed[0], options.advance_memory_m)
-    if advances and share > 0:
-        told, missing = _advances(area, options, epoch, share)
-        found, unused = found + told, unused + missing
-        timed = (travelled_m if told else timed[0], timed[1])
-    share = _new(travelled_m - timed[1], options.difference_memory_m)
-    if epoch.differences and share > 0:
-        told, missing = _differences(area, options, epoch, share)
-        found, unused = found + told, unused + missing
-        timed = (timed[0], travelled_m if told else timed[1])
-    if not found:
-        return reading, timed, unused
-    reading = reading or RadioReading()
-    expected = reading.expected + sum(one.expected for one in found)
-    return replace(reading, also=(*reading.also, *found), expected=expected), timed, unused
+
+    area: AreaMap
+    options: TimingOptions
+    advances: bool = True
+    name: ClassVar[str] = "timing"
+
+    def begin(self) -> TimingState:
+        """Return the state before the first reading."""
+        return TimingState()
+
+    def first(self, epoch: Epoch) -> EvidenceUpdate:
+        """Read an epoch as if it were the first."""
+        return self.read(TimingState(), epoch, 0.0)
+
+    def update(self, state: BayesState, epoch: Epoch, context: Context) -> EvidenceUpdate:  # noqa: ARG002
+        """Read the epoch's timing advances and differences."""
+        return self.read(state.sources[self.name], epoch, state.reckoning.travelled_m)
+
+    def read(self, state: TimingState, epoch: Epoch, travelled_m: float) -> EvidenceUpdate:
+        """Return the terms of an epoch, each weighted by the share of its error that is new."""
+        unused: list[UnusedReading] = []
+        terms: list[TimingTerm] = []
+        share = _new_share(travelled_m - state.advance_m, self.options.advance_memory_m)
+        if self.advances and share > 0 and self._add_advances(epoch, share, terms, unused):
+            state = state._replace(advance_m=travelled_m)
+        share = _new_share(travelled_m - state.difference_m, self.options.difference_memory_m)
+        if share > 0 and self._add_differences(epoch, share, terms, unused):
+            state = state._replace(difference_m=travelled_m)
+        expected = sum(one.expected for one in terms)
+        return EvidenceUpdate(state, tuple(terms), expected=expected, unused=unused)
+
+    @property
+    def _layout(self) -> StateLayout:
+        return StateLayout(2, 0, 1, height_m=self.options.height_m)
+
+    def _site(self, cell: str) -> list[float]:
+        (east, north, up), (west, south) = self.area.sites[cell], self.area.origin_m
+        return [east - west, north - south, up]
+
+    def _add_advances(
+        self, epoch: Epoch, share: float, terms: list[TimingTerm], unused: list[UnusedReading]
+    ) -> bool:
+        options, known = self.options, []
+        for row in epoch.heard:
+            if row.cell is None or not isfinite(row.timing_advance):
+                continue
+            if row.cell in self.area.sites:
+                known.append((row.cell, row.timing_advance))
+            else:
+                unused.append(UnusedReading(epoch.time_s, "ta", row.cell, Reason.UNKNOWN_CELL))
+        if not known:
+            return False
+        sigma_m = hypot(options.advance_sd_m, options.step_m / 12**0.5)
+        model = timing_advances(self._layout, [self._site(cell) for cell, _ in known], sigma_m)
+        reading_m = np.array([(steps + 0.5) * options.step_m for _, steps in known])
+        terms.append(TimingTerm(model, reading_m, share, options.clip_sd))
+        return True
+
+    def _add_differences(
+        self, epoch: Epoch, share: float, terms: list[TimingTerm], unused: list[UnusedReading]
+    ) -> bool:
+        """Add one term for each reference, as its differences share the reference's error."""
+        by_reference: dict[str, dict[str, Difference]] = {}
+        for row in epoch.differences:
+            if not isfinite(row.difference_m):
+                continue
+            of = by_reference.setdefault(row.reference, {})
+            unknown = [cell for cell in (row.cell, row.reference) if cell not in self.area.sites]
+            if unknown:
+                unused.append(UnusedReading(epoch.time_s, "tdoa", unknown[0], Reason.UNKNOWN_CELL))
+            elif row.cell in of:
+                unused.append(UnusedReading(epoch.time_s, "tdoa", row.cell, Reason.SECOND_READING))
+            elif self._site(row.cell) != self._site(row.reference):
+                of[row.cell] = row
+        before = len(terms)
+        for reference, rows in by_reference.items():
+            if not rows:
+                continue
+            reference_m = next((one.reference_sigma_m for one in rows.values()), nan)
+            sigma_m = [reference_m, *(one.sigma_m for one in rows.values())]
+            model = range_differences(
+                self._layout,
+                [self._site(reference), *(self._site(cell) for cell in rows)],
+                [value if isfinite(value) else self.options.difference_sd_m for value in sigma_m],
+            )
+            reading_m = np.array([one.difference_m for one in rows.values()])
+            terms.append(TimingTerm(model, reading_m, share, self.options.clip_sd))
+        return len(terms) > before
 
 
-def _new(gone_m: float, memory_m: float) -> float:
+def _new_share(gone_m: float, memory_m: float) -> float:
     return 1.0 - exp(-2.0 * gone_m / memory_m) if isfinite(gone_m) else 1.0
-
-
-def _layout(options: TimingOptions) -> StateLayout:
-    return StateLayout(2, 0, 1, height_m=options.height_m)
-
-
-def _site(area: AreaMap, cell: str) -> list[float]:
-    (east, north, up), (west, south) = area.sites[cell], area.origin_m
-    return [east - west, north - south, up]
-
-
-def _advances(
-    area: AreaMap, options: TimingOptions, epoch: Epoch, share: float
-) -> tuple[list[TimingEvidence], list[UnusedReading]]:
-    rows = [row for row in epoch.heard if row.cell is not None and isfinite(row.timing_advance)]
-    known = [row for row in rows if row.cell in area.sites]
-    unused = [
-        UnusedReading(epoch.time_s, "ta", str(row.cell), Reason.UNKNOWN_CELL)
-        for row in rows
-        if row.cell not in area.sites
-    ]
-    if not known:
-        return [], unused
-    sigma_m = hypot(options.advance_sd_m, options.step_m / 12**0.5)
-    sites = [_site(area, str(row.cell)) for row in known]
-    reading = np.array([(row.timing_advance + 0.5) * options.step_m for row in known])
-    model = timing_advances(_layout(options), sites, sigma_m)
-    return [TimingEvidence(model, reading, share, options.clip_sd)], unused
-
-
-def _differences(
-    area: AreaMap, options: TimingOptions, epoch: Epoch, share: float
-) -> tuple[list[TimingEvidence], list[UnusedReading]]:
-    """Take differences to one reference together, as they share its error."""
-    unused: list[UnusedReading] = []
-    by_reference: dict[str, dict[str, Difference]] = {}
-    for row in epoch.differences:
-        if not isfinite(row.difference_m):
-            continue
-        of = by_reference.setdefault(row.reference, {})
-        strange = [cell for cell in (row.cell, row.reference) if cell not in area.sites]
-        if strange:
-            unused.append(UnusedReading(epoch.time_s, "tdoa", strange[0], Reason.UNKNOWN_CELL))
-        elif row.cell in of:
-            unused.append(UnusedReading(epoch.time_s, "tdoa", row.cell, Reason.SECOND_READING))
-        elif _site(area, row.cell) != _site(area, row.reference):
-            of[row.cell] = row
-    found = []
-    for reference, rows in by_reference.items():
-        if not rows:
-            continue
-        own_m = next((one.reference_sigma_m for one in rows.values()), nan)
-        sigma_m = [own_m, *(one.sigma_m for one in rows.values())]
-        usual = options.difference_sd_m
-        model = range_differences(
-            _layout(options),
-            [_site(area, reference), *(_site(area, cell) for cell in rows)],
-            [value if isfinite(value) else usual for value in sigma_m],
-        )
-        reading = np.array([one.difference_m for one in rows.values()])
-        found.append(TimingEvidence(model, reading, share, options.clip_sd))
-    return found, unused
-
-
-def is_timed(epoch: Epoch) -> bool:
-    """Tell whether an epoch has anything to do with times of arrival."""
-    return bool(epoch.differences) or any(isfinite(row.timing_advance) for row in epoch.heard)

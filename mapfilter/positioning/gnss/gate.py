@@ -1,38 +1,35 @@
-"""Satellites and fixes beside a belief: weighed where they agree with it, else rejected.
+"""Comparison of fixes and pseudoranges with a belief: they are weighed where they agree with it.
 
-What is heard is compared with what the belief expects. Honest readings weigh its hypotheses and
-steer the clock. Readings that nothing of the belief explains are rejected, all of them or those of
-a few satellites; the clock may have jumped, but position never follows at once. A belief that
-rejects for long may itself be wrong: so it is disputed, and a challenger that believes the
-satellites may try (:mod:`mapfilter.positioning.bayes.alternative`).
+Readings that agree with the belief weigh its hypotheses and correct the receiver's clock. Readings
+that no hypothesis explains are rejected: all of them, or those of a few satellites. The clock may
+have jumped, the position never follows at once. After a rejection nothing is used for a while; a
+belief that rejects readings for long may be wrong itself and is disputed
+(:mod:`mapfilter.positioning.gnss.source`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from math import isfinite, nan
+from math import inf, isfinite, nan, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from mapfilter._types import Bools, Floats
+from mapfilter._types import Bools, Floats, Floats32
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.particle import ParticleBelief
+from mapfilter.models.street_motion import EAST, NORTH
 from mapfilter.positioning.bayes.alternative import MapBelief
-from mapfilter.positioning.bayes.evidence import Given, PlaceEvidence
+from mapfilter.positioning.bayes.evidence import FixedTerm, Term
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.gnss.options import GnssOptions
-from mapfilter.positioning.gnss.readings import (
-    LEAST_MOVED_M,
-    FixEvidence,
-    Told,
-    range_sigma_m,
-    sky_over,
-    widened,
-)
 from mapfilter.positioning.gnss.receiver import (
     LINEAR,
+    MIN_MOVED_M,
     Receiver,
     Sky,
+    Unused,
     Weighed,
     agreement,
     begun,
@@ -41,40 +38,114 @@ from mapfilter.positioning.gnss.receiver import (
     clock_reset,
     moved,
     near_clock,
+    range_sigma_m,
+    sky_over,
     weighed,
 )
-from mapfilter.positioning.gnss.state import GnssState
 
 _RESET_GATE = 0.5
+_F = np.float32
+_FIX_SD_M = 10.0
+_FIX_CLIP = 5.0
 
 
-@dataclass(frozen=True, eq=False)
-class Listened:
-    """What satellites and fixes make of a belief.
+@dataclass(frozen=True)
+class FixTerm:
+    """Log-likelihood of a position fix: Gaussian, clipped at five standard deviations.
 
     Parameters
     ----------
-    belief : MapBelief
-        Its hypotheses carry clock and height.
-    memory : GnssState
-    also : tuple of PlaceEvidence
-        To weigh it by.
-    heard : bool
-        Whether there was anything to compare.
-    told : tuple of (str, str, Reason)
-        What was left alone, and why.
+    fix : GnssFix
+    origin_m : (float, float)
+        Of the frame of the hypotheses.
+    """
+
+    fix: GnssFix
+    origin_m: tuple[float, float]
+
+    def log_likelihood(self, state: Floats32) -> Floats:
+        """Return the log-likelihood of each hypothesis."""
+        fix, (west, south) = self.fix, self.origin_m
+        dx = state[EAST] - _F(fix.east_m - west)
+        dy = state[NORTH] - _F(fix.north_m - south)
+        known = isfinite(fix.var_east_m2) and isfinite(fix.var_north_m2)
+        var_x = max(fix.var_east_m2, 1.0) if known else _FIX_SD_M**2
+        var_y = max(fix.var_north_m2, 1.0) if known else _FIX_SD_M**2
+        cross = fix.cov_east_north_m2 if known and isfinite(fix.cov_east_north_m2) else 0.0
+        cross = float(np.clip(cross, -0.99 * sqrt(var_x * var_y), 0.99 * sqrt(var_x * var_y)))
+        det = var_x * var_y - cross**2
+        square = (var_y * dx**2 - 2 * cross * dx * dy + var_x * dy**2) / det
+        return np.asarray(-0.5 * np.minimum(square, _FIX_CLIP**2), dtype=np.float64)
+
+
+def widened(fix: GnssFix, times: float) -> GnssFix:
+    """Return a fix with its variance multiplied; 10 m are assumed where it has none."""
+    known = isfinite(fix.var_east_m2) and isfinite(fix.var_north_m2)
+    east_m2, north_m2 = (fix.var_east_m2, fix.var_north_m2) if known else (_FIX_SD_M**2,) * 2
+    cross_m2 = fix.cov_east_north_m2 if known else 0.0
+    return GnssFix(fix.east_m, fix.north_m, times * east_m2, times * north_m2, times * cross_m2)
+
+
+@dataclass(frozen=True, eq=False)
+class GnssState:
+    """State of GNSS beside one belief.
+
+    Parameters
+    ----------
+    receiver : Receiver or None
+        Clock and height; None before the first pseudorange.
+    fix_used_at_m : float
+        Distance travelled when a fix was last used.
+    compared_at_m, compared_at_s : float
+        Distance travelled and time at the last comparison.
+    probation_until_s : float
+        Nothing is used before.
+    rejected_since_s : float
+        Start of the present series of rejections; NaN outside one.
+    """
+
+    receiver: Receiver | None = None
+    fix_used_at_m: float = -inf
+    compared_at_m: float = -inf
+    compared_at_s: float = -inf
+    probation_until_s: float = -inf
+    rejected_since_s: float = nan
+
+    def due(self, options: GnssOptions, time_s: float, travelled_m: float) -> bool:
+        """Tell whether to compare again where no radio report asks for it."""
+        gone_m = travelled_m - self.compared_at_m
+        return gone_m >= options.spacing_m or time_s - self.compared_at_s >= options.pause_s
+
+    @property
+    def rejecting(self) -> bool:
+        """Whether the last readings contradicted the belief."""
+        return isfinite(self.rejected_since_s)
+
+
+class GnssComparison(NamedTuple):
+    """Outcome of comparing an epoch's fix and pseudoranges with a belief.
+
+    ``belief`` carries clock and height in its hypotheses. ``compared`` is whether there was
+    anything to compare; ``unused`` holds kind, name and reason of readings left out.
     """
 
     belief: MapBelief
-    memory: GnssState
-    also: tuple[PlaceEvidence, ...] = ()
-    heard: bool = False
-    told: tuple[Told, ...] = ()
+    state: GnssState
+    terms: tuple[Term, ...] = ()
+    compared: bool = False
+    unused: tuple[Unused, ...] = ()
+
+    def without(
+        self, kind: str, names: Iterable[str], why: Reason, **changes: Any
+    ) -> GnssComparison:
+        """Add readings left out, and change further fields."""
+        left_out = tuple((kind, name, why) for name in names)
+        return self._replace(unused=(*self.unused, *left_out), **changes)
 
 
 @dataclass(frozen=True)
 class GnssGate:
-    """Compares satellites with beliefs.
+    """Compares fixes and pseudoranges with beliefs.
 
     Parameters
     ----------
@@ -89,101 +160,115 @@ class GnssGate:
     crs: str
     origin_m: tuple[float, float]
 
-    def listen(
+    def compare(
         self,
         belief: MapBelief,
-        memory: GnssState,
+        state: GnssState,
         epoch: Epoch,
         travelled_m: float,
         particle_spacing_m: float,
-    ) -> Listened:
-        """Compare an epoch's satellites and fix with a belief.
+    ) -> GnssComparison:
+        """Compare an epoch's fix and pseudoranges with a belief.
 
         Parameters
         ----------
         belief : MapBelief
-        memory : GnssState
+        state : GnssState
         epoch : Epoch
         travelled_m : float
         particle_spacing_m : float
-            How far the hypotheses nearest to the truth may lie beside it.
+            Distance of the hypotheses nearest to the true position from it.
         """
-        memory = replace(memory, heard_at_s=epoch.time_s, heard_at_m=travelled_m)
-        found = Listened(belief, memory)
-        if epoch.fix is not None:
-            found = self._hear_fix(found, epoch, epoch.fix, travelled_m)
+        state = replace(state, compared_at_s=epoch.time_s, compared_at_m=travelled_m)
+        found = GnssComparison(belief, state)
+        if epoch.fix is not None and belief.log_weight.size:
+            found = self._compare_fix(found, epoch.fix, epoch.time_s, travelled_m)
         if epoch.ranges:
-            found = self._hear_ranges(found, epoch, travelled_m, particle_spacing_m)
-        if found.memory.until_s > epoch.time_s:
-            # Where one is rejected, the other does not count alone.
-            found = replace(found, also=(Given(np.zeros(1)),))
+            found = self._compare_ranges(found, epoch, travelled_m, particle_spacing_m)
+        if found.state.probation_until_s > epoch.time_s:
+            # Where fixes are rejected, pseudoranges are not used alone, and the other way around.
+            found = found._replace(terms=(FixedTerm(np.zeros(1)),))
         return found
 
     def _gate(self, belief: MapBelief) -> float:
         searching = belief.status is Status.SEARCHING
         return self.options.search_gate if searching else self.options.gate
 
-    def _hear_ranges(
-        self, found: Listened, epoch: Epoch, travelled_m: float, particle_spacing_m: float
-    ) -> Listened:
-        belief, memory, options = found.belief, found.memory, self.options
+    def _rejected(self, state: GnssState, time_s: float) -> GnssState:
+        since_s = state.rejected_since_s if state.rejecting else time_s
+        until_s = time_s + self.options.probation_s
+        return replace(state, probation_until_s=until_s, rejected_since_s=since_s)
+
+    def _compare_fix(
+        self, found: GnssComparison, fix: GnssFix, time_s: float, travelled_m: float
+    ) -> GnssComparison:
+        belief, state, options = found.belief, found.state, self.options
+        if time_s < state.probation_until_s:
+            return found.without("gnss", [""], Reason.ON_PROBATION, compared=True)
+        gone_m = travelled_m - state.fix_used_at_m
+        wide = widened(fix, max(options.fix_memory_m / max(gone_m, MIN_MOVED_M), 1.0))
+        term, log_weight = FixTerm(wide, self.origin_m), belief.log_weight
+        gain = term.log_likelihood(belief.state)
+        total = float(np.logaddexp.reduce(log_weight + gain) - np.logaddexp.reduce(log_weight))
+        if total + 1.0 < -self._gate(belief):
+            state = self._rejected(state, time_s)
+            why = Reason.REJECTED_BY_EVIDENCE
+            return found.without("gnss", [""], why, state=state, compared=True)
+        state = replace(state, fix_used_at_m=travelled_m, rejected_since_s=nan)
+        # The likelihood of the whole belief is judged here, so it does not count in the CUSUM.
+        terms = (*found.terms, term, FixedTerm(np.array([-total])))
+        return found._replace(state=state, terms=terms, compared=True)
+
+    def _compare_ranges(
+        self, found: GnssComparison, epoch: Epoch, travelled_m: float, particle_spacing_m: float
+    ) -> GnssComparison:
+        belief, state, options, kind = found.belief, found.state, self.options, "pseudorange"
         if not isinstance(belief, ParticleBelief):
-            told = tuple(
-                ("pseudorange", row.satellite, Reason.NOT_USED_BY_FILTER) for row in epoch.ranges
-            )
-            return replace(found, told=(*found.told, *told))
+            missed = [row.satellite for row in epoch.ranges]
+            return found.without(kind, missed, Reason.NOT_USED_BY_FILTER)
         east, north = belief.state[:2].mean(axis=1, dtype=np.float64).tolist()
-        sky, told = sky_over(options, self.crs, self.origin_m, epoch, (east, north))
-        found = replace(found, told=(*found.told, *told))
+        sky, unused = sky_over(options, self.crs, self.origin_m, epoch, (east, north))
+        found = found._replace(unused=(*found.unused, *unused))
         if sky is None:
             return found
-        rows, fresh = carried(belief.state), memory.receiver is None
-        receiver = memory.receiver or near_clock(sky, begun(options, epoch.time_s, travelled_m))
+        rows, fresh = carried(belief.state), state.receiver is None
+        receiver = state.receiver or near_clock(sky, begun(options, epoch.time_s, travelled_m))
         if fresh:
             rows = np.zeros((LINEAR, belief.log_weight.size))
         receiver, rows = moved(options, receiver, rows, epoch.time_s, travelled_m)
-        gone_m = travelled_m - receiver.used_at_m
-        sigma = range_sigma_m(options, sky, gone_m, particle_spacing_m)
-        waits = epoch.time_s < memory.until_s
-        used: tuple[Sky, Weighed] | None = None
-        if not waits:
-            used = self._used(sky, sigma, receiver, belief, rows, fresh=fresh)
+        sigma = range_sigma_m(options, sky, travelled_m - receiver.used_at_m, particle_spacing_m)
+        used, why = None, Reason.ON_PROBATION
+        if epoch.time_s >= state.probation_until_s:
+            used = self._agreeing(sky, sigma, receiver, belief, rows, fresh=fresh)
+            why = Reason.REJECTED_BY_EVIDENCE
+            if used is None:
+                state = self._rejected(state, epoch.time_s)
         if used is None:
-            receiver, state = centred(receiver, rows, belief.state)
-            why = Reason.ON_PROBATION if waits else Reason.REJECTED_BY_EVIDENCE
-            memory = replace(memory, receiver=receiver)
-            if not waits:
-                memory = self._rejected(memory, epoch.time_s)
-            told = tuple(("pseudorange", name, why) for name in sky.names)
-            return replace(
-                found, belief=replace(belief, state=state), memory=memory, heard=True,
-                told=(*found.told, *told),
-            )  # fmt: skip
-        kept, news = used
-        receiver = replace(receiver, covariance=news.covariance, used_at_m=travelled_m)
-        receiver, state = centred(receiver, news.rows, belief.state)
-        told = tuple(
-            ("pseudorange", name, Reason.REJECTED_BY_EVIDENCE)
-            for name in sky.names
-            if name not in kept.names
-        )
-        return replace(
-            found,
-            belief=replace(belief, state=state),
-            memory=replace(memory, receiver=receiver, since_s=nan),
-            also=(*found.also, Given(self.mixed(news.gain))),
-            heard=True,
-            told=(*found.told, *told),
-        )
+            names = sky.names
+        else:
+            kept, result = used
+            names = tuple(name for name in sky.names if name not in kept.names)
+            receiver = replace(receiver, covariance=result.covariance, used_at_m=travelled_m)
+            rows, state = result.rows, replace(state, rejected_since_s=nan)
+            found = found._replace(terms=(*found.terms, FixedTerm(self._mixed(result.gain))))
+        receiver, carrying = centred(receiver, rows, belief.state)
+        belief, state = replace(belief, state=carrying), replace(state, receiver=receiver)
+        return found.without(kind, names, why, belief=belief, state=state, compared=True)
 
-    def _used(
-        self, sky: Sky, sigma: Floats, receiver: Receiver, belief: ParticleBelief, rows: Floats,
-        *, fresh: bool,
-    ) -> tuple[Sky, Weighed] | None:  # fmt: skip
-        """Return the satellites that agree with a belief, and what they make of it."""
+    def _agreeing(
+        self,
+        sky: Sky,
+        sigma: Floats,
+        receiver: Receiver,
+        belief: ParticleBelief,
+        rows: Floats,
+        *,
+        fresh: bool,
+    ) -> tuple[Sky, Weighed] | None:
+        """Return the satellites that agree with a belief, and the belief weighed by them."""
         gate, place, log_weight = self._gate(belief), belief.state[:2], belief.log_weight
         searching = belief.status is Status.SEARCHING
-        # Echoes that last make readings count less, but not be farther off.
+        # Echoes that last reduce the weight of readings, but do not explain larger innovations.
         once = sigma if searching else range_sigma_m(self.options, sky, np.inf, 0.0)
 
         def weigh(chosen: Bools, clock: Receiver, free: int, gate: float) -> Weighed | None:
@@ -210,38 +295,9 @@ class GnssGate:
         rest = weigh(good, receiver, 0, gate)
         return (sky.only(good), rest) if rest is not None else None
 
-    def mixed(self, gain: Floats) -> Floats:
-        """Return log-likelihoods of readings of which a share tells nothing."""
+    def _mixed(self, gain: Floats) -> Floats:
+        """Mix log-likelihoods with a share of readings that carry no information."""
         share = self.options.outliers
         if share == 0:
             return gain
         return np.asarray(np.logaddexp(np.log1p(-share) + gain, np.log(share)))
-
-    def _rejected(self, memory: GnssState, time_s: float) -> GnssState:
-        since_s = memory.since_s if isfinite(memory.since_s) else time_s
-        return replace(memory, until_s=time_s + self.options.probation_s, since_s=since_s)
-
-    def _hear_fix(
-        self, found: Listened, epoch: Epoch, fix: GnssFix, travelled_m: float
-    ) -> Listened:
-        belief, memory, options = found.belief, found.memory, self.options
-        if not (isfinite(fix.east_m) and isfinite(fix.north_m)) or not belief.log_weight.size:
-            return found
-        if epoch.time_s < memory.until_s:
-            told = ("gnss", "", Reason.ON_PROBATION)
-            return replace(found, heard=True, told=(*found.told, told))
-        gone_m = travelled_m - memory.fix_at_m
-        wide = widened(fix, max(options.fix_memory_m / max(gone_m, LEAST_MOVED_M), 1.0))
-        evidence, log_weight = FixEvidence(wide, self.origin_m), belief.log_weight
-        gain = evidence.log_likelihood(belief.state)
-        total = float(np.logaddexp.reduce(log_weight + gain) - np.logaddexp.reduce(log_weight))
-        if total + 1.0 < -self._gate(belief):
-            told = ("gnss", "", Reason.REJECTED_BY_EVIDENCE)
-            return replace(
-                found, memory=self._rejected(memory, epoch.time_s), heard=True,
-                told=(*found.told, told),
-            )  # fmt: skip
-        memory = replace(memory, fix_at_m=travelled_m, since_s=nan)
-        # What it says of the belief as a whole is judged here, and not once more as doubt.
-        also = (*found.also, evidence, Given(np.array([-total])))
-        return replace(found, memory=memory, also=also, heard=True)

@@ -1,124 +1,102 @@
-"""How far pseudoranges, fixes, timing advances and time differences are trusted by a map filter."""
+"""Options of GNSS, timing advances and time differences in the map filter."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-import numpy as np
+from annotated_types import Ge, Le, Lt
 
-from mapfilter.errors import ConfigError, Faults
 from mapfilter.models.ranging import GSM_STEP_M
+from mapfilter.options import Below1, NotNegative, Options, Positive
 
 
 @dataclass(frozen=True, slots=True)
-class GnssOptions:
-    """Noise, clock, height and doubt of what satellites tell.
+class GnssOptions(Options):
+    """Errors of pseudoranges and fixes, receiver's clock and height, and rejection.
 
     Parameters
     ----------
     zenith_m : float
-        White noise of a pseudorange overhead, where a log does not tell its deviation; it grows as
-        one over the sine of the elevation.
+        Standard deviation of a pseudorange overhead where the log has none; grows as one over the
+        sine of the elevation.
     echo_m : float
-        Deviation of what lasts: echoes in streets.
+        Standard deviation of lasting errors (multipath in streets).
     echo_memory_m : float
-        Over how many metres they do; pseudoranges in a row count as one in so many.
+        Distance for which they last; pseudoranges in a row count as one over it.
     fix_memory_m : float
-        The same of fixes.
+        The same for fixes.
     spacing_m, pause_s : float
-        Satellites are listened to with each report that counts; without one after so many metres,
-        or so many seconds where one stands.
+        Satellites are used with each radio report that is used; without one after this distance,
+        or after this time at a standstill.
     mask_deg : float
-        Lower satellites are left out.
+        Elevation below which satellites are left out.
     height_m, height_sd_m : float
-        Of the antenna over the ellipsoid, before anything is measured.
+        Height of the antenna over the ellipsoid before the first pseudorange.
     slope : float
-        Deviation of what the height changes by over a metre, metres per root metre.
+        Standard deviation of the change of height, metres per root metre travelled.
     clock_sd_m, drift_sd_mps : float
-        Of the clock's error and of its rate, before anything is measured.
+        Of the clock's error and rate before the first pseudorange.
     outliers : float
-        Share of the readings that tell nothing.
+        Share of the readings that carry no information.
     gate, search_gate : float
-        Readings that are less probable than e to the power of minus this, on what is believed, are
-        rejected: once converged, and while searching.
+        Readings are rejected where their log-likelihood is lower than usual by more than this:
+        after convergence, and while searching.
     probation_s : float
-        For so long after a rejection of all satellites none is used.
+        Time after a rejection of all satellites in which none is used.
     trust : float
-        Largest logarithm of a Bayes factor that satellites alone make for another belief,
+        Bound of the logarithm of the Bayes factor that satellites alone give an alternative.
     trust_grows_s : float
-        and over how many seconds it grows by one: spoofing ends some time.
+        Time in which ``trust`` grows by one, as spoofing is temporary.
     dispute_s : float
-        After so long a rejection another belief is tried.
+        Duration of a rejection after which an alternative is started.
     """
 
-    zenith_m: float = 2.0
-    echo_m: float = 4.0
-    echo_memory_m: float = 15.0
-    fix_memory_m: float = 20.0
-    spacing_m: float = 10.0
-    pause_s: float = 10.0
-    mask_deg: float = 5.0
-    height_m: float = 100.0
-    height_sd_m: float = 200.0
-    slope: float = 0.3
-    clock_sd_m: float = 3e5
-    drift_sd_mps: float = 100.0
-    outliers: float = 0.05
-    gate: float = 8.0
-    search_gate: float = 16.0
-    probation_s: float = 5.0
-    trust: float = 3.0
-    trust_grows_s: float = 120.0
-    dispute_s: float = 10.0
-
-    def __post_init__(self) -> None:
-        faults = Faults()
-        for name in self.__slots__:
-            value = getattr(self, name)
-            if not np.isfinite(value) or (value < 0 if name != "height_m" else abs(value) > 1e4):
-                faults.add(f"satellites, {name}", "a finite number, not negative", value)
-        for name in ("zenith_m", "echo_memory_m", "fix_memory_m", "clock_sd_m", "trust_grows_s"):
-            if getattr(self, name) == 0:
-                faults.add(f"satellites, {name}", "a number above 0", 0)
-        if not self.mask_deg < 90:
-            faults.add("satellites, mask_deg", "degrees in 0..90", self.mask_deg)
-        if not self.outliers < 1:
-            faults.add("satellites, outliers", "a share below 1", self.outliers)
-        faults.raise_if_any(ConfigError)
+    zenith_m: Positive = 2.0
+    echo_m: NotNegative = 4.0
+    echo_memory_m: Positive = 15.0
+    fix_memory_m: Positive = 20.0
+    spacing_m: NotNegative = 10.0
+    pause_s: NotNegative = 10.0
+    mask_deg: Annotated[float, Ge(0), Lt(90)] = 5.0
+    height_m: Annotated[float, Ge(-1e4), Le(1e4)] = 100.0
+    height_sd_m: NotNegative = 200.0
+    slope: NotNegative = 0.3
+    clock_sd_m: Positive = 3e5
+    drift_sd_mps: NotNegative = 100.0
+    outliers: Below1 = 0.05
+    gate: NotNegative = 8.0
+    search_gate: NotNegative = 16.0
+    probation_s: NotNegative = 5.0
+    trust: NotNegative = 3.0
+    trust_grows_s: Positive = 120.0
+    dispute_s: NotNegative = 10.0
 
 
 @dataclass(frozen=True, slots=True)
-class TimingOptions:
-    """How far timing advances and time differences are trusted.
+class TimingOptions(Options):
+    """Errors of timing advances and time differences of arrival.
 
     Parameters
     ----------
     step_m : float
-        Distance of a step of timing advance: GSM; 78.1 m in LTE.
+        Distance of one step of timing advance: GSM; 78.1 m in LTE.
     advance_sd_m : float
-        Deviation of a timing advance but for its rounding.
+        Standard deviation of a timing advance before rounding.
     advance_memory_m, difference_memory_m : float
-        Over how many metres errors of timing advances and of differences last.
+        Distance for which errors of timing advances and of differences last.
     difference_sd_m : float
-        Deviation of a time of arrival, as a distance, where a log does not tell it.
+        Standard deviation of a time of arrival, as a distance, where the log has none.
     clip_sd : float
-        A reading that is farther off counts no more than one at so many deviations.
+        Largest innovation in standard deviations; outliers count as this.
     height_m : float
         Of the phone above ground; a site's height is its cell's.
     """
 
-    step_m: float = GSM_STEP_M
-    advance_sd_m: float = 200.0
-    advance_memory_m: float = 500.0
-    difference_memory_m: float = 20.0
-    difference_sd_m: float = 30.0
-    clip_sd: float = 3.0
-    height_m: float = 1.5
-
-    def __post_init__(self) -> None:
-        faults = Faults()
-        for name in self.__slots__:
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                faults.add(f"timing, {name}", "a number above 0", value)
-        faults.raise_if_any(ConfigError)
+    step_m: Positive = GSM_STEP_M
+    advance_sd_m: Positive = 200.0
+    advance_memory_m: Positive = 500.0
+    difference_memory_m: Positive = 20.0
+    difference_sd_m: Positive = 30.0
+    clip_sd: Positive = 3.0
+    height_m: Positive = 1.5

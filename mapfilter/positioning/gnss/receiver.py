@@ -1,32 +1,40 @@
-"""The receiver's clock and height beside hypotheses of places.
+"""Pseudoranges, and the receiver's clock and height that each hypothesis carries.
 
-A pseudorange is the distance to a satellite, plus the clock's error, plus what the antenna's height
-adds. Given a hypothesis's path, clock and height are linear and Gaussian: each hypothesis carries
-their mean in three further rows of its state, and all share one covariance, by
-:mod:`mapfilter.filters.rao_blackwell`. So one satellite already weighs hypotheses, as soon as the
+A pseudorange is the distance to a satellite, plus the clock's error, plus the effect of the
+antenna's height. Given a hypothesis's path, clock and height are linear and Gaussian: each
+hypothesis carries their mean in three further rows of its state, and all share one covariance
+(:mod:`mapfilter.filters.rao_blackwell`). So a single satellite weighs hypotheses, as soon as the
 clock is known better than they are apart.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import isfinite
 
 import numpy as np
 
 from mapfilter._types import Bools, Floats, Floats32
 from mapfilter.filters import rao_blackwell
+from mapfilter.filters.contract import Reason
 from mapfilter.filters.rao_blackwell import MixedBelief, SirOptions
+from mapfilter.gnss.sky import GridFrame, directions
 from mapfilter.models.motion import clock_noise
 from mapfilter.models.ranging import pseudoranges
 from mapfilter.models.state import StateLayout
 from mapfilter.models.street_motion import STATES
+from mapfilter.positioning.epochs import Epoch, Pseudorange
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.kalman.models import compiled
 
 LAYOUT = StateLayout(5, 0, 1, clock=2)
 """East and north from the frame's origin, the clock's error and rate, and the height."""
 LINEAR = 3
+MIN_MOVED_M = 0.1
 _NO_RESAMPLING = SirOptions(resample_below=0.0)
+
+Unused = tuple[str, str, Reason]
+"""Kind and name of a reading left out, and why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,3 +259,79 @@ def agreement(
     spread = (apart * weight) @ apart.T + slope @ receiver.covariance @ slope.T
     square = float(mean @ np.linalg.solve(spread + np.diag(sigma_m**2), mean))
     return 0.5 * (max(len(sky.names) - free, 0) - square)
+
+
+def sky_over(
+    options: GnssOptions,
+    crs: str,
+    origin_m: tuple[float, float],
+    epoch: Epoch,
+    middle_m: tuple[float, float],
+) -> tuple[Sky | None, tuple[Unused, ...]]:
+    """Return the satellites of an epoch over a place, and those that are left alone.
+
+    Parameters
+    ----------
+    options : GnssOptions
+    crs : str
+        Of the map.
+    origin_m : (float, float)
+        Of the frame of the hypotheses.
+    epoch : Epoch
+    middle_m : (float, float)
+        The place in that frame, in the middle of the hypotheses.
+    """
+    unused = list[Unused]()
+    chosen: dict[str, Pseudorange] = {}
+    for row in epoch.ranges:
+        if not isfinite(row.range_m):
+            continue
+        if row.satellite in chosen:
+            unused.append(("pseudorange", row.satellite, Reason.SECOND_READING))
+        elif not all(isfinite(value) for value in row.place_m):
+            unused.append(("pseudorange", row.satellite, Reason.UNKNOWN_SATELLITE))
+        else:
+            chosen[row.satellite] = row
+    if not chosen:
+        return None, tuple(unused)
+    east, north = middle_m[0] + origin_m[0], middle_m[1] + origin_m[1]
+    frame = GridFrame(crs, east, north, options.height_m)
+    local = frame.satellites_m(np.array([row.place_m for row in chosen.values()]))
+    seen = directions(local)
+    sky = Sky(
+        tuple(chosen),
+        local,
+        seen.elevation_rad,
+        np.array([row.range_m for row in chosen.values()]),
+        np.array([row.sigma_m for row in chosen.values()]),
+        middle_m,
+        frame.true_from_grid,
+    )
+    up = seen.above(options.mask_deg)
+    for name in np.array(sky.names)[~up].tolist():
+        unused.append(("pseudorange", name, Reason.BELOW_HORIZON))
+    return (sky.only(up) if up.any() else None), tuple(unused)
+
+
+def range_sigma_m(
+    options: GnssOptions, sky: Sky, gone_m: float, particle_spacing_m: float
+) -> Floats:
+    """Return deviations of pseudoranges that follow others after some metres.
+
+    White noise is new each time. Echoes last for metres: readings in a row count as one in so
+    many.
+
+    Parameters
+    ----------
+    options : GnssOptions
+    sky : Sky
+    gone_m : float
+        Since the last ones that were used.
+    particle_spacing_m : float
+        How far the hypotheses nearest to the truth may lie beside it.
+    """
+    by_elevation = options.zenith_m / np.sin(sky.elevation_rad)
+    white = np.where(np.isfinite(sky.sigma_m), sky.sigma_m, by_elevation)
+    lasts = max(options.echo_memory_m / max(gone_m, MIN_MOVED_M), 1.0)
+    beside = particle_spacing_m * np.cos(sky.elevation_rad)
+    return np.asarray(np.sqrt(white**2 + options.echo_m**2 * lasts + beside**2))

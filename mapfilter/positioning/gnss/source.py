@@ -1,0 +1,163 @@
+"""GNSS as a source of evidence: fixes and pseudoranges beside a belief and its alternative.
+
+Each belief has a receiver (clock and height) of its own. Readings are compared with both beliefs
+(:mod:`mapfilter.positioning.gnss.gate`); whichever of the two rejects them loses against the other.
+As all satellites may be faulty at once, their part of the Bayes factor is bounded.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from mapfilter._types import Floats, Floats32
+from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief
+from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.evidence import Context, EvidenceSource, EvidenceUpdate
+from mapfilter.positioning.bayes.state import BayesState
+from mapfilter.positioning.epochs import Epoch
+from mapfilter.positioning.estimate import UnusedReading
+from mapfilter.positioning.gnss.gate import FixTerm, GnssGate, GnssState
+from mapfilter.positioning.gnss.options import GnssOptions
+from mapfilter.positioning.gnss.receiver import (
+    LINEAR,
+    Sky,
+    begun,
+    near_clock,
+    range_sigma_m,
+    sky_over,
+    weighed,
+)
+
+_FIRST_SPACING_M = 10.0
+_BLIND_START = 0.1
+"""Share of a first belief that ignores satellites."""
+
+
+@dataclass(frozen=True, eq=False)
+class FirstRanges:
+    """Log-likelihood of the first pseudoranges, with an unknown clock."""
+
+    sky: Sky
+    sigma_m: Floats
+    options: GnssOptions
+
+    def log_likelihood(self, state: Floats32) -> Floats:
+        """Return the log-likelihood of each place, such that the mean likelihood is 1."""
+        count = state.shape[1]
+        receiver = near_clock(self.sky, begun(self.options, 0.0, 0.0))
+        found = weighed(
+            self.sky, self.sigma_m, receiver, state[:2], np.zeros(count), np.zeros((LINEAR, count))
+        )
+        blind = np.log(_BLIND_START)
+        return np.asarray(np.logaddexp(np.log1p(-_BLIND_START) + found.gain, blind))
+
+
+@dataclass(frozen=True)
+class FirstFix(EvidenceSource):
+    """A fix before there is a belief to compare it with; :class:`GnssSource` takes later ones.
+
+    A source of its own, as it is added before the terms of timing.
+    """
+
+    origin_m: tuple[float, float]
+    name: ClassVar[str] = "first fix"
+
+    def first(self, epoch: Epoch) -> EvidenceUpdate:
+        """Return the fix as it is."""
+        return EvidenceUpdate(None, (FixTerm(epoch.fix, self.origin_m),) if epoch.fix else ())
+
+    def update(self, state: BayesState, epoch: Epoch, context: Context) -> EvidenceUpdate:  # noqa: ARG002
+        """Return nothing."""
+        return EvidenceUpdate(None)
+
+
+@dataclass(frozen=True)
+class GnssSource(EvidenceSource):
+    """Fixes and pseudoranges, with each radio report that is used, or on their own without one.
+
+    Parameters
+    ----------
+    area : AreaMap
+    options : GnssOptions
+    clock : bool
+        Whether hypotheses can carry a clock: those of the grid filter cannot.
+    """
+
+    area: AreaMap
+    options: GnssOptions
+    clock: bool = True
+    name: ClassVar[str] = "gnss"
+
+    @cached_property
+    def gate(self) -> GnssGate:
+        """Comparison with beliefs in the area's frame."""
+        return GnssGate(self.options, self.area.lattice.crs, self.area.origin_m)
+
+    def begin(self) -> GnssState:
+        """Return the state before the first comparison."""
+        return GnssState()
+
+    def first(self, epoch: Epoch) -> EvidenceUpdate:
+        """Return the pseudoranges, with the satellites as they stand over the area's middle."""
+        state = GnssState()
+        if not epoch.ranges or not self.clock:
+            return EvidenceUpdate(state)
+        options, (width_m, height_m) = self.options, self.area.size_m
+        middle_m = (width_m / 2, height_m / 2)
+        sky, _ = sky_over(options, self.gate.crs, self.gate.origin_m, epoch, middle_m)
+        if sky is None:
+            return EvidenceUpdate(state)
+        sigma_m = range_sigma_m(options, sky, np.inf, _FIRST_SPACING_M)
+        return EvidenceUpdate(state, (FirstRanges(sky, sigma_m, options),))
+
+    def start(
+        self, belief: MapBelief, epoch: Epoch, travelled_m: float
+    ) -> tuple[MapBelief, GnssState]:
+        """Give each hypothesis of a belief the clock that the pseudoranges require there."""
+        if not epoch.ranges and epoch.fix is None:
+            return belief, GnssState()
+        found = self.gate.compare(belief, GnssState(), epoch, travelled_m, _FIRST_SPACING_M)
+        return found.belief, found.state
+
+    def update(self, state: BayesState, epoch: Epoch, context: Context) -> EvidenceUpdate:
+        """Compare the epoch's fix and pseudoranges with the belief and the alternative."""
+        own: GnssState = state.sources[self.name]
+        travelled_m, belief = state.reckoning.travelled_m, state.belief
+        due = context.report_due or own.due(self.options, epoch.time_s, travelled_m)
+        if belief is None or not due or (epoch.fix is None and not epoch.ranges):
+            return EvidenceUpdate(own)
+        spacing_m = context.particle_spacing_m
+        main = self.gate.compare(belief, own, epoch, travelled_m, spacing_m)
+        alternative, terms = state.alternative, None
+        if alternative is not None:
+            before: GnssState = alternative.sources[self.name]
+            other = self.gate.compare(alternative.belief, before, epoch, travelled_m, spacing_m)
+            sources = {**alternative.sources, self.name: other.state}
+            alternative = replace(alternative, belief=other.belief, sources=sources)
+            terms = other.terms
+            if main.compared or other.compared:
+                step = float(main.state.rejecting) - float(other.state.rejecting)
+                alternative = self._supported(alternative, step, epoch.time_s)
+        rejected_s = epoch.time_s - main.state.rejected_since_s
+        return EvidenceUpdate(
+            main.state,
+            main.terms,
+            terms,
+            unused=[UnusedReading(epoch.time_s, *one) for one in main.unused],
+            belief=main.belief,
+            alternative=alternative,
+            disputed=rejected_s >= self.options.dispute_s,
+        )
+
+    def _supported(
+        self, alternative: AlternativeHypothesis, step: float, time_s: float
+    ) -> AlternativeHypothesis:
+        """Add to the alternative's Bayes factor, within the trust in satellites as a whole."""
+        most = self.options.trust
+        most += max(time_s - alternative.start_s, 0.0) / self.options.trust_grows_s
+        total = min(max(alternative.gnss_log_bayes_factor + step, -most), most)
+        return replace(alternative, gnss_log_bayes_factor=total)
