@@ -43,9 +43,6 @@ def export_cog(database: RadioRouteDatabase, path: Path | str) -> None:
     OutputError
         The file cannot be written.
     """
-    path = Path(path)
-    if path.suffix.lower() not in (".tif", ".tiff"):
-        raise fail(OutputError, str(path), "a name that ends in .tif", path.suffix or "no suffix")
     lattice = database.lattice
     columns = ("row", "col", *(name for name, _ in BANDS))
     reader = WindowReader([database.path / POINTS], columns, lattice)
@@ -53,7 +50,7 @@ def export_cog(database: RadioRouteDatabase, path: Path | str) -> None:
     tags = {CELLS_TAG: json.dumps(database.cell_ids, ensure_ascii=False)}
     if database.attribution:
         tags["TIFFTAG_COPYRIGHT"] = database.attribution
-    with new_geotiff(path, lattice, BANDS, tags) as target:
+    with new_geotiff(Path(path), lattice, BANDS, tags) as target:
         for window in tile_windows(lattice, _TILE_PX):
             found = reader.read(window)
             if not found or not len(found["row"]):

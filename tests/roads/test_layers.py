@@ -165,7 +165,7 @@ def test_heights_of_buildings(tmp_path):
     assert (found.from_height, found.from_levels, found.from_default) == (1, 1, 1)
     plain = read_layer_buildings(path, *AREA)
     assert plain.height_m.tolist() == [12.0] * 3
-    assert "the default for 3" in plain.told
+    assert "the default for 3" in plain.height_sources
 
 
 def test_water_of_a_layer_and_of_a_map(tmp_path):
