@@ -88,7 +88,7 @@ class Options:
         faults = Faults()
         for name, annotation in _annotations(cast(Any, type(self))).items():
             value = getattr(self, name)
-            if not _fits(annotation, value):
+            if not fits(annotation, value):
                 faults.add(f"{type(self).__name__}, {name}", expected(annotation), repr(value))
         self.check(faults)
         faults.raise_if_any(ConfigError)
@@ -124,7 +124,7 @@ def describe_options(options: type[Options]) -> Iterator[OptionInfo]:
         if field.default_factory is not MISSING:
             default = field.default_factory()
         annotation = annotations[field.name]
-        bare = _plain(annotation)
+        bare = plain_types(annotation)
         yield OptionInfo(
             field.name,
             default,
@@ -194,22 +194,22 @@ def _split(annotation: Any) -> tuple[Any, list[Any]]:
     return annotation, []
 
 
-def _plain(annotation: Any) -> list[Any]:
+def plain_types(annotation: Any) -> list[Any]:
     """Return the types of a union, without limits."""
     inner, _ = _split(annotation)
     if get_origin(inner) in (Union, UnionType):
-        return [one for part in get_args(inner) for one in _plain(part)]
+        return [one for part in get_args(inner) for one in plain_types(part)]
     return [inner]
 
 
-def _fits(annotation: Any, value: Any) -> bool:
+def fits(annotation: Any, value: Any) -> bool:
     """Tell whether a value is what an annotation allows."""
     inner, limits = _split(annotation)
     origin = get_origin(inner)
     if origin is Literal:
         return any(value == one and type(value) is type(one) for one in get_args(inner))
     if origin in (Union, UnionType):
-        return any(_fits(one, value) for one in get_args(inner))
+        return any(fits(one, value) for one in get_args(inner))
     if inner is NoneType:
         return value is None
     if inner is bool or inner is str:

@@ -60,7 +60,7 @@ REMEDIES = {
     "raster-without-cell": "Add the cells to the plan, or take the rasters out.",
     "rasters-invalid": "Correct or export the raster anew.",
     "rasters-missing": "Run `mapfilter predict`, or correct rasters.path.",
-    "reality-missing": "Correct rasters.reality, or leave it out and predict.",
+    "ground-truth-missing": "Correct rasters.ground_truth, or leave it out and predict.",
     "roads-invalid": "Correct the layer of roads, or its settings.",
     "roads-outside-rasters": "Take rasters, map and area of the same place; build leaves out roads "
     "without rasters.",

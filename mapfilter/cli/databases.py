@@ -52,11 +52,11 @@ def predict(
     seed: SeedOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Predict RxLev rasters from cell plan and buildings, and a set that plays reality."""
+    """Predict RxLev rasters from cell plan and buildings, and a perturbed set: the ground truth."""
     from mapfilter.config.load import load_config
     from mapfilter.workflows.predict import run_predict
 
-    settings = seeded(settings, seed, "prediction.seed", "prediction.reality.seed")
+    settings = seeded(settings, seed, "prediction.seed", "prediction.ground_truth.seed")
     with progress_bar("predict") as progress:
         result = run_predict(load_config(config, settings, out=out), progress)
     print_result(result, as_json)

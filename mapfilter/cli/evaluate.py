@@ -81,8 +81,12 @@ def evaluate(
     as_json: JsonOption = False,
 ) -> None:
     """Benchmark localization accuracy: simulated on any map, or on real sessions."""
-    from mapfilter.workflows.evaluate import RUNS, check_benchmark, run_global_positioning
-    from mapfilter.workflows.evaluate_settings import load_benchmark
+    from mapfilter.workflows.evaluate import (
+        RUNS,
+        check_benchmark,
+        load_benchmark,
+        run_global_positioning,
+    )
 
     check_benchmark(name, data)
     if name == "ottawa" and data is not None:
@@ -133,8 +137,8 @@ def _audit(
     resume: bool,
     as_json: bool,
 ) -> None:
+    from mapfilter.workflows.evaluate import load_benchmark
     from mapfilter.workflows.evaluate_audit import run_audit
-    from mapfilter.workflows.evaluate_settings import load_benchmark
 
     loaded, _ = load_benchmark("easy", config, settings)
     find_own_filter(loaded)

@@ -36,17 +36,28 @@ def sweep(
     workers: WorkersOption = 1,
     cluster: ClusterOption = None,
     resume: ResumeOption = False,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option("--vary", metavar="KEY=V1,V2,...", help="Values of any numeric option."),
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Count the runs and estimate the time, no more.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Run a filter over a grid of inertial noise; exit code 3 if it was stopped on the way."""
-    from mapfilter.workflows.sweep import brief, load_sweep, run_sweep
+    """Run filters over a grid of noises and options; exit code 3 if it was stopped on the way."""
+    from mapfilter.workflows.sweep import brief, forecast_sweep, load_sweep, run_sweep, vary_axes
 
     loaded = load_sweep(config, seeded(settings, seed, "sweep.seed"), out=out)
     find_own_filter(loaded)
+    axes = vary_axes(vary or ())
+    if dry_run:
+        print_result(forecast_sweep(loaded, axes, workers=workers), as_json)
+        return
     try:
         with rate_bar("sweep", "runs") as progress:
             result = run_sweep(
-                loaded, workers=workers, cluster=cluster, resume=resume, progress=progress
+                loaded, axes, workers=workers, cluster=cluster, resume=resume, progress=progress
             )
     except KeyboardInterrupt:
         say("stopped; finished batches are kept: go on with --resume")

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -62,15 +62,6 @@ def check_filter_name(value: str) -> str:
     return value
 
 
-def check_beside(value: Any) -> Any:
-    """See that a place on the street is one of its names, or a distance."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if value in ("centre", "pavement") or (number and 0 <= value <= 50):
-        return value
-    raise ValueError("'centre', 'pavement', or 0..50 metres beside the centre line")
-
-
-Beside = Annotated[Literal["centre", "pavement"] | float, BeforeValidator(check_beside)]
 FilePath = Annotated[Path, BeforeValidator(resolve_path)]
 MapName = Annotated[str, BeforeValidator(resolve_map)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]

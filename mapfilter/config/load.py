@@ -73,10 +73,15 @@ def load_config(
     try:
         return Config.model_validate(values, context={"folder": folder})
     except ValidationError as error:
-        changed = [_keys(setting) for setting in settings]
-        raise ConfigError(
-            tuple(_fault(file, changed, detail) for detail in error.errors())
-        ) from None
+        raise ConfigError(faults_of(error, file, settings)) from None
+
+
+def faults_of(
+    error: ValidationError, file: Path | None = None, settings: Sequence[str] = ()
+) -> tuple[Fault, ...]:
+    """Return what pydantic found as faults; where ``settings`` are at fault, the file is not."""
+    changed = [_keys(setting) for setting in settings]
+    return tuple(_fault(file, changed, detail) for detail in error.errors())
 
 
 def given_keys(file: Path | None, settings: Sequence[str] = ()) -> tuple[str, ...]:

@@ -14,7 +14,6 @@ from mapfilter.config.fields import (
     EMBEDDED_MAP,
     NO_MAP,
     SYNTHETIC_MAPS,
-    Beside,
     Box,
     FilePath,
     FilterName,
@@ -31,7 +30,9 @@ from mapfilter.config.fields import (
 )
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.propagation.models import Clutter, ModelName
-from mapfilter.simulation.imu import Turns
+from mapfilter.simulation.imu import ImuNoise
+from mapfilter.simulation.reports import ReportModel
+from mapfilter.simulation.walking import WalkerModel
 from mapfilter.tracks.log import Kind
 
 
@@ -331,8 +332,8 @@ class Area(Section):
         return self.map != NO_MAP or self.bbox is not None or self.southwest is not None
 
 
-class Reality(Section):
-    """``[prediction.reality]``: how the simulated ground truth differs from the prediction."""
+class GroundTruthSection(Section):
+    """``[prediction.ground_truth]``: how the simulated ground truth differs from the prediction."""
 
     write: bool = True
     level_error_db: NotNegative = 7.0
@@ -381,7 +382,7 @@ class Prediction(Section):
     shadowing_correlation_m: Positive = 50.0
     site_share: Share = 0.5
     seed: Seed = 0
-    reality: Reality = Reality()
+    ground_truth: GroundTruthSection = GroundTruthSection()
     survey: SurveySection = SurveySection()
 
 
@@ -394,7 +395,7 @@ class Rasters(Section):
     """
 
     path: FilePath | None = None
-    reality: FilePath | None = None
+    ground_truth: FilePath | None = None
     quantity: Literal["level", "loss"] | None = None
     crs: str | None = None
     factor: Finite = 1.0
@@ -421,6 +422,7 @@ class Database(Section):
     tile_px: Annotated[int, Field(ge=16, le=8192)] = 256
 
 
+@with_options(ReportModel, WalkerModel)
 class Journeys(Section):
     """``[journeys]``: routes along the streets and what the phone reports on them."""
 
@@ -428,38 +430,13 @@ class Journeys(Section):
     draws: Annotated[int, Field(ge=1, le=1_000_000)] = 1
     length_m: Positive = 1940.0
     speed_mps: Positive = 1.4
-    report_period_s: Positive = 1.0
-    radio: Literal["as_predicted", "reality"] = "reality"
-    hysteresis_db: NotNegative = 4.0
-    averaging_s: NotNegative = 1.92
-    fading_db: NotNegative = 1.0
-    max_neighbours: Annotated[int, Field(ge=0, le=32)] = 6
-    sensitivity_dbm: Annotated[float, Field(ge=-150, le=0)] = -104.0
-    phone_offset_sd_db: NotNegative = 0.0
-    beside: Beside = "centre"
-    change_side_m: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 150.0
-    stop_every_m: NotNegative = 0.0
-    stop_s: NotNegative = 20.0
     nlos_satellites: bool = False
     seed: Seed = 0
 
 
+@with_options(ImuNoise)
 class Imu(Section):
-    """``[imu]``: simulated dead reckoning: eqs. (5)-(8) of Khalaf-Allah (2007), lasting errors."""
-
-    period_s: Positive = 1.0
-    sigma_trans_m: NotNegative = 0.2
-    sigma_orient_deg: NotNegative = 3.0
-    bias_sd_deg: NotNegative = 0.0
-    drift_deg_per_sqrt_s: NotNegative = 0.0
-    scale: Annotated[float, Field(ge=0, lt=1)] = 0.0
-    translation_noise: Literal["zero_mean", "as_printed"] = "zero_mean"
-    heading_correlation_s: NotNegative = 0.0
-    step_scale_wander: Annotated[float, Field(ge=0, lt=1)] = 0.0
-    step_scale_correlation_s: NotNegative = 15.0
-    turns: Turns = "headings"
-    gyro_noise_deg_per_sqrt_s: NotNegative = 0.0
-    gyro_bias_deg_per_s: NotNegative = 0.0
+    """``[imu]``: errors of simulated dead reckoning."""
 
 
 class Track(Section):
@@ -522,9 +499,9 @@ class Config(Section):
         return self.rasters.path or self.output.dir / "rxlev.tif"
 
     @property
-    def reality_path(self) -> Path:
-        """Where the rasters that play reality are."""
-        return self.rasters.reality or self.output.dir / "rxlev-reality.tif"
+    def ground_truth_path(self) -> Path:
+        """Where the rasters of the simulated ground truth are."""
+        return self.rasters.ground_truth or self.output.dir / "rxlev-ground-truth.tif"
 
     @property
     def surveyed_plan(self) -> Path | None:

@@ -1,16 +1,19 @@
-"""Errors of an estimate against the truth (Khalaf-Allah 2007, section 6.2 and Table 4)."""
+"""Errors of an estimate against the truth, and how often its claims hold.
+
+Success and errors after convergence are those of Khalaf-Allah 2007, section 6.2 and Table 4.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, inf, nan
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from mapfilter._types import Floats
+from mapfilter._types import Bools, Floats
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import unproject
 from mapfilter.positioning.estimate import TrackEstimate
@@ -186,3 +189,96 @@ def outcome(estimate: TrackEstimate) -> Outcome:
         dict(sorted(Counter(str(reading.reason) for reading in estimate.unused).items())),
         dict(sorted(Counter(unknown).items())),
     )
+
+
+RADII = (50, 67, 95)
+"""Per cent of the belief that the radii of an estimate hold."""
+
+_CLAIMS = (Status.CONVERGED, Status.TRACKING)
+_WINDOW_M = 100.0
+
+
+@dataclass(frozen=True, slots=True)
+class Claims:
+    """The claims of one track, counted.
+
+    Parameters
+    ----------
+    epochs : int
+        All epochs at which the truth is known.
+    km : float
+        Really travelled.
+    claimed : int
+        Epochs at which a position was claimed: CONVERGED or TRACKING.
+    within_50m : int
+        Claimed epochs that were at most 50 m off.
+    covered : tuple of int
+        Claimed epochs whose radius held the truth, for 50, 67 and 95 %.
+    false_starts : int
+        How often a claim began more than 50 m off.
+    lost : int
+        How often LOST began.
+    false_lost : int
+        How often it began right after a claimed position that was at most 50 m off.
+    worst_100m_m : float
+        The largest mean error over 100 m travelled, from the first claim on; over what was
+        travelled, where that is less; NaN without a claim.
+    """
+
+    epochs: int
+    km: float
+    claimed: int
+    within_50m: int
+    covered: tuple[int, ...]
+    false_starts: int
+    lost: int
+    false_lost: int
+    worst_100m_m: float
+
+
+def score_claims(estimate: TrackEstimate, truth: Truth, *, until_s: float = inf) -> Claims:
+    """Count what a filter claimed along one track.
+
+    Parameters
+    ----------
+    until_s : float
+        Later epochs do not count.
+    """
+    errors_m = position_errors_m(estimate, truth)
+    inside = (estimate.time_s >= truth.time_s[0]) & (estimate.time_s <= truth.time_s[-1])
+    counted = inside & (estimate.time_s <= until_s)
+    claimed = counted & np.array([status in _CLAIMS for status in estimate.status], dtype=bool)
+    lost = counted & np.array([status is Status.LOST for status in estimate.status], dtype=bool)
+    near = errors_m <= SUCCESS_RADIUS_M
+    held = errors_m[:, np.newaxis] <= estimate.radii_m
+    followed = counted & np.logical_or.accumulate(claimed) & np.isfinite(errors_m)
+    began_claim, began_lost = claimed & ~_before(claimed), lost & ~_before(lost)
+    return Claims(
+        epochs=int(counted.sum()),
+        km=float(truth.distance_at(min(until_s, float(truth.time_s[-1]))) / 1000),
+        claimed=int(claimed.sum()),
+        within_50m=int((claimed & near).sum()),
+        covered=tuple(int(count) for count in held[claimed].sum(axis=0)),
+        false_starts=int((began_claim & ~near).sum()),
+        lost=int(began_lost.sum()),
+        false_lost=int((began_lost & _before(claimed & near)).sum()),
+        worst_100m_m=_worst_100m(errors_m[followed], truth.distance_at(estimate.time_s[followed])),
+    )
+
+
+def _before(happened: Bools) -> Bools:
+    """Return whether something held at the epoch before."""
+    return np.concatenate([[False], happened[:-1]])
+
+
+def _worst_100m(errors_m: Floats, travelled_m: Floats) -> float:
+    """Return the largest mean error over windows of 100 m that end at an epoch."""
+    if not errors_m.size:
+        return nan
+    full = travelled_m - travelled_m[0] >= _WINDOW_M
+    if not full.any():
+        return float(errors_m.mean())
+    total_m = np.concatenate([[0.0], np.cumsum(errors_m)])
+    ends = np.arange(1, errors_m.size + 1)
+    begins = np.searchsorted(travelled_m, travelled_m - _WINDOW_M)
+    return float(((total_m[ends] - total_m[begins]) / (ends - begins))[full].max())

@@ -25,7 +25,6 @@ def expected_information(measurement: GaussianMeasurement, states: Floats) -> Fl
 
     Parameters
     ----------
-    measurement : GaussianMeasurement
     states : (T, K, n) array
         True states of T trials over K steps.
 

@@ -24,7 +24,6 @@ class Coverage:
     ----------
     share : float
         That the radius should hold.
-    cases, inside : int
     covered, low, high : float
         Share of the cases inside, and its 95 % Wilson interval.
     """
@@ -63,7 +62,6 @@ class Reliability:
     ----------
     said : float
         Mean of the probabilities in the bin.
-    cases : int
     came_true, low, high : float
         Share of the cases that came true, and its 95 % Wilson interval.
     """
@@ -86,7 +84,6 @@ def reliability(
         Such as each epoch's mass within 50 m; NaN is left out.
     outcomes : array_like of bool, shape (N,)
         Such as whether the error was at most 50 m.
-    bins : int
 
     Examples
     --------

@@ -13,28 +13,277 @@ judged twice:
   an independent look that their distance travelled brings. This weighing is an approximation.
 
 A filter with noisy motion, or one that keeps fewer hypotheses, needs longer.
+
+All places are pixels; a hypothesis is where the journey may have begun, and its place at any time
+that start moved as the truth moved.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import erfc
+from typing import Annotated, NamedTuple
 
 import numpy as np
+from annotated_types import Ge, Gt, Le, Lt
 from numba import njit
 
 from mapfilter._parallel import Progress
-from mapfilter._types import Bools, Floats, Ints
-from mapfilter.errors import ConfigError, Faults
+from mapfilter._types import Bools, Floats, Floats32, Ints
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
-from mapfilter.evaluation.ideal_filter import judged_by_cells, judged_by_levels, walk
-from mapfilter.evaluation.radio_map import ErrorModel, RadioMap
+from mapfilter.evaluation.radio_map import (
+    MOST_HEARD,
+    ErrorModel,
+    RadioMap,
+    distance_squared,
+    heard_cells,
+)
+from mapfilter.options import Options, Positive
+
+_AHEAD_STEPS = 6
+_KEEP_ON = 2.5
+_TURN_BACK = 1e-3
+_HOPELESS = 30.0
+
+
+# In the kernels all places are pixels; a hypothesis is a possible start, and its place at any time
+# is that start, moved as the truth has moved.
+
+
+@njit(cache=True)
+def walk(rng, on_way, row, col, resolution_m, most_m):  # type: ignore[no-untyped-def]
+    """Draw a journey over the points, two pixels a step in one of 16 directions.
+
+    The farther the map goes on in a direction and the straighter it is on, the likelier it is.
+
+    Returns
+    -------
+    rows, cols : numpy.ndarray of int64, shape (K,)
+    gone_m : numpy.ndarray, shape (K,)
+        Metres travelled to each.
+    """
+    step_r = np.array([-2, -2, -2, -1, 0, 1, 2, 2, 2, 2, 2, 1, 0, -1, -2, -2])
+    step_c = np.array([0, 1, 2, 2, 2, 2, 2, 1, 0, -1, -2, -2, -2, -2, -2, -1])
+    length_px = np.sqrt((step_r * step_r + step_c * step_c).astype(np.float64))
+    most = int(most_m / (2 * resolution_m)) + 2
+    rows, cols = np.empty(most, dtype=np.int64), np.empty(most, dtype=np.int64)
+    gone_m = np.empty(most)
+    rows[0], cols[0], gone_m[0] = row, col, 0.0
+    chance = np.empty(16)
+    count, heading = 1, -1
+    while count < most and gone_m[count - 1] < most_m:
+        row, col = rows[count - 1], cols[count - 1]
+        total = 0.0
+        for way in range(16):
+            free = 0
+            while free < _AHEAD_STEPS:
+                r, c = row + (free + 1) * step_r[way], col + (free + 1) * step_c[way]
+                if r < 0 or c < 0 or r >= on_way.shape[0] or c >= on_way.shape[1]:
+                    break
+                if not on_way[r, c]:
+                    break
+                free += 1
+            chance[way] = (free / _AHEAD_STEPS) ** 2
+            if heading >= 0:
+                turn = np.cos((way - heading) * np.pi / 8)
+                chance[way] *= np.exp(_KEEP_ON * (turn - 1)) if turn > -0.5 else _TURN_BACK
+            total += chance[way]
+        if total == 0.0:
+            break
+        left = rng.random() * total
+        heading = 0
+        while heading < 15 and left >= chance[heading]:
+            left -= chance[heading]
+            heading += 1
+        rows[count], cols[count] = row + step_r[heading], col + step_c[heading]
+        gone_m[count] = gone_m[count - 1] + length_px[heading] * resolution_m
+        count += 1
+    return rows[:count], cols[:count], gone_m[:count]
+
+
+@njit(cache=True)
+def _serves(level_dbm, best_dbm, floor_dbm, margin_db):  # type: ignore[no-untyped-def]
+    return level_dbm > floor_dbm and level_dbm >= best_dbm - margin_db
+
+
+class Levels(NamedTuple):
+    """Levels of all pixels and cells, and where hypotheses may be, for the kernels."""
+
+    near_way: Bools
+    level_dbm: Floats32
+    best_dbm: Floats32
+    site: Ints
+    floor_dbm: float
+    margin_db: float
+
+
+class Judgement(NamedTuple):
+    """Errors of levels, and when a journey counts as clear, for the kernels."""
+
+    deviation_db: float
+    correlation_m: float
+    share: float
+    near_px: float
+    path_m: float
+    apart_px: float
+    mass: float
+
+
+@njit(cache=True)
+def judged_by_cells(rows, cols, gone_m, row, col, levels, near_px, path_m):  # type: ignore[no-untyped-def]
+    """Return metres until all hypotheses are near the truth, and bits after ``path_m``."""
+    near_way, level_dbm, best_dbm, _, floor_dbm, margin_db = levels
+    clear_m, bits = np.inf, -1.0
+    from_row, from_col = row.copy(), col.copy()
+    left = from_row.size
+    for k in range(rows.size):
+        server = np.argmax(level_dbm[rows[k], cols[k]])
+        moved_r, moved_c = rows[k] - rows[0], cols[k] - cols[0]
+        kept, farthest = 0, 0.0
+        for h in range(left):
+            r, c = from_row[h] + moved_r, from_col[h] + moved_c
+            if r < 0 or c < 0 or r >= near_way.shape[0] or c >= near_way.shape[1]:
+                continue
+            if not near_way[r, c]:
+                continue
+            if not _serves(level_dbm[r, c, server], best_dbm[r, c], floor_dbm, margin_db):
+                continue
+            from_row[kept], from_col[kept] = from_row[h], from_col[h]
+            off_r, off_c = from_row[h] - rows[0], from_col[h] - cols[0]
+            farthest = max(farthest, off_r * off_r + off_c * off_c)
+            kept += 1
+        left = kept
+        if clear_m == np.inf and farthest <= near_px * near_px:
+            clear_m = gone_m[k]
+        if bits < 0 and gone_m[k] >= path_m:
+            bits = np.log2(row.size / left)
+        if bits >= 0 and clear_m < np.inf:
+            break
+    return clear_m, (bits if bits >= 0 else np.log2(row.size / left))
+
+
+@njit(cache=True)
+def judged_by_levels(  # type: ignore[no-untyped-def]
+    rng, rows, cols, gone_m, row, col, point, levels, judgement
+):
+    """Return metres until levels decide, whether rightly, bits, twin, and the twin's error."""
+    near_way, level_dbm, _, site, floor_dbm, _ = levels
+    deviation_db, correlation_m, share, near_px, path_m, apart_px, mass = judgement
+    clear_m, right, bits, twin, twin_error = np.inf, 0.0, -1.0, -1.0, 0.0
+    cell_count = level_dbm.shape[2]
+    own_db, site_db = rng.standard_normal(cell_count), rng.standard_normal(site.max() + 1)
+    cells, part = np.empty(MOST_HEARD, dtype=np.int64), np.empty(MOST_HEARD)
+    report, truth = np.empty(MOST_HEARD), np.empty(MOST_HEARD)
+    off_db, apart_db = np.empty(MOST_HEARD), np.empty(MOST_HEARD)
+    from_row, from_col, number = row.copy(), col.copy(), point.copy()
+    left = from_row.size
+    log_weight, apart = np.zeros(left), np.zeros(left)
+    scale = deviation_db**2 * (1 - share)
+    for k in range(rows.size):
+        weight = 1.0
+        if k > 0:
+            step_m = gone_m[k] - gone_m[k - 1]
+            weight = step_m / (2 * correlation_m)
+            kept = np.exp(-step_m / correlation_m)
+            new = np.sqrt(1 - kept * kept)
+            for i in range(cell_count):
+                own_db[i] = kept * own_db[i] + new * rng.standard_normal()
+            for i in range(site_db.size):
+                site_db[i] = kept * site_db[i] + new * rng.standard_normal()
+        heard = heard_cells(level_dbm[rows[k], cols[k]], floor_dbm, site, share, cells, part)
+        for i in range(heard):
+            error = np.sqrt(share) * site_db[site[cells[i]]] + np.sqrt(1 - share) * own_db[cells[i]]
+            truth[i] = level_dbm[rows[k], cols[k], cells[i]]
+            report[i] = truth[i] + deviation_db * error
+        counts_twins = bits < 0
+        moved_r, moved_c = rows[k] - rows[0], cols[k] - cols[0]
+        kept_count = 0
+        heaviest = -np.inf
+        for h in range(left):
+            r, c = from_row[h] + moved_r, from_col[h] + moved_c
+            if r < 0 or c < 0 or r >= near_way.shape[0] or c >= near_way.shape[1]:
+                continue
+            if not near_way[r, c]:
+                continue
+            for i in range(heard):
+                level = level_dbm[r, c, cells[i]]
+                off_db[i] = report[i] - level
+                apart_db[i] = truth[i] - level
+            weighed = log_weight[h] - 0.5 * weight * distance_squared(off_db, part, heard) / scale
+            if counts_twins:
+                squared = distance_squared(apart_db, part, heard) / scale
+                apart[kept_count] = apart[h] + weight * squared
+            from_row[kept_count], from_col[kept_count] = from_row[h], from_col[h]
+            number[kept_count], log_weight[kept_count] = number[h], weighed
+            heaviest = max(heaviest, weighed)
+            kept_count += 1
+        left = kept_count
+        if counts_twins and (gone_m[k] >= path_m or k == rows.size - 1):
+            bits = np.log2(row.size) - _entropy_bits(log_weight[:left], heaviest)
+            least = np.inf
+            for h in range(left):
+                off_r, off_c = from_row[h] - rows[0], from_col[h] - cols[0]
+                if off_r * off_r + off_c * off_c >= apart_px * apart_px and apart[h] < least:
+                    least, twin = apart[h], float(number[h])
+            if least < np.inf:
+                twin_error = 0.5 * erfc(np.sqrt(least) / 2 / np.sqrt(2.0))
+        left = _without_hopeless(
+            log_weight, apart, from_row, from_col, number, left, heaviest, bits < 0
+        )
+        if clear_m == np.inf:
+            best = np.argmax(log_weight[:left])
+            if _mass_near(log_weight, from_row, from_col, left, best, near_px) >= mass:
+                clear_m = gone_m[k]
+                off_r, off_c = from_row[best] - rows[0], from_col[best] - cols[0]
+                right = 1.0 if off_r * off_r + off_c * off_c <= near_px * near_px else 0.0
+        if bits >= 0 and clear_m < np.inf:
+            break
+    return clear_m, right, max(bits, 0.0), twin, twin_error
+
+
+@njit(cache=True)
+def _entropy_bits(log_weight, heaviest):  # type: ignore[no-untyped-def]
+    total, moment = 0.0, 0.0
+    for value in log_weight:
+        weight = np.exp(value - heaviest)
+        total += weight
+        moment += weight * (value - heaviest)
+    return (np.log(total) - moment / total) / np.log(2.0)
+
+
+@njit(cache=True)
+def _mass_near(log_weight, row, col, left, best, near_px):  # type: ignore[no-untyped-def]
+    total, near = 0.0, 0.0
+    for h in range(left):
+        weight = np.exp(log_weight[h] - log_weight[best])
+        total += weight
+        off_r, off_c = row[h] - row[best], col[h] - col[best]
+        if off_r * off_r + off_c * off_c <= near_px * near_px:
+            near += weight
+    return near / total
+
+
+@njit(cache=True)
+def _without_hopeless(  # type: ignore[no-untyped-def]
+    log_weight, apart, row, col, number, left, heaviest, counts_twins
+):
+    """Drop hypotheses of no weight, unless they may be twins; return how many are left."""
+    kept = 0
+    for h in range(left):
+        likely = log_weight[h] >= heaviest - _HOPELESS
+        if likely or (counts_twins and apart[h] <= _HOPELESS):
+            log_weight[kept], row[kept], col[kept] = log_weight[h], row[h], col[h]
+            number[kept], apart[kept] = number[h], apart[h]
+            kept += 1
+    return kept
+
 
 _AT_A_TIME = 128
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 
 
 @dataclass(frozen=True, slots=True)
-class FirstFixOptions:
+class FirstFixOptions(Options):
     """What is tried, and when it counts as clear.
 
     Parameters
@@ -55,29 +304,15 @@ class FirstFixOptions:
     Raises
     ------
     ConfigError
-        With every value that is not as told.
+        With every value that is out of range.
     """
 
-    spacing_m: float = 50.0
-    journeys: int = 2
-    most_m: float = 1500.0
-    path_m: float = 100.0
-    apart_m: float = 200.0
-    mass: float = 0.95
-
-    def __post_init__(self) -> None:
-        faults = Faults()
-        for name in ("spacing_m", "most_m", "path_m", "apart_m"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                faults.add(f"bound, {name}", "metres > 0", value)
-        if not 1 <= self.journeys <= 1000:
-            faults.add("bound, journeys", "1..1000", self.journeys)
-        if not 0.5 <= self.mass < 1:
-            faults.add("bound, mass", "0.5 <= mass < 1", self.mass)
-        if self.most_m > 100_000:
-            faults.add("bound, most_m", "at most 100 km", self.most_m, "a wrong unit")
-        faults.raise_if_any(ConfigError)
+    spacing_m: Positive = 50.0
+    journeys: Annotated[int, Ge(1), Le(1000)] = 2
+    most_m: Annotated[float, Gt(0), Le(100_000)] = 1500.0
+    path_m: Positive = 100.0
+    apart_m: Positive = 200.0
+    mass: Annotated[float, Ge(0.5), Lt(1)] = 0.95
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,15 +375,24 @@ def first_fix(
     first, point = radio.points_by_cell()
     best_dbm = radio.level_dbm.max(axis=2)
     found = np.full((*shape, 7), np.nan)
+    levels = Levels(
+        radio.near_way, radio.level_dbm, best_dbm, radio.site, radio.floor_dbm, radio.margin_db
+    )
+    resolution_m = radio.lattice.resolution_m
+    judgement = Judgement(
+        errors.deviation_db,
+        errors.correlation_m,
+        errors.site_share,
+        SUCCESS_RADIUS_M / resolution_m,
+        options.path_m,
+        options.apart_m / resolution_m,
+        options.mass,
+    )
+    own = radio.row, radio.col, radio.server, first, point
+    walked = radio.on_way, resolution_m, options.most_m
     for begin in range(0, start.size, _AT_A_TIME):
         part = slice(begin, begin + _AT_A_TIME)
-        found[part] = _try_all(
-            rng, start[part], options.journeys, radio.row, radio.col, radio.server, first, point,
-            radio.on_way, radio.near_way, radio.level_dbm, best_dbm, radio.site,
-            radio.floor_dbm, radio.margin_db, radio.lattice.resolution_m, errors.deviation_db,
-            errors.correlation_m, errors.site_share, options.most_m, options.path_m,
-            options.apart_m, options.mass, SUCCESS_RADIUS_M,
-        )  # fmt: skip
+        found[part] = _try_all(rng, start[part], options.journeys, own, walked, levels, judgement)
         if progress is not None:
             progress(min(begin + _AT_A_TIME, start.size), start.size)
     return FirstFix(
@@ -164,24 +408,21 @@ def first_fix(
 
 
 @njit(cache=True)
-def _try_all(  # type: ignore[no-untyped-def]
-    rng, start, journeys, row, col, server, first, point, on_way, near_way, level_dbm, best_dbm,
-    site, floor_dbm, margin_db, resolution_m, deviation_db, correlation_m, share, most_m, path_m,
-    apart_m, mass, success_m,
-):  # fmt: skip
+def _try_all(rng, start, journeys, points, walked, levels, judgement):  # type: ignore[no-untyped-def]
+    row, col, server, first, point = points
+    on_way, resolution_m, most_m = walked
+    near_px, path_m = judgement.near_px, judgement.path_m
     found = np.empty((start.size, journeys, 7))
     for i in range(start.size):
         here = start[i]
         own = point[first[server[here]] : first[server[here] + 1]]
+        rows_own, cols_own = row[own], col[own]
         for j in range(journeys):
             rows, cols, gone_m = walk(rng, on_way, row[here], col[here], resolution_m, most_m)
             found[i, j, 0:2] = judged_by_cells(
-                rows, cols, gone_m, row[own], col[own], near_way, level_dbm, best_dbm, floor_dbm,
-                margin_db, success_m / resolution_m, path_m,
-            )  # fmt: skip
+                rows, cols, gone_m, rows_own, cols_own, levels, near_px, path_m
+            )
             found[i, j, 2:7] = judged_by_levels(
-                rng, rows, cols, gone_m, row[own], col[own], own, near_way, level_dbm, site,
-                floor_dbm, deviation_db, correlation_m, share, success_m / resolution_m, path_m,
-                apart_m / resolution_m, mass,
-            )  # fmt: skip
+                rng, rows, cols, gone_m, rows_own, cols_own, own, levels, judgement
+            )
     return found

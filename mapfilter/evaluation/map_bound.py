@@ -21,6 +21,7 @@ from scipy.spatial import cKDTree
 
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats, Floats32
+from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.evaluation.first_fix import FirstFix, FirstFixOptions, first_fix
 from mapfilter.evaluation.position_bound import PositionBound, position_bound
 from mapfilter.evaluation.radio_map import (
@@ -29,6 +30,7 @@ from mapfilter.evaluation.radio_map import (
     RadioMap,
     distance_squared,
     heard_cells,
+    radio_map,
 )
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters.geotiff import new_geotiff
@@ -115,16 +117,7 @@ BANDS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapBound:
-    """What a radio map is good for.
-
-    Parameters
-    ----------
-    radio : RadioMap
-    options : FirstFixOptions
-    position : PositionBound
-    distinct : Distinctness
-    fix : FirstFix
-    """
+    """What a radio map is good for."""
 
     radio: RadioMap
     options: FirstFixOptions
@@ -149,6 +142,13 @@ class MapBound:
             "levels_to_fix_m": np.minimum(fix.levels_m, most_m).mean(axis=1)[nearest],
             "twin_error": fix.twin_error.mean(axis=1)[nearest],
         }
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return one row for each point: way_id, east_m, north_m, and the columns of the bands."""
+        radio = self.radio
+        east_m, north_m = radio.lattice.east_north(radio.row, radio.col)
+        place = {"way_id": radio.way_id, "east_m": east_m, "north_m": north_m}
+        return pd.DataFrame(place | self.at_points())
 
     def by_way(self) -> pd.DataFrame:
         """Return one row for each way: its points' medians, and the means of its starts.
@@ -209,6 +209,44 @@ class MapBound:
                 "twin_error": error[kept],
             }
         )
+
+
+def bound(
+    database: RadioRouteDatabase,
+    *,
+    errors: ErrorModel | None = None,
+    options: FirstFixOptions | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> MapBound:
+    """Bound the positioning accuracy of a radio-route database, before any drive.
+
+    Parameters
+    ----------
+    database : RadioRouteDatabase
+    errors : ErrorModel, optional
+        Assumed errors of the predicted levels: 7 dB, correlated over 50 m.
+    options : FirstFixOptions, optional
+        Simulated journeys of the ideal filter.
+    seed : int
+        Of these journeys.
+    progress : callable, optional
+        Called with starts done and starts in all.
+
+    Returns
+    -------
+    MapBound
+        :meth:`~MapBound.to_dataframe` by point, :meth:`~MapBound.by_way`, and
+        :meth:`~MapBound.twins`: places that look alike.
+
+    Raises
+    ------
+    InputError
+        The database is too large for the memory.
+    """
+    radio = radio_map(database)
+    rng = np.random.default_rng(seed)
+    return map_bound(radio, errors or ErrorModel(), options or FirstFixOptions(), rng, progress)
 
 
 def map_bound(

@@ -10,8 +10,9 @@ from scipy.ndimage import distance_transform_edt
 
 from mapfilter._types import Bools, Floats32, Ints
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.errors import ConfigError, Faults, InputError, fail
+from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
+from mapfilter.options import Below1, Options, Positive
 
 MOST_HEARD = 7
 """Cells in a report: the serving one and six neighbours."""
@@ -21,7 +22,7 @@ _TOLERANCE_PX = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class ErrorModel:
+class ErrorModel(Options):
     """How far predicted levels are from those heard: normal, correlated along the way.
 
     The error of a cell has the autocorrelation exp(-d / correlation_m) (Gudmundson 1991,
@@ -40,22 +41,12 @@ class ErrorModel:
     Raises
     ------
     ConfigError
-        With every value that is not as told.
+        With every value that is out of range.
     """
 
-    deviation_db: float = 7.0
-    correlation_m: float = 50.0
-    site_share: float = 0.5
-
-    def __post_init__(self) -> None:
-        faults = Faults()
-        for name in ("deviation_db", "correlation_m"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                faults.add(f"error model, {name}", "a number > 0", value)
-        if not 0 <= self.site_share < 1:
-            faults.add("error model, site_share", "0 <= share < 1", self.site_share)
-        faults.raise_if_any(ConfigError)
+    deviation_db: Positive = 7.0
+    correlation_m: Positive = 50.0
+    site_share: Below1 = 0.5
 
     def looks(self, length_m: float) -> float:
         """Return how many independent looks a path is worth: 1 + length / (2 · correlation).
@@ -78,7 +69,6 @@ class RadioMap:
 
     Parameters
     ----------
-    lattice : Lattice
     cell_ids : tuple of str
         Those that are heard, C of them.
     site : numpy.ndarray of int64, shape (C,)

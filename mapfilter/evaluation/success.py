@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import sqrt
 from typing import Any
 
@@ -123,7 +123,6 @@ def summarise(
 
     Parameters
     ----------
-    scores : sequence of Accuracy
     routes : sequence, optional
         The route of each run, as anything that is equal for runs on one route; without it each run
         has its own.
@@ -172,7 +171,12 @@ COORDINATES = (
     "drift_deg_per_sqrt_s",
     "scale",
 )
-"""Columns that tell the cells of a grid apart."""
+"""Columns that tell the cells of a grid apart, beside those of varied options."""
+
+
+def varied_keys(runs: pd.DataFrame) -> list[str]:
+    """Return the columns of varied options: those that are named by a dotted key."""
+    return [name for name in runs.columns if "." in name]
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +187,6 @@ class SuccessCell:
     ----------
     database, radio, filter, reading : str
         Names.
-    prediction_error_db, report_period_s, imu_period_s, update_length_m, sigma_trans_m : float
     sigma_orient_deg, bias_sd_deg, drift_deg_per_sqrt_s, scale : float
         Where in the grid; NaN where that is not known.
     runs, routes : int
@@ -198,6 +201,8 @@ class SuccessCell:
         Means over the successful runs of each run's figure, as Table 4 of Khalaf-Allah 2007.
     switch_distance_m : float
         Mean over the runs that switched.
+    varied : dict of str to float
+        Values of varied options, by dotted key.
     """
 
     database: str
@@ -226,6 +231,7 @@ class SuccessCell:
     error_67_m: float
     error_95_m: float
     switch_distance_m: float
+    varied: dict[str, float] = field(default_factory=dict)
 
 
 def success_cells(runs: pd.DataFrame) -> tuple[SuccessCell, ...]:
@@ -237,17 +243,19 @@ def success_cells(runs: pd.DataFrame) -> tuple[SuccessCell, ...]:
         The coordinates, ``route``, ``switched``, ``success``, ``switch_distance_m`` and the errors
         of each run, as a sweep's table holds them.
     """
-    grouped = runs.groupby(list(COORDINATES), sort=False, dropna=False)
-    return tuple(_cell(place, rows) for place, rows in grouped)
+    keys = varied_keys(runs)
+    grouped = runs.groupby([*COORDINATES, *keys], sort=False, dropna=False)
+    return tuple(_cell(place, keys, rows) for place, rows in grouped)
 
 
-def _cell(place: tuple[object, ...], rows: pd.DataFrame) -> SuccessCell:
+def _cell(place: tuple[Any, ...], keys: Sequence[str], rows: pd.DataFrame) -> SuccessCell:
     by_route = rows.groupby("route")["success"].agg(["sum", "count"])
     good, total = int(by_route["sum"].sum()), len(rows)
     right = rows[rows["success"]]
     low, high = wilson_interval(good, total)
     routes_low, routes_high = wilson_interval_of_routes(by_route["sum"], by_route["count"])
-    at: dict[str, Any] = dict(zip(COORDINATES, place, strict=True))
+    count = len(COORDINATES)
+    at: dict[str, Any] = dict(zip(COORDINATES, place[:count], strict=True))
     return SuccessCell(
         **at,
         runs=total,
@@ -263,4 +271,5 @@ def _cell(place: tuple[object, ...], rows: pd.DataFrame) -> SuccessCell:
         error_67_m=float(right["error_67_m"].mean()),
         error_95_m=float(right["error_95_m"].mean()),
         switch_distance_m=float(rows["switch_distance_m"].mean()),
+        varied=dict(zip(keys, map(float, place[count:]), strict=True)),
     )

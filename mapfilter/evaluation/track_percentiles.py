@@ -46,7 +46,6 @@ def percentile_of_tracks(errors_m: Floats, counted: Bools, share: float) -> Perc
     errors_m : (T, K) array
         By track and epoch; NaN is worse than any error.
     counted : (T, K) array of bool
-    share : float
 
     Raises
     ------

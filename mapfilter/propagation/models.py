@@ -167,9 +167,9 @@ class GroundTruthErrors:
         limits |= {"correlation_m": (0, 1e5), "local_correlation_m": (0, 1e5)}
         limits |= dict.fromkeys(("site_share", "local_share", "slope_error", "roof_error"), (0, 1))
         limits |= {"azimuth_error_deg": (0, 180), "offset_db": (-50, 50), "seed": (0, np.inf)}
-        _check(self, "reality", limits, faults)
+        _check(self, "ground_truth", limits, faults)
         if self.clutter not in get_args(Clutter):
-            faults.add("reality, clutter", "own or shared", repr(self.clutter))
+            faults.add("ground_truth, clutter", "own or shared", repr(self.clutter))
         faults.raise_if_any(ConfigError)
 
     def truth_of(self, prediction: PredictionModel) -> PredictionModel:

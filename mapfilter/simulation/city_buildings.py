@@ -165,7 +165,6 @@ def houses(blocks: Geometries, style: Ints, rng: np.random.Generator) -> tuple[G
         What streets leave of each.
     style : numpy.ndarray of int64, shape (N,)
         In what style; parks stay free.
-    rng : numpy.random.Generator
 
     Returns
     -------

@@ -17,9 +17,16 @@ from mapfilter.roads.ways import Bounds, Geometries, Ways
 from mapfilter.simulation.city_streets import CLASSES, SNAP_M
 
 CLEAR_M = {
-    "primary": 11.0, "secondary": 9.0, "tertiary": 7.5, "residential": 5.2, "living_street": 3.2,
-    "pedestrian": 4.2, "service": 3.5, "footway": 2.0, "path": 2.0,
-}  # fmt: skip
+    "primary": 11.0,
+    "secondary": 9.0,
+    "tertiary": 7.5,
+    "residential": 5.2,
+    "living_street": 3.2,
+    "pedestrian": 4.2,
+    "service": 3.5,
+    "footway": 2.0,
+    "path": 2.0,
+}
 """Metres from the middle of a street to the houses, by its class."""
 
 _MAIN = frozenset(("primary", "secondary", "tertiary"))

@@ -167,9 +167,16 @@ def lines_of(shape: BaseGeometry) -> list[LineString]:
 
 
 CLASSES = (
-    "footway", "living_street", "path", "pedestrian", "primary", "residential", "secondary",
-    "service", "tertiary",
-)  # fmt: skip
+    "footway",
+    "living_street",
+    "path",
+    "pedestrian",
+    "primary",
+    "residential",
+    "secondary",
+    "service",
+    "tertiary",
+)
 """Kinds of way, as OpenStreetMap calls them."""
 
 OLD_TOWN, INNER, GRID, VILLAS, PARK = range(5)
@@ -182,12 +189,15 @@ _NAME_SHARES = (0.55, 0.3, 0.15)
 # Area of a block, least side, how uneven the cuts are, and kinds of street.
 _CUTS: dict[int, tuple[tuple[float, float], float, float, tuple[str, str, str]]] = {
     OLD_TOWN: (
-        (3200.0, 7000.0), 30.0, 0.3, ("living_street", "pedestrian", "footway"),
+        (3200.0, 7000.0),
+        30.0,
+        0.3,
+        ("living_street", "pedestrian", "footway"),
     ),
     INNER: ((14000.0, 27000.0), 65.0, 0.2, ("residential", "residential", "residential")),
     VILLAS: ((18000.0, 34000.0), 70.0, 0.18, ("residential", "residential", "residential")),
     PARK: ((30000.0, 70000.0), 80.0, 0.3, ("path", "path", "footway")),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -309,7 +319,6 @@ def bend(at: Floats, old_town_m: float, phases: Floats) -> Floats:
     ----------
     at : numpy.ndarray, shape (N, 2)
         Metres from the centre.
-    old_town_m : float
     phases : numpy.ndarray, shape (2, 3)
         Of the waves, radians.
     """

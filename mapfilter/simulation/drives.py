@@ -82,14 +82,12 @@ def shadowing_db(
 
     Parameters
     ----------
-    drive : Drive
     stations : int
         Independent of each other.
     sigma_db : float
         Standard deviation; 0 for none.
     correlation_m : float
         L.
-    rng : numpy.random.Generator
 
     Returns
     -------

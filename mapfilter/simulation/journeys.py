@@ -11,8 +11,9 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats, Ints
-from mapfilter.errors import ConfigError, Faults
+from mapfilter.errors import Faults
 from mapfilter.geodesy import wrap_rad
+from mapfilter.options import Options, Positive
 from mapfilter.simulation.routes import Route
 from mapfilter.simulation.walking import Inside, WalkerModel, path_beside, with_stops
 
@@ -43,8 +44,8 @@ _GRID_M = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class JourneyPlan:
-    """How far, how fast and along what kind of goals a journey goes.
+class JourneyPlan(Options):
+    """Length, speed and goals of a journey.
 
     Parameters
     ----------
@@ -55,7 +56,7 @@ class JourneyPlan:
     speed_mps : float
         Walking speed.
     period_s : float
-        Between two rows of truth and of motion.
+        Between two rows of the truth.
     leg_m : tuple of float
         Least and largest distance of successive goals as the crow flies.
     acceleration_mps2 : float
@@ -63,46 +64,35 @@ class JourneyPlan:
     lateral_acceleration_mps2 : float
         Largest in a turn.
     driving_speed_mps : mapping
-        Speed by class of way; classes that it lacks are driven at 8.3 m/s.
+        Speed by class of way; 8.3 m/s for classes that it lacks.
     walker : WalkerModel
-        Where on the street one walks, and stops; of walking only.
+        Place on the street, and stops; of walking only.
 
     Raises
     ------
     ConfigError
-        With every value that is not as told.
+        With every value that is out of range.
     """
 
-    length_m: float = 1940.0
+    length_m: Positive = 1940.0
     profile: Literal["walking", "driving"] = "walking"
-    speed_mps: float = 1.4
-    period_s: float = 1.0
+    speed_mps: Positive = 1.4
+    period_s: Positive = 1.0
     leg_m: tuple[float, float] = (300.0, 1200.0)
-    acceleration_mps2: float = 2.0
-    lateral_acceleration_mps2: float = 2.0
-    driving_speed_mps: Mapping[str, float] = field(default_factory=lambda: dict(DRIVING_SPEED_MPS))
+    acceleration_mps2: Positive = 2.0
+    lateral_acceleration_mps2: Positive = 2.0
+    driving_speed_mps: Mapping[str, float] = field(
+        default_factory=lambda: dict(DRIVING_SPEED_MPS), hash=False
+    )
     walker: WalkerModel = field(default_factory=WalkerModel)
 
-    def __post_init__(self) -> None:
-        faults = Faults()
-        for name in (
-            "length_m",
-            "speed_mps",
-            "period_s",
-            "acceleration_mps2",
-            "lateral_acceleration_mps2",
-        ):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                faults.add(f"journeys, {name}", "a finite number > 0", value)
-        if self.profile not in ("walking", "driving"):
-            faults.add("journeys, profile", "walking or driving", repr(self.profile))
+    def check(self, faults: Faults) -> None:
+        """Check the distances of goals and the speeds of ways."""
         if not 0 <= self.leg_m[0] < self.leg_m[1] < np.inf:
-            faults.add("journeys, leg_m", "least < largest distance", self.leg_m)
+            faults.add("JourneyPlan, leg_m", "least < largest distance", self.leg_m)
         for name, speed in self.driving_speed_mps.items():
             if not (np.isfinite(speed) and speed > 0):
-                faults.add(f"journeys, driving_speed_mps, {name}", "a finite number > 0", speed)
-        faults.raise_if_any(ConfigError)
+                faults.add(f"JourneyPlan, driving_speed_mps, {name}", "a number > 0", speed)
 
 
 def journey(
@@ -115,8 +105,6 @@ def journey(
 
     Parameters
     ----------
-    along : Route
-    plan : JourneyPlan
     rng : numpy.random.Generator, optional
         Draws on which side a walker goes, and the stops.
     inside : callable, optional

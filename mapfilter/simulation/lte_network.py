@@ -37,10 +37,8 @@ class LteRadio:
         Of its antenna, at boresight.
     beamwidth_deg, front_to_back_db : float
         Of its horizontal pattern.
-    frequency_mhz, bandwidth_mhz : float
     noise_figure_db : float
         Of receivers.
-    height_m, mobile_height_m : float
     """
 
     power_dbm: float = 43.0
@@ -103,20 +101,21 @@ def turned(places_m: Floats, angle_deg: float) -> Floats:
 
 
 def sites_along(
-    travelled_m: ArrayLike, sites: int, correlation_m: float, shared: float,
+    travelled_m: ArrayLike,
+    sites: int,
+    correlation_m: float,
+    shared: float,
     rng: np.random.Generator,
-) -> Floats:  # fmt: skip
+) -> Floats:
     """Draw standard normal numbers for sites, part of which is common: what is near the receiver.
 
     Parameters
     ----------
     travelled_m : (K,) array_like
-    sites : int
     correlation_m : float
         The correlation along the way is ``exp(-d / correlation_m)``.
     shared : float
         Correlation of any two sites.
-    rng : numpy.random.Generator
 
     Returns
     -------
@@ -147,7 +146,6 @@ def sector_levels_dbm(
 
     Parameters
     ----------
-    radio : LteRadio
     sites_m : (S, 2) array
     boresights_deg : (3,) array_like
         Of the sectors of each site, anticlockwise from east.
@@ -169,8 +167,9 @@ def sector_levels_dbm(
     bearing = np.arctan2(away[..., 1], away[..., 0])[..., None]
     gain = sector_gain_db(
         bearing - np.radians(np.asarray(boresights_deg, dtype=np.float64)),
-        np.radians(radio.beamwidth_deg), radio.front_to_back_db,
-    )  # fmt: skip
+        np.radians(radio.beamwidth_deg),
+        radio.front_to_back_db,
+    )
     level = radio.power_dbm + radio.gain_dbi - loss + np.asarray(shadowing_db)
     return np.asarray(level[..., None] + gain)
 
@@ -181,7 +180,6 @@ def site_sinr_db(levels_dbm: Floats, noise_dbm: float) -> Floats:
     Parameters
     ----------
     levels_dbm : (..., S, 3) array
-    noise_dbm : float
 
     Raises
     ------
@@ -278,9 +276,14 @@ class ArrivalModel:
 
 
 def detour_m(
-    travelled_m: ArrayLike, hidden: Bools, rng: np.random.Generator, *,
-    mean_m: float = 15.0, correlation_m: float = 10.0, shared: float = 0.5,
-) -> Floats:  # fmt: skip
+    travelled_m: ArrayLike,
+    hidden: Bools,
+    rng: np.random.Generator,
+    *,
+    mean_m: float = 15.0,
+    correlation_m: float = 10.0,
+    shared: float = 0.5,
+) -> Floats:
     """Draw the excess of ways without line of sight: exponential, correlated along the way.
 
     Part of a detour is near the receiver and common to all stations; differences of times are free
@@ -291,8 +294,6 @@ def detour_m(
     travelled_m : (K,) array_like
     hidden : (K, S) array of bool
         Where it is not 0.
-    rng : numpy.random.Generator
-    mean_m, correlation_m : float
     shared : float
         Correlation of the normal processes of any two stations, from which the excess is drawn.
 

@@ -31,7 +31,6 @@ class GasGround:
 
     Parameters
     ----------
-    lattice : Lattice
     free : (rows, cols) array of bool
         Where one can walk; what its largest connected part does not hold is left out.
     reach_m : float
@@ -60,13 +59,13 @@ class GasGround:
         number = np.full(free.shape, -1)
         number[self.free] = np.arange(len(self._cell))
         self._number = number
-        pairs = np.hstack([
-            [number[:, :-1][beside], number[:, 1:][beside]]
-            if axis else [number[:-1][beside], number[1:][beside]]
-            for axis, beside in (
-                (0, self.free[:-1] & self.free[1:]), (1, self.free[:, :-1] & self.free[:, 1:]),
-            )
-        ])  # fmt: skip
+        below, right = self.free[:-1] & self.free[1:], self.free[:, :-1] & self.free[:, 1:]
+        pairs = np.hstack(
+            [
+                [number[:-1][below], number[1:][below]],
+                [number[:, :-1][right], number[:, 1:][right]],
+            ]
+        )
         size = len(self._cell)
         loss = np.bincount(pairs.ravel(), minlength=size) + (lattice.resolution_m / reach_m) ** 2
         row = np.concatenate([pairs[0], pairs[1], np.arange(size)])
@@ -153,12 +152,8 @@ def gas_walk(
 
     Parameters
     ----------
-    ground : GasGround
     steps : int
         Epochs; the first one is one interval after the start.
-    speed_mps : float
-    rng : numpy.random.Generator
-    interval_s : float
 
     Returns
     -------

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import pandas as pd
+from annotated_types import Ge, Le
 from numpy.typing import NDArray
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.geodesy import Lattice
+from mapfilter.options import NotNegative, Options, Positive
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rxlev import quantise_level_dbm
 from mapfilter.rasters.raster_set import RxLevRasters
@@ -25,7 +27,6 @@ def running_mean_db(level_dbm: Floats, count: int) -> Floats:
     Parameters
     ----------
     level_dbm : ndarray, shape (N, cells)
-    count : int
 
     Examples
     --------
@@ -48,7 +49,6 @@ def serving_cells(mean_dbm: Floats, heard: Bools, hysteresis_db: float) -> Ints:
     ----------
     mean_dbm : ndarray, shape (N, cells)
     heard : ndarray of bool, shape (N, cells)
-    hysteresis_db : float
 
     Returns
     -------
@@ -84,71 +84,54 @@ _MOST_AVERAGED = 1000
 
 
 @dataclass(frozen=True, slots=True)
-class ReportModel:
-    """How a phone measures and which cell serves it.
+class ReportModel(Options):
+    """Measurement reports of a simulated phone; part of ``[journeys]`` of a configuration.
 
     Parameters
     ----------
-    period_s : float
+    report_period_s : float
         Between two reports: 0.48 s in GSM, 1 s in many logs.
+    radio : {"ground_truth", "as_predicted"}
+        With "as_predicted" the serving cell is the strongest at each place: no noise, no
+        averaging, no hysteresis. The levels must then be the predicted ones.
+    hysteresis_db : float
+        Another cell takes over when its mean is more than this above the serving cell's.
     averaging_s : float
         Handover compares means, in dB, over the reports of this long; at least the last one, at
         most 1000.
-    hysteresis_db : float
-        Another cell takes over when its mean is more than this above the serving cell's.
     fading_db : float
         Standard deviation of the measurement noise, drawn for each cell and report.
     max_neighbours : int
         Strongest other cells that are reported.
-    quantise : bool
-        Whether levels are RXLEV bin centres, censored at both ends of the scale.
     sensitivity_dbm : float
-        Weaker cells are not heard.
-    radio : {"reality", "as_predicted"}
-        With "as_predicted" the serving cell is the strongest at each place: no noise, no
-        averaging, no hysteresis. The levels must then be the predicted ones.
+        Weaker cells are not received.
     phone_offset_sd_db : float
         All levels of a journey are off by one number that is normal with this deviation: the
         receiver's calibration, the hand, the pocket.
+    quantise : bool
+        Whether levels are RXLEV bin centres, censored at both ends of the scale.
 
     Raises
     ------
     ConfigError
-        With every value that is not as told.
+        With every value that is out of range.
     """
 
-    period_s: float = 1.0
-    averaging_s: float = 1.92
-    hysteresis_db: float = 4.0
-    fading_db: float = 1.0
-    max_neighbours: int = 6
+    report_period_s: Positive = 1.0
+    radio: Literal["ground_truth", "as_predicted"] = "ground_truth"
+    hysteresis_db: NotNegative = 4.0
+    averaging_s: NotNegative = 1.92
+    fading_db: NotNegative = 1.0
+    max_neighbours: Annotated[int, Ge(0), Le(32)] = 6
+    sensitivity_dbm: Annotated[float, Ge(-150), Le(0)] = -104.0
+    phone_offset_sd_db: NotNegative = 0.0
     quantise: bool = True
-    sensitivity_dbm: float = -104.0
-    radio: Literal["reality", "as_predicted"] = "reality"
-    phone_offset_sd_db: float = 0.0
 
-    def __post_init__(self) -> None:
-        faults = Faults()
-        if not (np.isfinite(self.period_s) and self.period_s > 0):
-            faults.add("reports, period_s", "a finite number > 0", self.period_s)
-        for name in (
-            "averaging_s",
-            "hysteresis_db",
-            "fading_db",
-            "max_neighbours",
-            "phone_offset_sd_db",
-        ):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0):
-                faults.add(f"reports, {name}", "a finite number >= 0", value)
-        if not faults.found and self.averaging_s > _MOST_AVERAGED * self.period_s:
-            longest = f"at most {_MOST_AVERAGED} reports, {_MOST_AVERAGED * self.period_s:g} s"
-            faults.add("reports, averaging_s", longest, self.averaging_s, "a wrong unit")
-        if not -150 <= self.sensitivity_dbm <= 0:
-            faults.add("reports, sensitivity_dbm", "dBm in -150..0", self.sensitivity_dbm)
-        if self.radio not in ("reality", "as_predicted"):
-            faults.add("reports, radio", "reality or as_predicted", repr(self.radio))
-        faults.raise_if_any(ConfigError)
+    def check(self, faults: Faults) -> None:
+        """Check that the averaging does not cover too many reports."""
+        if not faults.found and self.averaging_s > _MOST_AVERAGED * self.report_period_s:
+            most = f"at most {_MOST_AVERAGED} reports, {_MOST_AVERAGED * self.report_period_s:g} s"
+            faults.add("ReportModel, averaging_s", most, self.averaging_s, "a wrong unit")
 
 
 def reports(
@@ -168,7 +151,6 @@ def reports(
         From positions to levels, one column for each cell in the plan's order.
     plan : CellPlan
         Tells the carriers and BSICs by which neighbours are known.
-    model : ReportModel
     rng : numpy.random.Generator
         The draws do not depend on ``model``.
 
@@ -190,12 +172,12 @@ def reports(
         raise fail(InputError, "truth", "at least one row", "none")
     time, east, north = (truth[name].to_numpy() for name in ("time_s", "east_m", "north_m"))
     # A whole number of periods must not lose the last report to rounding.
-    count = int(np.floor((time[-1] - time[0]) / model.period_s + 1e-9)) + 1
+    count = int(np.floor((time[-1] - time[0]) / model.report_period_s + 1e-9)) + 1
     if count * len(plan) > _MOST_LEVELS:
         expected = f"at most {_MOST_LEVELS:.0e} levels per journey"
         got = f"{count} reports of {len(plan)} cells"
-        raise fail(ConfigError, "reports, period_s", expected, got, "a wrong unit")
-    tick_s = time[0] + np.arange(count) * model.period_s
+        raise fail(ConfigError, "ReportModel, report_period_s", expected, got, "a wrong unit")
+    tick_s = time[0] + np.arange(count) * model.report_period_s
     there = np.interp(tick_s, time, east), np.interp(tick_s, time, north)
     level = np.asarray(levels(*there), dtype=np.float64)
     if level.shape != (count, len(plan)):
@@ -203,11 +185,11 @@ def reports(
         raise fail(InputError, "levels", expected, level.shape, "another plan's cells")
     noise_db = model.fading_db * rng.standard_normal(level.shape)
     noise_db += model.phone_offset_sd_db * rng.standard_normal()
-    if model.radio == "reality":
+    if model.radio == "ground_truth":
         level = level + noise_db
     heard = np.where(level >= model.sensitivity_dbm, level, -np.inf)
-    if model.radio == "reality":
-        averaged = max(1, round(model.averaging_s / model.period_s))
+    if model.radio == "ground_truth":
+        averaged = max(1, round(model.averaging_s / model.report_period_s))
         mean = running_mean_db(np.where(np.isnan(level), _SILENT_DBM, level), averaged)
         serving = serving_cells(mean, np.isfinite(heard), model.hysteresis_db)
     else:

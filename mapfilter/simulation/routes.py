@@ -29,7 +29,6 @@ class Route:
         The way of each segment.
     way_class : ndarray of int16, shape (V - 1,)
         The class of each segment, an index into ``class_names``.
-    class_names : tuple of str
     """
 
     east_m: Floats
@@ -76,9 +75,6 @@ def route(
 
     Parameters
     ----------
-    network : StreetNetwork
-    length_m : float
-    rng : numpy.random.Generator
     leg_m : tuple of float
         Least and largest distance of the next goal.
 

@@ -1,31 +1,151 @@
-"""What a receiver of satellites hears on a journey: who is seen, how far, by which clock.
+"""Simulated pseudoranges of a journey: visible satellites, ranges, clock, echoes, a spoofer.
 
 Satellites are seen past the buildings by geometry. A pseudorange is the distance, the receiver's
 clock, noise that grows towards the horizon, and echoes, which only make it longer and last for
 metres. Hidden satellites may be received by reflections. A spoofer may put a receiver elsewhere.
+
+A single reflection at a wall on the other side of the street is later by twice the distance to the
+wall times the cosine of the elevation, never earlier (Hsu 2018, *Analysis and modeling GPS NLOS
+effect in highly urbanized area*, GPS Solutions 22:7). Delays by ray tracing in streets follow
+gamma distributions whose shape falls with the depth of the street (Ollander, Bode & Baum 2020,
+*Simulation-based analysis of multipath delay distributions in urban canyons*, ENC); here the shape
+is one, the exponential distribution.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import pandas as pd
+from annotated_types import Ge, Gt, Le, Lt
+from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats
-from mapfilter.errors import ConfigError, Faults, InputError, fail
+from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import unproject
 from mapfilter.gnss.noise import correlated_along, multipath_bias_m
 from mapfilter.gnss.orbits import Almanac, gps_time, satellite_positions_m
 from mapfilter.gnss.sky import Directions, GridFrame, Skyline, directions, ecef_from_lonlat
 from mapfilter.models.motion import clock_noise
-from mapfilter.simulation.reflections import NlosModel, draw_reflections
+from mapfilter.options import NotNegative, Options, Positive, Share
 from mapfilter.tracks.satellites import sent_from_m
 
 
 @dataclass(frozen=True, slots=True)
-class ReceptionModel:
+class NlosModel(Options):
+    """Reception of satellites behind buildings by a reflection (non-line-of-sight, NLOS).
+
+    A single reflection at a wall on the other side of the street is later by twice the distance to
+    the wall times the cosine of the elevation, never earlier (Hsu 2018, *Analysis and modeling GPS
+    NLOS effect in highly urbanized area*, GPS Solutions 22:7). Delays by ray tracing in streets
+    follow gamma distributions whose shape falls with the depth of the street (Ollander, Bode & Baum
+    2020, *Simulation-based analysis of multipath delay distributions in urban canyons*, ENC); here
+    the shape is one, the exponential distribution.
+
+    Parameters
+    ----------
+    share : float
+        Probability that a hidden satellite at ``full_share_deg`` or higher is received.
+    full_share_deg : float
+        Below this elevation the probability falls linearly, to zero at the horizon: the lower a
+        satellite, the less of the walls that face it is lit.
+    memory_m : float
+        A satellite stays received, or not, for distances with this mean, after which it is drawn
+        anew.
+    delay_m : float
+        Mean delay of a reflection at elevation 0, exponentially distributed: twice the mean
+        distance to the reflecting wall. It shrinks with the cosine of the elevation.
+    delay_memory_m : float
+        Correlation length of the delay.
+    noise_factor : float
+        Factor on the deviation of the white noise: the code noise grows as one over the square
+        root of C/N0, so that 10 dB less make about 3.
+    """
+
+    share: Share = 0.5
+    full_share_deg: Annotated[float, Gt(0), Le(90)] = 30.0
+    memory_m: Positive = 20.0
+    delay_m: NotNegative = 30.0
+    delay_memory_m: Positive = 10.0
+    noise_factor: Annotated[float, Ge(1)] = 3.0
+
+    def probability(self, elevation_rad: ArrayLike) -> Floats:
+        """Return the probability that a hidden satellite is received.
+
+        Examples
+        --------
+        >>> NlosModel(share=0.6).probability(np.radians([0.0, 15.0, 30.0, 80.0])).round(9).tolist()
+        [0.0, 0.3, 0.6, 0.6]
+        """
+        ramp = np.asarray(elevation_rad, dtype=np.float64) / np.radians(self.full_share_deg)
+        return np.asarray(self.share * np.clip(ramp, 0.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Reflections:
+    """What of K epochs and S satellites would be received by reflections, were they hidden.
+
+    Parameters
+    ----------
+    received : (K, S) array of bool
+    delay_m : (K, S) array
+    """
+
+    received: Bools
+    delay_m: Floats
+
+
+def draw_reflections(
+    model: NlosModel, travelled_m: Floats, elevation_rad: Floats, rng: np.random.Generator
+) -> Reflections:
+    """Draw reflections along a path; neither depends on where satellites are hidden.
+
+    Parameters
+    ----------
+    travelled_m : (K,) array
+        Distance travelled at each epoch, never decreasing.
+    elevation_rad : (K, S) array
+    """
+    satellites = elevation_rad.shape[1]
+    level = held_along(travelled_m, satellites, model.memory_m, rng)
+    excess = multipath_bias_m(
+        travelled_m, satellites, rng, mean_m=1.0, correlation_m=model.delay_memory_m
+    )
+    delay_m = model.delay_m * np.cos(elevation_rad) * excess
+    return Reflections(level < model.probability(elevation_rad), delay_m)
+
+
+def held_along(
+    travelled_m: ArrayLike, columns: int, memory_m: float, rng: np.random.Generator
+) -> Floats:
+    """Draw uniform numbers that hold for exponentially distributed distances along a path.
+
+    Two numbers at a distance d are the same with probability ``exp(-d / memory_m)``, else
+    independent.
+
+    Parameters
+    ----------
+    travelled_m : (K,) array_like
+        Distance travelled at each epoch, never decreasing.
+    columns : int
+        Independent processes.
+
+    Returns
+    -------
+    (K, columns) array
+    """
+    travelled = np.asarray(travelled_m, dtype=np.float64)
+    drawn = rng.random((travelled.size, columns))
+    keep = np.exp(-np.diff(travelled, prepend=-np.inf) / memory_m)
+    anew = rng.random((travelled.size, columns)) >= keep[:, None]
+    row = np.where(anew, np.arange(travelled.size)[:, None], 0)
+    return np.asarray(np.take_along_axis(drawn, np.maximum.accumulate(row, axis=0), axis=0))
+
+
+@dataclass(frozen=True, slots=True)
+class ReceptionModel(Options):
     """How a receiver hears satellites.
 
     Parameters
@@ -37,7 +157,6 @@ class ReceptionModel:
     choice : {"random", "highest"}
         Which of those that can be, reflections alike; with "random" the order is drawn anew every
         ``hold_s``.
-    hold_s : float
     mask_deg : float
         Lower satellites are not received.
     zenith_m : float
@@ -45,7 +164,6 @@ class ReceptionModel:
     echo_m : float
         Mean of the echoes where half of the satellites over the mask are hidden, or more; in the
         open there are none.
-    echo_memory_m : float
     clock_m, drift_mps : float
         First error of the clock, uniform to both sides; deviation of its first rate.
     antenna_m : float
@@ -59,40 +177,22 @@ class ReceptionModel:
         nothing is in line of sight, as under a roof, they are not either.
     """
 
-    period_s: float = 1.0
-    most: int | None = None
+    period_s: Positive = 1.0
+    most: Annotated[int, Ge(0)] | None = None
     choice: Literal["random", "highest"] = "random"
-    hold_s: float = 20.0
-    mask_deg: float = 10.0
-    zenith_m: float = 2.0
-    echo_m: float = 3.0
-    echo_memory_m: float = 10.0
-    clock_m: float = 1e5
-    drift_mps: float = 30.0
-    antenna_m: float = 1.5
+    hold_s: Positive = 20.0
+    mask_deg: Annotated[float, Gt(0), Lt(90)] = 10.0
+    zenith_m: Positive = 2.0
+    echo_m: NotNegative = 3.0
+    echo_memory_m: Positive = 10.0
+    clock_m: NotNegative = 1e5
+    drift_mps: NotNegative = 30.0
+    antenna_m: NotNegative = 1.5
     height_m: float = 100.0
-    height_sd_m: float = 10.0
-    relief_m: float = 5.0
-    relief_memory_m: float = 300.0
+    height_sd_m: NotNegative = 10.0
+    relief_m: NotNegative = 5.0
+    relief_memory_m: Positive = 300.0
     nlos: NlosModel | None = None
-
-    def __post_init__(self) -> None:
-        faults = Faults()
-        for name in (
-            "period_s", "hold_s", "zenith_m", "echo_memory_m", "relief_memory_m",
-        ):  # fmt: skip
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                faults.add(f"reception, {name}", "a finite number > 0", getattr(self, name))
-        for name in ("echo_m", "clock_m", "drift_mps", "antenna_m", "height_sd_m", "relief_m"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
-                faults.add(f"reception, {name}", "a finite number >= 0", getattr(self, name))
-        if self.most is not None and self.most < 0:
-            faults.add("reception, most", "a number of satellites >= 0", self.most)
-        if self.choice not in ("random", "highest"):
-            faults.add("reception, choice", "random or highest", repr(self.choice))
-        if not 0 < self.mask_deg < 90:
-            faults.add("reception, mask_deg", "degrees between 0 and 90", self.mask_deg)
-        faults.raise_if_any(ConfigError)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +201,6 @@ class Spoofer:
 
     Parameters
     ----------
-    from_s, lasts_s : float
     east_m, north_m : float
         How far off it seems to be.
     clock_m : float
@@ -142,9 +241,6 @@ def receive(
         Its weeks as those of the start.
     start_utc_s : float
         UTC seconds at ``time_s`` = 0.
-    model : ReceptionModel
-    rng : numpy.random.Generator
-    spoofer : Spoofer, optional
 
     Raises
     ------
@@ -251,9 +347,12 @@ def _clock_m(count: int, model: ReceptionModel, rng: np.random.Generator) -> Flo
 
 
 def _sky(
-    seen: Directions, place: Floats, skyline: Skyline | None, frame: GridFrame,
+    seen: Directions,
+    place: Floats,
+    skyline: Skyline | None,
+    frame: GridFrame,
     model: ReceptionModel,
-) -> tuple[Bools, Floats]:  # fmt: skip
+) -> tuple[Bools, Floats]:
     """Return who is seen at each epoch, (K, S), and how large echoes are, (K,)."""
     above = seen.above(model.mask_deg)
     if skyline is None:

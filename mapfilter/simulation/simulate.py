@@ -11,10 +11,11 @@ import pandas as pd
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.geodesy import same_crs
 from mapfilter.radio.cells import CellPlan
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.network import StreetNetwork
-from mapfilter.simulation.imu import ImuErrors, noisy_motion
+from mapfilter.simulation.imu import ImuNoise, noisy_motion
 from mapfilter.simulation.journeys import JourneyPlan, journey
-from mapfilter.simulation.reports import Levels, ReportModel, reports
+from mapfilter.simulation.reports import Levels, ReportModel, level_sampler, reports
 from mapfilter.simulation.routes import route
 from mapfilter.simulation.walking import Inside
 from mapfilter.tracks.log import TrackLog, make_log
@@ -33,26 +34,19 @@ class SimulationSettings:
         Different routes.
     draws : int
         Logs for each route, which differ in noise only.
-    journey : JourneyPlan
-    imu : ImuErrors
-    imu_period_s : float
-        Length of an interval of dead reckoning; noise is drawn once for each.
-    reports : ReportModel
     start_utc_s : float
         When every journey starts, UTC seconds; NaN, the default, where that does not matter.
 
     Raises
     ------
     ConfigError
-        There are no journeys or no draws, the period is not > 0, or a journey would have more than
-        ten million ticks.
+        There are no journeys or no draws, or a journey would have more than ten million ticks.
     """
 
     journeys: int = 1
     draws: int = 1
     journey: JourneyPlan = field(default_factory=JourneyPlan)
-    imu: ImuErrors = field(default_factory=ImuErrors)
-    imu_period_s: float = 1.0
+    imu: ImuNoise = field(default_factory=ImuNoise)
     reports: ReportModel = field(default_factory=ReportModel)
     start_utc_s: float = float("nan")
 
@@ -60,8 +54,6 @@ class SimulationSettings:
         for name in ("journeys", "draws"):
             if getattr(self, name) < 1:
                 raise fail(ConfigError, f"journeys, {name}", "at least 1", getattr(self, name))
-        if not (np.isfinite(self.imu_period_s) and self.imu_period_s > 0):
-            raise fail(ConfigError, "imu, period_s", "seconds > 0", self.imu_period_s)
         self._check_ticks()
 
     def _check_ticks(self) -> None:
@@ -70,8 +62,8 @@ class SimulationSettings:
         speed_mps = journey.speed_mps if journey.profile == "walking" else 1.0
         for name, period_s in (
             ("journeys, period_s", journey.period_s),
-            ("imu, period_s", self.imu_period_s),
-            ("journeys, report_period_s", self.reports.period_s),
+            ("imu, period_s", self.imu.period_s),
+            ("journeys, report_period_s", self.reports.report_period_s),
         ):
             ticks = journey.length_m / speed_mps / period_s
             if ticks > _MOST_TICKS:
@@ -86,13 +78,13 @@ class SimulationSettings:
 
 def simulate_journeys(
     network: StreetNetwork,
-    levels: Levels,
+    levels: Levels | RxLevRasters,
     plan: CellPlan,
-    settings: SimulationSettings,
-    seed: int,
+    settings: SimulationSettings | None = None,
+    seed: int = 0,
     inside: Inside | None = None,
 ) -> Iterator[tuple[str, TrackLog]]:
-    """Make journeys one after another.
+    """Simulate journeys one after another.
 
     The randomness of route, inertial unit and radio comes from (seed, journey, draw) apart from
     each other: more journeys or draws, or another noise, change no other journey.
@@ -100,40 +92,42 @@ def simulate_journeys(
     Parameters
     ----------
     network : StreetNetwork
-    levels : callable
-        From positions to levels in the plan's order, as
-        :func:`mapfilter.simulation.reports.level_sampler` makes them.
+    levels : RxLevRasters or callable
+        The true levels: rasters, or a function from positions to levels in the plan's order, as
+        :func:`mapfilter.simulation.reports.level_sampler` returns it.
     plan : CellPlan
         In the network's CRS.
-    settings : SimulationSettings
+    settings : SimulationSettings, optional
+        Journeys, dead reckoning and reports.
     seed : int
         Not negative.
     inside : callable, optional
-        Where buildings keep walkers off the pavement.
+        Where buildings keep walkers off the pavement, see
+        :func:`mapfilter.simulation.walking.inside_buildings`.
 
     Yields
     ------
     name : str
         Such as ``journey-0003-draw-000``; names sort in the order of the journeys.
     log : TrackLog
+        With its truth.
 
     Raises
     ------
     InputError
-        Plan and network differ in their CRS, or one cannot go as far as wanted.
+        Plan and network differ in their CRS, or no route is as long as wanted.
     """
+    settings = settings or SimulationSettings()
     if not same_crs(plan.crs, network.crs):
         raise fail(InputError, "cell plan, crs", f"the streets' {network.crs}", plan.crs)
+    if isinstance(levels, RxLevRasters):
+        levels = level_sampler(levels, plan.ids, plan=plan)
+    walk, leg_m = settings.journey, settings.journey.leg_m
     for j in range(settings.journeys):
-        along = route(
-            network,
-            settings.journey.length_m,
-            _rng(seed, _ROUTE, j),
-            leg_m=settings.journey.leg_m,
-        )
+        along = route(network, walk.length_m, _rng(seed, _ROUTE, j), leg_m=leg_m)
         for d in range(settings.draws):
             # All draws of a route are the same walk.
-            truth = journey(along, settings.journey, _rng(seed, _WALKER, j), inside)
+            truth = journey(along, walk, _rng(seed, _WALKER, j), inside)
             rngs = _rng(seed, _IMU, j, d), _rng(seed, _RADIO, j, d)
             log = simulate_log(network.crs, truth, levels, plan, settings, *rngs)
             yield f"journey-{j:04d}-draw-{d:03d}", log
@@ -151,7 +145,7 @@ def simulate_log(
     """Make the log of one journey; arguments as of :func:`simulate_journeys`."""
     return make_log(
         crs,
-        motion=noisy_motion(at_ticks(truth, settings.imu_period_s), settings.imu, imu_rng),
+        motion=noisy_motion(at_ticks(truth, settings.imu.period_s), settings.imu, imu_rng),
         radio=reports(truth, levels, plan, settings.reports, radio_rng),
         truth=truth,
         start_utc_s=settings.start_utc_s,

@@ -57,8 +57,6 @@ class SyntheticCity:
         West, south, east, north.
     ways : Ways
         All that one may walk along; one connected network.
-    squares : Squares
-    buildings : Buildings
     water : Water
         The river; empty without one.
     parks : numpy.ndarray of shapely.Polygon

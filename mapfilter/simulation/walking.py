@@ -126,9 +126,6 @@ def path_beside(
 
     Parameters
     ----------
-    along : Route
-    walker : WalkerModel
-    rng : numpy.random.Generator
     inside : callable, optional
         From east and north (m), shape (N,), to whether a building stands there.
     """

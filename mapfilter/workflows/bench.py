@@ -6,7 +6,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -20,7 +20,19 @@ from mapfilter.database.build import BuildJob, build
 from mapfilter.database.estimate import dry_run, peak_memory_bytes
 from mapfilter.database.tiles import read_tile
 from mapfilter.errors import ConfigError, fail
+from mapfilter.experiments.papers.fritsche_klein_2009.experiment import bound_curves
+from mapfilter.experiments.papers.fritsche_klein_2009.scene import (
+    COMBINATIONS,
+    Layout,
+    Scene,
+    Trials,
+    draw,
+    scene,
+)
+from mapfilter.filters.gaussian import EKF, RBUKF, Method
+from mapfilter.filters.trials import run_trials
 from mapfilter.geodesy import Lattice
+from mapfilter.positioning.kalman.models import compiled
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
@@ -28,13 +40,13 @@ from mapfilter.roads.lattice import RouteLattice
 
 if TYPE_CHECKING:
     from mapfilter.workflows.bench_filter import FilterBench
-    from mapfilter.workflows.bench_fusion import FusionBench
     from mapfilter.workflows.bench_sweep import SweepBench
 
 CRS = "EPSG:32629"
 STAGES = ("build", "filter", "fusion", "sweep")
 _FLOOR_DBM = -104.0
 _BLOCK_PX = 256
+_TRIALS = 500
 
 
 @dataclass(frozen=True)
@@ -96,8 +108,6 @@ def run_bench(
 
         return bench_filter(runs=runs)
     if stage == "fusion":
-        from mapfilter.workflows.bench_fusion import bench_fusion
-
         return bench_fusion(runs=runs)
     if stage == "sweep":
         from mapfilter.workflows.bench_sweep import bench_sweep
@@ -183,15 +193,8 @@ def _bench_build(folder: Path, cells: int, side_px: int, points: int, runs: int)
             "build": lambda: build(rasters, plan, routes, folder / "db"),
             "two": in_two,
         }
-        took: dict[str, list[float]] = {name: [] for name in tasks}
-        for run in range(runs + 1):
-            for name, task in tasks.items():
-                began_s = time.perf_counter()
-                task()
-                # The first of each opens files, compiles and starts processes.
-                if run > 0:
-                    took[name].append(time.perf_counter() - began_s)
-    seconds = {name: median(times) for name, times in took.items()}
+        rates = median_rates({name: (task, 1) for name, task in tasks.items()}, runs)
+    seconds = {name: 1 / rate for name, rate in rates.items()}
     estimate = dry_run(rasters, plan, routes)
     size = sum(part.stat().st_size for part in (folder / "db").rglob("*.parquet"))
     return BuildBench(
@@ -233,3 +236,82 @@ def _peak_memory_bytes(rasters: Path, points: int) -> int:
     command = [sys.executable, "-c", code, str(rasters), str(points)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     return int(done.stdout)
+
+
+@dataclass(frozen=True)
+class FusionBench:
+    """Kalman-type filters on the hybrid problem of 6 states and 10 measurements, one process.
+
+    Figures are medians over the runs, which take turns; compilation is not counted.
+
+    Parameters
+    ----------
+    trials, steps, runs : int
+        The task.
+    ekf_per_s, rbukf_per_s : float
+        Steps of trials per second.
+    table_3_s : float
+        Table III of Fritsche & Klein 2009: three combinations, two filters, drawing and bounds.
+    """
+
+    trials: int
+    steps: int
+    runs: int
+    ekf_per_s: float
+    rbukf_per_s: float
+    table_3_s: float
+
+
+def bench_fusion(*, runs: int = 5) -> FusionBench:
+    """Measure the filters of one run."""
+    given = scene("hybrid2", Layout())
+    steps = Layout().steps
+    drawn = draw(given, _TRIALS, steps, np.random.default_rng(0))
+
+    def run(method: Method) -> Callable[[], object]:
+        return lambda: estimates(given, drawn, method, drawn.first_means, given.first_covariance)
+
+    many = _TRIALS * steps
+    rate = median_rates(
+        {"ekf": (run(EKF), many), "rbukf": (run(RBUKF), many), "table": (_table_3, 1)}, runs
+    )
+    return FusionBench(_TRIALS, steps, runs, rate["ekf"], rate["rbukf"], 1 / rate["table"])
+
+
+def estimates(given: Scene, drawn: Trials, method: Method, means: Floats, first: Floats) -> Floats:
+    """Run a filter over trials and return its means."""
+    run = run_trials(
+        compiled(given.measurement),
+        given.assumed.transition,
+        given.assumed.noise,
+        method,
+        means,
+        first,
+        drawn.readings[: len(means)],
+    )
+    return run.means
+
+
+def median_rates(
+    tasks: Mapping[str, tuple[Callable[[], object], int]], runs: int
+) -> dict[str, float]:
+    """Return how many steps per second tasks of so many steps take; tasks take turns."""
+    rates: dict[str, list[float]] = {name: [] for name in tasks}
+    for turn in range(runs + 1):
+        for name, (task, count) in tasks.items():
+            began_s = time.perf_counter()
+            task()
+            # The first of each opens files, compiles and starts processes.
+            if turn > 0:
+                rates[name].append(count / (time.perf_counter() - began_s))
+    return {name: median(values) for name, values in rates.items()}
+
+
+def _table_3() -> None:
+    rng = np.random.default_rng(1)
+    for name in COMBINATIONS:
+        given = scene(name, Layout())
+        drawn = draw(given, _TRIALS, Layout().steps, rng)
+        bound_curves(given, drawn.states)
+        for method in (RBUKF, EKF):
+            estimates(given, drawn, method, drawn.first_means, given.first_covariance)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -15,6 +17,7 @@ import numpy as np
 from mapfilter._kernels import draw_key
 from mapfilter._types import Floats32
 from mapfilter.config.load import load_config
+from mapfilter.database.estimate import peak_memory_bytes
 from mapfilter.database.store import open_database
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.particle import ParticleBelief, ParticleFilter, ParticleOptions
@@ -25,20 +28,14 @@ from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel, Start
 from mapfilter.positioning.bayes.options import BayesOptions, open_area
 from mapfilter.positioning.epochs import epochs
+from mapfilter.positioning.filter import locate
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.store import list_logs, read_log
-from mapfilter.workflows.bench_filter_memory import locating_memory_bytes
-from mapfilter.workflows.bench_filter_peers import (
-    NumpyModel,
-    numpy_step,
-    particles_step,
-    stone_soup_step,
-)
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.simulate import run_simulate
 
-_LEVELS, _PER_ROW, _PEER_STEPS = 7, 20, 10
+_LEVELS, _PER_ROW = 7, 20
 _JITTER = (0.5, 0.5, 0.005, 0.003, 0.0)
 _TRACKS, _LENGTH_M, _CUT_M = 5, 1940.0, 300.0
 
@@ -47,29 +44,29 @@ _TRACKS, _LENGTH_M, _CUT_M = 5, 1940.0, 300.0
 class StepBench:
     """A whole step: motion, map, serving cell, seven levels, normalise, resample.
 
-    Nanoseconds are per particle, medians over the runs, which take turns; ratios are of these.
+    Nanoseconds are per particle, medians over the runs, which take turns.
 
     Parameters
     ----------
-    particles : int
     step_ns : float
+        The kernels alone.
     filter_ns : float
-        The same by the filter, which also says what the belief is: mean, radii, entropy.
-    numpy_ns, particles_ns, stonesoup_ns : float or None
-        The same model in NumPy, alone and under two packages; None where one is not installed.
-    numpy_ratio, particles_ratio, stonesoup_ratio : float or None
-        Of these to ``step_ns``.
+        The filter, which also summarises its belief: mean, radii, entropy.
     """
 
     particles: int
     step_ns: float
     filter_ns: float
-    numpy_ns: float
-    particles_ns: float | None
-    stonesoup_ns: float | None
-    numpy_ratio: float
-    particles_ratio: float | None
-    stonesoup_ratio: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class StepInputs:
+    """What a step takes: the model, a step of dead reckoning, and a report with levels."""
+
+    model: BayesModel
+    motion: MotionStep
+    reading: RadioReading
+    levels: LevelReading
 
 
 @dataclass(frozen=True)
@@ -124,8 +121,6 @@ def bench_filter(
         Repetitions that the medians are of.
     particles : sequence of int
         Numbers of particles of the single step.
-    tracks : int
-    length_m : float
     settings : sequence of str
         ``section.key=value`` of the world.
 
@@ -165,14 +160,14 @@ def bench_filter(
 
 
 def make_world(folder: Path, settings: Sequence[str]) -> tuple[Path, Sequence[Path]]:
-    """Return a database of the embedded map, and the folders of walks in a perturbed reality."""
+    """Return a database of the embedded map, and the folders of walks in a ground truth."""
     config = load_config(None, ["output.pictures=none", *settings], out=folder)
     run_predict(config)
     run_build(config)
     return config.database_path, list_logs(run_simulate(config).path)
 
 
-def step_inputs(model: BayesModel, log: TrackLog, count: int) -> tuple[NumpyModel, ParticleBelief]:
+def step_inputs(model: BayesModel, log: TrackLog, count: int) -> tuple[StepInputs, ParticleBelief]:
     """Return a step's motion and report, and particles about a place of a walk with truth."""
     area, truth = model.area, log.truth.iloc[len(log.truth) // 2]
     belief = ParticleFilter(model, ParticleOptions(max_particles=count, min_particles=count)).init(
@@ -185,59 +180,47 @@ def step_inputs(model: BayesModel, log: TrackLog, count: int) -> tuple[NumpyMode
     size = cell.size
     rho = np.full(size, 0.7, dtype=np.float32)
     levels = LevelReading(
-        cell, (0.3 * level[cell]).astype(np.float32), rho,
-        np.full(size, 0.1, dtype=np.float32), 0.3, 0.7, 3.0, 4.0, 3.0,
-    )  # fmt: skip
+        cell,
+        (0.3 * level[cell]).astype(np.float32),
+        rho,
+        np.full(size, 0.1, dtype=np.float32),
+        0.3,
+        0.7,
+        3.0,
+        4.0,
+        3.0,
+    )
     reading = RadioReading(int(cell[0]), 5 / 40, levels, length_m=5.0)
-    return NumpyModel(model, MotionStep(1.4, radians(37.0)), reading, levels), belief
+    return StepInputs(model, MotionStep(1.4, radians(37.0)), reading, levels), belief
 
 
 def _step(model: BayesModel, log: TrackLog, count: int, runs: int) -> StepBench:
-    peer, belief = step_inputs(model, log, count)
-    rng = np.random.default_rng(1)
-    jitter = np.array(_JITTER)
-    wide = np.vstack([belief.state.astype(np.float64), np.zeros(count)])
+    given, belief = step_inputs(model, log, count)
+    rng, jitter = np.random.default_rng(1), np.array(_JITTER, np.float32)
     always = ParticleOptions(count, count, count, resample_below=0.999999, mass_exponent=1.0)
     filter_ = ParticleFilter(model, always)
 
-    def own() -> object:
-        return whole_step(peer, belief, jitter.astype(np.float32), rng)
-
     def by_filter() -> object:
-        moved, _ = filter_.predict(belief, peer.motion, rng)
-        return filter_.update(moved, peer.reading, rng)
+        moved, _ = filter_.predict(belief, given.motion, rng)
+        return filter_.update(moved, given.reading, rng)
 
-    numpy_ = numpy_step(peer, jitter, rng)
-    package, soup = particles_step(peer, rng, _PEER_STEPS), stone_soup_step(peer, rng)
-    tasks: dict[str, tuple[Callable[[], object], int]] = {
-        "own": (own, _PER_ROW),
-        "filter": (by_filter, _PER_ROW),
-        "numpy": (lambda: numpy_(wide), 1),
+    tasks: dict[str, Callable[[], object]] = {
+        "step": lambda: whole_step(given, belief, jitter, rng),
+        "filter": by_filter,
     }
-    if package is not None:
-        tasks["particles"] = (lambda: package(wide), 1)
-    if soup is not None:
-        tasks["stonesoup"] = (lambda: soup(wide), 1)
-    took: dict[str, list[float]] = {name: [] for name in tasks}
+    took_ns: dict[str, list[float]] = {name: [] for name in tasks}
     for run in range(runs + 1):
-        for name, (task, times) in tasks.items():
+        for name, task in tasks.items():
             began_s = time.process_time()
-            for _ in range(times):
+            for _ in range(_PER_ROW):
                 task()
             if run > 0:
-                steps = _PEER_STEPS if name == "particles" else times
-                took[name].append(1e9 * (time.process_time() - began_s) / (steps * count))
-    ns = {name: median(times) for name, times in took.items()}
-    peers = {name: ns.get(name) for name in ("particles", "stonesoup")}
-    ratios = {name: None if t is None else t / ns["own"] for name, t in peers.items()}
-    return StepBench(
-        count, ns["own"], ns["filter"], ns["numpy"], peers["particles"], peers["stonesoup"],
-        ns["numpy"] / ns["own"], ratios["particles"], ratios["stonesoup"],
-    )  # fmt: skip
+                took_ns[name].append(1e9 * (time.process_time() - began_s) / (_PER_ROW * count))
+    return StepBench(count, median(took_ns["step"]), median(took_ns["filter"]))
 
 
 def whole_step(
-    given: NumpyModel, belief: ParticleBelief, jitter: Floats32, rng: np.random.Generator
+    given: StepInputs, belief: ParticleBelief, jitter: Floats32, rng: np.random.Generator
 ) -> Floats32:
     """Return the particles after a step that always resamples, shape (5, N)."""
     model, count = given.model, belief.log_weight.size
@@ -276,3 +259,24 @@ def _without_middle(log: TrackLog) -> TrackLog:
         motion=log.motion[~off].reset_index(drop=True),
         radio=log.radio[~heard].reset_index(drop=True),
     )
+
+
+def locating_memory_bytes(database: Path, log: Path, *, smooth: bool) -> tuple[int, int]:
+    """Return the peak memory of a process: with its libraries loaded, and after locating a walk."""
+    code = (
+        "import sys; from pathlib import Path;"
+        "from mapfilter.workflows.bench_filter import locate_once;"
+        "print(*locate_once(Path(sys.argv[1]), Path(sys.argv[2]), smooth=sys.argv[3] == 'smooth'))"
+    )
+    given = [sys.executable, "-c", code, str(database), str(log), "smooth" if smooth else "forward"]
+    done = subprocess.run(given, check=True, capture_output=True, text=True)
+    loaded, at_the_end = map(int, done.stdout.split())
+    return loaded, at_the_end
+
+
+def locate_once(database: Path, log: Path, *, smooth: bool) -> tuple[int, int]:
+    """Open, locate, and return this process's peak memory (bytes) before and after."""
+    loaded = peak_memory_bytes()
+    positioner = BayesOptions(smooth=smooth).over(open_database(database))
+    locate(read_log(log), positioner, np.random.default_rng(0))
+    return loaded, peak_memory_bytes()

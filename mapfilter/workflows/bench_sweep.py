@@ -107,9 +107,13 @@ def _bench(folder: Path, repetitions: int, trials: int) -> SweepBench:
             for name, executor in executors.items():
                 began_s = time.perf_counter()
                 sweep(
-                    plan, world, {plan.databases[0]: database}, folder / name,
-                    executor=executor, in_flight=3 * _PROCESSES,
-                )  # fmt: skip
+                    plan,
+                    world,
+                    {plan.databases[0]: database},
+                    folder / name,
+                    executor=executor,
+                    in_flight=3 * _PROCESSES,
+                )
                 # The first of each opens files, compiles and starts processes.
                 if repetition > 0:
                     took[name].append(time.perf_counter() - began_s)

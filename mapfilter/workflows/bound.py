@@ -14,8 +14,8 @@ from mapfilter._parallel import Progress
 from mapfilter._types import Floats
 from mapfilter.database.store import open_database
 from mapfilter.evaluation.first_fix import FirstFixOptions
-from mapfilter.evaluation.map_bound import TWIN_ERROR, MapBound, map_bound, on_lattice, write_bound
-from mapfilter.evaluation.radio_map import ErrorModel, radio_map
+from mapfilter.evaluation.map_bound import TWIN_ERROR, MapBound, bound, on_lattice, write_bound
+from mapfilter.evaluation.radio_map import ErrorModel
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.bound import plot_point_values, plot_twins
 from mapfilter.report.canvas import save
@@ -103,11 +103,10 @@ def run_bound(
         cannot be written.
     """
     began_s = time.perf_counter()
-    errors, options = errors or ErrorModel(), options or FirstFixOptions()
     database = open_database(path)
-    radio = radio_map(database)
     ensure_writable_folder(out)
-    found = map_bound(radio, errors, options, np.random.default_rng(seed), progress)
+    found = bound(database, errors=errors, options=options, seed=seed, progress=progress)
+    radio = found.radio
     columns = found.at_points()
     rasters = {name: on_lattice(radio, values) for name, values in columns.items()}
     write_bound(rasters, radio.lattice, out / "bound.tif", database.attribution)
@@ -116,8 +115,8 @@ def run_bound(
     _write_table(twins, out / "twins.parquet")
     base = BaseMap(radio.lattice.bounds_m, attribution=database.attribution)
     on_map = radio.lattice, database.plan, base
-    bound, fix = rasters["along_bound_m"], rasters["levels_to_fix_m"]
-    drawn = plot_point_values(bound, *on_map, title=_BOUND_TITLE, label="bound / m")
+    along, fix = rasters["along_bound_m"], rasters["levels_to_fix_m"]
+    drawn = plot_point_values(along, *on_map, title=_BOUND_TITLE, label="bound / m")
     save(drawn, out / "position-bound.png")
     drawn = plot_point_values(fix, *on_map, title=_FIX_TITLE, label="metres to convergence / m")
     save(drawn, out / "metres-to-fix.png")

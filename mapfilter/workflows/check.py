@@ -77,12 +77,12 @@ def run_check(config: Config, progress: Progress | None = None) -> CheckResult:
         where = _plan_name(config)
         check_sites(plan, inputs.lattice, where, findings)
         check_power((), plan, where, findings)
-    reality = _reality(config, findings) if area is not None else None
-    if reality is not None and (
-        not _says_where(config) or check_rasters_place(reality, config, findings)
+    ground_truth = _ground_truth(config, findings) if area is not None else None
+    if ground_truth is not None and (
+        not _says_where(config) or check_rasters_place(ground_truth, config, findings)
     ):
-        plan_there = _plan(_Inputs(config, reality.lattice, reality), findings)
-        _check_rasters(reality, plan_there, config, findings)
+        plan_there = _plan(_Inputs(config, ground_truth.lattice, ground_truth), findings)
+        _check_rasters(ground_truth, plan_there, config, findings)
     done(3)
     if plan is not None and inputs.lattice is not None:
         _check_antennas(plan, inputs, findings)
@@ -131,12 +131,12 @@ def _rasters(config: Config, findings: Findings) -> RxLevRasters | None:
     return _opened(path, lambda: planned_rasters(config), findings)
 
 
-def _reality(config: Config, findings: Findings) -> RxLevRasters | None:
-    path = config.rasters.reality
+def _ground_truth(config: Config, findings: Findings) -> RxLevRasters | None:
+    path = config.rasters.ground_truth
     if path is None:
         return None
     if not path.exists():
-        findings.add("reality-missing", str(path), "There is nothing.", "warning")
+        findings.add("ground-truth-missing", str(path), "There is nothing.", "warning")
         return None
     return _opened(path, lambda: open_rasters(path), findings)
 

@@ -136,7 +136,7 @@ def run_demo(
         old_filter = config.filter.model_copy(update={"name": _OLD_FILTER})
         old_config = config.model_copy(update={"filter": old_filter})
         old = run_replay(old_config, out / _OLD_FILTER).logs[0]
-    files_written = [predicted.rasters, predicted.reality, predicted.plan, built.database]
+    files_written = [predicted.rasters, predicted.ground_truth, predicted.plan, built.database]
     return DemoResult(
         points=built.points,
         cells=built.cells,

@@ -11,8 +11,7 @@ from mapfilter._io import write_json
 from mapfilter._parallel import Progress, part_of
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.experiments.benchmarks.scores import CaseResult
-from mapfilter.workflows.evaluate import TABLE, run_global_positioning
-from mapfilter.workflows.evaluate_settings import load_benchmark
+from mapfilter.workflows.evaluate import TABLE, load_benchmark, run_global_positioning
 from mapfilter.workflows.jsonable import to_jsonable
 
 _GYRO = {
@@ -20,23 +19,23 @@ _GYRO = {
     "imu.gyro_noise_deg_per_sqrt_s": "0.2",
     "imu.gyro_bias_deg_per_s": "0.05",
 }
-_CLUTTER = {"prediction.reality.clutter": "own"}
+_CLUTTER = {"prediction.ground_truth.clutter": "own"}
 _HEADING = {"imu.sigma_orient_deg": "10", "imu.heading_correlation_s": "20"}
 _BESIDE = {"journeys.beside": "8"}
 _SCALE = {"imu.step_scale_wander": "0.1", "imu.step_scale_correlation_s": "15"}
 _FADING = {"journeys.fading_db": "4"}
 _MODEL = {
-    "prediction.reality.model": "tr38901_uma",
-    "prediction.reality.offset_db": "5",
-    "prediction.reality.street_width_m": "15",
-    "prediction.reality.building_separation_m": "50",
-    "prediction.reality.default_roof_height_m": "15",
-    "prediction.reality.roof_error": "0.2",
+    "prediction.ground_truth.model": "tr38901_uma",
+    "prediction.ground_truth.offset_db": "5",
+    "prediction.ground_truth.street_width_m": "15",
+    "prediction.ground_truth.building_separation_m": "50",
+    "prediction.ground_truth.default_roof_height_m": "15",
+    "prediction.ground_truth.roof_error": "0.2",
 }
 _LENGTHS = {
-    "prediction.reality.local_share": "0.5",
-    "prediction.reality.local_correlation_m": "15",
-    "prediction.reality.correlation_m": "100",
+    "prediction.ground_truth.local_share": "0.5",
+    "prediction.ground_truth.local_correlation_m": "15",
+    "prediction.ground_truth.correlation_m": "100",
 }
 
 
@@ -46,7 +45,6 @@ class Change:
 
     Parameters
     ----------
-    name : str
     what : str
         The change in words.
     settings : mapping of str to str
@@ -73,7 +71,7 @@ CHANGES = {
         Change(
             "noisy-truth",
             "the same, and 6 dB more of shadowing in the ground truth",
-            {"prediction.shadowing_db": "0", "prediction.reality.level_error_db": "9.22"},
+            {"prediction.shadowing_db": "0", "prediction.ground_truth.level_error_db": "9.22"},
         ),
         Change("heading", "heading error of 10°, correlated over 20 s", _HEADING),
         Change("gyro", "no compass; a gyro's errors accumulate", _GYRO, case="levels-nocompass"),
@@ -99,7 +97,7 @@ CHANGES = {
         Change(
             "plain-noisy-truth",
             "the plain world, 6 dB more of shadowing in the ground truth",
-            {"prediction.reality.level_error_db": "7.81"},
+            {"prediction.ground_truth.level_error_db": "7.81"},
             "plain",
         ),
     )
@@ -109,14 +107,7 @@ CHANGES = {
 
 @dataclass(frozen=True)
 class AuditRow:
-    """One row of the table.
-
-    Parameters
-    ----------
-    name, change, world, case : str
-    settings : dict
-    result : CaseResult
-    """
+    """One row of the table."""
 
     name: str
     change: str
@@ -134,11 +125,8 @@ class AuditResult:
     ----------
     map : str
         Name of the map's file.
-    seed : int
-    rows : tuple of AuditRow
     seconds : float
         Wall time.
-    out : Path
     """
 
     map: str
@@ -165,7 +153,7 @@ def run_audit(
     Parameters
     ----------
     config, settings
-        As for :func:`mapfilter.workflows.evaluate_settings.load_benchmark`; each row's change comes
+        As for :func:`mapfilter.workflows.evaluate.load_benchmark`; each row's change comes
         after them.
     out : Path
         Gets a folder for each row, and ``table.json``.

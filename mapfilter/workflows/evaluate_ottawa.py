@@ -62,11 +62,8 @@ class OttawaResult:
     ----------
     seed, runs : int
         Of the noise; draws of it for each session.
-    rows : tuple of PartRow
-    sessions : tuple of SessionRow
     seconds : float
         Wall time.
-    out : Path
     """
 
     seed: int
@@ -83,15 +80,12 @@ class Task:
 
     Parameters
     ----------
-    part : str
     session : Path
         Its file.
     others : tuple of Path
         Of those that make the map.
     folder : Path
         Gets survey, database and what came out.
-    options : OttawaOptions
-    runs, seed : int
     """
 
     part: str
@@ -131,9 +125,6 @@ def run_ottawa(
         ``errors.png``.
     runs : int
         Draws of the noise for each session.
-    seed : int
-    parts : sequence of str
-    options : OttawaOptions, optional
     workers : int
         Local processes.
     resume : bool
@@ -155,12 +146,17 @@ def run_ottawa(
     files = {part: _session_files(data, part) for part in parts}
     tasks = [
         Task(
-            part, file, tuple(other for other in every if other != file),
-            out / part / file.stem, chosen, runs, seed,
+            part,
+            file,
+            tuple(other for other in every if other != file),
+            out / part / file.stem,
+            chosen,
+            runs,
+            seed,
         )
         for part, every in files.items()
         for file in every
-    ]  # fmt: skip
+    ]
     ensure_writable_folder(out)
     head = {"version": _VERSION, "seed": seed, "runs": runs, "options": repr(chosen)}
     start_or_resume(out / HEAD, head, [task.result for task in tasks], resume=resume)
@@ -231,12 +227,7 @@ def _session_files(data: Path, part: str) -> list[Path]:
 
 
 def _map_of(others: Sequence[Session], folder: Path) -> tuple[Path, Path]:
-    """Make levels, ways and database of sessions, as drive tests without a street map are.
-
-    Returns
-    -------
-    deviation, database : Path
-    """
+    """Make levels, ways and database of sessions, as drive tests without a street map are."""
     files = [str(other.path) for other in others]
     # The trend stays where nobody measured: not measured there is not the same as not heard.
     survey = {"files": files, "cross_validate": False, "fill": True}

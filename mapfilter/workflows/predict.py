@@ -1,4 +1,4 @@
-"""``mapfilter predict``: cell plan and buildings to RxLev rasters, and simulated ground truth."""
+"""``mapfilter predict``: RxLev rasters of a cell plan, and a simulated ground truth."""
 
 from __future__ import annotations
 
@@ -22,58 +22,52 @@ from mapfilter.propagation.predict import (
 )
 from mapfilter.radio.cells import write_cell_plan
 from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.workflows.cover import check_cells_near, map_cover
 from mapfilter.workflows.world import World
 
 _PREDICTION_TAG = "PREDICTION_SHA256"
 
 
-def reality_tags(prediction: Path) -> dict[str, str]:
-    """Return the tags of rasters that play reality to a prediction that is written already."""
-    return {"PLAYS": "reality", _PREDICTION_TAG: sha256_file(prediction)}
+def ground_truth_tags(prediction: Path) -> dict[str, str]:
+    """Return the tags of ground truth rasters: they name the prediction that they belong to."""
+    return {"ROLE": "ground truth", _PREDICTION_TAG: sha256_file(prediction)}
 
 
-def check_reality_there(config: Config) -> None:
-    """See that there is reality to simulate in.
+def open_ground_truth(config: Config) -> RxLevRasters:
+    """Open the simulated ground truth that belongs to the prediction in the output folder.
+
+    Rasters that are named in ``rasters.ground_truth``, or that carry no tag of a prediction, are
+    taken as they are.
 
     Raises
     ------
     InputError
-        It was not predicted yet.
+        There are none, or they belong to another prediction, such as one with another plan.
     """
-    if config.rasters.reality is None and not config.reality_path.exists():
+    prediction, path = config.rasters_path, config.ground_truth_path
+    named = config.rasters.ground_truth is not None
+    if not named and not path.exists():
         hint = (
-            "not predicted yet; predict with prediction.reality.write = true, "
+            "not predicted yet; predict with prediction.ground_truth.write = true, "
             'or set journeys.radio = "as_predicted"'
         )
-        got = "no such file"
-        raise fail(InputError, str(config.reality_path), "rasters that play reality", got, hint)
-
-
-def check_reality(config: Config) -> None:
-    """See that reality was played to the prediction that lies in the output folder now.
-
-    Reality that is named in ``rasters.reality``, or that tells of no prediction, is taken as it is.
-
-    Raises
-    ------
-    InputError
-        It was played to another prediction, such as one with another plan.
-    """
-    prediction, reality = config.rasters_path, config.reality_path
-    if config.rasters.reality is not None or not prediction.is_file():
-        return
-    with rasterio.open(reality) as source:
-        played_to = source.tags().get(_PREDICTION_TAG)
-    if played_to not in (None, sha256_file(prediction)):
+        raise fail(InputError, str(path), "rasters of the ground truth", "no such file", hint)
+    rasters = open_rasters(path)
+    if named or not prediction.is_file():
+        return rasters
+    with rasterio.open(path) as source:
+        belongs_to = source.tags().get(_PREDICTION_TAG)
+    if belongs_to not in (None, sha256_file(prediction)):
         raise fail(
             InputError,
-            str(reality),
-            f"reality that was played to {prediction.name}, the prediction beside it",
+            str(path),
+            f"ground truth of {prediction.name}, the prediction beside it",
             "that of another prediction",
-            "predicted again without it; predict with prediction.reality.write = true, "
-            "or name the file in rasters.reality",
+            "predicted again without it; predict with prediction.ground_truth.write = true, "
+            "or name the file in rasters.ground_truth",
         )
+    return rasters
 
 
 def check_only_own_replaced(*paths: Path) -> None:
@@ -115,8 +109,8 @@ class PredictResult:
         Counts of cells and pixels.
     rasters : Path
         The predicted levels.
-    reality : Path or None
-        The levels that play reality, where asked for.
+    ground_truth : Path or None
+        The levels of the simulated ground truth, where asked for.
     plan : Path
         The cell plan used, as CSV.
     notes : tuple of str
@@ -129,7 +123,7 @@ class PredictResult:
     rows: int
     cols: int
     rasters: Path
-    reality: Path | None
+    ground_truth: Path | None
     plan: Path
     notes: tuple[str, ...]
 
@@ -142,17 +136,17 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     MapfilterError
         The area, map or plan is wrong, or the output cannot be written.
     """
-    target, reality = config.rasters_path, config.reality_path
-    surveyed, both = config.prediction.model == "survey", config.prediction.reality.write
+    target, ground_truth = config.rasters_path, config.ground_truth_path
+    surveyed, both = config.prediction.model == "survey", config.prediction.ground_truth.write
     check_only_own_replaced(
-        target, *([config.deviation_path] if surveyed else [reality] if both else [])
+        target, *([config.deviation_path] if surveyed else [ground_truth] if both else [])
     )
     if surveyed:
         from mapfilter.workflows.survey import run_survey
 
         return run_survey(config, progress)
     world = World.of(config)
-    for folder in (target.parent, reality.parent, config.output.dir):
+    for folder in (target.parent, ground_truth.parent, config.output.dir):
         ensure_writable_folder(folder)
     plan, lattice, model = world.plan, world.lattice, prediction_model(config.prediction)
     check_cells_near(plan, lattice, str(config.cells.plan or "cells"))
@@ -166,7 +160,7 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
         *off_frequency(plan, antennas),
     )
     heights_m = world.heights_m
-    wanted = 2 if config.prediction.reality.write else 1
+    wanted = 2 if config.prediction.ground_truth.write else 1
     tags = {"SOFTWARE": f"mapfilter {VERSION}", "MODEL": model.model, "MAP": world.map_name}
     levels = predict(
         plan, lattice, heights_m, model, part_of(progress, 0, wanted), antennas=antennas
@@ -177,7 +171,7 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
         real = simulate_ground_truth(
             plan, lattice, heights_m, model, errors, part_of(progress, 1, wanted), antennas=antennas
         )
-        write_rasters(reality, lattice, real, plan.ids, {**tags, **reality_tags(target)})
+        write_rasters(ground_truth, lattice, real, plan.ids, {**tags, **ground_truth_tags(target)})
     plan_path = config.output.dir / "cells.csv"
     write_cell_plan(plan, plan_path)
     return PredictResult(
@@ -185,7 +179,7 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
         lattice.rows,
         lattice.cols,
         target,
-        reality if wanted == 2 else None,
+        ground_truth if wanted == 2 else None,
         plan_path,
         notes,
     )
@@ -193,9 +187,9 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
 
 def prediction_model(section: Prediction) -> PredictionModel:
     """Return the propagation model of a configuration that does not ask for a survey."""
-    return PredictionModel(**section.model_dump(exclude={"reality", "survey"}))
+    return PredictionModel(**section.model_dump(exclude={"ground_truth", "survey"}))
 
 
 def ground_truth_errors(section: Prediction) -> GroundTruthErrors:
     """Return how a configuration's ground truth differs from its prediction."""
-    return GroundTruthErrors(**section.reality.model_dump(exclude={"write"}))
+    return GroundTruthErrors(**section.ground_truth.model_dump(exclude={"write"}))

@@ -5,23 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from mapfilter._io import atomic_dir
 from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, OutputError, fail
 from mapfilter.geodesy import same_crs
-from mapfilter.rasters.raster_set import check_against_plan, open_rasters
+from mapfilter.rasters.raster_set import check_against_plan
 from mapfilter.roads.network import street_network
-from mapfilter.simulation.imu import ImuErrors
+from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel, level_sampler
 from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
 from mapfilter.simulation.walking import WalkerModel, inside_buildings
 from mapfilter.tracks.store import check_log_replaceable, is_log, write_log
 from mapfilter.workflows.cover import check_cells_near
-from mapfilter.workflows.predict import check_reality, check_reality_there
+from mapfilter.workflows.predict import open_ground_truth
 from mapfilter.workflows.world import World, planned_rasters
 
 
@@ -53,13 +51,9 @@ def run_simulate(config: Config, progress: Progress | None = None) -> SimulateRe
         The area, map, plan or rasters are wrong, or the output cannot be written.
     """
     world = World.of(config)
-    section = config.journeys
-    as_predicted = section.radio == "as_predicted"
-    if not as_predicted:
-        check_reality_there(config)
-    rasters = planned_rasters(config) if as_predicted else open_rasters(config.reality_path)
-    if not as_predicted:
-        check_reality(config)
+    settings = simulation_settings(config)
+    as_predicted = settings.reports.radio == "as_predicted"
+    rasters = planned_rasters(config) if as_predicted else open_ground_truth(config)
     check_against_plan(rasters, world.plan)
     check_cells_near(world.plan, world.lattice, str(config.cells.plan or "cells"))
     if not same_crs(rasters.lattice.crs, world.lattice.crs):
@@ -69,13 +63,13 @@ def run_simulate(config: Config, progress: Progress | None = None) -> SimulateRe
     _check_replaceable(config.track_path)
     network = street_network(world.ways, world.routes)
     levels = level_sampler(rasters, world.plan.ids, world.lattice.bounds_m, plan=world.plan)
-    settings = simulation_settings(config)
     total = settings.journeys * settings.draws
     with atomic_dir(config.track_path) as folder:
         track_m = 0.0
-        on_pavement = section.beside != "centre"
-        inside = inside_buildings(world.heights_m, world.lattice) if on_pavement else None
-        journeys = simulate_journeys(network, levels, world.plan, settings, section.seed, inside)
+        centred = settings.journey.walker.beside == "centre"
+        inside = None if centred else inside_buildings(world.heights_m, world.lattice)
+        seed = config.journeys.seed
+        journeys = simulate_journeys(network, levels, world.plan, settings, seed, inside)
         for done, (name, log) in enumerate(journeys, start=1):
             write_log(log, folder / name)
             track_m = log.truth_length_m
@@ -95,8 +89,8 @@ def _check_replaceable(folder: Path) -> None:
 
 
 def simulation_settings(config: Config) -> SimulationSettings:
-    """Return the settings of journeys, inertial unit and reports that a configuration asks for."""
-    section, imu = config.journeys, config.imu
+    """Return the settings of journeys, inertial unit and reports of a configuration."""
+    section = config.journeys
     return SimulationSettings(
         journeys=section.count,
         draws=section.draws,
@@ -104,36 +98,8 @@ def simulation_settings(config: Config) -> SimulationSettings:
             length_m=section.length_m,
             profile=config.roads.profile,
             speed_mps=section.speed_mps,
-            walker=WalkerModel(
-                beside=section.beside,
-                change_side_m=section.change_side_m,
-                stop_every_m=section.stop_every_m,
-                stop_s=section.stop_s,
-            ),
+            walker=section.of(WalkerModel),
         ),
-        imu=ImuErrors(
-            sigma_trans_m=imu.sigma_trans_m,
-            sigma_orient_rad=float(np.radians(imu.sigma_orient_deg)),
-            heading_bias_sd_rad=float(np.radians(imu.bias_sd_deg)),
-            heading_drift_rad_per_sqrt_s=float(np.radians(imu.drift_deg_per_sqrt_s)),
-            step_scale_sd=imu.scale,
-            translation_noise=imu.translation_noise,
-            heading_correlation_s=imu.heading_correlation_s,
-            step_scale_wander_sd=imu.step_scale_wander,
-            step_scale_correlation_s=imu.step_scale_correlation_s,
-            turns=imu.turns,
-            gyro_noise_rad_per_sqrt_s=float(np.radians(imu.gyro_noise_deg_per_sqrt_s)),
-            gyro_bias_sd_rad_per_s=float(np.radians(imu.gyro_bias_deg_per_s)),
-        ),
-        imu_period_s=imu.period_s,
-        reports=ReportModel(
-            period_s=section.report_period_s,
-            averaging_s=section.averaging_s,
-            hysteresis_db=section.hysteresis_db,
-            fading_db=section.fading_db,
-            max_neighbours=section.max_neighbours,
-            sensitivity_dbm=section.sensitivity_dbm,
-            radio=section.radio,
-            phone_offset_sd_db=section.phone_offset_sd_db,
-        ),
+        imu=config.imu.of(ImuNoise),
+        reports=section.of(ReportModel),
     )

@@ -43,8 +43,8 @@ class SurveyResult:
         Levels that the map was made from, and the sessions they come from.
     rasters, deviation : Path
         Mean levels, and how far off they may be.
-    reality : None
-        Nobody plays reality to a survey.
+    ground_truth : None
+        A survey has no simulated ground truth.
     plan : Path
         The surveyed cells, as CSV: what ``mapfilter build`` takes with these rasters.
     validation : Validation or None
@@ -62,7 +62,7 @@ class SurveyResult:
     sessions: int
     rasters: Path
     deviation: Path
-    reality: None
+    ground_truth: None
     plan: Path
     validation: Validation | None
     notes: tuple[str, ...]

@@ -6,7 +6,7 @@ import contextlib
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +14,17 @@ import pandas as pd
 
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress, executor_of
+from mapfilter.config.axes import parse_axis
 from mapfilter.config.load import load_config, load_keys
 from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, Faults
-from mapfilter.evaluation.success import COORDINATES, SuccessCell, success_cells
-from mapfilter.experiments.sweep.run import sweep
+from mapfilter.evaluation.success import COORDINATES, SuccessCell, success_cells, varied_keys
+from mapfilter.experiments.sweep.run import seconds_per_run, sweep
 from mapfilter.experiments.sweep.table import read_runs
 from mapfilter.report.canvas import save
 from mapfilter.report.success import plot_run_distributions, plot_success_curves, plot_success_map
-from mapfilter.workflows.sweep_plan import sweep_databases, sweep_plan, sweep_world
+from mapfilter.report.table import write_table
+from mapfilter.workflows.sweep_plan import sweep_databases, sweep_plans, sweep_world
 
 _NOISES = ("sigma_trans_m", "sigma_orient_deg")
 _UNITS = {
@@ -70,7 +72,8 @@ def draw_group(rows: pd.DataFrame, out: Path, tail: str, title: str) -> list[Pat
 
 def groups_of(runs: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
     """Yield the runs by all coordinates but the white noises, each with a title."""
-    axes = [name for name in COORDINATES if name not in _NOISES]
+    white = {*_NOISES, *(f"imu.{name}" for name in _NOISES)}
+    axes = [name for name in (*COORDINATES, *varied_keys(runs)) if name not in white]
     several = [name for name in axes if runs[name].nunique(dropna=False) > 1]
     for place, rows in runs.groupby(axes, sort=False, dropna=False):
         at = dict(zip(axes, place, strict=True))
@@ -79,13 +82,15 @@ def groups_of(runs: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
 
 def _title(at: Mapping[str, object], several: list[str]) -> str:
     name, reading = at["filter"], at["reading"]
-    told = [f"{name} filter" if reading == name else f"{name} filter: {reading}"]
+    parts = [f"{name} filter" if reading == name else f"{name} filter: {reading}"]
     for axis in several:
         if axis in _UNITS and pd.notna(at[axis]):
-            told.append(_UNITS[axis].format(at[axis]))
+            parts.append(_UNITS[axis].format(at[axis]))
         elif axis in ("database", "radio"):
-            told.append(str(at[axis]))
-    return ", ".join(told)
+            parts.append(str(at[axis]))
+        elif "." in axis:
+            parts.append(f"{axis} {at[axis]:g}")
+    return ", ".join(parts)
 
 
 def _by_step(cells: tuple[SuccessCell, ...]) -> dict[str, list[SuccessCell]]:
@@ -104,12 +109,12 @@ class SweepResult:
 
     Parameters
     ----------
-    runs : int
     cells : tuple of SuccessCell
         One for each cell of the grid.
     table : Path
         One row for each run.
-    pictures : tuple of Path
+    tables : tuple of Path
+        One row for each cell of the grid, as CSV and as LaTeX.
     seconds : float
         Wall time.
     """
@@ -117,6 +122,7 @@ class SweepResult:
     runs: int
     cells: tuple[SuccessCell, ...]
     table: Path
+    tables: tuple[Path, ...]
     pictures: tuple[Path, ...]
     seconds: float
 
@@ -148,8 +154,69 @@ def load_sweep(
         raise
 
 
+def vary_axes(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
+    """Return the axes of ``--vary KEY=V1,V2,...``, checked; all faults are reported together."""
+    axes: dict[str, tuple[float, ...]] = {}
+    faults = Faults()
+    for text in given:
+        try:
+            key, values = parse_axis(text)
+        except ConfigError as error:
+            faults.found.extend(error.faults)
+            continue
+        if key in axes:
+            faults.add(f"--vary {key}", "every option once", "it twice", "values go in one list")
+        axes[key] = values
+    faults.raise_if_any(ConfigError)
+    return axes
+
+
+@dataclass(frozen=True)
+class SweepForecast:
+    """What a sweep would take.
+
+    Parameters
+    ----------
+    points : int
+        Combinations of varied options.
+    seconds_per_run : float
+        Of one process, from a short trial.
+    seconds : float
+        Of the whole sweep by that many workers, without predictions, tables and pictures.
+    """
+
+    runs: int
+    points: int
+    seconds_per_run: float
+    seconds: float
+
+
+def forecast_sweep(
+    config: Config, axes: Mapping[str, Sequence[float]] | None = None, *, workers: int = 1
+) -> SweepForecast:
+    """Check a sweep's inputs, count its runs, and estimate its time from a few of them.
+
+    Parameters
+    ----------
+    config, axes, workers
+        As for :func:`run_sweep`.
+
+    Raises
+    ------
+    MapfilterError
+        Plan, databases, area, map or rasters are wrong.
+    """
+    plans, databases = sweep_plans(config, axes)
+    world = sweep_world(config, plans[0].radios)
+    folders = {name: database.path for name, database in databases.items()}
+    per_run_s = seconds_per_run(plans[0], world, folders)
+    runs = sum(plan.runs for plan in plans)
+    return SweepForecast(runs, len(plans), per_run_s, runs * per_run_s / workers)
+
+
 def run_sweep(
     config: Config,
+    axes: Mapping[str, Sequence[float]] | None = None,
     *,
     workers: int = 1,
     cluster: str | None = None,
@@ -160,7 +227,9 @@ def run_sweep(
 
     Parameters
     ----------
-    config : Config
+    axes : mapping of str to sequence of float, optional
+        Values of any numeric options of ``[imu]``, ``[journeys]``, ``[filter]`` and of
+        ``database.margin_db``, by dotted key: the sweep is run for each combination.
     workers : int
         Local processes.
     cluster : str, optional
@@ -177,13 +246,13 @@ def run_sweep(
         Plan, databases, area, map or rasters are wrong, or the output cannot be written.
     """
     began_s = time.perf_counter()
-    plan, databases = sweep_plan(config)
+    plans, databases = sweep_plans(config, axes)
     out = config.output.dir / "sweep"
-    world = sweep_world(config, plan.radios)
+    world = sweep_world(config, plans[0].radios)
     ensure_writable_folder(out)
     with sweep_executor(workers, cluster) as (executor, in_flight):
         table = sweep(
-            plan,
+            plans,
             world,
             {name: database.path for name, database in databases.items()},
             out,
@@ -193,9 +262,15 @@ def run_sweep(
             progress=progress,
         )
     runs = read_runs(table)
-    pictures = () if config.output.pictures == "none" else draw_sweep(runs, out)
+    cells = success_cells(runs)
+    shown = cell_table(cells)
     return SweepResult(
-        len(runs), success_cells(runs), table, pictures, time.perf_counter() - began_s
+        len(runs),
+        cells,
+        table,
+        tuple(write_table(shown, out / f"table{suffix}") for suffix in (".csv", ".tex")),
+        () if config.output.pictures == "none" else draw_sweep(runs, out),
+        time.perf_counter() - began_s,
     )
 
 
@@ -210,6 +285,19 @@ _FOUND = ("runs", "success", "low", "high", "wrong", "error_mean_m", "switch_dis
 _ACROSS, _NAME = "sigma_orient_deg", "reading"
 
 
+def cell_table(cells: Sequence[SuccessCell]) -> pd.DataFrame:
+    """Return one row for each cell: coordinates in which the cells differ, and main figures."""
+    rows = [_place(cell) for cell in cells]
+    names = [*_different(rows), *_FOUND]
+    return pd.DataFrame(
+        [
+            [{**row, **asdict(cell)}[name] for name in names]
+            for row, cell in zip(rows, cells, strict=True)
+        ],
+        columns=names,
+    )
+
+
 def brief(cells: Sequence[SuccessCell]) -> list[dict[str, Any]]:
     """Return a row for each cell, or with several heading noises for all that differ in it alone.
 
@@ -220,31 +308,50 @@ def brief(cells: Sequence[SuccessCell]) -> list[dict[str, Any]]:
     --------
     >>> from dataclasses import replace
     >>> place = dict.fromkeys(SuccessCell.__dataclass_fields__, 0.0)
-    >>> cell = SuccessCell(**{**place, "runs": 4, "success": 0.75})
+    >>> cell = SuccessCell(**{**place, "runs": 4, "success": 0.75, "varied": {}})
     >>> brief([cell, replace(cell, sigma_orient_deg=3.0, success=0.5)])
     [{'runs': 4, 'success at 0°': 0.75, '3°': 0.5}]
     >>> list(brief([cell, replace(cell, sigma_trans_m=0.4)])[0])[:3]
     ['sigma_trans_m', 'runs', 'success']
     """
-    axes = [name for name in COORDINATES if len({repr(getattr(c, name)) for c in cells}) > 1]
+    places = [_place(cell) for cell in cells]
+    axes = _different(places)
     if _NAME in axes:
-        # What belongs to a name is told by it.
-        axes = [name for name in axes if name in (_NAME, _ACROSS) or not _belongs(cells, name)]
+        # A reading's name stands for what belongs to it.
+        axes = [name for name in axes if name in (_NAME, _ACROSS) or not _belongs(places, name)]
     if _ACROSS not in axes:
-        return [{name: getattr(cell, name) for name in (*axes, *_FOUND)} for cell in cells]
-    axes.remove(_ACROSS)
+        return [
+            {name: place[name] for name in axes} | {name: getattr(cell, name) for name in _FOUND}
+            for place, cell in zip(places, cells, strict=True)
+        ]
+    axes = [name for name in axes if name not in (_ACROSS, f"imu.{_ACROSS}")]
     degrees = sorted({cell.sigma_orient_deg for cell in cells})
-    names = [f"{'' if place else 'success at '}{deg:g}°" for place, deg in enumerate(degrees)]
+    names = [f"{'' if number else 'success at '}{deg:g}°" for number, deg in enumerate(degrees)]
     rows: dict[str, dict[str, Any]] = {}
-    for cell in cells:
-        place = {name: getattr(cell, name) for name in axes}
-        empty: dict[str, Any] = dict.fromkeys(names)
-        row = rows.setdefault(repr(place), {**place, "runs": cell.runs, **empty})
+    for place, cell in zip(places, cells, strict=True):
+        at = {name: place[name] for name in axes}
+        row = rows.setdefault(repr(at), {**at, "runs": cell.runs, **dict.fromkeys(names)})
         row[names[degrees.index(cell.sigma_orient_deg)]] = round(cell.success, 3)
     return list(rows.values())
 
 
-def _belongs(cells: Sequence[SuccessCell], axis: str) -> bool:
-    """Tell whether all cells of a reading have one value of a coordinate."""
-    values = {(cell.reading, repr(getattr(cell, axis))) for cell in cells}
-    return len(values) == len({cell.reading for cell in cells})
+def _place(cell: SuccessCell) -> dict[str, Any]:
+    """Return the coordinates of a cell, varied options included."""
+    return {name: getattr(cell, name) for name in COORDINATES} | cell.varied
+
+
+def _different(places: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the coordinates in which cells differ; a varied option stands for its own column."""
+    varied = {key.partition(".")[2] for key in (places[0] if places else ()) if "." in key}
+    return [
+        name
+        for name in (places[0] if places else ())
+        if len({repr(place[name]) for place in places}) > 1
+        and (name == _ACROSS or name not in varied)
+    ]
+
+
+def _belongs(places: Sequence[Mapping[str, Any]], axis: str) -> bool:
+    """Check that all cells of a reading have one value of a coordinate."""
+    values = {(place[_NAME], repr(place[axis])) for place in places}
+    return len(values) == len({place[_NAME] for place in places})

@@ -1,9 +1,10 @@
-"""The plan of a sweep from a configuration; everything that is wrong with it is told together."""
+"""Plans and world of a sweep from a configuration; all faults are reported together."""
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from mapfilter._types import Floats32
+from mapfilter.config.axes import vary
 from mapfilter.config.sections import Config, FilterSection, ReadingSection
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
@@ -26,16 +28,19 @@ from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.propagation.shadowing import site_shadowing
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan, open_rasters
+from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.network import street_network
+from mapfilter.simulation.reports import ReportModel
+from mapfilter.simulation.walking import WalkerModel
 from mapfilter.workflows.cover import check_cells_near
 from mapfilter.workflows.filters import filter_choice
-from mapfilter.workflows.predict import check_reality, check_reality_there
+from mapfilter.workflows.predict import open_ground_truth
 from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.world import World, planned_rasters
 
-REALITY = "reality"
+GROUND_TRUTH = "ground truth"
+_NOISE = ("sigma_trans_m", "sigma_orient_deg", "bias_sd_deg", "drift_deg_per_sqrt_s", "scale")
 
 
 def sweep_databases(config: Config) -> dict[str, Path]:
@@ -45,14 +50,22 @@ def sweep_databases(config: Config) -> dict[str, Path]:
     return {str(path) if names.count(path.name) > 1 else path.name: path for path in paths}
 
 
-def sweep_plan(config: Config) -> tuple[SweepPlan, dict[str, RadioRouteDatabase]]:
-    """Return the plan of a configuration's sweep, and its databases by name, checked.
+def sweep_plans(
+    config: Config, axes: Mapping[str, Sequence[float]] | None = None
+) -> tuple[tuple[SweepPlan, ...], dict[str, RadioRouteDatabase]]:
+    """Return the plans of a sweep, one for each point of the varied options, and its databases.
+
+    Parameters
+    ----------
+    axes : mapping of str to sequence of float, optional
+        Values of numeric options by dotted key, as :func:`mapfilter.config.axes.parse_axis` returns
+        them; without any there is one plan.
 
     Raises
     ------
     ConfigError, InputError
         With every fault: databases that are missing or damaged, of different resolutions or CRS,
-        readings with one name, axes that hold a value twice.
+        readings with one name, axes that hold a value twice or change nothing.
     """
     faults = Faults()
     databases: dict[str, RadioRouteDatabase] = {}
@@ -65,15 +78,40 @@ def sweep_plan(config: Config) -> tuple[SweepPlan, dict[str, RadioRouteDatabase]
         except MapfilterError as error:
             faults.found.extend(error.faults)
     _check_resolutions(databases, faults)
-    plan = None
+    broken = bool(faults.found)
+    plans: list[SweepPlan] = []
     try:
-        plan = _plan(config, tuple(paths))
+        for values in itertools.product(*(axes or {}).values()):
+            point = dict(zip(axes or {}, values, strict=True))
+            plan = _plan(_varied(config, point), tuple(paths))
+            plans.append(replace(plan, varied=tuple(point.items())))
+        _check_effect(plans, axes or {}, faults)
     except ConfigError as error:
         faults.found.extend(error.faults)
-    if plan is None or faults.found:
-        faults.raise_if_any(ConfigError if plan is None else InputError)
-        raise AssertionError
-    return plan, databases
+        broken = False
+    faults.raise_if_any(InputError if broken else ConfigError)
+    return tuple(plans), databases
+
+
+def _varied(config: Config, point: Mapping[str, float]) -> Config:
+    """Return the configuration of a point; the margin of a database is read as the filter's."""
+    changes = dict(point)
+    if "database.margin_db" in changes:
+        changes["filter.margin_db"] = changes["database.margin_db"]
+    return vary(config, changes)
+
+
+def _check_effect(plans: Sequence[SweepPlan], axes: Iterable[str], faults: Faults) -> None:
+    """Refuse an option that none of the sweep's simulations and filters uses."""
+    for key in axes:
+        others = {
+            replace(plan, varied=tuple(pair for pair in plan.varied if pair[0] != key))
+            for plan in plans
+        }
+        if len(others) < len(plans):
+            expected = "an option that the journeys, the unit or the filters of the sweep use"
+            hint = "an option of another filter, or one that [sweep] sets"
+            faults.add(f"--vary {key}", expected, "one without effect", hint)
 
 
 def _check_resolutions(databases: Mapping[str, RadioRouteDatabase], faults: Faults) -> None:
@@ -83,34 +121,23 @@ def _check_resolutions(databases: Mapping[str, RadioRouteDatabase], faults: Faul
 
 
 def _plan(config: Config, databases: tuple[str, ...]) -> SweepPlan:
-    section, imu, settings = config.sweep, config.imu, simulation_settings(config)
-    readings = _readings(config)
-    # No candidate filter uses neighbours, and what serves does not depend on them.
-    neighbours = 0 if all(one.choice.name == "candidate" for one in readings) else None
-    reports = settings.reports
-    if neighbours is not None:
-        reports = replace(reports, max_neighbours=neighbours)
+    section, settings = config.sweep, simulation_settings(config)
+    readings, reports = _readings(config), settings.reports
+    # No candidate filter uses neighbours, and the serving cell does not depend on them.
+    if all(one.choice.name == "candidate" for one in readings):
+        reports = replace(reports, max_neighbours=0)
+    noise = {name: _axis(getattr(section, name), getattr(settings.imu, name)) for name in _NOISE}
     return SweepPlan(
         readings=readings,
         databases=databases,
-        noises=noise_grid(
-            _axis(section.sigma_trans_m, imu.sigma_trans_m),
-            _axis(section.sigma_orient_deg, imu.sigma_orient_deg),
-            _axis(section.bias_sd_deg, imu.bias_sd_deg),
-            _axis(section.drift_deg_per_sqrt_s, imu.drift_deg_per_sqrt_s),
-            _axis(section.scale, imu.scale),
-        ),
+        noises=noise_grid(**noise, others=settings.imu),
         radios=_radios(config),
-        report_periods_s=_axis(section.report_period_s, config.journeys.report_period_s),
-        imu_periods_s=_axis(section.imu_period_s, imu.period_s),
+        report_periods_s=_axis(section.report_period_s, reports.report_period_s),
+        imu_periods_s=_axis(section.imu_period_s, settings.imu.period_s),
         routes=section.routes,
         draws=section.draws,
-        length_m=settings.journey.length_m,
-        profile=settings.journey.profile,
-        speed_mps=settings.journey.speed_mps,
+        journey=settings.journey,
         reports=reports,
-        imu=settings.imu,
-        walker=settings.journey.walker,
         seed=section.seed,
     )
 
@@ -122,10 +149,12 @@ def _axis(values: Sequence[float] | None, otherwise: float) -> tuple[float, ...]
 def _radios(config: Config) -> tuple[Radio, ...]:
     errors_db = config.sweep.prediction_error_db
     if errors_db is not None:
-        return tuple(Radio(f"{REALITY} {error_db:g} dB", float(error_db)) for error_db in errors_db)
-    if config.journeys.radio == AS_PREDICTED:
+        return tuple(
+            Radio(f"{GROUND_TRUTH} {error_db:g} dB", float(error_db)) for error_db in errors_db
+        )
+    if config.journeys.of(ReportModel).radio == AS_PREDICTED:
         return (Radio(),)
-    return (Radio(REALITY, math.nan),)
+    return (Radio(GROUND_TRUTH, math.nan),)
 
 
 def _readings(config: Config) -> tuple[Reading, ...]:
@@ -152,21 +181,18 @@ def sweep_world(config: Config, radios: Sequence[Radio]) -> SweepWorld:
     """Read streets, cells and levels, as ``simulate`` takes them.
 
     A prediction error adds a correlated field of that deviation, with the correlation,
-    the share of sites and the seed of ``[prediction.reality]``, to the predicted levels.
+    the share of sites and the seed of ``[prediction.ground_truth]``, to the predicted levels.
 
     Raises
     ------
     MapfilterError
-        The area, map, plan or rasters are wrong, or reality is wanted and not predicted yet.
+        The area, map, plan or rasters are wrong, or the ground truth is not predicted yet.
     """
     names = {radio.name for radio in radios}
-    if REALITY in names:
-        check_reality_there(config)
-        check_reality(config)
     world = World.of(config)
     opened = {
-        real: open_rasters(config.reality_path) if real else planned_rasters(config)
-        for real in sorted({name == REALITY for name in names})
+        real: open_ground_truth(config) if real else planned_rasters(config)
+        for real in sorted({name == GROUND_TRUTH for name in names})
     }
     for rasters in opened.values():
         check_against_plan(rasters, world.plan)
@@ -176,17 +202,17 @@ def sweep_world(config: Config, radios: Sequence[Radio]) -> SweepWorld:
             raise fail(InputError, where, expected, found, "another zone: set area.crs")
     lattices = [rasters.lattice for rasters in opened.values()]
     if len(set(lattices)) > 1:
-        expected = "rasters that play reality on the lattice of the predicted ones"
-        raise fail(InputError, str(config.reality_path), expected, "another")
+        expected = "ground truth rasters on the lattice of the predicted ones"
+        raise fail(InputError, str(config.ground_truth_path), expected, "another")
     check_cells_near(world.plan, world.lattice, str(config.cells.plan or "cells"))
     levels_dbm = {real: _levels(rasters, world.plan) for real, rasters in opened.items()}
     heard = {
         radio.name: _heard(
-            config, radio, levels_dbm[radio.name == REALITY], lattices[0], world.plan
+            config, radio, levels_dbm[radio.name == GROUND_TRUTH], lattices[0], world.plan
         )
         for radio in radios
     }
-    on_pavement = config.journeys.beside != "centre"
+    on_pavement = config.journeys.of(WalkerModel).beside != "centre"
     heights_m = rasterise_heights(world.buildings, lattices[0]) if on_pavement else None
     network = street_network(world.ways, world.routes)
     return SweepWorld(network, world.plan, lattices[0], heard, heights_m)
@@ -203,16 +229,16 @@ def _heard(
     lattice: Lattice,
     plan: CellPlan,
 ) -> Floats32:
-    if radio.name in (AS_PREDICTED, REALITY):
+    if radio.name in (AS_PREDICTED, GROUND_TRUTH):
         return predicted_dbm
-    reality = config.prediction.reality
+    truth = config.prediction.ground_truth
     fields = site_shadowing(
         plan,
         lattice,
         radio.prediction_error_db,
-        reality.correlation_m,
-        reality.site_share,
-        reality.seed,
+        truth.correlation_m,
+        truth.site_share,
+        truth.seed,
         stream="reality",
     )
     wrong_db = np.stack([field_db for _, field_db in fields])

@@ -94,8 +94,11 @@ def rate_bar(label: str, unit: str, every_s: float = 30.0) -> Iterator[Progress]
     from rich.progress import TextColumn
 
     columns = (*Bar.get_default_columns(), TextColumn("{task.fields[rate]}"))
-    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(label, rate="")
+    # Steps may lie minutes apart; with rich's usual 30 s there would be no time left.
+    with Bar(
+        *columns, console=Console(stderr=True), transient=True, speed_estimate_period=86_400.0
+    ) as bar:
+        task = bar.add_task(label, total=None, rate="")
 
         def show(done: int, total: int) -> None:
             nonlocal began_s, first

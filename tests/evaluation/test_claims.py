@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from mapfilter.evaluation.accuracy import Truth
-from mapfilter.evaluation.claims import score_claims
+from mapfilter.evaluation.accuracy import Truth, score_claims
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import Fix, TrackEstimate
 

@@ -5,7 +5,9 @@ from math import erfc
 import numpy as np
 import pytest
 
-from mapfilter.evaluation.ideal_filter import (
+from mapfilter.evaluation.first_fix import (
+    Judgement,
+    Levels,
     _entropy_bits,
     _mass_near,
     _serves,
@@ -43,6 +45,9 @@ class World:
         own = _serving(self.level_dbm[row, col], server, 6.0)
         self.row, self.col = row[own], col[own]
         self.site = np.array([1, 0, 1, 0])
+        self.levels = Levels(
+            self.near_way, self.level_dbm, self.best_dbm, self.site, FLOOR_DBM, 6.0
+        )
 
     def moved(self, k):
         """Return where each start would be now, and whether one can be there."""
@@ -78,9 +83,15 @@ def test_cells_alone_against_the_definition(seed, near_px, path_m):
             bits = np.log2(alive.size / alive.sum())
     expected = clear_m, np.log2(alive.size / alive.sum()) if bits is None else bits
     found = judged_by_cells(
-        world.rows, world.cols, world.gone_m, world.row, world.col, world.near_way,
-        world.level_dbm, world.best_dbm, FLOOR_DBM, 6.0, near_px, path_m,
-    )  # fmt: skip
+        world.rows,
+        world.cols,
+        world.gone_m,
+        world.row,
+        world.col,
+        world.levels,
+        near_px,
+        path_m,
+    )
     assert found == pytest.approx(expected)
 
 
@@ -151,10 +162,16 @@ def test_levels_against_the_definition(seed, deviation_db, share, options):
     near_px, path_m, apart_px, mass = options
     number = np.arange(world.row.size) + 1000
     clear_m, right, bits, twin, twin_error = judged_by_levels(
-        np.random.default_rng(seed), world.rows, world.cols, world.gone_m, world.row, world.col,
-        number, world.near_way, world.level_dbm, world.site, FLOOR_DBM, deviation_db,
-        correlation_m, share, near_px, path_m, apart_px, mass,
-    )  # fmt: skip
+        np.random.default_rng(seed),
+        world.rows,
+        world.cols,
+        world.gone_m,
+        world.row,
+        world.col,
+        number,
+        world.levels,
+        Judgement(deviation_db, correlation_m, share, near_px, path_m, apart_px, mass),
+    )
     assert (clear_m, right) == expected[:2]
     assert bits == pytest.approx(expected[2], abs=1e-5)
     assert twin_error == pytest.approx(expected[4], rel=1e-4, abs=1e-7)

@@ -10,7 +10,7 @@ from mapfilter.experiments.benchmarks.global_positioning import informed
 from mapfilter.models.street_motion import MotionErrors
 from mapfilter.positioning.bayes.options import BayesOptions
 from mapfilter.positioning.candidate import CandidateFilter
-from mapfilter.simulation.imu import ImuErrors
+from mapfilter.simulation.imu import ImuNoise
 
 BIASED = [
     "levels-bias10",
@@ -38,8 +38,8 @@ def test_all_cases_are_looked_at():
 
 @pytest.mark.parametrize(("name", "deg"), COMPASS_DEG.items())
 def test_a_compass_has_its_stated_noise_and_the_filter_its_own_defaults(name, deg):
-    errors = CASES[name].errors_in(ImuErrors())
-    assert errors == replace(ImuErrors(), sigma_orient_rad=radians(deg))
+    errors = CASES[name].errors_in(ImuNoise())
+    assert errors == replace(ImuNoise(), sigma_orient_deg=deg)
     assert known(name).motion == replace(DEFAULTS, heading_sd_rad=radians(deg))
 
 
@@ -49,13 +49,13 @@ def test_a_compass_has_its_stated_noise_and_the_filter_its_own_defaults(name, de
 )
 def test_a_biased_unit_is_stated_to_be_one(names, bias_sd_deg, drift_deg, scale):
     for name in names:
-        errors = CASES[name].errors_in(ImuErrors())
+        errors = CASES[name].errors_in(ImuNoise())
         assert errors == replace(
-            ImuErrors(),
-            sigma_orient_rad=radians(6),
-            heading_bias_sd_rad=radians(bias_sd_deg),
-            heading_drift_rad_per_sqrt_s=radians(drift_deg),
-            step_scale_sd=scale,
+            ImuNoise(),
+            sigma_orient_deg=6,
+            bias_sd_deg=bias_sd_deg,
+            drift_deg_per_sqrt_s=drift_deg,
+            scale=scale,
         )
         motion = known(name).motion
         # A drift by the second at 1.4 m/s, by the metre.
@@ -116,23 +116,23 @@ def test_what_was_set_is_not_changed_by_a_sheet():
     assert (found.heading_sd_rad, found.bias_sd_rad) == (0.5, radians(10))
     sky = known("satellites-2", fixed=frozenset({"height_m"})).satellites
     assert sky == replace(BayesOptions().satellites, height_sd_m=20.0)
-    world = ImuErrors(sigma_orient_rad=0.4, step_scale_sd=0.01)
-    errors = CASES["levels-bias10"].errors_in(world, frozenset({"sigma_orient_rad"}))
-    assert (errors.sigma_orient_rad, errors.step_scale_sd) == (0.4, 0.05)
+    world = ImuNoise(sigma_orient_deg=40.0, scale=0.01)
+    errors = CASES["levels-bias10"].errors_in(world, frozenset({"imu.sigma_orient_deg"}))
+    assert (errors.sigma_orient_deg, errors.scale) == (40.0, 0.05)
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_worlds_other_errors_stay_in_every_case(name):
-    world = ImuErrors(
+    world = ImuNoise(
         sigma_trans_m=0.3,
         heading_correlation_s=20.0,
-        step_scale_wander_sd=0.1,
+        step_scale_wander=0.1,
         turns="gyro",
-        gyro_noise_rad_per_sqrt_s=0.01,
-        gyro_bias_sd_rad_per_s=0.001,
+        gyro_noise_deg_per_sqrt_s=0.6,
+        gyro_bias_deg_per_s=0.06,
     )
     found, changed = CASES[name].errors_in(world), CASES[name].imu
-    for field in fields(ImuErrors):
+    for field in fields(ImuNoise):
         expected = changed.get(field.name, getattr(world, field.name))
         assert getattr(found, field.name) == expected
 
@@ -144,5 +144,5 @@ def test_the_candidate_filter_takes_no_sheet():
 
 def test_sheets_and_errors_name_what_there_is():
     for case in CASES.values():
-        assert set(case.imu) <= {f.name for f in fields(ImuErrors)}
+        assert set(case.imu) <= {f.name for f in fields(ImuNoise)}
         assert set(case.data_sheet) <= {f.name for f in fields(MotionErrors)}

@@ -1,12 +1,14 @@
 """Displacements of the benchmark: real, and not measured by anything but the radio."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from grid_town import levels, streets
 
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.journeys import displaced_walk, log_of
-from mapfilter.simulation.imu import ImuErrors
+from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.simulate import SimulationSettings
@@ -15,8 +17,8 @@ from mapfilter.tracks.deadreckoning import dead_reckon
 
 SEED = 5
 NUMBERS = range(12)
-PERFECT = ImuErrors(sigma_trans_m=0.0, sigma_orient_rad=0.0)
-FIXED = frozenset({"sigma_orient_rad"})
+PERFECT = ImuNoise(sigma_trans_m=0.0, sigma_orient_deg=0.0)
+FIXED = frozenset({"imu.sigma_orient_deg"})
 
 
 @pytest.fixture(scope="module")
@@ -69,9 +71,9 @@ def test_walkers_who_stop_are_displaced_after_as_many_metres(town):
 
 
 def logged(town, walked, period_s=1.0, name="recovery-levels", **imu):
-    errors = ImuErrors(**{"sigma_trans_m": 0.0, "sigma_orient_rad": 0.0, **imu})
+    errors = ImuNoise(**{"sigma_trans_m": 0.0, "sigma_orient_deg": 0.0, **imu})
     settings = SimulationSettings(
-        imu=errors, imu_period_s=period_s, reports=ReportModel(fading_db=0.0, quantise=False)
+        imu=replace(errors, period_s=period_s), reports=ReportModel(fading_db=0.0, quantise=False)
     )
     return log_of(CASES[name], walked, levels, town, settings, SEED, 0, FIXED)
 

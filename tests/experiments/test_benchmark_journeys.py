@@ -12,7 +12,7 @@ from grid_town import levels, streets
 
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.journeys import displaced_walk, log_of, walk
-from mapfilter.simulation.imu import ImuErrors
+from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.simulate import SimulationSettings
@@ -22,9 +22,10 @@ from mapfilter.tracks.deadreckoning import dead_reckon
 SEED = 11
 SHORT = JourneyPlan(length_m=280.0)
 QUIET = ReportModel(averaging_s=0.0, hysteresis_db=0.0, fading_db=0.0, quantise=False)
-PERFECT = ImuErrors(sigma_trans_m=0.0, sigma_orient_rad=0.0)
+PERFECT = ImuNoise(sigma_trans_m=0.0, sigma_orient_deg=0.0)
+FIXED = frozenset({"imu.sigma_orient_deg"})
 ERRORLESS = frozenset(
-    ("sigma_orient_rad", "heading_bias_sd_rad", "heading_drift_rad_per_sqrt_s", "step_scale_sd")
+    f"imu.{name}" for name in ("sigma_orient_deg", "bias_sd_deg", "drift_deg_per_sqrt_s", "scale")
 )
 
 
@@ -127,8 +128,8 @@ def test_lasting_errors_are_those_of_the_case(
     biases, scales, count = [], [], len(short_walks)
     for number, walked in enumerate(short_walks):
         _, log = made(
-            town, name, number, walked=walked, imu=PERFECT, fixed=frozenset({"sigma_orient_rad"}),
-            reports=replace(QUIET, period_s=100.0),
+            town, name, number, walked=walked, imu=PERFECT, fixed=FIXED,
+            reports=replace(QUIET, report_period_s=100.0),
         )  # fmt: skip
         step_m, heading = chords(walked)
         biases.append(wrapped(log.motion["heading_rad"].to_numpy() - heading)[[0, 99]])
@@ -215,19 +216,19 @@ def test_handover_waits_for_the_worlds_hysteresis(town):
 
 
 def test_errors_that_were_set_hold_in_all_cases(town):
-    errors = replace(PERFECT, sigma_orient_rad=np.radians(2.0))
+    errors = replace(PERFECT, sigma_orient_deg=2.0)
     for name in ("levels-3", "levels-20", "levels-bias10"):
         _, log = made(town, name, imu=errors, fixed=ERRORLESS)
         assert log.motion.equals(made(town, "levels-6", imu=errors, fixed=ERRORLESS)[1].motion)
     # Only the heading's noise was set: the lasting error is still the case's.
-    walked, log = made(town, "levels-bias20", imu=errors, fixed=frozenset({"sigma_orient_rad"}))
+    walked, log = made(town, "levels-bias20", imu=errors, fixed=FIXED)
     error = wrapped(log.motion["heading_rad"].to_numpy() - chords(walked)[1])
     assert np.degrees(abs(error.mean())) > 1.0
 
 
 @pytest.mark.parametrize("period_s", [0.5, 1.0, 2.0])
 def test_the_units_period_is_the_worlds(town, period_s):
-    walked, log = made(town, "levels-6", imu=PERFECT, fixed=ERRORLESS, imu_period_s=period_s)
+    walked, log = made(town, "levels-6", imu=replace(PERFECT, period_s=period_s), fixed=ERRORLESS)
     time_s = log.motion["time_s"].to_numpy()
     np.testing.assert_allclose(time_s, period_s * np.arange(1, round(200 / period_s) + 1))
     start = walked.truth[["east_m", "north_m"]].iloc[0]

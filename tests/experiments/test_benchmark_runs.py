@@ -12,7 +12,7 @@ from mapfilter.experiments.benchmarks.global_positioning import Batch, informed,
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.options import BayesOptions
 from mapfilter.positioning.estimate import Fix, PositionedTrack, TrackEstimate
-from mapfilter.simulation.imu import ImuErrors
+from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.satellites import ReceptionModel
@@ -129,9 +129,10 @@ def test_each_case_is_run_with_its_own_sheet():
 def test_errors_of_the_world_never_reach_the_filter():
     harsh = replace(
         WORLD,
-        imu=ImuErrors(sigma_trans_m=1.0, heading_correlation_s=20.0, step_scale_wander_sd=0.2),
+        imu=ImuNoise(
+            period_s=2.0, sigma_trans_m=1.0, heading_correlation_s=20.0, step_scale_wander=0.2
+        ),
         reports=ReportModel(fading_db=8.0, phone_offset_sd_db=9.0, hysteresis_db=1.0),
-        imu_period_s=2.0,
     )
     easy, _ = run(*USUAL)
     hard, _ = run(*USUAL, world=RecordedWorld(harsh))
@@ -170,9 +171,9 @@ def test_each_run_of_a_filter_has_draws_of_its_own():
 
 
 def test_fixed_errors_of_the_unit_hold_in_the_logs():
-    settings = replace(WORLD, imu=ImuErrors(0.0, 0.0))
+    settings = replace(WORLD, imu=ImuNoise(sigma_trans_m=0.0, sigma_orient_deg=0.0))
     world, _ = run(
-        "levels-20", world=RecordedWorld(settings), fixed=frozenset({"sigma_orient_rad"})
+        "levels-20", world=RecordedWorld(settings), fixed=frozenset({"imu.sigma_orient_deg"})
     )
     truth, motion = world.logs[0].truth, world.logs[0].motion
     heading = np.arctan2(np.diff(truth["north_m"]), np.diff(truth["east_m"]))

@@ -22,7 +22,7 @@ from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.ways import Buildings
-from mapfilter.simulation.imu import ImuErrors
+from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.simulate import SimulationSettings
 
 LATTICE = Lattice(CRS, WEST_M, SOUTH_M + 600.0, 10.0, 60, 60)
@@ -126,8 +126,8 @@ def test_the_checksum_is_of_all_that_is_simulated(tmp_path):
         world,
         replace(world, model=replace(MODEL, environment="suburban")),
         replace(world, errors=GroundTruthErrors(offset_db=1.0)),
-        replace(world, settings=SimulationSettings(imu=ImuErrors(turns="gyro"))),
-        replace(world, settings=SimulationSettings(imu_period_s=2.0)),
+        replace(world, settings=SimulationSettings(imu=ImuNoise(turns="gyro"))),
+        replace(world, settings=SimulationSettings(imu=ImuNoise(period_s=2.0))),
     ]
     assert len({one.sha256 for one in worlds}) == len(worlds)
     before = world.sha256

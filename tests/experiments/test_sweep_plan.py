@@ -3,7 +3,7 @@
 import pickle
 from dataclasses import replace
 from itertools import pairwise
-from math import inf, nan
+from math import inf
 
 import pytest
 from hypothesis import given
@@ -13,14 +13,14 @@ from mapfilter.errors import ConfigError
 from mapfilter.experiments.sweep.journeys import filter_rng, imu_rng, radio_rng, route_rng
 from mapfilter.experiments.sweep.plan import (
     LONGEST_BATCH,
-    Noise,
     Radio,
     Reading,
     SweepPlan,
     noise_grid,
 )
 from mapfilter.positioning.candidate import CandidateFilter
-from mapfilter.simulation.imu import ImuErrors
+from mapfilter.simulation.imu import ImuNoise
+from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.walking import WalkerModel
 
 SET = Reading("set", CandidateFilter(margin_db=0.0), 22.0)
@@ -32,7 +32,7 @@ def plan(**changed):
         "readings": (SET, LIST),
         "databases": ("a", "b"),
         "noises": noise_grid((0.0, 0.2), (0.0, 3.0, 6.0)),
-        "radios": (Radio(), Radio("reality 7 dB", 7.0)),
+        "radios": (Radio(), Radio("ground truth 7 dB", 7.0)),
         "report_periods_s": (1.0, 16.0),
         "routes": 3,
         "draws": 2,
@@ -46,7 +46,7 @@ def test_a_grid_holds_every_combination_once():
     assert whole.runs == len(runs) == len(set(runs)) == 2 * 2 * 3 * 6 * 2 * 2 * 2
     assert {run.noise for run in runs} == set(whole.noises)
     assert {(run.radio.name, run.report_period_s) for run in runs} == {
-        (radio, period) for radio in ("as_predicted", "reality 7 dB") for period in (1.0, 16.0)
+        (radio, period) for radio in ("as_predicted", "ground truth 7 dB") for period in (1.0, 16.0)
     }
     assert all(run.imu_period_s == run.report_period_s for run in runs)
     # A route's runs lie together, so that it is made once.
@@ -97,7 +97,7 @@ def seeds_of(some):
         {"databases": ("c", "b", "a")},
         {"readings": (LIST, replace(SET, name="other"), SET)},
         {"report_periods_s": (16.0, 2.0, 1.0)},
-        {"radios": (Radio("reality 3 dB", 3.0), Radio("reality 7 dB", 7.0), Radio())},
+        {"radios": (Radio("ground truth 3 dB", 3.0), Radio("ground truth 7 dB", 7.0), Radio())},
     ],
     ids=str,
 )
@@ -131,18 +131,22 @@ def test_every_fault_of_a_plan_in_one_message():
         plan(
             readings=(SET, SET),
             databases=(),
-            noises=(Noise(-1.0, nan), Noise(0.0, 0.0), Noise(0.0, 0.0)),
+            noises=(ImuNoise(), ImuNoise()),
             report_periods_s=(inf,),
             routes=0,
             draws=0,
-            length_m=-5.0,
             seed=-1,
         )
     text = str(caught.value)
     for told in (
-        "readings", "databases", "noise: expected every value once", "sigma_trans_m",
-        "sigma_orient_rad", "period", "routes", "draws", "length_m", "seed",
-    ):  # fmt: skip
+        "readings",
+        "databases",
+        "noise: expected every value once",
+        "period",
+        "routes",
+        "draws",
+        "seed",
+    ):
         assert told in text
 
 
@@ -156,13 +160,13 @@ def test_digest_changes_with_everything_that_changes_runs():
         {},
         {"seed": 1},
         {"draws": 3},
-        {"length_m": 900.0},
+        {"journey": JourneyPlan(length_m=900.0)},
         {"readings": (SET,)},
         {"readings": (replace(SET, choice=CandidateFilter(threshold=2, margin_db=0.0)), LIST)},
-        {"imu": ImuErrors(translation_noise="as_printed")},
-        {"imu": ImuErrors(turns="gyro")},
-        {"walker": WalkerModel(beside="pavement")},
-        {"walker": WalkerModel(stop_every_m=300.0)},
+        {"noises": (ImuNoise(translation_noise="as_printed"),)},
+        {"noises": (ImuNoise(turns="gyro"),)},
+        {"journey": JourneyPlan(walker=WalkerModel(beside="pavement"))},
+        {"journey": JourneyPlan(walker=WalkerModel(stop_every_m=300.0))},
         {"imu_periods_s": (1.0,)},
     )
     assert len({plan(**change).digest for change in changes}) == len(changes)

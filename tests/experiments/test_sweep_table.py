@@ -8,7 +8,7 @@ import pytest
 
 from mapfilter.errors import StoreError
 from mapfilter.evaluation.accuracy import Accuracy
-from mapfilter.experiments.sweep.plan import LONGEST_BATCH, Noise, Reading, SweepPlan
+from mapfilter.experiments.sweep.plan import LONGEST_BATCH, Reading, SweepPlan
 from mapfilter.experiments.sweep.table import (
     SCHEMA,
     is_part,
@@ -19,6 +19,7 @@ from mapfilter.experiments.sweep.table import (
     write_part,
 )
 from mapfilter.positioning.candidate import CandidateFilter
+from mapfilter.simulation.imu import ImuNoise
 
 NEVER = Accuracy(False, False, nan, nan, nan, nan, nan, nan, 0)
 RIGHT = Accuracy(True, True, 60.0, 84.0, 3.0, 4.0, 5.0, 9.0, 10)
@@ -74,7 +75,7 @@ def test_another_table_is_refused(tmp_path):
     ("routes", "draws", "sigmas"), [(3, 2, 40), (3, 1, 1), (100, 1, 3), (7, 5, 7), (1, 90, 9)]
 )
 def test_batches_hold_all_runs_once_and_whole_journeys_or_shares_of_one(routes, draws, sigmas):
-    noises = tuple(Noise(sigma_trans_m=0.01 * n) for n in range(sigmas))
+    noises = tuple(ImuNoise(sigma_trans_m=0.01 * n) for n in range(sigmas))
     plan = replace(PLAN, routes=routes, draws=draws, noises=noises)
     batches = list(plan.batches())
     assert [n for first, end in batches for n in range(first, end)] == list(range(plan.runs))

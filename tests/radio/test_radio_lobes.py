@@ -137,7 +137,7 @@ def test_free_space_is_not_exceeded_by_itself():
     ["friis", "log_distance", "okumura_hata", "cost231_walfisch_ikegami", "tr38901_umi"],
 )
 def test_levels_tell_an_eirp_that_is_forty_db_off(model):
-    """Of six cells of any model, with the shadowing of prediction and reality together."""
+    """Of six cells of any model, with the shadowing of prediction and ground truth together."""
     cells = [Cell(f"{n}", f"{n}", *SITE, 30.0, 60.0 * n, 43.0, 1800.0) for n in range(6)]
     plan, wanted = CellPlan(LATTICE.crs, tuple(cells)), PredictionModel(model=model)
     real = dict(simulate_ground_truth(plan, LATTICE, None, wanted, GroundTruthErrors()))

@@ -1,4 +1,4 @@
-"""Predictions against their parts, and the reality that is played."""
+"""Predictions against their parts, and the simulated ground truth."""
 
 from dataclasses import replace
 
@@ -161,7 +161,7 @@ def _difference(errors: GroundTruthErrors, cell: Cell = SECTOR) -> NDArray[np.fl
     return real - predicted
 
 
-def test_reality_without_errors_is_the_prediction() -> None:
+def test_ground_truth_without_errors_is_the_prediction() -> None:
     assert not _difference(NO_ERRORS).any()
 
 
@@ -193,7 +193,7 @@ def test_azimuth_is_off_by_up_to_what_is_stated() -> None:
     assert not _difference(replace(NO_ERRORS, azimuth_error_deg=5.0), OMNI).any()
 
 
-def test_shadowing_of_reality_has_its_deviation_and_is_not_the_predictions() -> None:
+def test_shadowing_of_the_ground_truth_has_its_deviation_and_is_not_the_predictions() -> None:
     model, plan = replace(PLAIN, shadowing_db=6.0, seed=1), CellPlan(CRS, (OMNI,))
     clutter = predict_cell(OMNI, LATTICE, None, model) - predict_cell(OMNI, LATTICE, None, PLAIN)
     squares, products = [], []

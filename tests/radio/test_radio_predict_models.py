@@ -190,7 +190,7 @@ def test_a_measured_omni_needs_no_azimuth() -> None:
     )
 
 
-def test_reality_turns_measured_antennas_too() -> None:
+def test_the_ground_truth_turns_measured_antennas_too() -> None:
     plan, antennas = CellPlan(CRS, (replace(NORTH, antenna="p"),)), {"p": _panel()}
     errors = GroundTruthErrors(0.0, 50.0, 0.5, 0.0, 5.0, 0.0)
     ((_, real),) = simulate_ground_truth(plan, LATTICE, None, PLAIN, errors, antennas=antennas)

@@ -1,14 +1,17 @@
 """The inertial unit: exact without errors, and with the statistics that its errors promise."""
 
+from dataclasses import replace
+from math import degrees
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from mapfilter.errors import ConfigError
-from mapfilter.simulation.imu import ImuErrors, noisy_motion
+from mapfilter.simulation.imu import ImuNoise, noisy_motion
 from mapfilter.tracks.deadreckoning import dead_reckon
 
-PERFECT = ImuErrors(sigma_trans_m=0.0, sigma_orient_rad=0.0)
+PERFECT = ImuNoise(sigma_trans_m=0.0, sigma_orient_deg=0.0)
 
 
 def straight(ticks, step_m=1.4, period_s=1.0):
@@ -59,7 +62,7 @@ def test_a_perfect_unit_leads_back_to_the_truth():
 
 
 def test_bias_and_scale_are_one_draw_for_each_journey():
-    errors = ImuErrors(0.0, 0.0, heading_bias_sd_rad=0.1, step_scale_sd=0.05)
+    errors = replace(PERFECT, bias_sd_deg=degrees(0.1), scale=0.05)
     journeys = 4000
     step, heading = motions(errors, journeys, straight(3))
     np.testing.assert_allclose(heading, heading[:, :1].repeat(3, axis=1))
@@ -76,7 +79,7 @@ def test_bias_and_scale_are_one_draw_for_each_journey():
 @pytest.mark.parametrize("period_s", [0.5, 2.0])
 def test_drift_grows_with_the_root_of_time_whatever_the_period(period_s):
     rate = np.radians(0.5)
-    errors = ImuErrors(0.0, 0.0, heading_drift_rad_per_sqrt_s=rate)
+    errors = replace(PERFECT, drift_deg_per_sqrt_s=degrees(rate))
     journeys, ticks = 3000, int(64 / period_s)
     _, heading = motions(errors, journeys, straight(ticks, period_s=period_s))
     for after_s in (4.0, 16.0, 64.0):
@@ -88,7 +91,9 @@ def test_drift_grows_with_the_root_of_time_whatever_the_period(period_s):
 
 
 def test_white_noise_is_drawn_once_per_interval():
-    step, heading = motions(ImuErrors(0.2, 0.1), 200, straight(100))
+    step, heading = motions(
+        ImuNoise(sigma_trans_m=0.2, sigma_orient_deg=degrees(0.1)), 200, straight(100)
+    )
     n = step.size
     assert abs(step.std() / 0.2 - 1) < 4 / np.sqrt(2 * n)
     assert abs(heading.std() / 0.1 - 1) < 4 / np.sqrt(2 * n)
@@ -96,13 +101,19 @@ def test_white_noise_is_drawn_once_per_interval():
 
 
 def test_as_printed_reads_equation_7_literally():
-    step, _ = motions(ImuErrors(0.0, 0.0, translation_noise="as_printed"), 1, straight(4))
+    step, _ = motions(replace(PERFECT, translation_noise="as_printed"), 1, straight(4))
     np.testing.assert_allclose(step, 2.8)
 
 
 def test_every_wrong_error_is_told():
     with pytest.raises(ConfigError) as caught:
-        ImuErrors(-0.1, 10.0, np.nan, translation_noise="double")  # type: ignore[arg-type]
+        ImuNoise(
+            sigma_trans_m=-0.1,
+            sigma_orient_deg=573.0,
+            bias_sd_deg=np.nan,
+            scale=1.0,
+            translation_noise="double",  # type: ignore[arg-type]
+        )
     message = str(caught.value)
-    for part in ("sigma_trans_m", "degrees given for radians", "heading_bias_sd_rad", "as_printed"):
+    for part in ("sigma_trans_m", "0..360", "bias_sd_deg", "scale", "as_printed"):
         assert part in message

@@ -117,7 +117,7 @@ def test_every_wrong_value_is_told():
             driving_speed_mps={"primary": 0.0},
         )
     message = str(caught.value)
-    for part in ("length_m", "speed_mps", "walking or driving", "leg_m", "primary"):
+    for part in ("length_m", "speed_mps", "'walking' or 'driving'", "leg_m", "primary"):
         assert part in message
 
 

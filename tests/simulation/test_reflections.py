@@ -9,8 +9,14 @@ from mapfilter.errors import ConfigError
 from mapfilter.geodesy import unproject
 from mapfilter.gnss.orbits import gps_time, nominal_gps
 from mapfilter.gnss.sky import Skyline, ecef_from_lonlat
-from mapfilter.simulation.reflections import NlosModel, draw_reflections, held_along
-from mapfilter.simulation.satellites import ReceptionModel, Spoofer, receive
+from mapfilter.simulation.satellites import (
+    NlosModel,
+    ReceptionModel,
+    Spoofer,
+    draw_reflections,
+    held_along,
+    receive,
+)
 
 CRS, START = "EPSG:32629", 1_700_000_000.0
 ALMANAC = nominal_gps(gps_time(START)[0])

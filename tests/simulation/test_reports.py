@@ -204,7 +204,7 @@ def test_reports_come_every_period_between_the_truths_ticks(plan_of):
         seen.append((east, north))
         return np.full((len(east), 1), -70.0)
 
-    radio = reports(truth, levels, plan_of([(0, 0)]), ReportModel(period_s=0.48), rng())
+    radio = reports(truth, levels, plan_of([(0, 0)]), ReportModel(report_period_s=0.48), rng())
     np.testing.assert_allclose(radio["time_s"], 10 + 0.48 * np.arange(6))
     np.testing.assert_allclose(seen[0][0], [0, 4.8, 9.6, 10, 10, 10])
     np.testing.assert_allclose(seen[0][1], [0, 0, 0, 4.4, 9.2, 14])
@@ -229,9 +229,9 @@ def test_levels_of_another_plan_are_refused(plan, plan_of, levels):
 
 @pytest.mark.parametrize("averaging_s", [481.0, 1e300])
 def test_means_over_too_many_reports_are_refused(averaging_s):
-    assert ReportModel(period_s=0.48, averaging_s=480.0).averaging_s == 480.0
+    assert ReportModel(report_period_s=0.48, averaging_s=480.0).averaging_s == 480.0
     with pytest.raises(ConfigError, match="averaging_s: expected at most 1000 reports, 480 s"):
-        ReportModel(period_s=0.48, averaging_s=averaging_s)
+        ReportModel(report_period_s=0.48, averaging_s=averaging_s)
 
 
 def test_more_levels_than_fit_into_memory_are_refused(plan_of):
@@ -241,7 +241,7 @@ def test_more_levels_than_fit_into_memory_are_refused(plan_of):
             truth,
             told([]),
             plan_of([(0, 0), (1, 1)]),
-            ReportModel(period_s=1e-6, averaging_s=0),
+            ReportModel(report_period_s=1e-6, averaging_s=0),
             rng(),
         )
 
@@ -249,7 +249,7 @@ def test_more_levels_than_fit_into_memory_are_refused(plan_of):
 def test_every_wrong_value_is_told():
     with pytest.raises(ConfigError) as caught:
         ReportModel(
-            period_s=0,
+            report_period_s=0,
             fading_db=-1,
             hysteresis_db=np.nan,
             sensitivity_dbm=104,

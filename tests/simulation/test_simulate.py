@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import ConfigError, InputError
-from mapfilter.simulation.imu import ImuErrors
+from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
@@ -61,7 +61,12 @@ def test_more_journeys_and_draws_change_no_other(town, levels, plan):
 
 def test_other_errors_change_neither_truth_nor_radio(town, levels, plan):
     one = made(town, levels, plan)
-    noisier = made(town, levels, plan, replace(SETTINGS, imu=ImuErrors(0.5, 0.3, 0.1)))
+    noisier = made(
+        town,
+        levels,
+        plan,
+        replace(SETTINGS, imu=ImuNoise(sigma_trans_m=0.5, sigma_orient_deg=17.0, bias_sd_deg=6.0)),
+    )
     louder = made(town, levels, plan, replace(SETTINGS, reports=ReportModel(fading_db=3.0)))
     for name, log in one.items():
         assert_same(noisier[name], log, ["truth", "radio"])
@@ -75,7 +80,7 @@ def test_other_seeds_give_other_journeys(town, levels, plan):
 
 
 def test_a_perfect_journey_reckons_back_to_its_end(town, levels, plan):
-    settings = SimulationSettings(imu=ImuErrors(0.0, 0.0))
+    settings = SimulationSettings(imu=ImuNoise(sigma_trans_m=0.0, sigma_orient_deg=0.0))
     (log,) = made(town, levels, plan, settings).values()
     start = log.truth.iloc[0]
     east, north = dead_reckon(
@@ -124,8 +129,11 @@ def test_no_journeys():
         ({"journey": JourneyPlan(length_m=1e12)}, "journeys, period_s"),
         ({"journey": JourneyPlan(length_m=1e12, profile="driving")}, "journeys, period_s"),
         ({"journey": JourneyPlan(speed_mps=1e-9)}, "journeys, period_s"),
-        ({"imu_period_s": 1e-9}, "imu, period_s"),
-        ({"reports": ReportModel(period_s=1e-9, averaging_s=0.0)}, "journeys, report_period_s"),
+        ({"imu": ImuNoise(period_s=1e-9)}, "imu, period_s"),
+        (
+            {"reports": ReportModel(report_period_s=1e-9, averaging_s=0.0)},
+            "journeys, report_period_s",
+        ),
     ],
 )
 def test_journeys_that_would_never_end_are_refused(changes, told):

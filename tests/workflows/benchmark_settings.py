@@ -8,8 +8,8 @@ from math import radians
 
 REFUSED_SECTIONS = ("prediction.survey.", "rasters.", "track.", "sweep.")
 REFUSED = {
-    "prediction.reality.write",
-    "prediction.reality.seed",
+    "prediction.ground_truth.write",
+    "prediction.ground_truth.seed",
     "database.path",
     "journeys.count",
     "journeys.draws",
@@ -62,10 +62,11 @@ OF_BAYES = {
 OF_JOURNEYS = {
     "journeys.length_m": (900.0, "journey.length_m"),
     "journeys.speed_mps": (1.1, "journey.speed_mps"),
-    "journeys.report_period_s": (0.48, "reports.period_s"),
+    "journeys.report_period_s": (0.48, "reports.report_period_s"),
     "journeys.hysteresis_db": (2.0, "reports.hysteresis_db"),
     "journeys.averaging_s": (3.0, "reports.averaging_s"),
     "journeys.fading_db": (5.0, "reports.fading_db"),
+    "journeys.quantise": (False, "reports.quantise"),
     "journeys.max_neighbours": (4, "reports.max_neighbours"),
     "journeys.sensitivity_dbm": (-99.0, "reports.sensitivity_dbm"),
     "journeys.phone_offset_sd_db": (6.0, "reports.phone_offset_sd_db"),
@@ -74,19 +75,19 @@ OF_JOURNEYS = {
     "journeys.stop_every_m": (222.0, "journey.walker.stop_every_m"),
     "journeys.stop_s": (33.0, "journey.walker.stop_s"),
     "roads.profile": ("driving", "journey.profile"),
-    "imu.period_s": (0.5, "imu_period_s"),
+    "imu.period_s": (0.5, "imu.period_s"),
     "imu.sigma_trans_m": (0.4, "imu.sigma_trans_m"),
-    "imu.sigma_orient_deg": (9.0, "imu.sigma_orient_rad", radians(9)),
-    "imu.bias_sd_deg": (4.0, "imu.heading_bias_sd_rad", radians(4)),
-    "imu.drift_deg_per_sqrt_s": (0.3, "imu.heading_drift_rad_per_sqrt_s", radians(0.3)),
-    "imu.scale": (0.06, "imu.step_scale_sd"),
+    "imu.sigma_orient_deg": (9.0, "imu.sigma_orient_deg"),
+    "imu.bias_sd_deg": (4.0, "imu.bias_sd_deg"),
+    "imu.drift_deg_per_sqrt_s": (0.3, "imu.drift_deg_per_sqrt_s"),
+    "imu.scale": (0.06, "imu.scale"),
     "imu.translation_noise": ("as_printed", "imu.translation_noise"),
     "imu.heading_correlation_s": (33.0, "imu.heading_correlation_s"),
-    "imu.step_scale_wander": (0.07, "imu.step_scale_wander_sd"),
+    "imu.step_scale_wander": (0.07, "imu.step_scale_wander"),
     "imu.step_scale_correlation_s": (9.0, "imu.step_scale_correlation_s"),
     "imu.turns": ("headings", "imu.turns"),
-    "imu.gyro_noise_deg_per_sqrt_s": (0.4, "imu.gyro_noise_rad_per_sqrt_s", radians(0.4)),
-    "imu.gyro_bias_deg_per_s": (0.02, "imu.gyro_bias_sd_rad_per_s", radians(0.02)),
+    "imu.gyro_noise_deg_per_sqrt_s": (0.4, "imu.gyro_noise_deg_per_sqrt_s"),
+    "imu.gyro_bias_deg_per_s": (0.02, "imu.gyro_bias_deg_per_s"),
 }
 
 _CLUTTER = {"prediction.shadowing_db": 6.0}
@@ -111,8 +112,8 @@ OF_THE_GROUND_TRUTH = {
 # The plain world's model has no streets; Walfisch-Ikegami does.
 GROUND_TRUTH_BESIDE = {
     "clutter": _CLUTTER,
-    "street_width_m": {"prediction.reality.model": "cost231_walfisch_ikegami"},
-    "building_separation_m": {"prediction.reality.model": "cost231_walfisch_ikegami"},
+    "street_width_m": {"prediction.ground_truth.model": "cost231_walfisch_ikegami"},
+    "building_separation_m": {"prediction.ground_truth.model": "cost231_walfisch_ikegami"},
 }
 
 OF_THE_MAP = {
@@ -176,7 +177,7 @@ OTHERWISE = {
     "output.dir",
     "journeys.nlos_satellites",
     "prediction.default_roof_height_m",
-    "prediction.reality.default_roof_height_m",
+    "prediction.ground_truth.default_roof_height_m",
 }
 """Settings with a test of their own."""
 

@@ -60,10 +60,10 @@ def test_equal_seeds_give_equal_bytes_and_others_other_journeys(database, tmp_pa
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        (["--spacing", "0"], "bound, spacing_m"),
-        (["--journeys", "0"], "bound, journeys"),
-        (["--level-error", "-1"], "error model, deviation_db"),
-        (["--correlation", "nan"], "error model, correlation_m"),
+        (["--spacing", "0"], "FirstFixOptions, spacing_m"),
+        (["--journeys", "0"], "FirstFixOptions, journeys"),
+        (["--level-error", "-1"], "ErrorModel, deviation_db"),
+        (["--correlation", "nan"], "ErrorModel, correlation_m"),
     ],
 )
 def test_impossible_options_are_refused(database, tmp_path, given, told):

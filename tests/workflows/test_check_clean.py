@@ -1,4 +1,4 @@
-"""Inputs that go together: nothing is found in them, predicted or playing reality."""
+"""Inputs that go together: nothing is found in them, predicted or as ground truth."""
 
 from importlib.resources import as_file, files
 
@@ -26,9 +26,9 @@ def test_the_demo(predicted):
     assert_nothing_found(*predicted[0])
 
 
-def test_the_demo_where_reality_differs_from_the_prediction(predicted):
+def test_the_demo_where_the_ground_truth_differs_from_the_prediction(predicted):
     given, out = predicted
-    assert_nothing_found(*given, f"--set=rasters.path={out / 'rxlev-reality.tif'}")
+    assert_nothing_found(*given, f"--set=rasters.path={out / 'rxlev-ground-truth.tif'}")
 
 
 def test_a_plan_by_rule_before_anything_runs(tmp_path):

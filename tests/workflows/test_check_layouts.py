@@ -1,4 +1,4 @@
-"""Check with roads of layers and tracks, a public list of cells, reality, surveyed rasters."""
+"""Check with roads of layers and tracks, a public list of cells, ground truth, surveyed rasters."""
 
 import geopandas
 import numpy as np
@@ -124,23 +124,23 @@ def test_exchanged_rasters_of_a_public_list(public):
     assert found(public, *public.settings) == [("site-labels-swapped", "error")]
 
 
-def given_reality(world, levels):
+def given_ground_truth(world, levels):
     path = world.folder / "other.tif"
     write_tiff(path, LATTICE, levels, "level")
-    return f"--set=rasters.reality={path}"
+    return f"--set=rasters.ground_truth={path}"
 
 
-def test_reality_is_looked_at_like_the_rasters(world, levels):
-    assert found(world, given_reality(world, levels)) == []
+def test_ground_truth_is_looked_at_like_the_rasters(world, levels):
+    assert found(world, given_ground_truth(world, levels)) == []
     swapped = levels | {"S1A": levels["S1C"], "S1C": levels["S1A"]}
-    assert found(world, given_reality(world, swapped)) == [("sector-labels-swapped", "error")]
+    assert found(world, given_ground_truth(world, swapped)) == [("sector-labels-swapped", "error")]
     raw = {name: np.clip(np.floor(v + 111), 0, 63) for name, v in levels.items()}
-    assert found(world, given_reality(world, raw)) == [("rxlev-as-level", "error")]
+    assert found(world, given_ground_truth(world, raw)) == [("rxlev-as-level", "error")]
 
 
-def test_reality_that_is_not_there(world):
-    given = f"--set=rasters.reality={world.folder / 'none.tif'}"
-    assert found(world, given) == [("reality-missing", "warning")]
+def test_ground_truth_that_is_not_there(world):
+    given = f"--set=rasters.ground_truth={world.folder / 'none.tif'}"
+    assert found(world, given) == [("ground-truth-missing", "warning")]
 
 
 def test_lobes_of_surveyed_rasters_are_passed_over(world):

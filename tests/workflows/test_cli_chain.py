@@ -28,12 +28,12 @@ def replay(world, out, *more):
     )  # fmt: skip
 
 
-def test_predict_writes_rasters_reality_and_plan(world, tmp_path):
+def test_predict_writes_rasters_ground_truth_and_plan(world, tmp_path):
     found = assert_done(mapfilter("predict", "-c", world.toml, "--out", tmp_path, "--json"))
     assert len(found.out.splitlines()) == 1
     assert found.json["cells"] == 3
     assert {path.name for path in tmp_path.iterdir()} == {
-        "cells.csv", "rxlev.tif", "rxlev-reality.tif",
+        "cells.csv", "rxlev.tif", "rxlev-ground-truth.tif",
     }  # fmt: skip
     rasters = open_rasters(found.json["rasters"])
     assert rasters.cell_ids == ("A", "B", "C")
@@ -51,7 +51,7 @@ def test_predict_takes_a_seed(world, tmp_path):
     a, b, c = (contents(tmp_path / name) for name in "abc")
     assert list(a.values()) == list(b.values())
     assert a["a/rxlev.tif"] != c["c/rxlev.tif"]
-    assert a["a/rxlev-reality.tif"] != c["c/rxlev-reality.tif"]
+    assert a["a/rxlev-ground-truth.tif"] != c["c/rxlev-ground-truth.tif"]
 
 
 def test_build_gives_the_same_bytes_whatever_the_workers(world, tmp_path):
@@ -122,23 +122,23 @@ def test_simulate_gives_the_same_bytes_for_a_seed(world, tmp_path):
     assert set(log.radio["cell"].dropna()) <= {"A", "B", "C"}
 
 
-def test_reality_of_another_prediction_is_refused(own_world):
-    given = ["-c", own_world.toml, "--set=journeys.radio=reality"]
+def test_ground_truth_of_another_prediction_is_refused(own_world):
+    given = ["-c", own_world.toml, "--set=journeys.radio=ground_truth"]
     assert_done(mapfilter("simulate", *given))
-    # The same prediction again, without reality: the older one still belongs to it.
-    again = [*given, "--set=prediction.reality.write=false"]
+    # The same prediction again, without ground truth: the older one still belongs to it.
+    again = [*given, "--set=prediction.ground_truth.write=false"]
     assert_done(mapfilter("predict", *again))
     assert_done(mapfilter("simulate", *given))
     assert_done(mapfilter("predict", *again, "--seed", 5))
     before = contents(own_world.folder)
     assert_refused(
         mapfilter("simulate", *given),
-        "rxlev-reality.tif: expected reality that was played to rxlev.tif",
-        "prediction.reality.write = true",
+        "rxlev-ground-truth.tif: expected ground truth of rxlev.tif",
+        "prediction.ground_truth.write = true",
     )
     assert contents(own_world.folder) == before
     assert_done(mapfilter("simulate", *given, "--set=journeys.radio=as_predicted"))
-    named = f"--set=rasters.reality={own_world.out / 'rxlev-reality.tif'}"
+    named = f"--set=rasters.ground_truth={own_world.out / 'rxlev-ground-truth.tif'}"
     assert_done(mapfilter("simulate", *given, named))
 
 

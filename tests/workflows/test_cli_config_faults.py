@@ -46,7 +46,7 @@ def test_a_folder_for_a_file(tmp_path):
 def test_all_faults_are_told_together_with_the_near_match(write):
     file = write(
         "[aera]\nmap = 'helsinki'\n[cells]\nsite = 3\nsectors = 9\nindoor = 'four'\n"
-        "[prediction]\nmetropolitan = 1\n[prediction.reality]\nslope_eror = 0.1\n"
+        "[prediction]\nmetropolitan = 1\n[prediction.ground_truth]\nslope_eror = 0.1\n"
         "[roads]\nprofile = 'cycling'\nlanduse = 'x.tif'\n[journeys]\nlength_m = -3.0\n"
     )
     refused = mapfilter("predict", "-c", file)
@@ -57,7 +57,7 @@ def test_all_faults_are_told_together_with_the_near_match(write):
         "given.toml, cells.sectors: expected less than or equal to 6, found 9",
         "given.toml, cells.indoor: expected a whole number, found 'four'",
         "given.toml, prediction.metropolitan: expected true or false, found 1",
-        "given.toml, prediction.reality.slope_eror: expected a known key, found 'slope_eror'",
+        "given.toml, prediction.ground_truth.slope_eror: expected a known key, found 'slope_eror'",
         "given.toml, roads.profile: expected 'walking' or 'driving', found 'cycling'",
         "given.toml, journeys.length_m: expected greater than 0, found -3.0",
     )

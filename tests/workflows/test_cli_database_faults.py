@@ -148,10 +148,13 @@ def test_a_file_in_the_way_of_the_output_folder(command, own_world):
     wall.write_text("keep me")
     before = contents(own_world.folder)
     given = [] if command == "demo" else ["-c", own_world.toml]
-    given += settings(
-        rasters__path=own_world.rasters, rasters__reality=own_world.out / "rxlev-reality.tif",
-        database__path=own_world.database, track__path=own_world.journeys,
-    ) if command == "replay" else []  # fmt: skip
+    if command == "replay":
+        given += settings(
+            rasters__path=own_world.rasters,
+            rasters__ground_truth=own_world.out / "rxlev-ground-truth.tif",
+            database__path=own_world.database,
+            track__path=own_world.journeys,
+        )
     if command in ("build", "simulate"):
         given += settings(rasters__path=own_world.rasters)
     refused = mapfilter(command, *given, "--out", wall / "deep")

@@ -34,7 +34,7 @@ def small(tmp_path):
         file = tmp_path / "small.toml"
         file.write_text(
             f'{BOX}[cells]\nplan = "cells.csv"\n{folder}[prediction]\nshadowing_db = 0.0\n'
-            '[prediction.reality]\nwrite = false\n[output]\ndir = "out"\n',
+            '[prediction.ground_truth]\nwrite = false\n[output]\ndir = "out"\n',
             encoding="utf-8",
         )
         return file
@@ -116,7 +116,7 @@ def test_rasters_of_another_program_are_not_overwritten(small, tmp_path):
         target.write(values)
     before = export.read_bytes()
     text = file.read_text(encoding="utf-8")
-    for key, write in (("path", "false"), ("reality", "true")):
+    for key, write in (("path", "false"), ("ground_truth", "true")):
         changed = text.replace("write = false", f"write = {write}")
         file.write_text(f'{changed}[rasters]\n{key} = "export.tif"\n', encoding="utf-8")
         expected = "export.tif: expected nothing yet, or rasters that mapfilter predicted"

@@ -56,7 +56,7 @@ def test_a_survey_becomes_rasters_and_a_database(survey, world, tmp_path):
     assert found["pictures"] == [str(path) for path in pictures]
     assert sorted((tmp_path / "pictures").iterdir()) == sorted(pictures)
     assert (found["cells"], found["sessions"], found["measurements"]) == (3, 3, 1350)
-    assert found["reality"] is None
+    assert found["ground_truth"] is None
     told = found["validation"]
     assert told["by_session"]
     assert told["rmse_db"] < 0.85 * told["trend_rmse_db"]

@@ -1,7 +1,9 @@
 """Sweeps by the command: the same table however it is done, cut short, gone on with, refused."""
 
 import shutil
+from pathlib import Path
 
+import pandas as pd
 import pytest
 from command_line import assert_done, assert_refused, mapfilter, settings
 from killed_worker import KillsOneWorker
@@ -13,7 +15,7 @@ from mapfilter.experiments.sweep.run import sweep
 from mapfilter.experiments.sweep.table import read_runs
 from mapfilter.workflows.simulate import run_simulate
 from mapfilter.workflows.sweep import load_sweep, run_sweep
-from mapfilter.workflows.sweep_plan import sweep_plan, sweep_world
+from mapfilter.workflows.sweep_plan import sweep_plans, sweep_world
 
 GRID = settings(
     sweep__sigma_orient_deg="0,6",
@@ -31,7 +33,7 @@ RUNS = 2 * 2 * 2 * 3 * 4
 def parts(world):
     """Plan, world and databases of one sweep."""
     config = load_config(world.toml, GIVEN)
-    plan, databases = sweep_plan(config)
+    (plan,), databases = sweep_plans(config)
     folders = {name: one.path for name, one in databases.items()}
     return plan, sweep_world(config, plan.radios), folders
 
@@ -53,7 +55,18 @@ def test_the_command_and_what_it_tells(world, whole, tmp_path):
     assert cell["low"] <= cell["success"] <= cell["high"]
     out = tmp_path / "world" / "out" / "sweep"
     assert (out / "runs.parquet").read_bytes() == whole
-    assert {file.name for file in out.iterdir()} == {"runs.parquet", "sweep.json"}
+    assert {file.name for file in out.iterdir()} == {
+        "runs.parquet",
+        "sweep.json",
+        "table.csv",
+        "table.tex",
+    }
+    table = pd.read_csv(out / "table.csv")
+    assert table["success"].tolist() == pytest.approx(
+        [cell["success"] for cell in found["cells"]], abs=1e-4
+    )
+    assert {"sigma_trans_m", "sigma_orient_deg", "update_length_m"} <= set(table)
+    assert "\\toprule" in (out / "table.tex").read_text()
     runs = read_runs(out / "runs.parquet")
     assert runs["success"].sum() == sum(round(c["success"] * 12) for c in found["cells"])
     assert (runs["switched"] | ~runs["success"]).all()
@@ -139,7 +152,7 @@ def test_another_sweep_is_not_resumed(parts, world, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         sweep(*parts, tmp_path, executor=StopsAfter(1), in_flight=1)
     config = load_config(world.toml, [*GIVEN, "sweep.seed=5"])
-    plan, _ = sweep_plan(config)
+    (plan,), _ = sweep_plans(config)
     with pytest.raises(ConfigError, match="found another plan "):
         sweep(plan, *parts[1:], tmp_path, resume=True)
     # Without --resume it starts anew.
@@ -154,6 +167,71 @@ def test_a_stopped_command_tells_how_to_go_on(own_world, monkeypatch):
     outcome = mapfilter("sweep", "-c", own_world.toml, *GRID)
     assert outcome.code == 3
     assert "--resume" in outcome.err
+
+
+VARIED = ("--vary", "imu.scale=0,0.1", "--vary", "filter.update_length_m=5,20")
+SMALL = settings(sweep__routes=2, sweep__draws=3, output__pictures="none")
+
+
+def test_any_numeric_option_is_an_axis(own_world):
+    """A varied option is a column by its key; runs are those of a sweep with that value."""
+    given = ("-c", own_world.toml, *SMALL)
+    found = assert_done(mapfilter("sweep", *given, *VARIED, "--json")).json
+    out = own_world.out / "sweep"
+    runs = read_runs(out / "runs.parquet")
+    assert found["runs"] == len(runs) == 2 * 2 * 2 * 3
+    points = [(0.0, 5.0), (0.0, 20.0), (0.1, 5.0), (0.1, 20.0)]
+    keys = ["imu.scale", "filter.update_length_m"]
+    assert [tuple(cell["varied"][key] for key in keys) for cell in found["cells"]] == points
+    assert list(runs[keys].drop_duplicates().itertuples(index=False, name=None)) == points
+    assert (runs["scale"] == runs["imu.scale"]).all()
+    assert list(pd.read_csv(out / "table.csv").columns[:2]) == keys
+    alone = settings(imu__scale=0.1, filter__update_length_m=20.0)
+    assert_done(mapfilter("sweep", *given, *alone, "--json"))
+    single = read_runs(out / "runs.parquet")
+    last = runs[(runs["imu.scale"] == 0.1) & (runs["filter.update_length_m"] == 20.0)]
+    pd.testing.assert_frame_equal(last.drop(columns=keys).reset_index(drop=True), single)
+
+
+def test_a_varied_sweep_is_resumed(own_world):
+    given = ("-c", own_world.toml, *SMALL, *VARIED, "--json")
+    assert_done(mapfilter("sweep", *given))
+    table = own_world.out / "sweep" / "runs.parquet"
+    before = table.read_bytes()
+    assert_done(mapfilter("sweep", *given, "--resume"))
+    assert table.read_bytes() == before
+    other = (*given[:-2], "filter.update_length_m=5,10", "--resume")
+    assert_refused(mapfilter("sweep", *other), "another plan")
+
+
+def test_the_margin_of_the_database_is_the_filters(own_world):
+    given = ("-c", own_world.toml, *SMALL, "--vary", "database.margin_db=0,3")
+    runs = read_runs(Path(assert_done(mapfilter("sweep", *given, "--json")).json["table"]))
+    assert sorted(set(runs["database.margin_db"])) == [0.0, 3.0]
+
+
+@pytest.mark.parametrize(
+    ("axes", "expected"),
+    [
+        (["filter.bayes.heading_sd_deg=3,6"], ["heading_sd_deg", "one without effect"]),
+        (["journeys.seed=1,2"], ["journeys.seed", "one without effect"]),
+        (["imu.turns=1,2", "imu.scale=2"], ["imu.turns", "a numeric option", "imu.scale", "< 1"]),
+        (["imu.scale=0", "imu.scale=0.1"], ["imu.scale", "every option once"]),
+    ],
+)
+def test_axes_that_cannot_be_varied(own_world, axes, expected):
+    given = [part for axis in axes for part in ("--vary", axis)]
+    assert_refused(mapfilter("sweep", "-c", own_world.toml, *SMALL, *given), *expected)
+    assert not (own_world.out / "sweep").exists()
+
+
+def test_a_dry_run_counts_and_estimates(own_world):
+    given = ("-c", own_world.toml, *SMALL, *VARIED, "--dry-run", "--json")
+    found = assert_done(mapfilter("sweep", *given)).json
+    assert (found["runs"], found["points"]) == (24, 4)
+    assert found["seconds"] == pytest.approx(24 * found["seconds_per_run"])
+    assert found["seconds"] > 0
+    assert not (own_world.out / "sweep").exists()
 
 
 def test_axes_of_everything_else(world, tmp_path):
@@ -184,7 +262,7 @@ update_length_m = 5.0
     found = run_sweep(load_sweep(toml, ["output.pictures=first"]))
     assert found.runs == 2 * 2 * 2 * 2 * 2
     runs = read_runs(found.table)
-    assert set(runs["radio"]) == {"reality 0 dB", "reality 7 dB"}
+    assert set(runs["radio"]) == {"ground truth 0 dB", "ground truth 7 dB"}
     assert set(runs["prediction_error_db"]) == {0.0, 7.0}
     lengths = dict(zip(runs["reading"], runs["update_length_m"], strict=True))
     assert lengths == {"printed": 10.0, "list": 5.0}
@@ -192,11 +270,13 @@ update_length_m = 5.0
     assert all(picture.stat().st_size > 10_000 for picture in found.pictures)
 
 
-def test_reality_must_have_been_predicted(own_world):
-    (own_world.out / "rxlev-reality.tif").unlink()
-    reality = settings(journeys__radio="reality")
+def test_ground_truth_must_have_been_predicted(own_world):
+    (own_world.out / "rxlev-ground-truth.tif").unlink()
+    ground_truth = settings(journeys__radio="ground_truth")
     assert_refused(
-        mapfilter("sweep", "-c", own_world.toml, *GRID, *reality), "rxlev-reality.tif", "reality"
+        mapfilter("sweep", "-c", own_world.toml, *GRID, *ground_truth),
+        "rxlev-ground-truth.tif",
+        "rasters of the ground truth",
     )
 
 

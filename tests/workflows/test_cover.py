@@ -125,11 +125,11 @@ def test_commands_before_predict(command, own_world):
     assert_refused(mapfilter(command, "-c", own_world.toml), *told)
 
 
-def test_simulating_without_reality(own_world):
-    (own_world.out / "rxlev-reality.tif").unlink(missing_ok=True)
-    outcome = mapfilter("simulate", "-c", own_world.toml, "--set=journeys.radio=reality")
-    told = "rxlev-reality.tif: expected rasters that play reality, found no such file"
-    assert_refused(outcome, told, "prediction.reality.write = true", 'radio = "as_predicted"')
+def test_simulating_without_ground_truth(own_world):
+    (own_world.out / "rxlev-ground-truth.tif").unlink(missing_ok=True)
+    outcome = mapfilter("simulate", "-c", own_world.toml, "--set=journeys.radio=ground_truth")
+    told = "rxlev-ground-truth.tif: expected rasters of the ground truth, found no such file"
+    assert_refused(outcome, told, "prediction.ground_truth.write = true", 'radio = "as_predicted"')
 
 
 @pytest.mark.parametrize(

@@ -10,12 +10,12 @@ from command_line import assert_done, assert_refused, mapfilter, settings
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.scores import CaseResult
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
-from mapfilter.simulation.imu import ImuErrors
+from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
 from mapfilter.workflows.evaluate import _world as prepare_world
+from mapfilter.workflows.evaluate import load_benchmark
 from mapfilter.workflows.evaluate_audit import CHANGES
-from mapfilter.workflows.evaluate_settings import load_benchmark
 from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.predict import ground_truth_errors, prediction_model
 from mapfilter.workflows.simulate import simulation_settings
@@ -24,14 +24,14 @@ from mapfilter.workflows.world import World
 EASY = (
     PredictionModel(shadowing_db=6.0),
     GroundTruthErrors(level_error_db=7.0, correlation_m=50.0, clutter="shared"),
-    ImuErrors(sigma_trans_m=0.2),
+    ImuNoise(sigma_trans_m=0.2),
     ReportModel(fading_db=1.0),
     WalkerModel(),
 )
 MODEL, ERRORS, IMU, REPORTS, WALKER = EASY
 HARD = {
-    "heading": {"sigma_orient_rad": radians(10), "heading_correlation_s": 20.0},
-    "scale": {"step_scale_wander_sd": 0.1, "step_scale_correlation_s": 15.0},
+    "heading": {"sigma_orient_deg": 10, "heading_correlation_s": 20.0},
+    "scale": {"step_scale_wander": 0.1, "step_scale_correlation_s": 15.0},
 }
 OWN = replace(ERRORS, clutter="own")
 
@@ -49,8 +49,8 @@ EXPECTED = {
         replace(
             IMU,
             turns="gyro",
-            gyro_noise_rad_per_sqrt_s=radians(0.2),
-            gyro_bias_sd_rad_per_s=radians(0.05),
+            gyro_noise_deg_per_sqrt_s=0.2,
+            gyro_bias_deg_per_s=0.05,
         ),
         REPORTS,
         WALKER,
@@ -120,7 +120,7 @@ def test_a_row_differs_from_the_easy_world_in_what_it_says(name):
     assert change.case == ("levels-nocompass" if name == "gyro" else "levels-6")
     errors = CASES[change.case].errors_in(simulation_settings(config).imu, fixed)
     expected_deg = 10.0 if name in ("heading", "all-but-gyro") else 6.0
-    assert errors.sigma_orient_rad == pytest.approx(radians(expected_deg))
+    assert errors.sigma_orient_deg == expected_deg
     assert CASES[change.case].data_sheet == {"heading_sd_rad": radians(6.0)}
 
 
@@ -135,7 +135,7 @@ def test_the_rows_of_the_plain_world():
         "plain-clutter",
         "plain-noisy-truth",
     }
-    noisy, _ = load_benchmark("plain", None, ["prediction.reality.level_error_db=7.81"])
+    noisy, _ = load_benchmark("plain", None, ["prediction.ground_truth.level_error_db=7.81"])
     assert simulated(load("plain-noisy-truth")[0]) == simulated(noisy)
     assert set(CHANGES) == {*EXPECTED, "plain", "plain-clutter", "plain-noisy-truth"}
     assert all(name == change.name for name, change in CHANGES.items())

@@ -26,9 +26,9 @@ from mapfilter.errors import ConfigError
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.global_positioning import informed
 from mapfilter.positioning.candidate import CandidateFilter
-from mapfilter.simulation.imu import ImuErrors
+from mapfilter.simulation.imu import ImuNoise
+from mapfilter.workflows.evaluate import _refused, load_benchmark
 from mapfilter.workflows.evaluate import _world as prepare_world
-from mapfilter.workflows.evaluate_settings import _refused, load_benchmark
 from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.world import World
 
@@ -91,7 +91,7 @@ def test_every_setting_is_known_to_be_honoured_or_refused():
         *OF_THE_MAP,
         *OF_JOURNEYS,
         *OTHERWISE,
-        *(f"prediction.reality.{name}" for name in OF_THE_GROUND_TRUTH),
+        *(f"prediction.ground_truth.{name}" for name in OF_THE_GROUND_TRUTH),
         *(f"filter.{name}" for name in OF_THE_CANDIDATE),
         *(f"filter.bayes.{name}" for name in OF_BAYES),
     }
@@ -121,9 +121,9 @@ def test_what_has_no_meaning_is_refused_by_name(key, world, tmp_path):
     [
         ("journeys.count=3", "--runs"),
         ("journeys.seed=3", "--seed"),
-        ('journeys.radio="reality"', "ground truth"),
-        ("prediction.reality.write=true", "ground truth"),
-        ("prediction.reality.seed=2", "--seed"),
+        ('journeys.radio="ground_truth"', "ground truth"),
+        ("prediction.ground_truth.write=true", "ground truth"),
+        ("prediction.ground_truth.seed=2", "--seed"),
         ('rasters.path="there.tif"', "predicted here"),
         ('prediction.model="survey"', "predicted here"),
         ('track.path="there"', "simulated here"),
@@ -224,7 +224,7 @@ def test_drivers_are_no_walkers(key):
 def test_settings_of_the_ground_truth(name, world_of):
     value, beside = OF_THE_GROUND_TRUTH[name], GROUND_TRUTH_BESIDE.get(name, {})
     given = {**SMALL, "cells.sectors": 3, **beside}
-    usual, other = world_of(given), world_of({**given, f"prediction.reality.{name}": value})
+    usual, other = world_of(given), world_of({**given, f"prediction.ground_truth.{name}": value})
     assert getattr(other.errors, name) == value
     assert other.sha256 != usual.sha256
     lattice = usual.streets.lattice
@@ -256,10 +256,10 @@ def test_roofs_where_no_building_is_near(world_of, tmp_path):
     file.write_text(json.dumps({"type": "FeatureCollection", "features": [shape]}))
     given = {**SMALL, "area.size_m": [600.0, 600.0], "buildings.layer": str(file)}
     given["buildings.default_height_m"] = 60.0
-    given["prediction.reality.model"] = "cost231_walfisch_ikegami"
+    given["prediction.ground_truth.model"] = "cost231_walfisch_ikegami"
     usual = world_of(given)
     predicted = world_of({**given, "prediction.default_roof_height_m": 20.0})
-    real = world_of({**given, "prediction.reality.default_roof_height_m": 20.0})
+    real = world_of({**given, "prediction.ground_truth.default_roof_height_m": 20.0})
     usual_map, other_map, real_map = (
         sha256_file(made.folder / "database" / "manifest.json") for made in (usual, predicted, real)
     )
@@ -291,9 +291,9 @@ def test_settings_without_a_name_of_their_own_are_not_fixed():
     _, fixed = load({"imu.sigma_trans_m": 0.4, "filter.bayes.map_sd_m": 5.0})
     assert fixed == frozenset()
     _, fixed = load({"imu.sigma_orient_deg": 4.0, "filter.bayes.scale": 0.1})
-    assert fixed == {"sigma_orient_rad", "scale_sd"}
+    assert fixed == {"imu.sigma_orient_deg", "scale_sd"}
     # What a world's own file says holds only where the cases say nothing.
     config, _ = load({})
     assert config.imu.turns == "gyro"
-    world = ImuErrors(sigma_orient_rad=0.5)
-    assert CASES["levels-3"].errors_in(world).sigma_orient_rad == pytest.approx(np.radians(3))
+    world = ImuNoise(sigma_orient_deg=30.0)
+    assert CASES["levels-3"].errors_in(world).sigma_orient_deg == 3

@@ -3,7 +3,6 @@
 import tomllib
 from dataclasses import replace
 from importlib.resources import files
-from math import radians
 
 import numpy as np
 import pytest
@@ -14,11 +13,11 @@ from mapfilter.config.sections import Config
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
-from mapfilter.simulation.imu import ImuErrors
+from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
+from mapfilter.workflows.evaluate import WORLDS, load_benchmark
 from mapfilter.workflows.evaluate import _world as prepare_world
-from mapfilter.workflows.evaluate_settings import WORLDS, load_benchmark
 from mapfilter.workflows.filters import filter_choice
 from mapfilter.workflows.predict import ground_truth_errors, prediction_model
 from mapfilter.workflows.simulate import simulation_settings
@@ -82,20 +81,20 @@ def test_the_plain_world_is_what_it_says():
         offset_db=5.0,
     )
     settings = simulation_settings(config)
-    assert settings.imu == ImuErrors(
+    assert settings.imu == ImuNoise(
         sigma_trans_m=0.2,
-        sigma_orient_rad=radians(3.0),
+        sigma_orient_deg=3.0,
         heading_correlation_s=20.0,
-        step_scale_wander_sd=0.1,
+        step_scale_wander=0.1,
         step_scale_correlation_s=15.0,
         turns="gyro",
-        gyro_noise_rad_per_sqrt_s=radians(0.2),
-        gyro_bias_sd_rad_per_s=radians(0.05),
+        gyro_noise_deg_per_sqrt_s=0.2,
+        gyro_bias_deg_per_s=0.05,
     )
     assert settings.reports == ReportModel(fading_db=3.5, phone_offset_sd_db=4.0)
     assert settings.journey.walker == WalkerModel("pavement", 150.0, 300.0, 20.0)
     assert config.journeys.nlos_satellites is True
-    assert (settings.journey.length_m, settings.imu_period_s) == (1940.0, 1.0)
+    assert (settings.journey.length_m, settings.imu.period_s) == (1940.0, 1.0)
 
 
 def test_the_easy_world_is_the_one_of_before():
@@ -104,7 +103,7 @@ def test_the_easy_world_is_the_one_of_before():
     errors = ground_truth_errors(config.prediction)
     assert errors == GroundTruthErrors(level_error_db=7.0, correlation_m=50.0, clutter="shared")
     settings = simulation_settings(config)
-    assert settings.imu == ImuErrors(sigma_trans_m=0.2)
+    assert settings.imu == ImuNoise(sigma_trans_m=0.2)
     assert settings.reports == ReportModel(fading_db=1.0)
     assert settings.journey.walker == WalkerModel()
     assert config.journeys.nlos_satellites is False
@@ -123,7 +122,7 @@ def test_what_is_given_goes_before_the_world(tmp_path):
     config, _ = load_benchmark("plain", file, ["journeys.fading_db=1.5"])
     assert (config.imu.turns, config.journeys.fading_db) == ("headings", 1.5)
     assert config.imu.heading_correlation_s == 20.0
-    assert config.prediction.reality.offset_db == 5.0
+    assert config.prediction.ground_truth.offset_db == 5.0
 
 
 def test_a_world_that_is_not_there_is_refused(tmp_path):

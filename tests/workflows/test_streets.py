@@ -43,7 +43,7 @@ street = 8.0
 alley = 0.0
 [prediction]
 shadowing_db = 0.0
-[prediction.reality]
+[prediction.ground_truth]
 write = false
 [journeys]
 count = 1

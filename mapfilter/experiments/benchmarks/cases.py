@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import Any
 
 from mapfilter.models.street_motion import MotionErrors
-from mapfilter.simulation.imu import ImuErrors
+from mapfilter.simulation.imu import ImuNoise
 
 _WALKING_MPS = 1.4
 _NOTHING: Mapping[str, float] = MappingProxyType({})
@@ -26,10 +26,9 @@ class Case:
 
     Parameters
     ----------
-    name : str
     imu : mapping of str to float
         Errors of dead reckoning in which the case differs from the simulated world, by their names
-        in :class:`mapfilter.simulation.imu.ImuErrors`.
+        in :class:`mapfilter.simulation.imu.ImuNoise`.
     data_sheet : mapping of str to float
         What is stated of the dead reckoning, by the names of
         :class:`mapfilter.models.street_motion.MotionErrors`.
@@ -64,16 +63,15 @@ class Case:
     satellites: int | None = None
     spoofed: bool = False
 
-    def errors_in(self, world: ImuErrors, fixed: frozenset[str] = frozenset()) -> ImuErrors:
+    def errors_in(self, world: ImuNoise, fixed: frozenset[str] = frozenset()) -> ImuNoise:
         """Return the errors of dead reckoning: the world's, with those of the case.
 
         Parameters
         ----------
-        world : ImuErrors
         fixed : frozenset of str
             Names that were set for all cases.
         """
-        changes: dict[str, Any] = {k: v for k, v in self.imu.items() if k not in fixed}
+        changes: dict[str, Any] = {k: v for k, v in self.imu.items() if f"imu.{k}" not in fixed}
         return replace(world, **changes)
 
     def stated_to(self, motion: MotionErrors, fixed: frozenset[str] = frozenset()) -> MotionErrors:
@@ -91,7 +89,7 @@ class Case:
 
 def _compass(sd_deg: float) -> tuple[Mapping[str, float], Mapping[str, float]]:
     """Return errors and data sheet of a compass of some accuracy."""
-    return {"sigma_orient_rad": radians(sd_deg)}, {"heading_sd_rad": radians(sd_deg)}
+    return {"sigma_orient_deg": sd_deg}, {"heading_sd_rad": radians(sd_deg)}
 
 
 def _biased(
@@ -99,18 +97,17 @@ def _biased(
 ) -> tuple[Mapping[str, float], Mapping[str, float]]:
     """Return errors and data sheet of a unit with a lasting heading error and step scale."""
     errors, sheet = _compass(6.0)
-    drift = radians(drift_deg_per_sqrt_s)
     return (
         {
             **errors,
-            "heading_bias_sd_rad": radians(bias_sd_deg),
-            "heading_drift_rad_per_sqrt_s": drift,
-            "step_scale_sd": scale,
+            "bias_sd_deg": bias_sd_deg,
+            "drift_deg_per_sqrt_s": drift_deg_per_sqrt_s,
+            "scale": scale,
         },
         {
             **sheet,
             "bias_sd_rad": radians(bias_sd_deg),
-            "bias_drift_rad_per_sqrt_m": drift / _WALKING_MPS**0.5,
+            "bias_drift_rad_per_sqrt_m": radians(drift_deg_per_sqrt_s) / _WALKING_MPS**0.5,
             "scale_sd": scale,
         },
     )

@@ -16,8 +16,14 @@ from mapfilter._io import read_json, write_json
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter._resume import start_or_resume
 from mapfilter.experiments.benchmarks.cases import CASES, Case
-from mapfilter.experiments.benchmarks.journeys import displaced_walk, log_of, walk
-from mapfilter.experiments.benchmarks.satellites import TOWN_HEIGHT, spoofer_of, with_satellites
+from mapfilter.experiments.benchmarks.journeys import (
+    TOWN_HEIGHT,
+    displaced_walk,
+    log_of,
+    spoofer_of,
+    walk,
+    with_satellites,
+)
 from mapfilter.experiments.benchmarks.scores import (
     CaseResult,
     Row,
@@ -42,10 +48,6 @@ class Batch:
 
     Parameters
     ----------
-    world : BenchmarkWorld
-    choice : FilterOptions
-    cases : tuple of str
-    seed : int
     first, end : int
         Numbers of the routes.
     fixed : frozenset of str
@@ -100,8 +102,6 @@ def informed(
 
     Parameters
     ----------
-    choice : FilterOptions
-    case : Case
     fixed : frozenset of str
         Options that were set for all cases.
     """
@@ -137,17 +137,12 @@ def benchmark(
 
     Parameters
     ----------
-    world : BenchmarkWorld
-    choice : FilterOptions
     cases : sequence of str
         Names out of :data:`mapfilter.experiments.benchmarks.cases.CASES`.
     runs : int
         Routes for each case, each with a ground truth of its own.
-    seed : int
     out : Path
         Folder in which finished batches are kept.
-    executor : Executor, optional
-    in_flight : int
     resume : bool
         Keep what the same benchmark has finished.
     progress : callable, optional

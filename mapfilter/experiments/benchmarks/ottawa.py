@@ -62,11 +62,8 @@ class OttawaOptions:
 
     Parameters
     ----------
-    filter : BayesOptions
     unmeasured_db : float
         Deviation of a level where its cell was not measured, and only its trend is known.
-    heard : HeardOptions
-    errors : ReckoningErrors
     """
 
     filter: BayesOptions = field(
@@ -99,14 +96,12 @@ class FoundSession:
 
     Parameters
     ----------
-    part, session, method : str
     on_map : float
         Share of all good fixes that lie within 50 m of the map.
     converged, success : bool
         At most 50 m off at the first good fix from CONVERGED on.
     switch_m : float
         Metres by dead reckoning until CONVERGED.
-    error_at_switch_m : float
     lost : int
         Epochs that were LOST.
     error_m : ndarray, shape (N,)
@@ -140,8 +135,6 @@ def surveyed_positioner(
     ----------
     database : RadioRouteDatabase
         Of the other sessions.
-    others : sequence of Session
-    options : OttawaOptions
     deviation : RxLevRasters, optional
         By how much a new reading differs from the map of levels, as the survey tells it; no value
         where a cell was not measured.

@@ -24,10 +24,9 @@ LONGEST_GAP_S = 30.0
 """Nothing is known of the way over a longer silence."""
 _MOST_STEPS = 1282
 _GOOD_M, _MOVED_M = 20.0, 4.0
-_COLUMNS = (
-    "mcc", "mnc", "lac", "cellid", "lat", "lon", "signal", "measured_at", "rating", "speed",
-    "direction", "ta",
-)  # fmt: skip
+_IDENTITY = ("mcc", "mnc", "lac", "cellid")
+_GNSS = ("lat", "lon", "measured_at", "rating", "speed", "direction")
+_COLUMNS = (*_IDENTITY, *_GNSS, "signal", "ta")
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +54,6 @@ class Session:
 
     Parameters
     ----------
-    name : str
-    path : Path
     time_s : ndarray of float64, shape (N,)
         Unix seconds.
     lon_deg, lat_deg, accuracy_m : ndarray
@@ -111,7 +108,7 @@ def read_session(path: Path) -> Session:
         raise fail(InputError, str(path), "two rows or more", len(numbers))
     steps = _column(numbers, "ta")
     told = (steps >= 0) & (steps <= _MOST_STEPS)
-    identity = numbers[["mcc", "mnc", "lac", "cellid"]].astype(np.int64)
+    identity = numbers[list(_IDENTITY)].astype(np.int64)
     return Session(
         path.stem,
         path,
@@ -142,11 +139,8 @@ def session_log(
 
     Parameters
     ----------
-    session : Session
     crs : str
         Of the log.
-    errors : ReckoningErrors
-    rng : numpy.random.Generator
     step_factor : float
         That all steps are multiplied by, as :func:`step_factor_of` learns it of other sessions.
     """
@@ -182,7 +176,6 @@ def step_factor_of(others: Sequence[Session], crs: str) -> float:
     ----------
     others : sequence of Session
         Of the same receiver, but not the one that is to be found.
-    crs : str
     """
     ratios = []
     for other in others:

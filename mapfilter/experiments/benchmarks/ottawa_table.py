@@ -25,7 +25,6 @@ class PartRow:
 
     Parameters
     ----------
-    part : str
     method : str
         ``bayes``: from CONVERGED on; ``smoothed``: whole tracks in hindsight; both also as
         ``-mapped``, of the sessions of which at least half lies within 50 m of where others were;
@@ -65,18 +64,14 @@ class SessionRow:
 
     Parameters
     ----------
-    part, session : str
     on_map : float
         Share of its good fixes within 50 m of where others were.
-    runs, converged, successes : int
     switch_m, error_at_switch_m : float
         Medians over the runs that converged.
     n : int
         Fixes scored from CONVERGED on.
-    median_m, coverage_95 : float
     smoothed_m : float
         Median error of the whole track in hindsight.
-    centroid_m : float
     lost : int
         Epochs that were LOST.
     """
@@ -104,7 +99,6 @@ def part_rows(
 
     Parameters
     ----------
-    part : str
     found : sequence of FoundSession
         Of this part, by all methods.
     centroid_m : dict of str to ndarray
@@ -209,10 +203,8 @@ class LeftOut:
 
     Parameters
     ----------
-    session : str
     centroid_m : ndarray
         Errors of the centroids of its serving cells.
-    found : tuple of FoundSession
     """
 
     session: str

@@ -10,13 +10,14 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.evaluation.accuracy import (
+    RADII,
     SUCCESS_RADIUS_M,
     Truth,
     accuracy,
     percentile_m,
     position_errors_m,
+    score_claims,
 )
-from mapfilter.evaluation.claims import RADII, score_claims
 from mapfilter.evaluation.success import wilson_interval_of_routes
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.benchmarks.journeys import Walk
@@ -37,8 +38,6 @@ class CaseResult:
 
     Parameters
     ----------
-    name, filter : str
-    runs : int
     success, success_low, success_high : float
         Share of the runs that were at most 50 m off when they converged; in the cases of a
         displacement, within 50 m again, and for 10 s, soon enough.
@@ -59,7 +58,6 @@ class CaseResult:
         Share of the claimed epochs that were at most 50 m off.
     coverage_50, coverage_67, coverage_95 : float
         Share of the claimed epochs whose radius held the truth.
-    coverage_95_low, coverage_95_high : float
     false_converged_per_journey, false_converged_per_km : float
         How often a claim began more than 50 m off, also after LOST.
     false_lost_per_journey, false_lost_per_km : float

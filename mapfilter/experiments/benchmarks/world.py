@@ -95,7 +95,6 @@ class BenchmarkWorld:
 
         Parameters
         ----------
-        seed : int
         level_error_db : float, optional
             Deviation of the shadowing, in place of the world's.
         """
@@ -149,13 +148,10 @@ def without_ways(
 
     Parameters
     ----------
-    routes : RouteLattice
     ways : Ways
         In the lattice's CRS.
     share : float
         Each way is missing with this probability; parts of one way go together.
-    half_width_m : float
-    rng : numpy.random.Generator
     """
     ids = np.unique(ways.way_id)
     gone = ids[rng.random(ids.size) < share]

@@ -51,7 +51,7 @@ CLAIMS = ((3.0, 0.80), (6.0, 0.65))
 TABLE_4_M = {"error_mean_m": (15.0, 20.0), "error_67_m": (14.0, 20.0), "error_95_m": (52.0, 56.0)}
 """Table 4: ranges over the cases that succeed."""
 
-REALITY = Radio("reality", math.nan)
+GROUND_TRUTH = Radio("ground truth", math.nan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,9 +122,9 @@ def plans(trials: int, seed: int) -> tuple[SweepPlan, ...]:
         main,
         one_route,
         replace(some, readings=left_open),
-        replace(some, readings=realistic, radios=(REALITY,)),
+        replace(some, readings=realistic, radios=(GROUND_TRUTH,)),
         replace(each_second, readings=at_1_hz),
-        replace(each_second, readings=realistic_1_hz, radios=(REALITY,)),
+        replace(each_second, readings=realistic_1_hz, radios=(GROUND_TRUTH,)),
     )
 
 

@@ -1,8 +1,8 @@
-"""The journeys of a sweep: routes with their truth and what is heard there, made once for many.
+"""Journeys of a sweep: routes with their truth and received levels, simulated once for many runs.
 
-Names and values are hashed, not places in the grid: another row, another order, another number of
-runs change no run that was there before. Filters see the same logs: neither the filter nor the
-database enters what a run's unit and phone say.
+Random streams are named by names and values, not by places in the grid: another row, another order,
+another number of runs change no run that was there before. All filters and databases see the same
+logs.
 """
 
 from __future__ import annotations
@@ -29,63 +29,34 @@ def route_rng(seed: int, route: int) -> np.random.Generator:
     return named_rng(seed, "route", str(route))
 
 
-def walker_rng(seed: int, route: int) -> np.random.Generator:
-    """Return the generator of how a route is walked."""
-    return named_rng(seed, "walker", str(route))
-
-
 def radio_rng(seed: int, route: int, radio: Radio, report_period_s: float) -> np.random.Generator:
     """Return the generator of what a phone measures along a route: once, as one measures once."""
-    return named_rng(seed, "radio", str(route), radio.name, _value(report_period_s))
+    return named_rng(seed, "radio", str(route), radio.stream, _value(report_period_s))
 
 
 def imu_rng(seed: int, run: Run) -> np.random.Generator:
-    """Return the generator of a run's inertial unit.
-
-    Examples
-    --------
-    >>> from mapfilter.experiments.sweep.plan import Noise, Reading, Run
-    >>> from mapfilter.positioning.candidate import CandidateFilter
-    >>> reading = Reading("as printed", CandidateFilter())
-    >>> run = Run(Radio(), 1.0, 0, 1.0, Noise(), 0, "database", reading)
-    >>> other = Run(Radio(), 1.0, 0, 1.0, Noise(), 0, "another", reading)
-    >>> imu_rng(1, run).normal() == imu_rng(1, other).normal()
-    True
-    """
-    noise = run.noise
-    values = (
-        noise.sigma_trans_m,
-        noise.sigma_orient_deg,
-        noise.bias_sd_deg,
-        noise.drift_deg_per_sqrt_s,
-        noise.scale,
-        run.imu_period_s,
-    )
+    """Return the generator of a run's inertial unit: of its noise, not of filter and database."""
+    values = (*_noise(run), run.imu_period_s)
     return named_rng(seed, "imu", str(run.route), str(run.draw), *map(_value, values))
 
 
 def filter_rng(seed: int, run: Run) -> np.random.Generator:
     """Return the generator of a run's filter."""
+    reading = run.reading
+    names = run.radio.stream, run.database, reading.name
+    values = reading.update_length_m, run.report_period_s, run.imu_period_s, *_noise(run)
+    return named_rng(seed, "filter", str(run.route), str(run.draw), *names, *map(_value, values))
+
+
+def _noise(run: Run) -> tuple[float, ...]:
     noise = run.noise
-    names = (
-        run.radio.name,
-        run.database,
-        run.reading.name,
-        _value(run.reading.update_length_m),
-        _value(run.report_period_s),
-        _value(run.imu_period_s),
-        *map(
-            _value,
-            (
-                noise.sigma_trans_m,
-                noise.sigma_orient_deg,
-                noise.bias_sd_deg,
-                noise.drift_deg_per_sqrt_s,
-                noise.scale,
-            ),
-        ),
+    return (
+        noise.sigma_trans_m,
+        noise.sigma_orient_deg,
+        noise.bias_sd_deg,
+        noise.drift_deg_per_sqrt_s,
+        noise.scale,
     )
-    return named_rng(seed, "filter", str(run.route), str(run.draw), *names)
 
 
 def _value(number: float) -> str:
@@ -101,10 +72,10 @@ def true_path(world: SweepWorld, plan: SweepPlan, number: int) -> pd.DataFrame:
     InputError
         One cannot go as far as the plan wants.
     """
-    settings = plan.journey
-    rng = route_rng(plan.seed, number)
+    settings, seed = plan.journey, plan.seed
+    rng = route_rng(seed, number)
     along = route(world.network, settings.length_m, rng, leg_m=settings.leg_m)
-    return journey(along, settings, walker_rng(plan.seed, number), world.inside)
+    return journey(along, settings, named_rng(seed, "walker", str(number)), world.inside)
 
 
 def heard(
@@ -118,8 +89,8 @@ def heard(
     """Return the log of a journey without its motion: what the phone reports, and the truth."""
     model = replace(
         plan.reports,
-        period_s=report_period_s,
-        radio="as_predicted" if radio.name == AS_PREDICTED else "reality",
+        report_period_s=report_period_s,
+        radio="as_predicted" if radio.name == AS_PREDICTED else "ground_truth",
     )
     levels = array_sampler(world.levels_dbm[radio.name], world.lattice)
     rng = radio_rng(plan.seed, number, radio, report_period_s)
@@ -132,9 +103,8 @@ def sensed(plan: SweepPlan, log: TrackLog, run: Run) -> TrackLog:
 
     What was checked once is not checked again for each run.
     """
-    errors = run.noise.errors(plan.imu)
     ticks = at_ticks(log.truth, run.imu_period_s)
-    return replace(log, motion=noisy_motion(ticks, errors, imu_rng(plan.seed, run)))
+    return replace(log, motion=noisy_motion(ticks, run.noise, imu_rng(plan.seed, run)))
 
 
 def truth_of(truth: pd.DataFrame) -> Truth:

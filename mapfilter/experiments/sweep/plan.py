@@ -1,4 +1,4 @@
-"""What a sweep runs: a grid of worlds, noises and filters, and so many runs in each cell of it."""
+"""Plan of a sweep: a grid of radio worlds, inertial noises and filters, and runs in each cell."""
 
 from __future__ import annotations
 
@@ -8,15 +8,13 @@ import itertools
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
-from math import ceil, isfinite, prod, radians
-from typing import Literal
+from math import ceil, isfinite, prod
 
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.positioning.filter import FilterOptions
-from mapfilter.simulation.imu import ImuErrors
+from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
-from mapfilter.simulation.walking import WalkerModel
 
 AS_PREDICTED = "as_predicted"
 """The radio world in which each place is served by the cell predicted best there."""
@@ -30,53 +28,24 @@ _MOST_RUNS = 100_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Noise:
-    """How wrong the inertial unit is; see :class:`mapfilter.simulation.imu.ImuErrors`.
-
-    Parameters
-    ----------
-    sigma_trans_m, sigma_orient_deg : float
-        White noise of each step and heading.
-    bias_sd_deg : float
-        Deviation of a journey's constant heading error.
-    drift_deg_per_sqrt_s : float
-        Of the heading error's random walk.
-    scale : float
-        Deviation of a journey's step scale.
-    """
-
-    sigma_trans_m: float = 0.2
-    sigma_orient_deg: float = 3.0
-    bias_sd_deg: float = 0.0
-    drift_deg_per_sqrt_s: float = 0.0
-    scale: float = 0.0
-
-    def errors(self, others: ImuErrors) -> ImuErrors:
-        """Return the same in the units of the simulation, beside errors that are not swept."""
-        return replace(
-            others,
-            sigma_trans_m=self.sigma_trans_m,
-            sigma_orient_rad=radians(self.sigma_orient_deg),
-            heading_bias_sd_rad=radians(self.bias_sd_deg),
-            heading_drift_rad_per_sqrt_s=radians(self.drift_deg_per_sqrt_s),
-            step_scale_sd=self.scale,
-        )
-
-
-@dataclass(frozen=True, slots=True)
 class Radio:
-    """What the phone hears: a set of levels, by name.
+    """A set of levels that the phone receives, by name.
 
     Parameters
     ----------
     name : str
-        ``as_predicted``, or that of a set of levels that plays reality.
+        ``as_predicted``, or that of a set of simulated ground truth levels.
     prediction_error_db : float
-        Deviation of reality from the prediction; NaN where it is not known.
+        Deviation of the ground truth from the prediction; NaN where it is not known.
     """
 
     name: str = AS_PREDICTED
     prediction_error_db: float = 0.0
+
+    @property
+    def stream(self) -> str:
+        """Part of the names of random streams: that of the first release, so that results stay."""
+        return self.name.replace("ground truth", "reality")
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +54,6 @@ class Reading:
 
     Parameters
     ----------
-    name : str
-    choice : FilterOptions
     update_length_m : float
         Of the filter; NaN where it knows none.
     """
@@ -104,7 +71,7 @@ class Run:
     report_period_s: float
     route: int
     imu_period_s: float
-    noise: Noise
+    noise: ImuNoise
     draw: int
     database: str
     reading: Reading
@@ -120,44 +87,37 @@ class SweepPlan:
         Filters; their names with their update lengths tell them apart.
     databases : tuple of str
         Names of the radio-route databases.
-    noises : tuple of Noise
-    radios : tuple of Radio
-    report_periods_s : tuple of float
+    noises : tuple of ImuNoise
+        Their ``period_s`` is replaced by that of ``imu_periods_s``.
     imu_periods_s : tuple of float
         None takes each report period.
     routes, draws : int
         Routes, and runs on each of them with every setting; they differ in noise only.
-    length_m, profile, speed_mps
-        Of the journeys; see :class:`mapfilter.simulation.journeys.JourneyPlan`.
     reports : ReportModel
         Its period and ``radio`` are replaced by the grid's.
-    imu : ImuErrors
-        Those of its errors that are not in ``noises``.
-    walker : WalkerModel
-    seed : int
+    varied : tuple of (str, float)
+        Options in which this plan differs from others of the same sweep, by dotted key; they become
+        columns of the table.
 
     Raises
     ------
     ConfigError
-        With everything that is wrong: an axis without values or with a value twice, a noise that
-        is impossible, more than 1e8 runs.
+        With everything that is wrong: an axis without values or with a value twice, more than 1e8
+        runs.
     """
 
     readings: tuple[Reading, ...]
     databases: tuple[str, ...] = ("database",)
-    noises: tuple[Noise, ...] = (Noise(),)
+    noises: tuple[ImuNoise, ...] = (ImuNoise(),)
     radios: tuple[Radio, ...] = (Radio(),)
     report_periods_s: tuple[float, ...] = (1.0,)
     imu_periods_s: tuple[float, ...] | None = None
     routes: int = 1
     draws: int = 100
-    length_m: float = 1940.0
-    profile: Literal["walking", "driving"] = "walking"
-    speed_mps: float = 1.4
+    journey: JourneyPlan = field(default_factory=JourneyPlan)
     reports: ReportModel = field(default_factory=ReportModel)
-    imu: ImuErrors = field(default_factory=ImuErrors)
-    walker: WalkerModel = field(default_factory=WalkerModel)
     seed: int = 0
+    varied: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
         faults = Faults()
@@ -182,15 +142,6 @@ class SweepPlan:
         for period_s in (*self.report_periods_s, *(self.imu_periods_s or ())):
             if not (isfinite(period_s) and period_s > 0):
                 faults.add("sweep, period", "seconds > 0", period_s)
-        for noise in self.noises:
-            try:
-                noise.errors(self.imu)
-            except ConfigError as error:
-                faults.found.extend(error.faults)
-        try:
-            _ = self.journey
-        except ConfigError as error:
-            faults.found.extend(error.faults)
         if self.seed < 0:
             faults.add("sweep, seed", "a whole number >= 0", self.seed)
         if not faults.found and self.runs > _MOST_RUNS:
@@ -215,16 +166,6 @@ class SweepPlan:
     def runs(self) -> int:
         """Runs in all."""
         return prod(self.shape)
-
-    @property
-    def journey(self) -> JourneyPlan:
-        """How far and how fast each journey goes."""
-        return JourneyPlan(
-            length_m=self.length_m,
-            profile=self.profile,
-            speed_mps=self.speed_mps,
-            walker=self.walker,
-        )
 
     def batches(self) -> Iterator[tuple[int, int]]:
         """Yield first run and end of each batch: together all runs, in order.
@@ -265,14 +206,14 @@ class SweepPlan:
             )
 
     @property
-    def told(self) -> str:
-        """All of the plan as JSON, in one form only."""
-        return json.dumps(_told(self), sort_keys=True)
+    def as_json(self) -> str:
+        """The whole plan as JSON, always in the same form."""
+        return json.dumps(_plain(self), sort_keys=True)
 
     @property
     def digest(self) -> str:
         """SHA-256 of the plan."""
-        return hashlib.sha256(self.told.encode()).hexdigest()
+        return hashlib.sha256(self.as_json.encode()).hexdigest()
 
 
 def noise_grid(
@@ -281,8 +222,10 @@ def noise_grid(
     bias_sd_deg: Sequence[float] = (0.0,),
     drift_deg_per_sqrt_s: Sequence[float] = (0.0,),
     scale: Sequence[float] = (0.0,),
-) -> tuple[Noise, ...]:
-    """Return every combination, the last axis changing fastest.
+    *,
+    others: ImuNoise | None = None,
+) -> tuple[ImuNoise, ...]:
+    """Return every combination, the last axis changing fastest; ``others`` gives what is not here.
 
     Examples
     --------
@@ -290,18 +233,28 @@ def noise_grid(
     [0.0, 3.0, 0.0, 3.0]
     """
     axes = sigma_trans_m, sigma_orient_deg, bias_sd_deg, drift_deg_per_sqrt_s, scale
-    return tuple(Noise(*map(float, values)) for values in itertools.product(*axes))
+    return tuple(
+        replace(
+            others or ImuNoise(),
+            sigma_trans_m=float(step_m),
+            sigma_orient_deg=float(heading_deg),
+            bias_sd_deg=float(bias_deg),
+            drift_deg_per_sqrt_s=float(drift),
+            scale=float(scale_sd),
+        )
+        for step_m, heading_deg, bias_deg, drift, scale_sd in itertools.product(*axes)
+    )
 
 
-def _told(value: object) -> object:
-    """Return a plan's part as JSON knows it; the kind of each dataclass is told, too."""
+def _plain(value: object) -> object:
+    """Return a part of a plan as JSON values; dataclasses name their kind."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        inner = {one.name: _told(getattr(value, one.name)) for one in fields(value)}
+        inner = {one.name: _plain(getattr(value, one.name)) for one in fields(value)}
         return {"kind": type(value).__name__, **inner}
     if isinstance(value, tuple | list):
-        return [_told(item) for item in value]
+        return [_plain(item) for item in value]
     if isinstance(value, str | int | None):
         return value
     if isinstance(value, float):
         return repr(value)
-    return {str(key): _told(item) for key, item in dict(value).items()}  # type: ignore[call-overload]
+    return {str(key): _plain(item) for key, item in dict(value).items()}  # type: ignore[call-overload]

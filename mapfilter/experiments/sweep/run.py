@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import lru_cache
@@ -17,6 +19,7 @@ import pyarrow as pa
 from mapfilter._io import ensure_writable_folder, sha256_file
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter._resume import start_or_resume
+from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.errors import StoreError, fail
 from mapfilter.evaluation.accuracy import accuracy
@@ -39,6 +42,7 @@ _DETERMINED_BY = {
     "version": "version of mapfilter",
 }
 _WORLDS, _LOCATORS, _PATHS = 1, 32, 2
+_TRIAL_RUNS = 8
 
 
 @dataclass(frozen=True)
@@ -47,7 +51,6 @@ class Batch:
 
     Parameters
     ----------
-    plan : SweepPlan
     world : Path
         Folder of the world.
     world_sha256 : str
@@ -87,12 +90,12 @@ def run_batch(batch: Batch) -> pa.Table:
             filter_ = _filter(*databases[run.database], run.reading.choice)
             found = locate(sensed(plan, log, run), filter_, filter_rng(plan.seed, run)).estimate
             last = str(found.status[-1]) if len(found) else ""
-            rows.append(table.row(run, accuracy(found, truth), last))
-    return table.to_table(rows)
+            rows.append(table.row(run, accuracy(found, truth), last, plan.varied))
+    return table.to_table(rows, table.schema_of(key for key, _ in plan.varied))
 
 
 def sweep(
-    plan: SweepPlan,
+    plans: SweepPlan | Sequence[SweepPlan],
     world: SweepWorld,
     databases: Mapping[str, Path],
     out: Path,
@@ -102,26 +105,33 @@ def sweep(
     resume: bool = False,
     progress: Progress | None = None,
 ) -> Path:
-    """Do all runs of a plan and return the path of their table.
+    """Do all runs of a sweep and return the path of their table.
 
     Parameters
     ----------
-    plan : SweepPlan
+    plans : SweepPlan or sequence of SweepPlan
+        Several where options are varied: they name the same databases and the same varied options.
     world : SweepWorld
-        With levels for each of the plan's radios.
+        With levels for each of the plans' radios.
     databases : mapping of str to Path
-        Folder of each of the plan's databases.
+        Folder of each of the plans' databases.
     out : Path
-        Gets ``runs.parquet`` and ``sweep.json``; what is unfinished lies in ``unfinished``.
+        Gets ``runs.parquet`` and ``sweep.json``; unfinished parts lie in ``unfinished``.
     executor : Executor, optional
         Does the batches; without one, this process. Its workers must reach ``out`` and the
         databases by the same paths.
     in_flight : int
         Batches that are handed out at once.
     resume : bool
-        Keep what a sweep of the same plan over the same world has finished.
+        Keep the finished parts of a sweep of the same plans over the same world.
     progress : callable, optional
         Called with runs done and runs in all.
+
+    Returns
+    -------
+    Path
+        Of the table; :func:`mapfilter.experiments.sweep.table.read_runs` returns it as a data
+        frame.
 
     Raises
     ------
@@ -130,44 +140,97 @@ def sweep(
     MapfilterError
         A database cannot be read, or the output cannot be written.
     """
+    grid = (plans,) if isinstance(plans, SweepPlan) else tuple(plans)
+    schema = table.schema_of(key for key, _ in grid[0].varied)
+    total = sum(plan.runs for plan in grid)
     unfinished = out / UNFINISHED
     stamp = write_world(world, unfinished / "world")
-    manifests = {name: sha256_file(databases[name] / "manifest.json") for name in plan.databases}
+    manifests = {name: sha256_file(databases[name] / "manifest.json") for name in grid[0].databases}
     head = {
         "version": _VERSION,
-        "runs": plan.runs,
-        "plan_sha256": plan.digest,
+        "runs": total,
+        "plan_sha256": [plan.digest for plan in grid],
         "world_sha256": stamp,
         "databases_sha256": manifests,
-        "plan": plan.told,
+        "plan": [plan.as_json for plan in grid],
     }
     batches = unfinished / "batches"
-    parts = [
-        (batches / f"{number:06d}.parquet", first, end)
-        for number, (first, end) in enumerate(plan.batches())
+    opened = tuple((databases[name], digest) for name, digest in manifests.items())
+    tasks = [
+        Batch(plan, unfinished / "world", stamp, opened, first, end)
+        for plan in grid
+        for first, end in plan.batches()
     ]
+    parts = [batches / f"{number:06d}.parquet" for number in range(len(tasks))]
     older = [out / RUNS, *(batches.glob("*") if batches.is_dir() else ())]
     resumed = start_or_resume(out / HEAD, head, older, resume=resume, names=_DETERMINED_BY)
-    if resumed and table.is_part(out / RUNS, plan.runs):
+    if resumed and table.is_part(out / RUNS, total, schema):
         shutil.rmtree(unfinished, ignore_errors=True)
         return out / RUNS
     ensure_writable_folder(batches)
-    todo = [part for part in parts if not table.is_part(part[0], part[2] - part[1])]
-    opened = tuple((databases[name], manifests[name]) for name in plan.databases)
-    place = unfinished / "world"
-    tasks = [Batch(plan, place, stamp, opened, first, end) for _, first, end in todo]
-    done = plan.runs - sum(end - first for _, first, end in todo)
+    todo = [
+        (part, task)
+        for part, task in zip(parts, tasks, strict=True)
+        if not table.is_part(part, task.end - task.first, schema)
+    ]
+    done = total - sum(task.end - task.first for _, task in todo)
     if progress is not None:
-        progress(done, plan.runs)
-    found = ordered_results(executor or SerialExecutor(), run_batch, tasks, in_flight=in_flight)
-    for (path, first, end), rows in zip(todo, found, strict=True):
-        table.write_part(rows, path)
-        done += end - first
+        progress(done, total)
+    found = ordered_results(
+        executor or SerialExecutor(), run_batch, [task for _, task in todo], in_flight=in_flight
+    )
+    for (part, task), rows in zip(todo, found, strict=True):
+        table.write_part(rows, part)
+        done += task.end - task.first
         if progress is not None:
-            progress(done, plan.runs)
-    table.join_parts((path for path, _, _ in parts), out / RUNS)
+            progress(done, total)
+    table.join_parts(parts, out / RUNS, schema)
     shutil.rmtree(unfinished, ignore_errors=True)
     return out / RUNS
+
+
+def sweep_runs(
+    plans: SweepPlan | Sequence[SweepPlan],
+    world: SweepWorld,
+    databases: Mapping[str, RadioRouteDatabase],
+    *,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> pd.DataFrame:
+    """Do all runs of a sweep and return one row for each run; nothing is kept on disk.
+
+    Parameters
+    ----------
+    plans, world, executor, progress
+        As for :func:`sweep`; see :meth:`SweepWorld.of` for a world of your own objects.
+    databases : mapping of str to RadioRouteDatabase
+        Each of the plans' databases.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The columns of :data:`mapfilter.experiments.sweep.table.SCHEMA` and those of varied options.
+        :func:`mapfilter.evaluation.success.success_cells` gives success rates with intervals.
+    """
+    folders = {name: database.path for name, database in databases.items()}
+    with tempfile.TemporaryDirectory(prefix="mapfilter-sweep-") as name:
+        done = sweep(plans, world, folders, Path(name), executor=executor, progress=progress)
+        return table.read_runs(done)
+
+
+def seconds_per_run(plan: SweepPlan, world: SweepWorld, databases: Mapping[str, Path]) -> float:
+    """Measure a few runs of a plan in this process, after one that opens files and compiles."""
+    with tempfile.TemporaryDirectory(prefix="mapfilter-trial-") as name:
+        folder = Path(name) / "world"
+        stamp = write_world(world, folder)
+        opened = tuple(
+            (databases[name], sha256_file(databases[name] / "manifest.json"))
+            for name in plan.databases
+        )
+        for runs in (1, min(_TRIAL_RUNS, plan.runs)):
+            began_s = time.perf_counter()
+            run_batch(Batch(plan, folder, stamp, opened, 0, runs))
+        return (time.perf_counter() - began_s) / runs
 
 
 def _journey(run: Run) -> tuple[Radio, float, int]:

@@ -1,4 +1,4 @@
-"""The table of a sweep: one tidy row for each run, in Parquet."""
+"""Table of a sweep: one tidy row for each run, in Parquet."""
 
 from __future__ import annotations
 
@@ -46,13 +46,27 @@ SCHEMA = pa.schema(
         ("final_status", _TEXT),
     ]
 )
-"""Columns: where the run lies in the grid, then what came of it; null where that is undefined."""
+"""Columns: coordinates of the run in the grid, then its results; null where undefined.
+
+Varied options are further columns, named by their dotted keys, before ``route``.
+"""
 
 _GROUP_ROWS = 100_000
+_VARIED_AT = SCHEMA.get_field_index("route")
 
 
-def row(run: Run, score: Accuracy, final_status: str) -> tuple[Any, ...]:
-    """Return a run's row, in the order of :data:`SCHEMA`."""
+def schema_of(varied: Iterable[str]) -> pa.Schema:
+    """Return the columns of a sweep that varies some options."""
+    schema = SCHEMA
+    for place, key in enumerate(varied):
+        schema = schema.insert(_VARIED_AT + place, pa.field(key, _FLOAT))
+    return schema
+
+
+def row(
+    run: Run, score: Accuracy, final_status: str, varied: Iterable[tuple[str, float]] = ()
+) -> tuple[Any, ...]:
+    """Return a run's row, in the order of :func:`schema_of`."""
     noise, reading = run.noise, run.reading
     return (
         run.database,
@@ -68,6 +82,7 @@ def row(run: Run, score: Accuracy, final_status: str) -> tuple[Any, ...]:
         noise.bias_sd_deg,
         noise.drift_deg_per_sqrt_s,
         noise.scale,
+        *(float(value) for _, value in varied),
         run.route,
         run.draw,
         score.switched,
@@ -83,14 +98,14 @@ def row(run: Run, score: Accuracy, final_status: str) -> tuple[Any, ...]:
     )
 
 
-def to_table(rows: Sequence[tuple[Any, ...]]) -> pa.Table:
+def to_table(rows: Sequence[tuple[Any, ...]], schema: pa.Schema = SCHEMA) -> pa.Table:
     """Return rows as a table; NaN becomes null."""
     columns = zip(*rows, strict=True)
     arrays = [
         pa.array(column, type=field.type, from_pandas=True)
-        for column, field in zip(columns, SCHEMA, strict=True)
+        for column, field in zip(columns, schema, strict=True)
     ]
-    return pa.Table.from_arrays(arrays, schema=SCHEMA)
+    return pa.Table.from_arrays(arrays, schema=schema)
 
 
 def write_part(table: pa.Table, path: Path) -> None:
@@ -99,7 +114,7 @@ def write_part(table: pa.Table, path: Path) -> None:
         pq.write_table(table, temporary, compression="zstd")
 
 
-def is_part(path: Path, rows: int) -> bool:
+def is_part(path: Path, rows: int, schema: pa.Schema = SCHEMA) -> bool:
     """Tell whether a batch's rows lie there, whole."""
     if not path.is_file():
         return False
@@ -107,18 +122,18 @@ def is_part(path: Path, rows: int) -> bool:
         found = pq.read_metadata(path)
     except (OSError, pa.ArrowInvalid):
         return False
-    return bool(found.num_rows == rows and found.schema.to_arrow_schema().equals(SCHEMA))
+    return bool(found.num_rows == rows and found.schema.to_arrow_schema().equals(schema))
 
 
-def join_parts(parts: Iterable[Path], path: Path) -> None:
+def join_parts(parts: Iterable[Path], path: Path, schema: pa.Schema = SCHEMA) -> None:
     """Put the parts together, in their order, holding only some of them in memory."""
     waiting: list[pa.Table] = []
     with (
         atomic_file(path) as temporary,
-        pq.ParquetWriter(temporary, SCHEMA, compression="zstd") as writer,
+        pq.ParquetWriter(temporary, schema, compression="zstd") as writer,
     ):
         for part in parts:
-            waiting.append(pq.read_table(part, schema=SCHEMA))
+            waiting.append(pq.read_table(part, schema=schema))
             if sum(map(len, waiting)) >= _GROUP_ROWS:
                 writer.write_table(pa.concat_tables(waiting).combine_chunks())
                 waiting = []

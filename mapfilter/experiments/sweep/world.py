@@ -12,17 +12,16 @@ import numpy as np
 from mapfilter._io import atomic_dir, read_json, sha256_file, write_json
 from mapfilter._types import Floats32
 from mapfilter.database.store import read_cells, write_cells
-from mapfilter.errors import StoreError, fail
+from mapfilter.errors import InputError, StoreError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
+from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.network import StreetNetwork
 from mapfilter.simulation.walking import Inside, inside_buildings
 
 _HEAD, _CELLS, _STREETS = "world.json", "cells.parquet", "streets.npz"
 _HEIGHTS = "heights.npy"
-_ARRAYS = (
-    "east_m", "north_m", "node_a", "node_b", "length_m", "way_id", "way_class", "oneway",
-)  # fmt: skip
+_ARRAYS = ["east_m", "north_m", "node_a", "node_b", "length_m", "way_id", "way_class", "oneway"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +32,6 @@ class SweepWorld:
     ----------
     network : StreetNetwork
         In the lattice's CRS.
-    plan : CellPlan
     lattice : Lattice
         Of the levels.
     levels_dbm : mapping of str to ndarray, shape (cells, rows, cols)
@@ -47,6 +45,24 @@ class SweepWorld:
     lattice: Lattice
     levels_dbm: Mapping[str, Floats32]
     heights_m: Floats32 | None = None
+
+    @classmethod
+    def of(
+        cls,
+        network: StreetNetwork,
+        plan: CellPlan,
+        rasters: Mapping[str, RxLevRasters],
+        heights_m: Floats32 | None = None,
+    ) -> SweepWorld:
+        """Read the levels of a sweep, by the names of its radios, from rasters of one lattice."""
+        lattices = {one.lattice for one in rasters.values()}
+        if len(lattices) != 1:
+            raise fail(InputError, "rasters", "one lattice for all", f"{len(lattices)} of them")
+        levels_dbm = {
+            name: np.asarray(one.read_levels_dbm(plan, None, plan.ids), dtype=np.float32)
+            for name, one in rasters.items()
+        }
+        return cls(network, plan, lattices.pop(), levels_dbm, heights_m)
 
     @property
     def inside(self) -> Inside | None:

@@ -296,7 +296,7 @@ def sky_over(
         return None, tuple(unused)
     east, north = middle_m[0] + origin_m[0], middle_m[1] + origin_m[1]
     frame = GridFrame(crs, east, north, options.height_m)
-    local = frame.satellites_m(np.array([row.place_m for row in chosen.values()]))
+    local = frame.local.to_local(np.array([row.place_m for row in chosen.values()]))
     seen = directions(local)
     sky = Sky(
         tuple(chosen),

@@ -1,23 +1,32 @@
-"""The map filter's model in NumPy, and a step of it by other particle-filter packages."""
+"""A step of the Bayes map filter against NumPy, particles and Stone Soup, with the same model.
+
+Run by hand, after ``pip install particles stonesoup``: ``python benchmarks/bayes_peers.py``.
+Nanoseconds per particle are medians over repetitions that take turns; packages that are not
+installed are left out.
+"""
 
 from __future__ import annotations
 
 import importlib.util
+import tempfile
+import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import datetime, timedelta
 from functools import cached_property
 from math import exp
+from pathlib import Path
+from statistics import median
 from typing import Any
 
 import numpy as np
 
 from mapfilter._types import Floats, Ints
-from mapfilter.filters.contract import MotionStep
-from mapfilter.models.fingerprint import LevelReading, log_serving
+from mapfilter.database.store import open_database
+from mapfilter.models.fingerprint import log_serving
 from mapfilter.models.street_motion import BIAS, EAST, LOG_SCALE, NORTH, OFF
-from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.options import BayesOptions, open_area
+from mapfilter.tracks.store import read_log
+from mapfilter.workflows.bench_filter import StepInputs, make_world, step_inputs, whole_step
 
 Step = Callable[[Floats], Floats]
 """From equally weighted particles, shape (6, N), to those after a whole step."""
@@ -26,27 +35,17 @@ MAP = 5
 """Row of a step's log-likelihood of the map, after the rows of the model's own state."""
 
 _NEW_ROWS = 4
+_RUNS, _PACKAGE_STEPS = 5, 10
+_JITTER = (0.5, 0.5, 0.005, 0.003, 0.0)
 _TABLE_DB, _PER_DB = 64, 4
 
 
-@dataclass(frozen=True, eq=False)
 class NumpyModel:
-    """One step of the Bayes map filter's model, by whole arrays.
+    """One step of the Bayes map filter's model, by whole arrays."""
 
-    Parameters
-    ----------
-    model : BayesModel
-    motion : MotionStep
-    reading : RadioReading
-        With a serving cell and levels.
-    levels : LevelReading
-        Those of the reading.
-    """
-
-    model: BayesModel
-    motion: MotionStep
-    reading: RadioReading
-    levels: LevelReading
+    def __init__(self, inputs: StepInputs) -> None:
+        self.model, self.motion = inputs.model, inputs.motion
+        self.reading, self.levels = inputs.reading, inputs.levels
 
     @cached_property
     def _serving(self) -> Floats:
@@ -94,8 +93,8 @@ class NumpyModel:
         v = np.clip(v, -levels.clip, levels.clip)
         common = levels.common
         shared = common / (1 + (levels.cell.size - 1) * common) * v.sum(axis=1) ** 2
-        told = -0.5 * levels.weight / (1 - common) * ((v**2).sum(axis=1) - shared)
-        return np.asarray(state[MAP] + served + told)
+        matched = -0.5 * levels.weight / (1 - common) * ((v**2).sum(axis=1) - shared)
+        return np.asarray(state[MAP] + served + matched)
 
     def _mapped(self, state: Floats, off: Floats, length_m: float) -> tuple[Floats, Floats]:
         lattice, raster = self.model.area.lattice, self.model.log_map
@@ -122,7 +121,7 @@ class NumpyModel:
 
 
 def numpy_step(model: NumpyModel, jitter: Floats, rng: np.random.Generator) -> Step:
-    """Return a whole step in NumPy: move, weigh, normalise, resample, part the copies."""
+    """Return a whole step in NumPy: move, weigh, normalise, resample, jitter the copies."""
 
     def step(state: Floats) -> Floats:
         moved = model.move(state, rng)
@@ -216,7 +215,7 @@ def stone_soup_step(model: NumpyModel, rng: np.random.Generator) -> Step | None:
     later = began + timedelta(seconds=1)
     predictor = ParticlePredictor(Walk())
     updater = ParticleUpdater(measurement_model=ReportRow(), resampler=SystematicResampler())
-    heard = Detection(np.zeros((1, 1)), timestamp=later)
+    report = Detection(np.zeros((1, 1)), timestamp=later)
 
     def step(state: Floats) -> Floats:
         count = state.shape[1]
@@ -224,7 +223,54 @@ def stone_soup_step(model: NumpyModel, rng: np.random.Generator) -> Step | None:
             StateVectors(state), weight=np.full(count, 1 / count), timestamp=began
         )
         predicted = predictor.predict(known, timestamp=later)
-        found = updater.update(SingleHypothesis(predicted, heard))
+        found = updater.update(SingleHypothesis(predicted, report))
         return np.asarray(found.state_vector)
 
     return step
+
+
+def compare(inputs: StepInputs, belief: Any, runs: int = _RUNS) -> dict[str, float]:
+    """Return nanoseconds per particle of a whole step, by package."""
+    count = belief.log_weight.size
+    rng, jitter = np.random.default_rng(1), np.array(_JITTER)
+    peer = NumpyModel(inputs)
+    wide = np.vstack([belief.state.astype(np.float64), np.zeros(count)])
+    steps = {
+        "numpy": (numpy_step(peer, jitter, rng), 1),
+        "particles": (particles_step(peer, rng, _PACKAGE_STEPS), _PACKAGE_STEPS),
+        "stonesoup": (stone_soup_step(peer, rng), 1),
+    }
+    tasks: dict[str, tuple[Callable[[], object], int]] = {
+        name: (lambda step=step: step(wide), times)
+        for name, (step, times) in steps.items()
+        if step is not None
+    }
+    tasks["mapfilter"] = (
+        lambda: whole_step(inputs, belief, jitter.astype(np.float32), rng),
+        1,
+    )
+    took_ns: dict[str, list[float]] = {name: [] for name in tasks}
+    for run in range(runs + 1):
+        for name, (task, times) in tasks.items():
+            began_s = time.process_time()
+            task()
+            # The first loads what is compiled.
+            if run > 0:
+                took_ns[name].append(1e9 * (time.process_time() - began_s) / (times * count))
+    return {name: median(values) for name, values in took_ns.items()}
+
+
+def main() -> None:
+    """Print a line for each number of particles and package."""
+    with tempfile.TemporaryDirectory(prefix="mapfilter-bench-") as name:
+        database, folders = make_world(Path(name), ["journeys.count=1"])
+        model = BayesOptions().over(open_area(open_database(database))).model
+        for count in (10_000, 100_000):
+            found = compare(*step_inputs(model, read_log(folders[0]), count))
+            for package, ns in found.items():
+                ratio = ns / found["mapfilter"]
+                print(f"{count} particles, {package}: {ns:.0f} ns per particle, {ratio:.1f} times")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,4 +1,4 @@
-"""Reality is drawn apart from the prediction, even when both have the same seed."""
+"""The ground truth is drawn apart from the prediction, even when both have the same seed."""
 
 from dataclasses import replace
 
@@ -35,7 +35,7 @@ Fields = NDArray[np.float64]
 
 @pytest.fixture(scope="module")
 def fields() -> tuple[Fields, Fields]:
-    """Clutter of the prediction and error of reality, shape (seeds, cells, rows, cols)."""
+    """Clutter of the prediction and error of the ground truth, shape (seeds, cells, rows, cols)."""
     plain = dict(predict(PLAN, LATTICE, None, replace(MODEL, shadowing_db=0.0)))
     clutter, error = [], []
     for seed in SEEDS:

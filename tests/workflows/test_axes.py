@@ -1,0 +1,73 @@
+"""Numeric options as axes: keys, values and configurations are checked."""
+
+import pytest
+
+from mapfilter.config.axes import check_axis, numeric_keys, parse_axis, vary
+from mapfilter.config.load import load_config
+from mapfilter.config.sections import Config
+from mapfilter.errors import ConfigError
+
+
+def test_every_numeric_option_of_four_sections_is_an_axis():
+    keys = numeric_keys()
+    wanted = ("filter.margin_db", "imu.scale", "journeys.stop_s", "database.floor_dbm")
+    assert set(wanted) <= set(keys)
+    assert {key.partition(".")[0] for key in keys} == {"filter", "imu", "journeys", "database"}
+    assert any(key.startswith("filter.bayes.") for key in keys)
+    assert not {"filter.smooth", "filter.name", "imu.turns", "database.path"} & set(keys)
+
+
+@pytest.mark.parametrize("key", numeric_keys())
+def test_the_default_of_each_option_is_a_value_of_its_axis(key):
+    value = Config()
+    for part in key.split("."):
+        value = getattr(value, part)
+    if value is not None:
+        assert check_axis(key, [value]) == (value,)
+        assert vary(Config(), {key: value}) == Config()
+
+
+@pytest.mark.parametrize(
+    ("key", "values", "words"),
+    [
+        ("imu.sigma_tran_m", [1.0], "found 'imu.sigma_tran_m' (likely: 'imu.sigma_trans_m'"),
+        ("heading_sd_deg", [1.0], "likely: 'filter.bayes.heading_sd_deg'"),
+        ("imu.turns", [1.0], "expected a numeric option, found an option that is 'headings' or"),
+        ("imu.scale", [0.1, 1.0], "imu.scale: expected a number >= 0 and < 1, found 1.0"),
+        ("filter.threshold", [1.5], "filter.threshold: expected a whole number >= 1, found 1.5"),
+        ("imu.scale", [0.1, 0.1], "expected every value once, found 0.1, 0.1"),
+        ("imu.scale", [float("nan")], "expected a number >= 0 and < 1, found nan"),
+        ("imu.scale", [], "expected at least one value, found none"),
+    ],
+)
+def test_a_wrong_axis_is_refused(key, values, words):
+    with pytest.raises(ConfigError) as raised:
+        check_axis(key, values)
+    assert words in str(raised.value)
+
+
+def test_whole_numbers_stay_whole():
+    assert parse_axis("filter.bayes.most_particles=1000,2e3") == (
+        "filter.bayes.most_particles",
+        (1000, 2000),
+    )
+    varied = vary(Config(), {"filter.threshold": 3.0})
+    assert type(varied.filter.threshold) is int
+
+
+@pytest.mark.parametrize("text", ["imu.scale", "imu.scale=", "imu.scale=a,b", "imu.scale=1,"])
+def test_an_axis_of_another_form_is_refused(text):
+    with pytest.raises(ConfigError, match=r"--vary: expected section\.key=number,number"):
+        parse_axis(text)
+
+
+def test_what_is_not_varied_stays(tmp_path):
+    config = load_config(
+        None,
+        ["area.southwest=3,0", "area.size_m=500,500", "roads.half_width_by_class_m.steps=0"],
+        out=tmp_path,
+    )
+    varied = vary(config, {"imu.sigma_orient_deg": 10, "filter.bayes.heading_sd_deg": 12.0})
+    assert (varied.imu.sigma_orient_deg, varied.filter.bayes.heading_sd_deg) == (10.0, 12.0)
+    back = vary(varied, {"imu.sigma_orient_deg": 3.0, "filter.bayes.heading_sd_deg": 6.0})
+    assert back == config
