@@ -6,7 +6,6 @@ from math import radians
 
 import pytest
 from command_line import assert_done, assert_refused, mapfilter, settings
-from mapfilter.workflows.filters import filter_choice
 
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.scores import CaseResult
@@ -18,7 +17,7 @@ from mapfilter.workflows.evaluate import _world as prepare_world
 from mapfilter.workflows.evaluate import load_benchmark
 from mapfilter.workflows.evaluate_audit import CHANGES
 from mapfilter.workflows.simulate import simulation_settings
-from mapfilter.workflows.world import World
+from mapfilter.workflows.world import World, filter_choice
 
 EASY = (
     PredictionModel(shadowing_db=6.0),

@@ -18,7 +18,6 @@ from benchmark_settings import (
     REFUSED_SECTIONS,
     toml,
 )
-from mapfilter.workflows.filters import filter_choice
 from pydantic import BaseModel
 
 from mapfilter._io import sha256_file
@@ -30,7 +29,7 @@ from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.simulation.imu import ImuNoise
 from mapfilter.workflows.evaluate import _refused, load_benchmark
 from mapfilter.workflows.evaluate import _world as prepare_world
-from mapfilter.workflows.world import World
+from mapfilter.workflows.world import World, filter_choice
 
 SMALL = {
     "area.map": "manhattan",

@@ -7,7 +7,6 @@ from importlib.resources import files
 import numpy as np
 import pytest
 from command_line import assert_refused, mapfilter
-from mapfilter.workflows.filters import filter_choice
 from pydantic import BaseModel
 
 from mapfilter.config.sections import Config
@@ -20,7 +19,7 @@ from mapfilter.simulation.walking import WalkerModel
 from mapfilter.workflows.evaluate import WORLDS, load_benchmark
 from mapfilter.workflows.evaluate import _world as prepare_world
 from mapfilter.workflows.simulate import simulation_settings
-from mapfilter.workflows.world import World
+from mapfilter.workflows.world import World, filter_choice
 
 SMALL = [
     'area.map="manhattan"',
