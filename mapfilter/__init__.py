@@ -19,9 +19,15 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from mapfilter.api import Bound as Bound
+    from mapfilter.api import Score as Score
+    from mapfilter.api import Sweep as Sweep
     from mapfilter.api import Track as Track
+    from mapfilter.api import bound as bound
     from mapfilter.api import locate as locate
     from mapfilter.api import score as score
+    from mapfilter.api import simulate as simulate
+    from mapfilter.api import sweep as sweep
     from mapfilter.database.build import build as build
     from mapfilter.database.radioroutes import RadioRouteDatabase as RadioRouteDatabase
     from mapfilter.database.store import open_database as open_database
@@ -43,6 +49,10 @@ if TYPE_CHECKING:
     from mapfilter.rasters.raster_set import RxLevRasters as RxLevRasters
     from mapfilter.rasters.raster_set import open_rasters as open_rasters
     from mapfilter.roads.lattice import RouteLattice as RouteLattice
+    from mapfilter.roads.routes import read_routes as read_routes
+    from mapfilter.simulation.imu import ImuNoise as ImuNoise
+    from mapfilter.simulation.reports import ReportModel as ReportModel
+    from mapfilter.simulation.walking import WalkerModel as WalkerModel
     from mapfilter.tracks.log import TrackLog as TrackLog
     from mapfilter.tracks.log import make_log as make_log
     from mapfilter.tracks.store import read_log as read_log
@@ -50,23 +60,30 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "BayesFilter": "positioning.bayes.options",
+    "Bound": "api",
     "CandidateFilter": "positioning.candidate",
     "CellPlan": "radio.cells",
     "Epoch": "positioning.epochs",
     "Filter": "positioning.filter",
     "Fix": "positioning.estimate",
     "GridFilter": "positioning.bayes.options",
+    "ImuNoise": "simulation.imu",
     "KalmanFilter": "positioning.kalman.filter",
     "Lattice": "geodesy",
     "MapfilterError": "errors",
     "RadioRouteDatabase": "database.radioroutes",
+    "ReportModel": "simulation.reports",
     "RouteLattice": "roads.lattice",
     "RxLevRasters": "rasters.raster_set",
+    "Score": "api",
     "Status": "filters.contract",
     "StepOutput": "positioning.estimate",
+    "Sweep": "api",
     "Track": "api",
     "TrackEstimate": "positioning.estimate",
     "TrackLog": "tracks.log",
+    "WalkerModel": "simulation.walking",
+    "bound": "api",
     "build": "database.build",
     "epochs": "positioning.epochs",
     "locate": "api",
@@ -75,7 +92,10 @@ _HOMES = {
     "open_rasters": "rasters.raster_set",
     "read_cell_plan": "radio.cells",
     "read_log": "tracks.store",
+    "read_routes": "roads.routes",
     "score": "api",
+    "simulate": "api",
+    "sweep": "api",
     "write_log": "tracks.store",
 }
 

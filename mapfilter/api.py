@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -11,9 +14,28 @@ import pandas as pd
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.accuracy import Accuracy, Truth, accuracy, position_errors_m
-from mapfilter.positioning import filter as filters
+from mapfilter.evaluation.first_fix import FirstFixOptions
+from mapfilter.evaluation.map_bound import MapBound, on_lattice
+from mapfilter.evaluation.map_bound import bound as bound_of
+from mapfilter.evaluation.radio_map import ErrorModel
+from mapfilter.evaluation.success import success_cells
+from mapfilter.experiments.sweep.plan import Reading, SweepPlan
+from mapfilter.experiments.sweep.run import sweep_runs
+from mapfilter.experiments.sweep.world import SweepWorld
+from mapfilter.positioning import filter as loop
 from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
+from mapfilter.positioning.filter import FilterOptions
 from mapfilter.positioning.locators import DEFAULT, as_filter
+from mapfilter.radio.cells import CellPlan
+from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.roads.network import StreetNetwork, street_network
+from mapfilter.roads.routes import read_roads
+from mapfilter.roads.ways import Ways
+from mapfilter.simulation.imu import ImuNoise
+from mapfilter.simulation.journeys import JourneyPlan
+from mapfilter.simulation.reports import ReportModel
+from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
+from mapfilter.simulation.walking import WalkerModel
 from mapfilter.tracks.log import TrackLog
 
 if TYPE_CHECKING:
@@ -114,10 +136,10 @@ def locate(
     """
     rng = np.random.default_rng(seed)
     bound = as_filter(filter, database, ways=ways)
-    return Track(filters.locate(log, bound, rng, snapshots=snapshots), log, database)
+    return Track(loop.locate(log, bound, rng, snapshots=snapshots), log, database)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Score(Accuracy):
     """Accuracy of one track against ground truth.
 
@@ -130,6 +152,16 @@ class Score(Accuracy):
     """
 
     error_m: Any = None
+
+    def __repr__(self) -> str:
+        if not self.switched:
+            return "Score: the filter never converged"
+        verdict = "right" if self.success else "wrong"
+        return (
+            f"Score: converged after {self.switch_distance_m:.0f} m, "
+            f"{self.error_at_switch_m:.1f} m off ({verdict}); "
+            f"then {self.error_mean_m:.1f} m on average, {self.error_95_m:.1f} m at 95 %"
+        )
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the figures as a table of one row."""
@@ -163,3 +195,216 @@ def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
         truth = known
     figures = asdict(accuracy(estimate, truth))
     return Score(**figures, error_m=position_errors_m(estimate, truth))
+
+
+def simulate(
+    rasters: RxLevRasters,
+    cells: CellPlan,
+    roads: Path | str | Ways,
+    *,
+    journeys: int = 1,
+    draws: int = 1,
+    length_m: float = 1940.0,
+    imu: ImuNoise | None = None,
+    reports: ReportModel | None = None,
+    walker: WalkerModel | None = None,
+    profile: Literal["walking", "driving"] = "walking",
+    seed: int = 0,
+) -> dict[str, TrackLog]:
+    """Simulate journeys along streets: dead reckoning, radio reports and ground truth.
+
+    Parameters
+    ----------
+    rasters : RxLevRasters
+        The levels that the phone receives. Take others than those that a database is built of, or
+        the filter knows the ground truth.
+    cells : CellPlan
+    roads : path, or Ways
+        OpenStreetMap file or vector layer, as for :func:`mapfilter.read_routes`.
+    journeys : int
+        Number of different routes.
+    draws : int
+        Logs of each route, which differ in noise only.
+    length_m : float
+        Length of each route.
+    imu : ImuNoise, optional
+        Errors of the inertial unit.
+    reports : ReportModel, optional
+        What the phone reports: period, hysteresis, fading, neighbours.
+    walker : WalkerModel, optional
+        Place on the street, and stops.
+    profile : {"walking", "driving"}
+    seed : int
+
+    Returns
+    -------
+    dict of str to TrackLog
+        By name, in the order of the journeys.
+    """
+    journey = JourneyPlan(length_m=length_m, profile=profile, walker=walker or WalkerModel())
+    settings = SimulationSettings(
+        journeys=journeys,
+        draws=draws,
+        journey=journey,
+        imu=imu or ImuNoise(),
+        reports=reports or ReportModel(),
+    )
+    network = _network(roads, rasters, profile)
+    return dict(simulate_journeys(network, rasters, cells, settings, seed))
+
+
+@dataclass(frozen=True, repr=False)
+class Sweep:
+    """Results of a sweep.
+
+    Parameters
+    ----------
+    runs : DataFrame
+        One row for each run, see :data:`mapfilter.experiments.sweep.table.SCHEMA`.
+    """
+
+    runs: pd.DataFrame
+
+    def __repr__(self) -> str:
+        return f"Sweep: {len(self.runs)} runs in {len(success_cells(self.runs))} cells of its grid"
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return success rates with 95 % intervals and mean errors, one row for each grid cell."""
+        return pd.DataFrame([asdict(cell) for cell in success_cells(self.runs)])
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw success over the deviation of headings, one curve for each filter.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Where to draw; a new figure when left out.
+        """
+        from mapfilter.report.success import plot_success_curves
+
+        cells = success_cells(self.runs)
+        names = dict.fromkeys(cell.reading for cell in cells)
+        curves = [(name, [cell for cell in cells if cell.reading == name]) for name in names]
+        return plot_success_curves(curves, ax, title="Success over the noise of headings")
+
+
+def sweep(
+    database: RadioRouteDatabase,
+    rasters: RxLevRasters,
+    roads: Path | str | Ways,
+    filters: Mapping[str, FilterOptions],
+    *,
+    noises: Sequence[ImuNoise] = (ImuNoise(),),
+    routes: int = 10,
+    draws: int = 1,
+    length_m: float = 1940.0,
+    reports: ReportModel | None = None,
+    seed: int = 0,
+    executor: Executor | None = None,
+) -> Sweep:
+    """Simulate many journeys with each noise, and locate each with every filter.
+
+    Parameters
+    ----------
+    database : RadioRouteDatabase
+    rasters : RxLevRasters
+        The levels that the phone receives.
+    roads : path, or Ways
+        As for :func:`simulate`.
+    filters : mapping of str to options
+        Such as ``{"6 deg": BayesFilter(), "10 deg": BayesFilter(heading_sd_deg=10)}``.
+    noises : sequence of ImuNoise
+        See :func:`mapfilter.experiments.sweep.plan.noise_grid` for all combinations.
+    routes, draws : int
+        Routes, and runs on each of them with every noise.
+    length_m : float
+    reports : ReportModel, optional
+    seed : int
+    executor : Executor, optional
+        Does the runs, such as a ``ProcessPoolExecutor``; this process when left out.
+    """
+    plan = SweepPlan(
+        tuple(Reading(name, options) for name, options in filters.items()),
+        noises=tuple(noises),
+        routes=routes,
+        draws=draws,
+        journey=JourneyPlan(length_m=length_m),
+        reports=reports or ReportModel(),
+        seed=seed,
+    )
+    network = _network(roads, rasters, "walking")
+    world = SweepWorld.of(network, database.plan, {"as_predicted": rasters})
+    return Sweep(sweep_runs(plan, world, {"database": database}, executor=executor))
+
+
+@dataclass(frozen=True, repr=False)
+class Bound:
+    """Where positioning will work, before any drive.
+
+    Parameters
+    ----------
+    found : MapBound
+        All figures.
+    database : RadioRouteDatabase
+    """
+
+    found: MapBound
+    database: RadioRouteDatabase
+
+    def __repr__(self) -> str:
+        along_m = self.found.at_points()["along_bound_m"]
+        median_m = float(np.nanmedian(along_m))
+        return f"Bound: {along_m.size} points, {median_m:.1f} m along the street (median)"
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the figures of each point; see also ``found.by_way()`` and ``found.twins()``."""
+        return self.found.to_dataframe()
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the least position error along the street at each point.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Where to draw; a new figure when left out.
+        """
+        from mapfilter.report.basemap import BaseMap
+        from mapfilter.report.bound import plot_point_values
+
+        radio, database = self.found.radio, self.database
+        base = BaseMap(radio.lattice.bounds_m, attribution=database.attribution)
+        values = on_lattice(radio, self.found.at_points()["along_bound_m"])
+        title = "Least position error along the street from one report of levels"
+        return plot_point_values(
+            values, radio.lattice, database.plan, base, ax, title=title, label="bound / m"
+        )
+
+
+def bound(
+    database: RadioRouteDatabase,
+    *,
+    errors: ErrorModel | None = None,
+    options: FirstFixOptions | None = None,
+    seed: int = 0,
+) -> Bound:
+    """Bound the accuracy of positions by a database (Cramér-Rao), and the metres to a first fix.
+
+    Parameters
+    ----------
+    database : RadioRouteDatabase
+    errors : ErrorModel, optional
+        Assumed errors of the predicted levels.
+    options : FirstFixOptions, optional
+        Of the simulated journeys.
+    seed : int
+        Of these journeys.
+    """
+    return Bound(bound_of(database, errors=errors, options=options, seed=seed), database)
+
+
+def _network(
+    roads: Path | str | Ways, rasters: RxLevRasters, profile: Literal["walking", "driving"]
+) -> StreetNetwork:
+    if not isinstance(roads, Ways):
+        roads = read_roads(roads, rasters.lattice, profile=profile).ways
+    return street_network(roads)

@@ -11,7 +11,7 @@ Import :func:`check_filter` into a test of your own and hand it your filter, a d
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from math import isfinite, nan
 from typing import Any, Generic, TypeVar
@@ -52,6 +52,12 @@ def same(a: Any, b: Any) -> bool:
         return type(a) is type(b) and all(
             same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a)
         )
+    if isinstance(a, tuple | list):
+        pairs = zip(a, b, strict=False) if type(a) is type(b) else ()
+        return type(a) is type(b) and len(a) == len(b) and all(same(*pair) for pair in pairs)
+    if isinstance(a, Mapping):
+        alike = isinstance(b, Mapping) and a.keys() == b.keys()
+        return alike and all(same(a[key], b[key]) for key in a)
     if isinstance(a, np.ndarray):
         alike = isinstance(b, np.ndarray) and a.dtype == b.dtype
         return alike and np.array_equal(a, b, equal_nan=a.dtype.kind == "f")

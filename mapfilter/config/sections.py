@@ -196,18 +196,18 @@ class Track(Section):
 
 @with_options(CandidateFilter)
 class FilterSection(Section):
-    """``[filter]``: which filter; most options are those of the filter "candidate".
+    """``[filter]``: which filter; the options beside ``name`` and ``smooth`` are those of "candidate".
 
     Parameters
     ----------
     name : str
-        "candidate", "bayes", "grid" or a custom filter as ``package.module:Name`` (its code is
+        "bayes", "grid", "candidate" or a custom filter as ``package.module:Name`` (its code is
         run); without a map "ekf", "iekf", "rbukf", "ukf" or "ckf".
     smooth : bool
         Smooth the track, with ekf, iekf, rbukf, ukf and ckf.
     """
 
-    name: FilterName = "candidate"
+    name: FilterName = "bayes"
     smooth: bool = False
     bayes: BayesSection = BayesSection()
 

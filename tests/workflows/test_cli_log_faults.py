@@ -132,7 +132,7 @@ def test_one_bad_log_of_many_stops_all_before_anything_is_written(own_world, rep
             "setting track.without.1: expected 'gnss', 'fixes', 'pseudoranges', 'ta', 'tdoa'",
         ),
         (["--without", ""], "setting track.without.0: expected"),
-        (["--set", "filter.threshold=0"], "setting filter.threshold: expected greater than"),
+        (["--set", "filter.threshold=0"], "setting filter.threshold: expected a whole number >= 1"),
     ],
 )
 def test_options(more, told, log, replay):

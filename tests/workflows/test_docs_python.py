@@ -32,7 +32,7 @@ def test_locating_a_log():
     names: dict[str, object] = {}
     (code,) = blocks("explanation/candidate-filter.rst")
     exec(code, names)
-    estimate = names["located"].estimate
+    estimate = names["track"].estimate
     assert (
         estimate.converged_at is None or estimate.status[estimate.converged_at] is Status.CONVERGED
     )

@@ -6,7 +6,9 @@ from mapfilter.workflows.terminal import text_lines
 
 
 def cell(**place):
-    return SuccessCell(**{**dict.fromkeys(SuccessCell.__dataclass_fields__, 0.0), **place})
+    return SuccessCell(
+        **{**dict.fromkeys(SuccessCell.__dataclass_fields__, 0.0), "varied": {}, **place}
+    )
 
 
 def test_heading_noises_stand_side_by_side_and_what_belongs_to_a_name_is_left_out():

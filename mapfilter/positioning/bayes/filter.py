@@ -65,6 +65,7 @@ class BayesPositioner(Filter[BayesState]):
     satellites: GnssOptions = field(default_factory=GnssOptions)
     timing: TimingOptions = field(default_factory=TimingOptions)
     smooth: bool = False
+    more_sources: tuple[EvidenceSource, ...] = ()
 
     @property
     def crs(self) -> str:
@@ -90,6 +91,7 @@ class BayesPositioner(Filter[BayesState]):
             TimingSource(area, self.timing, self.model.timed_by_sites),
             FirstFix(area.origin_m),
             self._radio,
+            *self.more_sources,
         )
 
     @cached_property

@@ -1,0 +1,133 @@
+"""Every filter of the package keeps the contract over epochs; breaches are noticed."""
+# ruff: noqa: ARG002
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from cross_world import CROSSING, make_database, walk_log
+
+from mapfilter.filters.contract import Estimate, Reason, Status, UpdateInfo
+from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.estimate import Fix, StepOutput
+from mapfilter.positioning.locators import BUILT_IN
+from mapfilter.testing import ContractError, check_filter
+
+
+@pytest.fixture(scope="module")
+def database(tmp_path_factory):
+    return make_database(tmp_path_factory.mktemp("cross"))
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_every_built_in_filter_keeps_the_contract(name, database):
+    check_filter(name, database, walk_log())
+
+
+@pytest.mark.parametrize("options", [BayesFilter(levels=False), BayesFilter(smooth=True)], ids=str)
+def test_so_does_the_bayes_filter_with_other_options(options, database):
+    check_filter(options, database, walk_log())
+
+
+@dataclass(frozen=True)
+class Beliefs:
+    """A filter of beliefs that stays at the crossing."""
+
+    database: object
+
+    def init(self, first, rng):
+        return 0
+
+    def predict(self, belief, motion, rng):
+        return belief + 1, Reason.USED
+
+    def update(self, belief, epoch, rng):
+        return belief, UpdateInfo(Reason.USED, Status.SEARCHING, 1)
+
+    def locate(self, belief):
+        return Estimate(*CROSSING, np.eye(2), np.arange(3.0))
+
+
+def fix_at(epoch, status, *, radii_m=(1.0, 2.0, 3.0), time_s=None):
+    return StepOutput(
+        Fix(
+            epoch.time_s if time_s is None else time_s, *CROSSING, np.eye(2), np.array(radii_m),
+            status, 1, 1.0, 0, 0.0, Reason.USED,
+        )
+    )  # fmt: skip
+
+
+class Steady:
+    """A filter over epochs that stays at the crossing."""
+
+    def __init__(self, database):
+        pass
+
+    def begin(self, kinds):
+        return {"steps": 0}
+
+    def step(self, state, epoch, rng):
+        return {"steps": state["steps"] + 1}, fix_at(epoch, Status.SEARCHING)
+
+
+@pytest.mark.parametrize("made", [Beliefs, Steady])
+def test_custom_filters_of_either_contract_keep_it(made, database):
+    check_filter(made, database, walk_log())
+
+
+class InPlace(Steady):
+    def step(self, state, epoch, rng):
+        state["steps"] += 1
+        return state, fix_at(epoch, Status.SEARCHING)
+
+
+class Jumping(Steady):
+    def step(self, state, epoch, rng):
+        return state, fix_at(epoch, Status.TRACKING)
+
+
+class OwnDice(Steady):
+    dice = np.random.default_rng(1)
+
+    def step(self, state, epoch, rng):
+        output = fix_at(epoch, Status.SEARCHING)
+        return state, replace(output, fix=replace(output.fix, east_m=self.dice.random()))
+
+
+class Shrinking(Steady):
+    def step(self, state, epoch, rng):
+        return state, fix_at(epoch, Status.SEARCHING, radii_m=(3.0, 2.0, 1.0))
+
+
+class Late(Steady):
+    def step(self, state, epoch, rng):
+        return state, fix_at(epoch, Status.SEARCHING, time_s=epoch.time_s + 1e-3)
+
+
+class Drifting(Steady):
+    def step(self, state, epoch, rng):
+        steps = state["steps"] + 1
+        output = fix_at(epoch, Status.SEARCHING)
+        fix = replace(output.fix, east_m=output.fix.east_m + steps)
+        return {"steps": steps}, replace(output, fix=fix)
+
+
+@pytest.mark.parametrize(
+    ("made", "clause"),
+    [
+        (InPlace, "states are never changed in place"),
+        (Jumping, "SEARCHING is not followed by TRACKING"),
+        (OwnDice, "the generator alone decides the result"),
+        (Shrinking, "do not shrink"),
+        (Late, "time of its epoch"),
+        (Drifting, "moves nothing"),
+    ],
+)
+def test_a_breach_is_named(made, clause, database):
+    with pytest.raises(ContractError, match=clause):
+        check_filter(made, database, walk_log())
+
+
+def test_a_short_log_is_not_enough(database):
+    with pytest.raises(ValueError, match="ten epochs"):
+        check_filter("bayes", database, walk_log(((0.0, 5.0),)))
