@@ -196,7 +196,7 @@ class Track(Section):
 
 @with_options(CandidateFilter)
 class FilterSection(Section):
-    """``[filter]``: which filter; the options beside ``name`` and ``smooth`` are those of "candidate".
+    """``[filter]``: which filter; most options are those of the filter "candidate".
 
     Parameters
     ----------
