@@ -18,8 +18,8 @@ from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
-from mapfilter.workflows.area import pixels_on
 from mapfilter.workflows.pictures import NETWORK_PICTURES, clear_pictures, draw_network
+from mapfilter.workflows.streets import pixels_on
 from mapfilter.workflows.world import (
     World,
     area_lattice,

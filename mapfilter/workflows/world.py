@@ -30,10 +30,10 @@ from mapfilter.roads.maps import map_bounds_deg, resolve_map
 from mapfilter.roads.routes import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings, Ways
 from mapfilter.simulation.layout import lay_out_plan
-from mapfilter.workflows.area import LARGEST_AREA_PX as LARGEST_AREA_PX
-from mapfilter.workflows.area import area_lattice as area_lattice
-from mapfilter.workflows.area import check_scale as check_scale
+from mapfilter.workflows.streets import LARGEST_AREA_PX as LARGEST_AREA_PX
 from mapfilter.workflows.streets import Streets
+from mapfilter.workflows.streets import area_lattice as area_lattice
+from mapfilter.workflows.streets import check_scale as check_scale
 
 
 def planned_rasters(config: Config) -> RxLevRasters:

@@ -21,7 +21,7 @@ from mapfilter.positioning.bayes.radio import name_of
 from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
 from mapfilter.positioning.epochs import GnssFix, ReportRow, headed
 from mapfilter.positioning.gnss.gate import FixTerm, widened
-from mapfilter.positioning.kalman.filter import gaussian_radii_m, share_within
+from mapfilter.positioning.kalman.belief import gaussian_radii_m, share_within
 from mapfilter.positioning.kalman.static_fix import (
     BAD_GEOMETRY,
     TOO_FEW,

@@ -14,7 +14,8 @@ from mapfilter.filters.gaussian import EKF, METHODS
 from mapfilter.models.state import POSITION
 from mapfilter.positioning.estimate_store import read_estimate
 from mapfilter.positioning.filter import locate
-from mapfilter.positioning.kalman.filter import KalmanFilter, gaussian_radii_m
+from mapfilter.positioning.kalman.belief import gaussian_radii_m
+from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.kalman.models import FusionOptions, SiteModels
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.tracks.log import make_log
