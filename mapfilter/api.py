@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -77,6 +78,10 @@ class Track:
             f"Track by {found.filter}: {len(found)} epochs, {status}, "
             f"{self.positioned.filter_s:.2f} s of processor time"
         )
+
+    def _repr_html_(self) -> str:
+        """Return the summary and the last epochs, as notebooks show them."""
+        return f"<p>{escape(repr(self))}</p>{self.to_dataframe().tail().to_html()}"
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return one row for each epoch: position (m), radii (m), status, reason and so on."""

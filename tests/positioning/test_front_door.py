@@ -53,6 +53,7 @@ def test_a_track_as_tables_and_a_picture(track, database):
     assert len(places) == table["east_m"].notna().sum() < len(table)
     assert places.crs == database.lattice.crs
     assert track.plot().get_title()
+    assert "<table" in track._repr_html_()
 
 
 @pytest.mark.parametrize("filter_", [mf.CandidateFilter(), "candidate"], ids=str)
