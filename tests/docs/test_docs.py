@@ -72,9 +72,9 @@ def test_quickstart_commands_run(tmp_path, monkeypatch):
         assert result.exit_code == 0, (command, result.output)
     found = {path.name for path in (tmp_path / "located").rglob("*")}
     named_there = {f"estimate.{kind}" for kind in ("parquet", "gpx", "geojson")}
-    assert named_there | {"figures.json", "candidates.png", "track.png", "error.png"} <= found
-    drawn = {path.name for path in (tmp_path / "located-bayes").rglob("*.png")}
-    assert drawn == {"belief.png", "track.png", "error.png", "evidence.png"}
+    assert named_there | {"figures.json", "belief.png", "track.png", "evidence.png"} <= found
+    drawn = {path.name for path in (tmp_path / "located-candidate").rglob("*.png")}
+    assert drawn == {"candidates.png", "track.png", "error.png"}
 
 
 def test_citation_is_of_this_version_and_licence():

@@ -29,7 +29,7 @@ def test_a_live_application_gets_what_a_replay_gets(tmp_path, monkeypatch):
         names["on_second"](step.time_s, SPEED_MPS, step.heading_rad, row.cell, row.level_dbm)
         for step, row in seconds
     ]
-    positioner = BayesFilter().over(database)
+    positioner = BayesFilter(level_error_db=8.0).over(database)
     replayed = locate(log, positioner, np.random.default_rng(0)).estimate
     assert [status for status, *_ in live] == list(replayed.status)
     places = np.array([row[1:] for row in live], dtype=np.float64)

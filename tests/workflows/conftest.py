@@ -27,6 +27,7 @@ count = 2
 length_m = 250
 radio = "as_predicted"
 [filter]
+name = "candidate"
 margin_db = 0.0
 update_length_m = 10.0
 [output]

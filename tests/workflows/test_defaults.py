@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from mapfilter.config.sections import Config, Journeys
 from mapfilter.errors import ConfigError
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.roads.buildings import read_buildings
@@ -32,7 +33,9 @@ def test_simulation():
 
 
 def test_filter():
-    assert filter_choice(CONFIG.filter) == CandidateFilter()
+    assert filter_choice(CONFIG.filter) == BayesFilter()
+    candidate = CONFIG.filter.model_copy(update={"name": "candidate"})
+    assert filter_choice(candidate) == CandidateFilter()
 
 
 def test_buildings_and_cells():
