@@ -43,11 +43,11 @@ _ORDER = {
 
 
 class ContractError(AssertionError):
-    """A filter breaks its contract; the message says which clause."""
+    """A filter breaks its contract; the message names the clause."""
 
 
 def same(a: Any, b: Any) -> bool:
-    """Tell whether two beliefs, estimates or news are equal to the last bit."""
+    """Return whether two beliefs, estimates or news are equal to the last bit."""
     if is_dataclass(a) and not isinstance(a, type):
         return type(a) is type(b) and all(
             same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a)
@@ -347,7 +347,7 @@ def _check_nothing(filter_: AnyFilter, steps: Sequence[Step[Any, Any]]) -> None:
 
 
 def _alike(a: Estimate, b: Estimate) -> bool:
-    """Tell whether two estimates differ by rounding at most, as sums in another order do."""
+    """Return whether two estimates differ by rounding at most, as sums in another order do."""
     pairs = ((getattr(a, one.name), getattr(b, one.name)) for one in fields(Estimate))
     return all(np.allclose(x, y, rtol=1e-9, atol=1e-9, equal_nan=True) for x, y in pairs)
 

@@ -222,7 +222,7 @@ _FALLS = 0.3
 
 
 def is_surveyed(rasters: RxLevRasters) -> bool:
-    """Tell whether rasters were made of measurements, not predicted."""
+    """Return whether rasters were made of measurements, not predicted."""
     if not rasters.path.is_file():
         return False
     try:
@@ -316,7 +316,7 @@ def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) ->
 
 
 def _falls_away(samples: Sequence[RasterSample], plan: CellPlan | None) -> bool:
-    """Tell whether numbers above 0 fall with the distance, as no path loss does."""
+    """Return whether numbers above 0 fall with the distance, as no path loss does."""
     if plan is None:
         return False
     known = [(s, plan[s.cell_id]) for s in samples if s.cell_id in plan]

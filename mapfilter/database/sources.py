@@ -38,7 +38,7 @@ class LatticeRoutes:
         return self.points.lattice
 
     def holds(self, window: Lattice) -> bool:
-        """Tell whether there is a point in a window."""
+        """Return whether there is a point in a window."""
         return bool(self._inside(window).size)
 
     def part(self, window: Lattice) -> RouteLattice:
@@ -83,7 +83,7 @@ class LayerRoutes:
     lattice: Lattice
 
     def holds(self, window: Lattice) -> bool:
-        """Tell whether a way or a square is near a window."""
+        """Return whether a way or a square is near a window."""
         squares = self.layers.squares
         if squares is not None and squares.near(window).geometry.size:
             return True

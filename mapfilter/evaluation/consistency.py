@@ -1,6 +1,6 @@
 """Whether a filter is as sure as it should be: coverage, reliability, ranks and NEES.
 
-A filter that says "95 % within 10 m" must be right in 95 of 100 cases, no more and no less. Epochs
+A filter that reports "95 % within 10 m" must be right in 95 of 100 cases, no more and no less. Epochs
 of one track are not independent; take one, or few, of each track for intervals to hold.
 """
 

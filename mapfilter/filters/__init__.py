@@ -1,1 +1,1 @@
-"""Belief through time. This room knows no roads and no radio: it sees arrays and callables."""
+"""Filters of beliefs over arrays and callables, without roads and radio."""

@@ -274,7 +274,7 @@ class CandidateSearch:
         return tracked, _info(tracked, Reason.USED)
 
     def _few_left(self, belief: CandidateBelief) -> bool:
-        """Tell whether the switch rule of lines 6 and 21 holds."""
+        """Return whether the switch rule of lines 6 and 21 holds."""
         count = belief.east_m.size
         if self.options.at_threshold == "switch":
             return count <= self.options.threshold

@@ -1,4 +1,4 @@
-"""The one contract of all filters: state in, state out, news in ``info``.
+"""The contract of filters of beliefs: state in, state out, and what happened in ``info``.
 
 A filter is a frozen object with four functions. ``predict`` and ``update`` are apart, because
 inertial data, radio reports and GNSS fixes tick at different rates.
@@ -20,10 +20,10 @@ ReadingT = TypeVar("ReadingT", contravariant=True)
 
 
 class Status(StrEnum):
-    """What a filter says about itself at an epoch.
+    """State of a filter at an epoch.
 
     ``SEARCHING`` → ``CONVERGED`` (the first epoch at which the switch rule holds) → ``TRACKING``;
-    ``LOST`` when the evidence says that the belief is wrong.
+    ``LOST`` when the evidence contradicts the belief.
     """
 
     SEARCHING = "SEARCHING"
@@ -77,7 +77,7 @@ class MotionStep:
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """What a belief says about the position; NaN where the filter does not say it.
+    """Position of a belief; NaN where the filter gives none.
 
     Parameters
     ----------
@@ -123,12 +123,12 @@ class BeliefFilter(Protocol[PriorT, BeliefT, ReadingT]):
     def predict(
         self, belief: BeliefT, motion: MotionStep, rng: np.random.Generator
     ) -> tuple[BeliefT, Reason]:
-        """Move the belief by one interval of dead reckoning; say why if it could not be used."""
+        """Move the belief by one interval of dead reckoning; return why if it was not used."""
 
     def update(
         self, belief: BeliefT, reading: ReadingT, rng: np.random.Generator
     ) -> tuple[BeliefT, UpdateInfo]:
-        """Weigh the belief with one reading."""
+        """Update the belief with one reading."""
 
     def locate(self, belief: BeliefT) -> Estimate:
-        """Say where the belief is."""
+        """Return the position of the belief."""

@@ -226,7 +226,7 @@ class Skyline:
         self._boxes = shapely.bounds(shapes).reshape(-1, 4)
 
     def seen(self, places_m: ArrayLike, toward: Directions) -> Bools:
-        """Tell which directions are open to the sky.
+        """Return which directions are open to the sky.
 
         Parameters
         ----------

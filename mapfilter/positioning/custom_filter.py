@@ -124,7 +124,7 @@ def _lacking(found: object, names: tuple[str, ...]) -> list[str]:
 
 @contextmanager
 def wrap_user_errors(name: str) -> Iterator[None]:
-    """Tell what goes wrong in a filter's code with its place; the cause keeps the traceback.
+    """Name the file and line of an error in a filter's code; the cause keeps the traceback.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def wrap_user_errors(name: str) -> Iterator[None]:
         own = [frame for frame in frames if file is not None and Path(frame.filename) == file]
         at = (own or list(frames))[-1]
         where = f"filter {name}, {Path(at.filename).name} line {at.lineno}, in {at.name}"
-        hint = "mapfilter.testing.check_filter tells which clause of the contract it breaks"
+        hint = "mapfilter.testing.check_filter names the clause of the contract that it breaks"
         raise fail(ConfigError, where, "a filter that runs", _said(error), hint) from error
 
 

@@ -27,7 +27,7 @@ class ReportRow:
     level_dbm : float
         NaN where it was not reported.
     censored : int
-        -1: below; 1: above what is told; 0: this.
+        -1: below the reported level, 1: above it, 0: the level itself.
     timing_advance : float
         Steps; NaN where it was not reported.
     """

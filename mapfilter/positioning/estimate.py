@@ -1,4 +1,4 @@
-"""What a filter says: one :class:`Fix` per epoch, together a :class:`TrackEstimate`."""
+"""Estimates: one :class:`Fix` for each epoch, together a :class:`TrackEstimate`."""
 
 from __future__ import annotations
 

@@ -270,7 +270,7 @@ def probability_of_sight(model: PredictionModel, distance_m: ArrayLike) -> Float
 
 
 def needs_sight(model: PredictionModel) -> bool:
-    """Tell whether a model loses less where the antenna is seen."""
+    """Return whether a model loses less where the antenna is seen."""
     return model.model == "cost231_walfisch_ikegami" or model.model in _SCENARIOS
 
 

@@ -40,7 +40,7 @@ class Range:
         return next((text for low, high, text in self.mistakes if low <= value <= high), "")
 
     def holds(self, value: Any) -> bool:
-        """Tell whether ``value`` lies in the range."""
+        """Return whether ``value`` lies in the range."""
         if isinstance(value, bool) or not isinstance(value, int | float | np.number):
             return False
         inside = bool(self.low <= value <= self.high) and not (self.above_low and value == self.low)
@@ -115,7 +115,7 @@ def antenna_fault(value: Any) -> tuple[str, str] | None:
 
 
 def looks_like_radians(azimuths: list[float]) -> bool:
-    """Tell whether azimuths are more likely radians than degrees.
+    """Return whether azimuths are more likely radians than degrees.
 
     True when there are at least two different ones, none beyond 2π, and most are no whole or half
     numbers.

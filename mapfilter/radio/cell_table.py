@@ -214,7 +214,7 @@ def _area_of_use(crs: str) -> Any:
 
 
 def _near(crs: str, lon_deg: float, lat_deg: float) -> bool:
-    """Tell whether a place lies in, or within a few degrees of, the area a CRS is made for."""
+    """Return whether a place lies in, or within a few degrees of, the area a CRS is made for."""
     area = _area_of_use(crs)
     if not (math.isfinite(lon_deg) and math.isfinite(lat_deg)):
         return False

@@ -251,6 +251,6 @@ def _downtilt_deg(header: dict[str, str], vertical: tuple[Floats, Floats]) -> fl
 
 
 def _counted_upwards(vertical: tuple[Floats, Floats], downtilt_deg: float) -> bool:
-    """Tell whether the beam lies clearly above the horizon although it is tilted down."""
+    """Return whether the beam lies clearly above the horizon although it is tilted down."""
     at_db = np.interp([downtilt_deg, -downtilt_deg], *vertical, period=360.0)
     return bool(downtilt_deg >= 2 and at_db[1] < 1.0 <= at_db[0])

@@ -41,7 +41,7 @@ class FoundRasters(NamedTuple):
 
 
 def is_raster_folder(path: Path) -> bool:
-    """Tell whether a folder holds rasters."""
+    """Return whether a folder holds rasters."""
     return path.is_dir() and any(_is_raster(inner) for inner in path.iterdir())
 
 

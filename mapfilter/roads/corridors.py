@@ -77,7 +77,7 @@ class _Net:
             self._squares[self._square(place)].remove((place, moment))
 
     def are_joined(self, a: Place, b: Place) -> bool:
-        """Tell whether a few steps along lines lead from one vertex to another."""
+        """Return whether a few steps along lines lead from one vertex to another."""
         seen, edge = {a}, {a}
         for _ in range(_NEIGHBOURHOOD):
             if b in seen:

@@ -138,7 +138,7 @@ def street_network(ways: Ways, allowed: RouteLattice | None = None) -> StreetNet
 
 
 def _stays_on(allowed: RouteLattice, start: Floats, end: Floats) -> Bools:
-    """Tell which straight edges keep to the pixels of a route lattice, shape (E,)."""
+    """Return which straight edges keep to the pixels of a route lattice, shape (E,)."""
     steps = np.ceil(np.hypot(*(end - start).T) / SAMPLE_M).astype(np.int64) + 1
     edge = np.repeat(np.arange(len(start)), steps)
     rank = np.arange(edge.size) - np.repeat(np.cumsum(steps) - steps, steps)

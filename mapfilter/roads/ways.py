@@ -213,7 +213,7 @@ def _check_geometry(what: str, geometry: Geometries, kind: str, faults: Faults) 
 
 
 def on_earth(geometry: Geometries) -> Bools:
-    """Tell which geometries, in metres, have only coordinates that can be places."""
+    """Return which geometries, in metres, have only coordinates that can be places."""
     corner, origin = shapely.get_coordinates(geometry, return_index=True)
     # Written so that NaN is no place.
     is_place = (np.abs(corner) < _FARTHEST_M).all(axis=1)

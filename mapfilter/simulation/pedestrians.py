@@ -122,7 +122,7 @@ class GasGround:
         return found / length if length > 0 else found
 
     def is_free(self, place_m: Floats) -> bool:
-        """Tell whether a place is on open ground."""
+        """Return whether a place is on open ground."""
         resolution = self.lattice.resolution_m
         row = int(np.floor((self.lattice.north_m - place_m[1]) / resolution))
         return self._is_free(row, int(np.floor((place_m[0] - self.lattice.west_m) / resolution)))

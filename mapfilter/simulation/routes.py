@@ -150,7 +150,7 @@ def _leg(
 
 
 def _through(network: StreetNetwork) -> Bools:
-    """Tell which nodes are left when dead ends are taken off again and again."""
+    """Return which nodes are left when dead ends are taken off again and again."""
     left = np.ones(network.east_m.size, dtype=bool)
     ends = np.unique(np.sort(np.stack([network.node_a, network.node_b], axis=1), axis=1), axis=0)
     ends = ends[ends[:, 0] != ends[:, 1]]

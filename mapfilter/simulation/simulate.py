@@ -1,4 +1,4 @@
-"""Whole journeys: a route, its truth, what the inertial unit says and what the phone reports."""
+"""Whole journeys: a route, its truth, what the inertial unit and the phone report."""
 
 from __future__ import annotations
 

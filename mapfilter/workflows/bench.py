@@ -68,7 +68,7 @@ class BuildBench:
     peak_memory_bytes : int
         Of a process that opens the rasters and builds.
     estimated_seconds, estimated_bytes, estimated_memory_bytes, bytes
-        What ``--dry-run`` says of the same build, and the size that it has.
+        What ``--dry-run`` estimates of the same build, and the size that it has.
     """
 
     rasters: int

@@ -133,7 +133,7 @@ def follow(case, world, walk, seed=3):
 
 
 def same(a, b):
-    """Tell whether two beliefs, estimates or news are equal to the last bit."""
+    """Return whether two beliefs, estimates or news are equal to the last bit."""
     if is_dataclass(a):
         return type(a) is type(b) and all(
             same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a)

@@ -108,7 +108,7 @@ def write_part(table: pa.Table, path: Path) -> None:
 
 
 def is_part(path: Path, rows: int, schema: pa.Schema = SCHEMA) -> bool:
-    """Tell whether a batch's rows lie there, whole."""
+    """Return whether a batch's rows lie there, whole."""
     if not path.is_file():
         return False
     try:

@@ -88,7 +88,7 @@ class AlternativeRules:
     converge_threshold: float = 2.0
 
     def alarms(self, cusum: EvidenceCusum, *, cells_only: bool) -> bool:
-        """Tell whether a CUSUM is large enough to start an alternative."""
+        """Return whether a CUSUM is large enough to start an alternative."""
         return cusum.sum >= (self.start_cusum_cells if cells_only else self.start_cusum)
 
 

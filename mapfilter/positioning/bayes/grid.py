@@ -116,5 +116,5 @@ class StreetGrid:
         return self.model.weigh(state, log_weight, reading)
 
     def can_converge(self, summary: BeliefSummary) -> bool:
-        """Tell whether the leading hypothesis is on the map rather than off it."""
+        """Return whether the leading hypothesis is on the map rather than off it."""
         return self.model.can_converge(summary)

@@ -211,7 +211,7 @@ class BayesModel:
         return Reason.USED if used else Reason.NO_READING
 
     def can_converge(self, summary: BeliefSummary) -> bool:
-        """Tell whether the leading hypothesis is on the map rather than off it."""
+        """Return whether the leading hypothesis is on the map rather than off it."""
         return bool(summary.mean[OFF] < 0.5)
 
     def _pixels(self, state: Floats32, back_east_m: float, back_north_m: float) -> Ints32:

@@ -1,4 +1,4 @@
-"""Everything that can be set of the Bayes map filter."""
+"""Options of the Bayes map filter."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class BayesOptions:
     timing : TimingOptions
         How far timing advances and time differences are trusted.
     smooth : bool
-        Whether positions are those in hindsight, by the whole log.
+        Whether positions are smoothed by the whole log.
     grid : bool
         The exact filter on the lattice in place of particles: slow, and without the step scale.
     """
@@ -138,21 +138,25 @@ class BayesFilter(Options):
         Exponent of the likelihood of levels.
     report_spacing_m : float
         Distance travelled between two reports that are used.
-    max_particles, min_particles : int
-        Limits of the number of particles once converged.
+    max_particles : int
+        Most particles.
     min_search_particles : int
-        Least number until then.
+        Least number of particles until the filter has converged.
+    min_particles : int
+        Least number of particles afterwards.
     switch_mass : float
-        The filter has converged when so much of the belief lies within 50 m of the leading
-        hypothesis,
+        Share of the belief within 50 m of the leading hypothesis from which on the filter has
+        converged.
     switch_hold_m : float
-        for so many metres travelled.
+        Distance travelled for which that must hold.
     smooth : bool
         Whether positions are smoothed by the whole log (backward simulation).
     satellite_sd_m : float
         Assumed white noise of a pseudorange at the zenith, where a log gives no deviation.
-    antenna_height_m, antenna_height_sd_m : float
-        Of the antenna above the ellipsoid, before anything is measured.
+    antenna_height_m : float
+        Assumed height of the antenna above the ellipsoid, before anything is measured.
+    antenna_height_sd_m : float
+        Its assumed deviation.
     timing_step_m : float
         Distance of a step of timing advance: 553.5 m in GSM, 78.1 m in LTE.
     timing_sd_m : float

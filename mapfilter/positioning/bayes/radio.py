@@ -100,12 +100,12 @@ class RadioSource(EvidenceSource):
         return self.read(history, state.reckoning, epoch, context.particle_spacing_m)
 
     def due(self, history: RadioHistory, travelled_m: float) -> bool:
-        """Tell whether a report would be used after so many metres."""
+        """Return whether a report would be used after so many metres."""
         used = history.used
         return used is None or travelled_m - used.travelled_m >= self.options.spacing_m
 
     def cells_only(self, reading: RadioReading, history: RadioHistory) -> bool:
-        """Tell whether the serving cell is the only evidence by radio, as no levels are reported.
+        """Return whether the serving cell is the only evidence by radio, as no levels are reported.
 
         A reading of satellites or timing alone, between two reports, is no sign of that.
         """

@@ -108,7 +108,7 @@ class GnssState:
     rejected_since_s: float = nan
 
     def due(self, options: GnssOptions, time_s: float, travelled_m: float) -> bool:
-        """Tell whether to compare again where no radio report asks for it."""
+        """Return whether to compare again where no radio report asks for it."""
         gone_m = travelled_m - self.compared_at_m
         return gone_m >= options.spacing_m or time_s - self.compared_at_s >= options.pause_s
 

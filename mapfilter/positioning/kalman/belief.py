@@ -2,7 +2,7 @@
 
 A start that is known to a kilometre is cut into narrow parts (:mod:`mapfilter.filters.gaussian_sum`
 tells why); a start from a fix has one. Parts without weight are dropped, and one that has come to
-lie on a heavier one is given to it, so that a settled belief is one Gaussian again.
+lie on a heavier one is given to it, so that a converged belief is one Gaussian again.
 
 Parts never branch: each that is left at the end has one past, which the Rauch-Tung-Striebel
 smoother goes back over; the weights at the end say which past it was.

@@ -301,7 +301,7 @@ class _Step:
         return Reason.USED if taken else Reason.UPDATE_FAILED
 
     def _aged(self, model: GaussianTerms, kept_m: Sequence[float]) -> GaussianTerms:
-        """Return a model with noise for errors that last: reports in a row tell it only once."""
+        """Return a model with noise for errors that last: reports in a row count once."""
         growth = np.sqrt(np.maximum(1.0, np.array(kept_m) / max(self.moved_m, _LEAST_MOVED_M)))
         return replace(model, noise=model.noise * np.outer(growth, growth))
 
@@ -347,7 +347,7 @@ class _Step:
         return self._update(position_fix(self.layout, noise), [fix.east_m, fix.north_m])
 
     def _update(self, model: GaussianTerms, reading: Sequence[float]) -> bool:
-        """Take a reading in; tell whether that could be done."""
+        """Update with a measurement; return whether that could be done."""
         if self.belief is None:
             raise AssertionError("started before it measures")
         self.belief, news = self.belief.update(compiled(model), reading, self.method)
@@ -373,7 +373,7 @@ class _Step:
         )  # fmt: skip
 
     def _tell(self, radius_m: float) -> None:
-        """Bring the status up to date: settled or not, surprised for long or not."""
+        """Update the status: converged by the radius, lost by the innovations."""
         lost = len(self.surprise) == _WINDOW and float(np.mean(self.surprise)) > _SURPRISE
         if self.status is Status.SEARCHING:
             if radius_m <= self.options.converged_radius_m:
@@ -383,7 +383,7 @@ class _Step:
 
 
 def _place(belief: Gaussian, where: list[int]) -> dict[str, Any]:
-    """Return what a belief says about the position, as fields of a fix."""
+    """Return the position of a belief as fields of a fix."""
     covariance = belief.covariance[np.ix_(where, where)]
     radii, mass = gaussian_radii_m(covariance, _WITHIN_M)
     east_m, north_m = (float(value) for value in belief.mean[where])

@@ -46,7 +46,7 @@ class FusionOptions(Options):
         same: reports in a row count as one in so many metres. With a correlation of
         ``exp(-d/50 m)`` that is 100 m.
     fix_sigma_m : float
-        Deviation of GNSS fixes that tell none.
+        Deviation of GNSS fixes without one.
     acceleration : float
         Root of the power density of acceleration without dead reckoning, m/s^1.5.
     speed_sigma_mps : float
@@ -62,10 +62,10 @@ class FusionOptions(Options):
     start_spacing_m : float
         Distance of the parts of a start from a timing advance, along its circle.
     reach_m : float
-        Farthest that a cell is taken for the neighbour that a carrier and a BSIC tell, from the
+        Farthest that a cell is taken for the neighbour that a carrier and a BSIC identify, from the
         serving site; 63 steps of timing advance in GSM.
     converged_radius_m : float
-        A 95 % radius below which the filter says that it has converged.
+        95 % radius below which the filter has converged.
     """
 
     level_sigma_db: Positive = 9.0

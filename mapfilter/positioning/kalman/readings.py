@@ -22,7 +22,7 @@ class SiteReadings:
         Whose levels were heard.
     levels_dbm : tuple of float
     timed : tuple of str
-        Whose timing advances were told.
+        Whose timing advances were reported.
     steps : tuple of int
     unused : tuple of UnusedReading
     """
