@@ -1,7 +1,7 @@
 """Whether a filter is as sure as it should be: coverage, reliability, ranks and NEES.
 
-A filter that reports "95 % within 10 m" must be right in 95 of 100 cases, no more and no less. Epochs
-of one track are not independent; take one, or few, of each track for intervals to hold.
+A filter that reports "95 % within 10 m" must be right in 95 of 100 cases, no more and no less.
+Epochs of one track are not independent; take one, or few, of each track for intervals to hold.
 """
 
 from __future__ import annotations
