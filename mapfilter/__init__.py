@@ -15,7 +15,6 @@ The names below are loaded when they are first used, so that importing mapfilter
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -100,10 +99,12 @@ _HOMES = {
 }
 
 __all__ = sorted(_HOMES)
-__version__ = version("mapfilter")
+__version__: str
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return import_module(f"{__name__}._io").VERSION
     home = _HOMES.get(name)
     if home is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
