@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from html import escape
+from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,20 +14,20 @@ import numpy as np
 import pandas as pd
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.errors import InputError, fail
+from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.evaluation.accuracy import Accuracy, Truth, accuracy, position_errors_m
 from mapfilter.evaluation.first_fix import FirstFixOptions
 from mapfilter.evaluation.map_bound import MapBound, on_lattice
 from mapfilter.evaluation.map_bound import bound as bound_of
 from mapfilter.evaluation.radio_map import ErrorModel
 from mapfilter.evaluation.success import success_cells
-from mapfilter.experiments.sweep.plan import Reading, SweepPlan
+from mapfilter.experiments.sweep.plan import AS_PREDICTED, Radio, Reading, SweepPlan
 from mapfilter.experiments.sweep.run import sweep_runs
 from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.positioning import filter as loop
 from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
 from mapfilter.positioning.filter import FilterOptions
-from mapfilter.positioning.locators import DEFAULT, as_filter
+from mapfilter.positioning.locators import DEFAULT, as_filter, filter_options
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.network import StreetNetwork, street_network
@@ -39,12 +40,21 @@ from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
 from mapfilter.simulation.walking import WalkerModel
 from mapfilter.tracks.log import TrackLog
 
+_NOISE_COLUMNS = (
+    "period_s",
+    "sigma_trans_m",
+    "sigma_orient_deg",
+    "bias_sd_deg",
+    "drift_deg_per_sqrt_s",
+    "scale",
+)
+
 if TYPE_CHECKING:
     import geopandas as gpd
     from matplotlib.axes import Axes
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Track:
     """A log, located: positions, how sure they are, tables and pictures.
 
@@ -144,7 +154,7 @@ def locate(
     return Track(loop.locate(log, bound, rng, snapshots=snapshots), log, database)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Score(Accuracy):
     """Accuracy of one track against ground truth.
 
@@ -258,7 +268,7 @@ def simulate(
     return dict(simulate_journeys(network, rasters, cells, settings, seed))
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Sweep:
     """Results of a sweep.
 
@@ -297,7 +307,7 @@ def sweep(
     database: RadioRouteDatabase,
     rasters: RxLevRasters,
     roads: Path | str | Ways,
-    filters: Mapping[str, FilterOptions],
+    filters: Mapping[str, FilterOptions | str],
     *,
     noises: Sequence[ImuNoise] = (ImuNoise(),),
     routes: int = 10,
@@ -313,7 +323,7 @@ def sweep(
     ----------
     database : RadioRouteDatabase
     rasters : RxLevRasters
-        The levels that the phone receives.
+        The levels that the phone receives, with the handovers and fading of ``reports``.
     roads : path, or Ways
         As for :func:`simulate`.
     filters : mapping of str to options
@@ -328,21 +338,67 @@ def sweep(
     executor : Executor, optional
         Does the runs, such as a ``ProcessPoolExecutor``; this process when left out.
     """
-    plan = SweepPlan(
-        tuple(Reading(name, options) for name, options in filters.items()),
-        noises=tuple(noises),
-        routes=routes,
-        draws=draws,
-        journey=JourneyPlan(length_m=length_m),
-        reports=reports or ReportModel(),
-        seed=seed,
-    )
+    reports = reports or ReportModel()
+    radio = Radio() if reports.radio == AS_PREDICTED else Radio("ground truth", nan)
+    plans = [
+        SweepPlan(
+            _readings(filters),
+            noises=(noise,),
+            radios=(radio,),
+            report_periods_s=(reports.report_period_s,),
+            imu_periods_s=(noise.period_s,),
+            routes=routes,
+            draws=draws,
+            journey=JourneyPlan(length_m=length_m),
+            reports=reports,
+            seed=seed,
+            varied=varied,
+        )
+        for noise, varied in _told_apart(noises)
+    ]
     network = _network(roads, rasters, "walking")
-    world = SweepWorld.of(network, database.plan, {"as_predicted": rasters})
-    return Sweep(sweep_runs(plan, world, {"database": database}, executor=executor))
+    world = SweepWorld.of(network, database.plan, {radio.name: rasters})
+    return Sweep(sweep_runs(plans, world, {"database": database}, executor=executor))
 
 
-@dataclass(frozen=True, repr=False)
+def _readings(filters: Mapping[str, Any]) -> tuple[Reading, ...]:
+    faults = Faults()
+    found = []
+    for name, given in filters.items():
+        options = filter_options(given) if isinstance(given, str) else given
+        if isinstance(options, type) or not hasattr(options, "over"):
+            expected = "options, or the name of a filter"
+            faults.add(
+                f"filters, {name}", expected, type(options).__name__, "custom filters by name"
+            )
+        else:
+            found.append(Reading(name, options))
+    faults.raise_if_any(ConfigError)
+    return tuple(found)
+
+
+def _told_apart(
+    noises: Sequence[ImuNoise],
+) -> list[tuple[ImuNoise, tuple[tuple[str, float], ...]]]:
+    """Return each noise with the values of those fields that the table has no column for."""
+    if not noises or len(set(noises)) < len(noises):
+        raise fail(ConfigError, "noises", "one noise or several, each once", f"{len(noises)}")
+    other = [
+        field.name
+        for field in fields(ImuNoise)
+        if field.name not in _NOISE_COLUMNS and len({getattr(n, field.name) for n in noises}) > 1
+    ]
+    for name in other:
+        if not all(isinstance(getattr(noise, name), int | float) for noise in noises):
+            hint = "one sweep for each value"
+            raise fail(ConfigError, f"noises, {name}", "one value for all", "several", hint)
+    return [
+        (noise, tuple((f"imu.{name}", float(getattr(noise, name))) for name in other))
+        for noise in noises
+    ]
+
+
+@dataclass(frozen=True, repr=False, eq=False)
 class Bound:
     """Where positioning will work, before any drive.
 

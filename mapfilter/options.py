@@ -108,10 +108,13 @@ class Options:
         faults = Faults()
         for name, annotation in _annotations(cast(Any, type(self))).items():
             value = getattr(self, name)
-            if not fits(annotation, value):
+            if fits(annotation, value):
+                object.__setattr__(self, name, _as_plain(annotation, value))
+            else:
                 where = f"{type(self).__name__}, {name}"
                 faults.add(where, expected(annotation), repr(value), likely(annotation, value))
-        self.check(faults)
+        if not faults.found:
+            self.check(faults)
         faults.raise_if_any(ConfigError)
 
     def check(self, faults: Faults) -> None:
@@ -245,15 +248,27 @@ def fits(annotation: Any, value: Any) -> bool:
     if inner in (int, float):
         try:
             number = float(value)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             return False
-        if isinstance(value, bool | str) or not isfinite(number):
+        if isinstance(value, bool | str) or type(value).__name__ in ("bool_", "bool"):
+            return False
+        if not isfinite(number):
             return False
         return (inner is float or number == int(number)) and all(
             _holds(one, value) for one in limits
         )
     # Lists, paths and nested options check themselves or are checked by their owner.
     return not (isinstance(inner, type) and is_dataclass(inner)) or isinstance(value, inner)
+
+
+def _as_plain(annotation: Any, value: Any) -> Any:
+    """Return a number of NumPy, or a whole float for an integer, as Python's own number."""
+    types = plain_types(annotation)
+    if value is None or not {int, float} & set(types) or isinstance(value, str | tuple):
+        return value
+    if float in types:
+        return value if type(value) in (int, float) else float(value)
+    return int(value)
 
 
 def _holds(limit: Any, value: Any) -> bool:

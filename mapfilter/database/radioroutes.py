@@ -147,7 +147,7 @@ class Points:
         return f"Points({len(self)} of {', '.join(self.__dataclass_fields__)})"
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class RadioRouteDatabase:
     """A database folder, read on demand and only as far as needed.
 

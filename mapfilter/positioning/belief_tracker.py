@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import nan
@@ -90,6 +90,11 @@ class BeliefTracker(Filter[TrackState]):
     def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> TrackState:  # noqa: ARG002
         """Return the state before the first epoch."""
         return TrackState()
+
+    def warm_up(self, merged: Sequence[Epoch]) -> None:  # noqa: ARG002
+        """Read the points that positions are matched to."""
+        if self.ways:
+            _ = self._points
 
     def step(
         self, state: TrackState, epoch: Epoch, rng: np.random.Generator

@@ -90,6 +90,7 @@ class CandidateTracker(BeliefTracker):
 
     def warm_up(self, merged: Sequence[Epoch]) -> None:
         """Read the points of the serving cells, and load the compiled search."""
+        super().warm_up(merged)
         for cell in {serving_cell(epoch) for epoch in merged} - {None}:
             points = self.filter.points_of(cell)  # type: ignore[attr-defined]
             if points is not None:

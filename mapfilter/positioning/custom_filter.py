@@ -13,7 +13,7 @@ import hashlib
 import inspect
 import sys
 import traceback
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -30,7 +30,7 @@ from mapfilter.filters.contract import Reason
 from mapfilter.positioning.belief_tracker import BeliefTracker, TrackState
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import StepOutput
-from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind
+from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind, Smoother
 
 _BELIEF_FUNCTIONS = ("init", "predict", "update", "locate")
 _EPOCH_FUNCTIONS = ("begin", "step")
@@ -123,8 +123,14 @@ def _lacking(found: object, names: tuple[str, ...]) -> list[str]:
 
 
 @contextmanager
-def wrap_user_errors(name: str) -> Iterator[None]:
+def wrap_user_errors(name: str, owner: object = None) -> Iterator[None]:
     """Name the file and line of an error in a filter's code; the cause keeps the traceback.
+
+    Parameters
+    ----------
+    name : str
+    owner : object
+        The filter, or its class, where the name is not that of a module.
 
     Raises
     ------
@@ -137,7 +143,13 @@ def wrap_user_errors(name: str) -> Iterator[None]:
         raise
     except Exception as error:
         # The last line outside of libraries is most likely the user's own.
-        frames, file = traceback.extract_tb(error.__traceback__), _file(_module(name))
+        frames, file = (
+            traceback.extract_tb(error.__traceback__),
+            _file(
+                _module(name)
+                or inspect.getmodule(owner if isinstance(owner, type) else type(owner))
+            ),
+        )
         own = [frame for frame in frames if file is not None and Path(frame.filename) == file]
         at = (own or list(frames))[-1]
         where = f"filter {name}, {Path(at.filename).name} line {at.lineno}, in {at.name}"
@@ -179,7 +191,7 @@ def adapted(
     """
     _check_functions(name, made)
     if not _lacking(made, _EPOCH_FUNCTIONS):
-        return CustomEpochFilter(made, name, database.lattice.crs)
+        return CustomEpochFilter(made, name, getattr(made, "crs", database.lattice.crs))
     return CustomTracker(
         made, database, _cells_with_points(database), _measured, name, start_by_fix=True, ways=ways
     )
@@ -193,7 +205,7 @@ class CustomTracker(BeliefTracker):
         self, state: TrackState, epoch: Epoch, rng: np.random.Generator
     ) -> tuple[TrackState, StepOutput]:
         """Take one epoch: first move, then measure."""
-        with wrap_user_errors(self.name):
+        with wrap_user_errors(self.name, self.filter):
             return super().step(state, epoch, rng)
 
 
@@ -224,14 +236,33 @@ class CustomEpochFilter(Filter[Any]):
         """CRS of the database."""
         return self.filter_crs
 
+    @property
+    def uses(self) -> Collection[Kind]:
+        """Kinds of measurements that it takes."""
+        return getattr(self.filter, "uses", ALL_KINDS)
+
+    def warm_up(self, merged: Sequence[Epoch]) -> None:
+        """Prepare the filter, where it can be prepared."""
+        if hasattr(self.filter, "warm_up"):
+            with wrap_user_errors(self.name, self.filter):
+                self.filter.warm_up(merged)
+
+    def smoother(self) -> Smoother | None:
+        """Return the filter's smoother, where it has one."""
+        return self.filter.smoother() if hasattr(self.filter, "smoother") else None
+
+    def hypotheses(self, state: Any) -> Hypotheses | None:
+        """Return the filter's hypotheses, where it shows them."""
+        return self.filter.hypotheses(state) if hasattr(self.filter, "hypotheses") else None
+
     def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> Any:
         """Return the state before the first epoch."""
-        with wrap_user_errors(self.name):
+        with wrap_user_errors(self.name, self.filter):
             return self.filter.begin(kinds)
 
     def step(self, state: Any, epoch: Epoch, rng: np.random.Generator) -> tuple[Any, StepOutput]:
         """Take one epoch."""
-        with wrap_user_errors(self.name):
+        with wrap_user_errors(self.name, self.filter):
             state, output = self.filter.step(state, epoch, rng)
             if not isinstance(output, StepOutput):
                 raise TypeError("step returns (state, StepOutput)")

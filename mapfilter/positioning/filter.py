@@ -165,7 +165,7 @@ def locate(
     if not same_crs(log.crs, filter_.crs):
         hint = "log of another area or zone"
         raise fail(InputError, "log, crs", filter_.crs, log.crs, hint)
-    log, unused = _without_unused(log, filter_)
+    log, unused = usable_part(log, filter_)
     merged = epochs(log)
     filter_.warm_up(merged)
     smoother = filter_.smoother()
@@ -207,8 +207,8 @@ def kinds_of(log: TrackLog) -> frozenset[Kind]:
     return frozenset(kind for kind, count in rows.items() if count)
 
 
-def _without_unused(log: TrackLog, filter_: Filter[Any]) -> tuple[TrackLog, list[UnusedReading]]:
-    """Take out tables that the filter has no use for, and name each kind once.
+def usable_part(log: TrackLog, filter_: Filter[Any]) -> tuple[TrackLog, list[UnusedReading]]:
+    """Take tables that the filter has no use for out of a log, and name each kind once.
 
     Neighbours stay, as rows of the reports that the filter takes.
     """

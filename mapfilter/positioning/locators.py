@@ -7,6 +7,7 @@ from typing import Any
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, fail
 from mapfilter.filters.gaussian import METHODS
+from mapfilter.options import Options
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.custom_filter import adapted, custom_filter, wrap_user_errors
@@ -78,8 +79,8 @@ def as_filter(given: Any, database: RadioRouteDatabase, *, ways: bool = True) ->
         return found
     name = getattr(given, "__name__", type(given).__name__)
     if callable(given):
-        with wrap_user_errors(name):
+        if isinstance(given, type) and issubclass(given, Options):
+            return as_filter(given(), database, ways=ways)
+        with wrap_user_errors(name, given):
             given = given(database)
-        if isinstance(given, Filter):
-            return given
     return adapted(given, database, name, ways=ways)

@@ -9,6 +9,7 @@ from cross_world import CROSSING, make_database, walk_log
 
 from mapfilter.filters.contract import Estimate, Reason, Status, UpdateInfo
 from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.estimate import Fix, StepOutput
 from mapfilter.positioning.locators import BUILT_IN
 from mapfilter.testing import ContractError, check_filter
@@ -27,6 +28,10 @@ def test_every_built_in_filter_keeps_the_contract(name, database):
 @pytest.mark.parametrize("options", [BayesFilter(levels=False), BayesFilter(smooth=True)], ids=str)
 def test_so_does_the_bayes_filter_with_other_options(options, database):
     check_filter(options, database, walk_log())
+
+
+def test_candidates_may_all_vanish(database):
+    check_filter(CandidateFilter(update_length_m=2.0), database, walk_log())
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,17 @@
 """The front door: names, laziness, how objects are shown, errors."""
+# ruff: noqa: ARG002
 
 import subprocess
 import sys
 
+import geopandas as gpd
 import pandas as pd
 import pytest
 from cross_world import make_database, walk_log
 
 import mapfilter as mf
+from mapfilter.filters.contract import Reason
+from mapfilter.positioning.locators import as_filter
 
 
 @pytest.fixture(scope="module")
@@ -80,3 +84,87 @@ def test_what_is_no_ground_truth_is_refused(track):
 def test_an_unknown_filter_is_refused(database):
     with pytest.raises(mf.MapfilterError, match="filter: expected bayes"):
         mf.locate(walk_log(), database, "bays")
+
+
+class Recording(mf.Filter):
+    """Takes GNSS only; fails where it is told to."""
+
+    name, crs = "recording", "EPSG:32629"
+    uses = ("gnss",)
+
+    def __init__(self, database):
+        pass
+
+    def begin(self, kinds=()):
+        return 0
+
+    def step(self, state, epoch, rng):
+        if state == 3:
+            raise ValueError("no idea")
+        fix = mf.Fix.nowhere(epoch.time_s, mf.Status.SEARCHING, Reason.NO_READING)
+        return state + 1, mf.StepOutput(fix)
+
+
+@pytest.mark.parametrize("given", [Recording, f"{__name__}:Recording"], ids=["class", "name"])
+def test_a_custom_filter_is_the_same_by_class_and_by_name(given, database):
+    with pytest.raises(mf.MapfilterError, match=r"test_front_door.py line \d+, in step.*no idea"):
+        mf.locate(walk_log(), database, given)
+    bound = as_filter(given, database)
+    assert bound.uses == ("gnss",)
+
+
+def test_the_class_of_options_means_its_defaults(database):
+    assert as_filter(mf.CandidateFilter, database).filter.options == mf.CandidateFilter()
+
+
+@pytest.fixture(scope="module")
+def streets():
+    from cross_world import LATTICE
+    from shapely import LineString
+
+    west, south, east, north = LATTICE.bounds_m
+    lines = [
+        LineString([(west + 25, south + 147.5), (east - 25, south + 147.5)]),
+        LineString([(west + 127.5, south + 20), (west + 127.5, north - 20)]),
+    ]
+    return gpd.GeoDataFrame({"highway": ["residential"] * 2}, geometry=lines, crs="EPSG:32629")
+
+
+@pytest.fixture(scope="module")
+def rasters(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rasters")
+    make_database(folder)
+    return mf.open_rasters(next(folder.rglob("*.tif")), "level")
+
+
+def swept(database, rasters, streets, **given):
+    filters = {"c": mf.CandidateFilter(), "again": "candidate"}
+    return mf.sweep(database, rasters, streets, filters, routes=2, length_m=200.0, **given)
+
+
+def test_a_sweep_takes_reports_and_periods_as_given(database, rasters, streets):
+    reports = mf.ReportModel(report_period_s=5.0)
+    noise = mf.ImuNoise(period_s=0.5)
+    runs = swept(database, rasters, streets, noises=(noise,), reports=reports).runs
+    assert set(runs["report_period_s"]) == {5.0}
+    assert set(runs["imu_period_s"]) == {0.5}
+    assert set(runs["radio"]) == {"ground truth"}
+    plain = mf.ReportModel(report_period_s=5.0, radio="as_predicted")
+    assert set(swept(database, rasters, streets, reports=plain).runs["radio"]) == {"as_predicted"}
+
+
+def test_noises_of_any_field_have_cells_of_their_own(database, rasters, streets):
+    noises = (mf.ImuNoise(), mf.ImuNoise(heading_correlation_s=20.0, step_scale_wander=0.3))
+    found = swept(database, rasters, streets, noises=noises)
+    assert repr(found) == "Sweep: 8 runs in 4 cells of its grid"
+    assert {"imu.heading_correlation_s", "imu.step_scale_wander"} <= set(found.runs)
+    assert found.plot().get_title()
+
+
+def test_what_cannot_be_swept_is_refused(database, rasters, streets):
+    with pytest.raises(mf.MapfilterError, match="noises: expected one noise or several, each once"):
+        swept(database, rasters, streets, noises=(mf.ImuNoise(), mf.ImuNoise()))
+    with pytest.raises(mf.MapfilterError, match="noises, turns: expected one value for all"):
+        swept(database, rasters, streets, noises=(mf.ImuNoise(), mf.ImuNoise(turns="gyro")))
+    with pytest.raises(mf.MapfilterError, match="filters, mine: expected options, or the name"):
+        mf.sweep(database, rasters, streets, {"mine": Recording})

@@ -139,7 +139,8 @@ class BayesPositioner(Filter[BayesState]):
         state, unused = self._moved(state, epoch, rng)
         state, updates = self._collected(state, epoch, spacing_m)
         unused += [reading for update in updates for reading in update.unused]
-        reason = next(update.reason for update in updates if update.reason is not None)
+        reasons = (update.reason for update in updates if update.reason is not None)
+        reason = next(reasons, Reason.NO_READING)
         if state.belief is None:
             started = self._started(updates, state, epoch, rng)
             if started is not None:
