@@ -16,6 +16,7 @@ from __future__ import annotations
 import operator
 import re
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache
 from inspect import cleandoc
@@ -113,7 +114,8 @@ class Options:
             else:
                 where = f"{type(self).__name__}, {name}"
                 faults.add(where, expected(annotation), repr(value), likely(annotation, value))
-        if not faults.found:
+        # A field of another type may not compare with others; it is named already.
+        with suppress(*((TypeError, AttributeError, KeyError) if faults.found else ())):
             self.check(faults)
         faults.raise_if_any(ConfigError)
 
@@ -241,6 +243,13 @@ def fits(annotation: Any, value: Any) -> bool:
         return any(value == one and type(value) is type(one) for one in get_args(inner))
     if origin in (Union, UnionType):
         return any(fits(one, value) for one in get_args(inner))
+    if origin is tuple:
+        kinds = get_args(inner)
+        if not isinstance(value, tuple | list):
+            return False
+        if kinds[-1] is Ellipsis:
+            return all(fits(kinds[0], one) for one in value)
+        return len(value) == len(kinds) and all(map(fits, kinds, value))
     if inner is NoneType:
         return value is None
     if inner is bool or inner is str:
@@ -264,6 +273,8 @@ def fits(annotation: Any, value: Any) -> bool:
 def _as_plain(annotation: Any, value: Any) -> Any:
     """Return a number of NumPy, or a whole float for an integer, as Python's own number."""
     types = plain_types(annotation)
+    if isinstance(value, list) and any(get_origin(one) is tuple for one in types):
+        return tuple(value)
     if value is None or not {int, float} & set(types) or isinstance(value, str | tuple):
         return value
     if float in types:
