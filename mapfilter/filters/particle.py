@@ -64,20 +64,17 @@ class ParticleOptions(Options):
     particles_per_bin: Positive = 60.0
     resample_below: Probability = 0.5
     mass_exponent: Annotated[float, Gt(0), Le(1)] = 0.5
-    jitter: tuple[float, ...] = (0.2, 0.2, 0.005, 0.003, 0.0)
-    searching_jitter: tuple[float, ...] = (1.5, 1.5, 0.015, 0.009, 0.0)
+    jitter: tuple[NotNegative, ...] = (0.2, 0.2, 0.005, 0.003, 0.0)
+    searching_jitter: tuple[NotNegative, ...] = (1.5, 1.5, 0.015, 0.009, 0.0)
     switch_mass: Probability = 0.99
     switch_hold_m: NotNegative = 14.0
 
     def check(self, faults: Faults) -> None:
-        """Add a lower limit above the upper one, and jitter that is negative or not finite."""
+        """Add a lower limit above the upper one."""
         if self.min_particles > self.max_particles:
             found = f"{self.min_particles} and {self.max_particles}"
             where = "ParticleOptions, min_particles and max_particles"
             faults.add(where, "min_particles <= max_particles", found)
-        for name in ("jitter", "searching_jitter"):
-            if not all(isfinite(sd) and sd >= 0 for sd in getattr(self, name)):
-                faults.add(f"ParticleOptions, {name}", "finite numbers >= 0", getattr(self, name))
 
 
 def switched(
