@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-
 import numpy as np
 from numba import njit
 
 from mapfilter._types import Floats32, Ints32
-from mapfilter.database.nearest import CellPointIndex
-from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.estimate import Fix
 
 
 def matched_way(
@@ -38,17 +32,6 @@ def matched_way(
         1 / lattice.resolution_m,
     )  # fmt: skip
     return int(area.way_ids[rank]), min(float(share), 1.0)
-
-
-def nearest_ways(database: RadioRouteDatabase, fixes: Sequence[Fix]) -> list[Fix]:
-    """Match each position to the way of the database point nearest to it."""
-    points = database.points()
-    index = CellPointIndex.of_points(database.lattice, points.row, points.col)
-    nearest, _ = index.nearest([f.east_m for f in fixes], [f.north_m for f in fixes])
-    return [
-        replace(fix, way_id=int(points.way_id[point])) if point >= 0 else fix
-        for fix, point in zip(fixes, nearest.tolist(), strict=True)
-    ]
 
 
 @njit(error_model="numpy", cache=True)

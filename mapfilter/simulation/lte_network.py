@@ -21,7 +21,6 @@ from mapfilter.models.motion import SPEED_OF_LIGHT_MPS
 from mapfilter.propagation.tr38901 import hidden_loss_db, seen_loss_db
 from mapfilter.radio.antenna import sector_gain_db
 
-SECTORS = 3
 _LEAST_DISTANCE_M = 10.0
 
 

@@ -256,7 +256,10 @@ def report(before: Status, belief: MapBelief, found: Status) -> tuple[MapBelief,
     """Return the status to report, and the belief with it where it has converged before."""
     status = REPORTED.get((before, found), found)
     if found is _CONVERGED and status is _TRACKING:
-        belief = replace(belief, status=_TRACKING)
+        tracking = replace(belief, status=_TRACKING)
+        # The estimate stays that before resampling, which the belief carries along.
+        tracking.__dict__["summary"] = belief.summary
+        return tracking, status
     return belief, status
 
 
