@@ -354,7 +354,7 @@ def sweep(
             seed=seed,
             varied=varied,
         )
-        for noise, varied in _told_apart(noises)
+        for noise, varied in _distinguished(noises)
     ]
     network = _network(roads, rasters, "walking")
     world = SweepWorld.of(network, database.plan, {radio.name: rasters})
@@ -377,7 +377,7 @@ def _readings(filters: Mapping[str, Any]) -> tuple[Reading, ...]:
     return tuple(found)
 
 
-def _told_apart(
+def _distinguished(
     noises: Sequence[ImuNoise],
 ) -> list[tuple[ImuNoise, tuple[tuple[str, float], ...]]]:
     """Return each noise with the values of those fields that the table has no column for."""

@@ -20,7 +20,7 @@ from mapfilter.cli.options import (
     SeedOption,
     SetOption,
     WorkersOption,
-    find_own_filter,
+    check_custom_filter,
     given_path,
     seeded,
     toml,
@@ -253,7 +253,7 @@ def replay(
     if smooth:
         given += ["filter.bayes.smooth=true", "filter.smooth=true"]
     loaded = load_config(config, given)
-    find_own_filter(loaded)
+    check_custom_filter(loaded)
     name = loaded.filter.name
     if smooth and (name in ("candidate", "grid") or ":" in name):
         raise fail(ConfigError, "--smooth", "bayes, ekf, iekf, rbukf, ukf, ckf", name)

@@ -18,7 +18,7 @@ from mapfilter.cli.options import (
     SeedOption,
     SetOption,
     WorkersOption,
-    find_own_filter,
+    check_custom_filter,
     given_path,
     numbers,
     refuse,
@@ -52,7 +52,7 @@ def sweep(
     from mapfilter.workflows.sweep import brief, forecast_sweep, load_sweep, run_sweep, vary_axes
 
     loaded = load_sweep(config, seeded(settings, seed, "sweep.seed"), out=out)
-    find_own_filter(loaded)
+    check_custom_filter(loaded)
     axes = vary_axes(vary or ())
     if dry_run:
         print_result(forecast_sweep(loaded, axes, workers=workers), as_json)
@@ -221,7 +221,7 @@ def evaluate(
         refuse({"--world": world}, name)
         world = "easy"
     loaded, fixed = load_benchmark(world or "plain", config, given)
-    find_own_filter(loaded)
+    check_custom_filter(loaded)
     folder = (out or loaded.output.dir / name).absolute()
     common["runs"] = runs or RUNS
     with rate_bar("evaluate", "batches") as progress:

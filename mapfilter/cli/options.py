@@ -75,7 +75,7 @@ def numbers(text: str | None, count: int, where: str) -> list[float] | None:
     return found
 
 
-def find_own_filter(config: Config) -> None:
+def check_custom_filter(config: Config) -> None:
     """Let a custom filter be imported from the working folder, after all other places."""
     names = [config.filter.name, *(reading.filter or "" for reading in config.sweep.readings)]
     folder = str(Path.cwd())

@@ -31,7 +31,7 @@ MAP_NAMES = (EMBEDDED_MAP, NO_MAP, *SYNTHETIC_MAPS)
 MAP_FILTERS = ("candidate", "bayes", "grid")
 FUSION_FILTERS = ("ekf", "iekf", "rbukf", "ukf", "ckf")
 _NAME = r"[^\W\d]\w*(\.[^\W\d]\w*)*"
-_OWN_FILTER = re.compile(f"{_NAME}:{_NAME}")
+_CUSTOM_FILTER = re.compile(f"{_NAME}:{_NAME}")
 
 
 def resolve_path(value: Any, info: ValidationInfo) -> Any:
@@ -57,7 +57,7 @@ def resolve_map(value: Any, info: ValidationInfo) -> Any:
 def check_filter_name(value: str) -> str:
     """Check that a filter is built in, or has the form ``package.module:Name``."""
     known = (*MAP_FILTERS, *FUSION_FILTERS)
-    if value not in known and not _OWN_FILTER.fullmatch(value):
+    if value not in known and not _CUSTOM_FILTER.fullmatch(value):
         names = ", ".join(map(repr, known))
         raise ValueError(f"{names}, or your own as package.module:Name")
     return value

@@ -32,11 +32,11 @@ from mapfilter._parallel import Progress
 from mapfilter._types import Bools, Floats, Floats32, Ints
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
 from mapfilter.evaluation.radio_map import (
-    MOST_HEARD,
+    MOST_RECEIVED,
     ErrorModel,
     RadioMap,
     distance_squared,
-    heard_cells,
+    received_cells,
 )
 from mapfilter.options import Options, Positive
 
@@ -172,9 +172,9 @@ def judged_by_levels(  # type: ignore[no-untyped-def]
     clear_m, right, bits, twin, twin_error = np.inf, 0.0, -1.0, -1.0, 0.0
     cell_count = level_dbm.shape[2]
     own_db, site_db = rng.standard_normal(cell_count), rng.standard_normal(site.max() + 1)
-    cells, part = np.empty(MOST_HEARD, dtype=np.int64), np.empty(MOST_HEARD)
-    report, truth = np.empty(MOST_HEARD), np.empty(MOST_HEARD)
-    off_db, apart_db = np.empty(MOST_HEARD), np.empty(MOST_HEARD)
+    cells, part = np.empty(MOST_RECEIVED, dtype=np.int64), np.empty(MOST_RECEIVED)
+    report, truth = np.empty(MOST_RECEIVED), np.empty(MOST_RECEIVED)
+    off_db, apart_db = np.empty(MOST_RECEIVED), np.empty(MOST_RECEIVED)
     from_row, from_col, number = row.copy(), col.copy(), point.copy()
     left = from_row.size
     log_weight, apart = np.zeros(left), np.zeros(left)
@@ -190,8 +190,8 @@ def judged_by_levels(  # type: ignore[no-untyped-def]
                 own_db[i] = kept * own_db[i] + new * rng.standard_normal()
             for i in range(site_db.size):
                 site_db[i] = kept * site_db[i] + new * rng.standard_normal()
-        heard = heard_cells(level_dbm[rows[k], cols[k]], floor_dbm, site, share, cells, part)
-        for i in range(heard):
+        received = received_cells(level_dbm[rows[k], cols[k]], floor_dbm, site, share, cells, part)
+        for i in range(received):
             error = np.sqrt(share) * site_db[site[cells[i]]] + np.sqrt(1 - share) * own_db[cells[i]]
             truth[i] = level_dbm[rows[k], cols[k], cells[i]]
             report[i] = truth[i] + deviation_db * error
@@ -205,13 +205,15 @@ def judged_by_levels(  # type: ignore[no-untyped-def]
                 continue
             if not near_way[r, c]:
                 continue
-            for i in range(heard):
+            for i in range(received):
                 level = level_dbm[r, c, cells[i]]
                 off_db[i] = report[i] - level
                 apart_db[i] = truth[i] - level
-            weighed = log_weight[h] - 0.5 * weight * distance_squared(off_db, part, heard) / scale
+            weighed = (
+                log_weight[h] - 0.5 * weight * distance_squared(off_db, part, received) / scale
+            )
             if counts_twins:
-                squared = distance_squared(apart_db, part, heard) / scale
+                squared = distance_squared(apart_db, part, received) / scale
                 apart[kept_count] = apart[h] + weight * squared
             from_row[kept_count], from_col[kept_count] = from_row[h], from_col[h]
             number[kept_count], log_weight[kept_count] = number[h], weighed

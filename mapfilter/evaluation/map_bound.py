@@ -25,12 +25,12 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.evaluation.first_fix import FirstFix, FirstFixOptions, first_fix
 from mapfilter.evaluation.position_bound import PositionBound, position_bound
 from mapfilter.evaluation.radio_map import (
-    MOST_HEARD,
+    MOST_RECEIVED,
     ErrorModel,
     RadioMap,
     distance_squared,
-    heard_cells,
     radio_map,
+    received_cells,
 )
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters.geotiff import new_geotiff
@@ -85,17 +85,17 @@ def _mean_overlap(  # type: ignore[no-untyped-def]
     levels, server, first, others, site, floor_dbm, variance, share
 ):
     mean = np.zeros(server.size)
-    cells = np.empty(MOST_HEARD, dtype=np.int64)
-    off_db, part = np.empty(MOST_HEARD), np.empty(MOST_HEARD)
+    cells = np.empty(MOST_RECEIVED, dtype=np.int64)
+    off_db, part = np.empty(MOST_RECEIVED), np.empty(MOST_RECEIVED)
     scale = -1.0 / (8.0 * variance * (1.0 - share))
     for i in range(server.size):
-        heard = heard_cells(levels[i], floor_dbm, site, share, cells, part)
+        received = received_cells(levels[i], floor_dbm, site, share, cells, part)
         begin, end = first[server[i]], first[server[i] + 1]
         total = 0.0
         for other in range(begin, end):
-            for j in range(heard):
+            for j in range(received):
                 off_db[j] = levels[i, cells[j]] - others[other, cells[j]]
-            total += np.exp(scale * distance_squared(off_db, part, heard))
+            total += np.exp(scale * distance_squared(off_db, part, received))
         mean[i] = total / max(end - begin, 1)
     return mean
 

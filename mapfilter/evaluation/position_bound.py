@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 
 from mapfilter._types import Floats
-from mapfilter.evaluation.radio_map import MOST_HEARD, ErrorModel, RadioMap, heard_cells
+from mapfilter.evaluation.radio_map import MOST_RECEIVED, ErrorModel, RadioMap, received_cells
 
 _STREET_M = 25.0
 # A fit across less than this share of the window says nothing of that direction.
@@ -68,15 +68,15 @@ def _bounds(  # type: ignore[no-untyped-def]
     """Return the bounds in pixels."""
     count = rows.size
     plane, along = np.full(count, np.inf), np.full(count, np.inf)
-    cells = np.empty(MOST_HEARD, dtype=np.int64)
-    slope, part = np.empty((MOST_HEARD, 2)), np.empty(MOST_HEARD)
+    cells = np.empty(MOST_RECEIVED, dtype=np.int64)
+    slope, part = np.empty((MOST_RECEIVED, 2)), np.empty(MOST_RECEIVED)
     reach = int(np.ceil(reach_px))
     most = (2 * reach + 1) ** 2
     near_row, near_col = np.empty(most, dtype=np.int64), np.empty(most, dtype=np.int64)
     weight = np.empty(most)
     for i in range(count):
         row, col = rows[i], cols[i]
-        heard = heard_cells(level_dbm[row, col], floor_dbm, site, share, cells, part)
+        received = received_cells(level_dbm[row, col], floor_dbm, site, share, cells, part)
         found = 0
         mean_r, mean_c, total = 0.0, 0.0, 0.0
         axis_rr, axis_rc, axis_cc = 0.0, 0.0, 0.0
@@ -101,13 +101,13 @@ def _bounds(  # type: ignore[no-untyped-def]
         mean_r /= total
         mean_c /= total
         s_rr, s_rc, s_cc = 0.0, 0.0, 0.0
-        slope[:heard] = 0.0
+        slope[:received] = 0.0
         for k in range(found):
             dr, dc = near_row[k] - row - mean_r, near_col[k] - col - mean_c
             s_rr += weight[k] * dr * dr
             s_rc += weight[k] * dr * dc
             s_cc += weight[k] * dc * dc
-            for j in range(heard):
+            for j in range(received):
                 level = level_dbm[near_row[k], near_col[k], cells[j]]
                 slope[j, 0] += weight[k] * dr * level
                 slope[j, 1] += weight[k] * dc * level
@@ -119,14 +119,14 @@ def _bounds(  # type: ignore[no-untyped-def]
         if major <= 0:
             continue
         least = total * (_NARROW * reach_px / 2) ** 2
-        for j in range(heard):
+        for j in range(received):
             first = (slope[j, 0] * cos + slope[j, 1] * sin) / major
             second = 0.0
             if minor > least:
                 second = (slope[j, 1] * cos - slope[j, 0] * sin) / minor
             slope[j, 0] = first * cos - second * sin
             slope[j, 1] = first * sin + second * cos
-        j_rr, j_rc, j_cc = _information(slope, part, heard, variance * (1.0 - share))
+        j_rr, j_rc, j_cc = _information(slope, part, received, variance * (1.0 - share))
         determinant = j_rr * j_cc - j_rc * j_rc
         if minor > least and determinant > 1e-12 * (j_rr + j_cc) ** 2 and determinant > 0:
             plane[i] = np.sqrt((j_rr + j_cc) / determinant)
@@ -139,11 +139,11 @@ def _bounds(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _information(slope, part, heard, scale):  # type: ignore[no-untyped-def]
+def _information(slope, part, received, scale):  # type: ignore[no-untyped-def]
     """Return the entries of G' S⁻¹ G, with the inverse within each site in closed form."""
     rr, rc, cc = 0.0, 0.0, 0.0
     sum_r, sum_c = 0.0, 0.0
-    for j in range(heard):
+    for j in range(received):
         rr += slope[j, 0] * slope[j, 0]
         rc += slope[j, 0] * slope[j, 1]
         cc += slope[j, 1] * slope[j, 1]

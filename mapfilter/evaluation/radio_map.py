@@ -1,4 +1,4 @@
-"""A radio map as bounds see it: where one can be, what is heard there, how wrong that may be."""
+"""A radio map as bounds see it: where one can be, what is received there, how wrong that may be."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.options import Below1, Options, Positive
 
-MOST_HEARD = 7
+MOST_RECEIVED = 7
 """Cells in a report: the serving one and six neighbours."""
 MOST_LEVELS = 1_000_000_000
 
@@ -23,7 +23,7 @@ _TOLERANCE_PX = 1.0
 
 @dataclass(frozen=True, slots=True)
 class ErrorModel(Options):
-    """How far predicted levels are from those heard: normal, correlated along the way.
+    """How far predicted levels are from those received: normal, correlated along the way.
 
     The error of a cell has the autocorrelation exp(-d / correlation_m) (Gudmundson 1991,
     "Correlation model for shadow fading in mobile radio systems"); cells of one site share a part
@@ -70,11 +70,11 @@ class RadioMap:
     Parameters
     ----------
     cell_ids : tuple of str
-        Those that are heard, C of them.
+        Those that are received, C of them.
     site : numpy.ndarray of int64, shape (C,)
         Number of the site of each cell.
     level_dbm : numpy.ndarray of float32, shape (rows, cols, C)
-        Off the points, those of the nearest; ``floor_dbm`` where a cell is not heard.
+        Off the points, those of the nearest; ``floor_dbm`` where a cell is not received.
     floor_dbm, margin_db : float
         Of the database.
     on_way : numpy.ndarray of bool, shape (rows, cols)
@@ -118,8 +118,8 @@ class RadioMap:
         """
         level = self.level_dbm[self.row, self.col]
         best = level.max(axis=1, keepdims=True)
-        heard = (level >= best - np.float32(self.margin_db)) & (level > self.floor_dbm)
-        cell, point = np.nonzero(heard.T)
+        received = (level >= best - np.float32(self.margin_db)) & (level > self.floor_dbm)
+        cell, point = np.nonzero(received.T)
         first = np.searchsorted(cell, np.arange(len(self.cell_ids) + 1))
         return first.astype(np.int64), point.astype(np.int64)
 
@@ -160,11 +160,11 @@ def radio_map(database: RadioRouteDatabase) -> RadioMap:
 
 
 @njit(cache=True)
-def heard_cells(level_dbm, floor_dbm, site, share, found, part):  # type: ignore[no-untyped-def]
+def received_cells(level_dbm, floor_dbm, site, share, found, part):  # type: ignore[no-untyped-def]
     """Write the strongest cells above the floor into ``found``, those of a site side by side.
 
     ``part`` gets, at the last cell of each site, what :func:`distance_squared` needs, and 0 at the
-    others. Returns how many cells are heard.
+    others. Returns how many cells are received.
     """
     count = 0
     for cell in range(level_dbm.size):
@@ -198,7 +198,7 @@ def heard_cells(level_dbm, floor_dbm, site, share, found, part):  # type: ignore
 
 @njit(inline="always")
 def distance_squared(off_db, part, count):  # type: ignore[no-untyped-def]
-    """Return x' S⁻¹ x for offsets of heard cells, in units of (1 - share) · variance.
+    """Return x' S⁻¹ x for offsets of received cells, in units of (1 - share) · variance.
 
     Within a site S is, in units of the variance, (1 - share) I + share 1 1', whose inverse is known
     in closed form (Sherman and Morrison 1950).

@@ -84,7 +84,7 @@ def _linearised(measure: Any, problem: Problem, reading: Floats, lanes: Lanes) -
     _solve_and_correct(present, noise_factor, seen, residual, lanes)
 
 
-_SETTLED = 1e-9
+_CONVERGED = 1e-9
 _ROUNDING = 1e-8
 
 
@@ -102,7 +102,7 @@ def _iterated(measure: Any, problem: Problem, reading: Floats, lanes: Lanes) -> 
     information, half = np.empty((n, n, count)), np.empty((n, count))
     z, trial, target = np.zeros((n, count)), np.zeros((n, count)), np.zeros((n, count))
     best, length = np.full(count, np.inf), np.ones(count)
-    settled = np.zeros(count, dtype=np.bool_)
+    converged = np.zeros(count, dtype=np.bool_)
     for _ in range(problem.iterations):
         points = mean[uses]
         for a in range(uses.size):
@@ -113,7 +113,7 @@ def _iterated(measure: Any, problem: Problem, reading: Floats, lanes: Lanes) -> 
             measure, problem, points, reading, present, noise_factor, lower
         )
         for w in range(count):
-            if settled[w]:
+            if converged[w]:
                 continue
             value = 0.0
             for k in range(n):
@@ -135,14 +135,14 @@ def _iterated(measure: Any, problem: Problem, reading: Floats, lanes: Lanes) -> 
         information, half, target = solve_lanes(seen, r)
         open_lanes = 0
         for w in range(count):
-            if settled[w]:
+            if converged[w]:
                 continue
             moved = 0.0
             for k in range(n):
                 trial[k, w] = z[k, w] + length[w] * (target[k, w] - z[k, w])
                 moved = max(moved, abs(trial[k, w] - z[k, w]))
-            settled[w] = moved < _SETTLED
-            open_lanes += not settled[w]
+            converged[w] = moved < _CONVERGED
+            open_lanes += not converged[w]
         if open_lanes == 0:
             break
     evidence_lanes(present, noise_factor, r, information, half, lanes)

@@ -27,7 +27,7 @@ _CLIP_SD = 4.0
 
 
 @dataclass(frozen=True, slots=True)
-class HeardOptions:
+class MeasuredMapOptions:
     """Smoothing of the counts.
 
     Parameters
@@ -49,7 +49,7 @@ class HeardOptions:
 
 
 @dataclass(frozen=True, eq=False)
-class HeardRows:
+class MeasuredRows:
     """Rows of earlier sessions, shape (N,) each.
 
     Parameters
@@ -85,7 +85,7 @@ class ServingStatistics:
 
     @classmethod
     def of_rows(
-        cls, rows: HeardRows, lattice: Lattice, site: Ints, options: HeardOptions
+        cls, rows: MeasuredRows, lattice: Lattice, site: Ints, options: MeasuredMapOptions
     ) -> ServingStatistics:
         """Count the rows that lie on a lattice.
 

@@ -138,9 +138,9 @@ class BeliefTracker(Filter[TrackState]):
 
     def _serving(self, epoch: Epoch) -> tuple[str, Reason, list[UnusedReading]]:
         """Return the serving cell, whether the filter can start from it, and what is left out."""
-        if not epoch.heard:
+        if not epoch.radio:
             return "", Reason.NO_READING, []
-        named = [row.cell for row in epoch.heard if row.role == SERVING and row.cell is not None]
+        named = [row.cell for row in epoch.radio if row.role == SERVING and row.cell is not None]
         if not named:
             why = Reason.NO_SERVING_CELL
             return "", why, [_unused(epoch, SERVING, "", why)]

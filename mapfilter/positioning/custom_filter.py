@@ -101,7 +101,7 @@ def _imported(name: str) -> Any:
             ConfigError,
             f"filter {name}",
             "a filter that can be imported as package.module:Name",
-            _said(error),
+            _fault_text(error),
             hint if isinstance(error, ModuleNotFoundError) else "",
         ) from error
     if not callable(found):
@@ -154,10 +154,10 @@ def wrap_user_errors(name: str, owner: object = None) -> Iterator[None]:
         at = (own or list(frames))[-1]
         where = f"filter {name}, {Path(at.filename).name} line {at.lineno}, in {at.name}"
         hint = "mapfilter.testing.check_filter names the clause of the contract that it breaks"
-        raise fail(ConfigError, where, "a filter that runs", _said(error), hint) from error
+        raise fail(ConfigError, where, "a filter that runs", _fault_text(error), hint) from error
 
 
-def _said(error: BaseException) -> str:
+def _fault_text(error: BaseException) -> str:
     return " ".join(f"{type(error).__name__}: {error}".split())
 
 
@@ -271,7 +271,7 @@ class CustomEpochFilter(Filter[Any]):
 
 def _measured(epoch: Epoch) -> Epoch | None:
     """Return an epoch in which something besides motion was measured."""
-    some = epoch.heard or epoch.ranges or epoch.differences or epoch.fix is not None
+    some = epoch.radio or epoch.ranges or epoch.differences or epoch.fix is not None
     return epoch if some else None
 
 

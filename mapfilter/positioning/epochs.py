@@ -1,4 +1,4 @@
-"""A log's tables merged into epochs: what moved, what was heard and where GNSS said one is."""
+"""A log's tables merged into epochs: what moved, what was received and where GNSS said one is."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ class Epoch:
     time_s : float
     motion : tuple of MotionStep
         Intervals that end now.
-    heard : tuple of ReportRow
+    radio : tuple of ReportRow
         The report, of all its rows.
     fix : GnssFix or None
     ranges : tuple of Pseudorange
@@ -118,7 +118,7 @@ class Epoch:
 
     time_s: float
     motion: tuple[MotionStep, ...] = ()
-    heard: tuple[ReportRow, ...] = ()
+    radio: tuple[ReportRow, ...] = ()
     fix: GnssFix | None = None
     ranges: tuple[Pseudorange, ...] = ()
     differences: tuple[Difference, ...] = ()
@@ -129,13 +129,13 @@ def epochs(log: TrackLog) -> list[Epoch]:
     motion: dict[float, list[MotionStep]] = {}
     for time_s, *step in _rows(log.motion, ("time_s", "step_m", "heading_rad", "turn_rad")):
         motion.setdefault(time_s, []).append(MotionStep(*step))
-    heard: dict[float, list[ReportRow]] = {}
+    radio: dict[float, list[ReportRow]] = {}
     names = ("time_s", "role", "cell", "arfcn", "bsic", "level_dbm", "censored", "timing_advance")
     for time_s, role, cell, arfcn, bsic, level_dbm, censored, steps in _rows(log.radio, names):
         level = float(level_dbm) if level_dbm is not None else nan
         advance = float(steps) if steps is not None else nan
         row = ReportRow(role, cell, arfcn, bsic, level, censored or 0, advance)
-        heard.setdefault(time_s, []).append(row)
+        radio.setdefault(time_s, []).append(row)
     fixes = {
         time_s: GnssFix(*place)
         for time_s, *place in _rows(
@@ -152,12 +152,12 @@ def epochs(log: TrackLog) -> list[Epoch]:
     compared = ("time_s", "cell", "reference", "difference_m", "sigma_m", "reference_sigma_m")
     for time_s, *told in _rows(log.tdoa, compared):
         differences.setdefault(time_s, []).append(Difference(*told))
-    times = motion.keys() | heard.keys() | fixes.keys() | ranges.keys() | differences.keys()
+    times = motion.keys() | radio.keys() | fixes.keys() | ranges.keys() | differences.keys()
     return [
         Epoch(
             time_s,
             tuple(motion.get(time_s, ())),
-            tuple(heard.get(time_s, ())),
+            tuple(radio.get(time_s, ())),
             fixes.get(time_s),
             tuple(ranges.get(time_s, ())),
             tuple(differences.get(time_s, ())),
@@ -206,5 +206,5 @@ def headed(step: MotionStep, heading_rad: float) -> tuple[MotionStep, float]:
 
 def serving_cell(epoch: Epoch) -> str | None:
     """Return the first serving cell that a report names."""
-    named = (row.cell for row in epoch.heard if row.role == SERVING and row.cell is not None)
+    named = (row.cell for row in epoch.radio if row.role == SERVING and row.cell is not None)
     return next(named, None)

@@ -1,6 +1,6 @@
-"""A hexagonal LTE network as it is heard: sites of three sectors, levels, and SINR.
+"""A hexagonal LTE network as it is received: sites of three sectors, levels, and SINR.
 
-All sectors send at once and in the same band, so that each is heard against all others.
+All sectors send at once and in the same band, so that each is received against all others.
 
 All times are distances (m), times of arrival times the speed of light.
 """

@@ -39,21 +39,21 @@ def running_mean_db(level_dbm: Floats, count: int) -> Floats:
     return np.asarray(total / np.minimum(np.arange(len(total)) + 1, count)[:, np.newaxis])
 
 
-def serving_cells(mean_dbm: Floats, heard: Bools, hysteresis_db: float) -> Ints:
+def serving_cells(mean_dbm: Floats, received: Bools, hysteresis_db: float) -> Ints:
     """Return which cell serves at each report: handover with hysteresis.
 
-    A cell serves until the strongest heard one is more than ``hysteresis_db`` above it, or until
-    it is not heard any more; then the strongest takes over (the first of equals).
+    A cell serves until the strongest received one is more than ``hysteresis_db`` above it, or until
+    it is not received any more; then the strongest takes over (the first of equals).
 
     Parameters
     ----------
     mean_dbm : ndarray, shape (N, cells)
-    heard : ndarray of bool, shape (N, cells)
+    received : ndarray of bool, shape (N, cells)
 
     Returns
     -------
     serving : ndarray of int64, shape (N,)
-        Column of the cell, or -1 when none is heard.
+        Column of the cell, or -1 when none is received.
 
     Examples
     --------
@@ -61,22 +61,22 @@ def serving_cells(mean_dbm: Floats, heard: Bools, hysteresis_db: float) -> Ints:
     >>> serving_cells(mean_dbm, np.ones((4, 2), dtype=bool), 4.0).tolist()
     [0, 0, 1, 1]
     """
-    audible = np.where(heard, mean_dbm, -np.inf)
+    audible = np.where(received, mean_dbm, -np.inf)
     serving = np.full(len(audible), -1, dtype=np.int64)
     if not audible.size:
         return serving
     best = np.argmax(audible, axis=1)
     now = -1
     for i, strongest in enumerate(best):
-        lost = now < 0 or not heard[i, now]
+        lost = now < 0 or not received[i, now]
         if lost or audible[i, strongest] > audible[i, now] + hysteresis_db:
-            now = int(strongest) if heard[i, strongest] else -1
+            now = int(strongest) if received[i, strongest] else -1
         serving[i] = now
     return serving
 
 
 Levels = Callable[[Floats, Floats], NDArray[np.floating]]
-"""From east and north (m), shape (N,), to levels (dBm), shape (N, cells); NaN: not heard."""
+"""From east and north (m), shape (N,), to levels (dBm), shape (N, cells); NaN: not received."""
 
 _SILENT_DBM = -140.0
 _MOST_LEVELS = 100_000_000
@@ -159,7 +159,7 @@ def reports(
     radio : pandas.DataFrame
         The columns of a log's radio table; for each report the serving cell, then the neighbours
         from the strongest down, whose ``cell`` is None. Of cells that share carrier and BSIC only
-        the strongest is heard, or the serving one. A report in which nothing is heard has no rows.
+        the strongest is received, or the serving one. An empty report has no rows.
 
     Raises
     ------
@@ -187,14 +187,14 @@ def reports(
     noise_db += model.phone_offset_sd_db * rng.standard_normal()
     if model.radio == "ground_truth":
         level = level + noise_db
-    heard = np.where(level >= model.sensitivity_dbm, level, -np.inf)
+    received = np.where(level >= model.sensitivity_dbm, level, -np.inf)
     if model.radio == "ground_truth":
         averaged = max(1, round(model.averaging_s / model.report_period_s))
         mean = running_mean_db(np.where(np.isnan(level), _SILENT_DBM, level), averaged)
-        serving = serving_cells(mean, np.isfinite(heard), model.hysteresis_db)
+        serving = serving_cells(mean, np.isfinite(received), model.hysteresis_db)
     else:
-        serving = np.where(np.isfinite(heard).any(axis=1), np.argmax(heard, axis=1), -1)
-    rank = _ranked(heard, serving, _shared_carriers(plan), model.max_neighbours)
+        serving = np.where(np.isfinite(received).any(axis=1), np.argmax(received, axis=1), -1)
+    rank = _ranked(received, serving, _shared_carriers(plan), model.max_neighbours)
     return _table(tick_s, level, rank, plan, model.quantise)
 
 
@@ -273,7 +273,7 @@ def _shared_carriers(plan: CellPlan) -> list[Ints]:
 
 
 def _ranked(
-    heard_dbm: Floats,
+    received_dbm: Floats,
     serving: Ints,
     shared: list[Ints],
     max_neighbours: int,
@@ -281,7 +281,7 @@ def _ranked(
     """Return the cells of each report, shape (N, 1 + neighbours), -1 where there is none."""
     report = np.arange(len(serving))
     served = serving >= 0
-    others = heard_dbm.copy()
+    others = received_dbm.copy()
     # The serving cell drowns those of its own carrier and BSIC.
     others[report[served], serving[served]] = np.inf
     for group in shared:

@@ -279,14 +279,14 @@ def receive(
     open_sky, echo_m = _sky(seen, place, skyline, frame, model)
     range_m = np.linalg.norm(satellites - there[:, None], axis=2)
     sigma_m = model.zenith_m / np.sin(np.maximum(seen.elevation_rad, 0.05))
-    heard_m = range_m + clock_m[:, None] + sigma_m * white + echo_m[:, None] * echo
+    measured_m = range_m + clock_m[:, None] + sigma_m * white + echo_m[:, None] * echo
     audible = open_sky
     if model.nlos is not None:
         # Drawn last: nothing else changes.
         mirrored = draw_reflections(model.nlos, gone_m, seen.elevation_rad, rng)
         hidden = seen.above(model.mask_deg) & ~open_sky & open_sky.any(axis=1, keepdims=True)
         late_m = model.nlos.noise_factor * sigma_m * white + mirrored.delay_m
-        heard_m = np.where(hidden, range_m + clock_m[:, None] + late_m, heard_m)
+        measured_m = np.where(hidden, range_m + clock_m[:, None] + late_m, measured_m)
         audible = open_sky | (hidden & mirrored.received)
     if spoofer is not None:
         shift = np.array([spoofer.east_m, spoofer.north_m])
@@ -294,7 +294,7 @@ def receive(
         false_m = np.linalg.norm(satellites - elsewhere[:, None], axis=2)
         on = (tick_s >= spoofer.from_s) & (tick_s < spoofer.from_s + spoofer.lasts_s)
         false_m = false_m + (clock_m + spoofer.clock_m)[:, None] + sigma_m * white
-        heard_m = np.where(on[:, None], false_m, heard_m)
+        measured_m = np.where(on[:, None], false_m, measured_m)
     if model.choice == "highest":
         prefer = seen.elevation_rad
     else:
@@ -305,7 +305,7 @@ def receive(
         {
             "time_s": tick_s[row],
             "satellite": np.array(usable.names, dtype=object)[column],
-            "pseudorange_m": heard_m[row, column],
+            "pseudorange_m": measured_m[row, column],
             "x_m": satellites[row, column, 0],
             "y_m": satellites[row, column, 1],
             "z_m": satellites[row, column, 2],

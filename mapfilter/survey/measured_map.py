@@ -91,7 +91,7 @@ class SurveyedCell:
         Known or estimated place, east and north (m).
     estimated : bool
         Whether the place was estimated from the levels.
-    heard : scipy.spatial.cKDTree
+    measured : scipy.spatial.cKDTree
         Places of all readings.
     """
 
@@ -100,14 +100,14 @@ class SurveyedCell:
     field: ResidualField
     antenna: tuple[float, float] | None
     estimated: bool
-    heard: cKDTree
+    measured: cKDTree
 
     def distance_m(self, east_m: Floats, north_m: Floats, beyond_m: float = np.inf) -> Floats:
         """Return how far places are from the nearest reading; infinite beyond ``beyond_m``."""
         # The bound itself must still count.
         bound_m = np.nextafter(beyond_m, np.inf)
         places = np.column_stack([east_m, north_m])
-        return np.asarray(self.heard.query(places, distance_upper_bound=bound_m)[0])
+        return np.asarray(self.measured.query(places, distance_upper_bound=bound_m)[0])
 
     def predict(self, east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
         """Return the mean level (dBm) and the deviation (dB) of a new reading at places."""
@@ -217,7 +217,7 @@ def fit_survey(
                 made,
                 (antenna.east_m, antenna.north_m) if antenna is not None else None,
                 antenna is not None and not (plan is not None and some.cell_id in plan),
-                cKDTree(some.heard_at),
+                cKDTree(some.measured_at),
             )
     located = sum(cell.estimated for cell in cells.values())
     if located:

@@ -264,7 +264,7 @@ class Points:
     """Mean level and position of a cell's readings in each square and session, shape (N,) each.
 
     Readings of one session in one square count once, however long it stood still there.
-    ``heard_at``, shape (M, 2), is east and north of every reading.
+    ``measured_at``, shape (M, 2), is east and north of every reading.
     """
 
     cell_id: str
@@ -272,7 +272,7 @@ class Points:
     north_m: Floats
     level_dbm: Floats
     session: Ints
-    heard_at: Floats
+    measured_at: Floats
 
     def __len__(self) -> int:
         return len(self.level_dbm)
@@ -291,7 +291,7 @@ class Points:
     def some(self, kept: Ints | Bools) -> Points:
         """Return some of the points."""
         columns = self.east_m[kept], self.north_m[kept], self.level_dbm[kept], self.session[kept]
-        return Points(self.cell_id, *columns, self.heard_at)
+        return Points(self.cell_id, *columns, self.measured_at)
 
 
 def points_by_cell(measurements: Measurements, square_m: float, most: int) -> dict[str, Points]:

@@ -157,8 +157,8 @@ def _windows(
     """Yield strips of the lattice that hold every pixel in reach of a cell's readings."""
     top, left, bottom, right = 0, 0, lattice.rows - 1, lattice.cols - 1
     if not fill:
-        west, south = cell.points.heard_at.min(axis=0) - reach_m
-        east, north = cell.points.heard_at.max(axis=0) + reach_m
+        west, south = cell.points.measured_at.min(axis=0) - reach_m
+        east, north = cell.points.measured_at.max(axis=0) + reach_m
         first_row, first_col = lattice.row_col(west, north)
         last_row, last_col = lattice.row_col(east, south)
         top, left = max(top, first_row), max(left, first_col)

@@ -253,11 +253,11 @@ def _without_middle(log: TrackLog) -> TrackLog:
     whole_m = float(gone_m.iloc[-1])
     off = (gone_m > 0.5 * whole_m) & (gone_m < 0.5 * whole_m + _CUT_M)
     times = log.motion["time_s"][off]
-    heard = log.radio["time_s"].between(times.min(), times.max())
+    received = log.radio["time_s"].between(times.min(), times.max())
     return replace(
         log,
         motion=log.motion[~off].reset_index(drop=True),
-        radio=log.radio[~heard].reset_index(drop=True),
+        radio=log.radio[~received].reset_index(drop=True),
     )
 
 

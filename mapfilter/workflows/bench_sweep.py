@@ -15,7 +15,7 @@ from mapfilter._parallel import SerialExecutor, cluster_executor, local_executor
 from mapfilter.database.store import open_database
 from mapfilter.evaluation.accuracy import accuracy
 from mapfilter.experiments.papers.khalaf_allah_2007 import MAP_SETTINGS, ONE_SIGMA_TRANS_M, plans
-from mapfilter.experiments.sweep.journeys import filter_rng, heard, sensed, true_path, truth_of
+from mapfilter.experiments.sweep.journeys import filter_rng, radio_log, sensed, true_path, truth_of
 from mapfilter.experiments.sweep.plan import SweepPlan
 from mapfilter.experiments.sweep.run import sweep
 from mapfilter.experiments.sweep.world import SweepWorld
@@ -37,8 +37,8 @@ class SweepBench:
     runs, epochs : int
         The task: the candidate filter of Khalaf-Allah 2007 on the embedded map, so many runs of
         so many epochs.
-    route_s, heard_s : float
-        Making a route with its truth, and what is heard along it: once for all runs on it.
+    route_s, radio_s : float
+        Making a route with its truth, and what is received along it: once for all runs on it.
     sensed_s, located_s, scored_s : float
         A run's inertial unit, its filter, and its score, per run.
     filter_step_s : float
@@ -55,7 +55,7 @@ class SweepBench:
     runs: int
     epochs: int
     route_s: float
-    heard_s: float
+    radio_s: float
     sensed_s: float
     located_s: float
     scored_s: float
@@ -153,8 +153,8 @@ def _parts(plan: SweepPlan, world: SweepWorld, database: Path) -> tuple[int, dic
         run = next(plan.select(first, first + 1))
         with timed("route_s"):
             truth = true_path(world, plan, number)
-        with timed("heard_s"):
-            log = heard(world, plan, truth, number, run.radio, run.report_period_s)
+        with timed("radio_s"):
+            log = radio_log(world, plan, truth, number, run.radio, run.report_period_s)
         for run in plan.select(first, first + min(runs_of_route, _TIMED)):
             with timed("sensed_s"):
                 moved = sensed(plan, log, run)

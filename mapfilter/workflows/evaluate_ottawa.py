@@ -229,7 +229,7 @@ def _session_files(data: Path, part: str) -> list[Path]:
 def _map_of(others: Sequence[Session], folder: Path) -> tuple[Path, Path]:
     """Make levels, ways and database of sessions, as drive tests without a street map are."""
     files = [str(other.path) for other in others]
-    # The trend stays where nobody measured: not measured there is not the same as not heard.
+    # The trend stays where nobody measured: not measured there is not the same as not received.
     survey = {"files": files, "cross_validate": False, "fill": True}
     config = Config.model_validate(
         {

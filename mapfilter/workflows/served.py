@@ -189,10 +189,10 @@ def best_servers(
                 found.server[here][better] = database.plan.index(cell_id)
     floor_dbm = np.float32(database.floor_dbm)
     second_dbm[second_dbm < floor_dbm] = -np.inf
-    heard, known = best_dbm >= floor_dbm, np.isfinite(best_dbm)
-    found.server[~heard] = -1
+    received, known = best_dbm >= floor_dbm, np.isfinite(best_dbm)
+    found.server[~received] = -1
     found.level_dbm[known] = best_dbm[known]
-    found.margin_db[heard] = best_dbm[heard] - second_dbm[heard]
+    found.margin_db[received] = best_dbm[received] - second_dbm[received]
     return found
 
 

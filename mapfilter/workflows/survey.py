@@ -37,7 +37,7 @@ from mapfilter.workflows.world import (
     area_lattice,
     check_cells_near,
     check_scale,
-    open_as_said,
+    open_by_section,
     outside_m,
     planned_cells,
 )
@@ -294,7 +294,7 @@ def survey_inputs(config: Config) -> SurveyInputs:
         raise fail(ConfigError, "prediction.survey.files", "measurement files", "none")
     predicted = None
     if section.calibrate is not None:
-        predicted = open_as_said(section.calibrate, config.rasters)
+        predicted = open_by_section(section.calibrate, config.rasters)
     given = _given_lattice(config, predicted)
     measurements, plan = _measurements(config, given)
     reach_m = section.of(SurveyOptions).reach_m

@@ -207,8 +207,8 @@ def sweep_world(config: Config, radios: Sequence[Radio]) -> SweepWorld:
         raise fail(InputError, str(config.ground_truth_path), expected, "another")
     check_cells_near(world.plan, world.lattice, str(config.cells.plan or "cells"))
     levels_dbm = {real: _levels(rasters, world.plan) for real, rasters in opened.items()}
-    heard = {
-        radio.name: _heard(
+    received = {
+        radio.name: _predicted(
             config, radio, levels_dbm[radio.name == GROUND_TRUTH], lattices[0], world.plan
         )
         for radio in radios
@@ -216,14 +216,14 @@ def sweep_world(config: Config, radios: Sequence[Radio]) -> SweepWorld:
     on_pavement = config.journeys.of(WalkerModel).beside != "centre"
     heights_m = rasterise_heights(world.buildings, lattices[0]) if on_pavement else None
     network = street_network(world.ways, world.routes)
-    return SweepWorld(network, world.plan, lattices[0], heard, heights_m)
+    return SweepWorld(network, world.plan, lattices[0], received, heights_m)
 
 
 def _levels(rasters: RxLevRasters, plan: CellPlan) -> Floats32:
     return np.asarray(rasters.read_levels_dbm(plan, None, plan.ids), dtype=np.float32)
 
 
-def _heard(
+def _predicted(
     config: Config,
     radio: Radio,
     predicted_dbm: Floats32,

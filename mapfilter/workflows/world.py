@@ -53,10 +53,10 @@ def planned_rasters(config: Config) -> RxLevRasters:
         raise fail(
             InputError, str(config.rasters_path), "rasters", "No such file or directory", hint
         )
-    return open_as_said(config.rasters_path, section)
+    return open_by_section(config.rasters_path, section)
 
 
-def open_as_said(path: Path, section: Rasters) -> RxLevRasters:
+def open_by_section(path: Path, section: Rasters) -> RxLevRasters:
     """Open rasters as ``[rasters]`` describes them.
 
     Raises
@@ -267,7 +267,7 @@ def map_cover(world: World) -> tuple[str, ...]:
     replaced = roads.layer is not None or roads.tracks.files
     if not area.has_box or not area.map_is_a_file or replaced:
         return ()
-    if _told_share(area, lattice) >= _ENOUGH:
+    if _declared_share(area, lattice) >= _ENOUGH:
         return ()
     box = shapely.box(*lattice.bounds_m)
     try:
@@ -278,7 +278,7 @@ def map_cover(world: World) -> tuple[str, ...]:
     return _note(f"the map {area.map}", float(near.area / box.area))
 
 
-def _told_share(area: Area, lattice: Lattice) -> float:
+def _declared_share(area: Area, lattice: Lattice) -> float:
     along = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
     rows, cols = np.meshgrid(along * lattice.rows - 0.5, along * lattice.cols - 0.5, indexing="ij")
     lon, lat = unproject(lattice.crs, *lattice.east_north(rows.ravel(), cols.ravel()))

@@ -7,7 +7,7 @@ from mapfilter.errors import ConfigError
 from mapfilter.evaluation.first_fix import FirstFixOptions, first_fix, starts
 from mapfilter.evaluation.map_bound import BANDS, distinctness, map_bound
 from mapfilter.evaluation.position_bound import position_bound
-from mapfilter.evaluation.radio_map import ErrorModel, RadioMap, distance_squared, heard_cells
+from mapfilter.evaluation.radio_map import ErrorModel, RadioMap, distance_squared, received_cells
 from mapfilter.geodesy import Lattice
 
 FLOOR_DBM = -110.0
@@ -76,7 +76,7 @@ def test_distances_are_those_of_the_inverse_matrix():
     for _ in range(20):
         level = rng.uniform(-120, -60, site.size).astype(np.float32)
         cells, part = np.empty(7, dtype=np.int64), np.empty(7)
-        count = heard_cells(level, FLOOR_DBM, site, 0.4, cells, part)
+        count = received_cells(level, FLOOR_DBM, site, 0.4, cells, part)
         heard = np.flatnonzero(level > FLOOR_DBM)
         strongest = heard[np.argsort(-level[heard], kind="stable")][:7]
         assert sorted(cells[:count]) == sorted(strongest)

@@ -27,7 +27,7 @@ from mapfilter.experiments.benchmarks.ottawa_table import read_left_out
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.geodesy import Lattice, unproject
 from mapfilter.models.fingerprint import LevelReading
-from mapfilter.models.measured_map import HeardOptions, HeardRows, ServingStatistics
+from mapfilter.models.measured_map import MeasuredMapOptions, MeasuredRows, ServingStatistics
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.rasters.raster_set import open_rasters
@@ -279,13 +279,13 @@ def test_a_real_walk_is_found(shared_data, tmp_path):
 
 def test_another_cell_of_the_site_may_serve():
     lattice = Lattice(CRS, WEST, SOUTH + 200.0, 10.0, 20, 20)
-    rows = HeardRows(
+    rows = MeasuredRows(
         np.array([0] * 9 + [2]),
         WEST + np.array([55.0] * 9 + [155.0]),
         np.full(10, SOUTH + 55.0),
         np.array([2.0] * 9 + [7.0]),
     )
-    options = HeardOptions(reach_m=20.0, prior_rows=1.0, site_part=0.2)
+    options = MeasuredMapOptions(reach_m=20.0, prior_rows=1.0, site_part=0.2)
     maps = ServingStatistics.of_rows(rows, lattice, np.array([0, 0, 1]), options)
     row, col = lattice.row_col([WEST + 55.0, WEST + 155.0], [SOUTH + 55.0] * 2)
     at = np.asarray(row) * lattice.cols + np.asarray(col)

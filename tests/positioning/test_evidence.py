@@ -11,7 +11,7 @@ from mapfilter.positioning.epochs import Epoch, ReportRow
 
 
 def report(level_dbm):
-    return Epoch(0.0, heard=(ReportRow("serving", "W", None, None, level_dbm, 0),))
+    return Epoch(0.0, radio=(ReportRow("serving", "W", None, None, level_dbm, 0),))
 
 
 def test_the_level_of_a_first_report_counts_as_it_is_and_of_a_second_its_news(tmp_path):

@@ -59,7 +59,7 @@ def first_reading():
         ReportRow("serving", "B", None, None, -75.0, 0),
         ReportRow("neighbour", "D", None, None, -90, 0),
     )
-    return RadioSource(AREA, OPTIONS).first(Epoch(0.0, heard=heard)).radio
+    return RadioSource(AREA, OPTIONS).first(Epoch(0.0, radio=heard)).radio
 
 
 def likelihoods():

@@ -121,7 +121,7 @@ def test_before_the_start_nothing_moves():
     assert (fix.way_id, np.isnan(fix.east_m), np.isnan(fix.mass_50m)) == (0, True, True)
     assert made.time_s == 3.0
     heard = (ReportRow("serving", "Z", None, None, -70.0, 0),)
-    assert made.take(Epoch(4.0, heard=heard)).reason is Reason.UNKNOWN_CELL
+    assert made.take(Epoch(4.0, radio=heard)).reason is Reason.UNKNOWN_CELL
     assert made.take(Epoch(5.0, fix=GnssFix(nan, 1.0))).reason is Reason.NO_READING
     assert made.unused[-1].kind == "gnss"
     assert made.belief is None
@@ -216,7 +216,7 @@ def test_statuses():
 def test_an_epoch_is_moved_and_then_measured():
     made, smoother = walk(), KalmanSmoother()
     heard = (ReportRow("serving", "A", None, None, -70.0, 0, 1.0),)
-    first = made.take(Epoch(0.0, heard=heard))
+    first = made.take(Epoch(0.0, radio=heard))
     assert (first.reason, made.moved_m) == (Reason.USED, 0.0)
     smoother.add(None, made.state)
     assert first.hypotheses == made.belief.weights.size > 1
@@ -243,7 +243,7 @@ def test_which_rows_are_taken():
         ReportRow("neighbour", None, None, None, -84.0, 0),
         ReportRow("serving", "B", None, None, nan, 0, 4.0),
     )
-    found = site_readings(SITES, Epoch(3.0, heard=rows))
+    found = site_readings(SITES, Epoch(3.0, radio=rows))
     assert (found.cells, found.levels_dbm) == (("A", "B"), (-70.0, -80.0))
     assert (found.timed, found.steps) == (("B",), (4,))
     assert [(one.kind, one.what, one.reason) for one in found.unused] == [

@@ -173,7 +173,7 @@ def test_a_live_stream_gives_the_same_as_a_replay(locate, cross_database, cross_
         )
         for motion in epoch.motion:
             belief, _ = search.predict(belief, motion, rng)
-        for row in epoch.heard:
+        for row in epoch.radio:
             belief, _ = search.update(belief, row.cell, rng)
         assert_same_belief(state.belief, belief)
 

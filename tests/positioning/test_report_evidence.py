@@ -40,7 +40,7 @@ def read(*rows, history=None, moved=START, options=OPTIONS):
     """Read a report after a history, and as many metres as were moved."""
     source = RadioSource(AREA, options)
     history = source.begin() if history is None else history
-    update = source.read(history, moved, Epoch(0.0, heard=rows), SPACING_M)
+    update = source.read(history, moved, Epoch(0.0, radio=rows), SPACING_M)
     return update.state, update.radio, update.reason, update.unused
 
 

@@ -232,7 +232,7 @@ def test_the_exact_filter_takes_fixes_and_rejects_lies(area):
 def test_a_fix_of_no_place_is_no_fix_before_a_start_neither(area, grid):
     positioner = BayesOptions(particles=FEW, satellites=HEIGHTS, grid=grid).over_area(area)
     row = ReportRow("serving", "W", None, None, np.nan, 0)
-    blank, report = Epoch(0.0, fix=GnssFix(np.nan, 1.0)), Epoch(1.0, heard=(row,))
+    blank, report = Epoch(0.0, fix=GnssFix(np.nan, 1.0)), Epoch(1.0, radio=(row,))
     rng, other = np.random.default_rng(0), np.random.default_rng(0)
     nothing, news = positioner.step(positioner.begin(), blank, rng)
     assert (nothing.belief, news.fix.hypotheses) == (None, 0)

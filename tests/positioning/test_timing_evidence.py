@@ -38,7 +38,7 @@ def read(area, epoch, before=(), travelled_m=0.0, options=LTE):
 
 
 def test_a_timing_advance_is_a_ring(area):
-    epoch = Epoch(0.0, heard=(ReportRow("serving", "W", None, None, nan, 0, 1.0),))
+    epoch = Epoch(0.0, radio=(ReportRow("serving", "W", None, None, nan, 0, 1.0),))
     update = read(area, epoch)
     assert (update.state, update.unused) == ((0.0, -inf), [])
     # Cell W stands at (0, 150) and 28.5 m above the phone: 1.5 steps are 117.15 m.
@@ -52,7 +52,7 @@ def test_a_timing_advance_is_a_ring(area):
 
 
 def test_errors_that_last_count_once(area):
-    epoch = Epoch(0.0, heard=(ReportRow("serving", "W", None, None, nan, 0, 1.0),))
+    epoch = Epoch(0.0, radio=(ReportRow("serving", "W", None, None, nan, 0, 1.0),))
     soon = read(area, epoch, (0.0, -inf), 5.0)
     place = state((300.0, 150.0))
     whole = read(area, epoch).terms[0].log_likelihood(place)
@@ -82,14 +82,14 @@ def test_readings_of_unknown_cells_are_reported_unused(area):
         Difference("E", "W", 4.0), Difference("W", "W", 0.0),
     )  # fmt: skip
     heard = (ReportRow("serving", "??", None, None, nan, 0, 2.0),)
-    update = read(area, Epoch(0.0, heard=heard, differences=rows))
+    update = read(area, Epoch(0.0, radio=heard, differences=rows))
     assert len(update.terms) == 1
     assert [(u.kind, u.what, u.reason) for u in update.unused] == [
         ("ta", "??", Reason.UNKNOWN_CELL),
         ("tdoa", "??", Reason.UNKNOWN_CELL),
         ("tdoa", "E", Reason.SECOND_READING),
     ]
-    untimed = Epoch(0.0, heard=(ReportRow("serving", "W", None, None, nan, 0),))
+    untimed = Epoch(0.0, radio=(ReportRow("serving", "W", None, None, nan, 0),))
     assert read(area, untimed) == (TimingState(), (), None, 0, [], None, None, False, None, None)
 
 

@@ -225,7 +225,7 @@ def test_who_stands_still_does_not_count_more():
     rows = measured(east_m, north_m, np.r_[np.full(50, -90.0), -60.0], np.r_[np.zeros(50), 0])
     (points,) = points_by_cell(rows, 10.0, 100).values()
     np.testing.assert_array_equal(np.sort(points.level_dbm), [-90, -60])
-    assert len(points.heard_at) == 51
+    assert len(points.measured_at) == 51
 
 
 def test_many_points_take_larger_squares():

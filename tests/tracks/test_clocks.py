@@ -57,7 +57,7 @@ def test_the_files_of_the_tables_are_named():
 
 
 @pytest.mark.parametrize(
-    "heard_s",
+    "radio_s",
     [
         [5.0],
         [0.0, 0.1, 0.18],  # a burst, 1000 times shorter
@@ -66,9 +66,9 @@ def test_the_files_of_the_tables_are_named():
         [],
     ],
 )
-def test_tables_of_one_clock(heard_s):
-    log = make_log(CRS, motion=motion(TIME_S), radio=radio(np.array(heard_s)))
-    assert len(log.radio) == len(heard_s)
+def test_tables_of_one_clock(radio_s):
+    log = make_log(CRS, motion=motion(TIME_S), radio=radio(np.array(radio_s)))
+    assert len(log.radio) == len(radio_s)
 
 
 @pytest.mark.parametrize(

@@ -80,7 +80,7 @@ def test_logs_of_a_sweep_are_as_sound_as_checked_ones(parts):
     plan, world, _ = parts
     run = next(plan.select(0, 1))
     truth = journeys.true_path(world, plan, run.route)
-    log = journeys.heard(world, plan, truth, run.route, run.radio, run.report_period_s)
+    log = journeys.radio_log(world, plan, truth, run.route, run.radio, run.report_period_s)
     sensed = journeys.sensed(plan, log, run)
     checked = make_log(sensed.crs, motion=sensed.motion, radio=sensed.radio, truth=sensed.truth)
     for name in ("motion", "radio", "truth"):

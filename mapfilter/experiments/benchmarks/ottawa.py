@@ -27,7 +27,7 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
 from mapfilter.filters.contract import Status
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.fingerprint import LevelErrors, ServingWeights
-from mapfilter.models.measured_map import HeardOptions, HeardRows, ServingStatistics
+from mapfilter.models.measured_map import MeasuredMapOptions, MeasuredRows, ServingStatistics
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.filter import BayesPositioner
@@ -86,7 +86,7 @@ class OttawaOptions:
         )
     )
     unmeasured_db: float = 8.0
-    heard: HeardOptions = field(default_factory=HeardOptions)
+    serving_map: MeasuredMapOptions = field(default_factory=MeasuredMapOptions)
     errors: ReckoningErrors = field(default_factory=ReckoningErrors)
 
 
@@ -152,11 +152,16 @@ def surveyed_positioner(
     good = np.concatenate([other.accuracy_m for other in others]) <= MAP_M
     cell = np.array([area.band_of.get(name, -1) for other in others for name in other.cell])
     steps = np.concatenate([other.timing_advance for other in others])
-    rows = HeardRows(cell[good], places[good, 0], places[good, 1], steps[good])
+    rows = MeasuredRows(cell[good], places[good, 0], places[good, 1], steps[good])
     sites = np.unique([site_of(name) for name in area.cell_ids], return_inverse=True)[1]
-    heard = ServingStatistics.of_rows(rows, area.lattice, sites, options.heard)
+    serving_model = ServingStatistics.of_rows(rows, area.lattice, sites, options.serving_map)
     model = MeasuredMapModel(
-        area, chosen.motion, chosen.map, chosen.evidence, heard=heard, level_sd_db=level_sd_db
+        area,
+        chosen.motion,
+        chosen.map,
+        chosen.evidence,
+        serving_model=serving_model,
+        level_sd_db=level_sd_db,
     )
     return replace(chosen.over_area(area), model=model)
 

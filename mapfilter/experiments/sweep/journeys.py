@@ -78,7 +78,7 @@ def true_path(world: SweepWorld, plan: SweepPlan, number: int) -> pd.DataFrame:
     return journey(along, settings, named_rng(seed, "walker", str(number)), world.inside)
 
 
-def heard(
+def radio_log(
     world: SweepWorld,
     plan: SweepPlan,
     truth: pd.DataFrame,

@@ -170,7 +170,7 @@ class SweepPlan:
     def batches(self) -> Iterator[tuple[int, int]]:
         """Yield first run and end of each batch: together all runs, in order.
 
-        A batch holds whole journeys, or an equal share of one journey's runs: what is heard on a
+        A batch holds whole journeys, or an equal share of one journey's runs: what is received on a
         journey is made anew in each of its batches.
         """
         wanted = min(max(self.runs // _BATCHES, SHORTEST_BATCH), LONGEST_BATCH)

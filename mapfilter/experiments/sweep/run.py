@@ -24,7 +24,7 @@ from mapfilter.database.store import open_database
 from mapfilter.errors import StoreError, fail
 from mapfilter.evaluation.accuracy import accuracy
 from mapfilter.experiments.sweep import table
-from mapfilter.experiments.sweep.journeys import filter_rng, heard, sensed, true_path, truth_of
+from mapfilter.experiments.sweep.journeys import filter_rng, radio_log, sensed, true_path, truth_of
 from mapfilter.experiments.sweep.plan import Radio, Run, SweepPlan
 from mapfilter.experiments.sweep.world import SweepWorld, open_world, write_world
 from mapfilter.positioning.filter import Filter, FilterOptions, locate
@@ -84,7 +84,7 @@ def run_batch(batch: Batch) -> pa.Table:
     rows = []
     runs = plan.select(batch.first, batch.end)
     for (radio, period_s, route), alike in groupby(runs, key=_journey):
-        log = _heard(batch.world, batch.world_sha256, plan, route, radio, period_s)
+        log = _radio_log(batch.world, batch.world_sha256, plan, route, radio, period_s)
         truth = truth_of(log.truth)
         for run in alike:
             filter_ = _filter(*databases[run.database], run.reading.choice)
@@ -255,8 +255,8 @@ def _true_path(folder: Path, sha256: str, plan: SweepPlan, number: int) -> pd.Da
 
 
 @lru_cache(maxsize=_PATHS)
-def _heard(
+def _radio_log(
     folder: Path, sha256: str, plan: SweepPlan, number: int, radio: Radio, report_period_s: float
 ) -> TrackLog:
     truth = _true_path(folder, sha256, plan, number)
-    return heard(_world(folder, sha256), plan, truth, number, radio, report_period_s)
+    return radio_log(_world(folder, sha256), plan, truth, number, radio, report_period_s)

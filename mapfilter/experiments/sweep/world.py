@@ -26,7 +26,7 @@ _ARRAYS = ["east_m", "north_m", "node_a", "node_b", "length_m", "way_id", "way_c
 
 @dataclass(frozen=True, eq=False)
 class SweepWorld:
-    """Where journeys go and what is heard there.
+    """Where journeys go and what is received there.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class SweepWorld:
     lattice : Lattice
         Of the levels.
     levels_dbm : mapping of str to ndarray, shape (cells, rows, cols)
-        By the radio's name; NaN where a cell is not heard. Read from disk, they are mapped.
+        By the radio's name; NaN where a cell is not received. Read from disk, they are mapped.
     heights_m : ndarray, shape (rows, cols), or None
         Of buildings on the lattice, where walkers keep out of them.
     """

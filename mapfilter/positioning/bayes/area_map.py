@@ -64,16 +64,16 @@ class AreaMap:
         level = np.empty((rows, cols, count + 2), dtype=np.float32)
         quiet_dbm = np.float32(floor_dbm - _BELOW_FLOOR_DB)
         np.copyto(level[..., :count], field.level_dbm)
-        heard = level[..., :count]
-        heard[np.isnan(heard)] = quiet_dbm
+        received = level[..., :count]
+        received[np.isnan(received)] = quiet_dbm
         level[..., count:] = quiet_dbm
         if count > 1:
             # One row at a time, as sorting all of them at once would double the memory.
             for row in range(rows):
-                top = np.partition(heard[row], count - 2, axis=-1)
+                top = np.partition(received[row], count - 2, axis=-1)
                 level[row, :, count], level[row, :, count + 1] = top[:, -1], top[:, -2]
         elif count:
-            level[..., count] = heard[..., 0]
+            level[..., count] = received[..., 0]
         return cls(
             field.lattice,
             field.cell_ids,

@@ -153,7 +153,7 @@ class BayesPositioner(Filter[BayesState]):
                 belief, status = report(before, state.belief, state.status)
                 state = replace(state, belief=belief, status=status)
         if reason not in (Reason.USED, Reason.NOT_MOVED_ENOUGH, Reason.NO_READING):
-            cell = next((str(row.cell) for row in epoch.heard if row.cell is not None), "")
+            cell = next((str(row.cell) for row in epoch.radio if row.cell is not None), "")
             unused.append(UnusedReading(epoch.time_s, "serving", cell, reason))
         return state, step_output(self.area, state, epoch.time_s, reason, tuple(unused))
 
@@ -222,7 +222,7 @@ class BayesPositioner(Filter[BayesState]):
     ) -> tuple[BayesState, list[EvidenceUpdate]]:
         """Ask all sources for their evidence; return the state with theirs, and the evidence."""
         history = state.sources[self._radio.name]
-        due = bool(epoch.heard) and self._radio.due(history, state.reckoning.travelled_m)
+        due = bool(epoch.radio) and self._radio.due(history, state.reckoning.travelled_m)
         context, updates = Context(particle_spacing_m, due), []
         for source in self.sources:
             if state.belief is None:

@@ -231,30 +231,32 @@ class MeasuredMapModel(BayesModel):
 
     Parameters
     ----------
-    heard : ServingStatistics
+    serving_model : ServingStatistics
         On the area's lattice.
     level_sd_db : ndarray of float32, shape (C, P), optional
         Standard deviation of a new reading from the map of levels, on the area's lattice; without
         it that of the evidence options everywhere.
     """
 
-    heard: ServingStatistics | None = None
+    serving_model: ServingStatistics | None = None
     level_sd_db: Floats32 | None = None
 
     @property
     def timed_by_sites(self) -> bool:
         """Whether timing advances are compared with the distances of sites: not with maps."""
-        return self.heard is None
+        return self.serving_model is None
 
     def weigh(self, state: Floats32, log_weight: Floats, reading: RadioReading) -> Reason:
         """Add the log-likelihood of a report and of further terms, in place."""
-        heard = self.heard
-        if heard is None or reading.serving < 0:
+        serving_model = self.serving_model
+        if serving_model is None or reading.serving < 0:
             return super().weigh(state, log_weight, reading)
         pixel = self._pixels(state, 0.0, 0.0)
-        found = heard.log_serving(reading.serving, pixel)
+        found = serving_model.log_serving(reading.serving, pixel)
         if isfinite(reading.timing_advance):
-            found = found + heard.log_advance(reading.serving, pixel, reading.timing_advance)
+            found = found + serving_model.log_advance(
+                reading.serving, pixel, reading.timing_advance
+            )
         log_weight += reading.serving_weight * found
         levels = reading.levels
         if levels is not None and self.level_sd_db is not None:

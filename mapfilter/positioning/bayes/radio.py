@@ -127,8 +127,8 @@ class RadioSource(EvidenceSource):
         options = self.options
         serving, reason, rows = self._serving(epoch)
         due = self.due(history, reckoning.travelled_m)
-        if not due or not epoch.heard:
-            if epoch.heard and reason is Reason.USED:
+        if not due or not epoch.radio:
+            if epoch.radio and reason is Reason.USED:
                 reason = Reason.NOT_MOVED_ENOUGH
             return EvidenceUpdate(history, unused=_unused(epoch, rows), reason=reason)
         first = history.used is None
@@ -168,9 +168,9 @@ class RadioSource(EvidenceSource):
 
     def _serving(self, epoch: Epoch) -> tuple[int, Reason, list[_Unplaced]]:
         """Return the band of the serving cell, or -1 and the reason; and further serving rows."""
-        named = [row for row in epoch.heard if row.role == SERVING and row.cell is not None]
+        named = [row for row in epoch.radio if row.role == SERVING and row.cell is not None]
         if not named:
-            return -1, Reason.NO_SERVING_CELL if epoch.heard else Reason.NO_READING, []
+            return -1, Reason.NO_SERVING_CELL if epoch.radio else Reason.NO_READING, []
         more = [(row, Reason.SECOND_SERVING_CELL) for row in named[1:]]
         cell = str(named[0].cell)
         if cell in self.area.band_of:
@@ -186,7 +186,7 @@ class RadioSource(EvidenceSource):
         others: list[tuple[tuple[int, ...], ReportRow]] = []
         unplaced: list[_Unplaced] = []
         served = False
-        for row in epoch.heard:
+        for row in epoch.radio:
             if row.role == SERVING:
                 # A second or unknown serving cell has its reason already.
                 bands: tuple[int, ...] = () if served or serving < 0 else (serving,)
@@ -258,7 +258,7 @@ _Unplaced = tuple[ReportRow, Reason]
 
 
 def _timing_advance(epoch: Epoch) -> float:
-    return next((row.timing_advance for row in epoch.heard if row.role == SERVING), nan)
+    return next((row.timing_advance for row in epoch.radio if row.role == SERVING), nan)
 
 
 def _unused(epoch: Epoch, rows: list[_Unplaced]) -> list[UnusedReading]:

@@ -114,7 +114,7 @@ class TimingSource(EvidenceSource):
         self, epoch: Epoch, share: float, terms: list[TimingTerm], unused: list[UnusedReading]
     ) -> bool:
         options, known = self.options, []
-        for row in epoch.heard:
+        for row in epoch.radio:
             if row.cell is None or not isfinite(row.timing_advance):
                 continue
             if row.cell in self.area.sites:

@@ -36,7 +36,7 @@ from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
 
-_SURPRISE, _WINDOW = 5.0, 10
+_LOST_NIS, _WINDOW = 5.0, 10
 _WITHIN_M = 50.0
 _MOST_PARTS = 64
 _LEAST_MOVED_M = 0.1
@@ -102,7 +102,7 @@ class KalmanState:
     moved_m : float
         Travelled since levels or timing advances were last used.
     status : Status
-    surprise : tuple of float
+    recent_nis : tuple of float
         Normalised innovations squared of the last measurements, per component.
     motion : tuple of arrays
         Transition, noise and shift that led to the last epoch.
@@ -113,7 +113,7 @@ class KalmanState:
     time_s: float = nan
     moved_m: float = inf
     status: Status = Status.SEARCHING
-    surprise: tuple[float, ...] = ()
+    recent_nis: tuple[float, ...] = ()
     motion: tuple[Floats, Floats, Floats] | None = None
 
 
@@ -212,7 +212,7 @@ class _Step:
         self.layout, self.belief, self.time_s = state.layout, state.belief, state.time_s
         self.where = [self.layout.east, self.layout.north]
         self.moved_m, self.status = state.moved_m, state.status
-        self.surprise = list(state.surprise)
+        self.recent_nis = list(state.recent_nis)
         self.motion = state.motion
         self.unused: list[UnusedReading] = []
 
@@ -225,7 +225,7 @@ class _Step:
             self.time_s,
             self.moved_m,
             self.status,
-            tuple(self.surprise),
+            tuple(self.recent_nis),
             self.motion,
         )
 
@@ -286,7 +286,7 @@ class _Step:
             self.unused.append(UnusedReading(epoch.time_s, "gnss", "", Reason.NO_READING))
             fix = None
         if fix is None and not given.cells and not given.timed:
-            return Reason.UNKNOWN_CELL if epoch.heard else Reason.NO_READING
+            return Reason.UNKNOWN_CELL if epoch.radio else Reason.NO_READING
         if self.belief is None:
             self.belief = self._start(fix, given)
         taken = fix is not None and self._update_fix(fix)
@@ -352,7 +352,7 @@ class _Step:
             raise AssertionError("started before it measures")
         self.belief, news = self.belief.update(compiled(model), reading, self.method)
         if news.used:
-            self.surprise = [*self.surprise, news.nis / len(reading)][-_WINDOW:]
+            self.recent_nis = [*self.recent_nis, news.nis / len(reading)][-_WINDOW:]
         return news.used
 
     def _label(self, epoch: Epoch, steps: Sequence[MotionStep], reason: Reason) -> None:
@@ -374,7 +374,7 @@ class _Step:
 
     def _tell(self, radius_m: float) -> None:
         """Update the status: converged by the radius, lost by the innovations."""
-        lost = len(self.surprise) == _WINDOW and float(np.mean(self.surprise)) > _SURPRISE
+        lost = len(self.recent_nis) == _WINDOW and float(np.mean(self.recent_nis)) > _LOST_NIS
         if self.status is Status.SEARCHING:
             if radius_m <= self.options.converged_radius_m:
                 self.status = Status.CONVERGED

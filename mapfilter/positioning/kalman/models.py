@@ -128,10 +128,10 @@ class SiteModels:
         self.neighbours = lru_cache(maxsize=65_536)(self._neighbours)
 
     def _of(
-        self, layout: StateLayout, heard: tuple[str, ...], timed: tuple[str, ...]
+        self, layout: StateLayout, received: tuple[str, ...], timed: tuple[str, ...]
     ) -> GaussianTerms:
         """Return the model of levels of cells, and of timing advances of cells, in this order."""
-        parts = [self.level(layout, name) for name in heard]
+        parts = [self.level(layout, name) for name in received]
         for name in timed:
             cell, step = self.cells[name], self.options.timing_step_m
             sigma = float(np.hypot(self.options.timing_sigma_m, step / 12**0.5))

@@ -19,7 +19,7 @@ class SiteReadings:
     Parameters
     ----------
     cells : tuple of str
-        Whose levels were heard.
+        Whose levels were received.
     levels_dbm : tuple of float
     timed : tuple of str
         Whose timing advances were reported.
@@ -47,23 +47,23 @@ def site_readings(sites: SiteModels, epoch: Epoch) -> SiteReadings:
     """
     timed = {
         row.cell: int(row.timing_advance)
-        for row in epoch.heard
+        for row in epoch.radio
         if row.cell is not None and isfinite(row.timing_advance)
     }
-    serving = next((row.cell for row in epoch.heard if row.role == SERVING and row.cell), None)
-    heard: list[tuple[str, float]] = []
+    serving = next((row.cell for row in epoch.radio if row.role == SERVING and row.cell), None)
+    received: list[tuple[str, float]] = []
     unused: list[UnusedReading] = []
-    for row in epoch.heard:
+    for row in epoch.radio:
         name, reason = _cell(sites, row, serving)
         level = isfinite(row.level_dbm) and row.censored == 0
         if name is not None and level:
-            heard.append((name, row.level_dbm))
+            received.append((name, row.level_dbm))
         elif name is None or name not in timed:
             kind = SERVING if row.role == SERVING else NEIGHBOUR
             unused.append(UnusedReading(epoch.time_s, kind, _what(row), reason))
     known = {name: steps for name, steps in timed.items() if name in sites.cells}
     return SiteReadings(
-        tuple(name for name, _ in heard), tuple(level for _, level in heard), tuple(known),
+        tuple(name for name, _ in received), tuple(level for _, level in received), tuple(known),
         tuple(known.values()), tuple(unused),
     )  # fmt: skip
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mapfilter.geodesy import Lattice
-from mapfilter.models.measured_map import HeardOptions, HeardRows, ServingStatistics
+from mapfilter.models.measured_map import MeasuredMapOptions, MeasuredRows, ServingStatistics
 
 NAN = float("nan")
 ROWS, COLS, SIDE_M = 12, 15, 10.0
@@ -30,7 +30,7 @@ def rows(told=TOLD):
     cell, col, row, advance = (np.array(column) for column in zip(*told, strict=True))
     east = 500.0 + SIDE_M * (col + 0.3)
     north = 1120.0 - SIDE_M * (row + 0.6)
-    return HeardRows(cell, east, north, advance.astype(float))
+    return MeasuredRows(cell, east, north, advance.astype(float))
 
 
 def kernel(sigma):
@@ -82,10 +82,10 @@ PIXELS = ((4, 3), (5, 3), (0, 0), (11, 14), (8, 9), (6, 7), (9, 12))
 @pytest.mark.parametrize(
     "options",
     [
-        HeardOptions(),
-        HeardOptions(reach_m=12.0, prior_rows=2.5, site_part=0.4, rounding_steps=0.8),
+        MeasuredMapOptions(),
+        MeasuredMapOptions(reach_m=12.0, prior_rows=2.5, site_part=0.4, rounding_steps=0.8),
         # A kernel narrower than a pixel counts rows of the pixel itself as one each.
-        HeardOptions(reach_m=2.0, prior_rows=0.5, site_part=0.0, rounding_steps=0.25),
+        MeasuredMapOptions(reach_m=2.0, prior_rows=0.5, site_part=0.0, rounding_steps=0.25),
     ],
     ids=("usual", "other", "narrow"),
 )
@@ -105,7 +105,7 @@ def test_maps_are_sums_over_rows(options):
 
 
 def test_shares_of_all_cells_and_of_foreign_ones_sum_to_at_most_one():
-    maps = ServingStatistics.of_rows(rows(), LATTICE, SITE, HeardOptions())
+    maps = ServingStatistics.of_rows(rows(), LATTICE, SITE, MeasuredMapOptions())
     total = np.exp(maps.log_share.astype(float)).sum(axis=0)
     assert total.max() <= 1 + 1e-6
     # A row of a foreign cell lies at (5, 5); where nothing was heard all goes by the prior.
@@ -115,7 +115,7 @@ def test_shares_of_all_cells_and_of_foreign_ones_sum_to_at_most_one():
 def test_rows_beyond_the_lattice_do_not_count():
     outside = ((0, -1, 4, 9.0), (1, 3, -1, 9.0), (2, COLS, 4, 9.0), (3, 3, ROWS, 9.0))
     maps = [
-        ServingStatistics.of_rows(rows(told), LATTICE, SITE, HeardOptions())
+        ServingStatistics.of_rows(rows(told), LATTICE, SITE, MeasuredMapOptions())
         for told in (TOLD, TOLD + outside)
     ]
     np.testing.assert_array_equal(maps[0].log_share, maps[1].log_share)
@@ -123,8 +123,8 @@ def test_rows_beyond_the_lattice_do_not_count():
 
 
 def test_the_usual_options():
-    assert HeardOptions() == HeardOptions(30.0, 1.0, 0.1, 0.5)
-    assert HeardOptions(30.0, 1.0, 0.1, 0.5).prior_rows == 1.0
+    assert MeasuredMapOptions() == MeasuredMapOptions(30.0, 1.0, 0.1, 0.5)
+    assert MeasuredMapOptions(30.0, 1.0, 0.1, 0.5).prior_rows == 1.0
 
 
 def made():
