@@ -185,7 +185,7 @@ def test_which_rows_make_maps_of_what_was_heard(tmp_path, monkeypatch):
     # Cells of one base station are one site.
     assert sites.tolist() == [1, 0, 1]
     assert lattice is area.lattice
-    assert heard is options.heard
+    assert heard is options.serving_map
     assert (made.model.motion, made.model.level_sd_db) == (options.filter.motion, None)
 
 

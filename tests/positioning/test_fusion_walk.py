@@ -195,22 +195,22 @@ def test_statuses():
     assert made.status is Status.CONVERGED
     made._tell(5000.0)
     assert made.status is Status.TRACKING
-    made.surprise = [5.1] * 9
+    made.recent_nis = [5.1] * 9
     made._tell(5.0)
     assert made.status is Status.TRACKING
-    made.surprise = [5.0] * 10
+    made.recent_nis = [5.0] * 10
     made._tell(5.0)
     assert made.status is Status.TRACKING
-    made.surprise = [0.0] * 9 + [50.1]
+    made.recent_nis = [0.0] * 9 + [50.1]
     made._tell(5.0)
     assert made.status is Status.LOST
     # Ten readings are remembered, each by its square for one component.
     for _ in range(12):
         made._update_fix(GnssFix(5.0, 5.0 + 1e-9))
-    assert len(made.surprise) == 10
+    assert len(made.recent_nis) == 10
     far = started()
     far._update_fix(GnssFix(5.0 + 109**0.5 * 2, 5.0))
-    assert far.surprise == [pytest.approx(2.0)]
+    assert far.recent_nis == [pytest.approx(2.0)]
 
 
 def test_an_epoch_is_moved_and_then_measured():
