@@ -155,7 +155,8 @@ def locate(
     filter_ : Filter
     rng : numpy.random.Generator
     snapshots : bool
-        Whether to keep the hypotheses at some epochs until the filter tracks, for figures.
+        Whether to keep the hypotheses at some epochs at which the filter does not track, for
+        figures: from the start to convergence, and again after a loss.
 
     Raises
     ------
@@ -262,34 +263,24 @@ def estimate_of(
 
 
 class _Album:
-    """Hypotheses at chosen epochs until tracking or lost: at a new status, and every 20 m."""
+    """Hypotheses at chosen epochs while not tracking: at a new status, and every 20 m."""
 
     def __init__(self, filter_: Filter[Any]) -> None:
-        self.filter, self.travelled_m, self.open = filter_, 0.0, True
+        self.filter, self.travelled_m = filter_, 0.0
         self.taken: list[Snapshot] = []
 
     def add(self, state: Any, epoch: Epoch, output: StepOutput) -> None:
         fix, found = output.fix, self.filter.hypotheses(state)
-        if found is None or not self.open:
+        if found is None:
             return
         if self.taken:
             moved = (step.step_m for step in epoch.motion if isfinite(step.step_m))
             self.travelled_m += sum(map(abs, moved))
             last = self.taken[-1]
             near = self.travelled_m - last.travelled_m < _SNAPSHOT_EVERY_M
-            if fix.status is last.status and near:
+            if fix.status is last.status and (near or not found.east_m.size):
                 return
-        self.open = fix.status in (Status.SEARCHING, Status.CONVERGED)
         if fix.status is not Status.TRACKING:
-            self.taken.append(
-                Snapshot(
-                    fix.time_s,
-                    self.travelled_m,
-                    found.east_m,
-                    found.north_m,
-                    found.weight,
-                    fix.east_m,
-                    fix.north_m,
-                    fix.status,
-                )
-            )
+            hypotheses = found.east_m, found.north_m, found.weight
+            at = fix.east_m, fix.north_m, fix.status
+            self.taken.append(Snapshot(fix.time_s, self.travelled_m, *hypotheses, *at))
