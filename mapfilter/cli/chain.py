@@ -26,7 +26,7 @@ from mapfilter.cli.options import (
     toml,
 )
 from mapfilter.errors import ConfigError, fail
-from mapfilter.workflows.terminal import print_result, progress_bar, say
+from mapfilter.workflows.terminal import print_message, print_result, progress_bar
 
 
 def check(
@@ -262,6 +262,6 @@ def replay(
         result = run_replay(loaded, folder, progress=progress)
     print_result(replay_facts(result), as_json)
     for warning in result.warnings:
-        say(warning)
+        print_message(warning)
     if result.partial:
         raise typer.Exit(PARTIAL)

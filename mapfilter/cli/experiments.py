@@ -26,7 +26,7 @@ from mapfilter.cli.options import (
     toml,
 )
 from mapfilter.experiments.papers import PAPERS
-from mapfilter.workflows.terminal import print_result, rate_bar, say
+from mapfilter.workflows.terminal import print_message, print_result, rate_bar
 
 *_FIRST, _LAST = PAPERS
 
@@ -63,7 +63,7 @@ def sweep(
                 loaded, axes, workers=workers, cluster=cluster, resume=resume, progress=progress
             )
     except KeyboardInterrupt:
-        say("stopped; finished batches are kept: go on with --resume")
+        print_message("stopped; finished batches are kept: go on with --resume")
         raise typer.Exit(PARTIAL) from None
     told = asdict(result) | ({} if as_json else {"cells": brief(result.cells)})
     print_result(told, as_json)
