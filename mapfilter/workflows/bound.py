@@ -1,4 +1,4 @@
-"""``mapfilter bound``: where a radio-route database will work, before anybody drives."""
+"""``mapfilter bound``: position bounds of a radio-route database, without a journey."""
 
 from __future__ import annotations
 
@@ -30,56 +30,43 @@ NOTES = (
 _DECIMALS = 3
 
 _BOUND_TITLE = "Least position error along the street from one report of levels"
-_FIX_TITLE = "Expected metres until an ideal filter knows where it is"
+_FIX_TITLE = "Expected distance to convergence of an ideal filter"
 
 
 @dataclass(frozen=True)
 class BoundResult:
-    """What a database promises; medians and shares over points or journeys.
-
-    Parameters
-    ----------
-    points, cells, ways, starts : int
-        Counts; journeys begin at the starts.
-    plane_bound_m, along_bound_m : float
-        Medians of the position-error bound of one report, of points that have one.
-    without_plane_bound : float
-        Share of points at which levels carry no information along one direction.
-    cell_bits, level_bits : float
-        Mean information of one report.
-    cells_bits_per_m, levels_bits_per_m : float
-        Expected information on the start per metre, over the first ``path_m``.
-    cells_to_fix_m, levels_to_fix_m : float
-        Expected metres to convergence.
-    cells_unclear, levels_unclear : float
-        Share of journeys that never converged.
-    levels_wrong : float
-        Of those that did by levels, the share that did so in a wrong place.
-    twins : float
-        Share of journeys with a twin.
-    notes : tuple of str
-        What is exact and what is approximate.
-    """
+    """What a database promises; medians and shares over points or journeys."""
 
     points: int
     cells: int
     ways: int
     starts: int
+    """Where journeys begin."""
     plane_bound_m: float
+    """Median of the position-error bound of one report, of points that have one."""
     along_bound_m: float
+    """The same along the street."""
     without_plane_bound: float
+    """Share of points at which levels carry no information along one direction."""
     cell_bits: float
+    """Mean information of the serving cell of one report; ``level_bits`` of its levels."""
     level_bits: float
     cells_bits_per_m: float
+    """Expected information on the start per metre, over the first ``path_m``."""
     levels_bits_per_m: float
     cells_to_fix_m: float
+    """Expected metres to convergence."""
     levels_to_fix_m: float
     cells_unclear: float
+    """Share of journeys that never converged."""
     levels_unclear: float
     levels_wrong: float
+    """Of the journeys that converged by levels, the share that did so in a wrong place."""
     twins: float
+    """Share of journeys with a twin."""
     seconds: float
     notes: tuple[str, ...]
+    """What is exact and what is approximate."""
     outputs: tuple[Path, ...]
 
 
@@ -92,7 +79,7 @@ def run_bound(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> BoundResult:
-    """Bound what a database is good for; write a raster, tables by way and of twins, pictures.
+    """Compute bounds on positioning by a database; write a raster, tables by way and of twins.
 
     Raises
     ------
