@@ -430,7 +430,7 @@ class Bound:
             Where to draw; a new figure when left out.
         """
         from mapfilter.report.basemap import BaseMap
-        from mapfilter.report.bound import plot_point_values
+        from mapfilter.report.network import plot_point_values
 
         radio, database = self.found.radio, self.database
         base = BaseMap(radio.lattice.bounds_m, attribution=database.attribution)

@@ -20,12 +20,16 @@ from mapfilter.geodesy import Lattice
 from mapfilter.positioning.estimate import PositionedTrack, Snapshot
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.belief import MAX_PANELS, plot_belief, plot_candidates
 from mapfilter.report.canvas import BLUE, ORANGE, Drawn, save
 from mapfilter.report.errors import plot_error_over_distance, plot_evidence
-from mapfilter.report.landuse import plot_landuse
-from mapfilter.report.network import plot_best_server, plot_level, plot_margin, plot_points_per_cell
-from mapfilter.report.track import plot_track
+from mapfilter.report.network import (
+    plot_best_server,
+    plot_landuse,
+    plot_level,
+    plot_margin,
+    plot_points_per_cell,
+)
+from mapfilter.report.track import MAX_PANELS, plot_belief, plot_candidates, plot_track
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.ways import Buildings

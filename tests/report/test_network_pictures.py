@@ -15,8 +15,7 @@ from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.report.basemap import BaseMap, draw_base, largest
 from mapfilter.report.canvas import BLUE, ORANGE, save
-from mapfilter.report.landuse import plot_landuse
-from mapfilter.report.network import plot_margin
+from mapfilter.report.network import plot_landuse, plot_margin
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.routes import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings
