@@ -155,8 +155,7 @@ def locate(
     filter_ : Filter
     rng : numpy.random.Generator
     snapshots : bool
-        Whether to keep the hypotheses at some epochs at which the filter does not track, for
-        figures: from the start to convergence, and again after a loss.
+        Whether to keep the hypotheses at some epochs until the filter first tracks, for figures.
 
     Raises
     ------
@@ -263,23 +262,24 @@ def estimate_of(
 
 
 class _Album:
-    """Hypotheses at chosen epochs while not tracking: at a new status, and every 20 m."""
+    """Hypotheses until the filter first tracks or is lost: at a new status, and every 20 m."""
 
     def __init__(self, filter_: Filter[Any]) -> None:
-        self.filter, self.travelled_m = filter_, 0.0
+        self.filter, self.travelled_m, self.open = filter_, 0.0, True
         self.taken: list[Snapshot] = []
 
     def add(self, state: Any, epoch: Epoch, output: StepOutput) -> None:
         fix, found = output.fix, self.filter.hypotheses(state)
-        if found is None:
+        if found is None or not self.open:
             return
         if self.taken:
             moved = (step.step_m for step in epoch.motion if isfinite(step.step_m))
             self.travelled_m += sum(map(abs, moved))
             last = self.taken[-1]
             near = self.travelled_m - last.travelled_m < _SNAPSHOT_EVERY_M
-            if fix.status is last.status and (near or not found.east_m.size):
+            if fix.status is last.status and near:
                 return
+        self.open = fix.status in (Status.SEARCHING, Status.CONVERGED)
         if fix.status is not Status.TRACKING:
             hypotheses = found.east_m, found.north_m, found.weight
             at = fix.east_m, fix.north_m, fix.status
