@@ -76,7 +76,7 @@ def reproduce(
     ],
     area_map: Annotated[
         str | None,
-        typer.Option("--map", metavar="FILE", help="An .osm.pbf file; else a made city."),
+        typer.Option("--map", metavar="FILE", help="An .osm.pbf file; default: a synthetic city."),
     ] = None,
     bbox: Annotated[
         str | None, typer.Option("--bbox", metavar="W,S,E,N", help="Degrees; else the map's own.")

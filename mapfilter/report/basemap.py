@@ -90,7 +90,7 @@ class BaseMap:
 
 @dataclass(frozen=True, slots=True)
 class LocalFrame:
-    """Turns metres of the CRS into the units of the axes: m or km from the local origin."""
+    """Conversion of metres of the CRS to the units of the axes: m or km from the local origin."""
 
     west_m: float
     south_m: float

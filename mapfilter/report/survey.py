@@ -33,6 +33,7 @@ from mapfilter.report.canvas import (
     STREET,
     VERMILLION,
     Look,
+    axes_of,
     figure_of,
     grouped,
     new_figure,
@@ -69,17 +70,10 @@ class SurveyedLevels(NamedTuple):
 
 @styled
 def plot_surveyed_levels(cells: Sequence[SurveyedLevels], base: BaseMap) -> Figure:
-    """Draw up to four cells: the level with the measured points in its colours, the deviation.
+    """Draw one to four cells: the level with the measured points in its colours, the deviation.
 
     A point that vanishes in its surroundings is predicted well. The ends of both scales are those
     of the data of all cells shown.
-
-    Parameters
-    ----------
-    cells : sequence of SurveyedLevels
-        One to four, in the order of the rows.
-    base : BaseMap
-        The map below.
 
     Raises
     ------
@@ -129,18 +123,8 @@ def plot_left_out(
 ) -> Axes:
     """Draw measured against predicted levels of sessions that the map was made without.
 
-    Parameters
-    ----------
-    measured_dbm, predicted_dbm : (n,) arrays
-        At least one finite pair.
-    ax : Axes, optional
-        Drawn on; a figure of its own by default.
-    title : str
-        What was left out.
-    trend_dbm : (n,) array, optional
-        What the trend alone predicts, to show what the residuals add.
-    attribution : str
-        Whose measurements they are.
+    Levels are arrays, (n,); ``trend_dbm`` is what the trend alone predicts, to show what the
+    residuals add. ``attribution`` names the owner of the measurements.
 
     Raises
     ------
@@ -158,7 +142,7 @@ def plot_left_out(
     rmse_db = _rms(error_db)
     low, high = _range([measured_dbm, predicted_dbm], (-120, -60))
     low, high = low - _RIM_DB, high + _RIM_DB
-    axes = new_figure(*_SCATTER_IN).subplots() if ax is None else ax
+    axes = axes_of(ax, *_SCATTER_IN)
     hexagons = Look(
         gridsize=max(int((high - low) / _BIN_DB), 10),
         extent=(low, high, low, high),

@@ -14,19 +14,8 @@ from mapfilter.errors import OutputError, fail
 def write_table(table: pd.DataFrame, path: Path, *, digits: int | None = 4) -> Path:
     """Write a table as CSV or LaTeX, by the suffix of the path, in one step.
 
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        The index is left out.
-    path : Path
-        Ends in ``.csv`` or ``.tex``; the folder is made where it is missing.
-    digits : int, optional
-        Significant digits of numbers; None for all of them.
-
-    Returns
-    -------
-    Path
-        ``path``.
+    The index is left out, the folder is made where it is missing, and the path is returned;
+    ``digits`` are the significant digits of numbers, None for all of them.
 
     Raises
     ------
