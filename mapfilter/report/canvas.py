@@ -98,7 +98,7 @@ def new_figure(width_in: float, height_in: float) -> Figure:
     return figure
 
 
-def axes_of(given: Axes | None, width_in: float, height_in: float) -> Axes:
+def single_axes(given: Axes | None, width_in: float, height_in: float) -> Axes:
     """Return the axes given, or those of a new figure of a size in inches."""
     return new_figure(width_in, height_in).subplots() if given is None else given
 

@@ -23,11 +23,11 @@ from mapfilter.report.canvas import (
     ORANGE,
     VERMILLION,
     Look,
-    axes_of,
     bottom_legend,
     draw_shares,
     legend,
     new_figure,
+    single_axes,
     stretches,
     styled,
     tidy,
@@ -163,7 +163,7 @@ def plot_cumulative(
     share : float
         The share, 0 to 1, that the line marks.
     """
-    axes = axes_of(ax, *_SIZE_IN)
+    axes = single_axes(ax, *_SIZE_IN)
     for curve in curves:
         look = Look(color=curve.colour, linestyle=curve.style, linewidth=1.6)
         draw_shares(axes, curve.errors_m, label=curve.name, **look)
@@ -210,7 +210,7 @@ def plot_over_threshold(
     ``bound`` is the name and value of a figure for comparison; ``ax`` as in
     :func:`plot_cumulative`.
     """
-    axes = axes_of(ax, *_SIZE_IN)
+    axes = single_axes(ax, *_SIZE_IN)
     for line in lines:
         at, colour = line.threshold_db, line.colour
         low, high = [one.low for one in line.found], [one.high for one in line.found]
@@ -249,7 +249,7 @@ def plot_scene(
     azimuths clockwise from north; ``serving`` is the index of a site.
     """
     sites, angles = np.array(sites_m), np.radians(boresights_deg)
-    axes = axes_of(ax, 6.4, 6.4)
+    axes = single_axes(ax, 6.4, 6.4)
     arrows = Look(angles="xy", scale_units="xy", scale=1 / 330.0, width=0.006)
     axes.quiver(*sites.T, np.cos(angles), np.sin(angles), color=BLUE, **arrows)
     axes.plot(*sites.T, "o", color=BLACK, markersize=7, label="base station")

@@ -23,10 +23,10 @@ from mapfilter.report.canvas import (
     PURPLE,
     VERMILLION,
     Look,
-    axes_of,
     bottom_legend,
     legend,
     new_figure,
+    single_axes,
     stretches,
     styled,
     tidy,
@@ -57,7 +57,7 @@ def plot_error_over_distance(
     score = accuracy(estimate, truth)
     known_m = errors_m[np.isfinite(errors_m)]
     most_m = max(float(known_m.max(initial=0.0)), 1.1 * SUCCESS_RADIUS_M)
-    axes = axes_of(ax, *_SIZE_IN)
+    axes = single_axes(ax, *_SIZE_IN)
     axes.set(xlim=(0.0, length_m), ylim=(0.0, 1.15 * most_m))
     if score.switched and most_m > _WIDE * score.error_95_m:
         # Hundreds of metres while searching would press what follows flat.
@@ -110,7 +110,7 @@ def plot_errors_over_time(
 
     ``spans`` are stretches of time to shade: name, begin and end in seconds.
     """
-    axes = axes_of(ax, *_SIZE_IN)
+    axes = single_axes(ax, *_SIZE_IN)
     for (name, begin_s, end_s), shade in zip(spans, _SPANS, strict=False):
         axes.axvspan(begin_s, end_s, color=shade, linewidth=0, zorder=0, label=name)
     for (name, estimate), colour in zip(estimates.items(), _COLOURS, strict=False):

@@ -16,13 +16,13 @@ from mapfilter.report.canvas import (
     GREY,
     VERMILLION,
     Look,
-    axes_of,
     bottom_legend,
     distinct_colours,
     draw_shares,
     figure_of,
     legend,
     new_figure,
+    single_axes,
     styled,
     tidy,
 )
@@ -53,7 +53,7 @@ def plot_success_curves(
     claimant : str
         Who claims, for the legend.
     """
-    axes = axes_of(ax, *_SIZE_IN)
+    axes = single_axes(ax, *_SIZE_IN)
     words = ", ".join(f"over {100 * share:.0f} % up to {deg:g}°" for deg, share in claims)
     name: str | None = f"{claimant}: {words}"
     for deg, share in claims:
@@ -91,7 +91,7 @@ def plot_success_map(cells: Sequence[SuccessCell], ax: Axes | None = None, *, ti
     for cell in cells:
         place = trans.index(cell.sigma_trans_m), orient.index(cell.sigma_orient_deg)
         share[place] = 100 * cell.success
-    axes = axes_of(ax, max(2.8 + 0.8 * len(orient), 6.0), max(1.9 + 0.55 * len(trans), 3.2))
+    axes = single_axes(ax, max(2.8 + 0.8 * len(orient), 6.0), max(1.9 + 0.55 * len(trans), 3.2))
     image = axes.imshow(share, origin="lower", cmap="viridis", vmin=0, vmax=100, aspect="auto")
     for (row, col), percent in np.ndenumerate(share):
         if np.isfinite(percent):

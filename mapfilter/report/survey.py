@@ -33,10 +33,10 @@ from mapfilter.report.canvas import (
     STREET,
     VERMILLION,
     Look,
-    axes_of,
     figure_of,
     grouped,
     new_figure,
+    single_axes,
     styled,
 )
 
@@ -142,7 +142,7 @@ def plot_left_out(
     rmse_db = _rms(error_db)
     low, high = _range([measured_dbm, predicted_dbm], (-120, -60))
     low, high = low - _RIM_DB, high + _RIM_DB
-    axes = axes_of(ax, *_SCATTER_IN)
+    axes = single_axes(ax, *_SCATTER_IN)
     hexagons = Look(
         gridsize=max(int((high - low) / _BIN_DB), 10),
         extent=(low, high, low, high),

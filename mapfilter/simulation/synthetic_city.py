@@ -236,9 +236,9 @@ def _check(lattice: Lattice, seed: int, *lengths_m: float) -> None:
     size_m = east - west, north - south
     if not (min(size_m) >= LEAST_SIZE_M and max(size_m) <= LARGEST_SIZE_M):
         expected = f"sides of {LEAST_SIZE_M:g} to {LARGEST_SIZE_M:g} m"
-        faults.add("synthetic city, size_m", expected, f"{size_m[0]:g} x {size_m[1]:g} m")
+        faults.add("made city, size_m", expected, f"{size_m[0]:g} x {size_m[1]:g} m")
     if seed < 0:
-        faults.add("synthetic city, seed", "a number >= 0", seed)
+        faults.add("made city, seed", "a number >= 0", seed)
     if not all(np.isfinite(length) and length > 0 for length in lengths_m):
-        faults.add("synthetic city, lengths", "metres > 0", lengths_m)
+        faults.add("made city, lengths", "metres > 0", lengths_m)
     faults.raise_if_any(ConfigError)

@@ -319,7 +319,7 @@ def _predicted(
     if rasters is None:
         return None
     if plan is None and rasters.quantity == "loss":
-        hint = "losses are subtracted from the EIRP in the cell plan"
+        hint = "levels are the EIRP of each cell less its loss"
         raise fail(ConfigError, "cells.plan", "the plan of the losses to calibrate", "none", hint)
     return predicted_levels(rasters, plan)
 
