@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from mapfilter._io import atomic_file, ensure_writable_folder
 from mapfilter._parallel import Progress
@@ -91,25 +90,27 @@ def run_bound(
     database = open_database(path)
     ensure_writable_folder(out)
     found = bound(database, errors=errors, options=options, seed=seed, progress=progress)
-    radio = found.radio
-    columns = found.at_points()
-    rasters = {name: on_lattice(radio, values) for name, values in columns.items()}
+    radio, ways, twins = found.radio, found.by_way(), found.twins()
+    rasters = {name: on_lattice(radio, values) for name, values in found.at_points().items()}
     write_bound(rasters, radio.lattice, out / "bound.tif", database.attribution)
-    ways, twins = found.by_way(), found.twins()
-    _write_table(ways, out / "ways.parquet")
-    _write_table(twins, out / "twins.parquet")
+    for table, name in ((ways, "ways.parquet"), (twins, "twins.parquet")):
+        with atomic_file(out / name) as temporary:
+            table.to_parquet(temporary, index=False)
     base = BaseMap(radio.lattice.bounds_m, attribution=database.attribution)
     on_map = radio.lattice, database.plan, base
     along, fix = rasters["along_bound_m"], rasters["levels_to_fix_m"]
-    drawn = plot_point_values(along, *on_map, title=_BOUND_TITLE, label="bound / m")
-    save(drawn, out / "position-bound.png")
-    drawn = plot_point_values(fix, *on_map, title=_FIX_TITLE, label="metres to convergence / m")
-    save(drawn, out / "metres-to-fix.png")
     pairs_m = twins[["east_m", "north_m", "twin_east_m", "twin_north_m"]].to_numpy()
-    save(plot_twins(rasters["twin_error"], pairs_m, *on_map), out / "twins.png")
-    tables = ["bound.tif", "ways.parquet", "twins.parquet"]
-    names = [*tables, "position-bound.png", "metres-to-fix.png", "twins.png"]
-    return _summary(found, began_s, tuple(out / name for name in names))
+    label = "distance to convergence / m"
+    pictures = {
+        "position-bound.png": plot_point_values(
+            along, *on_map, title=_BOUND_TITLE, label="bound / m"
+        ),
+        "metres-to-fix.png": plot_point_values(fix, *on_map, title=_FIX_TITLE, label=label),
+        "twins.png": plot_twins(rasters["twin_error"], pairs_m, *on_map),
+    }
+    drawn = [save(picture, out / name) for name, picture in pictures.items()]
+    tables = [out / name for name in ("bound.tif", "ways.parquet", "twins.parquet")]
+    return _summary(found, began_s, (*tables, *drawn))
 
 
 def _summary(found: MapBound, began_s: float, outputs: tuple[Path, ...]) -> BoundResult:
@@ -147,8 +148,3 @@ def _median(values: Floats) -> float:
 
 def _rounded(value: float) -> float:
     return round(float(value), _DECIMALS)
-
-
-def _write_table(table: pd.DataFrame, path: Path) -> None:
-    with atomic_file(path) as temporary:
-        table.to_parquet(temporary, index=False)

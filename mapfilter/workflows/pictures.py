@@ -163,7 +163,7 @@ def draw_network(
     ensure_writable_folder(folder)
     clear_pictures(folder, NETWORK_PICTURES)
     everywhere = served_points(database, within)
-    window, points, where = everywhere.crowded_window(database.lattice), everywhere, ""
+    window, points, where = everywhere.crowded_window(), everywhere, ""
     if window != within:
         points = served_points(database, window)
         share = 100 * points.counts.sum() // everywhere.counts.sum()
@@ -208,13 +208,13 @@ def _plot_site(database: RadioRouteDatabase, points: ServedPoints, site: str) ->
 
     In an area that had to be thinned, only the surroundings of these points are shown.
     """
-    plan, lattice = database.plan, database.lattice
+    plan = database.plan
     cells = [cell.id for cell in plan.cells if cell.site == site]
     own = np.isin(points.best.server, [plan.index(cell_id) for cell_id in cells])
     row, col = np.nonzero(own)
-    if points.best.lattice.resolution_m > lattice.resolution_m and row.size:
+    if points.step > 1 and row.size:
         rows, cols = ((int(at.min()), int(at.max())) for at in (row, col))
-        points = served_points(database, points.window_about(rows, cols, lattice))
+        points = served_points(database, points.window_about(rows, cols))
     return _plot_points(database, points, cells, f"Points served by site {site}")
 
 

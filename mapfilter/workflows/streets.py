@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -323,16 +324,17 @@ def _parts(path: Path) -> list[Path]:
     return [path, table] if path.suffix.lower() == ".shp" and table.is_file() else [path]
 
 
+def measurements_of(config: Config, files: Sequence[Path], crs: str | None) -> Measurements:
+    """Read measurements as the section of the survey describes them."""
+    survey = config.prediction.survey
+    columns, gap_s = survey.columns.given or None, survey.session_gap_s
+    return read_measurements(files, crs, format=survey.format, columns=columns, session_gap_s=gap_s)
+
+
 def _corridors(config: Config, crs: str, bounds_m: Bounds) -> Roads:
     """Return the ways along the tracks of measurements, cut to a box."""
-    tracks, survey = config.roads.tracks, config.prediction.survey
-    read = read_measurements(
-        tracks.files,
-        crs,
-        format=survey.format,
-        columns=survey.columns.given or None,
-        session_gap_s=survey.session_gap_s,
-    )
+    tracks = config.roads.tracks
+    read = measurements_of(config, tracks.files, crs)
     found = corridors(
         crs,
         [_positions(read, session) for session in range(len(read.sessions))],
@@ -349,7 +351,7 @@ def _corridors(config: Config, crs: str, bounds_m: Bounds) -> Roads:
 
 
 def _positions(read: Measurements, session: int) -> Positions:
-    """Return the places of a session, in the order of time; a report's rows share one."""
+    """Return the positions of a session, in the order of time; a report's rows share one."""
     own = np.flatnonzero(read.session == session)
     own = own[np.argsort(read.time_s[own], kind="stable")]
     moved = np.hypot(np.diff(read.east_m[own]), np.diff(read.north_m[own])) > 0

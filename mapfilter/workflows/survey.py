@@ -28,10 +28,11 @@ from mapfilter.survey.measured_map import (
     fit_survey,
     leave_out,
 )
-from mapfilter.survey.measurements import Measurements, named_after, read_measurements
+from mapfilter.survey.measurements import Measurements, named_after
 from mapfilter.survey.survey_rasters import predicted_levels, surveyed_plan, write_survey
 from mapfilter.workflows.pictures import clear_pictures
 from mapfilter.workflows.served import thinned_lattice
+from mapfilter.workflows.streets import measurements_of
 from mapfilter.workflows.world import (
     LARGEST_AREA_PX,
     area_lattice,
@@ -97,23 +98,21 @@ def _surveyed(survey: SurveyEvidence) -> tuple[list[SurveyedLevels], BaseMap]:
     rows, whole = survey.measurements, survey.levels.lattice
     near = outside_m(rows.east_m, rows.north_m, whole) <= survey.reach_m
     counts = np.bincount(rows.cell[near], minlength=len(rows.cell_ids))
-    shown = [
-        index
-        for index in np.argsort(-counts, kind="stable").tolist()
-        if counts[index] and rows.cell_ids[index] in survey.levels.cell_ids
-    ][:_CELLS]
-    if not shown:
+    cells: list[SurveyedLevels] = []
+    for index in np.argsort(-counts, kind="stable").tolist():
+        if counts[index] and rows.cell_ids[index] in survey.levels.cell_ids:
+            own = rows.where(near & (rows.cell == index))
+            cells.append(_cell(survey, own, rows.cell_ids[index]))
+        if len(cells) == _CELLS:
+            break
+    if not cells:
         expected = "measurements of cells of the survey's rasters"
         raise fail(InputError, str(survey.levels.path), expected, "none", "rasters of another area")
-    cells = [
-        _cell(survey, rows.where(near & (rows.cell == index)), rows.cell_ids[index])
-        for index in shown
-    ]
     return cells, BaseMap(whole.bounds_m, attribution=survey.attribution)
 
 
 def _cell(survey: SurveyEvidence, own: Measurements, cell_id: str) -> SurveyedLevels:
-    """Return the map about a cell's own measurements, thinned to what a picture can show."""
+    """Return the map about a cell's measurements, thinned to what a picture can show."""
     whole = survey.levels.lattice
     row, col = whole.row_col(own.east_m, own.north_m)
     around = ceil(survey.reach_m / whole.resolution_m)
@@ -271,13 +270,7 @@ def _measurements(config: Config, lattice: Lattice | None) -> tuple[Measurements
     crs = lattice.crs if lattice is not None else None
     if crs is None and config.area.crs is not None:
         crs = projected_crs(config.area.crs, "area.crs")
-    found = read_measurements(
-        section.files,
-        crs,
-        format=section.format,
-        columns=section.columns.given or None,
-        session_gap_s=section.session_gap_s,
-    ).accurate(section.max_accuracy_m)
+    found = measurements_of(config, section.files, crs).accurate(section.max_accuracy_m)
     if not len(found):
         expected = f"positions accurate to {section.max_accuracy_m:g} m"
         raise fail(InputError, "measurements", expected, "none")
@@ -288,13 +281,10 @@ def _measurements(config: Config, lattice: Lattice | None) -> tuple[Measurements
 
 
 def _lattice_about(measurements: Measurements, reach_m: float, resolution_m: float) -> Lattice:
-    bounds_m = (
-        float(measurements.east_m.min()) - reach_m,
-        float(measurements.north_m.min()) - reach_m,
-        float(measurements.east_m.max()) + reach_m,
-        float(measurements.north_m.max()) + reach_m,
-    )
-    width_m, height_m = bounds_m[2] - bounds_m[0], bounds_m[3] - bounds_m[1]
+    at_m = np.array([measurements.east_m, measurements.north_m])
+    west, south = (at_m.min(axis=1) - reach_m).tolist()
+    east, north = (at_m.max(axis=1) + reach_m).tolist()
+    bounds_m, width_m, height_m = (west, south, east, north), east - west, north - south
     pixels = width_m * height_m / resolution_m**2
     if pixels > LARGEST_AREA_PX:
         expected = f"at most {LARGEST_AREA_PX:.0e} pixels about all measurements"

@@ -245,7 +245,7 @@ def test_pictures_show_where_nearly_all_points_lie(drive, most_px, tmp_path, mon
     rasters, database = drive
     whole = served_points(database)
     assert whole.number.sum() == 3631
-    top, left, rows, cols = whole.crowded_window(database.lattice)
+    top, left, rows, cols = whole.crowded_window()
     # Two hundredths of the points may lie outside; some room is about the others.
     assert 0 <= top <= 20
     assert 0 <= left <= 30
@@ -264,7 +264,7 @@ def test_pictures_show_where_nearly_all_points_lie(drive, most_px, tmp_path, mon
 
 def test_an_area_full_of_points_is_shown_whole(network):
     points = served_points(network[1])
-    assert points.crowded_window(LATTICE) == (0, 0, 40, 50)
+    assert points.crowded_window() == (0, 0, 40, 50)
 
 
 def test_rasters_of_another_place_are_told(network, tmp_path):
