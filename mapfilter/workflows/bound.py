@@ -78,14 +78,7 @@ def run_bound(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> BoundResult:
-    """Compute bounds on positioning by a database; write a raster, tables by way and of twins.
-
-    Raises
-    ------
-    MapfilterError
-        The database is missing, damaged or too large, an option is out of range, or the output
-        cannot be written.
-    """
+    """Compute bounds on positioning by a database; write a raster, tables by way and of twins."""
     began_s = time.perf_counter()
     database = open_database(path)
     ensure_writable_folder(out)

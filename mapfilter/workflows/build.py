@@ -71,12 +71,6 @@ def run_build(
         rasters by the same paths.
     resume : bool
         Go on where a build of the same inputs was cut short.
-
-    Raises
-    ------
-    MapfilterError
-        Rasters, plan, map or area are wrong or do not fit each other, or the output cannot be
-        written.
     """
     began_s = time.perf_counter()
     target, section = config.database_path, config.database
@@ -118,13 +112,7 @@ def run_build(
 
 
 def run_dry_build(config: Config) -> BuildEstimate:
-    """Estimate size, memory and time of a build, writing nothing.
-
-    Raises
-    ------
-    MapfilterError
-        As for :func:`run_build`.
-    """
+    """Estimate size, memory and time of a build, writing nothing."""
     began_s = time.perf_counter()
     rasters, plan, world = _raster_world(config)
     section, routes = config.database, world.route_tiles

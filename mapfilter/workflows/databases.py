@@ -35,14 +35,7 @@ def run_merge(
     without: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Merge databases; within its area a later one overrides earlier ones in its own cells.
-
-    Raises
-    ------
-    MapfilterError
-        A database is missing or damaged, they do not fit each other, or the output cannot be
-        written.
-    """
+    """Merge databases; within its area a later one overrides earlier ones in its own cells."""
     began_s = time.perf_counter()
     opened = [open_database(path, verify="full") for path in databases]
     ensure_writable_folder(out.parent)
@@ -53,13 +46,7 @@ def run_merge(
 
 
 def run_export(database: Path, to: Path) -> dict[str, Any]:
-    """Write a database as GeoPackage, or its best server and margin as GeoTIFF.
-
-    Raises
-    ------
-    MapfilterError
-        The database is missing or damaged, the file's kind is unknown, or it cannot be written.
-    """
+    """Write a database as GeoPackage, or its best server and margin as GeoTIFF."""
     from mapfilter.database.export import export_cog, export_geopackage
 
     kind = to.suffix.lower()
@@ -76,13 +63,7 @@ def run_export(database: Path, to: Path) -> dict[str, Any]:
 
 
 def run_info(path: Path) -> dict[str, Any]:
-    """Describe the file or folder at a path, ready for JSON; a database's checksums are compared.
-
-    Raises
-    ------
-    MapfilterError
-        mapfilter does not read such files, or it is damaged.
-    """
+    """Describe the file or folder at a path, ready for JSON; compare a database's checksums."""
     if not path.exists():
         raise fail(InputError, str(path), "a database, raster file or log", "nothing there")
     if path.is_file():

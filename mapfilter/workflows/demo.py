@@ -55,11 +55,6 @@ def run_demo(
         Points and cells of the database, length of the walk, whether, where and how accurately the
         Bayes filter switched to tracking, its errors from then on (as in ``Accuracy``), the same
         figures of the candidate filter, wall time of each stage, and all files written.
-
-    Raises
-    ------
-    MapfilterError
-        A setting is wrong, or the output cannot be written.
     """
     ensure_writable_folder(out)
     seeds = [] if seed is None else [f"journeys.seed={seed}"]

@@ -117,13 +117,7 @@ class PredictResult:
 
 
 def run_predict(config: Config, progress: Progress | None = None) -> PredictResult | SurveyResult:
-    """Predict every cell of the plan over the area, or make the map of a survey's measurements.
-
-    Raises
-    ------
-    MapfilterError
-        The area, map or plan is wrong, or the output cannot be written.
-    """
+    """Predict every cell of the plan over the area, or make the map of a survey's measurements."""
     target, ground_truth = config.rasters_path, config.ground_truth_path
     surveyed, both = config.prediction.model == "survey", config.prediction.ground_truth.write
     check_only_own_replaced(

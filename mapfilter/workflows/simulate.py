@@ -35,13 +35,7 @@ class SimulateResult:
 
 
 def run_simulate(config: Config, progress: Progress | None = None) -> SimulateResult:
-    """Simulate journeys and write their logs; a folder of older logs is replaced as a whole.
-
-    Raises
-    ------
-    MapfilterError
-        The area, map, plan or rasters are wrong, or the output cannot be written.
-    """
+    """Simulate journeys and write their logs; a folder of older logs is replaced as a whole."""
     world = World.of(config)
     settings = simulation_settings(config)
     as_predicted = settings.reports.radio == "as_predicted"

@@ -158,12 +158,6 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
 
     Without an area the lattice covers the measurements; with rasters to calibrate it is theirs.
     With cross-validation the deviations are stretched to what left-out sessions showed.
-
-    Raises
-    ------
-    MapfilterError
-        Measurements, area, plan or rasters are wrong or do not fit each other, or the output
-        cannot be written.
     """
     section = config.prediction.survey
     options = section.of(SurveyOptions)
@@ -238,13 +232,7 @@ class SurveyInputs:
 
 
 def survey_inputs(config: Config) -> SurveyInputs:
-    """Read what the survey of a configuration is made of.
-
-    Raises
-    ------
-    MapfilterError
-        Measurements, area, plan or rasters are wrong or do not fit each other.
-    """
+    """Read what the survey of a configuration is made of."""
     section = config.prediction.survey
     if not section.files:
         raise fail(ConfigError, "prediction.survey.files", "measurement files", "none")
