@@ -47,19 +47,6 @@ _MOST_NAMES = 60
 class BaseMap:
     """What lies under the data of a map picture; all in metres of one projected CRS.
 
-    Parameters
-    ----------
-    bounds_m : (west, south, east, north)
-        Extent of the area; its south-western corner is the local origin of the axes.
-    streets : tuple of (k, 2) arrays
-        Lines as east, north.
-    points_m : (n, 2) array or None
-        Places where one can be, as east, north, on a lattice; drawn as pale pixels.
-    attribution : str
-        Whose map it is, such as "© OpenStreetMap contributors"; drawn small in a corner.
-    resolution_m : float
-        Distance between neighbouring points.
-
     Raises
     ------
     InputError
@@ -67,10 +54,15 @@ class BaseMap:
     """
 
     bounds_m: Bounds
+    """West, south, east, north; the south-western corner is the local origin of the axes."""
     streets: tuple[Floats, ...] = ()
+    """Lines, arrays (k, 2), as east, north."""
     points_m: Floats | None = None
+    """Places where one can be, (n, 2), as east, north, on a lattice; drawn as pale pixels."""
     attribution: str = ""
+    """Owner of the map, such as "© OpenStreetMap contributors"; drawn small in a corner."""
     resolution_m: float = 5.0
+    """Distance between neighbouring points."""
 
     def __post_init__(self) -> None:
         west, south, east, north = self.bounds_m
@@ -140,8 +132,7 @@ def draw_base(
 ) -> LocalFrame:
     """Draw streets and points, set extent and labels, and add scale bar and north arrow.
 
-    ``streets`` is their colour; ``scale_bar`` whether to draw the bar and the arrow. By the frame
-    that is returned data are put onto the axes.
+    ``streets`` is their colour. Return the frame, which converts data to the units of the axes.
     """
     frame = local_frame(base)
     if base.points_m is not None and len(base.points_m):
@@ -278,9 +269,9 @@ def side_legend(
     counts: Sequence[int],
     marks: Sequence[Line2D],
 ) -> None:
-    """Put a legend to the right of the map: the largest groups that it has room for, and marks.
+    """Put a legend to the right of the map: the largest groups that it has room for, all marks.
 
-    Both are labelled; ``counts`` are the sizes of the groups. Marks are always shown.
+    ``counts`` are the sizes of the groups.
     """
     figure = figure_of(axes)
     room = int((figure.get_figheight() - _HEADING_IN) / _ROW_IN) - len(marks)

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
-from matplotlib.image import AxesImage
 from matplotlib.ticker import FormatStrFormatter, NullLocator
 from numpy.typing import NDArray
 
@@ -93,14 +92,19 @@ def plot_surveyed_levels(cells: Sequence[SurveyedLevels], base: BaseMap) -> Figu
     panels = figure.subplots(count, 2, squeeze=False)
     for cell, (left, right) in zip(cells, panels, strict=True):
         shown = base.zoomed(_surroundings(cell))
-        levels, deviations = (cell.level_dbm, levels_dbm), (cell.deviation_db, deviations_db)
-        image = _draw_raster(left, cell.lattice, shown, *levels, "viridis", "level / dBm")
-        _draw_raster(right, cell.lattice, shown, *deviations, "magma_r", "deviation / dB")
+        for axes, values, ends, colours, label in (
+            (left, cell.level_dbm, levels_dbm, "viridis", "level / dBm"),
+            (right, cell.deviation_db, deviations_db, "magma_r", "deviation / dB"),
+        ):
+            draw_base(axes, shown, streets=OVER_RASTER, scale_bar=axes is left)
+            axes.set_facecolor(_NO_DATA)
+            look = Look(cmap=colours, clim=ends, zorder=1)
+            image = draw_raster(axes, shown, cell.lattice, values, **look)
+            look = Look(shrink=0.8, pad=0.02, aspect=28)
+            figure.colorbar(image, ax=axes, label=label, **look)
         at = local_frame(shown)(cell.east_m, cell.north_m)
-        rim = Look(edgecolors="white", linewidths=0.25)
-        left.scatter(
-            *at, s=15, c=cell.measured_dbm, cmap=image.cmap, norm=image.norm, zorder=5, **rim
-        )
+        look = Look(cmap="viridis", clim=levels_dbm, edgecolors="white", linewidths=0.25)
+        left.scatter(*at, s=15, c=cell.measured_dbm, zorder=5, **look)
         right.scatter(*at, s=3, color=BLACK, linewidths=0, zorder=5)
         points = grouped(len(cell.measured_dbm))
         left.set_title(f"{cell.cell_id}: level, {points} measurements", fontsize=10)
@@ -182,23 +186,6 @@ def plot_left_out(
         small = Look(ha="right", va="bottom", fontsize=6.5, color=GREY)
         figure.text(0.995, 0.004, attribution, **small)
     return axes
-
-
-def _draw_raster(
-    axes: Axes,
-    lattice: Lattice,
-    base: BaseMap,
-    values: NDArray[np.floating],
-    ends: tuple[float, float],
-    colours: str,
-    label: str,
-) -> AxesImage:
-    draw_base(axes, base, streets=OVER_RASTER, scale_bar=colours == "viridis")
-    axes.set_facecolor(_NO_DATA)
-    image = draw_raster(axes, base, lattice, values, cmap=colours, clim=ends, zorder=1)
-    look = Look(shrink=0.8, pad=0.02, aspect=28)
-    figure_of(axes).colorbar(image, ax=axes, label=label, **look)
-    return image
 
 
 def _surroundings(cell: SurveyedLevels) -> Bounds:

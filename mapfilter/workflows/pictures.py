@@ -135,21 +135,14 @@ def draw_network(
 
     Parameters
     ----------
-    rasters : RxLevRasters
-        Levels or losses.
     folder : Path
         Made where it is missing; pictures of an older database in it are removed.
     area : Lattice, optional
         The part of the database's lattice that its roads were laid on, when that is not all.
     landuse : LandUse, optional
-        On that part: what the points were made from.
+        On that part: the classes that the points were laid on.
     buildings : Buildings, optional
         Without ``landuse``: drawn beside ways and squares.
-
-    Returns
-    -------
-    tuple of Path
-        The pictures, in this order.
 
     Raises
     ------
@@ -264,7 +257,7 @@ def draw_track(
     estimate, evidence = track.estimate, track.estimate.evidence
     drawn: dict[str, Drawn] = {}
     if track.snapshots and evidence is None:
-        chosen = choose_snapshots(track.snapshots, _candidates)
+        chosen = choose_snapshots(track.snapshots, lambda one: one.weight.size)
         drawn["candidates.png"] = plot_candidates(chosen, truth, base)
     elif track.snapshots:
         chosen = choose_snapshots(track.snapshots, _places)
@@ -282,8 +275,7 @@ def choose_snapshots(
 ) -> list[Snapshot]:
     """Choose at most six: the first, the last, and between them even steps of the thinning out.
 
-    Steps are even in the logarithm of ``spread``, the number of places that a belief is spread
-    over, because that is how it falls.
+    Steps are even in the logarithm of ``spread``, the number of places in a belief.
     """
     if len(snapshots) <= MAX_PANELS:
         return list(snapshots)
@@ -297,12 +289,8 @@ def choose_snapshots(
     return [snapshots[i] for i in sorted(chosen)]
 
 
-def _candidates(snapshot: Snapshot) -> float:
-    return float(snapshot.hypothesis_east_m.size)
-
-
 def _places(snapshot: Snapshot) -> float:
-    """Return the effective number of squares that a belief of probabilities is spread over."""
+    """Return the effective number of squares in a belief (the exponential of its entropy)."""
     if not snapshot.weight.size:
         return 0.0
     at_m = np.array([snapshot.hypothesis_east_m, snapshot.hypothesis_north_m])
