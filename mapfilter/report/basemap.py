@@ -29,7 +29,8 @@ Bounds = tuple[float, float, float, float]
 HALO = (withStroke(linewidth=2.5, foreground="white"),)
 """White rim that keeps text and marks readable on any ground."""
 
-_NAME = Look(ha="center", va="center", fontweight="bold", path_effects=HALO)
+MAP_NAME = Look(ha="center", va="center", fontweight="bold", path_effects=HALO)
+"""Bold text on a map."""
 
 OVER_RASTER = "#00000030"
 """Colour of streets that lie over a raster."""
@@ -40,7 +41,6 @@ MAP_IN = 7.0
 _KILOMETRE_FROM_M = 1500.0
 _MOST_PX = 2400
 _ROW_IN, _HEADING_IN = 0.205, 0.55
-_MOST_NAMES = 60
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,7 +150,7 @@ def draw_base(
         _draw_scale_bar(axes, base.bounds_m[2] - base.bounds_m[0])
         arrow = Look(arrowstyle="-|>", color=BLACK, linewidth=1.4, shrinkA=1)
         at = Look(xycoords="axes fraction", textcoords="offset points", arrowprops=arrow)
-        axes.annotate("N", (0.96, 0.985), (0, -38), **at, **_NAME, fontsize=9.5, zorder=19)
+        axes.annotate("N", (0.96, 0.985), (0, -38), **at, **MAP_NAME, fontsize=9.5, zorder=19)
     return frame
 
 
@@ -231,11 +231,6 @@ def largest(counts: Sequence[int], most: int) -> set[int]:
     return set(np.argsort(-np.asarray(counts), kind="stable")[:most].tolist())
 
 
-def named_groups(counts: Sequence[int]) -> set[int]:
-    """Return the places of the groups to name on the map: not so many that no name is read."""
-    return {i for i in largest(counts, _MOST_NAMES) if counts[i] > 0}
-
-
 def short_names(names: Sequence[str]) -> list[str]:
     """Return names without what they all begin with, up to a hyphen, for want of room on a map.
 
@@ -253,13 +248,6 @@ def short_names(names: Sequence[str]) -> list[str]:
     differ = (i for i, (a, b) in enumerate(zip(first, last, strict=False)) if a != b)
     cut = first[: next(differ, len(first))].rfind("-") + 1
     return [name[cut:] or name for name in names]
-
-
-def name_group(axes: Axes, x: Floats, y: Floats, name: str) -> None:
-    """Write a group's name on that one of its points that lies nearest to their median."""
-    middle = int(np.argmin(np.hypot(x - np.median(x), y - np.median(y))))
-    at = float(x[middle]), float(y[middle])
-    axes.text(*at, name, **_NAME, fontsize=8, zorder=12, clip_on=True)
 
 
 def side_legend(

@@ -26,6 +26,7 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.report.basemap import (
     HALO,
     MAP_IN,
+    MAP_NAME,
     OVER_RASTER,
     BaseMap,
     Bounds,
@@ -33,11 +34,10 @@ from mapfilter.report.basemap import (
     attribute,
     draw_base,
     draw_raster,
+    largest,
     local_frame,
     map_axes,
     map_height_in,
-    name_group,
-    named_groups,
     shape_faults,
     short_names,
     side_legend,
@@ -66,7 +66,7 @@ _LEGEND_IN, _WIDE_LEGEND_IN, _BAR_IN, _POINT_BAR_IN = 2.7, 3.4, 1.7, 1.5
 _ONE_CELL = "#fff7bc"
 _PANEL_IN, _LEGEND_ROW_IN, _COLUMNS = 5.2, 0.24, 4
 _NOT_WALKABLE, _UNKNOWN = "#ececec", "white"
-_MOST_TWINS = 25
+_MOST_NAMES, _MOST_TWINS = 60, 25
 _SHOWN = (2.0, 98.0)
 
 
@@ -200,15 +200,21 @@ class _Groups:
         self.colours = distinct_colours(len(cell_ids))
         self.handles: list[Line2D] = []
         self._axes, self._plan, self._ids = axes, plan, cell_ids
-        self._names, self._named = short_names(cell_ids), named_groups(counts)
+        self._names, self._named = short_names(cell_ids), largest(counts, _MOST_NAMES)
 
     def add(self, index: int, amount: str, at: tuple[Floats, Floats]) -> None:
-        """Add a cell to the legend, and name it amid its places unless its own mark does."""
+        """Add a cell to the legend; name it at the place nearest to their median.
+
+        Indoor cells are named at their marks, and so are not named here.
+        """
         name, colour = self._ids[index], self.colours[index]
         self.handles.append(mark(f"{name}: {amount}", "s", 7, color=colour))
         indoor = name in self._plan and self._plan[name].indoor
         if at[0].size and index in self._named and not indoor:
-            name_group(self._axes, *at, self._names[index])
+            x, y = at
+            middle = int(np.argmin(np.hypot(x - np.median(x), y - np.median(y))))
+            look = Look(fontsize=8, zorder=12, clip_on=True) | MAP_NAME
+            self._axes.text(float(x[middle]), float(y[middle]), self._names[index], **look)
 
 
 @styled
