@@ -29,7 +29,7 @@ NOTES = (
 _DECIMALS = 3
 
 _BOUND_TITLE = "Least position error along the street from one report of levels"
-_FIX_TITLE = "Expected distance to convergence of an ideal filter"
+_FIX_TITLE = "Expected metres to convergence of an ideal filter"
 
 
 @dataclass(frozen=True)
