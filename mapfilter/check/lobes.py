@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -117,15 +117,6 @@ def _binned(
     return mean, far, full % _DIRECTIONS, weight
 
 
-Mistake = Literal[
-    "azimuth-radians",
-    "azimuth-counter-clockwise",
-    "azimuth-off-by-90",
-    "azimuth-off-by-180",
-    "sector-labels-swapped",
-    "azimuth-off-lobe",
-]
-
 _FAR_OFF_DEG = 45.0
 _WORSE = 0.4
 _CLEAR_SCORE = 0.25
@@ -133,7 +124,7 @@ _CLEAR_CONTRAST_DB = 6.0
 _BETTER = 0.3
 _STRAY_SHARE = 0.1
 
-_READINGS: tuple[tuple[Mistake, str, Callable[[float], float]], ...] = (
+_READINGS: tuple[tuple[str, str, Callable[[float], float]], ...] = (
     ("azimuth-counter-clockwise", "counter-clockwise from north", lambda a: -a),
     ("azimuth-counter-clockwise", "counter-clockwise from east", lambda a: 90 - a),
     ("azimuth-off-by-180", "to be 180° more", lambda a: a + 180),
@@ -144,12 +135,13 @@ _READINGS: tuple[tuple[Mistake, str, Callable[[float], float]], ...] = (
 """What azimuths may have been meant to be: as degrees clockwise from north."""
 
 
-@dataclass(frozen=True, slots=True)
-class AzimuthMistake:
+class AzimuthMistake(NamedTuple):
     """Azimuths that go against the lobes, and what explains it.
 
     Parameters
     ----------
+    mistake : str
+        Code of the finding.
     cells : tuple of str
         Whose azimuths or rasters are concerned.
     reading : str
@@ -160,7 +152,7 @@ class AzimuthMistake:
         The same after the mistake is mended.
     """
 
-    mistake: Mistake
+    mistake: str
     cells: tuple[str, ...]
     reading: str
     offset_deg: float
@@ -233,7 +225,7 @@ def _whole_plan(
         return float(np.mean([lobes[i].score(azimuths[i]) for i in ids]))
 
     as_given = mean_score(azimuth)
-    best: tuple[float, Mistake, str, dict[str, float]] | None = None
+    best: tuple[float, str, str, dict[str, float]] | None = None
     for mistake, reading, read in _READINGS:
         meant = {i: read(azimuth[i]) % 360 for i in ids}
         score = mean_score(meant)

@@ -12,8 +12,8 @@ import rasterio
 from rasterio.errors import RasterioError
 
 from mapfilter._types import Floats, Floats32
-from mapfilter.check.findings import Findings, listed
-from mapfilter.errors import InputError
+from mapfilter.check.findings import Findings
+from mapfilter.errors import InputError, listed
 from mapfilter.geodesy import (
     Lattice,
     azimuth_from_heading_deg,

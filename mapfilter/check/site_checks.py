@@ -16,9 +16,10 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from mapfilter._types import Floats, Floats32
-from mapfilter.check.findings import Findings, listed
+from mapfilter.check.findings import Findings
 from mapfilter.check.lobes import Lobe, azimuth_mistakes, find_lobe
 from mapfilter.check.raster_checks import RasterSample, above_free_space_db, falls_with_distance
+from mapfilter.errors import listed
 from mapfilter.radio.cells import Cell, CellPlan
 
 _SIDE = 40

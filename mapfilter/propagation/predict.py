@@ -14,7 +14,7 @@ import numpy as np
 
 from mapfilter._parallel import Progress
 from mapfilter._types import Bools, Floats, Floats32
-from mapfilter.errors import Faults, InputError
+from mapfilter.errors import Faults, InputError, listed
 from mapfilter.geodesy import Lattice, grid_convergence_rad, heading_from_azimuth_rad, unproject
 from mapfilter.propagation.line_of_sight import (
     check_heights,
@@ -351,8 +351,7 @@ def off_frequency(plan: CellPlan, antennas: Antennas) -> tuple[str, ...]:
 def _named(ids: list[str]) -> str:
     if len(ids) == 1:
         return f"cell {ids[0]!r}"
-    shown = ", ".join(repr(name) for name in ids[:_MOST_NAMED])
-    return f"{len(ids)} cells ({shown}{', …' if len(ids) > _MOST_NAMED else ''})"
+    return f"{len(ids)} cells ({listed([repr(name) for name in ids], _MOST_NAMED)})"
 
 
 def _check_antennas(plan: CellPlan, antennas: Antennas | None) -> None:

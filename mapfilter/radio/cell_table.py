@@ -13,7 +13,7 @@ from typing import Any
 from pyproj import CRS
 
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import project, projected_crs, unproject
+from mapfilter.geodesy import degree_fault, project, projected_crs, unproject
 from mapfilter.radio.cell_layouts import COLUMNS, Arranged, Layout, arrange, number, read_table
 from mapfilter.radio.cell_rules import ANTENNAS, OPTIONAL, RANGES, antenna_fault, id_fault
 
@@ -171,7 +171,7 @@ def _place(path: Path, rows: list[Row], crs: str, faults: Faults) -> None:
         values, names, wrong = row.values, "lat, lon", None
         if "lat" in values:
             if values["lat"] is not None and values["lon"] is not None:
-                wrong = _degree_fault(values["lat"], values["lon"], crs)
+                wrong = _place_fault(values["lat"], values["lon"], crs)
         elif values["east"] is not None and values["north"] is not None:
             names, own = "east, north", values.get("crs", crs)
             values["east_m"], values["north_m"] = values["east"], values["north"]
@@ -194,18 +194,14 @@ def _metre_fault(east: float, north: float, crs: str) -> tuple[str, str, str] | 
     return expected, got, "east and north swapped, or another CRS"
 
 
-def _degree_fault(lat: float, lon: float, crs: str) -> tuple[str, str, str] | None:
-    got = f"{lat:g}, {lon:g}"
-    if abs(lat) > 180 or abs(lon) > 180:
-        return "degrees in -90..90 and -180..180", got, "metres given for degrees"
-    if abs(lat) > 90:
-        return "degrees in -90..90 and -180..180", got, "longitude and latitude swapped"
-    if _near(crs, lon, lat):
-        return None
+def _place_fault(lat: float, lon: float, crs: str) -> tuple[str, str, str] | None:
+    wrong = degree_fault(lat, lon)
+    if wrong is not None or _near(crs, lon, lat):
+        return wrong
     hint = "a cell of another place, or another CRS"
     if abs(lon) <= 90 and _near(crs, lat, lon):
         hint = "longitude and latitude swapped"
-    return f"a place where {crs} is used", got, hint
+    return f"a place where {crs} is used", f"{lat:g}, {lon:g}", hint
 
 
 @lru_cache(maxsize=16)

@@ -14,7 +14,7 @@ import numpy as np
 
 from mapfilter._io import atomic_file
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import project, projected_crs, same_crs, unproject
+from mapfilter.geodesy import project, projected_crs, same_crs, short_crs, unproject
 from mapfilter.radio.cell_layouts import COLUMNS, Layout
 from mapfilter.radio.cell_rules import (
     OPTIONAL,
@@ -93,7 +93,7 @@ class Cell:
     bsic: int | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class CellPlan:
     """The cells of an area, in one projected CRS; checked when it is made.
 
@@ -125,6 +125,11 @@ class CellPlan:
         object.__setattr__(self, "cells", tuple(self.cells))
         _check_cells(self.cells, lambda i, name: f"cell {self.cells[i].id!r}, {name}", faults)
         faults.raise_if_any(InputError)
+
+    def __repr__(self) -> str:
+        """Return the numbers of cells and sites, and the CRS, in one line."""
+        sites = len({cell.site for cell in self.cells})
+        return f"<CellPlan: {len(self.cells)} cells at {sites} sites, {short_crs(self.crs)}>"
 
     @property
     def ids(self) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mapfilter._io import read_input
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio.antenna import MeasuredAntenna
@@ -119,12 +120,7 @@ Row = tuple[int, list[str]]
 
 def _sections(path: Path) -> tuple[dict[str, str], dict[str, tuple[int, str, list[Row]]]]:
     """Split a file into its keywords and, by name, each cut's first row, count and rows."""
-    try:
-        if path.stat().st_size > _LARGEST_BYTES:
-            raise fail(InputError, str(path), "an antenna of at most 1 MiB", "a larger file")
-        data = path.read_bytes()
-    except OSError as error:
-        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
+    data = read_input(path, _LARGEST_BYTES, "an antenna")
     if b"\0" in data:
         raise fail(InputError, str(path), "text", "NUL characters", "no text file, or UTF-16")
     # Comments hold degree signs in any code page; all that counts is ASCII.

@@ -13,6 +13,7 @@ import numpy as np
 from mapfilter._types import Bools, Floats32
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
+from mapfilter.rasters.grid_header import GridHeader
 
 Window = tuple[int, int, int, int]
 """Row, column, rows, columns."""
@@ -37,11 +38,14 @@ class Declared:
         Projected CRS.
     nodata : float or None
         A number that means no data, besides the files' own.
+    header : GridHeader or None
+        From an index of raw pixels; used where they have none, or one without the place.
     """
 
     quantity: Quantity | None = None
     crs: str | None = None
     nodata: float | None = None
+    header: GridHeader | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,13 +106,14 @@ def without_nodata(values: Floats32, nodata: Sequence[float]) -> Floats32:
 
 def check_file(path: Path) -> None:
     """Check that there is a file with something in it."""
-    try:
-        size = path.stat().st_size
-    except OSError as error:
-        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
     if path.is_dir():
         raise fail(InputError, str(path), "a raster file", "a folder")
-    if size == 0:
+    try:
+        with path.open("rb") as stream:
+            empty = not stream.read(1)
+    except OSError as error:
+        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
+    if empty:
         raise fail(InputError, str(path), "a raster file", "an empty file")
 
 

@@ -13,12 +13,11 @@ from mapfilter.radio.cell_rules import id_fault
 from mapfilter.rasters.atoll import INDEX_SUFFIXES, IndexRow, find_index, read_index
 from mapfilter.rasters.files import Declared, Quantity, RasterFile, check_file
 from mapfilter.rasters.geotiff import open_geotiff
-from mapfilter.rasters.grid_header import GridHeader
 from mapfilter.rasters.plain_grids import open_ascii_grid, open_raw_grid
 
-Opener = Callable[[Path, str, Declared, GridHeader | None], RasterFile]
-"""From a file, the cell's id if the file names none, what the user declares, and the header that an
-index holds, to the opened file; pixels are not read."""
+Opener = Callable[[Path, str, Declared], RasterFile]
+"""From a file, the cell's id if the file names none, and what the user or an index declares, to the
+opened file; pixels are not read."""
 
 FORMATS: Mapping[str, Opener] = {
     ".tif": open_geotiff,
@@ -100,8 +99,8 @@ def _open(path: Path, declared: Declared, row: IndexRow | None, notes: list[str]
     check_file(path)
     opener = FORMATS.get(path.suffix.lower(), open_geotiff if row is None else open_raw_grid)
     if row is None:
-        return opener(path, path.stem, declared, None)
-    file = opener(path, row.cell_id, declared, row.header())
+        return opener(path, path.stem, declared)
+    file = opener(path, row.cell_id, replace(declared, header=row.header()))
     if len(file.cell_ids) > 1:
         got = f"{len(file.cell_ids)} bands"
         raise fail(InputError, str(path), "one band per file of an index", got)

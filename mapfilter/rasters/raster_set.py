@@ -17,7 +17,7 @@ import numpy as np
 
 from mapfilter._io import sha256_file
 from mapfilter._types import Floats, Floats32
-from mapfilter.errors import Faults, InputError, fail
+from mapfilter.errors import Faults, InputError, fail, listed
 from mapfilter.geodesy import Lattice, projected_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.files import Declared, Quantity, RasterFile, Window, check_plausible
@@ -27,7 +27,7 @@ from mapfilter.rasters.resampling import Resampling, common_lattice, read_on
 _LARGEST_READ_BYTES = 4 << 30
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RxLevRasters:
     """Which cells a set of rasters holds and where; the values stay in the files until read.
 
@@ -63,6 +63,11 @@ class RxLevRasters:
     factor: float = 1.0
     resampling: Resampling = "nearest"
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """Return name, number of cells, size and place in one line."""
+        held = f"{self.quantity} of {len(self.cell_ids)} cells"
+        return f"<RxLevRasters {self.path.name}: {held}, {self.lattice}>"
 
     def sha256(self) -> str:
         """Return the checksum of the file, or one of the names and checksums of all files."""
@@ -242,13 +247,13 @@ def open_rasters(
 def check_against_plan(rasters: RxLevRasters, plan: CellPlan) -> None:
     """Check that rasters and plan hold the same cells."""
     faults, held = Faults(), set(rasters.cell_ids)
-    unknown = [cell_id for cell_id in rasters.cell_ids if cell_id not in plan]
-    missing = [cell_id for cell_id in plan.ids if cell_id not in held]
+    unknown = [repr(cell_id) for cell_id in rasters.cell_ids if cell_id not in plan]
+    missing = [repr(cell_id) for cell_id in plan.ids if cell_id not in held]
     hint = "rasters and plan of different dates or places"
     if unknown:
-        faults.add(str(rasters.path), "cells of the plan only", _listed(unknown), hint)
+        faults.add(str(rasters.path), "cells of the plan only", listed(unknown), hint)
     if missing:
-        got = f"no band for {_listed(missing)}"
+        got = f"no band for {listed(missing)}"
         faults.add(str(rasters.path), "a band for each cell of the plan", got, hint)
     faults.raise_if_any(InputError)
 
@@ -266,8 +271,3 @@ def _check_options(
     if resolution_m is not None and not (math.isfinite(resolution_m) and resolution_m > 0):
         faults.add("rasters, resolution_m", "metres > 0", resolution_m)
     faults.raise_if_any(InputError)
-
-
-def _listed(ids: Sequence[str]) -> str:
-    more = f" and {len(ids) - 10} more" if len(ids) > 10 else ""
-    return ", ".join(repr(cell_id) for cell_id in ids[:10]) + more

@@ -11,11 +11,11 @@ import rasterio
 from rasterio.errors import RasterioError
 
 from mapfilter._parallel import Progress
-from mapfilter.check.findings import CheckResult, Findings, Severity, listed
+from mapfilter.check.findings import CheckResult, Findings, Severity
 from mapfilter.check.raster_checks import check_ids, is_surveyed, sampled
 from mapfilter.check.site_checks import check_against_sites, check_power
 from mapfilter.config.sections import Config
-from mapfilter.errors import MapfilterError
+from mapfilter.errors import MapfilterError, listed
 from mapfilter.geodesy import Lattice
 from mapfilter.propagation.predict import off_frequency
 from mapfilter.radio.cell_rules import ANTENNAS
@@ -213,7 +213,7 @@ def _misspelt(named: Sequence[str]) -> Iterator[str]:
     """Yield what names that are nearly those of antennas by formula may mean."""
     for name in named:
         for close in difflib.get_close_matches(name.lower(), ANTENNAS, n=1):
-            yield f" Did you mean {close!r} where it says {name!r}?"
+            yield f" {close!r} in place of {name!r}?"
 
 
 def _check_roads(inputs: _Inputs, area: Lattice, findings: Findings) -> None:

@@ -376,7 +376,7 @@ def _predicted(
     if rasters is None:
         return None
     if plan is None and rasters.quantity == "loss":
-        hint = "the cell plan says what to take the losses from"
+        hint = "levels are the EIRP of each cell less its loss"
         raise fail(ConfigError, "cells.plan", "the plan of the losses to calibrate", "none", hint)
     return predicted_levels(rasters, plan)
 
