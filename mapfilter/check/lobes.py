@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -225,17 +226,16 @@ def _whole_plan(
         return float(np.mean([lobes[i].score(azimuths[i]) for i in ids]))
 
     as_given = mean_score(azimuth)
-    best: tuple[float, str, str, dict[str, float]] | None = None
+    found: list[tuple[float, str, str, dict[str, float]]] = []
     for mistake, reading, read in _READINGS:
         meant = {i: read(azimuth[i]) % 360 for i in ids}
         score = mean_score(meant)
         stray = sum(_is_off(lobes[i], meant[i]) for i in ids)
-        better = score - as_given > _BETTER and stray <= _STRAY_SHARE * len(ids)
-        if better and (best is None or score > best[0]):
-            best = score, mistake, reading, meant
-    if best is None:
+        if score - as_given > _BETTER and stray <= _STRAY_SHARE * len(ids):
+            found.append((score, mistake, reading, meant))
+    if not found:
         return None
-    _, mistake, reading, meant = best
+    _, mistake, reading, meant = max(found, key=itemgetter(0))
     concerned = tuple(cell.id for cell in wrong)
     off_deg, read_deg = (_median_off(concerned, lobes, some) for some in (azimuth, meant))
     return AzimuthMistake(mistake, concerned, reading, off_deg, read_deg)

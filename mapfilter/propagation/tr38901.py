@@ -48,8 +48,8 @@ def breakpoint_distance_m(
     frequency_mhz: float,
     base_height_m: float,
     mobile_height_m: float,
-    environment_height_m: ArrayLike = _ENVIRONMENT_M,
-) -> Floats:
+    environment_height_m: float = _ENVIRONMENT_M,
+) -> float:
     """Return the breakpoint distance ``d'_BP = 4 (h_BS - h_E)(h_UT - h_E) f_c / c`` in metres.
 
     Table 7.4.1-1, note 1. The effective environment height h_E is 1 m in UMi, and in UMa for
@@ -57,13 +57,14 @@ def breakpoint_distance_m(
 
     Examples
     --------
-    >>> breakpoint_distance_m(2000.0, 25.0, 1.5).item()
+    >>> breakpoint_distance_m(2000.0, 25.0, 1.5)
     320.0
     """
-    environment = np.asarray(environment_height_m, dtype=np.float64)
-    base = np.maximum(base_height_m - environment, _LEAST_EFFECTIVE_M)
-    mobile = np.maximum(mobile_height_m - environment, _LEAST_EFFECTIVE_M)
-    return np.asarray(4 * base * mobile * frequency_mhz * 1e6 / _SPEED_OF_LIGHT_MPS)
+    base, mobile = (
+        max(height_m - environment_height_m, _LEAST_EFFECTIVE_M)
+        for height_m in (base_height_m, mobile_height_m)
+    )
+    return 4 * base * mobile * frequency_mhz * 1e6 / _SPEED_OF_LIGHT_MPS
 
 
 def seen_loss_db(
@@ -72,7 +73,6 @@ def seen_loss_db(
     frequency_mhz: float,
     base_height_m: float,
     mobile_height_m: float,
-    environment_height_m: ArrayLike = _ENVIRONMENT_M,
 ) -> Floats:
     """Return the path loss with line of sight in dB, PL_UMa-LOS or PL_UMi-LOS.
 
@@ -85,8 +85,6 @@ def seen_loss_db(
     ----------
     distance_m : array_like, any shape
         Horizontal distance, d_2D.
-    environment_height_m : array_like
-        Effective environment height, h_E.
 
     Examples
     --------
@@ -95,12 +93,12 @@ def seen_loss_db(
     """
     terms = _TERMS[scenario]
     flat, slant = _distances_m(distance_m, base_height_m, mobile_height_m)
-    break_m = breakpoint_distance_m(
-        frequency_mhz, base_height_m, mobile_height_m, environment_height_m
-    )
+    break_m = breakpoint_distance_m(frequency_mhz, base_height_m, mobile_height_m)
     lg_slant, frequency_db = np.log10(slant), 20 * np.log10(frequency_mhz / 1000)
     near_db = terms.constant_db + terms.near_slope_db * lg_slant + frequency_db
-    bend_db = terms.breakpoint_db * np.log10(break_m**2 + (base_height_m - mobile_height_m) ** 2)
+    bend_db = terms.breakpoint_db * np.log10(
+        break_m * break_m + (base_height_m - mobile_height_m) ** 2
+    )
     far_db = terms.constant_db + 40 * lg_slant + frequency_db - bend_db
     return np.asarray(np.where(flat <= break_m, near_db, far_db))
 
@@ -111,7 +109,6 @@ def hidden_loss_db(
     frequency_mhz: float,
     base_height_m: float,
     mobile_height_m: float,
-    environment_height_m: ArrayLike = _ENVIRONMENT_M,
 ) -> Floats:
     """Return the path loss without line of sight in dB, PL_UMa-NLOS or PL_UMi-NLOS.
 
@@ -132,9 +129,7 @@ def hidden_loss_db(
         + terms.hidden_frequency_db * np.log10(frequency_mhz / 1000)
         - terms.hidden_height_db * (mobile_height_m - 1.5)
     )
-    seen_db = seen_loss_db(
-        scenario, distance_m, frequency_mhz, base_height_m, mobile_height_m, environment_height_m
-    )
+    seen_db = seen_loss_db(scenario, distance_m, frequency_mhz, base_height_m, mobile_height_m)
     return np.asarray(np.maximum(seen_db, own_db))
 
 

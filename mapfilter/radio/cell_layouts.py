@@ -166,13 +166,14 @@ class Arranged:
     """A table with the fields of a cell plan as columns.
 
     ``shown`` names fields in messages, with the file's own column; ``notes`` counts the values that
-    were filled in.
+    were filled in; ``decimal_comma`` allows commas in numbers.
     """
 
     header: tuple[str, ...]
     rows: tuple[tuple[int, list[str]], ...]
     shown: Mapping[str, str]
     notes: tuple[str, ...]
+    decimal_comma: bool
 
 
 def arrange(
@@ -218,7 +219,8 @@ def arrange(
         for name, count in sorted(filled.items())
     )
     shown = {name: f"{header[at]} ({name})" for name, at in picked.items() if header[at] != name}
-    return Arranged((*fields, "cell") if composed else tuple(fields), tuple(found), shown, notes)
+    names = (*fields, "cell") if composed else tuple(fields)
+    return Arranged(names, tuple(found), shown, notes, table.separator != ",")
 
 
 def _pick(

@@ -32,10 +32,8 @@ _FEWEST_POINTS, _MOST_POINTS = 36, 7200
 _LARGEST_GAP_DEG = 15.0
 _LARGEST_LOSS_DB = 200.0
 _SECTIONS = ("HORIZONTAL", "VERTICAL")
-_GAIN = re.compile(r"\s*([+-]?\d+(?:\.\d+)?)\s*\(?\s*(dbd|dbi)?\s*\)?\s*", re.IGNORECASE)
-_FREQUENCY = re.compile(
-    r"\s*(\d+(?:\.\d+)?)(?:\s*-\s*(\d+(?:\.\d+)?))?\s*(mhz|ghz)?\s*", re.IGNORECASE
-)
+_GAIN = re.compile(r"\s*([+-]?\d+(?:\.\d+)?)\s*\(?\s*(dbd|dbi)?\s*\)?\s*", re.I)
+_FREQUENCY = re.compile(r"\s*(\d+(?:\.\d+)?)(?:\s*-\s*(\d+(?:\.\d+)?))?\s*(mhz|ghz)?\s*", re.I)
 _TILT = re.compile(r"\s*([+-]?\d+(?:\.\d+)?)\b.*")
 
 
@@ -53,14 +51,13 @@ def read_antennas(folder: Path | str, names: Iterable[str]) -> dict[str, Measure
     """
     folder = Path(folder)
     wanted = sorted(set(names) - set(ANTENNAS))
+    faults, inside = Faults(), folder.resolve()
     try:
         files = {file.name: file for file in sorted(folder.iterdir()) if file.is_file()}
     except OSError as error:
         hint = "no folder of antennas there"
         raise fail(InputError, str(folder), "a folder", error.strerror or error, hint) from error
-    inside = folder.resolve()
     by_lower = {name.lower(): file for name, file in files.items()}
-    faults = Faults()
     found: dict[str, MeasuredAntenna] = {}
     for name in wanted:
         file = files.get(name)
@@ -210,8 +207,7 @@ def _gain_dbi(path: Path, header: dict[str, str], faults: Faults) -> float | Non
     if not text:
         return None
     match = _GAIN.fullmatch(text)
-    gain = math.nan if match is None else float(match[1])
-    if match is None or not -20 <= gain <= 60:
+    if match is None or not -20 <= (gain := float(match[1])) <= 60:
         faults.add(f"{path}, GAIN", "a gain in -20..60 with dBd or dBi", repr(text[:40]))
         return None
     return gain if (match[2] or "").lower() == "dbi" else gain + DBI_OVER_DBD
@@ -222,11 +218,10 @@ def _frequency_mhz(path: Path, header: dict[str, str], faults: Faults) -> float 
     text = header.get("FREQUENCY", "")
     if not text:
         return None
-    match = _FREQUENCY.fullmatch(text)
-    scale = 1000.0 if match and (match[3] or "").lower() == "ghz" else 1.0
-    value = math.nan if match is None else scale * float(match[1])
-    if match is not None and match[2] is not None:
-        value = (value + scale * float(match[2])) / 2
+    match, value = _FREQUENCY.fullmatch(text), math.nan
+    if match is not None:
+        scale = 1000.0 if (match[3] or "").lower() == "ghz" else 1.0
+        value = (scale * float(match[1]) + scale * float(match[2] or match[1])) / 2
     if not 10 <= value <= 1e5:
         hint = "GHz or Hz given for MHz" if match else ""
         faults.add(f"{path}, FREQUENCY", "MHz in 10..100000", repr(text[:40]), hint)
@@ -235,7 +230,6 @@ def _frequency_mhz(path: Path, header: dict[str, str], faults: Faults) -> float 
 
 
 def _downtilt_deg(header: dict[str, str], vertical: tuple[Floats, Floats]) -> float:
-    """Return the electrical downtilt of the cuts."""
     for key in ("ELECTRICAL_TILT", "TILT"):
         match = _TILT.fullmatch(header.get(key, ""))
         if match is not None and abs(float(match[1])) <= 90:

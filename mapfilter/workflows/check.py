@@ -213,7 +213,7 @@ def _misspelt(named: Sequence[str]) -> Iterator[str]:
     """Yield what names that are nearly those of antennas by formula may mean."""
     for name in named:
         for close in difflib.get_close_matches(name.lower(), ANTENNAS, n=1):
-            yield f" {close!r} in place of {name!r}?"
+            yield f" Did you mean {close!r} in place of {name!r}?"
 
 
 def _check_roads(inputs: _Inputs, area: Lattice, findings: Findings) -> None:
