@@ -87,11 +87,6 @@ def read_msi(path: Path | str) -> MeasuredAntenna:
     where ``TILT`` is just the word ``ELECTRICAL``, it is where the vertical cut is strongest. A
     vertical cut whose beam lies as far above the horizon as that tilt is below was counted upwards:
     it is turned over, with a note.
-
-    Raises
-    ------
-    InputError
-        The file is missing or damaged; with the row and the likely mistake of every fault.
     """
     path = Path(path)
     header, cuts = _sections(path)

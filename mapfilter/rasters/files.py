@@ -118,13 +118,7 @@ def check_file(path: Path) -> None:
 
 
 def check_plausible(values: Floats32, quantity: Quantity, path: Path) -> None:
-    """Check that numbers can be levels, losses or deviations; NaN is ignored.
-
-    Raises
-    ------
-    InputError
-        They cannot; with the likely mistake.
-    """
+    """Check that numbers can be levels, losses or deviations; NaN is ignored."""
     lowest, highest = (extreme.reduce(values, axis=None) for extreme in (np.fmin, np.fmax))
     if np.isnan(lowest):
         return

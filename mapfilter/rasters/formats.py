@@ -45,13 +45,7 @@ def is_raster_folder(path: Path) -> bool:
 
 
 def open_files(path: Path, declared: Declared) -> FoundRasters:
-    """Open a raster file, a folder of them or an index, without reading pixels.
-
-    Raises
-    ------
-    InputError
-        With every fault of every file.
-    """
+    """Open a raster file, a folder of them or an index, without reading pixels."""
     index = find_index(path) if path.is_dir() else None
     if path.suffix.lower() in INDEX_SUFFIXES and not path.is_dir():
         check_file(path)
@@ -148,7 +142,7 @@ def _one_quantity(path: Path, files: Sequence[RasterFile], declared: Quantity | 
         raise fail(InputError, str(path), "levels or losses in all files", both)
     found = known.pop() if known and None not in stated else None
     if found is None:
-        expected = "to know whether the bands are levels (dBm) or losses (dB)"
+        expected = "a quantity of the bands, levels (dBm) or losses (dB)"
         hint = "set quantity = level or loss"
         raise fail(InputError, str(path), expected, "neither tag nor unit", hint)
     return found

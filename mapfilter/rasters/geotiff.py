@@ -181,13 +181,7 @@ class GeoTiff(RasterFile):
 
 
 def open_geotiff(path: Path, cell_id: str, declared: Declared) -> GeoTiff:
-    """Read the header of a GeoTIFF; ``cell_id`` names a single band without a description.
-
-    Raises
-    ------
-    InputError
-        With every fault of the file.
-    """
+    """Read the header of a GeoTIFF; ``cell_id`` names a single band without a description."""
     faults = Faults()
     try:
         with warnings.catch_warnings(record=True) as caught:

@@ -28,11 +28,6 @@ def common_lattice(
 
     Its pixels are those of most files of the finest resolution, unless another resolution is
     asked for; it covers all files.
-
-    Raises
-    ------
-    InputError
-        The files are in different systems, or far apart.
     """
     lattices, faults = [file.lattice for file in files], Faults()
     first = lattices[0]
