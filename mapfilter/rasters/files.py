@@ -42,7 +42,6 @@ class Declared:
         From an index of raw pixels; used where they have none, or one without the place.
     """
 
-    quantity: Quantity | None = None
     crs: str | None = None
     nodata: float | None = None
     header: GridHeader | None = None
