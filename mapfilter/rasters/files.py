@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -13,7 +13,6 @@ import numpy as np
 from mapfilter._types import Bools, Floats32
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
-from mapfilter.rasters.grid_header import GridHeader
 
 Window = tuple[int, int, int, int]
 """Row, column, rows, columns."""
@@ -38,13 +37,14 @@ class Declared:
         Projected CRS.
     nodata : float or None
         A number that means no data, besides the files' own.
-    header : GridHeader or None
-        From an index of raw pixels; used where they have none, or one without the place.
+    header : (str, mapping of str to str) or None
+        Row of an index of raw pixels, and the keys and values of a header; used where the pixels
+        have none, or one without the place.
     """
 
     crs: str | None = None
     nodata: float | None = None
-    header: GridHeader | None = None
+    header: tuple[str, Mapping[str, str]] | None = None
 
 
 @dataclass(frozen=True, slots=True)

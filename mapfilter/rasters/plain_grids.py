@@ -3,6 +3,10 @@
 GDAL reads these formats, too, but fills raw pixels that were cut off with zeros, reads text that is
 no number as 0 and ignores surplus numbers; here each of these is an error.
 
+Headers hold a key and a value per line. They place the grid by the lower left pixel's corner or
+centre (``XLLCORNER``, ``XLLCENTER``) or by the upper left pixel's *centre* (``ULXMAP``), whose
+corner lies half a pixel to the north-west.
+
 References
 ----------
 Esri, "BIL, BIP, and BSQ raster files" and "ASCII raster file format" (ArcGIS help).
@@ -12,8 +16,8 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from array import array
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import takewhile
 from pathlib import Path
@@ -21,13 +25,25 @@ from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
+from pyproj import CRS
+from pyproj.exceptions import CRSError
 
+from mapfilter._io import read_input
 from mapfilter._types import Floats32, Ints
-from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.geodesy import Lattice, projected_crs, same_crs
+from mapfilter.radio.cell_layouts import number
 from mapfilter.rasters.files import Declared, RasterFile, Window, without_nodata
-from mapfilter.rasters.grid_header import WEST_KEYS, GridHeader, beside, grid_crs
 
+_LARGEST_HEADER_BYTES = 1 << 16
+_LONGEST_VALUE = 60
+_MOST_PX = 10_000_000
+_FARTHEST_M = 1e8
+_SQUARE_TOLERANCE = 1e-6
+_DEGREES_STEP = 0.05
+_WEST_KEYS = ("ULXMAP", "XLLCORNER", "XLLCENTER", "XLLCENTRE")
+_NORTH_KEYS = ("ULYMAP", "YLLCORNER", "YLLCENTER", "YLLCENTRE")
+_SIDE_KEYS = ("XDIM", "YDIM", "DX", "DY", "CELLSIZE")
 _ORDERS = {"I": "<", "LSBFIRST": "<", "M": ">", "MSBFIRST": ">"}
 _TYPES = {
     "SIGNEDINT": {8: "i1", 16: "i2", 32: "i4"},
@@ -40,6 +56,137 @@ _LARGEST_ASCII_HEADER_BYTES = 4096
 _MOST_HEADER_LINES = 12
 _MOST_COLS = 1_000_000
 _LONGEST_NUMBER = 64
+
+
+@dataclass(frozen=True, slots=True)
+class GridHeader:
+    """The header of the file ``where``: keys in capitals with their values, as texts.
+
+    What is wrong with the values that were asked for is noted in ``faults``.
+    """
+
+    where: str
+    values: Mapping[str, str]
+    faults: Faults = field(default_factory=Faults, compare=False)
+
+    @classmethod
+    def of(cls, where: str, lines: Sequence[bytes]) -> GridHeader:
+        """Split the lines of a header; a line without a value, or a comment, is ignored."""
+        values: dict[str, str] = {}
+        for line in lines:
+            words = line.decode("utf-8", "replace").replace("=", " ").split(None, 2)
+            if len(words) >= 2:
+                values.setdefault(words[0].upper(), words[1])
+        return cls(where, values)
+
+    @classmethod
+    def read(cls, path: Path) -> GridHeader:
+        """Read the header file of raw pixels."""
+        return cls.of(str(path), read_input(path, _LARGEST_HEADER_BYTES, "a header").splitlines())
+
+    def first(self, *keys: str) -> str | None:
+        """Return the first of some keys that is there."""
+        return next((key for key in keys if key in self.values), None)
+
+    def number(self, key: str) -> float | None:
+        """Return a value as a finite number, or None with a fault."""
+        text = self.values[key]
+        # A comma can only be a decimal one here: values end at blanks.
+        value = number(text, decimal_comma=True)
+        if value is None:
+            self.faults.add(f"{self.where}, {key}", "a number", repr(text[:_LONGEST_VALUE]))
+        return value
+
+    def whole(
+        self, key: str, default: int | None = None, *, low: int = 0, high: int = _MOST_PX
+    ) -> int | None:
+        """Return a value as a whole number in a range, or None with a fault."""
+        if key not in self.values:
+            if default is None:
+                self.faults.add(self.where, f"a line {key}", "none", "a header that is cut off")
+            return default
+        value = self.number(key)
+        if value is None or (value == int(value) and low <= value <= high):
+            return None if value is None else int(value)
+        expected, got = f"a whole number in {low}..{high}", self.values[key][:_LONGEST_VALUE]
+        self.faults.add(f"{self.where}, {key}", expected, got)
+        return None
+
+    def lattice(self, crs: str, rows: int | None, cols: int | None) -> Lattice | None:
+        """Return where a grid of so many pixels lies, or None with a fault."""
+        side_m = self._side_m()
+        west_key, north_key = self.first(*_WEST_KEYS), self.first(*_NORTH_KEYS)
+        if west_key is None or north_key is None:
+            expected = "XLLCORNER and YLLCORNER, their CENTER, or ULXMAP and ULYMAP"
+            self.faults.add(self.where, expected, "not both", "exported without its place")
+            return None
+        west_m, north_m = self.number(west_key), self.number(north_key)
+        if side_m is None or west_m is None or north_m is None or rows is None or cols is None:
+            return None
+        if not west_key.endswith("CORNER"):
+            west_m -= side_m / 2
+        if north_key == "ULYMAP":
+            north_m += side_m / 2
+        else:
+            half_m = 0.0 if north_key.endswith("CORNER") else side_m / 2
+            north_m = north_m + rows * side_m - half_m
+        if max(abs(west_m), abs(north_m), rows * side_m, cols * side_m) > _FARTHEST_M:
+            got = f"{west_m:g}, {north_m:g} and {rows} x {cols} pixels of {side_m:g} m"
+            self.faults.add(self.where, f"a grid within {_FARTHEST_M:g} m of the origin", got)
+            return None
+        if side_m < _DEGREES_STEP and max(abs(west_m), abs(north_m)) <= 180:
+            got, hint = f"pixels of {side_m:g}", "degrees given for metres"
+            self.faults.add(self.where, f"metres in {crs}", got, hint)
+            return None
+        return Lattice(crs, west_m, north_m, side_m, rows, cols)
+
+    def _side_m(self) -> float | None:
+        found = [key for key in _SIDE_KEYS if key in self.values][:2]
+        if not found or (len(found) == 1 and found[0] != "CELLSIZE"):
+            expected = "the size of a pixel: CELLSIZE, or XDIM and YDIM"
+            self.faults.add(self.where, expected, "none")
+            return None
+        sides_m = [side for key in found if (side := self.number(key)) is not None]
+        if len(sides_m) < len(found):
+            return None
+        if not 0 < min(sides_m) <= _FARTHEST_M:
+            self.faults.add(f"{self.where}, {found[0]}", "metres > 0", f"{sides_m[0]:g}")
+            return None
+        if max(sides_m) - min(sides_m) > _SQUARE_TOLERANCE * max(sides_m):
+            got = " x ".join(f"{side:g}" for side in sides_m)
+            self.faults.add(self.where, "square pixels", got)
+            return None
+        return sides_m[0]
+
+
+def _beside(path: Path, *suffixes: str) -> Path | None:
+    """Return the file of the same name with one of some suffixes, if there is one."""
+    return next((p for s in suffixes if (p := path.with_suffix(s)).is_file()), None)
+
+
+def _grid_crs(path: Path, declared: str | None) -> str:
+    """Return the CRS in the ``.prj`` file beside a plain grid, else the declared one."""
+    found = _beside(path, ".prj", ".PRJ")
+    if found is None:
+        if declared is None:
+            hint = "plain grids have none; set crs in [rasters]"
+            raise fail(InputError, f"{path}, CRS", "a projected CRS in metres", "none", hint)
+        return declared
+    try:
+        text = found.read_bytes()[:_LARGEST_HEADER_BYTES].decode("utf-8-sig").strip()
+        stated = CRS.from_user_input(text)
+    except (CRSError, UnicodeDecodeError, OSError, ValueError) as error:
+        if declared is not None:
+            return declared
+        expected = "a CRS as well-known text"
+        raise fail(InputError, str(found), expected, "none that is known", "set crs") from error
+    # The dialect of these files names datums in its own way, so that nothing matches exactly.
+    code = stated.to_epsg(min_confidence=70)
+    crs = projected_crs(code or stated, str(found))
+    if declared is not None and not same_crs(crs, declared):
+        hint = "two systems mixed up"
+        raise fail(InputError, str(found), f"{declared}, as declared", crs, hint)
+    return declared or crs
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,14 +245,15 @@ def open_raw_grid(path: Path, cell_id: str, declared: Declared) -> RawGrid:
         With every fault: no header, an unknown type of pixels, several bands, a place or size that
         makes no sense, a file shorter or longer than its header requires.
     """
-    header_file, instead = beside(path, ".HDR", ".hdr"), declared.header
-    header = instead
-    if header is None or header_file is not None:
+    header_file = _beside(path, ".HDR", ".hdr")
+    where, instead = declared.header or ("", {})
+    header = GridHeader(where, instead)
+    if header_file is not None or not instead:
         header = GridHeader.read(header_file or path.with_suffix(".hdr"))
-        if instead is not None and header.first(*WEST_KEYS) is None:
-            header = GridHeader(header.where, {**instead.values, **header.values})
+        if header.first(*_WEST_KEYS) is None:
+            header = GridHeader(header.where, {**instead, **header.values})
     faults = header.faults
-    crs = grid_crs(path, declared.crs)
+    crs = _grid_crs(path, declared.crs)
     rows, cols = header.whole("NROWS", low=1), header.whole("NCOLS", low=1)
     lattice = header.lattice(crs, rows, cols)
     if (bands := header.whole("NBANDS", 1)) not in (1, None):
@@ -138,8 +286,8 @@ def open_raw_grid(path: Path, cell_id: str, declared: Declared) -> RawGrid:
         path,
         (cell_id,),
         cast(Lattice, lattice),
-        tuple(number for number in nodata if number is not None),
-        tuple(filter(None, (path, header_file, beside(path, ".prj", ".PRJ")))),
+        tuple(empty for empty in nodata if empty is not None),
+        tuple(filter(None, (path, header_file, _beside(path, ".prj", ".PRJ")))),
         bits=bits,
         dtype=dtype,
         skip_bytes=skip_bytes,
@@ -214,7 +362,7 @@ def open_ascii_grid(path: Path, cell_id: str, declared: Declared) -> AsciiGrid:
     header, header_bytes = GridHeader.of(str(path), lines), sum(map(len, lines))
     if "NCOLS" not in header.values or "NROWS" not in header.values:
         raise fail(InputError, str(path), "lines NCOLS and NROWS first", "none", "no ASCII grid")
-    crs, faults = grid_crs(path, declared.crs), header.faults
+    crs, faults = _grid_crs(path, declared.crs), header.faults
     rows, cols = header.whole("NROWS", low=1), header.whole("NCOLS", low=1)
     lattice = header.lattice(crs, rows, cols)
     key = header.first("NODATA_VALUE", "NODATA")
@@ -228,7 +376,7 @@ def open_ascii_grid(path: Path, cell_id: str, declared: Declared) -> AsciiGrid:
         faults.add(str(path), expected, f"{found_bytes} bytes", hint)
     faults.raise_if_any(InputError)
     nodata = (own,) if declared.nodata is None else (own, declared.nodata)
-    parts = tuple(filter(None, (path, beside(path, ".prj", ".PRJ"))))
+    parts = tuple(filter(None, (path, _beside(path, ".prj", ".PRJ"))))
     place = cast(Lattice, lattice)
     return AsciiGrid(path, (cell_id,), place, nodata, parts, header_bytes=header_bytes)
 
