@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TextIO
+from typing import NamedTuple, TextIO
 
 import numpy as np
 
@@ -27,7 +27,6 @@ from mapfilter.radio.cell_layouts import number
 from mapfilter.radio.cell_rules import RANGES, id_fault
 
 _LONGEST_LINE = 1 << 16
-_LONGEST_LOG_LINE = 4096
 _FAULTS_KEPT = 20
 _FAULTS_SHOWN = 3
 _LATEST_S = 4_102_444_800.0
@@ -104,30 +103,21 @@ class Rows:
         self.identified[given] = cell
         return cell
 
-    def add(
-        self,
-        line: int,
-        cell: str,
-        place: tuple[str, str],
-        level: str,
-        *,
-        time: str = "",
-        accuracy: str = "",
-        session: str = "",
-    ) -> None:
-        """Check one row given as texts, and keep it or refuse it.
+    def add(self, line: int, cell: str, given: Mapping[str, str]) -> None:
+        """Check one row, given as texts by :data:`FIELDS`, and keep it or refuse it.
 
-        ``place`` is latitude and longitude. A time or accuracy that makes no sense becomes
-        unknown: the level is as good without.
+        A time or accuracy that makes no sense becomes unknown: the level is as good without.
         """
         if cell not in self.cells and (wrong := id_fault(cell)) is not None:
             self.refuse(line, "cell", *wrong)
             return
         found = []
-        for name, text in (("lat", place[0]), ("lon", place[1]), ("level_dbm", level)):
-            value = number(text)
+        for name in _REQUIRED:
+            value = number(given[name])
             if value is None:
-                self.refuse(line, name, "a number", repr(text[:40]) if text else "nothing")
+                self.refuse(
+                    line, name, "a number", repr(given[name][:40]) if given[name] else "nothing"
+                )
                 return
             found.append(value)
         lat_deg, lon_deg, level_dbm = found
@@ -142,27 +132,25 @@ class Rows:
             hint = "RXLEV or ASU given for dBm" if 0 <= level_dbm <= 97 else ""
             if abs(level_dbm) >= _UNAVAILABLE:
                 hint = "the marker of a level that was not available"
-            self.refuse(line, "level_dbm", expected, level[:40], hint)
+            self.refuse(line, "level_dbm", expected, given["level_dbm"][:40], hint)
             return
-        time_s, accuracy_m = unix_seconds(time), number(accuracy) or math.nan
-        if time and math.isnan(time_s):
+        time_s, accuracy_m = unix_seconds(given["time"]), number(given["accuracy_m"]) or math.nan
+        if given["time"] and math.isnan(time_s):
             self.aside["times not understood (levels kept)"] += 1
         if not 0 < accuracy_m < _UNAVAILABLE:
             accuracy_m = math.nan
         self.cell.append(self.cells.setdefault(cell, len(self.cells)))
-        self.session.append(self.sessions.setdefault(session, len(self.sessions)))
+        self.session.append(self.sessions.setdefault(given["session"], len(self.sessions)))
         self.values.extend((time_s, lat_deg, lon_deg, level_dbm, accuracy_m))
 
     def notes(self) -> list[str]:
         """Return remarks on how many rows were refused or set aside, and where the first are."""
-        found = []
+        found = [f"{count} {what}" for what, count in self.aside.items()]
         if self.refused:
             some = "; ".join(str(fault) for fault in self.faults[:_FAULTS_SHOWN])
             more = "; …" if self.refused > _FAULTS_SHOWN else ""
-            found.append(
-                f"{self.path.name}: {self.refused} of {self.read} rows left out: {some}{more}"
-            )
-        return found + [f"{self.path.name}: {count} {what}" for what, count in self.aside.items()]
+            found.insert(0, f"{self.refused} of {self.read} rows left out: {some}{more}")
+        return [f"{self.path.name}: {note}" for note in found]
 
 
 def unix_seconds(text: str) -> float:
@@ -193,22 +181,19 @@ def _whole(text: str) -> int | None:
     return int(value)
 
 
-@dataclass(frozen=True)
-class Dialect:
+class Dialect(NamedTuple):
     """Names of the columns of one kind of file.
 
     Parameters
     ----------
     columns : mapping of str to tuple of str
-        Column or columns that hold each of :data:`FIELDS`; of several, the first that is not empty.
-    technology : str
-        Column with the radio technology, where the level may be an ASU; "" when it is always dBm.
+        Column or columns that hold each of :data:`FIELDS`, and the radio technology where the level
+        may be an ASU; of several, the first that is not empty.
     required : tuple of str
         Fields without which a file is none of the kind.
     """
 
     columns: Mapping[str, tuple[str, ...]]
-    technology: str = ""
     required: tuple[str, ...] = _REQUIRED
 
 
@@ -216,31 +201,27 @@ def mapped(columns: Mapping[str, str]) -> Dialect:
     """Return the dialect of a map from :data:`FIELDS` to columns; these columns are required."""
     own = {name: (name,) for name in FIELDS}
     named = {name: (column,) for name, column in columns.items()}
-    return Dialect({**own, **named}, required=(*_REQUIRED, *columns))
+    return Dialect({**own, **named}, (*_REQUIRED, *columns))
 
 
-def _upload(lac: tuple[str, ...], ci: str, level: str, accuracy: str, act: str = "") -> Dialect:
-    columns = {name: (name,) for name in ("mcc", "mnc", "lat", "lon")}
-    columns |= {"ci": (ci,), "level_dbm": (level,), "accuracy_m": (accuracy,)}
-    return Dialect({**columns, "lac": lac, "time": ("measured_at",)}, act, (*_REQUIRED, *_IDENTITY))
+def _upload(**columns: str) -> Dialect:
+    names = {name: name for name in ("mcc", "mnc", "lat", "lon")} | {"time": "measured_at"}
+    split = {name: tuple(text.split()) for name, text in (names | columns).items()}
+    return Dialect(split, (*_REQUIRED, *_IDENTITY))
 
 
 DIALECTS: Mapping[str, Dialect] = {
     "csv": mapped({}),
-    "opencellid": _upload(("lac", "tac"), "cellid", "signal", "rating", "act"),
-    "towercollector": _upload(("lac",), "cell_id", "dbm", "accuracy"),
+    "opencellid": _upload(
+        lac="lac tac", ci="cellid", level_dbm="signal", accuracy_m="rating", technology="act"
+    ),
+    "towercollector": _upload(lac="lac", ci="cell_id", level_dbm="dbm", accuracy_m="accuracy"),
 }
 """Columns named as the fields are; uploads to OpenCellID; exports of Tower Collector."""
 
 
 def read_csv(path: Path, dialect: Dialect) -> Rows:
-    """Read a file of measurements; bad rows are refused one by one.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or its header lacks a column, each with its likely meaning.
-    """
+    """Read a file of measurements; bad rows are refused one by one."""
     rows = Rows(path)
     lines = _lines(path)
     separator, header = _header(lines)
@@ -270,12 +251,11 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
         cell = rows.identify(line, found["cell"], [found[name] for name in _IDENTITY])
         if not cell:
             continue
-        level, technology = found["level_dbm"], found["technology"].upper()
-        if technology and (dbm := _from_asu(level, technology)) is not None:
+        dbm = _from_asu(found["level_dbm"], found["technology"].upper())
+        if dbm is not None:
             rows.aside["levels given as ASU (turned into dBm)"] += 1
-            level = repr(dbm)
-        rest = {"time": found["time"], "accuracy": found["accuracy_m"]}
-        rows.add(line, cell, (found["lat"], found["lon"]), level, session=found["session"], **rest)
+            found["level_dbm"] = repr(dbm)
+        rows.add(line, cell, found)
     return rows
 
 
@@ -293,7 +273,7 @@ def _header(lines: Iterator[tuple[int, str | None]]) -> tuple[str, list[str]]:
 
 def _from_asu(text: str, technology: str) -> float | None:
     """Turn an arbitrary strength unit into dBm: 3GPP TS 27.007 +CSQ for GSM, +CESQ for LTE."""
-    asu = number(text)
+    asu = number(text) if technology else None
     if asu is None:
         return None
     if technology in _GSM and 0 <= asu <= 31:
@@ -327,14 +307,13 @@ def _split(text: str, separator: str) -> list[str]:
 def _places(path: Path, header: Sequence[str], dialect: Dialect) -> dict[str, tuple[int, ...]]:
     """Return where each field is in a line, or raise with every column that is not there."""
     faults, where = Faults(), f"{path} header"
-    named = {**dialect.columns, "technology": (dialect.technology,)}
-    places = dict.fromkeys(FIELDS, ()) | {
+    places = dict.fromkeys((*FIELDS, "technology"), ()) | {
         name: tuple(header.index(column.lower()) for column in columns if column.lower() in header)
-        for name, columns in named.items()
+        for name, columns in dialect.columns.items()
     }
     for name in dialect.required:
         if not places.get(name):
-            columns = " or ".join(named.get(name, (name,)))
+            columns = " or ".join(dialect.columns.get(name, (name,)))
             near = difflib.get_close_matches(columns.lower(), header, n=1, cutoff=0.5)
             expected = f"a column {columns}" + (f" for {name}" if columns != name else "")
             faults.add(where, expected, "none", f"{near[0]} meant" if near else "")
@@ -353,50 +332,46 @@ def read_antennas_log(path: Path) -> Rows:
 
     A level written with ``>`` is a bound, no level: it is counted and left out.
     """
-    rows, line = Rows(path), 0
+    rows = Rows(path)
     time, operator = "", ""
     received: list[tuple[int, dict[str, str]]] = []
 
     def drop_unplaced() -> None:
         for at, _ in received:
-            expected, hint = "a position after the cells", "the log cut off"
-            rows.refuse(at, "Best Location", expected, "none", hint)
+            rows.refuse(at, "Best Location", "a position after the cells", "none", "cut off")
         received.clear()
 
-    with _open_text(path) as stream:
-        while text := stream.readline(_LONGEST_LOG_LINE):
-            line += 1
-            kind = text.split(",", 1)[0].strip()
-            values = {key.strip(): value.strip(' "\r\n') for key, value in _KEY.findall(text)}
-            if kind == "Record":
-                drop_unplaced()
-                time, operator = values.get("Time", ""), values.get("Operator", "")
-            elif kind in ("ACTIVE GSM", "GSM"):
-                rows.read += 1
-                received.append((line, values))
-            elif kind == "Best Location":
-                place = values.get("Lat", ""), values.get("Lon", "")
-                for at, cell in received:
-                    _add_logged(rows, at, cell, place, _iso(time), operator)
-                received.clear()
+    for line, text in _lines(path):
+        kind, pairs = (text or "").split(",", 1)[0].strip(), _KEY.findall(text or "")
+        values = {key.strip(): value.strip(' "\r\n') for key, value in pairs}
+        if kind == "Record":
+            drop_unplaced()
+            time, operator = values.get("Time", ""), values.get("Operator", "")
+        elif kind in ("ACTIVE GSM", "GSM"):
+            rows.read += 1
+            received.append((line, values))
+        elif kind == "Best Location":
+            found = dict.fromkeys(FIELDS, "") | {"time": _iso(time)}
+            found |= {"lat": values.get("Lat", ""), "lon": values.get("Lon", "")}
+            for at, cell in received:
+                _add_logged(rows, at, cell, operator, found)
+            received.clear()
     drop_unplaced()
     return rows
 
 
 def _add_logged(
-    rows: Rows, line: int, cell: dict[str, str], place: tuple[str, str], time: str, operator: str
+    rows: Rows, line: int, cell: dict[str, str], operator: str, found: Mapping[str, str]
 ) -> None:
     texts = (operator[:3], operator[3:], cell.get("LAC", ""), cell.get("CID", ""))
     name, signal = rows.identify(line, "", texts), cell.get("Signal", "")
-    if not name:
-        return
-    found = _LEVEL.match(signal)
-    if found is None:
+    level = _LEVEL.match(signal)
+    if name and level is None:
         rows.refuse(line, "Signal", "a level such as -67dBm", repr(signal[:40]))
-    elif found[1]:
+    elif name and level is not None and level[1]:
         rows.aside["levels that are only bounds (>)"] += 1
-    else:
-        rows.add(line, name, place, found[2], time=time)
+    elif name and level is not None:
+        rows.add(line, name, {**found, "level_dbm": level[2]})
 
 
 def _iso(time: str) -> str:
