@@ -1,4 +1,4 @@
-"""The lobe of a raster: how well boresights explain its levels, and what is wrong with azimuths.
+"""Main lobes of rasters, and the mistakes of azimuths that do not agree with them.
 
 A level is explained by ``a + b log10(distance) + c gain(direction - azimuth)``, fitted to the means
 of rings and directions about a place; the correlation of fit and levels is the measure.
@@ -30,7 +30,7 @@ _FRONT_TO_BACK_DB = 20.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lobe:
-    """How well each boresight explains a raster.
+    """Scores of all boresights for one raster.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ _READINGS: tuple[tuple[str, str, Callable[[float], float]], ...] = (
     ("azimuth-off-by-90", "to be 90° less", lambda a: a - 90),
     ("azimuth-radians", "radians", lambda a: float(np.degrees(a))),
 )
-"""What azimuths may have been meant to be: as degrees clockwise from north."""
+"""Likely conventions of wrong azimuths, each with its conversion to degrees from north."""
 
 
 class AzimuthMistake(NamedTuple):

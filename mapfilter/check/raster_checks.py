@@ -1,4 +1,4 @@
-"""Whether rasters hold what they should: levels or losses of the cells of the plan."""
+"""Checks of raster values: quantity, nodata, constants, copies, and the cells of the plan."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _LEAST_IN_RING = 50
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RasterSample:
-    """Some pixels of one cell's raster, in equal steps over the raster or about the site.
+    """Sample of one cell's raster, in equal steps over the raster or about the site.
 
     Parameters
     ----------

@@ -113,7 +113,7 @@ _FITS = 0.65
 
 
 class _Fit(NamedTuple):
-    """How well a raster is explained by its site, by those about the best place, and by that."""
+    """Fit of a raster to its site, to the sites near the best place, and to that place."""
 
     own: float
     by_site: Mapping[str, float]
@@ -237,7 +237,7 @@ _TURNS: tuple[tuple[str, Callable[[Floats32], Floats32]], ...] = (
     ("a quarter turn", lambda v: v.T[::-1]),
     ("a quarter turn the other way", lambda v: v.T[:, ::-1]),
 )
-"""How exporters turn rasters, as what undoes it."""
+"""Turns that exporters may have made, each with what undoes it."""
 
 
 def check_against_sites(

@@ -29,7 +29,7 @@ _LEAST_NODATA = 250.0
 
 @dataclass(frozen=True, slots=True)
 class Declared:
-    """What a user declares of files that do not state it themselves.
+    """Properties given by the user for files that do not state them.
 
     Parameters
     ----------

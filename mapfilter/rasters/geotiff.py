@@ -62,7 +62,7 @@ def new_geotiff(
     bands : sequence of (str, str)
         Description and unit of each band.
     overviews : {"average", "nearest"}
-        How coarser levels are made; numbers that stand for names must not be averaged.
+        Resampling of coarser levels; class numbers must not be averaged.
 
     Yields
     ------

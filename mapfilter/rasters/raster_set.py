@@ -53,7 +53,7 @@ _LARGEST_READ_BYTES = 4 << 30
 
 @dataclass(frozen=True, repr=False)
 class RxLevRasters:
-    """Which cells a set of rasters holds and where; the values stay in the files until read.
+    """Cells and lattice of a set of rasters, whose values stay in the files until they are read.
 
     Parameters
     ----------
@@ -62,20 +62,20 @@ class RxLevRasters:
     cell_ids : tuple of str
         In the order of the files and their bands.
     lattice : Lattice
-        Where the pixels lie, or are put by resampling.
+        Lattice of the pixels, resampled where files differ from it.
     quantity : {"level", "loss", "deviation"}
         Received level (dBm), path loss (dB) that is to be taken from a cell's EIRP, or how far off
         levels may be (dB, one standard deviation).
     files : tuple of RasterFile
-        Where the values are.
+        Files that hold the values.
     parts : tuple of Path
         All files that the set is made of, with headers, CRS files and the index.
     factor : float
         dB (dBm) per unit stored in the files.
     resampling : {"nearest", "bilinear"}
-        How files on another lattice are read.
+        Method for files on another lattice.
     notes : tuple of str
-        What was done to the files: resampled, put on one extent, named by their file.
+        Changes made in reading: resampled, put on one extent, named by their file.
     """
 
     path: Path
@@ -240,7 +240,7 @@ def open_rasters(
     resolution_m : float, optional
         Of the lattice that all files are read on; the finest of them when left out.
     resampling : {"nearest", "bilinear"}
-        How files on another lattice are read; bilinear in dB.
+        Method for files on another lattice; bilinear in dB.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""How the level of one cell depends on the place: a trend and residuals about it.
+"""Model of the level of one cell by position: a trend and residuals about it.
 
 A trend is ``offset + slope * covariate``: the covariate is the loss over distance, a prediction, or
 nothing. It is fitted by generalised least squares, because neighbouring levels err together, with

@@ -150,7 +150,7 @@ def fit_survey(
     Parameters
     ----------
     plan : CellPlan, optional
-        Where antennas are, for the cells it names; the others are located from their levels.
+        Positions of the antennas it names; the others are located from their levels.
     predicted : mapping of str to callable, optional
         Calibrate predictions: for each cell a function from east and north (m) to the predicted
         level (dBm, NaN where there is none). Offset, slope and residuals are fitted about it.

@@ -38,7 +38,7 @@ _LEVEL = re.compile(r"^(>?)\s*(-?\d+)\s*dBm$")
 _IDENTITY = ("mcc", "mnc", "lac", "ci")
 _REQUIRED = ("lat", "lon", "level_dbm")
 FIELDS = ("cell", *_IDENTITY, *_REQUIRED, "time", "accuracy_m", "session")
-"""What a column map may name."""
+"""Fields that a column map may name."""
 
 Identity = tuple[int, int, int, int]
 """mcc, mnc, lac (tac in LTE) and ci."""
