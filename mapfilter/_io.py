@@ -22,7 +22,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from mapfilter.errors import MapfilterError, OutputError, StoreError, fail
+from mapfilter.errors import InputError, MapfilterError, OutputError, StoreError, fail
 
 _ASIDE = "old"
 _AT_FDCWD = -100
@@ -33,6 +33,20 @@ _WRITE_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO
 
 VERSION = version("mapfilter")
 """Of the program, for the record in what it writes."""
+
+
+def read_input(path: Path, largest_bytes: int, what: str) -> bytes:
+    """Return the bytes of an input file; raise InputError for one that is missing or too large."""
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(largest_bytes + 1)
+    except OSError as error:
+        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
+    if len(data) > largest_bytes:
+        kib = largest_bytes >> 10
+        size = f"{kib >> 10} MiB" if kib >= 1024 else f"{kib} KiB"
+        raise fail(InputError, str(path), f"{what} of at most {size}", "a larger file")
+    return data
 
 
 def sha256_file(path: Path) -> str:

@@ -17,6 +17,7 @@ mapfilter.errors.InputError: cells.csv row 3, lat: expected degrees in -90..90, 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 _MAX_SHOWN = 20
@@ -97,6 +98,17 @@ class Faults:
         """Raise ``kind`` with every fault noted so far, or return when there is none."""
         if self.found:
             raise kind(tuple(self.found))
+
+
+def listed(names: Sequence[str], most: int = 8) -> str:
+    """Return names in one line, the first of many only.
+
+    Examples
+    --------
+    >>> listed(["a", "b", "c"], 2)
+    'a, b and 1 more'
+    """
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def fail(

@@ -115,7 +115,7 @@ BANDS = (
 """What the raster holds, in the order of its bands, with units."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class MapBound:
     """What a radio map is good for."""
 
@@ -124,6 +124,11 @@ class MapBound:
     position: PositionBound
     distinct: Distinctness
     fix: FirstFix
+
+    def __repr__(self) -> str:
+        """Return the numbers of points and starts, and the place, in one line."""
+        sizes = f"{self.radio.row.size} points, {self.fix.start.size} starts"
+        return f"<MapBound: {sizes}, {self.radio.lattice}>"
 
     def at_points(self) -> dict[str, Floats]:
         """Return the columns of :data:`BANDS`, shape (N,) each.

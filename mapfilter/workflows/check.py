@@ -11,11 +11,11 @@ import rasterio
 from rasterio.errors import RasterioError
 
 from mapfilter._parallel import Progress
-from mapfilter.check.findings import CheckResult, Findings, Severity, listed
+from mapfilter.check.findings import CheckResult, Findings, Severity
 from mapfilter.check.raster_checks import check_ids, is_surveyed, sampled
 from mapfilter.check.site_checks import check_against_sites, check_power
 from mapfilter.config.sections import Config
-from mapfilter.errors import MapfilterError
+from mapfilter.errors import MapfilterError, listed
 from mapfilter.geodesy import Lattice
 from mapfilter.propagation.predict import off_frequency
 from mapfilter.radio.cell_rules import ANTENNAS

@@ -9,10 +9,10 @@ import numpy as np
 import shapely
 
 from mapfilter._types import Bools, Floats
-from mapfilter.check.findings import Findings, listed
+from mapfilter.check.findings import Findings
 from mapfilter.config.inputs import Area
 from mapfilter.config.sections import Config
-from mapfilter.errors import InputError
+from mapfilter.errors import InputError, listed
 from mapfilter.geodesy import Lattice, project, projected_crs, same_crs, unproject, utm_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters

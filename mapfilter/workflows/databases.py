@@ -18,8 +18,7 @@ from mapfilter.database.manifest import MANIFEST
 from mapfilter.database.merge import merge
 from mapfilter.database.store import info, open_database
 from mapfilter.errors import ConfigError, InputError, fail
-from mapfilter.rasters.formats import is_raster_folder
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.raster_set import is_raster_folder, open_rasters
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import is_log, read_log
 
