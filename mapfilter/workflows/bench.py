@@ -20,7 +20,7 @@ from mapfilter.database.build import BuildJob, build
 from mapfilter.database.estimate import dry_run, peak_memory_bytes
 from mapfilter.database.tiles import read_tile
 from mapfilter.errors import ConfigError, fail
-from mapfilter.experiments.papers.fritsche_klein_2009.experiment import bound_curves
+from mapfilter.experiments.papers.fritsche_klein_2009.paper import bound_curves
 from mapfilter.experiments.papers.fritsche_klein_2009.scene import (
     COMBINATIONS,
     Layout,
