@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -20,6 +21,7 @@ from mapfilter.experiments.sweep.plan import SweepPlan
 from mapfilter.experiments.sweep.run import sweep
 from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.positioning.filter import locate
+from mapfilter.workflows.bench import median_seconds
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.reproduce import paper_config
@@ -98,26 +100,21 @@ def _bench(folder: Path, repetitions: int, trials: int) -> SweepBench:
     world = sweep_world(config, plan.radios)
     database = config.database_path
     epochs, parts = _parts(plan, world, database)
-    with contextlib.ExitStack() as stack:
-        executors: dict[str, Executor] = {"one": SerialExecutor()}
-        executors["two"] = stack.enter_context(local_executor(_PROCESSES))
-        executors |= stack.enter_context(_dask())
-        took: dict[str, list[float]] = {name: [] for name in executors}
-        for repetition in range(repetitions + 1):
-            for name, executor in executors.items():
-                began_s = time.perf_counter()
-                sweep(
-                    plan,
-                    world,
-                    {plan.databases[0]: database},
-                    folder / name,
-                    executor=executor,
-                    in_flight=3 * _PROCESSES,
-                )
-                # The first of each opens files, compiles and starts processes.
-                if repetition > 0:
-                    took[name].append(time.perf_counter() - began_s)
-    seconds = {name: median(times) for name, times in took.items()}
+    with local_executor(_PROCESSES) as two, _dask() as dask:
+        executors: dict[str, Executor] = {"one": SerialExecutor(), "two": two, **dask}
+        tasks = {
+            name: partial(
+                sweep,
+                plan,
+                world,
+                {plan.databases[0]: database},
+                folder / name,
+                executor=executor,
+                in_flight=3 * _PROCESSES,
+            )
+            for name, executor in executors.items()
+        }
+        seconds = median_seconds(tasks, repetitions)
     dask_s = seconds.get("dask")
     speedup = seconds["one"] / seconds["two"]
     return SweepBench(

@@ -19,6 +19,7 @@ from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
 from mapfilter.experiments.sweep.plan import (
     AS_PREDICTED,
+    NOISE_AXES,
     Radio,
     Reading,
     SweepPlan,
@@ -40,7 +41,6 @@ from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.world import World, check_cells_near, filter_choice, planned_rasters
 
 GROUND_TRUTH = "ground truth"
-_NOISE = ("sigma_trans_m", "sigma_orient_deg", "bias_sd_deg", "drift_deg_per_sqrt_s", "scale")
 
 
 def sweep_databases(config: Config) -> dict[str, Path]:
@@ -126,7 +126,9 @@ def _plan(config: Config, databases: tuple[str, ...]) -> SweepPlan:
     # No candidate filter uses neighbours, and the serving cell does not depend on them.
     if all(one.choice.name == "candidate" for one in readings):
         reports = replace(reports, max_neighbours=0)
-    noise = {name: _axis(getattr(section, name), getattr(settings.imu, name)) for name in _NOISE}
+    noise = {
+        name: _axis(getattr(section, name), getattr(settings.imu, name)) for name in NOISE_AXES
+    }
     return SweepPlan(
         readings=readings,
         databases=databases,

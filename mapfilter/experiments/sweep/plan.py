@@ -9,6 +9,7 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from math import ceil, isfinite, prod
+from typing import Any
 
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.positioning.filter import FilterOptions
@@ -18,6 +19,9 @@ from mapfilter.simulation.reports import ReportModel
 
 AS_PREDICTED = "as_predicted"
 """The radio world in which each place is served by the cell predicted best there."""
+
+NOISE_AXES = ("sigma_trans_m", "sigma_orient_deg", "bias_sd_deg", "drift_deg_per_sqrt_s", "scale")
+"""Errors of dead reckoning that are axes of the grid, and columns of its table."""
 
 LONGEST_BATCH = 100
 SHORTEST_BATCH = 24
@@ -75,6 +79,11 @@ class Run:
     draw: int
     database: str
     reading: Reading
+
+    @property
+    def noises(self) -> tuple[float, ...]:
+        """Errors of dead reckoning, in the order of :data:`NOISE_AXES`."""
+        return tuple(getattr(self.noise, name) for name in NOISE_AXES)
 
 
 @dataclass(frozen=True)
@@ -233,17 +242,11 @@ def noise_grid(
     [0.0, 3.0, 0.0, 3.0]
     """
     axes = sigma_trans_m, sigma_orient_deg, bias_sd_deg, drift_deg_per_sqrt_s, scale
-    return tuple(
-        replace(
-            others or ImuNoise(),
-            sigma_trans_m=float(step_m),
-            sigma_orient_deg=float(heading_deg),
-            bias_sd_deg=float(bias_deg),
-            drift_deg_per_sqrt_s=float(drift),
-            scale=float(scale_sd),
-        )
-        for step_m, heading_deg, bias_deg, drift, scale_sd in itertools.product(*axes)
-    )
+    found = []
+    for values in itertools.product(*axes):
+        chosen: dict[str, Any] = dict(zip(NOISE_AXES, map(float, values), strict=True))
+        found.append(replace(others or ImuNoise(), **chosen))
+    return tuple(found)
 
 
 def _plain(value: object) -> object:
