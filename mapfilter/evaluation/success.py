@@ -53,7 +53,7 @@ def wilson_interval_of_routes(
     Returns
     -------
     low, high : float
-        NaN for a single route, which tells nothing of others.
+        NaN for a single route.
 
     Examples
     --------

@@ -92,15 +92,7 @@ class BuildBench:
 def run_bench(
     stage: str, *, rasters: int = 10, side_px: int = 3000, points: int = 100_000, runs: int = 5
 ) -> BuildBench | FilterBench | FusionBench | SweepBench:
-    """Measure a stage on made inputs; a filter and a sweep on the embedded map.
-
-    Raises
-    ------
-    ConfigError
-        There is no such stage.
-    MapfilterError
-        The temporary folder cannot be written.
-    """
+    """Measure a stage on generated inputs; a filter and a sweep on the embedded map."""
     if stage not in STAGES:
         raise fail(ConfigError, "bench", f"one of {', '.join(STAGES)}", repr(stage))
     if stage == "filter":
@@ -162,7 +154,7 @@ def made_routes(lattice: Lattice, points: int) -> RouteLattice:
 
 
 def build_made(rasters_path: Path, points: int) -> int:
-    """Build from made rasters; return the most memory (bytes) that this process has taken."""
+    """Build from generated rasters; return the most memory (bytes) that this process has taken."""
     rasters = open_rasters(rasters_path)
     plan = made_plan(rasters.lattice, len(rasters.cell_ids))
     build(rasters, plan, made_routes(rasters.lattice, points), rasters_path.with_name("peak"))

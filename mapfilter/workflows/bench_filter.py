@@ -125,11 +125,6 @@ def bench_filter(
         Numbers of particles of the single step.
     settings : sequence of str
         ``section.key=value`` of the world.
-
-    Raises
-    ------
-    MapfilterError
-        The temporary folder cannot be written.
     """
     with tempfile.TemporaryDirectory(prefix="mapfilter-bench-") as name:
         given = [f"journeys.count={tracks}", f"journeys.length_m={length_m}", *settings]

@@ -72,19 +72,9 @@ class SweepBench:
 
 
 def bench_sweep(*, runs: int = 3, trials: int = 160) -> SweepBench:
-    """Measure a sweep on the embedded map.
+    """Measure a sweep on the embedded map: medians of so many ``runs``.
 
-    Parameters
-    ----------
-    runs : int
-        Repetitions that the medians are of.
-    trials : int
-        Runs in each of the six cells of the grid.
-
-    Raises
-    ------
-    MapfilterError
-        The temporary folder cannot be written.
+    ``trials`` are the runs in each of the six cells of its grid.
     """
     with tempfile.TemporaryDirectory(prefix="mapfilter-bench-") as name:
         return _bench(Path(name), runs, trials)

@@ -30,7 +30,7 @@ NOTES = (
 _DECIMALS = 3
 
 _BOUND_TITLE = "Least position error along the street from one report of levels"
-_FIX_TITLE = "Expected metres until an ideal filter knows where it is"
+_FIX_TITLE = "Expected metres to convergence of an ideal filter"
 
 
 @dataclass(frozen=True)

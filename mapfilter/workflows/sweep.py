@@ -88,18 +88,9 @@ def groups_of(runs: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
 
 @dataclass(frozen=True)
 class SweepResult:
-    """What a sweep found.
+    """Results of a sweep.
 
-    Parameters
-    ----------
-    cells : tuple of SuccessCell
-        One for each cell of the grid.
-    table : Path
-        One row for each run.
-    tables : tuple of Path
-        One row for each cell of the grid, as CSV and as LaTeX.
-    seconds : float
-        Wall time.
+    ``table`` has one row for each run, ``tables`` (CSV, LaTeX) one for each cell of the grid.
     """
 
     runs: int
@@ -113,17 +104,9 @@ class SweepResult:
 def load_sweep(
     file: Path | None, settings: Sequence[str] = (), *, out: Path | None = None
 ) -> Config:
-    """Read and check the configuration of a sweep.
+    """Read and check the configuration of a sweep, as :func:`mapfilter.config.load.load_config`.
 
-    Parameters
-    ----------
-    file, settings, out
-        As for :func:`mapfilter.config.load.load_config`.
-
-    Raises
-    ------
-    ConfigError
-        With every fault of the configuration, databases that are not there included.
+    Databases that are not there are reported with the faults of the configuration.
     """
     try:
         return load_config(file, settings, out=out)
@@ -156,16 +139,10 @@ def vary_axes(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
 
 @dataclass(frozen=True)
 class SweepForecast:
-    """What a sweep would take.
+    """Runs of a sweep, combinations of varied options, and estimated times.
 
-    Parameters
-    ----------
-    points : int
-        Combinations of varied options.
-    seconds_per_run : float
-        Of one process, from a short trial.
-    seconds : float
-        Of the whole sweep by that many workers, without predictions, tables and pictures.
+    ``seconds_per_run`` is that of one process, from a short trial, and ``seconds`` that of the
+    whole sweep by its workers, without predictions, tables and pictures.
     """
 
     runs: int
@@ -177,18 +154,7 @@ class SweepForecast:
 def forecast_sweep(
     config: Config, axes: Mapping[str, Sequence[float]] | None = None, *, workers: int = 1
 ) -> SweepForecast:
-    """Check a sweep's inputs, count its runs, and estimate its time from a few of them.
-
-    Parameters
-    ----------
-    config, axes, workers
-        As for :func:`run_sweep`.
-
-    Raises
-    ------
-    MapfilterError
-        Plan, databases, area, map or rasters are wrong.
-    """
+    """Check the inputs of :func:`run_sweep`, count its runs, and estimate its time from a few."""
     plans, databases = sweep_plans(config, axes)
     world = sweep_world(config, plans[0].radios)
     folders = {name: database.path for name, database in databases.items()}

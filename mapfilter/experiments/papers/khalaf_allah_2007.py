@@ -96,7 +96,7 @@ def plans(trials: int, seed: int) -> tuple[SweepPlan, ...]:
         report_periods_s=(ROW_PERIOD_S,),
         routes=routes,
         draws=-(-trials // routes),
-        # The filter knows no neighbours, and which cell serves does not depend on them.
+        # The filter uses no neighbours, and which cell serves does not depend on them.
         reports=ReportModel(max_neighbours=0),
         seed=seed,
     )

@@ -54,13 +54,7 @@ def _value(number: float) -> str:
 
 
 def true_path(world: SweepWorld, plan: SweepPlan, number: int) -> pd.DataFrame:
-    """Draw a route and return the truth of the journey along it.
-
-    Raises
-    ------
-    InputError
-        One cannot go as far as the plan wants.
-    """
+    """Draw a route and return the truth of the journey along it."""
     settings, seed = plan.journey, plan.seed
     rng = route_rng(seed, number)
     along = route(world.network, settings.length_m, rng, leg_m=settings.leg_m)

@@ -11,6 +11,8 @@ from dataclasses import dataclass, field, fields, replace
 from math import ceil, isfinite, prod
 from typing import Any
 
+import numpy as np
+
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.positioning.filter import FilterOptions
 from mapfilter.simulation.imu import ImuNoise
@@ -33,14 +35,9 @@ _MOST_RUNS = 100_000_000
 
 @dataclass(frozen=True, slots=True)
 class Radio:
-    """A set of levels that the phone receives, by name.
+    """Levels that the phone receives: ``as_predicted``, or a simulated ground truth by its name.
 
-    Parameters
-    ----------
-    name : str
-        ``as_predicted``, or that of a set of simulated ground truth levels.
-    prediction_error_db : float
-        Deviation of the ground truth from the prediction; NaN where it is not known.
+    ``prediction_error_db`` is its deviation from the prediction; NaN where that is unknown.
     """
 
     name: str = AS_PREDICTED
@@ -54,13 +51,7 @@ class Radio:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One filter with its options, by the name that tables and figures call it.
-
-    Parameters
-    ----------
-    update_length_m : float
-        Of the filter; NaN where it knows none.
-    """
+    """A filter with its options, its name in tables, and its update length; NaN without one."""
 
     name: str
     choice: FilterOptions
@@ -93,7 +84,7 @@ class SweepPlan:
     Parameters
     ----------
     readings : tuple of Reading
-        Filters; their names with their update lengths tell them apart.
+        Filters, each of another name or update length.
     databases : tuple of str
         Names of the radio-route databases.
     noises : tuple of ImuNoise
@@ -197,11 +188,8 @@ class SweepPlan:
     def select(self, first: int, end: int) -> Iterator[Run]:
         """Yield the runs of a batch. Those of one route lie together, however long their grid."""
         for number in range(first, end):
-            rest, place = number, []
-            for length in reversed(self.shape):
-                rest, index = divmod(rest, length)
-                place.append(index)
-            reading, database, draw, noise, imu, route, period, radio = place
+            place = map(int, np.unravel_index(number, self.shape))
+            radio, period, route, imu, noise, draw, database, reading = place
             period_s = self.report_periods_s[period]
             yield Run(
                 self.radios[radio],

@@ -39,7 +39,7 @@ CLAIMS = (
     "Fig. 10, fewer than four satellites, 90 %: GPS 30 m, with Galileo about 18 m, with time "
     "differences near a base station about 15 m, at the cell edge below 11 m",
 )
-"""What the paper says; its Figs. 7 and 9 disagree on the EKF."""
+"""The paper's claims; its Figs. 7 and 9 disagree on the EKF."""
 
 _ALL = {"static": dlr.STATIC, "pkf": dlr.PKF, "ekf": dlr.EKF, "pf": dlr.PF}
 FIGURES: dict[str, tuple[str, dict[str, dlr.Run]]] = {

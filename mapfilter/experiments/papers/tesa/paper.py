@@ -26,7 +26,7 @@ CLAIMS = (
     "Figs. 6 and 7: with powers of GSM the accuracy improves slightly",
     "Fig. 8: without satellites a position is still available, with a far larger error",
 )
-"""What the paper says; it prints no values."""
+"""The paper's claims; it prints no values."""
 
 _GNSS, _HYBRID = tesa.Run(1, IDENTITY), tesa.Run(1, IDENTITY, BETA_DB)
 
