@@ -20,13 +20,13 @@ from mapfilter.evaluation.accuracy import (
 )
 from mapfilter.evaluation.success import wilson_interval_of_routes
 from mapfilter.experiments.benchmarks.cases import Case
-from mapfilter.experiments.benchmarks.journeys import Walk
+from mapfilter.experiments.benchmarks.journeys import WINDOW_S, Walk
 from mapfilter.experiments.sweep.journeys import truth_of
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import PositionedTrack
 
 _STAY_S = 10.0
-_WINDOW_S = 120.0
+_ERRORS = ("error_mean_m", "error_67_m", "error_95_m")
 Row = dict[str, Any]
 
 
@@ -115,12 +115,10 @@ def score(case: Case, walked: Walk, found: PositionedTrack) -> Row:
     estimate, truth = found.estimate, truth_of(walked.truth)
     errors_m = position_errors_m(estimate, truth)
     claims = score_claims(estimate, truth, until_s=walked.displaced_at_s)
-    row: Row = {"case": case.name, "seconds": found.filter_s}
-    row |= {
-        "km": claims.km,
-        "epochs": claims.epochs,
-        "claimed": claims.claimed,
-        "within_50m": claims.within_50m,
+    row: Row = {
+        "case": case.name,
+        "seconds": found.filter_s,
+        **{name: getattr(claims, name) for name in ("km", "epochs", "claimed", "within_50m")},
         **{f"covered_{share}": held for share, held in zip(RADII, claims.covered, strict=True)},
         "false_converged": claims.false_starts,
         "false_lost": claims.false_lost,
@@ -134,9 +132,7 @@ def score(case: Case, walked: Walk, found: PositionedTrack) -> Row:
         "success": scored.success,
         "wrong": bool(scored.error_at_switch_m > SUCCESS_RADIUS_M),
         "switch_m": _finite(scored.switch_distance_m),
-        "error_mean_m": _finite(scored.error_mean_m),
-        "error_67_m": _finite(scored.error_67_m),
-        "error_95_m": _finite(scored.error_95_m),
+        **{name: _finite(getattr(scored, name)) for name in _ERRORS},
     }
     if case.smooth:
         row |= _errors(errors_m[np.isfinite(errors_m)])
@@ -159,7 +155,7 @@ def summarise(case: Case, filter_name: str, rows: Sequence[Mapping[str, Any]]) -
         low, high = _interval([int(row[column]) for row in rows], totals)
         share = _ratio(_total(rows, column), sum(totals))
         figures |= {figure: share, f"{figure}_low": low, f"{figure}_high": high}
-    for name in ("error_mean_m", "error_67_m", "error_95_m"):
+    for name in _ERRORS:
         figures[name] = _mean(_known(row[name] for row in good))
     for name in ("false_converged", "false_lost"):
         figures[f"{name}_per_journey"] = _ratio(_total(rows, name), runs)
@@ -187,7 +183,7 @@ def score_window(walked: Walk, found: PositionedTrack, from_s: float) -> Row:
     estimate = found.estimate
     errors_m = position_errors_m(estimate, truth_of(walked.truth))
     known = np.array([status is not Status.SEARCHING for status in estimate.status], dtype=bool)
-    at = (estimate.time_s >= from_s) & (estimate.time_s < from_s + _WINDOW_S) & known
+    at = (estimate.time_s >= from_s) & (estimate.time_s < from_s + WINDOW_S) & known
     inside = errors_m[at]
     inside = inside[np.isfinite(inside)]
     return {"window_median_m": _finite(float(np.median(inside))) if inside.size else None}
@@ -213,15 +209,12 @@ def _recovered(case: Case, walked: Walk, truth: Truth, time_s: Floats, errors_m:
             row["switch_m"] = float(gone_m[begin])
             row["success"] = row["switch_m"] <= case.recovery_within_m
             return row | _errors(errors_m[after[begin:]])
-    return row | {f"error_{name}_m": None for name in ("mean", "67", "95")}
+    return row | dict.fromkeys(_ERRORS)
 
 
 def _errors(errors_m: Floats) -> Row:
-    return {
-        "error_mean_m": _finite(float(np.mean(errors_m))) if errors_m.size else None,
-        "error_67_m": _finite(percentile_m(errors_m, 0.67)),
-        "error_95_m": _finite(percentile_m(errors_m, 0.95)),
-    }
+    values = _mean(errors_m), percentile_m(errors_m, 0.67), percentile_m(errors_m, 0.95)
+    return dict(zip(_ERRORS, map(_finite, values), strict=True))
 
 
 def _interval(counts: Sequence[int], totals: Sequence[int]) -> tuple[float, float]:
