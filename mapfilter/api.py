@@ -21,7 +21,13 @@ from mapfilter.evaluation.map_bound import MapBound, on_lattice
 from mapfilter.evaluation.map_bound import bound as bound_of
 from mapfilter.evaluation.radio_map import ErrorModel
 from mapfilter.evaluation.success import success_cells
-from mapfilter.experiments.sweep.plan import AS_PREDICTED, Radio, Reading, SweepPlan
+from mapfilter.experiments.sweep.plan import (
+    AS_PREDICTED,
+    NOISE_AXES,
+    Radio,
+    Reading,
+    SweepPlan,
+)
 from mapfilter.experiments.sweep.run import sweep_runs
 from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.positioning import filter as loop
@@ -39,15 +45,6 @@ from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
 from mapfilter.simulation.walking import WalkerModel
 from mapfilter.tracks.log import TrackLog
-
-_NOISE_COLUMNS = (
-    "period_s",
-    "sigma_trans_m",
-    "sigma_orient_deg",
-    "bias_sd_deg",
-    "drift_deg_per_sqrt_s",
-    "scale",
-)
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -288,18 +285,18 @@ class Sweep:
         return pd.DataFrame([asdict(cell) for cell in success_cells(self.runs)])
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw success over the deviation of headings, one curve for each filter.
+        """Draw success over the deviation of headings.
+
+        There is a curve for each filter, and for each other noise or option that differs.
 
         Parameters
         ----------
         ax : matplotlib Axes, optional
             Where to draw; a new figure when left out.
         """
-        from mapfilter.report.success import plot_success_curves
+        from mapfilter.report.success import plot_success_curves, success_curves
 
-        cells = success_cells(self.runs)
-        names = dict.fromkeys(cell.reading for cell in cells)
-        curves = [(name, [cell for cell in cells if cell.reading == name]) for name in names]
+        curves = success_curves(success_cells(self.runs))
         return plot_success_curves(curves, ax, title="Success over the noise of headings")
 
 
@@ -386,7 +383,8 @@ def _distinguished(
     other = [
         field.name
         for field in fields(ImuNoise)
-        if field.name not in _NOISE_COLUMNS and len({getattr(n, field.name) for n in noises}) > 1
+        if field.name not in ("period_s", *NOISE_AXES)
+        and len({getattr(n, field.name) for n in noises}) > 1
     ]
     for name in other:
         if not all(isinstance(getattr(noise, name), int | float) for noise in noises):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
-from mapfilter.evaluation.success import SuccessCell
+from mapfilter.evaluation.success import HEADING, SuccessCell, axes_of
 from mapfilter.report.canvas import (
     BLACK,
     GREY,
@@ -30,6 +31,41 @@ from mapfilter.report.canvas import (
 _SIZE_IN = (8.4, 5.2)
 _RUNS_SIZE_IN = (11.0, 4.6)
 _FARTHEST_M = 200.0
+_UNITS = {
+    "prediction_error_db": "prediction error {:g} dB",
+    "report_period_s": "reports every {:g} s",
+    "imu_period_s": "dead reckoning every {:g} s",
+    "update_length_m": "updates of {:g} m",
+    "sigma_trans_m": "step {:g} m",
+    "bias_sd_deg": "bias {:g}°",
+    "drift_deg_per_sqrt_s": "drift {:g}°/√s",
+    "scale": "scale {:g}",
+}
+
+
+def place_words(at: Mapping[str, Any], axes: Iterable[str]) -> Iterator[str]:
+    """Yield words for a place in a grid, by some of its coordinates."""
+    for axis in axes:
+        if axis in _UNITS and pd.notna(at[axis]):
+            yield _UNITS[axis].format(at[axis])
+        elif axis in ("database", "radio"):
+            yield str(at[axis])
+        elif "." in axis:
+            yield f"{axis} {at[axis]:g}"
+
+
+def success_curves(cells: Sequence[SuccessCell]) -> list[tuple[str, list[SuccessCell]]]:
+    """Return the curves of a grid over the noise of headings, each with its name.
+
+    Cells of one curve differ in that noise alone; filters name the curves, and the other
+    coordinates in which cells of one filter differ.
+    """
+    axes = [axis for axis in axes_of(cells, by_reading=True) if axis.split(".")[-1] != HEADING]
+    curves: dict[str, list[SuccessCell]] = {}
+    for cell in cells:
+        name = ", ".join([cell.reading, *place_words(cell.place, axes)])
+        curves.setdefault(name, []).append(cell)
+    return list(curves.items())
 
 
 @styled

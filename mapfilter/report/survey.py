@@ -38,6 +38,7 @@ from mapfilter.report.canvas import (
     single_axes,
     styled,
 )
+from mapfilter.survey.measured_map import rms
 
 MAX_CELLS = 4
 
@@ -143,7 +144,7 @@ def plot_left_out(
     if not (measured_dbm.size and np.isfinite(np.stack([measured_dbm, predicted_dbm])).all()):
         raise fail(InputError, "left-out levels", "finite levels (dBm)", "none, or NaN")
     error_db = measured_dbm - predicted_dbm
-    rmse_db = _rms(error_db)
+    rmse_db = rms(error_db)
     low, high = _range([measured_dbm, predicted_dbm], (-120, -60))
     low, high = low - _RIM_DB, high + _RIM_DB
     axes = single_axes(ax, *_SCATTER_IN)
@@ -166,7 +167,7 @@ def plot_left_out(
     axes.set(xlabel="predicted level / dBm", ylabel="measured level / dBm")
     text = f"RMSE {rmse_db:.1f} dB"
     if trend_dbm is not None:
-        text += f" (trend alone {_rms(measured_dbm - trend_dbm):.1f} dB)"
+        text += f" (trend alone {rms(measured_dbm - trend_dbm):.1f} dB)"
     mean_db = round(float(error_db.mean()), 1)
     bias = f"{mean_db:+.1f}".replace("-", "\N{MINUS SIGN}") if mean_db else "0.0"
     text += f"\nbias {bias} dB\n{grouped(error_db.size)} measurements"
@@ -215,7 +216,3 @@ def _range(
         return if_empty
     low, high = np.floor(known.min()), np.ceil(known.max())
     return float(low), float(max(high, low + 1))
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -312,9 +312,9 @@ class LeftOut:
         relative = np.abs(error_db) / self.deviation_db
         return Validation(
             *counts,
-            _rms(error_db),
-            _rms(self.measured_dbm - self.trend_dbm),
-            _rms(self.measured_dbm - self.mean_dbm),
+            rms(error_db),
+            rms(self.measured_dbm - self.trend_dbm),
+            rms(self.measured_dbm - self.mean_dbm),
             float(np.mean(error_db)),
             float(np.mean(relative <= 1)),
             float(np.mean(relative <= 2)),
@@ -322,7 +322,8 @@ class LeftOut:
         )
 
 
-def _rms(values: Floats) -> float:
+def rms(values: Floats) -> float:
+    """Return the root mean square."""
     return float(np.sqrt(np.mean(values**2)))
 
 

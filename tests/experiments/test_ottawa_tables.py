@@ -159,5 +159,5 @@ def test_what_came_of_a_session_is_read_as_it_was_written(tmp_path):
 )  # fmt: skip
 def test_what_is_damaged_is_told(tmp_path, text):
     (tmp_path / "found.json").write_text(text)
-    with pytest.raises(StoreError, match="what came of a session"):
+    with pytest.raises(StoreError, match="the results of a session"):
         read_left_out(tmp_path / "found.json")

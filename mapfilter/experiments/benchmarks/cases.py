@@ -49,6 +49,10 @@ class Case:
         How many satellites the phone receives at most; None without a receiver.
     spoofed : bool
         Whether a spoofer shifts their position for a while.
+
+    Notes
+    -----
+    ``fixed`` are names of errors and options that were set for all cases.
     """
 
     name: str
@@ -64,26 +68,12 @@ class Case:
     spoofed: bool = False
 
     def errors_in(self, world: ImuNoise, fixed: frozenset[str] = frozenset()) -> ImuNoise:
-        """Return the errors of dead reckoning: the world's, with those of the case.
-
-        Parameters
-        ----------
-        fixed : frozenset of str
-            Names that were set for all cases.
-        """
+        """Return the world's errors of dead reckoning with those of the case that are not fixed."""
         changes: dict[str, Any] = {k: v for k, v in self.imu.items() if f"imu.{k}" not in fixed}
         return replace(world, **changes)
 
     def stated_to(self, motion: MotionErrors, fixed: frozenset[str] = frozenset()) -> MotionErrors:
-        """Return the filter's options of dead reckoning with what the data sheet states.
-
-        Parameters
-        ----------
-        motion : MotionErrors
-            The filter's own.
-        fixed : frozenset of str
-            Names that were set for all cases.
-        """
+        """Return the filter's own options with those of the data sheet that are not fixed."""
         return replace(motion, **{k: v for k, v in self.data_sheet.items() if k not in fixed})
 
 

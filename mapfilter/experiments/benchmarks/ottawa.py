@@ -1,6 +1,6 @@
 """Real phones in Ottawa: each session is found on the map that the other sessions made.
 
-A phone tells its serving cell, RSRP and timing advance; speed and bearing by GNSS, with noise and
+A phone reports its serving cell, RSRP and timing advance; speed and bearing by GNSS, with noise and
 bias added, are its dead reckoning. Positions by GNSS are the truth where they are good enough.
 """
 
@@ -129,15 +129,10 @@ def surveyed_positioner(
     options: OttawaOptions,
     deviation: RxLevRasters | None = None,
 ) -> BayesPositioner:
-    """Return the filter over a map that sessions made.
+    """Return the filter over the database that other sessions made.
 
-    Parameters
-    ----------
-    database : RadioRouteDatabase
-        Of the other sessions.
-    deviation : RxLevRasters, optional
-        By how much a new reading differs from the map of levels, as the survey tells it; no value
-        where a cell was not measured.
+    ``deviation``, of the survey, is by how much a new reading differs from the map of levels; it
+    has no value where a cell was not measured.
     """
     area, chosen, level_sd_db = open_area(database), options.filter, None
     if deviation is not None:
@@ -247,7 +242,7 @@ def _scored(
 
 
 def _on_map(positioner: BayesPositioner, places: Floats) -> float:
+    """Return the share of places within 50 m of the map."""
     area = positioner.area
-    points = area.points.T + np.array(area.origin_m)
-    away_m, _ = cKDTree(points).query(places)
+    away_m, _ = cKDTree(area.points.T + np.array(area.origin_m)).query(places)
     return float(np.mean(away_m <= _ON_MAP_M)) if len(places) else float("nan")
