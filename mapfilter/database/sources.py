@@ -16,11 +16,10 @@ from shapely import STRtree
 from mapfilter._types import Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice, same_crs
-from mapfilter.roads.index import RouteSource, WayIndex
+from mapfilter.roads.index import AreaIndex, RouteSource, WayIndex
 from mapfilter.roads.lattice import RouteLattice
 
 _ALIGNED_PX = 1e-3
-
 
 RoutePart = RouteLattice | Callable[[], RouteLattice]
 """The points of one tile, or what lays them; it can be sent to other processes."""
@@ -85,22 +84,24 @@ class LayerRoutes:
     def holds(self, window: Lattice) -> bool:
         """Return whether a way or a square is near a window."""
         squares = self.layers.squares
-        if squares is not None and squares.near(window).geometry.size:
-            return True
-        return bool(self.layers.ways.segments_near(window).size)
+        on_square = squares is not None and squares.near(window).size > 0
+        return on_square or self.layers.ways.segments_near(window).size > 0
 
     def part(self, window: Lattice) -> Callable[[], RouteLattice]:
         """Return what lays the points of a window: the same as of the whole layers."""
         layers = self.layers
-        squares = layers.squares.near(window) if layers.squares else None
+        squares, buildings, water = (
+            AreaIndex.of(areas.near(window)) if areas is not None else None
+            for areas in (layers.squares, layers.buildings, layers.water)
+        )
         if squares is not None and not squares.geometry.size:
             squares = None
         near = RouteSource(
             layers.crs,
             _ways_near(layers.ways, window, far=squares is not None),
             squares,
-            layers.buildings.near(window) if layers.buildings else None,
-            layers.water.near(window) if layers.water else None,
+            buildings,
+            water,
             _ways_near(layers.bridges, window, far=False) if layers.bridges else None,
         )
         return partial(near.tile, window)
@@ -112,7 +113,7 @@ class LayerRoutes:
         inside = shapely.intersection(ways.tree.geometries[near], box)
         area = float((shapely.length(inside) * 2 * ways.half_width_m[near]).sum())
         if self.layers.squares is not None:
-            valid = shapely.make_valid(self.layers.squares.near(window).geometry)
+            valid = shapely.make_valid(self.layers.squares.near(window))
             area += float(shapely.area(shapely.intersection(valid, box)).sum())
         return area
 

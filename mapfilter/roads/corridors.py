@@ -289,9 +289,7 @@ class _Piece:
 
 def _check(sessions: Sequence[Positions], min_sessions: int, **lengths_m: float) -> None:
     faults = Faults()
-    for name, value in lengths_m.items():
-        if not (np.isfinite(value) and value > 0):
-            faults.add(name, "metres > 0", value)
+    faults.check_positive("", "metres", **lengths_m)
     if min_sessions < 1:
         faults.add("min_sessions", "a whole number >= 1", min_sessions)
     for number, positions in enumerate(sessions, start=1):

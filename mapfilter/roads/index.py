@@ -1,7 +1,4 @@
-"""Indexed ways and areas, from which the points of any tile are made.
-
-Distances from points to the straight segments of ways are exact.
-"""
+"""Indexed ways and areas, from which the points of any tile are made; distances are exact."""
 
 from __future__ import annotations
 
@@ -24,7 +21,6 @@ from mapfilter.roads.ways import Buildings, Geometries, Squares, Water, Ways
 HALF_WIDTH_M = 6.0
 TILE_PX = 512
 SQUARE_CLASS = "square"
-_NO_WIDTHS: Mapping[str, float] = {}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +51,7 @@ class WayIndex:
         cls,
         ways: Ways,
         half_width_m: float = HALF_WIDTH_M,
-        by_class_m: Mapping[str, float] = _NO_WIDTHS,
+        by_class_m: Mapping[str, float] | None = None,
     ) -> WayIndex:
         """Index the segments of ways.
 
@@ -63,7 +59,7 @@ class WayIndex:
         ----------
         half_width_m : float
             How far from its centre line a point still belongs to a way.
-        by_class_m : mapping of str to float
+        by_class_m : mapping of str to float, optional
             The same for some classes; 0 leaves the class out.
 
         Raises
@@ -71,8 +67,8 @@ class WayIndex:
         InputError
             A half width is not > 0 (of a class, not >= 0).
         """
-        faults = Faults()
-        note_half_widths(faults, half_width_m, by_class_m)
+        faults, by_class_m = Faults(), by_class_m or {}
+        _note_half_widths(faults, half_width_m, by_class_m)
         faults.raise_if_any(InputError)
         by_code = np.array([by_class_m.get(name, half_width_m) for name in ways.class_names])
         if by_code.size and not by_code.all():
@@ -161,10 +157,8 @@ class WayIndex:
         return way, distance
 
 
-def note_half_widths(faults: Faults, half_width_m: float, by_class_m: Mapping[str, float]) -> None:
-    """Note half widths that are no lengths; that of a class may be 0."""
-    if not (np.isfinite(half_width_m) and half_width_m > 0):
-        faults.add("half_width_m", "metres > 0", half_width_m)
+def _note_half_widths(faults: Faults, half_width_m: float, by_class_m: Mapping[str, float]) -> None:
+    faults.check_positive("", "metres", half_width_m=half_width_m)
     for name, width_m in by_class_m.items():
         if not (np.isfinite(width_m) and width_m >= 0):
             faults.add(f"half_width_by_class_m, {name}", "metres >= 0", width_m)
@@ -182,27 +176,21 @@ class AreaIndex:
         """Index polygons."""
         return cls(geometry, STRtree(geometry))
 
-    def near(self, window: Lattice) -> AreaIndex:
+    def near(self, window: Lattice) -> Geometries:
         """Return the polygons about a window, in their order."""
         near = np.sort(self.tree.query(shapely.box(*window.bounds_m)))
-        return AreaIndex.of(self.geometry[near])
+        return np.asarray(self.geometry[near])
 
     def mask(self, window: Lattice) -> Bools:
         """Return which pixel centres of a window lie in a polygon, shape (rows, cols)."""
-        near = np.sort(self.tree.query(shapely.box(*window.bounds_m)))
-        return burn(((shape, 1) for shape in self.geometry[near]), window, "uint8").astype(bool)
+        return burn(((shape, 1) for shape in self.near(window)), window, "uint8").astype(bool)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RouteSource:
-    """What any tile of a route lattice is made from; it can be sent to other processes.
+    """Layers of a route lattice, ready for any of its tiles; it can be sent to other processes.
 
-    Parameters
-    ----------
-    crs : str
-        Projected CRS of everything, in metres.
-    bridges : WayIndex or None
-        The parts of the ways that lie in the water, which stay.
+    ``bridges`` are the parts of the ways that lie in the water, which stay.
     """
 
     crs: str
@@ -222,20 +210,22 @@ class RouteSource:
         *,
         half_width_by_class_m: Mapping[str, float] | None = None,
         water: Water | None = None,
+        crs: str | None = None,
     ) -> RouteSource:
-        """Index the layers of an area; the parameters are those of :func:`route_lattice`.
+        """Index the layers of an area; parameters and errors as of :func:`route_lattice`.
 
-        Raises
-        ------
-        InputError
-            The CRS differ, or a half width is no length.
+        ``crs`` is that of the lattice; by default that of the ways.
         """
-        faults = Faults()
-        note_crs(faults, ways.crs, {"squares": squares, "buildings": buildings, "water": water})
+        faults, crs = Faults(), crs or ways.crs
+        layers = {"ways": ways, "squares": squares, "buildings": buildings, "water": water}
+        for name, layer in layers.items():
+            if layer is not None and not same_crs(layer.crs, crs):
+                faults.add(f"{name}, crs", crs, layer.crs, "layers of different CRS")
+        _note_half_widths(faults, half_width_m, half_width_by_class_m or {})
         faults.raise_if_any(InputError)
-        index = WayIndex.of(ways, half_width_m, half_width_by_class_m or {})
+        index = WayIndex.of(ways, half_width_m, half_width_by_class_m)
         return cls(
-            ways.crs,
+            crs,
             index,
             AreaIndex.of(squares.geometry) if squares else None,
             AreaIndex.of(buildings.footprints) if buildings else None,
@@ -311,15 +301,6 @@ def described(
         distance_m.astype(np.float32),
         on_square[row, col],
     )
-
-
-def note_crs(
-    faults: Faults, crs: str, layers: Mapping[str, Ways | Squares | Buildings | Water | None]
-) -> None:
-    """Note layers of another CRS."""
-    for name, layer in layers.items():
-        if layer is not None and not same_crs(layer.crs, crs):
-            faults.add(f"{name}, crs", crs, layer.crs, "layers of different CRS")
 
 
 def _mask(areas: AreaIndex | None, window: Lattice) -> Bools:

@@ -12,7 +12,7 @@ import shapely
 from geopandas import GeoDataFrame
 
 from mapfilter._types import Bools
-from mapfilter.errors import Faults, InputError, fail
+from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.roads.index import (
@@ -21,8 +21,6 @@ from mapfilter.roads.index import (
     RouteSource,
     WayIndex,
     described,
-    note_crs,
-    note_half_widths,
 )
 from mapfilter.roads.landuse import read_landuse
 from mapfilter.roads.lattice import RouteLattice
@@ -91,7 +89,6 @@ def read_routes(
     >>> len(routes), routes.mask().shape
     (166, (20, 20))
     """
-    by_class_m = half_width_by_class_m or {}
     if roads is None and landuse is None:
         raise fail(InputError, "roads", "a map, a layer or ways; or landuse", "none")
     found = Roads(Ways.none(lattice.crs))
@@ -103,7 +100,7 @@ def read_routes(
             lattice,
             profile=profile,
             half_width_m=half_width_m,
-            half_width_by_class_m=by_class_m,
+            half_width_by_class_m=half_width_by_class_m,
             squares=squares,
             layer_name=layer_name,
             class_column=class_column,
@@ -115,7 +112,7 @@ def read_routes(
             lattice,
             clip_ways(found.ways, lattice.bounds_m),
             half_width_m,
-            half_width_by_class_m=by_class_m,
+            half_width_by_class_m=half_width_by_class_m,
         )
     here = lattice.crs, lattice.bounds_m
     map_file = roads if isinstance(roads, Path | str) and is_map(roads) else None
@@ -133,7 +130,7 @@ def read_routes(
         buildings,
         lattice,
         half_width_m,
-        half_width_by_class_m=by_class_m,
+        half_width_by_class_m=half_width_by_class_m,
         water=water,
     )
 
@@ -258,14 +255,14 @@ def route_lattice(
     InputError
         The CRS differ, a half width is no length, or no point is left.
     """
-    by_class_m = half_width_by_class_m or {}
-    faults = Faults()
-    layers = {"ways": ways, "squares": squares, "buildings": buildings, "water": water}
-    note_crs(faults, lattice.crs, layers)
-    note_half_widths(faults, half_width_m, by_class_m)
-    faults.raise_if_any(InputError)
     source = RouteSource.of(
-        ways, squares, buildings, half_width_m, half_width_by_class_m=by_class_m, water=water
+        ways,
+        squares,
+        buildings,
+        half_width_m,
+        half_width_by_class_m=half_width_by_class_m,
+        water=water,
+        crs=lattice.crs,
     )
     return source.over(lattice, tile_px)
 
@@ -302,7 +299,6 @@ def route_lattice_from_landuse(
         raise fail(InputError, "land-use mask", f"shape {shape}", mask.shape)
     if not mask.any():
         raise fail(InputError, "land use", "a walkable point", "none", "no class is walkable")
-    index = WayIndex.of(
-        Ways.none(lattice.crs) if ways is None else ways, half_width_m, half_width_by_class_m or {}
-    )
+    ways = Ways.none(lattice.crs) if ways is None else ways
+    index = WayIndex.of(ways, half_width_m, half_width_by_class_m)
     return described(mask, lattice, mask, index, index.reaching(lattice), LANDUSE_CLASS)

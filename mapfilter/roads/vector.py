@@ -63,7 +63,7 @@ class Features:
     columns : mapping of str to numpy.ndarray of object, shape (N,)
         The columns asked for.
     notes : tuple of str
-        What was left out.
+        Numbers of features left out, and why.
     """
 
     name: str
@@ -72,13 +72,22 @@ class Features:
     columns: Mapping[str, NDArray[np.object_]]
     notes: tuple[str, ...]
 
+    @property
+    def kinds(self) -> str:
+        """Types of geometry, for messages."""
+        return ", ".join(sorted({shape.geom_type for shape in self.geometry}))
+
+    def column(self, name: str | None) -> NDArray[np.object_] | None:
+        """Return a column, or None without a name."""
+        return None if name is None else self.columns[name]
+
 
 def read_layer(
     source: Layer,
     crs: str,
     bounds_m: Bounds,
     layer_name: str | None,
-    columns: Sequence[str] = (),
+    wanted: Sequence[str | None] = (),
     *,
     may_be_empty: bool = False,
 ) -> Features:
@@ -94,8 +103,8 @@ def read_layer(
         West, south, east, north of the area in ``crs``.
     layer_name : str, optional
         Needed where the file has several layers.
-    columns : sequence of str
-        Columns to read beside the geometry.
+    wanted : sequence of str or None
+        Columns to read beside the geometry; None are passed over.
     may_be_empty : bool
         Accept a layer with nothing in the area.
 
@@ -105,6 +114,7 @@ def read_layer(
         The file is missing, damaged or no vector file, has several layers, no CRS, or lacks a
         column, or nothing of it lies in the area.
     """
+    columns = [column for column in wanted if column is not None]
     name, frame, hint = "GeoDataFrame", None, ""
     if isinstance(source, GeoDataFrame):
         frame, hint = source.reset_index(drop=True), "not set; see GeoDataFrame.set_crs"
@@ -130,7 +140,8 @@ def read_layer(
         raise fail(InputError, f"{name}, crs", "a layer with a CRS", "none", hint)
     box = _box(name, crs, bounds_m, source_crs)
     if frame is None:
-        frame = _guarded(name, lambda: _read(path, layer, box, columns))
+        settings = {"columns": columns, "bbox": box, "fid_as_index": True, "force_2d": True}
+        frame = _guarded(name, lambda: pyogrio.read_dataframe(path, layer=layer, **settings))
     found = _features(name, frame, crs, bounds_m, columns)
     if not (found.number.size or may_be_empty):
         raise _nothing_there(name, crs, bounds_m, source_crs, covered)
@@ -174,9 +185,9 @@ def _check_file(path: Path) -> None:
         expected = "a vector file that holds its data itself"
         raise fail(InputError, str(path), expected, "one that leads to other places")
     if path.suffix.lower() == ".shp":
-        told_bytes = 2 * int.from_bytes(head[_SHP_LENGTH], "big")
-        if size_bytes < told_bytes:
-            raise fail(InputError, str(path), f"{told_bytes} bytes", size_bytes, "cut off")
+        stated_bytes = 2 * int.from_bytes(head[_SHP_LENGTH], "big")
+        if size_bytes < stated_bytes:
+            raise fail(InputError, str(path), f"{stated_bytes} bytes", size_bytes, "cut off")
     if zipfile.is_zipfile(path):
         with _guarded(str(path), lambda: zipfile.ZipFile(path)) as archive:
             unpacked_bytes = sum(inner.file_size for inner in archive.infolist())
@@ -223,12 +234,6 @@ def _box(name: str, crs: str, bounds_m: Bounds, source_crs: Any) -> tuple[float,
         expected = f"a CRS that can show the area {_numbers(bounds_m)}"
         raise fail(InputError, f"{name}, crs", expected, source_crs, "a CRS of another region")
     return tuple(float(side) for side in box)
-
-
-def _read(path: Path, layer: str, box: tuple[float, ...], columns: Sequence[str]) -> GeoDataFrame:
-    return pyogrio.read_dataframe(
-        path, layer=layer, columns=list(columns), bbox=box, fid_as_index=True, force_2d=True
-    )
 
 
 def _guarded(name: str, read: Callable[[], T]) -> T:

@@ -1,6 +1,8 @@
-"""Lays out a cell plan over any area by rule, where no real plan is at hand."""
+"""Cell plans laid out over any area by rule, where no real plan is at hand."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt, find_objects, label
@@ -86,44 +88,37 @@ def lay_out_plan(
     rng = np.random.default_rng(seed)
     masts = _masts(lattice, sites, heights, rng)
     cells: list[Cell] = []
-    for i, (east_m, north_m) in enumerate(masts, start=1):
-        roof_m = 0.0
-        if heights is not None:
-            roof_m = float(heights[lattice.row_col(east_m, north_m)])
+
+    def add(site: str, letter: str, place: tuple[float, float], **properties: Any) -> None:
+        round_, carrier = divmod(len(cells), _CARRIERS)
+        properties["arfcn"] = _FIRST_ARFCN + _CARRIER_STEP * carrier
+        properties["bsic"] = round_ % _COLOURS
+        cells.append(Cell(site + letter, site, *place, frequency_mhz=frequency_mhz, **properties))
+
+    for i, place in enumerate(masts, start=1):
+        roof_m = 0.0 if heights is None else float(heights[lattice.row_col(*place)])
         for j in range(sectors):
             azimuth_deg = (first_azimuth_deg + j * 360.0 / sectors) % 360.0
-            cells.append(
-                Cell(
-                    id=f"S{i}{'ABCDEF'[j]}",
-                    site=f"S{i}",
-                    east_m=east_m,
-                    north_m=north_m,
-                    height_m=max(site_height_m, roof_m + _ABOVE_ROOF_M),
-                    azimuth_deg=None if sectors == 1 else azimuth_deg,
-                    antenna="omni" if sectors == 1 else "sector",
-                    eirp_dbm=eirp_dbm,
-                    frequency_mhz=frequency_mhz,
-                    arfcn=_arfcn(len(cells)),
-                    bsic=_bsic(len(cells)),
-                )
+            add(
+                f"S{i}",
+                "ABCDEF"[j],
+                place,
+                height_m=max(site_height_m, roof_m + _ABOVE_ROOF_M),
+                azimuth_deg=None if sectors == 1 else azimuth_deg,
+                antenna="omni" if sectors == 1 else "sector",
+                eirp_dbm=eirp_dbm,
             )
-    for i, (east_m, north_m) in enumerate(_indoor_places(lattice, indoor, heights, masts), 1):
-        cells.append(
-            Cell(
-                id=f"I{i}",
-                site=f"I{i}",
-                east_m=east_m,
-                north_m=north_m,
-                height_m=indoor_height_m,
-                azimuth_deg=None,
-                antenna="omni",
-                eirp_dbm=indoor_eirp_dbm,
-                frequency_mhz=frequency_mhz,
-                indoor=True,
-                penetration_loss_db=penetration_loss_db,
-                arfcn=_arfcn(len(cells)),
-                bsic=_bsic(len(cells)),
-            )
+    for i, place in enumerate(_indoor_places(lattice, indoor, heights, masts), start=1):
+        add(
+            f"I{i}",
+            "",
+            place,
+            height_m=indoor_height_m,
+            azimuth_deg=None,
+            antenna="omni",
+            eirp_dbm=indoor_eirp_dbm,
+            indoor=True,
+            penetration_loss_db=penetration_loss_db,
         )
     return CellPlan(lattice.crs, tuple(cells))
 
@@ -137,14 +132,6 @@ def _check(sites: int, sectors: int, indoor: int, seed: int) -> None:
     if seed < 0:
         faults.add("cells, seed", "a whole number ≥ 0", seed)
     faults.raise_if_any(ConfigError)
-
-
-def _arfcn(number: int) -> int:
-    return _FIRST_ARFCN + _CARRIER_STEP * (number % _CARRIERS)
-
-
-def _bsic(number: int) -> int:
-    return (number // _CARRIERS) % _COLOURS
 
 
 def _masts(
@@ -230,10 +217,9 @@ def _interior(lattice: Lattice) -> Floats:
     """Return the candidates that are not near the edge of the area."""
     points = _candidates(lattice)
     west, south, east, north = lattice.bounds_m
-    margins = _INTERIOR * (east - west), _INTERIOR * (north - south)
-    inside = (np.abs(points[:, 0] - (west + east) / 2) <= (east - west) / 2 - margins[0]) & (
-        np.abs(points[:, 1] - (south + north) / 2) <= (north - south) / 2 - margins[1]
-    )
+    size_m = np.array([east - west, north - south])
+    off_m = np.abs(points - np.array([west + east, south + north]) / 2)
+    inside = (off_m <= size_m / 2 - _INTERIOR * size_m).all(axis=1)
     return points[inside] if inside.any() else points
 
 
