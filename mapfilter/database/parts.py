@@ -81,19 +81,13 @@ def levels_table(cell_id: str, rows: Sequence[LevelsRows]) -> pa.Table:
 
 
 class PartWriter:
-    """Collects rows, and writes them whenever enough of them are in memory.
+    """Collects rows, and writes them into a folder whenever enough of them are in memory.
 
-    Parameters
-    ----------
-    folder : Path
-        The database folder under construction.
-    writers : int
-        Parts written at a time; they do not depend on it.
+    ``writers`` parts are written at a time; they do not depend on it.
     """
 
     def __init__(self, folder: Path, crs: str, cell_ids: tuple[str, ...], writers: int = 1) -> None:
-        self._writers = writers
-        self._folder, self._crs, self._cell_ids = folder, crs, cell_ids
+        self._folder, self._crs, self._cell_ids, self._writers = folder, crs, cell_ids, writers
         self._folders = levels_folders(cell_ids)
         self._points: list[pa.Table] = []
         self._levels: dict[int, list[LevelsRows]] = {}
@@ -129,8 +123,7 @@ class PartWriter:
         """
         self._flush()
         if self._points_file is not None:
-            bounds = tuple(float(value) for value in np.concatenate(self._bounds))
-            geo = geo_metadata(self._crs, (bounds[0], bounds[1], bounds[2], bounds[3]))
+            geo = geo_metadata(self._crs, np.concatenate(self._bounds).tolist())
             self._points_file.add_key_value_metadata({"geo": geo.decode()})
             self._points_file.close()
             self._points_file = None
@@ -169,7 +162,7 @@ class PartWriter:
 class Written(NamedTuple):
     """Manifest entries of the parts written, the points of the tiles, and those with a level."""
 
-    parts: tuple[Mapping[str, Any], ...]
+    parts: list[dict[str, Any]]
     points: int
     received: int
 
@@ -226,4 +219,4 @@ def write_parts(
             if progress is not None:
                 progress(done, total)
         parts = writer.finish() if received else []
-    return Written(tuple(parts), points, received)
+    return Written(parts, points, received)

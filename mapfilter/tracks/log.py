@@ -49,13 +49,12 @@ _FASTEST_KMPS = 0.1
 _EXPECTED = "metres moved in each interval"
 
 
-def check_clocks(
+def _check_clocks(
     tables: Mapping[str, pd.DataFrame], names: Mapping[str, str], faults: Faults
 ) -> None:
     """Note tables that do not overlap in time, or last about 1000 times as long as another.
 
-    ``tables`` are sorted by finite ``time_s``; ``names`` are those of the tables in messages, and
-    ``log`` of the whole. At most one fault is added, since it takes two tables to disagree.
+    At most one fault is added, since it takes two tables to disagree.
     """
     times = {
         names.get(table, table): np.unique(rows["time_s"].to_numpy())
@@ -74,7 +73,7 @@ def check_clocks(
         faults.add(f"{whole}, time_s", "tables that overlap in time", spans, hint)
 
 
-def early_ends(tables: Mapping[str, pd.DataFrame]) -> tuple[str, ...]:
+def _early_ends(tables: Mapping[str, pd.DataFrame]) -> tuple[str, ...]:
     """Return a note where motion or radio ends long before the other one, as if cut off."""
     ends_s = {
         table: float(tables[table]["time_s"].iloc[-1])
@@ -90,8 +89,8 @@ def early_ends(tables: Mapping[str, pd.DataFrame]) -> tuple[str, ...]:
     return (f"{first}: ends {last_s - first_s:.0f} s before {last}, as if cut off",)
 
 
-def check_start(
-    start_utc_s: float, tables: Mapping[str, pd.DataFrame], faults: Faults, whole: str = "log"
+def _check_start(
+    start_utc_s: float, tables: Mapping[str, pd.DataFrame], faults: Faults, whole: str
 ) -> None:
     """Note a start or times that are no dates within the years 1 to 9999."""
     if np.isnan(start_utc_s):
@@ -126,12 +125,8 @@ def _milliseconds(times: Mapping[str, Floats]) -> str:
     return ""
 
 
-def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) -> tuple[str, ...]:
-    """Note steps that are cumulative, backwards or in another unit; return notes on odd ones.
-
-    ``tables`` have finite times, sorted, and ``where`` names the table of motion. Tables of less
-    than ten steps are not checked.
-    """
+def _check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) -> tuple[str, ...]:
+    """Note steps that are cumulative, backwards or in another unit; return notes on odd ones."""
     motion = tables["motion"]
     motion = motion[np.isfinite(motion["step_m"].to_numpy())]
     time_s, step_m = motion["time_s"].to_numpy(), motion["step_m"].to_numpy()
@@ -172,13 +167,10 @@ def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) 
 
 def _extent_m(tables: Mapping[str, pd.DataFrame], first_s: float, last_s: float) -> float:
     """Return how far apart true positions or fixes lie within some time."""
-    found = [0.0]
-    for table in ("truth", "gnss"):
-        places = tables[table]
-        places = places[places["time_s"].between(first_s, last_s)]
-        if len(places):
-            found.append(float(np.hypot(np.ptp(places["east_m"]), np.ptp(places["north_m"]))))
-    return max(found)
+    every = (tables[table] for table in ("truth", "gnss"))
+    within = (places[places["time_s"].between(first_s, last_s)] for places in every)
+    extents = (np.hypot(np.ptp(p["east_m"]), np.ptp(p["north_m"])) for p in within if len(p))
+    return float(max(extents, default=0.0))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -366,11 +358,11 @@ def make_log(
         rows, more = tidy_table(table, given.get(table), where, faults, numbers.get(table))
         tables[table] = rows
         every_note += more
-    check_start(start_utc_s, tables, faults, whole)
+    _check_start(start_utc_s, tables, faults, whole)
     if not any(fault.where.endswith("time_s") for fault in faults.found):
-        check_clocks(tables, called, faults)
-        every_note += check_steps(tables, called.get("motion", "motion"), faults)
-        every_note += early_ends(tables)
+        _check_clocks(tables, called, faults)
+        every_note += _check_steps(tables, called.get("motion", "motion"), faults)
+        every_note += _early_ends(tables)
     faults.raise_if_any(InputError)
     placeless = int(tables["pseudoranges"][list(PLACE)].isna().any(axis=1).sum())
     if almanac is None and placeless:
