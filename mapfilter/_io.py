@@ -22,7 +22,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from mapfilter.errors import MapfilterError, OutputError, StoreError, fail
+from mapfilter.errors import Faults, MapfilterError, OutputError, StoreError, fail
 
 _ASIDE = "old"
 _AT_FDCWD = -100
@@ -111,37 +111,35 @@ def left_aside(path: Path) -> Path | None:
 
 
 def check_replaceable(folder: Path, head: str, what: str) -> None:
-    """Raise OutputError where a folder holds other files than mapfilter wrote there.
+    """Raise OutputError where a folder, which may be absent, holds files of others.
 
-    Parameters
-    ----------
-    folder : Path
-        May be absent.
-    head : str
-        Name of the JSON file in it with ``format``, which must be ``what``, and ``parts``.
-    what : str
-        Format, as messages name it.
+    Those of mapfilter are listed as ``parts`` in the JSON file ``head``, with ``what`` as format.
     """
     inner = folder.rglob("*") if folder.is_dir() else ()
     found = {p.relative_to(folder).as_posix() for p in inner if p.is_symlink() or not p.is_dir()}
-    if foreign := sorted(found - _listed(folder / head, what)):
+    try:
+        value = read_json(folder / head)
+    except StoreError:
+        value = {}
+    if value.get("format") == what and isinstance(parts := value.get("parts"), list):
+        found -= {head, *(str(part.get("path")) for part in parts if isinstance(part, dict))}
+    if foreign := sorted(found):
         got = f"other files ({', '.join(foreign[:3])}{', …' if len(foreign) > 3 else ''})"
         hint = "a mistyped path; choose another, or move the files away"
         raise fail(OutputError, str(folder), f"a {what}, or nothing yet", got, hint)
 
 
-def _listed(head: Path, what: str) -> set[str]:
-    """Return the names of a head and of the parts that it lists; none when it is no such head."""
-    try:
-        value = read_json(head)
-    except StoreError:
-        return set()
-    if value.get("format") != what or not isinstance(value.get("parts"), list):
-        return set()
-    return {
-        head.name,
-        *(str(part.get("path")) for part in value["parts"] if isinstance(part, dict)),
-    }
+def check_part(file: Path, part: Mapping[str, Any], faults: Faults, *, full: bool = True) -> bool:
+    """Note where a file is missing or has another size (``full``: or SHA-256) than its entry."""
+    size, digest, before = part.get("bytes"), str(part.get("sha256")), len(faults.found)
+    if not file.is_file():
+        faults.add(str(file), f"a file of {size} bytes", "no such file", "not copied whole")
+    elif (found := file.stat().st_size) != size:
+        faults.add(str(file), f"{size} bytes", f"{found} bytes", "cut off or overwritten")
+    elif full and (of_file := sha256_file(file)) != digest:
+        expected, got = f"SHA-256 {digest[:12]}…", f"{of_file[:12]}…"
+        faults.add(str(file), expected, got, "changed after it was written")
+    return len(faults.found) == before
 
 
 def check_version(where: str, found: object, known: int) -> None:

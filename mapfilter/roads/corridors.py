@@ -71,9 +71,20 @@ class _Net:
             self._next.setdefault(a, set()).add(b)
             self._next.setdefault(b, set()).add(a)
 
-    def take_back(self, vertices: Sequence[tuple[Place, int]]) -> None:
-        """Forget vertices that were added."""
-        for place, moment in vertices:
+    def end(
+        self, before: Place | None, own: Sequence[tuple[Place, int]], joint: Place | None
+    ) -> None:
+        """End a line whose own vertices were added, between older ones or nothing.
+
+        It is accepted where it is long enough or joins what was apart.
+        """
+        places = [place for place, _ in own]
+        length_m = sum(math.dist(a, b) for a, b in itertools.pairwise(places))
+        joins = before is not None and joint is not None and not self.are_joined(before, joint)
+        if length_m >= self.reach_m or joins:
+            self.keep([place for place in (before, *places, joint) if place is not None])
+            return
+        for place, moment in own:
             self._squares[self._square(place)].remove((place, moment))
 
     def are_joined(self, a: Place, b: Place) -> bool:
@@ -103,62 +114,31 @@ class _Net:
         return int(place[0] // self.reach_m), int(place[1] // self.reach_m)
 
 
-class _Track:
-    """The new part of a track, while it grows."""
-
-    def __init__(self, net: _Net) -> None:
-        self._net = net
-        self._own: list[tuple[Place, int]] = []
-        self._joint: Place | None = None
-
-    def goes_on(self, place: Place, moment: int) -> None:
-        """Take a vertex that is new."""
-        self._own.append((place, moment))
-        self._net.add(place, moment)
-
-    def meets(self, joint: Place | None) -> None:
-        """End the new part, at a vertex that is there already or at nothing."""
-        before, places = self._joint, [place for place, _ in self._own]
-        line = [place for place in (before, *places, joint) if place is not None]
-        length_m = sum(math.dist(a, b) for a, b in itertools.pairwise(places))
-        long_enough = length_m >= self._net.reach_m
-        joins = before is not None and joint is not None and not self._net.are_joined(before, joint)
-        if long_enough or joins:
-            self._net.keep(line)
-        else:
-            self._net.take_back(self._own)
-        self._own, self._joint = [], joint
-
-
-def grown_lines(
+def _grown_lines(
     tracks: Sequence[Floats], usable: Sequence[Bools], reach_m: float
 ) -> list[list[Place]]:
     """Return the lines of a network that covers tracks once.
 
-    An end within two reaches of another line is joined to it.
-
-    Parameters
-    ----------
-    tracks : sequence of numpy.ndarray, each of shape (N, 2)
-        Vertices no farther apart than half the reach.
-    usable : sequence of numpy.ndarray of bool, each of shape (N,)
-        Which vertices may be taken; the others interrupt a line.
-    reach_m : float
-        A vertex so near to an older one is not new. New parts that are shorter are left out,
-        unless they join what was apart.
+    Tracks have vertices, shape (N, 2), at most half a reach apart; those that are not usable
+    interrupt a line. A vertex within reach of an older one is not new. New parts shorter than a
+    reach are left out, unless they join what was apart. An end within two reaches of another line
+    is joined to it.
     """
     net, moment = _Net(reach_m), 0
     for vertices, taken in zip(tracks, usable, strict=True):
         moment += _TRAIL
-        track = _Track(net)
+        before: Place | None = None
+        own: list[tuple[Place, int]] = []
         for (x, y), may in zip(vertices.tolist(), taken.tolist(), strict=True):
             moment += 1
             there = net.nearest((x, y), moment - _TRAIL) if may else None
             if may and there is None:
-                track.goes_on((x, y), moment)
+                own.append(((x, y), moment))
+                net.add((x, y), moment)
             else:
-                track.meets(there)
-        track.meets(None)
+                net.end(before, own, there)
+                before, own = there, []
+        net.end(before, own, None)
     for line in tuple(net.lines):
         net.join_end(line[0])
         net.join_end(line[-1])
@@ -258,7 +238,7 @@ def corridors(
     drawn = _drawn_together(pieces, measured, half_width_m)
     passed = _sessions_near(np.concatenate(drawn), measured, of_session, half_width_m)
     kept = np.split(passed >= min_sessions, np.cumsum([len(part) for part in drawn])[:-1])
-    lines = grown_lines(drawn, kept, half_width_m)
+    lines = _grown_lines(drawn, kept, half_width_m)
     if not lines:
         expected = f"a way of at least {half_width_m:g} m that {min_sessions} sessions went along"
         raise fail(InputError, "tracks", expected, "none")

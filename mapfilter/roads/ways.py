@@ -177,7 +177,7 @@ class Buildings(_Layer):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Water(_Layer):
-    """Water, where nobody walks or drives except on bridges.
+    """Water, which is crossed on bridges only.
 
     Parameters
     ----------

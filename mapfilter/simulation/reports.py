@@ -164,11 +164,7 @@ def reports(
 
 
 def running_mean_db(level_dbm: Floats, count: int) -> Floats:
-    """Return the mean, in dB, of the last ``count`` reports, or of as many as there are.
-
-    Parameters
-    ----------
-    level_dbm : ndarray, shape (N, cells)
+    """Return the mean, in dB, of the last ``count`` of N reports, shape (N, cells).
 
     Examples
     --------
@@ -185,17 +181,9 @@ def serving_cells(mean_dbm: Floats, received: Bools, hysteresis_db: float) -> In
     """Return which cell serves at each report: handover with hysteresis.
 
     A cell serves until the strongest received one is more than ``hysteresis_db`` above it, or until
-    it is not received any more; then the strongest takes over (the first of equals).
-
-    Parameters
-    ----------
-    mean_dbm : ndarray, shape (N, cells)
-    received : ndarray of bool, shape (N, cells)
-
-    Returns
-    -------
-    serving : ndarray of int64, shape (N,)
-        Column of the cell, or -1 when none is received.
+    it is not received any more; then the strongest takes over (the first of equals). Means and
+    received are of shape (N, cells); of each report, the column of the cell is returned, or -1
+    when none is received.
 
     Examples
     --------

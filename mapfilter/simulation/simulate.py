@@ -85,7 +85,6 @@ def simulate_journeys(
 
     Parameters
     ----------
-    network : StreetNetwork
     levels : RxLevRasters or callable
         The true levels: rasters, or a function from positions to levels in the plan's order, as
         :func:`mapfilter.simulation.reports.level_sampler` returns it.

@@ -1,11 +1,11 @@
-"""Walkers as they are: beside the centre line of their way, and standing now and then."""
+"""Walkers beside the centre line of their way, who stop now and then."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from annotated_types import Ge, Le
@@ -46,7 +46,6 @@ _GRID_M = 1.0
 _SMOOTHED_M = 4.0
 _PARTS = (0.25, 0.5, 0.75, 1.0)
 _CLEARANCE_PX = 7
-
 
 Beside = Annotated[float, Ge(0), Le(50)]
 
@@ -92,18 +91,8 @@ class WalkerModel(Options):
         return np.full(len(along.way_class), float(self.beside))
 
 
-@dataclass(frozen=True, eq=False)
-class WalkedPath:
-    """Where a walker goes, by metres along the route.
-
-    Parameters
-    ----------
-    distance_m : (K,) array
-        Along the centre lines.
-    walked_m : (K,) array
-        Along the path itself.
-    east_m, north_m : (K,) arrays
-    """
+class WalkedPath(NamedTuple):
+    """A walker's path: distance along the route and along the path itself, and position."""
 
     distance_m: Floats
     walked_m: Floats

@@ -21,6 +21,7 @@ import pyarrow.parquet as pq
 
 from mapfilter._io import (
     atomic_dir,
+    check_part,
     check_replaceable,
     check_version,
     read_json,
@@ -56,16 +57,8 @@ def _checked_parts(folder: Path, head: dict[str, Any]) -> dict[str, Path]:
         if not isinstance(part, dict) or part.get("path") not in allowed:
             faults.add(f"{folder / HEAD}, parts", "tables of a log", repr(part))
             continue
-        name = part["path"]
-        path = folder / name
-        if not path.is_file():
-            faults.add(str(path), "a table of the log", "no such file")
-        elif (size := path.stat().st_size) != (bytes_ := part.get("bytes")):
-            hint = "cut off" if isinstance(bytes_, int) and size < bytes_ else "changed by hand"
-            faults.add(str(path), f"{bytes_} bytes", f"{size} bytes", hint)
-        elif sha256_file(path) != part.get("sha256"):
-            faults.add(str(path), f"SHA-256 {part.get('sha256')}", "another", "changed or damaged")
-        paths[allowed[name]] = path
+        paths[allowed[part["path"]]] = path = folder / part["path"]
+        check_part(path, part, faults)
     faults.raise_if_any(StoreError)
     return paths
 
