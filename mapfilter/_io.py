@@ -46,25 +46,17 @@ def atomic_file(path: Path) -> Iterator[Path]:
     """Give a temporary path beside ``path``; rename it into place when the block succeeds.
 
     The temporary path keeps the suffix of ``path``, because drivers choose formats by it. Where
-    ``path`` is a link, its target is replaced.
-
-    Raises
-    ------
-    OutputError
-        The folder cannot be made or written, or writing the file fails, as on a full disk.
+    ``path`` is a link, its target is replaced. Raises OutputError where a file or its folder cannot
+    be written, as on a full disk.
     """
-    target = _behind_link(path)
-    partial = _partial_folder(target)
+    target, partial = _partial_folder(path)
     temporary = partial / path.name
     try:
         with _writing(temporary, path):
             yield temporary
             _sync(temporary)
-        try:
+        with _into_place(path, target):
             temporary.replace(target)
-            _sync(target.parent)
-        except OSError as error:
-            raise _not_writable(path, error) from error
     finally:
         shutil.rmtree(partial, ignore_errors=True)
 
@@ -73,17 +65,12 @@ def atomic_file(path: Path) -> Iterator[Path]:
 def atomic_dir(path: Path) -> Iterator[Path]:
     """Give a temporary folder beside ``path``; exchange it with ``path`` when the block succeeds.
 
-    Where ``path`` is a link, its target is replaced.
-
-    Raises
-    ------
-    OutputError
-        ``path`` is a file, or the folder cannot be made or written.
+    Where ``path`` is a link, its target is replaced. Raises OutputError where ``path`` is a file,
+    or the folder cannot be written.
     """
     if path.exists() and not path.is_dir():
         raise fail(OutputError, str(path), "a folder, or nothing yet", "a file")
-    target = _behind_link(path)
-    partial = _partial_folder(target)
+    target, partial = _partial_folder(path)
     new = partial / "new"
     new.mkdir()
     try:
@@ -92,14 +79,11 @@ def atomic_dir(path: Path) -> Iterator[Path]:
             for inner in sorted(new.rglob("*")):
                 _sync(inner)
             _sync(new)
-        try:
+        with _into_place(path, target):
             if target.exists():
                 _exchange(new, target)
             else:
                 new.rename(target)
-            _sync(target.parent)
-        except OSError as error:
-            raise _not_writable(path, error) from error
     finally:
         shutil.rmtree(partial, ignore_errors=True)
 
@@ -181,10 +165,6 @@ def ensure_writable_folder(path: Path) -> None:
         raise _not_writable(path, error) from error
 
 
-def _behind_link(path: Path) -> Path:
-    return Path(os.path.realpath(path)) if path.is_symlink() else path
-
-
 @contextlib.contextmanager
 def _writing(temporary: Path, path: Path) -> Iterator[None]:
     """Turn errors in writing ``temporary`` into OutputErrors of ``path``, but not of reading."""
@@ -203,7 +183,18 @@ def _writing(temporary: Path, path: Path) -> Iterator[None]:
         raise _not_writable(path, error) from error
 
 
-def _partial_folder(path: Path) -> Path:
+@contextlib.contextmanager
+def _into_place(path: Path, target: Path) -> Iterator[None]:
+    try:
+        yield
+        _sync(target.parent)
+    except OSError as error:
+        raise _not_writable(path, error) from error
+
+
+def _partial_folder(path: Path) -> tuple[Path, Path]:
+    """Return the target of a path that may be a link, and a new hidden folder beside it."""
+    path = Path(os.path.realpath(path)) if path.is_symlink() else path
     ensure_writable_folder(path.parent)
     prefix = f".{path.name}.partial-"
     for stale in path.parent.glob(f"{glob.escape(prefix)}*"):
@@ -213,18 +204,18 @@ def _partial_folder(path: Path) -> Path:
                 (stale / _ASIDE).rename(path)
             shutil.rmtree(stale, ignore_errors=True)
     try:
-        return Path(tempfile.mkdtemp(prefix=f"{prefix}{os.getpid()}-", dir=path.parent))
+        folder = tempfile.mkdtemp(prefix=f"{prefix}{os.getpid()}-", dir=path.parent)
     except OSError as error:
         raise _not_writable(path, error) from error
+    return path, Path(folder)
 
 
 def _is_alive(pid: str) -> bool:
     try:
-        os.kill(int(pid), 0)
+        with contextlib.suppress(PermissionError):
+            os.kill(int(pid), 0)
     except (ValueError, OverflowError, ProcessLookupError):
         return False
-    except PermissionError:
-        return True
     return True
 
 

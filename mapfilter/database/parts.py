@@ -169,7 +169,7 @@ class Written(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """Everything in a manifest but the parts."""
+    """Contents of a manifest without its parts."""
 
     lattice: Lattice
     plan: CellPlan

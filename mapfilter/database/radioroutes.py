@@ -1,4 +1,4 @@
-"""The radio-route database: the points where one can be, and the levels of each cell there."""
+"""The radio-route database: accessible points, and the levels of each cell there."""
 
 from __future__ import annotations
 
@@ -68,14 +68,8 @@ def fill_field(
 ) -> RadioField:
     """Spread points over a window and fill the gaps from the nearest point.
 
-    Parameters
-    ----------
-    pixels : tuple of numpy.ndarray, shape (N,) each
-        Rows and columns of the points in the window, at least one.
-    way_id, distance_m : numpy.ndarray, shape (N,)
-        Each point's way, and how far its centre line is.
-    received : sequence of (cell id, row, col, level_dbm)
-        The points at which each cell is received; they are among ``pixels``.
+    ``pixels`` are rows and columns of the points in the window, at least one. ``received`` are the
+    cell id, row, col and level_dbm of the points at which each cell is received, all among these.
     """
     size = (window.rows, window.cols)
     on_way = np.zeros(size, dtype=np.bool_)
@@ -177,7 +171,7 @@ class RadioRouteDatabase:
 
     @property
     def attribution(self) -> str:
-        """Whose map the roads come from; to be shown with every picture of it."""
+        """Attribution of the map that the roads come from; to be shown with every picture of it."""
         return str(self.manifest.get("attribution", ""))
 
     @cached_property
@@ -231,9 +225,8 @@ class RadioRouteDatabase:
 
         Returns
         -------
-        row, col : numpy.ndarray of int32, shape (N,)
+        row, col, level_dbm : numpy.ndarray, shape (N,)
             In row-major order.
-        level_dbm : numpy.ndarray of float32, shape (N,)
 
         Raises
         ------

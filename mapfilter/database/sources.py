@@ -22,7 +22,7 @@ from mapfilter.roads.lattice import RouteLattice
 _ALIGNED_PX = 1e-3
 
 RoutePart = RouteLattice | Callable[[], RouteLattice]
-"""The points of one tile, or what lays them; it can be sent to other processes."""
+"""The points of one tile, or a function that makes them in another process."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +33,7 @@ class LatticeRoutes:
 
     @property
     def lattice(self) -> Lattice:
-        """Where the points lie."""
+        """Lattice of the points."""
         return self.points.lattice
 
     def holds(self, window: Lattice) -> bool:

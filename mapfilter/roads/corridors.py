@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -257,8 +258,7 @@ def corridors(
     return Corridors(ways, sessions_each, half_width_m, tuple(notes))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Piece:
+class _Piece(NamedTuple):
     """A part of a session without gaps, sampled evenly: places, directions, weights."""
 
     session: int
@@ -320,16 +320,12 @@ def _sampled(session: int, place_m: Floats, accuracy_m: Floats, step_m: float) -
     at_m = np.linspace(0.0, length_m[-1], count)
     samples = np.column_stack([np.interp(at_m, length_m, axis) for axis in place_m.T])
     accuracy = np.interp(at_m, length_m, accuracy_m)
-    return _Piece(session, samples, _directions(samples), 1.0 / accuracy**2)
-
-
-def _directions(place_m: Floats) -> Floats:
-    """Return unit vectors along a line, shape (N, 2); (1, 0) where it turns on the spot."""
-    along = np.gradient(place_m, axis=0)
+    # Unit vectors along the line; (1, 0) where it turns on the spot.
+    along = np.gradient(samples, axis=0)
     length = np.hypot(*along.T)[:, None]
     unit: Floats = np.divide(along, length, out=np.zeros_like(along), where=length > 0)
     unit[length[:, 0] == 0, 0] = 1.0
-    return unit
+    return _Piece(session, samples, unit, 1.0 / accuracy**2)
 
 
 def _drawn_together(

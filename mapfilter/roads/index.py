@@ -53,14 +53,7 @@ class WayIndex:
         half_width_m: float = HALF_WIDTH_M,
         by_class_m: Mapping[str, float] | None = None,
     ) -> WayIndex:
-        """Index the segments of ways.
-
-        Parameters
-        ----------
-        half_width_m : float
-            How far from its centre line a point still belongs to a way.
-        by_class_m : mapping of str to float, optional
-            The same for some classes; 0 leaves the class out.
+        """Index the segments of ways; half widths as for :func:`route_lattice`.
 
         Raises
         ------
@@ -108,15 +101,10 @@ class WayIndex:
         return self._of_lines(self.ways, parts[line], self.way[segment[pair[line]]], by_code)
 
     def reaching(self, window: Lattice) -> tuple[Ints, Floats]:
-        """Return, of each pixel of a window, the nearest of the ways that it belongs to.
+        """Return, of each pixel of a window, the nearest way that it belongs to, and its distance.
 
-        Returns
-        -------
-        way : numpy.ndarray of int64, shape (rows, cols)
-            Index into ``ways``, -1 where none reaches the pixel's centre; of equally near ways the
-            one with the smallest id.
-        distance_m : numpy.ndarray, shape (rows, cols)
-            Infinite where ``way`` is -1.
+        Ways are indices into ``ways``, -1 where none reaches the pixel's centre: there the distance
+        is infinite. Of equally near ways it is the one with the smallest id.
         """
         size = (window.rows, window.cols)
         segment, distance_m = np.full(size, -1, dtype=np.int64), np.full(size, np.inf)
@@ -134,16 +122,7 @@ class WayIndex:
         return segment, distance_m
 
     def nearest(self, east_m: Floats, north_m: Floats) -> tuple[Ints, Floats]:
-        """Return the nearest way of each position, however far, and its distance.
-
-        Returns
-        -------
-        way : numpy.ndarray of int64, shape (N,)
-            Index into ``ways``, -1 when there are none; of equally near ways the one with the
-            smallest id.
-        distance_m : numpy.ndarray, shape (N,)
-            Infinite where ``way`` is -1.
-        """
+        """Return the nearest way of each position, however far, as :meth:`reaching` does."""
         way = np.full(east_m.size, -1, dtype=np.int64)
         distance = np.full(east_m.size, np.inf)
         if self.way.size and east_m.size:

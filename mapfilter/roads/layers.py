@@ -1,6 +1,6 @@
 """Roads, buildings and water from any vector file, such as a shapefile, GeoPackage or GeoJSON.
 
-Lines are ways; polygons in a layer of roads are areas where one can be, as squares are. A layer
+Lines are ways; polygons in a layer of roads are accessible areas, as squares are. A layer
 has no access rules: classes that must not be used are left out by a half width of 0.
 """
 

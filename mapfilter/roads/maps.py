@@ -188,11 +188,6 @@ def is_map(name_or_path: str | Path) -> bool:
 def resolve_map(name_or_path: str | Path) -> Path:
     """Return the file of a map given by path, or by the name of an embedded map.
 
-    Raises
-    ------
-    InputError
-        There is no such file, it is empty, or of another format.
-
     Examples
     --------
     >>> resolve_map("helsinki").name
@@ -248,11 +243,6 @@ def read_elements(
 
     Columns are ``id``, ``osm_type`` ("way" or "relation") and each tag of the query, an empty text
     where an element has no such tag.
-
-    Raises
-    ------
-    InputError
-        The map is missing, empty, cut off or of another format.
     """
     path = resolve_map(name_or_path)
     west, south, east, north = bounds_m

@@ -48,7 +48,7 @@ def read_routes(
     class_column: str | None = None,
     id_column: str | None = None,
 ) -> RouteLattice:
-    """Read roads and return the lattice points where one can be.
+    """Read roads and return the accessible lattice points.
 
     Parameters
     ----------
@@ -237,13 +237,10 @@ def route_lattice(
     Parameters
     ----------
     ways, squares, buildings
-        Of the lattice's area, in its CRS. Ways just outside count for points inside.
-    lattice : Lattice
-        Normally that of the radio rasters.
-    half_width_m : float
-        A point belongs to a way at most this far from its centre line; to the nearest of several.
-    half_width_by_class_m : mapping of str to float, optional
-        The same for some classes of way; 0 leaves the class out.
+        Of the lattice's area, in its CRS. Ways just outside count for points inside; of several
+        near a point it belongs to the nearest.
+    lattice, half_width_m, half_width_by_class_m
+        As for :func:`read_routes`.
     water : Water, optional
         Cut out except on ways that cross it and within their half width: where a way runs through
         water there is a bridge, a pier or a ford.
@@ -280,7 +277,7 @@ def route_lattice_from_landuse(
     Parameters
     ----------
     mask : numpy.ndarray of bool, shape (lattice.rows, lattice.cols)
-        Where one can be, such as ``LandUse.walkable``.
+        Accessible points, such as ``LandUse.walkable``.
     lattice : Lattice
         Of the mask.
     ways : Ways, optional

@@ -50,20 +50,10 @@ _SHP_LENGTH = slice(24, 28)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Features:
-    """What a layer holds in and about an area.
+    """N features of a layer, in and about an area, in the CRS asked for.
 
-    Parameters
-    ----------
-    name : str
-        The file, for messages.
-    geometry : numpy.ndarray of shapely geometries, shape (N,)
-        In two dimensions and the CRS asked for; they reach beyond the area.
-    number : numpy.ndarray of int64, shape (N,)
-        The features' own numbers in the file (FID), plus 1.
-    columns : mapping of str to numpy.ndarray of object, shape (N,)
-        The columns asked for.
-    notes : tuple of str
-        Numbers of features left out, and why.
+    ``name`` is the file, for messages; ``number`` are the features' own numbers in it (FID), plus
+    1; ``notes`` count features left out.
     """
 
     name: str
@@ -97,12 +87,8 @@ def read_layer(
     ----------
     source : path or GeoDataFrame
         A file, a zipped one, or a folder that is a file geodatabase; or a table in memory.
-    crs : str
-        Projected CRS of the result, in metres.
-    bounds_m : tuple of float
-        West, south, east, north of the area in ``crs``.
-    layer_name : str, optional
-        Needed where the file has several layers.
+    crs, bounds_m, layer_name
+        As for :func:`mapfilter.roads.layers.read_layer_roads`.
     wanted : sequence of str or None
         Columns to read beside the geometry; None are passed over.
     may_be_empty : bool

@@ -112,7 +112,7 @@ class Ways(_Layer):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Squares(_Layer):
-    """Areas where one may walk in any direction.
+    """Areas that are walked in any direction.
 
     Parameters
     ----------

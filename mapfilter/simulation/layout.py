@@ -83,7 +83,14 @@ def lay_out_plan(
     InputError
         The heights do not fit the lattice, or a cell would be none (such as an EIRP of 100 dBm).
     """
-    _check(sites, sectors, indoor, seed)
+    faults = Faults()
+    if sites < 0 or indoor < 0 or sites + indoor < 1:
+        faults.add("cells, sites and indoor", "at least one cell", f"{sites} and {indoor}")
+    if not 1 <= sectors <= _MOST_SECTORS:
+        faults.add("cells, sectors", f"1..{_MOST_SECTORS}", sectors)
+    if seed < 0:
+        faults.add("cells, seed", "a whole number ≥ 0", seed)
+    faults.raise_if_any(ConfigError)
     heights = None if heights_m is None else check_heights(heights_m, lattice)
     rng = np.random.default_rng(seed)
     masts = _masts(lattice, sites, heights, rng)
@@ -121,17 +128,6 @@ def lay_out_plan(
             penetration_loss_db=penetration_loss_db,
         )
     return CellPlan(lattice.crs, tuple(cells))
-
-
-def _check(sites: int, sectors: int, indoor: int, seed: int) -> None:
-    faults = Faults()
-    if sites < 0 or indoor < 0 or sites + indoor < 1:
-        faults.add("cells, sites and indoor", "at least one cell", f"{sites} and {indoor}")
-    if not 1 <= sectors <= _MOST_SECTORS:
-        faults.add("cells, sectors", f"1..{_MOST_SECTORS}", sectors)
-    if seed < 0:
-        faults.add("cells, seed", "a whole number ≥ 0", seed)
-    faults.raise_if_any(ConfigError)
 
 
 def _masts(
@@ -189,10 +185,19 @@ def _indoor_places(
     for place in _building_cores(lattice, heights) if count and heights is not None else []:
         if len(places) < count and all(np.hypot(*np.subtract(place, p)) > apart_m for p in places):
             places.append(place)
-    inside = _interior(lattice)
+    points = _candidates(lattice)
+    west, south, east, north = lattice.bounds_m
+    size_m = np.array([east - west, north - south])
+    off_m = np.abs(points - np.array([west + east, south + north]) / 2)
+    # Not near the edge of the area, where there is room.
+    interior = (off_m <= size_m / 2 - _INTERIOR * size_m).all(axis=1)
+    inside = points[interior] if interior.any() else points
     while len(places) < count:
         taken = [*masts, *places]
-        distance = cKDTree(taken).query(inside)[0] if taken else _edge_distance(lattice, inside)
+        if taken:
+            distance = cKDTree(taken).query(inside)[0]
+        else:
+            distance = np.minimum(inside - (west, south), (east, north) - inside).min(axis=1)
         east_m, north_m = inside[int(np.argmax(distance))]
         places.append((round(float(east_m), 2), round(float(north_m), 2)))
     return places
@@ -211,19 +216,3 @@ def _building_cores(lattice: Lattice, heights: Floats32) -> list[tuple[float, fl
         east_m, north_m = lattice.east_north(int(row) + top, int(col) + left)
         cores.append((float(east_m), float(north_m)))
     return cores
-
-
-def _interior(lattice: Lattice) -> Floats:
-    """Return the candidates that are not near the edge of the area."""
-    points = _candidates(lattice)
-    west, south, east, north = lattice.bounds_m
-    size_m = np.array([east - west, north - south])
-    off_m = np.abs(points - np.array([west + east, south + north]) / 2)
-    inside = (off_m <= size_m / 2 - _INTERIOR * size_m).all(axis=1)
-    return points[inside] if inside.any() else points
-
-
-def _edge_distance(lattice: Lattice, points: Floats) -> Floats:
-    west, south, east, north = lattice.bounds_m
-    across = np.minimum(points[:, 0] - west, east - points[:, 0])
-    return np.minimum(across, np.minimum(points[:, 1] - south, north - points[:, 1]))

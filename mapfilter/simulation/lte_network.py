@@ -25,7 +25,7 @@ _LEAST_DISTANCE_M = 10.0
 
 @dataclass(frozen=True, slots=True)
 class LteRadio:
-    """What all sectors have in common.
+    """Properties of all sectors and receivers of an LTE network.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def site_sinr_db(levels_dbm: Floats, noise_dbm: float) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class ArrivalModel:
-    """How a receiver measures times of arrival.
+    """Measurement of times of arrival by a receiver.
 
     Parameters
     ----------

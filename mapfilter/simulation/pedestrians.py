@@ -1,4 +1,4 @@
-"""Pedestrians who follow a gas that diffuses from where they are going.
+"""Pedestrians who follow a gas that diffuses from their destination.
 
 A source at the target gives off gas, which spreads between the houses and decays; nothing passes a
 wall. A pedestrian walks up the gradient: by the shortest way in the large, on smooth curves in the
@@ -32,7 +32,7 @@ class GasGround:
     Parameters
     ----------
     free : (rows, cols) array of bool
-        Where one can walk; what its largest connected part does not hold is left out.
+        Open ground; what its largest connected part does not hold is left out.
     reach_m : float
         L.
 

@@ -55,7 +55,7 @@ class SyntheticCity:
     bounds_m : tuple of float
         West, south, east, north.
     ways : Ways
-        All that one may walk along; one connected network.
+        All walkable ways; one connected network.
     water : Water
         The river; empty without one.
     parks : numpy.ndarray of shapely.Polygon
@@ -71,7 +71,7 @@ class SyntheticCity:
 
     @property
     def driving_ways(self) -> Ways:
-        """The ways that one may drive along."""
+        """The ways that are open to cars."""
         names = self.ways.class_names
         drivable = np.array([name in DRIVING_CLASSES for name in names], dtype=np.bool_)
         return self.ways.select(drivable[self.ways.way_class])

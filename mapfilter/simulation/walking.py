@@ -52,7 +52,7 @@ Beside = Annotated[float, Ge(0), Le(50)]
 
 @dataclass(frozen=True, slots=True)
 class WalkerModel(Options):
-    """How a walker differs from a point that moves along centre lines at constant speed.
+    """Differences of a walker from a point that moves along centre lines at constant speed.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class WalkerModel(Options):
         return self.beside in ("centre", 0)
 
     def offsets_m(self, along: Route) -> Floats:
-        """Return how far from the centre line one walks on each segment of a route."""
+        """Return the distance from the centre line on each segment of a route."""
         if isinstance(self.beside, str):
             by_class = [PAVEMENT_M.get(name, _OTHER_PAVEMENT_M) for name in along.class_names]
             width_m = np.array(by_class)[along.way_class]
@@ -110,8 +110,8 @@ def path_beside(
 
     The distance from the centre line follows the class of way and changes its sign where the
     street is crossed, both over about ten metres; corners are cut by as much. Where a building
-    stands on the pavement, one walks closer to the centre line. A walker on the centre line cuts no
-    corners.
+    stands on the pavement, the path is closer to the centre line. A walker on the centre line cuts
+    no corners.
 
     Parameters
     ----------

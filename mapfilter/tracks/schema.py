@@ -29,7 +29,7 @@ SATELLITE = r"[GRECJIS]\d{2}"
 """A satellite's name as in RINEX: the letter of its constellation and two digits."""
 
 PLACE = ("x_m", "y_m", "z_m")
-"""Where a satellite was, earth-centred."""
+"""Position of a satellite, earth-centred."""
 
 SERVING = "serving"
 NEIGHBOUR = "neighbour"
