@@ -18,7 +18,7 @@ from mapfilter.database.manifest import FORMAT, MANIFEST, POINTS, InputFile
 from mapfilter.database.parquet import Window, WindowReader, point_geometry
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.database.sources import overlap, pixels_between
+from mapfilter.database.sources import note_misaligned, overlap, pixels_between
 from mapfilter.database.store import open_database
 from mapfilter.database.tiles import (
     TileRows,
@@ -27,7 +27,7 @@ from mapfilter.database.tiles import (
     z_order,
 )
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 
 _PLACE = ("row", "col", "way_id", "way_class", "on_square", "distance_to_way_m")
@@ -238,16 +238,9 @@ def _check(
 
 
 def _note_misfit(first: RadioRouteDatabase, other: RadioRouteDatabase, faults: Faults) -> None:
-    a, b, where = first.lattice, other.lattice, f"{other.path}, compared with {first.path}"
+    where = f"{other.path}, compared with {first.path}"
     for name in ("margin_db", "floor_dbm"):
         if getattr(first, name) != getattr(other, name):
             expected = f"{name} {getattr(first, name):g}"
             faults.add(where, expected, f"{getattr(other, name):g}", "built with other parameters")
-    if not same_crs(a.crs, b.crs):
-        faults.add(where, f"one CRS ({a.crs})", b.crs)
-    elif abs(a.resolution_m - b.resolution_m) > 1e-6 * a.resolution_m:
-        faults.add(where, f"{a.resolution_m:g} m pixels", f"{b.resolution_m:g} m")
-    else:
-        shift = np.array([a.north_m - b.north_m, b.west_m - a.west_m]) / a.resolution_m
-        if np.abs(shift - shift.round()).max() > 1e-3:
-            faults.add(where, "pixels that align", "shifted pixels", "rasters of another lattice")
+    note_misaligned(first.lattice, other.lattice, where, "rasters of another lattice", faults)

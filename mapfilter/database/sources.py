@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from shapely import STRtree
 
 from mapfilter._types import Ints
-from mapfilter.errors import Faults, InputError
+from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.roads.index import AreaIndex, RouteSource, WayIndex
 from mapfilter.roads.lattice import RouteLattice
@@ -135,23 +135,28 @@ Routes = LatticeRoutes | LayerRoutes
 
 def check_aligned(raster: Lattice, lattice: Lattice, where: str) -> None:
     """Check that a route lattice lies on the pixels of the rasters, and overlaps them."""
-    faults, hint = Faults(), "make the route lattice on the rasters' lattice"
-    if not same_crs(raster.crs, lattice.crs):
-        faults.add(where, f"one CRS ({raster.crs})", lattice.crs, "files of different zones")
-    elif abs(raster.resolution_m - lattice.resolution_m) > 1e-6 * raster.resolution_m:
-        got = f"{raster.resolution_m:g} m and {lattice.resolution_m:g} m"
-        faults.add(where, "one resolution", got, hint)
+    faults = Faults()
+    note_misaligned(
+        raster, lattice, where, "make the route lattice on the rasters' lattice", faults
+    )
     faults.raise_if_any(InputError)
-    down = (raster.north_m - lattice.north_m) / raster.resolution_m
-    right = (lattice.west_m - raster.west_m) / raster.resolution_m
-    row, col = round(down), round(right)
-    if max(abs(down - row), abs(right - col)) > _ALIGNED_PX:
-        got = f"shifted by {right - col:+.3f} and {down - row:+.3f} pixels"
-        faults.add(where, "pixels that align", got, f"half-pixel convention; {hint}")
-    elif overlap(raster, lattice, (0, 0, raster.rows, raster.cols)) is None:
+    if overlap(raster, lattice, (0, 0, raster.rows, raster.cols)) is None:
         got = f"rasters {_box(raster)}, roads {_box(lattice)}"
-        faults.add(where, "areas that overlap", got, "files of different areas")
-    faults.raise_if_any(InputError)
+        raise fail(InputError, where, "areas that overlap", got, "files of different areas")
+
+
+def note_misaligned(a: Lattice, b: Lattice, where: str, hint: str, faults: Faults) -> None:
+    """Note where two lattices differ in CRS or resolution, or are shifted by parts of a pixel."""
+    down, right = (a.north_m - b.north_m) / a.resolution_m, (b.west_m - a.west_m) / a.resolution_m
+    off_px = right - round(right), down - round(down)
+    if not same_crs(a.crs, b.crs):
+        faults.add(where, f"one CRS ({a.crs})", b.crs, "files of different zones")
+    elif abs(a.resolution_m - b.resolution_m) > 1e-6 * a.resolution_m:
+        got = f"{a.resolution_m:g} m and {b.resolution_m:g} m"
+        faults.add(where, "one resolution", got, hint)
+    elif max(abs(off_px[0]), abs(off_px[1])) > _ALIGNED_PX:
+        got = f"shifted by {off_px[0]:+.3f} and {off_px[1]:+.3f} pixels"
+        faults.add(where, "pixels that align", got, f"half-pixel convention; {hint}")
 
 
 def pixels_between(lattice: Lattice, other: Lattice) -> tuple[int, int]:

@@ -44,12 +44,8 @@ def read_buildings(
 
     Parameters
     ----------
-    path : str or Path
-        An ``.osm.pbf``, ``.osm`` or ``.osm.gz`` file, or the name of an embedded map ("helsinki").
-    crs : str
-        Projected CRS of the result, in metres.
-    bounds_m : tuple of float
-        West, south, east, north of the area in ``crs``. Footprints are not cut at its edge.
+    path, crs, bounds_m
+        As for :func:`mapfilter.roads.osm.read_ways`; footprints are not cut at the area's edge.
     default_height_m, storey_height_m : float
         Heights (m) of buildings without their own.
 

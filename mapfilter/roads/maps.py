@@ -10,7 +10,7 @@ import gzip
 import tempfile
 import warnings
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -262,7 +262,7 @@ def read_elements(
 def check_on_map(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> None:
     """Raise InputError where a box in metres does not overlap the box in the map's header."""
     header = _header_bounds_deg(resolve_map(name_or_path))
-    if header is not None and not _overlap(box_deg(crs, bounds_m), header):
+    if header is not None and not boxes_overlap(box_deg(crs, bounds_m), header):
         raise nothing_there(name_or_path, crs, bounds_m)
 
 
@@ -270,9 +270,9 @@ def nothing_there(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> Mapfi
     """Return the error for an area in which the map has no ways, with the likely mistake."""
     area, covered = box_deg(crs, bounds_m), map_bounds_deg(name_or_path)
     hint = "the area lies outside the map; name another, or none where other files replace it"
-    if _overlap((area[1], area[0], area[3], area[2]), covered):
+    if boxes_overlap((area[1], area[0], area[3], area[2]), covered):
         hint = "longitude and latitude swapped"
-    elif _overlap(area, covered):
+    elif boxes_overlap(area, covered):
         hint = "the map holds no ways there: cut from a larger one by tags?"
     numbers = ", ".join(f"{value:.4f}" for value in area)
     extent = ", ".join(f"{value:.4f}" for value in covered)
@@ -336,5 +336,6 @@ def _read(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | None:
     return GeoDataFrame(found, geometry="geometry", crs="EPSG:4326")
 
 
-def _overlap(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
+def boxes_overlap(a: Sequence[float], b: Sequence[float]) -> bool:
+    """Return whether two boxes west, south, east, north have an area in common."""
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]

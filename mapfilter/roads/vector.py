@@ -24,7 +24,7 @@ from shapely.errors import GEOSException
 
 from mapfilter._types import Ints
 from mapfilter.errors import InputError, MapfilterError, fail
-from mapfilter.roads.maps import box_deg
+from mapfilter.roads.maps import box_deg, boxes_overlap
 from mapfilter.roads.ways import Bounds, Geometries, on_earth
 
 T = TypeVar("T")
@@ -246,7 +246,7 @@ def _nothing_there(
         west, south, east, north = box_deg(crs, bounds_m)
         if np.any(np.abs(covered) > (_MOST_DEG, 90.0, _MOST_DEG, 90.0)):
             hint = "a CRS in degrees with other numbers: another CRS left out on export"
-        elif south < covered[2] and covered[0] < north and west < covered[3] and covered[1] < east:
+        elif boxes_overlap((south, west, north, east), covered):
             hint = "longitude and latitude swapped"
     expected = f"features in the area; the layer covers {_numbers(covered)}"
     return fail(InputError, where, expected, "none", hint)

@@ -116,8 +116,6 @@ class Squares(_Layer):
 
     Parameters
     ----------
-    crs : str
-        Projected CRS, in metres.
     area_id : numpy.ndarray of int64, shape (N,)
         The map's own numbers; those of multipolygon relations are negative.
     geometry : numpy.ndarray of shapely.Polygon, shape (N,)
@@ -138,8 +136,6 @@ class Buildings(_Layer):
 
     Parameters
     ----------
-    crs : str
-        Projected CRS, in metres.
     footprints : numpy.ndarray of shapely.Polygon, shape (N,)
         Their ground plans.
     height_m : numpy.ndarray of float64, shape (N,)
@@ -179,12 +175,7 @@ class Buildings(_Layer):
 class Water(_Layer):
     """Water, which is crossed on bridges only.
 
-    Parameters
-    ----------
-    crs : str
-        Projected CRS, in metres.
-    geometry : numpy.ndarray of shapely.Polygon, shape (N,)
-        Rivers, lakes and seas; holes (islands) are not part of them.
+    Its polygons are rivers, lakes and seas; holes (islands) are not part of them.
     """
 
     crs: str

@@ -27,16 +27,8 @@ _LEAST_DISTANCE_M = 10.0
 class LteRadio:
     """Properties of all sectors and receivers of an LTE network.
 
-    Parameters
-    ----------
-    power_dbm : float
-        Of a sector.
-    gain_dbi : float
-        Of its antenna, at boresight.
-    beamwidth_deg, front_to_back_db : float
-        Of its horizontal pattern.
-    noise_figure_db : float
-        Of receivers.
+    Antenna gain is at boresight; beamwidth and front-to-back ratio are of the horizontal pattern.
+    The noise figure is that of receivers.
     """
 
     power_dbm: float = 43.0

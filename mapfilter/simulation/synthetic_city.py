@@ -48,12 +48,10 @@ _CHURCH_M = (13.0, 30.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SyntheticCity:
-    """An invented city.
+    """An invented city within ``bounds_m``: west, south, east, north.
 
     Parameters
     ----------
-    bounds_m : tuple of float
-        West, south, east, north.
     ways : Ways
         All walkable ways; one connected network.
     water : Water
@@ -172,12 +170,10 @@ def manhattan(
     ----------
     lattice : Lattice
         The area; the first streets to the east and north run along its western and southern edge.
-    block_m : float
-        Side of a block, which is one house.
+    block_m, height_m : float
+        Side and height of a block, which is one house.
     street_m : tuple of float
         Width of the streets that run east-west, and of those that run north-south.
-    height_m : float
-        Of all houses.
 
     Raises
     ------
