@@ -24,7 +24,7 @@ from mapfilter.roads.ways import Ways
 
 Place = tuple[float, float]
 
-CORRIDOR_CLASS = "corridor"
+_CLASS = "corridor"
 CORRIDOR_HALF_WIDTH_M = 15.0
 MAX_ACCURACY_M = 50.0
 MAX_GAP_M = 100.0
@@ -244,15 +244,11 @@ def corridors(
         expected = f"a way of at least {half_width_m:g} m that {min_sessions} sessions went along"
         raise fail(InputError, "tracks", expected, "none")
     middle = np.array([line[len(line) // 2] for line in lines])
-    count = len(lines)
-    ways = Ways(
+    ways = Ways.open(
         crs,
-        np.arange(1, count + 1, dtype=np.int64),
-        np.zeros(count, dtype=np.int16),
-        (CORRIDOR_CLASS,),
+        np.arange(1, len(lines) + 1, dtype=np.int64),
+        np.full(len(lines), _CLASS, dtype=object),
         np.array([shapely.LineString(line) for line in lines], dtype=object),
-        np.zeros(count, dtype=np.bool_),
-        np.zeros(count, dtype=np.int8),
     )
     sessions_each = _sessions_near(middle, measured, of_session, half_width_m)
     return Corridors(ways, sessions_each, half_width_m, tuple(notes))

@@ -89,20 +89,10 @@ def read_layer_roads(
     order = np.argsort(number[origin], kind="stable")
     lines, origin = lines[order], origin[order]
     words = _classes(found.column(class_column), len(number))
-    names, codes = np.unique(words[origin].astype(str), return_inverse=True)
     areas, of_area = polygons_inside(found.geometry, bounds_m, cut=True)
     if not (origin.size or of_area.size):
         raise fail(InputError, found.name, "lines or polygons in the area", found.kinds)
-    none = np.zeros(origin.size, dtype=np.int8)
-    ways = Ways(
-        crs,
-        number[origin],
-        codes.astype(np.int16),
-        tuple(str(name) for name in names),
-        lines,
-        none.astype(bool),
-        none,
-    )
+    ways = Ways.open(crs, number[origin], words[origin], lines)
     squares = Squares(crs, number[of_area], areas)
     return LayerRoads(ways, squares, tuple(map(str, words[of_area])), found.notes)
 

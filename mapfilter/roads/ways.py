@@ -90,12 +90,20 @@ class Ways(_Layer):
         faults.raise_if_any(InputError)
 
     @classmethod
+    def open(
+        cls, crs: str, way_id: Ints, classes: NDArray[np.object_], geometry: Geometries
+    ) -> Ways:
+        """Return ways that are neither covered nor one-way; classes are given in words."""
+        names, codes = np.unique(classes.astype(str), return_inverse=True)
+        flag = np.zeros(way_id.size, dtype=np.int8)
+        words = tuple(str(name) for name in names)
+        return cls(crs, way_id, codes.astype(np.int16), words, geometry, flag.astype(bool), flag)
+
+    @classmethod
     def none(cls, crs: str) -> Ways:
         """Return no ways."""
-        number = np.empty(0, dtype=np.int64)
-        lines = np.empty(0, dtype=object)
-        code, flag = number.astype(np.int16), number.astype(np.bool_)
-        return cls(crs, number, code, (), lines, flag, number.astype(np.int8))
+        nothing = np.empty(0, dtype=object)
+        return cls.open(crs, np.empty(0, dtype=np.int64), nothing, nothing)
 
     def select(self, which: Any, geometry: Geometries | None = None) -> Ways:
         """Return the ways chosen by a mask or by indices, with other lines where given."""
