@@ -250,7 +250,7 @@ def _aside(function: Callable[[], str]) -> Future[str]:
 
 
 def check_parameters(margin_db: float, floor_dbm: float, tile_px: int) -> None:
-    """Check the ranges of the parameters."""
+    """Raise InputError with every parameter that is out of range."""
     faults = Faults()
     if not (np.isfinite(margin_db) and margin_db >= 0):
         faults.add("margin_db", "dB >= 0", margin_db)

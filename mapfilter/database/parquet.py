@@ -143,17 +143,10 @@ def dictionary(codes: NDArray[Any], names: tuple[str, ...]) -> pa.Array:
 
 
 class WindowReader:
-    """Rows of some parts within windows, columns as asked.
+    """Reads some columns, among them ``row`` and ``col``, of a database's parts by windows.
 
     Points lie along a space-filling curve, so a row group covers a small area. Groups of the window
     that was read last are kept, as its neighbour needs most of them again.
-
-    Parameters
-    ----------
-    columns : sequence of str
-        Among them ``row`` and ``col``.
-    lattice : Lattice
-        The database's.
     """
 
     def __init__(self, parts: Sequence[Path], columns: Sequence[str], lattice: Lattice) -> None:

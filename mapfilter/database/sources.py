@@ -16,7 +16,7 @@ from shapely import STRtree
 from mapfilter._types import Ints
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, same_crs
-from mapfilter.roads.index import AreaIndex, RouteSource, WayIndex
+from mapfilter.roads.index import RouteSource, WayIndex, areas_near
 from mapfilter.roads.lattice import RouteLattice
 
 _ALIGNED_PX = 1e-3
@@ -84,18 +84,17 @@ class LayerRoutes:
     def holds(self, window: Lattice) -> bool:
         """Return whether a way or a square is near a window."""
         squares = self.layers.squares
-        on_square = squares is not None and squares.near(window).size > 0
+        on_square = squares is not None and areas_near(squares, window).size > 0
         return on_square or self.layers.ways.segments_near(window).size > 0
 
     def part(self, window: Lattice) -> Callable[[], RouteLattice]:
         """Return what lays the points of a window: the same as of the whole layers."""
         layers = self.layers
         squares, buildings, water = (
-            AreaIndex.of(areas.near(window)) if areas is not None else None
+            STRtree(areas_near(areas, window)) if areas is not None else None
             for areas in (layers.squares, layers.buildings, layers.water)
         )
-        if squares is not None and not squares.geometry.size:
-            squares = None
+        squares = squares if squares is not None and len(squares) else None
         near = RouteSource(
             layers.crs,
             _ways_near(layers.ways, window, far=squares is not None),
@@ -113,7 +112,7 @@ class LayerRoutes:
         inside = shapely.intersection(ways.tree.geometries[near], box)
         area = float((shapely.length(inside) * 2 * ways.half_width_m[near]).sum())
         if self.layers.squares is not None:
-            valid = shapely.make_valid(self.layers.squares.near(window))
+            valid = shapely.make_valid(areas_near(self.layers.squares, window))
             area += float(shapely.area(shapely.intersection(valid, box)).sum())
         return area
 
@@ -121,7 +120,7 @@ class LayerRoutes:
         """Return a checksum of the layers."""
         layers, ways = self.layers, self.layers.ways
         areas = [
-            shapely.to_wkb(area.geometry).tolist() if area is not None else None
+            shapely.to_wkb(area.geometries).tolist() if area is not None else None
             for area in (layers.squares, layers.buildings, layers.water)
         ]
         parts = (ways.ends_m, ways.half_width_m, ways.ways.way_id[ways.way])

@@ -293,21 +293,16 @@ def _pieces(
     gaps = np.flatnonzero(np.hypot(*np.diff(place_m, axis=0).T) > max_gap_m) + 1
     pieces, aside = [], int((~good).sum())
     for part in np.split(np.arange(len(place_m)), gaps):
-        kept = part[_moving(place_m[part], step_m)]
+        # Positions at least a step from the last one kept: none of standing still.
+        kept: list[int] = []
+        for i in part.tolist():
+            if not kept or np.hypot(*(place_m[i] - place_m[kept[-1]])) >= step_m:
+                kept.append(i)
         if len(kept) < 2:
             aside += len(part)
             continue
         pieces.append(_sampled(session, place_m[kept], accuracy_m[kept], step_m))
     return pieces, aside
-
-
-def _moving(place_m: Floats, step_m: float) -> Ints:
-    """Return the positions that are a step from the last one taken: none of standing still."""
-    taken: list[int] = []
-    for i, place in enumerate(place_m):
-        if not taken or np.hypot(*(place - place_m[taken[-1]])) >= step_m:
-            taken.append(i)
-    return np.array(taken, dtype=np.int64)
 
 
 def _sampled(session: int, place_m: Floats, accuracy_m: Floats, step_m: float) -> _Piece:

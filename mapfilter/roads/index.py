@@ -143,40 +143,24 @@ def _note_half_widths(faults: Faults, half_width_m: float, by_class_m: Mapping[s
             faults.add(f"half_width_by_class_m, {name}", "metres >= 0", width_m)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class AreaIndex:
-    """Polygons in a search tree, to burn those of a tile."""
-
-    geometry: Geometries
-    tree: STRtree
-
-    @classmethod
-    def of(cls, geometry: Geometries) -> AreaIndex:
-        """Index polygons."""
-        return cls(geometry, STRtree(geometry))
-
-    def near(self, window: Lattice) -> Geometries:
-        """Return the polygons about a window, in their order."""
-        near = np.sort(self.tree.query(shapely.box(*window.bounds_m)))
-        return np.asarray(self.geometry[near])
-
-    def mask(self, window: Lattice) -> Bools:
-        """Return which pixel centres of a window lie in a polygon, shape (rows, cols)."""
-        return burn(((shape, 1) for shape in self.near(window)), window, "uint8").astype(bool)
+def areas_near(areas: STRtree, window: Lattice) -> Geometries:
+    """Return the polygons about a window, in their order."""
+    near = np.sort(areas.query(shapely.box(*window.bounds_m)))
+    return np.asarray(areas.geometries[near])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RouteSource:
-    """Layers of a route lattice, ready for any of its tiles; it can be sent to other processes.
+    """Indexed layers of a route lattice, for any of its tiles; it can be sent to other processes.
 
     ``bridges`` are the parts of the ways that lie in the water, which stay.
     """
 
     crs: str
     ways: WayIndex
-    squares: AreaIndex | None
-    buildings: AreaIndex | None
-    water: AreaIndex | None
+    squares: STRtree | None
+    buildings: STRtree | None
+    water: STRtree | None
     bridges: WayIndex | None
 
     @classmethod
@@ -206,9 +190,9 @@ class RouteSource:
         return cls(
             crs,
             index,
-            AreaIndex.of(squares.geometry) if squares else None,
-            AreaIndex.of(buildings.footprints) if buildings else None,
-            AreaIndex.of(water.geometry) if water else None,
+            STRtree(squares.geometry) if squares else None,
+            STRtree(buildings.footprints) if buildings else None,
+            STRtree(water.geometry) if water else None,
             index.inside(water.geometry) if water else None,
         )
 
@@ -218,7 +202,7 @@ class RouteSource:
         way, distance_m = self.ways.reaching(window)
         allowed = ((way >= 0) | on_square) & ~_mask(self.buildings, window)
         if self.water is not None and self.bridges is not None:
-            wet = self.water.mask(window)
+            wet = _mask(self.water, window)
             if np.any(wet & allowed):
                 allowed &= ~wet | (self.bridges.reaching(window)[0] >= 0)
         return described(allowed, window, on_square, self.ways, (way, distance_m), SQUARE_CLASS)
@@ -282,10 +266,10 @@ def described(
     )
 
 
-def _mask(areas: AreaIndex | None, window: Lattice) -> Bools:
-    if areas is None:
-        return np.zeros((window.rows, window.cols), dtype=np.bool_)
-    return areas.mask(window)
+def _mask(areas: STRtree | None, window: Lattice) -> Bools:
+    """Return which pixel centres of a window lie in a polygon, shape (rows, cols)."""
+    near = np.empty(0) if areas is None else areas_near(areas, window)
+    return burn(((shape, 1) for shape in near), window, "uint8").astype(bool)
 
 
 @njit(cache=True)

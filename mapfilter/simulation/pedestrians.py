@@ -59,12 +59,8 @@ class GasGround:
         number[self.free] = np.arange(len(self._cell))
         self._number = number
         below, right = self.free[:-1] & self.free[1:], self.free[:, :-1] & self.free[:, 1:]
-        pairs = np.hstack(
-            [
-                [number[:-1][below], number[1:][below]],
-                [number[:, :-1][right], number[:, 1:][right]],
-            ]
-        )
+        down = [number[:-1][below], number[1:][below]]
+        pairs = np.hstack([down, [number[:, :-1][right], number[:, 1:][right]]])
         size = len(self._cell)
         loss = np.bincount(pairs.ravel(), minlength=size) + (lattice.resolution_m / reach_m) ** 2
         row = np.concatenate([pairs[0], pairs[1], np.arange(size)])
@@ -140,15 +136,8 @@ def gas_walk(
 ) -> Floats:
     """Draw a walk from a random place to random targets, one after another.
 
-    Parameters
-    ----------
-    steps : int
-        Epochs; the first one is one interval after the start.
-
-    Returns
-    -------
-    (steps, 2) array
-        East and north.
+    Positions, of shape (steps, 2), are one interval apart; the first one is an interval after the
+    start.
 
     Raises
     ------
