@@ -25,6 +25,7 @@ from mapfilter.models.motion import clock_noise
 from mapfilter.options import NotNegative, Options, Positive, Share
 from mapfilter.simulation.journeys import ticks_s
 from mapfilter.tracks.satellites import sent_from_m
+from mapfilter.tracks.schema import PLACE
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,16 +233,14 @@ def receive(
     hour = max(int(3600 / model.period_s), 1)
     usable = _over_horizon(almanac.usable(), week, tow_s[count // 2 % hour :: hour], frame, model)
     clock_m = _clock_m(count, model, rng)
-    white = rng.standard_normal((count, len(usable.names)))
-    echo = multipath_bias_m(
-        gone_m, len(usable.names), rng, mean_m=1.0, correlation_m=model.echo_memory_m
-    )
-    slots = int(tick_s[-1] // model.hold_s) - int(tick_s[0] // model.hold_s) + 1
-    order = rng.random((slots, len(usable.names)))
+    every = range(len(usable.names))
+    white = rng.standard_normal((count, len(every)))
+    memory_m = model.echo_memory_m
+    echo = multipath_bias_m(gone_m, len(every), rng, mean_m=1.0, correlation_m=memory_m)
+    slot = (tick_s // model.hold_s - tick_s[0] // model.hold_s).astype(int)
+    order = rng.random((int(slot[-1]) + 1, len(every)))
     there = _ecef(crs, place, up_m)
-    satellites = np.stack(
-        [_places(usable, index, week, tow_s, there) for index in range(len(usable.names))], axis=1
-    )
+    satellites = np.stack([_places(usable, i, week, tow_s, there) for i in every], axis=1)
     seen = directions(frame.local.to_local(satellites), frame.local.to_local(there)[:, None])
     open_sky, echo_m = _sky(seen, place, skyline, frame, model)
     range_m = np.linalg.norm(satellites - there[:, None], axis=2)
@@ -262,20 +261,14 @@ def receive(
         on = (tick_s >= spoofer.from_s) & (tick_s < spoofer.from_s + spoofer.lasts_s)
         false_m = false_m + (clock_m + spoofer.clock_m)[:, None] + sigma_m * white
         measured_m = np.where(on[:, None], false_m, measured_m)
-    if model.choice == "highest":
-        prefer = seen.elevation_rad
-    else:
-        prefer = order[(tick_s // model.hold_s - tick_s[0] // model.hold_s).astype(int)]
-    received = _received(audible, prefer, model.most)
-    row, column = np.nonzero(received)
+    prefer = seen.elevation_rad if model.choice == "highest" else order[slot]
+    row, column = np.nonzero(_received(audible, prefer, model.most))
     return pd.DataFrame(
         {
             "time_s": tick_s[row],
             "satellite": np.array(usable.names, dtype=object)[column],
             "pseudorange_m": measured_m[row, column],
-            "x_m": satellites[row, column, 0],
-            "y_m": satellites[row, column, 1],
-            "z_m": satellites[row, column, 2],
+            **dict(zip(PLACE, satellites[row, column].T, strict=True)),
         }
     )
 
@@ -320,7 +313,7 @@ def _sky(
     frame: GridFrame,
     model: ReceptionModel,
 ) -> tuple[Bools, Floats]:
-    """Return who is seen at each epoch, (K, S), and how large echoes are, (K,)."""
+    """Return which satellites are in sight at each epoch, (K, S), and the mean of echoes, (K,)."""
     above = seen.above(model.mask_deg)
     if skyline is None:
         return above, np.zeros(len(place))
