@@ -19,6 +19,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from math import isfinite
 
 _MAX_SHOWN = 20
 _MAX_ALIKE = 3
@@ -93,6 +94,12 @@ class Faults:
     def add(self, where: str, expected: str, got: object, hint: str = "") -> None:
         """Note one fault."""
         self.found.append(Fault(where, expected, str(got), hint))
+
+    def check_positive(self, where: str, unit: str, **values: float) -> None:
+        """Note each value that is no finite number > 0; its place is ``where`` and its name."""
+        for name, value in values.items():
+            if not (isfinite(value) and value > 0):
+                self.add(f"{where}{name}", f"{unit} > 0", value)
 
     def raise_if_any(self, kind: type[MapfilterError]) -> None:
         """Raise ``kind`` with every fault noted so far, or return when there is none."""

@@ -16,7 +16,7 @@ from mapfilter.errors import InputError, listed
 from mapfilter.geodesy import Lattice, project, projected_crs, same_crs, unproject, utm_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
-from mapfilter.roads.maps import box_deg, map_bounds_deg
+from mapfilter.roads.maps import box_deg, boxes_overlap, map_bounds_deg
 from mapfilter.roads.ways import Ways
 from mapfilter.workflows.world import area_lattice, outside_m
 
@@ -42,11 +42,13 @@ def check_rasters_place(rasters: RxLevRasters, config: Config, findings: Finding
             return False
     box = box_deg(lattice.crs, lattice.bounds_m)
     wanted_box = _area_box(area)
-    if _overlap(box, wanted_box):
+    if boxes_overlap(box, wanted_box):
         return True
     seen = f"The rasters cover {_shown(box)}, the area {_shown(wanted_box)} (degrees)."
     for crs in _other_systems(wanted_box):
-        if not same_crs(crs, lattice.crs) and _overlap(box_deg(crs, lattice.bounds_m), wanted_box):
+        if not same_crs(crs, lattice.crs) and boxes_overlap(
+            box_deg(crs, lattice.bounds_m), wanted_box
+        ):
             evidence = f"{seen} As numbers of {crs} instead of {lattice.crs} they would overlap."
             findings.add("crs-mixed", where, evidence)
             return False
@@ -128,10 +130,6 @@ def _area_box(area: Area) -> BoxDeg:
         lattice = area_lattice(area)
         return box_deg(lattice.crs, lattice.bounds_m)
     return map_bounds_deg(area.map)
-
-
-def _overlap(a: BoxDeg, b: BoxDeg) -> bool:
-    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
 def _inside(east: Floats, north: Floats, lattice: Lattice) -> Bools:
