@@ -9,8 +9,10 @@ from mapfilter.models.gaussian import stack
 from mapfilter.models.motion import constant_velocity
 from mapfilter.models.ranging import position_fix, pseudoranges, timing_advances
 from mapfilter.models.signal_strength import levels
-from mapfilter.models.state import MOVING, MOVING_CLOCK
+from mapfilter.models.state import MOVING, MOVING_CLOCK, StateLayout
 
+# East, north, up and the clock's bias, each followed by its rate.
+MOVING_3D, MOVING_CLOCK_3D = StateLayout(6, 0, 2, 4), StateLayout(8, 0, 2, 4, 6)
 CASES = json.loads((Path(__file__).parent / "fusion_cases.json").read_text(encoding="utf-8"))
 LAYOUT = CASES["fk_layout"]
 PHI = np.array(CASES["fk_process"]["Phi"])

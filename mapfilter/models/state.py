@@ -75,12 +75,6 @@ MOVING = StateLayout(4, 0, 2)
 MOVING_CLOCK = StateLayout(6, 0, 2, clock=4)
 """East, its rate, north, its rate, clock bias, clock drift (Fritsche & Klein 2009, eq. 8)."""
 
-MOVING_3D = StateLayout(6, 0, 2, 4)
-"""East, north and up, each followed by its rate."""
-
-MOVING_CLOCK_3D = StateLayout(8, 0, 2, 4, 6)
-"""East, north, up and clock bias, each followed by its rate."""
-
 
 ReadingT = TypeVar("ReadingT")
 

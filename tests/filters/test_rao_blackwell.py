@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from fusion_world import MOVING_CLOCK_3D
 
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.filters import kalman
@@ -12,7 +13,7 @@ from mapfilter.models.gaussian import stack
 from mapfilter.models.motion import clock_motion, constant_velocity, random_walk, together
 from mapfilter.models.ranging import position_fix, pseudoranges, range_differences
 from mapfilter.models.signal_strength import levels
-from mapfilter.models.state import MOVING_CLOCK, MOVING_CLOCK_3D, POSITION_CLOCK_3D, StateLayout
+from mapfilter.models.state import MOVING_CLOCK, POSITION_CLOCK_3D, StateLayout
 from mapfilter.positioning.kalman.models import compiled
 
 AWAY = np.array(

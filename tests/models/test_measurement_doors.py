@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from fusion_world import MOVING_3D, MOVING_CLOCK_3D
 
 from mapfilter.errors import InputError
 from mapfilter.models.gaussian import stack
@@ -20,9 +21,7 @@ from mapfilter.models.ranging import (
 from mapfilter.models.signal_strength import levels, sampled_pattern
 from mapfilter.models.state import (
     MOVING,
-    MOVING_3D,
     MOVING_CLOCK,
-    MOVING_CLOCK_3D,
     POSITION,
     POSITION_CLOCK_3D,
     StateLayout,

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from fusion_world import CASES, LAYOUT, hybrid, zhang
+from fusion_world import CASES, LAYOUT, MOVING_3D, MOVING_CLOCK_3D, hybrid, zhang
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -22,9 +22,7 @@ from mapfilter.models.ranging import (
 from mapfilter.models.signal_strength import levels, sampled_pattern
 from mapfilter.models.state import (
     MOVING,
-    MOVING_3D,
     MOVING_CLOCK,
-    MOVING_CLOCK_3D,
     POSITION,
     POSITION_CLOCK_3D,
     GaussianMeasurement,
