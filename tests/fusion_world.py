@@ -19,6 +19,21 @@ PHI = np.array(CASES["fk_process"]["Phi"])
 Q = np.array(CASES["fk_process"]["GQGt_filter"])
 
 
+def log_density(model, state, reading):
+    """Log density of a reading in states, by the covariance's inverse; NaN components are absent."""
+    present = np.isfinite(reading)
+    off = (reading - model.mean(state))[..., present]
+    noise = 2 * np.pi * model.covariance()[np.ix_(present, present)]
+    square = np.einsum("...i,ij,...j->...", off, 2 * np.pi * np.linalg.inv(noise), off)
+    return -0.5 * (square + np.linalg.slogdet(noise)[1])
+
+
+def information(model, state):
+    """Fisher information of a reading in states."""
+    slope = model.jacobian(state)
+    return np.swapaxes(slope, -1, -2) @ np.linalg.solve(model.covariance(), slope)
+
+
 def hybrid(satellites):
     """Pseudoranges, timing advance and levels of Fritsche & Klein (2009)."""
     state = MOVING_CLOCK if satellites else MOVING

@@ -32,10 +32,7 @@ from mapfilter.models.state import StateLayout
 from mapfilter.models.terms import COMPONENT, DIFFERENCE, RANGE
 
 GSM_STEP_M = SPEED_OF_LIGHT_MPS * 48 / 13 * 1e-6 / 2
-"""About 553 m."""
-
-LTE_STEP_M = SPEED_OF_LIGHT_MPS * 16 / 30.72e6 / 2
-"""About 78 m."""
+"""About 553 m; in LTE a step is 78.1 m."""
 
 
 def pseudoranges(layout: StateLayout, satellites_m: ArrayLike, sigma_m: ArrayLike) -> GaussianTerms:
@@ -143,8 +140,6 @@ def timing_advances(
     >>> from mapfilter.models.state import POSITION
     >>> timing_advances(POSITION, [[300.0, 400.0]], 300.0).mean([0.0, 0.0]).tolist()
     [500.0]
-    >>> round(GSM_STEP_M, 1), round(LTE_STEP_M, 1)
-    (553.5, 78.1)
     """
     faults = Faults()
     sites = places("sites_m", sites_m, faults)
@@ -153,17 +148,6 @@ def timing_advances(
         faults.add("step_m", "metres >= 0", step_m)
     rows = terms(layout, RANGE, sites)
     return independent(faults, layout, rows, sigma, "timing advance", step_m)
-
-
-def metres_of_steps(steps: ArrayLike, step_m: float = GSM_STEP_M) -> np.ndarray:
-    """Return the middle of the distances that a reported timing advance covers.
-
-    Examples
-    --------
-    >>> metres_of_steps([0, 2]).round(1).tolist()
-    [276.7, 1383.7]
-    """
-    return (np.asarray(steps, dtype=np.float64) + 0.5) * step_m
 
 
 def position_fix(layout: StateLayout, covariance_m2: ArrayLike) -> GaussianTerms:

@@ -117,7 +117,7 @@ def test_levels_and_one_satellite_against_a_grid():
     for k, value in enumerate(bias):
         state = np.stack([east, north, np.full(east.shape, value)], axis=-1)
         prior = -0.5 * np.sum((state - mean) ** 2 / np.diagonal(covariance), axis=-1)
-        log_density[..., k] = prior + both.log_likelihood(state, reading)
+        log_density[..., k] = prior + log_density(both, state, reading)
     density = np.exp(log_density - log_density.max())
     density /= density.sum()
     told = np.array(
