@@ -19,8 +19,8 @@ PHI = np.array(CASES["fk_process"]["Phi"])
 Q = np.array(CASES["fk_process"]["GQGt_filter"])
 
 
-def log_density(model, state, reading):
-    """Log density of a reading in states, by the covariance's inverse; NaN components are absent."""
+def log_likelihood(model, state, reading):
+    """Log density of a reading in states; NaN components are absent."""
     present = np.isfinite(reading)
     off = (reading - model.mean(state))[..., present]
     noise = 2 * np.pi * model.covariance()[np.ix_(present, present)]

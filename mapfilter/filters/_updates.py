@@ -1,8 +1,7 @@
 """Updates of Kalman-type filters and whole runs of them, compiled, for a block of lanes.
 
-Each update is compiled when it is first wanted, see :func:`kernel_of`. All have the signature
-:data:`UPDATE_SIGNATURE`: a measurement, the problem, a reading (m, W), NaN where absent, and the
-beliefs, which they change.
+Each update has the signature :data:`UPDATE_SIGNATURE`: a measurement, the problem, a reading
+(m, W), NaN where absent, and the beliefs, which it changes.
 """
 
 from __future__ import annotations
@@ -69,7 +68,7 @@ def _linear(
 def _solve_and_correct(
     present: Bools, noise_factor: Floats, seen: Floats, residual: Floats, lanes: Lanes
 ) -> None:
-    """Take in a whitened linear measurement ``r = A z + v``."""
+    """Update by a whitened linear measurement ``r = A z + v``."""
     information, half, z = solve_lanes(seen, residual)
     evidence_lanes(present, noise_factor, residual, information, half, lanes)
     correct_lanes(information, z, lanes)
@@ -146,7 +145,7 @@ def _iterated(measure: Any, problem: Problem, reading: Floats, lanes: Lanes) -> 
         if open_lanes == 0:
             break
     evidence_lanes(present, noise_factor, r, information, half, lanes)
-    correct_lanes(information, target if problem.iterations == 1 else trial, lanes)
+    correct_lanes(information, trial, lanes)
 
 
 def _by_sigma_points(measure: Any, problem: Problem, reading: Floats, lanes: Lanes) -> None:
@@ -215,7 +214,7 @@ def _compiled(update: Callable[..., None]) -> Callable[..., None]:
 
 
 def kernel_of(method: Method) -> Callable[..., None]:
-    """Return the compiled update; each is compiled when it is first wanted."""
+    """Return the compiled update; each is compiled at its first use."""
     if method.sigma is not None:
         return _compiled(_by_sigma_points)
     return _compiled(_iterated if method.iterations > 1 else _linearised)
@@ -270,26 +269,10 @@ def run_lanes(
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Predict and update over all steps.
 
-    Parameters
-    ----------
-    update : callable
-        Of :func:`kernel_of`.
-    measure : callable
-        With :data:`mapfilter._kernels.MEASURE_SIGNATURE`.
-    problem : Problem
-    readings : (K, m, W) array
-        NaN where absent.
-    mean, factor : (n, W) and (n, n, W) arrays
-        The first beliefs; changed.
-    keep : bool
-        Whether to keep covariances.
-
-    Returns
-    -------
-    means : (K, n, W) array
-    covariances : (K or 0, W, n, n) array
-    evidence, nis : (K, W) arrays
-        NaN where an update failed and the prediction was kept.
+    Readings are (K, m, W), NaN where absent; the first beliefs, (n, W) and (n, n, W), are changed.
+    Return means (K, n, W), covariances (K, W, n, n), with K = 0 unless they are kept, and evidence
+    and normalised innovations squared (K, W), NaN where an update failed and the prediction was
+    kept.
     """
     steps, (n, lanes) = readings.shape[0], mean.shape
     means = np.empty((steps, n, lanes))

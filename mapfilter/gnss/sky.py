@@ -49,8 +49,9 @@ class LocalFrame:
 
     Examples
     --------
-    >>> LocalFrame(4.86, 43.52, 20.0).to_local(ecef_from_lonlat(4.86, 43.52, 23.0)).round(6).tolist()
-    [0.0, 0.0, 3.0]
+    >>> above = ecef_from_lonlat(4.86, 43.52, 23.0)
+    >>> LocalFrame(4.86, 43.52, 20.0).to_local(above)[2].round(6).item()
+    3.0
     """
 
     lon_deg: float

@@ -52,13 +52,8 @@ class MeasuredMapOptions:
 class MeasuredRows:
     """Rows of earlier sessions, shape (N,) each.
 
-    Parameters
-    ----------
-    cell : ndarray of int
-        Band of the serving cell; -1 for one that is not of the map.
-    east_m, north_m : ndarray
-    timing_advance : ndarray
-        Steps; NaN where it was not reported.
+    ``cell`` is the band of the serving cell, -1 for a cell that is not of the map; the timing
+    advance is in steps, NaN where it was not reported.
     """
 
     cell: Ints

@@ -32,16 +32,9 @@ _ALIKE = 0.2
 
 @dataclass(frozen=True, eq=False)
 class SumBelief:
-    """Weighted Gaussians of a state of n components.
+    """Gaussians of weights (c,) that sum to one, means (c, n) and covariances (c, n, n).
 
-    Parameters
-    ----------
-    weights : (c,) array
-        They sum to one.
-    means : (c, n) array
-    covariances : (c, n, n) array
-    parts : (c,) integer array
-        Which of the first parts each of them is.
+    ``parts`` (c,) is the index of each of them among the parts of the start.
     """
 
     weights: Floats
