@@ -32,6 +32,8 @@ from mapfilter.filters._square_root import (
 )
 from mapfilter.filters.gaussian import Method
 
+_CONVERGED = 1e-9
+_ROUNDING = 1e-8
 VECTOR, MATRIX, BLOCK, INDEX = float64[::1], float64[:, ::1], float64[:, :, ::1], int64[::1]
 TYPES: Any = types
 _SENSOR, _METHOD = (INDEX, INDEX, MATRIX, VECTOR, MATRIX, boolean), (int64, float64, float64)
@@ -42,6 +44,7 @@ _MEASURE = types.FunctionType(MEASURE_SIGNATURE)
 UPDATE_SIGNATURE = void(_MEASURE, _PROBLEM, MATRIX, _LANES)
 RUN = (types.FunctionType(UPDATE_SIGNATURE), _MEASURE, _PROBLEM)
 """What compiled runs take first: the update, the measurement and the problem."""
+_FOUND = TYPES.Tuple((BLOCK, float64[:, :, :, ::1], MATRIX, MATRIX))
 
 
 @kernel
@@ -81,10 +84,6 @@ def _linearised(measure: Any, problem: Problem, reading: Floats, lanes: Lanes) -
     points = lanes.mean[problem.uses]
     seen, residual = _linear(measure, problem, points, reading, present, noise_factor, lanes.lower)
     _solve_and_correct(present, noise_factor, seen, residual, lanes)
-
-
-_CONVERGED = 1e-9
-_ROUNDING = 1e-8
 
 
 def _iterated(measure: Any, problem: Problem, reading: Floats, lanes: Lanes) -> None:
@@ -252,9 +251,6 @@ def advance(
                 mean[i, w] = predicted[i, w]
                 for j in range(n):
                     factor[i, j, w] = lower[i, j, w] if j <= i else 0.0
-
-
-_FOUND = TYPES.Tuple((BLOCK, float64[:, :, :, ::1], MATRIX, MATRIX))
 
 
 @njit([_FOUND(*RUN, BLOCK, MATRIX, BLOCK, boolean)], cache=True, nogil=True, error_model="numpy")

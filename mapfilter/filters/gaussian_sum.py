@@ -26,6 +26,7 @@ from mapfilter.filters.trials import CompiledMeasurement, checked_sizes, problem
 
 _WIDEST = 0.9
 """Largest deviation of a part, as a share of that of the whole."""
+_FOUND = TYPES.Tuple((MATRIX, BLOCK, VECTOR, INDEX))
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,9 +155,6 @@ def _moments(
     for i in range(n):
         for j in range(i):
             covariance[j, i] = covariance[i, j]
-
-
-_FOUND = TYPES.Tuple((MATRIX, BLOCK, VECTOR, INDEX))
 
 
 @njit(

@@ -59,7 +59,7 @@ class TrialRun:
     means : (T, K, n) array
         Updated means.
     covariances : (T, K, n, n) array
-        Updated covariances; K is 0 unless they were asked for.
+        Updated covariances; K is 0 unless they are kept.
     evidence : (T, K) array
         Log density of each reading given those before it; NaN where an update failed and the
         prediction was kept.
@@ -88,12 +88,8 @@ def run_trials(
 
     Parameters
     ----------
-    measurement : CompiledMeasurement
-        Which readings.
     transition, process : (n, n) arrays
         Φ and Q.
-    method : Method
-        Which update.
     first_mean : (T, n) or (n,) array_like
         The beliefs before the first step.
     first_covariance : (n, n) or (T, n, n) array_like

@@ -129,7 +129,7 @@ class ServingStatistics:
         return np.asarray(self.log_share[band][pixel])
 
     def log_advance(self, band: int, pixel: Ints32, steps: float) -> Floats32:
-        """Return the log-likelihood of a timing advance at pixels; 0 where nothing is known."""
+        """Return the log-likelihood of a timing advance at pixels; 0 where none was reported."""
         deviation = self.deviation_steps[band][pixel]
         beside = np.abs(steps - self.advance_steps[band][pixel]) / deviation
         found = -0.5 * np.minimum(beside, _CLIP_SD) ** 2 - np.log(deviation)

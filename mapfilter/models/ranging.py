@@ -36,16 +36,7 @@ GSM_STEP_M = SPEED_OF_LIGHT_MPS * 48 / 13 * 1e-6 / 2
 
 
 def pseudoranges(layout: StateLayout, satellites_m: ArrayLike, sigma_m: ArrayLike) -> GaussianTerms:
-    """Return the model of pseudoranges to satellites, for a state with a clock.
-
-    Parameters
-    ----------
-    layout : StateLayout
-        With a clock.
-    satellites_m : (m, 3) array_like
-        Positions of the satellites in the frame of the state.
-    sigma_m : float or (m,) array_like
-        Standard deviations.
+    """Return the model of pseudoranges to satellites (m, 3), in the frame of a state with a clock.
 
     Examples
     --------
@@ -83,8 +74,6 @@ def range_differences(
 
     Parameters
     ----------
-    layout : StateLayout
-        Of the states.
     stations_m : (m, 2) or (m, 3) array_like
         At least two, the reference among them.
     sigma_m : float or (m,) array_like
@@ -124,16 +113,11 @@ def timing_advances(
 
     Parameters
     ----------
-    layout : StateLayout
-        Of the states.
     sites_m : (m, 2) or (m, 3) array_like
         Positions of the base stations; without heights all is in one plane.
-    sigma_m : float or (m,) array_like
-        Standard deviations.
     step_m : float
-        Size of the steps in which a report is drawn: the middle of a step stands for it. 0 for
-        a continuous one. What filters take is not changed by it: add ``step²/12`` to the variance
-        for the rounding.
+        Size of the steps in which reports are drawn, as the middle of a step; 0 for continuous
+        ones. Filters are not affected: add ``step²/12`` to the variance for the rounding.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Motion over a map of streets: dead reckoning with lasting errors, and where one can walk.
+"""Motion over a map of streets: dead reckoning with lasting errors, and the map of ways.
 
 A hypothesis holds its position, the lasting error of its headings, the logarithm of its step scale,
 and how probably it is off the map. One step of dead reckoning (Khalaf-Allah 2007, eqs. 3-10) moves
@@ -29,6 +29,10 @@ EAST, NORTH, BIAS, LOG_SCALE, OFF = range(5)
 STATES = 5
 
 _F = np.float32
+_MOST_SQUARES = 400
+_PARTS = 4
+_MOST_NATS = 14.0
+"""Hypotheses that are less likely than by this many nats are not compared."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,12 +225,6 @@ def weigh_by_map(log_map: Floats32, off: Floats32, factors: MapFactors, log_weig
         total = away * off_cost + (one - away) * on
         off[i] = away * off_cost / total
         log_weight[i] += log32(total)
-
-
-_MOST_SQUARES = 400
-_PARTS = 4
-_MOST_NATS = 14.0
-"""What is farther than this many nats is as good as never drawn."""
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)

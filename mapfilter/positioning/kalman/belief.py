@@ -1,6 +1,6 @@
 """A belief as a Gaussian sum whose parts are Kalman-type filters, step by step over a log.
 
-A start that is known to a kilometre is cut into narrow parts (see
+A start with an uncertainty of a kilometre is cut into narrow parts (see
 :mod:`mapfilter.filters.gaussian_sum`); a start from a fix is one part. Parts without weight are
 dropped, and parts that have come to lie on a heavier one are merged into it, so that a converged
 belief is one Gaussian again.
@@ -28,6 +28,8 @@ _NEAR = 0.1
 """Squared distance, in a heavier part's deviations, at which another is the same."""
 _ALIKE = 0.2
 """Largest difference of the logarithms of their volumes then."""
+_ANGLES = np.pi * (np.arange(256) + 0.5) / 256
+_SHARES = np.array([0.50, 0.67, 0.95])
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +170,7 @@ class FusionHistory:
         last = self.beliefs[-1]
         phi = np.array(self.transitions[1:]).reshape(-1, *self.transitions[0].shape)
         noise = np.array(self.processes[1:]).reshape(phi.shape)
-        # Known shifts are taken off, so that what is left is linear.
+        # Without the shifts, which are given, the motion is linear.
         moved = _moved(self.transitions, self.shifts)
         means, covariances = [], []
         for belief in self.beliefs:
@@ -190,10 +192,6 @@ def _moved(transitions: list[Floats], shifts: list[Floats]) -> Floats:
         at = phi @ at + shift if k else at
         found.append(at)
     return np.array(found)
-
-
-_ANGLES = np.pi * (np.arange(256) + 0.5) / 256
-_SHARES = np.array([0.50, 0.67, 0.95])
 
 
 def gaussian_radii_m(covariance_m2: Floats, within_m: float) -> tuple[Floats, float]:
@@ -230,7 +228,7 @@ def share_within(covariance_m2: Floats, within_m: float) -> float:
 
 def _spread(covariance_m2: Floats) -> tuple[float, float]:
     values = np.maximum(np.linalg.eigvalsh(covariance_m2), 1e-6)
-    # Ratios beyond this are a line as far as any radius can tell.
+    # Ratios beyond this are a line for any radius.
     return float(values[1]), float(max(values[0], 1e-4 * values[1]))
 
 

@@ -91,7 +91,7 @@ class KalmanOptions(Options):
 
 
 class SiteModels:
-    """Measurement models of a cell plan's sites, made when first asked for.
+    """Measurement models of a cell plan's sites, made at their first use.
 
     Path loss is that of COST 231 Hata at the cell's frequency and height, whatever the distance;
     antennas are the plan's sectors by formula, or the measured ones that cells name
