@@ -263,10 +263,6 @@ def _shared_notes(logs: Sequence[ReplayedLog]) -> list[str]:
     return [f"{note} (in {_named(names)})" for note, names in owners.items()]
 
 
-SITE_FILTERS = tuple(METHODS)
-"""Filters that need the sites of a cell plan, and no database."""
-
-
 def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -> ReplayResult:
     """Locate the log or logs of a configuration and write estimates, figures and pictures.
 
@@ -285,7 +281,7 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         The database, the cell plan, an antenna or a log is missing or damaged, or the output
         cannot be written.
     """
-    replay = _Sites(config) if config.filter.name in SITE_FILTERS else _OnDatabase(config)
+    replay = _Sites(config) if config.filter.name in METHODS else _OnDatabase(config)
     folders = list_logs(config.track_path)
     replay.check(folders)
     ensure_writable_folder(out)
@@ -346,9 +342,9 @@ class _Sites:
         """Accept logs in any CRS: the plan is projected to theirs."""
 
     def filter_for(self, log: TrackLog) -> Filter[Any]:
-        section = self.config.filter
-        options = KalmanFilter(method=section.name, smooth=section.smooth)  # type: ignore[arg-type]
-        plan = planned_cells(self.config, log.crs)
+        options, plan = filter_choice(self.config.filter), planned_cells(self.config, log.crs)
+        if not isinstance(options, KalmanFilter):
+            raise AssertionError("checked before")
         return options.over_sites(plan, plan_antennas(self.config, plan))
 
     def draw(self, log: TrackLog, track: PositionedTrack, into: Path) -> tuple[Path, ...]:

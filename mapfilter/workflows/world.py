@@ -13,11 +13,13 @@ from mapfilter._types import Floats
 from mapfilter.config.inputs import Area, Rasters
 from mapfilter.config.sections import Config, FilterSection
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes, Routes
-from mapfilter.errors import ConfigError, InputError, fail
+from mapfilter.errors import InputError, fail
+from mapfilter.filters.gaussian import METHODS
 from mapfilter.geodesy import Lattice, unproject
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.filter import FilterOptions
+from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.locators import filter_options
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan, read_cell_plan
@@ -307,16 +309,16 @@ def filter_choice(section: FilterSection) -> FilterOptions:
     Raises
     ------
     ConfigError
-        The filter takes no database, or a custom filter cannot be imported.
+        A custom filter cannot be imported.
     """
     match section.name:
         case "candidate":
             return section.of(CandidateFilter)
         case "bayes":
-            return section.bayes.of(BayesFilter)
+            return section.bayes.of(BayesFilter, smooth=section.smooth)
         case "grid":
-            return section.bayes.of(GridFilter)
-        case name if ":" in name:
-            return filter_options(name)
+            return section.bayes.of(GridFilter, smooth=section.smooth)
+        case name if name in METHODS:
+            return section.kalman.of(KalmanFilter, method=name, smooth=section.smooth)
         case name:
-            raise fail(ConfigError, "filter.name", "a filter that takes a database", repr(name))
+            return filter_options(name)
