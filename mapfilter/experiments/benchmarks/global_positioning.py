@@ -32,7 +32,7 @@ from mapfilter.experiments.benchmarks.scores import (
     summarise,
 )
 from mapfilter.experiments.benchmarks.world import BenchmarkWorld
-from mapfilter.positioning.bayes.options import BayesFilter, BayesOptions
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.filter import FilterOptions, locate
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.simulation.reports import Levels
@@ -105,18 +105,11 @@ def informed(
     fixed : frozenset of str
         Options that were set for all cases.
     """
-    if isinstance(choice, BayesFilter):
-        choice = choice.options
-    match choice:
-        case BayesOptions() as options:
-            known = replace(
-                options, motion=case.stated_to(options.motion, fixed), smooth=case.smooth
-            )
-            if case.satellites is not None:
-                height = {k: v for k, v in TOWN_HEIGHT.items() if k not in fixed}
-                known = replace(known, satellites=replace(options.satellites, **height))
-            return known
-    return choice
+    if not isinstance(choice, BayesFilter):
+        return choice
+    stated = {**case.data_sheet, **(TOWN_HEIGHT if case.satellites is not None else {})}
+    known: dict[str, Any] = {name: value for name, value in stated.items() if name not in fixed}
+    return replace(choice, smooth=case.smooth, **known)
 
 
 def benchmark(
