@@ -25,7 +25,6 @@ from mapfilter.cli.options import (
     seeded,
     toml,
 )
-from mapfilter.errors import ConfigError, fail
 from mapfilter.workflows.terminal import print_result, progress_bar, say
 
 
@@ -251,12 +250,9 @@ def replay(
     if without is not None:
         given.append(f"track.without={toml([kind.strip() for kind in without.split(',')])}")
     if smooth:
-        given += ["filter.bayes.smooth=true", "filter.smooth=true"]
+        given.append("filter.smooth=true")
     loaded = load_config(config, given)
     check_custom_filter(loaded)
-    name = loaded.filter.name
-    if smooth and (name in ("candidate", "grid") or ":" in name):
-        raise fail(ConfigError, "--smooth", "bayes, ekf, iekf, rbukf, ukf, ckf", name)
     folder = (out or loaded.output.dir / "replay").absolute()
     with progress_bar("replay") as progress:
         result = run_replay(loaded, folder, progress=progress)

