@@ -33,7 +33,7 @@ from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
-from mapfilter.tracks.log import Kind
+from mapfilter.tracks.log import Without
 
 
 def _axis_values(value: Any) -> Any:
@@ -191,7 +191,7 @@ class Track(Section):
     """
 
     path: FilePath | None = None
-    without: Annotated[tuple[Kind, ...], Field(strict=False)] = ()
+    without: Annotated[tuple[Without, ...], Field(strict=False)] = ()
 
 
 @with_options(CandidateFilter)

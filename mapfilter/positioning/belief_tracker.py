@@ -125,8 +125,9 @@ class BeliefTracker(Filter[TrackState]):
             if not isinstance(info, UpdateInfo):
                 raise TypeError("update returns (belief, UpdateInfo)")
             status, count, reason = info.status, info.hypotheses, info.reason
-            if reason not in _SILENT:
-                unused.append(_unused(epoch, SERVING, cell, reason))
+            label = _unused(epoch, SERVING, cell, reason)
+            if reason not in _SILENT and label not in unused:
+                unused.append(label)
         elif status is Status.CONVERGED:
             # CONVERGED lasts one epoch, also where the next one has no measurement.
             status = Status.TRACKING

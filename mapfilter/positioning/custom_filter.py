@@ -193,7 +193,13 @@ def adapted(
     if not _lacking(made, _EPOCH_FUNCTIONS):
         return CustomEpochFilter(made, name, getattr(made, "crs", database.lattice.crs))
     return CustomTracker(
-        made, database, _cells_with_points(database), _measured, name, start_by_fix=True, ways=ways
+        made,
+        database,
+        _cells_with_points(database),
+        lambda epoch: epoch if epoch.measured else None,
+        name,
+        start_by_fix=True,
+        ways=ways,
     )
 
 
@@ -267,12 +273,6 @@ class CustomEpochFilter(Filter[Any]):
             if not isinstance(output, StepOutput):
                 raise TypeError("step returns (state, StepOutput)")
             return state, output
-
-
-def _measured(epoch: Epoch) -> Epoch | None:
-    """Return an epoch in which something besides motion was measured."""
-    some = epoch.radio or epoch.ranges or epoch.differences or epoch.fix is not None
-    return epoch if some else None
 
 
 def _cells_with_points(database: RadioRouteDatabase) -> Callable[[str], Reason]:

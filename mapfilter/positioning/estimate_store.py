@@ -23,12 +23,7 @@ from mapfilter.positioning.estimate import TrackEstimate, TrackEvidence, UnusedR
 VERSION = 1
 _META = b"mapfilter"
 _GPX = "http://www.topografix.com/GPX/1/1"
-_COLUMNS = (
-    "time_s", "east_m", "north_m", "var_east_m2", "var_north_m2", "cov_east_north_m2",
-    "radius_50_m", "radius_67_m", "radius_95_m", "status", "hypotheses", "mass_50m", "way_id",
-    "way_probability", "reason",
-)  # fmt: skip
-
+_COLUMNS = tuple(TrackEstimate.of_fixes("", "", ()).to_dataframe())
 _EVIDENCE = tuple(TrackEvidence.__dataclass_fields__)
 
 
@@ -43,25 +38,7 @@ def write_estimate(estimate: TrackEstimate, path: str | Path) -> None:
     located = np.isfinite(estimate.east_m) & np.isfinite(estimate.north_m)
     points = np.full(len(estimate), None, dtype=object)
     points[located] = shapely.points(estimate.east_m[located], estimate.north_m[located])
-    values = (
-        estimate.time_s,
-        estimate.east_m,
-        estimate.north_m,
-        estimate.covariance_m2[:, 0, 0],
-        estimate.covariance_m2[:, 1, 1],
-        estimate.covariance_m2[:, 0, 1],
-        *estimate.radii_m.T,
-        [str(s) for s in estimate.status],
-        estimate.hypotheses,
-        estimate.mass_50m,
-        estimate.way_id,
-        estimate.way_probability,
-        [str(r) for r in estimate.reason],
-    )
-    columns: dict[str, Any] = dict(zip(_COLUMNS, values, strict=True))
-    if estimate.evidence is not None:
-        columns |= {name: getattr(estimate.evidence, name) for name in _EVIDENCE}
-    frame = geopandas.GeoDataFrame(columns, geometry=points, crs=estimate.crs)
+    frame = geopandas.GeoDataFrame(estimate.to_dataframe(), geometry=points, crs=estimate.crs)
     meta = {
         "version": VERSION,
         "crs": estimate.crs,
@@ -88,7 +65,7 @@ def read_estimate(path: str | Path) -> TrackEstimate:
     """
     path = Path(path)
     try:
-        # pyarrow says of a missing file only its name.
+        # The message of pyarrow for a missing file is only its name.
         with path.open("rb"), pq.ParquetFile(path, page_checksum_verification=True) as source:
             table = source.read()
     except OSError as error:

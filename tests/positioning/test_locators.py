@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from belief_events import Event, run
 from cross_world import make_database, walk_log
 
 from mapfilter.errors import ConfigError
@@ -14,7 +15,6 @@ from mapfilter.positioning.candidate import CandidateFilter, cell_points
 from mapfilter.positioning.filter import locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.locators import BUILT_IN, as_filter, filter_options
-from mapfilter.testing import Event, run
 
 OPTIONS = CandidateFilter(update_length_m=20.0, margin_db=0.0)
 

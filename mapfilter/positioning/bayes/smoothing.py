@@ -23,7 +23,6 @@ from mapfilter.positioning.bayes.alternative import MapBelief
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.positioning.matched_way import matched_way
 
 _MAX_BYTES = 400 * 2**20
 _JUMPS = 1e-4
@@ -137,7 +136,7 @@ class BayesSmoother:
         for index in range(kept[0].epoch, len(estimate)):
             place = _between(kept, states, moved, index)
             found = summarise(place, weight, bins)
-            way = matched_way(area, place[0], place[1], weight)
+            way = area.matched_way(place[0], place[1], weight)
             values = (
                 found.mean[0] + west,
                 found.mean[1] + south,

@@ -13,7 +13,6 @@ from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, EvidenceCusum, MapBelief
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
-from mapfilter.positioning.matched_way import matched_way
 
 FIRST_SPACING_M = 5.0
 """Assumed distance between hypotheses before there are any."""
@@ -107,7 +106,7 @@ def step_output(
         summary, count, way = empty_summary(STATES), 0, (0, nan)
     else:
         summary, count = belief.summary, belief.log_weight.size
-        way = matched_way(area, belief.state[0], belief.state[1], belief.weight)
+        way = area.matched_way(belief.state[0], belief.state[1], belief.weight)
     fix = Fix(
         time_s,
         float(summary.mean[0]) + west,
