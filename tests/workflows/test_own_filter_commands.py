@@ -112,7 +112,7 @@ def test_a_configuration_takes_each_built_in_filter_by_its_name(name):
     section = FilterSection(name=name)
     assert filter_options(section.name).name == name
     assert filter_choice(section) == filter_options(name)
-    if name != "candidate":
+    if hasattr(filter_options(name), "smooth"):
         assert FilterSection(name=name, smooth=True).smooth
         assert filter_choice(FilterSection(name=name, smooth=True)).smooth
 
