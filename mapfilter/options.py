@@ -61,7 +61,7 @@ _ENTRY = re.compile(r"^(\w+(?:, \w+)*) : .*$")
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """In an annotation: what it allows, where the type does not say enough.
+    """In an annotation: the allowed values in words, where the type is not enough.
 
     Parameters
     ----------

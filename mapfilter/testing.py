@@ -79,10 +79,8 @@ def check_filter(
     ----------
     filter_ : str, options, Filter, or class
         As :func:`mapfilter.locate` takes it: built-in and custom filters alike.
-    database : RadioRouteDatabase
     log : TrackLog
         At least ten epochs with motion, in the CRS of the database.
-    seed : int
 
     Raises
     ------
@@ -173,7 +171,6 @@ def check_belief_filter(
         Some steps, at least ten, that move.
     readings : sequence of object
         What ``update`` takes, one for each step, or None.
-    seed : int
 
     Raises
     ------

@@ -75,7 +75,7 @@ def seeded(settings: list[str] | None, seed: int | None, *keys: str) -> list[str
 
 def toml(value: str | list[str]) -> str:
     """Return a text, or a list of texts, as TOML writes it."""
-    # Escapes of JSON in the ASCII form are pairs of surrogates, which TOML does not know.
+    # Escapes of JSON in the ASCII form are pairs of surrogates, which TOML has not.
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 

@@ -61,7 +61,6 @@ def cell_points(database: RadioRouteDatabase, margin_db: float | None = None) ->
 
     Parameters
     ----------
-    database : RadioRouteDatabase
     margin_db : float or None
         As for :class:`CandidateFilter`.
     """

@@ -128,7 +128,6 @@ def wrap_user_errors(name: str, owner: object = None) -> Iterator[None]:
 
     Parameters
     ----------
-    name : str
     owner : object
         The filter, or its class, where the name is not that of a module.
 
@@ -177,8 +176,6 @@ def adapted(
 
     Parameters
     ----------
-    made : object
-    database : RadioRouteDatabase
     name : str
         Of the filter, in estimates and in messages of errors in its code.
     ways : bool
@@ -223,7 +220,6 @@ class CustomEpochFilter(Filter[Any]):
     ----------
     filter : object
         With ``begin(kinds)`` and ``step(state, epoch, rng)``.
-    filter_name : str
     filter_crs : str
         Of the database.
     """

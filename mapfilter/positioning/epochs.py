@@ -24,8 +24,6 @@ class ReportRow:
     ----------
     role : str
         ``serving`` or ``neighbour``.
-    cell : str or None
-    arfcn, bsic : int or None
     level_dbm : float
         NaN where it was not reported.
     censored : int
@@ -49,7 +47,6 @@ class GnssFix:
 
     Parameters
     ----------
-    east_m, north_m : float
     var_east_m2, var_north_m2, cov_east_north_m2 : float
         NaN where unknown.
     """
@@ -67,7 +64,6 @@ class Pseudorange:
 
     Parameters
     ----------
-    satellite : str
     range_m : float
         With the receiver's clock in it; NaN where it was not measured.
     sigma_m : float
@@ -88,7 +84,6 @@ class Difference:
 
     Parameters
     ----------
-    cell, reference : str
     difference_m : float
         NaN where it was not measured.
     sigma_m, reference_sigma_m : float
@@ -108,14 +103,10 @@ class Epoch:
 
     Parameters
     ----------
-    time_s : float
     motion : tuple of MotionStep
         Intervals that end now.
     radio : tuple of ReportRow
         The report, of all its rows.
-    fix : GnssFix or None
-    ranges : tuple of Pseudorange
-    differences : tuple of Difference
     """
 
     time_s: float
@@ -182,7 +173,6 @@ def headed(step: MotionStep, heading_rad: float) -> tuple[MotionStep, float]:
 
     Parameters
     ----------
-    step : MotionStep
     heading_rad : float
         After the last step; NaN before the first.
 
@@ -190,7 +180,6 @@ def headed(step: MotionStep, heading_rad: float) -> tuple[MotionStep, float]:
     -------
     step : MotionStep
         With a heading; without one where it has neither heading nor turn and none was known.
-    heading_rad : float
     """
     if isfinite(step.heading_rad):
         return step, step.heading_rad

@@ -94,7 +94,6 @@ class StepOutput:
 
     Parameters
     ----------
-    fix : Fix
     evidence : tuple of float, optional
         Runner-up's east, north and mass, entropy in bits, log evidence; of filters that hold
         probabilities.
@@ -147,10 +146,8 @@ class TrackEstimate:
     covariance_m2 : (N, 2, 2) array
     radii_m : (N, 3) array
         For 50, 67 and 95 %.
-    status : tuple of Status
     hypotheses, way_id : (N,) integer arrays
     mass_50m, way_probability : (N,) arrays
-    reason : tuple of Reason
     unused : tuple of UnusedReading
         Every reading not used, and why.
     evidence : TrackEvidence or None
@@ -273,24 +270,24 @@ class TrackEstimate:
         evidence: TrackEvidence | None = None,
     ) -> TrackEstimate:
         """Put the fixes of a track together."""
-        count = len(fixes)
+        columns: dict[str, Any] = {
+            one.name: [getattr(fix, one.name) for fix in fixes] for one in fields(Fix)
+        }
+        for name, values in columns.items():
+            if name in ("status", "reason"):
+                columns[name] = tuple(values)
+            else:
+                whole = name in ("hypotheses", "way_id")
+                columns[name] = np.array(values, dtype=np.int64 if whole else np.float64)
+        columns["covariance_m2"] = columns["covariance_m2"].reshape(-1, 2, 2)
+        columns["radii_m"] = columns["radii_m"].reshape(-1, 3)
         return cls(
-            crs,
-            filter_name,
-            start_utc_s,
-            np.array([f.time_s for f in fixes], dtype=np.float64),
-            np.array([f.east_m for f in fixes], dtype=np.float64),
-            np.array([f.north_m for f in fixes], dtype=np.float64),
-            np.array([f.covariance_m2 for f in fixes], dtype=np.float64).reshape(count, 2, 2),
-            np.array([f.radii_m for f in fixes], dtype=np.float64).reshape(count, 3),
-            tuple(f.status for f in fixes),
-            np.array([f.hypotheses for f in fixes], dtype=np.int64),
-            np.array([f.mass_50m for f in fixes], dtype=np.float64),
-            np.array([f.way_id for f in fixes], dtype=np.int64),
-            np.array([f.way_probability for f in fixes], dtype=np.float64),
-            tuple(f.reason for f in fixes),
-            tuple(unused),
-            evidence,
+            crs=crs,
+            filter=filter_name,
+            start_utc_s=start_utc_s,
+            **columns,
+            unused=tuple(unused),
+            evidence=evidence,
         )
 
 

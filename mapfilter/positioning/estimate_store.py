@@ -89,14 +89,10 @@ def _estimate(table: Any, meta: dict[str, Any], path: Path) -> TrackEstimate:
             faults.add(f"{path}, {name}", "a column of that name", "none")
     faults.raise_if_any(StoreError)
     column = {name: table[name].to_numpy() for name in _COLUMNS}
-    cross = column["cov_east_north_m2"]
-    covariance = np.stack(
-        [
-            np.stack([column["var_east_m2"], cross], -1),
-            np.stack([cross, column["var_north_m2"]], -1),
-        ],
-        axis=-2,
+    east, cross, north = (
+        column[name] for name in ("var_east_m2", "cov_east_north_m2", "var_north_m2")
     )
+    covariance = np.stack([east, cross, cross, north], axis=-1).reshape(-1, 2, 2)
     start = meta["start_utc_s"]
     evidence = None
     if set(_EVIDENCE) <= set(table.column_names):
@@ -144,36 +140,28 @@ def write_geojson(estimate: TrackEstimate, path: str | Path) -> None:
     positions = [
         [round(x, 7), round(y, 7)] for x, y in zip(lon.tolist(), lat.tolist(), strict=True)
     ]
-    features: list[dict[str, object]] = []
+    features = []
     if len(positions) > 1:
-        features.append(
-            {
-                "type": "Feature",
-                "geometry": {"type": "LineString", "coordinates": positions},
-                "properties": {"filter": estimate.filter},
-            }
-        )
+        features.append(_feature("LineString", positions, {"filter": estimate.filter}))
     for index, position in zip(located.tolist(), positions, strict=True):
         radius_m = float(estimate.radii_m[index, 2])
-        features.append(
-            {
-                "type": "Feature",
-                "geometry": {"type": "Point", "coordinates": position},
-                "properties": {
-                    "time_s": round(float(estimate.time_s[index]), 3),
-                    "status": str(estimate.status[index]),
-                    "radius_95_m": round(radius_m, 2) if np.isfinite(radius_m) else None,
-                },
-            }
-        )
+        properties = {
+            "time_s": round(float(estimate.time_s[index]), 3),
+            "status": str(estimate.status[index]),
+            "radius_95_m": round(radius_m, 2) if np.isfinite(radius_m) else None,
+        }
+        features.append(_feature("Point", position, properties))
     with atomic_file(Path(path)) as temporary:
         text = json.dumps({"type": "FeatureCollection", "features": features}, allow_nan=False)
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def _located_lonlat(
-    estimate: TrackEstimate,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _feature(kind: str, coordinates: Any, properties: dict[str, Any]) -> dict[str, Any]:
+    geometry = {"type": kind, "coordinates": coordinates}
+    return {"type": "Feature", "geometry": geometry, "properties": properties}
+
+
+def _located_lonlat(estimate: TrackEstimate) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     located = np.flatnonzero(np.isfinite(estimate.east_m) & np.isfinite(estimate.north_m))
     lon, lat = unproject(estimate.crs, estimate.east_m[located], estimate.north_m[located])
     return located, lon, lat

@@ -150,8 +150,6 @@ def locate(
     ----------
     log : TrackLog
         In the filter's CRS.
-    filter_ : Filter
-    rng : numpy.random.Generator
     snapshots : bool
         Whether to keep the hypotheses at some epochs until the filter tracks, for figures.
 

@@ -54,7 +54,6 @@ def as_filter(given: Any, database: RadioRouteDatabase, *, ways: bool = True) ->
         A name as in :func:`filter_options`; options such as :class:`mapfilter.BayesFilter`; a
         filter that is already over an area; or a custom filter: a class or function that is called
         with the database, or what it returned.
-    database : RadioRouteDatabase
     ways : bool
         Whether positions are matched to ways.
 

@@ -141,7 +141,7 @@ class World:
 
     @cached_property
     def streets(self) -> Streets:
-        """The layers that say where one can be."""
+        """The layers of ways, squares and buildings."""
         return Streets(self.config, self.lattice)
 
     @property
@@ -172,7 +172,7 @@ class World:
 
     @cached_property
     def routes(self) -> RouteLattice:
-        """Where one can be: near ways and in squares, or from a land-use raster."""
+        """Walkable or drivable points: near ways and in squares, or of a land-use raster."""
         if self.landuse is None:
             return self.streets.source.over(self.lattice)
         roads = self.config.roads
@@ -186,7 +186,7 @@ class World:
 
     @cached_property
     def route_tiles(self) -> Routes:
-        """The same points, laid tile by tile when they are wanted."""
+        """The same points, laid tile by tile on request."""
         if self.landuse is not None:
             return LatticeRoutes(self.routes)
         return LayerRoutes(self.streets.source, self.lattice)
@@ -256,7 +256,7 @@ def outside_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> Floats:
 
 
 def map_cover(world: World) -> tuple[str, ...]:
-    """Return a note when the ways of a map extend over but a part of the area that is asked for.
+    """Return a note when the ways of a map cover only a part of the requested area.
 
     The extent in a map's header is only a reason to look: maps often hold more, as whole ways are
     kept. The share is that of the ways' convex hull, 100 m about it included.
@@ -287,7 +287,7 @@ def _declared_share(area: Area, lattice: Lattice) -> float:
 
 
 def raster_cover(area: Area, lattice: Lattice) -> tuple[str, ...]:
-    """Return a note when rasters, cut to ``lattice``, cover but a part of the area asked for."""
+    """Return a note when rasters, cut to ``lattice``, cover only a part of the requested area."""
     if not area.has_box:
         return ()
     wanted = area_lattice(area.model_copy(update={"crs": lattice.crs}))

@@ -147,7 +147,6 @@ class AreaMap:
         -------
         way_id : int
             0 where the largest share lies in squares, off all ways.
-        probability : float
         """
         per_m, count = 1 / self.lattice.resolution_m, len(self.way_ids)
         rank, share = _heaviest(east_m, north_m, weight, self.way_rank, count, per_m)

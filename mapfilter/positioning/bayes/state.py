@@ -100,7 +100,7 @@ def step_output(
     reason: Reason,
     unused: tuple[UnusedReading, ...],
 ) -> StepOutput:
-    """Summarise the leading belief; ``reason`` tells whether the epoch's report was used."""
+    """Summarise the leading belief; ``reason`` is whether the epoch's report was used."""
     belief, (west, south) = state.leading, area.origin_m
     if belief is None:
         summary, count, way = empty_summary(STATES), 0, (0, nan)
