@@ -122,7 +122,7 @@ def field_annotation(section: type[BaseModel], name: str) -> Any:
 
 
 def with_options(
-    *kinds: type[Options], without: Sequence[str] = ()
+    *kinds: type[Options], without: Sequence[str] = (), optional: bool = False
 ) -> Callable[[type[SectionT]], type[SectionT]]:
     """Return a class decorator that gives a section the fields of option dataclasses.
 
@@ -135,6 +135,8 @@ def with_options(
         Dataclasses of options.
     without : sequence of str
         Fields that no configuration sets.
+    optional : bool
+        Whether the fields are None unless they are given, whatever the dataclasses' defaults.
     """
 
     def extended(section: type[SectionT]) -> type[SectionT]:
@@ -143,7 +145,8 @@ def with_options(
             annotations = annotations_of(kind)
             for info in describe_options(kind):
                 if info.name not in (*section.model_fields, *without):
-                    given[info.name] = (annotations[info.name], info.default)
+                    wanted = annotations[info.name]
+                    given[info.name] = (wanted | None, None) if optional else (wanted, info.default)
         made = _extended(section, given)
         made.kinds = kinds
         return made

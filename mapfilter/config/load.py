@@ -100,19 +100,15 @@ def given_keys(file: Path | None, settings: Sequence[str] = ()) -> tuple[str, ..
 def load_keys(
     file: Path | None, settings: Sequence[str], out: Path | None, keys: Sequence[str]
 ) -> Config | None:
-    """Return what some keys of a configuration say, however wrong others are.
+    """Return a configuration of some keys alone, whatever faults others have.
 
     Parameters
     ----------
     file, settings, out
         As for :func:`load_config`.
     keys : sequence of str
-        Such as ``database.path``; all others have their defaults.
-
-    Returns
-    -------
-    config : Config or None
-        None where the keys themselves are wrong.
+        Such as ``database.path``; all others have their defaults. Where these keys themselves are
+        wrong, the result is None.
     """
     try:
         values, folder = _given(file, settings, out)

@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 
 from mapfilter._types import Floats, Floats32, Ints32
+from mapfilter.filters.contract import Estimate
 
 NEAR_M = 50.0
 SHARES = (0.50, 0.67, 0.95)
@@ -77,8 +78,14 @@ class BeliefSummary(NamedTuple):
 
     @property
     def effective_bins(self) -> float:
-        """Return two to the power of the entropy: how many bins the belief covers."""
+        """Number of bins that the belief covers: two to the power of the entropy."""
         return float(2.0**self.entropy_bits)
+
+    @property
+    def estimate(self) -> Estimate:
+        """The leading hypothesis."""
+        east_m, north_m = float(self.mean[0]), float(self.mean[1])
+        return Estimate(east_m, north_m, self.covariance_m2, self.radii_m)
 
 
 def summarise(state: Floats32, weight: Floats32, bins: Bins) -> BeliefSummary:

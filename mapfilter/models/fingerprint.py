@@ -109,7 +109,6 @@ class BoundReading(NamedTuple):
     ----------
     cells : ndarray of int32, shape (J,)
         Bands of the candidates; the likelihood is the mean over them.
-    level_dbm : float
     censored : int
         -1: the level is below; 1: it is above; 0: it is this.
     sd_db : float
@@ -145,16 +144,7 @@ class ServingWeights(Options):
 
 
 class RasterFrame(NamedTuple):
-    """Where the pixels of a raster lie.
-
-    Parameters
-    ----------
-    west_m, north_m : float
-        Corner of the raster.
-    per_m : float
-        Pixels per metre.
-    rows, cols : int
-    """
+    """Where the pixels of a raster lie: its north-western corner, pixels per metre, and size."""
 
     west_m: float
     north_m: float
@@ -191,19 +181,10 @@ def bound_table() -> Floats32:
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def pixels(state: Floats32, back_east_m: float, back_north_m: float, raster: RasterFrame) -> Ints32:
-    """Find the pixel that holds each hypothesis, or held it some displacement ago.
+    """Return the flat pixel of each hypothesis, or of where it was before a displacement.
 
-    Parameters
-    ----------
-    state : ndarray of float32, shape (5, N)
-    back_east_m, back_north_m : float
-        The displacement by dead reckoning, turned and scaled by each hypothesis's own errors.
-    raster : RasterFrame
-
-    Returns
-    -------
-    ndarray of int32, shape (N,)
-        Flat indices; beyond the edge the edge's.
+    The displacement by dead reckoning is turned and scaled by each hypothesis's own errors. Beyond
+    the edge of the raster pixels are those of the edge.
     """
     east, north, bias, scale = state[0], state[1], state[2], state[3]
     be, bn, zero = _F(back_east_m), _F(back_north_m), _F(0.0)

@@ -28,6 +28,11 @@ from numba import njit
 from mapfilter._kernels import MEASURE_SIGNATURE
 from mapfilter._types import Floats, Ints
 
+COLUMNS = 13
+RANGE, LEVEL, DIFFERENCE, COMPONENT = 0.0, 1.0, 2.0, 3.0
+
+_LOG10_E = 0.4342944819032518
+_TWO_PI = 2 * np.pi
 _LN2 = 0.6931471805599453
 _SQRT_HALF_BITS = 0x3FE6A09E00000000
 _ONE_BITS = 0x3FF0000000000000
@@ -50,17 +55,10 @@ def log_lanes(value: Floats, out: Floats, scratch: Floats) -> None:
         s = f / (2.0 + f)
         z = s * s
         even = z * z
-        t1 = even * (
-            0.3999999999940941908 + even * (0.2222219843214978396 + even * 0.1531383769920937332)
-        )
-        t2 = z * (
-            0.6666666666666735130
-            + even
-            * (
-                0.2857142874366239149
-                + even * (0.1818357216161805012 + even * 0.1479819860511658591)
-            )
-        )
+        odd = 0.2857142874366239149 + even * (0.1818357216161805012 + even * 0.1479819860511658591)
+        t1 = 0.2222219843214978396 + even * 0.1531383769920937332
+        t1 = even * (0.3999999999940941908 + even * t1)
+        t2 = z * (0.6666666666666735130 + even * odd)
         half = 0.5 * f * f
         out[w] = out[w] * _LN2 + (f - (half - s * (half + t1 + t2)))
 
@@ -75,46 +73,17 @@ def atan2_lanes(left: Floats, ahead: Floats, out: Floats) -> None:
         t = (ratio - 1.0) / (ratio + 1.0) if steep else ratio
         z = t * t
         u = z * z
-        odd = z * (
-            0.333333333333329318027
-            + u
-            * (
-                0.142857142725034663711
-                + u
-                * (
-                    0.0909088713343650656196
-                    + u
-                    * (
-                        0.0666107313738753120669
-                        + u * (0.0497687799461593236017 + u * 0.0162858201153657823623)
-                    )
-                )
-            )
-        )
-        even = u * (
-            -0.199999999998764832476
-            + u
-            * (
-                -0.111111104054623557880
-                + u
-                * (
-                    -0.0769187620504482999495
-                    + u * (-0.0583357013379057348645 + u * -0.0365315727442169155270)
-                )
-            )
-        )
+        odd = 0.0497687789461593236017 + u * 0.0162858201153657823623
+        odd = 0.0909088713343650656196 + u * (0.0666107313738753120669 + u * odd)
+        odd = z * (0.333333333333329318027 + u * (0.142857142725034663711 + u * odd))
+        even = -0.0583357013379057348645 + u * -0.0365315727442169155270
+        even = -0.111111104054623557880 + u * (-0.0769187620504482999495 + u * even)
+        even = u * (-0.199999999998764832476 + u * even)
         angle = t - t * (odd + even)
         angle = angle + 0.7853981633974483 if steep else angle
         angle = 1.5707963267948966 - angle if abs(left[w]) > abs(ahead[w]) else angle
         angle = 3.141592653589793 - angle if ahead[w] < 0.0 else angle
         out[w] = -angle if left[w] < 0.0 else angle
-
-
-COLUMNS = 13
-RANGE, LEVEL, DIFFERENCE, COMPONENT = 0.0, 1.0, 2.0, 3.0
-
-_LOG10_E = 0.4342944819032518
-_TWO_PI = 2 * np.pi
 
 
 @_kernel

@@ -29,6 +29,7 @@ from mapfilter.experiments.benchmarks.world import (
     write_buildings,
 )
 from mapfilter.experiments.sweep.world import SweepWorld, write_world
+from mapfilter.filters.gaussian import METHODS
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import predict
 from mapfilter.propagation.shadowing import named_rng
@@ -230,7 +231,6 @@ REFUSED: Mapping[str, str] = {
     "journeys.radio": "the ground truth is what is received",
     "track": _NO_JOURNEYS,
     "filter.smooth": _CASES,
-    "filter.bayes.smooth": _CASES,
     "filter.bayes.timing_step_m": _NO_TIMING,
     "filter.bayes.timing_sd_m": _NO_TIMING,
     "sweep": "there is no grid here; use mapfilter sweep",
@@ -319,10 +319,9 @@ def _refused(key: str, config: Config) -> str:
     if not key.startswith("filter.") or key == "filter.name":
         return ""
     chosen = config.filter.name
-    of_bayes = key.startswith("filter.bayes.")
+    *_, section, _ = key.split(".")
+    sections = {"candidate": "filter", "bayes": "bayes", "grid": "bayes"}
     particles = chosen == "bayes" or key not in _OF_PARTICLES
-    if chosen in ("bayes", "grid") and of_bayes and particles:
-        return ""
-    if chosen == "candidate" and not of_bayes:
+    if sections.get(chosen, "kalman" if chosen in METHODS else "") == section and particles:
         return ""
     return f"the filter {chosen} has no such option"

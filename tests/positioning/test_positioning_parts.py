@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 import scalar_oracle as oracle
 import small_area
+from fusion_world import MOVING_3D
 from scipy.special import ndtr
 
 from mapfilter.errors import InputError
 from mapfilter.filters.contract import MotionStep
 from mapfilter.models.motion import random_walk
 from mapfilter.models.ranging import pseudoranges, timing_advances
-from mapfilter.models.state import MOVING_3D, POSITION, POSITION_CLOCK_3D
+from mapfilter.models.state import POSITION, POSITION_CLOCK_3D
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel, Start

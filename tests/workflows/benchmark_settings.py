@@ -4,7 +4,10 @@ Each entry is a setting's other value, the settings that it needs beside it, and
 must arrive.
 """
 
+from dataclasses import fields
 from math import radians
+
+from mapfilter.positioning.kalman.models import KalmanOptions
 
 REFUSED_SECTIONS = ("prediction.survey.", "rasters.", "track.", "sweep.")
 REFUSED = {
@@ -16,7 +19,6 @@ REFUSED = {
     "journeys.seed",
     "journeys.radio",
     "filter.smooth",
-    "filter.bayes.smooth",
     "filter.bayes.timing_step_m",
     "filter.bayes.timing_sd_m",
     "output.pictures",
@@ -33,6 +35,8 @@ OF_THE_CANDIDATE = {
     "switch_check": ("next_call", "switch_check"),
     "when_empty": ("reinitialise", "when_empty"),
 }
+
+OF_KALMAN = tuple(field.name for field in fields(KalmanOptions))
 
 # Name of the setting: its value, the option, and the option's value where it has another unit.
 OF_BAYES = {

@@ -10,6 +10,7 @@ from benchmark_settings import (
     GROUND_TRUTH_BESIDE,
     OF_BAYES,
     OF_JOURNEYS,
+    OF_KALMAN,
     OF_THE_CANDIDATE,
     OF_THE_GROUND_TRUTH,
     OF_THE_MAP,
@@ -101,6 +102,7 @@ def test_every_setting_is_known_to_be_honoured_or_refused():
         *(f"prediction.ground_truth.{name}" for name in OF_THE_GROUND_TRUTH),
         *(f"filter.{name}" for name in OF_THE_CANDIDATE),
         *(f"filter.bayes.{name}" for name in OF_BAYES),
+        *(f"filter.kalman.{name}" for name in OF_KALMAN),
     }
     every = list(leaves())
     as_for_a_build = {key for key in every if key.startswith(READ_AS_FOR_A_BUILD)}
@@ -134,7 +136,8 @@ def test_what_has_no_meaning_is_refused_by_name(key, world, tmp_path):
         ('rasters.path="there.tif"', "predicted here"),
         ('prediction.model="survey"', "predicted here"),
         ('track.path="there"', "simulated here"),
-        ("filter.bayes.smooth=true", "--case"),
+        ("filter.smooth=true", "--case"),
+        ("filter.kalman.fix_sd_m=3", "bayes has no such option"),
         ("filter.bayes.timing_sd_m=100.0", "no timing advances"),
         ("sweep.scale=[0.1]", "mapfilter sweep"),
         ('output.pictures="none"', "no pictures"),
@@ -192,6 +195,19 @@ def test_options_of_the_candidate_filter(name, entry):
     for other in ("bayes", "grid", "mine:Filter"):
         with pytest.raises(ConfigError, match="has no such option"):
             load({f"filter.{name}": value, "filter.name": other})
+
+
+@pytest.mark.parametrize("name", OF_KALMAN)
+def test_options_of_the_kalman_type_filters(name):
+    key = f"filter.kalman.{name}"
+    config, _ = load({key: 7, "filter.name": "ukf"})
+    choice = filter_choice(config.filter)
+    assert (choice.method, getattr(choice, name)) == ("ukf", 7)
+    for other in ("bayes", "candidate", "mine:Filter"):
+        with pytest.raises(ConfigError, match="has no such option"):
+            load({key: 7, "filter.name": other})
+    with pytest.raises(ConfigError, match="ekf has no such option"):
+        load({"filter.bayes.step_sd_m": 7, "filter.name": "ekf"})
 
 
 def test_the_filters_name():

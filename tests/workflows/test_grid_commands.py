@@ -43,7 +43,7 @@ def test_the_grid_smooths_a_track(world, tmp_path):
     first = read_estimate(tmp_path / "estimate.parquet")
     smoothed = assert_done(mapfilter("replay", *given, "--smooth")).json
     assert smoothed["success"] is True
-    assert smoothed["error_mean_m"] < plain["error_mean_m"] + 2.0
+    assert plain["error_mean_m"] != smoothed["error_mean_m"] < 10
     later = read_estimate(tmp_path / "estimate.parquet")
     # Positions of the whole track, also before the filter has converged.
     assert np.isfinite(later.east_m).all()

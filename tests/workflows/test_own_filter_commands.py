@@ -117,11 +117,7 @@ def test_a_configuration_takes_each_built_in_filter_by_its_name(name):
         assert filter_choice(FilterSection(name=name, smooth=True)).smooth
 
 
-def test_a_filter_without_a_map_takes_the_sites_of_a_database(own_world, tmp_path):
-    place = settings(database__path=own_world.database, rasters__path=own_world.rasters)
-    given = [*GRID, *place, *settings(filter__name="ekf"), "--out", tmp_path, "--json"]
-    found = assert_done(mapfilter("sweep", "-c", own_world.toml, *given)).json
-    assert {cell["filter"] for cell in found["cells"]} == {"ekf"}
+def test_a_replay_without_a_map_takes_the_sites_of_the_database(own_world, tmp_path):
     log = own_world.journeys / "journey-0000-draw-000"
     given = ["--db", own_world.database, "--log", log, "--filter", "ekf", "--out", tmp_path / "o"]
     replayed = mapfilter("replay", *given, "--json").json
@@ -129,10 +125,18 @@ def test_a_filter_without_a_map_takes_the_sites_of_a_database(own_world, tmp_pat
     assert (tmp_path / "o" / "track.png").is_file()
 
 
-def test_a_benchmark_of_a_filter_without_a_map(world, tmp_path):
-    given = ["--filter", "ekf", "--case", "levels-6", "--runs", "1", "--workers", "1"]
-    file = world.benchmark_toml
-    done = mapfilter("evaluate", "global-positioning", "-c", file, *given, "--out", tmp_path / "c",
-                     "--json")  # fmt: skip
-    (case,) = done.json["cases"]
-    assert (case["name"], case["filter"], case["runs"]) == ("levels-6", "ekf", 1)
+def test_a_sweep_of_a_filter_without_a_map_takes_the_sites_of_the_database(own_world, tmp_path):
+    place = settings(database__path=own_world.database, rasters__path=own_world.rasters)
+    ekf = [*GRID, *place, *settings(filter__name="ekf"), "--vary", "filter.kalman.step_sd_m=0.3,3"]
+    assert_done(mapfilter("sweep", "-c", own_world.toml, *ekf, "--out", tmp_path))
+    runs = read_runs(tmp_path / "sweep" / "runs.parquet")
+    assert set(runs["filter"]) == {"ekf"}
+    assert sorted(set(runs["filter.kalman.step_sd_m"])) == [0.3, 3.0]
+
+
+def test_a_benchmark_of_a_filter_without_a_map(own_world, tmp_path):
+    given = [*settings(area__resolution_m=10), "--filter", "ekf", "--runs", 1, "--workers", 1]
+    given += ["--world", "easy", "--case", "levels-6", "--out", tmp_path, "--json"]
+    told = mapfilter("evaluate", "global-positioning", "-c", own_world.benchmark_toml, *given)
+    (case,) = assert_done(told).json["cases"]
+    assert case["filter"] == "ekf"
