@@ -13,10 +13,9 @@ import hashlib
 import inspect
 import sys
 import traceback
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -26,8 +25,8 @@ import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, MapfilterError, fail
-from mapfilter.filters.contract import Reason
 from mapfilter.positioning.belief_tracker import BeliefTracker, TrackState
+from mapfilter.positioning.candidate import cell_points, startable
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import StepOutput
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind, Smoother
@@ -192,7 +191,7 @@ def adapted(
     return CustomTracker(
         made,
         database,
-        _cells_with_points(database),
+        startable(cell_points(database)),
         lambda epoch: epoch if epoch.measured else None,
         name,
         start_by_fix=True,
@@ -269,16 +268,3 @@ class CustomEpochFilter(Filter[Any]):
             if not isinstance(output, StepOutput):
                 raise TypeError("step returns (state, StepOutput)")
             return state, output
-
-
-def _cells_with_points(database: RadioRouteDatabase) -> Callable[[str], Reason]:
-    cells = frozenset(database.cell_ids)
-
-    @cache
-    def known(cell: str) -> Reason:
-        if cell not in cells:
-            return Reason.UNKNOWN_CELL
-        row, _, _ = database.cell_points(cell)
-        return Reason.USED if row.size else Reason.NO_POINTS_IN_CELL
-
-    return known
