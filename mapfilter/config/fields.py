@@ -91,15 +91,7 @@ class Section(BaseModel):
     kinds: ClassVar[tuple[type[Options], ...]] = ()
 
     def of(self, kind: type[OptionsT], **others: Any) -> OptionsT:
-        """Return an option dataclass with the values of this section.
-
-        Parameters
-        ----------
-        kind : type
-            The dataclass.
-        **others
-            Values of further fields; those of neither have their defaults.
-        """
+        """Return an option dataclass with the values of this section, and of further fields."""
         own = type(self).model_fields
         values = {one.name: getattr(self, one.name) for one in fields(kind) if one.name in own}
         return kind(**values | others)
@@ -126,17 +118,9 @@ def with_options(
 ) -> Callable[[type[SectionT]], type[SectionT]]:
     """Return a class decorator that gives a section the fields of option dataclasses.
 
-    Names, limits and defaults are those of the dataclasses; what the section defines itself goes
-    first. :meth:`Section.of` returns the dataclasses again.
-
-    Parameters
-    ----------
-    *kinds : type
-        Dataclasses of options.
-    without : sequence of str
-        Fields that no configuration sets.
-    optional : bool
-        Whether the fields are None unless they are given, whatever the dataclasses' defaults.
+    Names, limits and defaults are those of the dataclasses (None if ``optional``), but for fields
+    that the section defines itself and for those in ``without``. :meth:`Section.of` returns the
+    dataclasses again.
     """
 
     def extended(section: type[SectionT]) -> type[SectionT]:

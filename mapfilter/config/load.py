@@ -63,17 +63,7 @@ def load_config(
 def faults_of(
     error: ValidationError, file: Path | None = None, settings: Sequence[str] = ()
 ) -> tuple[Fault, ...]:
-    """Return what pydantic found as faults, one for each field.
-
-    Parameters
-    ----------
-    error : ValidationError
-        From :class:`~mapfilter.config.sections.Config`.
-    file : Path, optional
-        Named as the place of faults that no setting caused.
-    settings : sequence of str
-        As for :func:`load_config`.
-    """
+    """Return the faults of a configuration, one for each field; faults of settings name these."""
     changed = [_keys(setting) for setting in settings]
     faults: dict[tuple[str, ...], Fault] = {}
     for detail in error.errors():
@@ -87,13 +77,7 @@ def faults_of(
 
 
 def given_keys(file: Path | None, settings: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the keys that a file and settings give, such as ``area.map``, sorted.
-
-    Raises
-    ------
-    ConfigError
-        As for :func:`load_config`, of the file and of the settings' form.
-    """
+    """Return the keys that a file and settings give, such as ``area.map``, sorted."""
     return tuple(sorted(_leaves(_values(file, settings))))
 
 

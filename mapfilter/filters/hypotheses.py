@@ -89,16 +89,9 @@ class BeliefSummary(NamedTuple):
 
 
 def summarise(state: Floats32, weight: Floats32, bins: Bins) -> BeliefSummary:
-    """Summarise a cloud.
+    """Summarise a cloud (R, N), whose first two rows are east and north; its weights sum to one.
 
-    Parameters
-    ----------
-    state : ndarray of float32, shape (R, N)
-        The first two rows are east and north.
-    weight : ndarray of float32, shape (N,)
-        Summing to one.
-    bins : Bins
-        The area that holds the cloud; what lies beyond counts to the bins at its edge.
+    Particles beyond the bins count to those at the edge.
     """
     return BeliefSummary(*_summarise(state, weight, bins))
 

@@ -90,15 +90,7 @@ class LocalFrame:
 
 @dataclass(frozen=True, eq=False)
 class Directions:
-    """Where satellites are seen from a place; both arrays have the same shape.
-
-    Parameters
-    ----------
-    elevation_rad : array
-        Above the horizon.
-    azimuth_rad : array
-        Clockwise from north, in [0, 2π).
-    """
+    """Elevation above the horizon, and azimuth clockwise from north, in [0, 2π), of satellites."""
 
     elevation_rad: Floats
     azimuth_rad: Floats
@@ -136,16 +128,9 @@ def directions(satellites_m: ArrayLike, receiver_m: ArrayLike = (0.0, 0.0, 0.0))
 
 @dataclass(frozen=True)
 class GridFrame:
-    """The surroundings of a place of a projected CRS.
+    """The surroundings of a place of a projected CRS, at a height over the ellipsoid.
 
     Good for some kilometres: after 5 km the ellipsoid has fallen away by 2 m.
-
-    Parameters
-    ----------
-    east_m, north_m : float
-        Of the place.
-    height_m : float
-        Of its origin over the ellipsoid.
 
     Examples
     --------
