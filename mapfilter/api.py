@@ -53,14 +53,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Track:
-    """A log, located: positions, how sure they are, tables and pictures.
+    """A located log: positions with their uncertainty, as tables and pictures.
 
     Parameters
     ----------
     positioned : PositionedTrack
-        The filter's result: an estimate, snapshots of its hypotheses, and processor time.
-    log : TrackLog
-    database : RadioRouteDatabase
+        The filter's result: an estimate, snapshots of its hypotheses, and the processor time of
+        this process in seconds, without reading the database.
     """
 
     positioned: PositionedTrack
@@ -128,7 +127,6 @@ def locate(
     ----------
     log : TrackLog
         In the CRS of the database.
-    database : RadioRouteDatabase
     filter : options, str, Filter or class
         Options such as ``BayesFilter(level_error_db=8.0)``, the name of a filter, or a custom
         filter (see the page "Extending"). The Bayes map filter when left out.
@@ -185,7 +183,6 @@ def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
 
     Parameters
     ----------
-    track : Track or TrackEstimate
     truth : DataFrame or Truth
         Columns ``time_s``, ``east_m`` and ``north_m``, as the table ``truth`` of a log, in the CRS
         of the track.
@@ -228,9 +225,8 @@ def simulate(
     Parameters
     ----------
     rasters : RxLevRasters
-        The levels that the phone receives. Take others than those that a database is built of, or
-        the filter knows the ground truth.
-    cells : CellPlan
+        The levels that the phone receives. Other rasters than those of the database, or
+        the database has no errors.
     roads : path, or Ways
         OpenStreetMap file or vector layer, as for :func:`mapfilter.read_routes`.
     journeys : int
@@ -246,7 +242,9 @@ def simulate(
     walker : WalkerModel, optional
         Place on the street, and stops.
     profile : {"walking", "driving"}
+        Ways that routes may use, and speed.
     seed : int
+        Of routes and noise.
 
     Returns
     -------
@@ -318,7 +316,6 @@ def sweep(
 
     Parameters
     ----------
-    database : RadioRouteDatabase
     rasters : RxLevRasters
         The levels that the phone receives, with the handovers and fading of ``reports``.
     roads : path, or Ways
@@ -330,8 +327,11 @@ def sweep(
     routes, draws : int
         Routes, and runs on each of them with every noise.
     length_m : float
+        Length of each route.
     reports : ReportModel, optional
+        As for :func:`simulate`.
     seed : int
+        Of routes and noise.
     executor : Executor, optional
         Does the runs, such as a ``ProcessPoolExecutor``; this process when left out.
     """
@@ -404,7 +404,6 @@ class Bound:
     ----------
     found : MapBound
         All figures.
-    database : RadioRouteDatabase
     """
 
     found: MapBound
@@ -450,7 +449,6 @@ def bound(
 
     Parameters
     ----------
-    database : RadioRouteDatabase
     errors : ErrorModel, optional
         Assumed errors of the predicted levels.
     options : FirstFixOptions, optional

@@ -13,6 +13,9 @@ from mapfilter.cli.options import (
     WRONG,
     ClusterOption,
     ConfigOption,
+    DatabaseArgument,
+    DryRunOption,
+    FilterOption,
     JsonOption,
     OutOption,
     PathArgument,
@@ -69,9 +72,7 @@ def build(
     config: ConfigOption = None,
     settings: SetOption = None,
     out: OutOption = None,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Only estimate size, memory and time.")
-    ] = False,
+    dry_run: DryRunOption = False,
     workers: WorkersOption = 1,
     cluster: ClusterOption = None,
     resume: ResumeOption = False,
@@ -115,7 +116,7 @@ def merge(
 
 
 def export(
-    database: Annotated[Path, typer.Argument(metavar="DB", callback=given_path)],
+    database: DatabaseArgument,
     to: Annotated[
         Path,
         typer.Option("--to", metavar="FILE", help="A .gpkg or .tif file.", callback=given_path),
@@ -136,7 +137,7 @@ def info(path: PathArgument, as_json: JsonOption = False) -> None:
 
 
 def bound(
-    database: Annotated[Path, typer.Argument(metavar="DB", callback=given_path)],
+    database: DatabaseArgument,
     out: OutOption = None,
     spacing_m: Annotated[
         float, typer.Option("--spacing", metavar="M", help="Metres between the starts of journeys.")
@@ -208,15 +209,7 @@ def replay(
     log: Annotated[
         Path | None, typer.Option("--log", metavar="LOG", help="A log, or a folder of logs.")
     ] = None,
-    filter_name: Annotated[
-        str | None,
-        typer.Option(
-            "--filter",
-            metavar="NAME",
-            help="candidate, bayes, grid or a custom filter, package.module:Name; "
-            "without a map ekf, iekf, rbukf, ukf, ckf.",
-        ),
-    ] = None,
+    filter_name: FilterOption = None,
     without: Annotated[
         str | None,
         typer.Option(

@@ -21,18 +21,15 @@ from mapfilter.config.inputs import (
     Rasters,
     Roads,
 )
-from mapfilter.filters.gaussian import METHODS
 from mapfilter.options import Below1, Degrees, NotNegative, Positive, Seed
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.kalman.filter import KalmanFilter
+from mapfilter.positioning.locators import BUILT_IN, filter_options
 from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
-from mapfilter.tracks.log import Kind
-
-SMOOTHING = ("bayes", "grid", *METHODS)
-"""Filters that can smooth a track."""
+from mapfilter.tracks.log import Without
 
 
 def _axis_values(value: Any) -> Any:
@@ -175,7 +172,7 @@ class Track(Section):
     """
 
     path: FilePath | None = None
-    without: Annotated[tuple[Kind, ...], Field(strict=False)] = ()
+    without: Annotated[tuple[Without, ...], Field(strict=False)] = ()
 
 
 @with_options(CandidateFilter)
@@ -198,8 +195,9 @@ class FilterSection(Section):
 
     @model_validator(mode="after")
     def _smooths(self) -> FilterSection:
-        if self.smooth and self.name not in SMOOTHING:
-            names = ", ".join(SMOOTHING)
+        smoothing = [name for name in BUILT_IN if hasattr(filter_options(name), "smooth")]
+        if self.smooth and self.name not in smoothing:
+            names = ", ".join(smoothing)
             raise ValueError(f"no smooth (--smooth) with {self.name!r}; {names} can smooth")
         return self
 

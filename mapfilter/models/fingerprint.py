@@ -29,6 +29,7 @@ from scipy.special import log_ndtr
 
 from mapfilter._kernels import cos_sin32, exp32, log32
 from mapfilter._types import Floats, Floats32, Ints32
+from mapfilter.options import NotNegative, Options, Positive, Share
 
 _F = np.float32
 _STEPS_PER_SD, _REACH_SD = 32, 8
@@ -36,7 +37,7 @@ _STEPS_PER_DB, _REACH_DB = 4, 64
 
 
 @dataclass(frozen=True, slots=True)
-class LevelErrors:
+class LevelErrors(Options):
     """How levels differ from their prediction.
 
     Parameters
@@ -58,13 +59,13 @@ class LevelErrors:
         Exponent of the likelihood; below 1 where the model is not trusted to be exact.
     """
 
-    sd_db: float = 10.0
-    correlation_m: float = 50.0
-    measurement_db: float = 1.5
-    roughness_db: float = 6.0
-    common: float = 0.3
-    clip_sd: float = 3.0
-    weight: float = 0.7
+    sd_db: NotNegative = 10.0
+    correlation_m: Positive = 50.0
+    measurement_db: NotNegative = 1.5
+    roughness_db: NotNegative = 6.0
+    common: Share = 0.3
+    clip_sd: Positive = 3.0
+    weight: Share = 0.7
 
     def offset_variance_db2(self, particle_spacing_m: float) -> float:
         """Return the variance of a prediction so far beside the true position."""
@@ -124,7 +125,7 @@ class BoundReading(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class ServingWeights:
+class ServingWeights(Options):
     """How the serving cell counts.
 
     Parameters
@@ -137,9 +138,9 @@ class ServingWeights:
         Exponent of the likelihood for each metre travelled, because errors last.
     """
 
-    hysteresis_db: float = 2.0
-    sd_db: float = 9.0
-    weight_per_m: float = 1 / 22
+    hysteresis_db: NotNegative = 2.0
+    sd_db: Positive = 9.0
+    weight_per_m: NotNegative = 1 / 22
 
 
 class RasterFrame(NamedTuple):

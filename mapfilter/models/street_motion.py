@@ -23,12 +23,14 @@ from numba import njit
 
 from mapfilter._kernels import cos_sin32, exp32, hashed, log32, normals, uniforms, wrap32
 from mapfilter._types import Floats, Floats32, Ints32
+from mapfilter.options import NotNegative, Options, Positive
 
 EAST, NORTH, BIAS, LOG_SCALE, OFF = range(5)
 """Rows of the state: metres from the frame's origin, radians, a number, a probability."""
 STATES = 5
 
 _F = np.float32
+_HEADING_SD_RAD, _BIAS_SD_RAD, _BIAS_DRIFT_RAD = radians(6.0), radians(3.0), radians(0.05)
 _MOST_SQUARES = 400
 _PARTS = 4
 _MOST_NATS = 14.0
@@ -36,7 +38,7 @@ _MOST_NATS = 14.0
 
 
 @dataclass(frozen=True, slots=True)
-class MotionErrors:
+class MotionErrors(Options):
     """Errors of dead reckoning; those that last are estimated with the position.
 
     Parameters
@@ -57,13 +59,13 @@ class MotionErrors:
         Random walk of that logarithm.
     """
 
-    step_sd_m: float = 0.3
-    typical_step_m: float = 1.4
-    heading_sd_rad: float = radians(6.0)
-    bias_sd_rad: float = radians(3.0)
-    bias_drift_rad_per_sqrt_m: float = radians(0.05)
-    scale_sd: float = 0.02
-    scale_drift_per_sqrt_m: float = 0.0
+    step_sd_m: NotNegative = 0.3
+    typical_step_m: Positive = 1.4
+    heading_sd_rad: NotNegative = _HEADING_SD_RAD
+    bias_sd_rad: NotNegative = _BIAS_SD_RAD
+    bias_drift_rad_per_sqrt_m: NotNegative = _BIAS_DRIFT_RAD
+    scale_sd: NotNegative = 0.02
+    scale_drift_per_sqrt_m: NotNegative = 0.0
 
 
 class MapFactors(NamedTuple):
@@ -80,7 +82,7 @@ class MapFactors(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class MapWeights:
+class MapWeights(Options):
     """Weight of the map in the likelihood.
 
     Parameters
@@ -95,11 +97,11 @@ class MapWeights:
         Rates of leaving the map and of coming back.
     """
 
-    sd_m: float = 4.0
-    weight_per_m: float = 1 / 18
-    off_cost_per_m: float = 0.1
-    leave_per_m: float = 1e-3
-    return_per_m: float = 1e-2
+    sd_m: Positive = 4.0
+    weight_per_m: NotNegative = 1 / 18
+    off_cost_per_m: NotNegative = 0.1
+    leave_per_m: NotNegative = 1e-3
+    return_per_m: NotNegative = 1e-2
 
     def over(self, length_m: float) -> MapFactors:
         """Return the factors for a length travelled."""

@@ -21,9 +21,12 @@ from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import projected_crs, short_crs
 from mapfilter.gnss.orbits import Almanac
 from mapfilter.tracks.satellites import place_satellites
-from mapfilter.tracks.schema import NEIGHBOUR, PLACE, TABLES, tidy_table
+from mapfilter.tracks.schema import NEIGHBOUR, PLACE, SERVING, TABLES, tidy_table
 
-Kind = Literal["gnss", "fixes", "pseudoranges", "ta", "tdoa", "neighbours", "radio"]
+Kind = Literal["motion", "serving", "neighbour", "gnss", "pseudorange", "tdoa"]
+"""Kinds of measurements that a log may hold."""
+Without = Literal["gnss", "fixes", "pseudoranges", "ta", "tdoa", "neighbours", "radio"]
+"""What can be left out of a log."""
 
 # Tables may begin this long after another ends.
 _APART_S = 600.0
@@ -356,7 +359,20 @@ def make_log(
     return TrackLog(str(crs), start_utc_s, **tables, notes=tuple(dict.fromkeys(every_note)))
 
 
-def leave_out(log: TrackLog, kinds: Collection[Kind]) -> TrackLog:
+def rows_by_kind(log: TrackLog) -> dict[Kind, pd.DataFrame]:
+    """Return the rows of each kind of measurement."""
+    serving = log.radio["role"] == SERVING
+    return {
+        "motion": log.motion,
+        "serving": log.radio[serving],
+        "neighbour": log.radio[~serving],
+        "gnss": log.gnss,
+        "pseudorange": log.pseudoranges,
+        "tdoa": log.tdoa,
+    }
+
+
+def leave_out(log: TrackLog, kinds: Collection[Without]) -> TrackLog:
     """Return a log without some kinds of measurements; its notes count them.
 
     Parameters

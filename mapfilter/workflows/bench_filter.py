@@ -26,7 +26,7 @@ from mapfilter.models.fingerprint import LevelReading
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel, Start
-from mapfilter.positioning.bayes.options import BayesOptions, open_area
+from mapfilter.positioning.bayes.options import BayesFilter, open_area
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.filter import locate
 from mapfilter.tracks.log import TrackLog
@@ -131,7 +131,7 @@ def bench_filter(
         database, folders = make_world(Path(name), given)
         logs = [read_log(folder) for folder in folders]
         area = open_area(open_database(database))
-        positioner = BayesOptions().over_area(area)
+        positioner = BayesFilter().over_area(area)
         steps = [_step(positioner.model, logs[0], count, runs) for count in particles]
         # The first loads what is compiled.
         timed = [_track(positioner, log) for _ in range(runs + 1) for log in logs][len(logs) :]
@@ -271,6 +271,6 @@ def locating_memory_bytes(database: Path, log: Path, *, smooth: bool) -> tuple[i
 def locate_once(database: Path, log: Path, *, smooth: bool) -> tuple[int, int]:
     """Open, locate, and return this process's peak memory (bytes) before and after."""
     loaded = peak_memory_bytes()
-    positioner = BayesOptions(smooth=smooth).over(open_database(database))
+    positioner = BayesFilter(smooth=smooth).over(open_database(database))
     locate(read_log(log), positioner, np.random.default_rng(0))
     return loaded, peak_memory_bytes()

@@ -79,6 +79,15 @@ _OF_WALKERS = frozenset(
 
 _OF_PARTICLES = frozenset(f"filter.bayes.{name}_particles" for name in ("max", "min_search", "min"))
 
+_STATED = (
+    "step_sd_m",
+    "heading_sd_deg",
+    "bias_sd_deg",
+    "drift_deg_per_sqrt_m",
+    "scale",
+    "antenna_height_m",
+    "antenna_height_sd_m",
+)
 _OF_THE_CASES: Mapping[str, str] = {
     "prediction.ground_truth.level_error_db": "level_error_db",
     "journeys.length_m": "length_m",
@@ -86,13 +95,7 @@ _OF_THE_CASES: Mapping[str, str] = {
     "imu.bias_sd_deg": "imu.bias_sd_deg",
     "imu.drift_deg_per_sqrt_s": "imu.drift_deg_per_sqrt_s",
     "imu.scale": "imu.scale",
-    "filter.bayes.step_sd_m": "step_sd_m",
-    "filter.bayes.heading_sd_deg": "heading_sd_rad",
-    "filter.bayes.bias_sd_deg": "bias_sd_rad",
-    "filter.bayes.drift_deg_per_sqrt_m": "bias_drift_rad_per_sqrt_m",
-    "filter.bayes.scale": "scale_sd",
-    "filter.bayes.antenna_height_m": "height_m",
-    "filter.bayes.antenna_height_sd_m": "height_sd_m",
+    **{f"filter.bayes.{name}": name for name in _STATED},
 }
 """Settings that hold in all cases once they are given, and the cases' own names for them."""
 

@@ -30,7 +30,6 @@ from mapfilter.positioning.kalman.static_fix import (
     filter_fixes,
     static_fix,
 )
-from mapfilter.positioning.matched_way import matched_way
 
 
 def fix_at(dx, dy, **variances):
@@ -129,11 +128,11 @@ def test_the_way_that_holds_the_largest_share():
     for r, c, w in zip((row, 0, 6), (col, 0, 8), weight, strict=True):
         mass[ids[r, c]] = mass.get(ids[r, c], 0.0) + w
     best = max(mass, key=mass.get)
-    found = matched_way(area, east.astype("f4"), north.astype("f4"), weight)
+    found = area.matched_way(east.astype("f4"), north.astype("f4"), weight)
     assert found == (best, pytest.approx(min(mass[best], 1.0)))
     # Beyond the edges those of the edge.
     for place, at in (((-50.0, 999.0), (0, 0)), ((999.0, -50.0), (6, 8)), ((-1.0, -1.0), (6, 0))):
-        one = matched_way(area, *np.array([[place[0]], [place[1]]], "f4"), np.ones(1, "f4"))
+        one = area.matched_way(*np.array([[place[0]], [place[1]]], "f4"), np.ones(1, "f4"))
         assert one == (ids[at], 1.0)
 
 

@@ -46,8 +46,7 @@ def estimate() -> TrackEstimate:
     ]  # fmt: skip
     half = np.linspace(0.0, 0.5, COUNT)
     nowhere = np.full(COUNT, np.nan)
-    settled = np.zeros(COUNT, dtype=np.bool_)
-    evidence = TrackEvidence(nowhere, nowhere, half, 9 - 18 * half, -half, settled)
+    evidence = TrackEvidence(nowhere, nowhere, half, 9 - 18 * half, -half)
     return TrackEstimate.of_fixes("EPSG:32635", "bayes", fixes, evidence=evidence)
 
 

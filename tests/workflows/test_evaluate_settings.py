@@ -1,6 +1,7 @@
 """Every setting of a configuration: the benchmark honours it or refuses it."""
 
 import json
+from dataclasses import replace
 from functools import reduce
 
 import numpy as np
@@ -26,12 +27,19 @@ from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.global_positioning import informed
+from mapfilter.geodesy import Lattice
+from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.simulation.imu import ImuNoise
 from mapfilter.workflows.evaluate import _refused, load_benchmark
 from mapfilter.workflows.evaluate import _world as prepare_world
 from mapfilter.workflows.world import World, filter_choice
 
+LATTICE = Lattice("EPSG:32629", 500_000.0, 4_500_000.0, 10.0, 2, 2)
+EMPTY = np.zeros((2, 2), dtype=np.float32)
+AREA = AreaMap(
+    LATTICE, (), frozenset(), EMPTY[..., None], EMPTY, EMPTY.astype(int), EMPTY > 0, {}, -110.0
+)
 SMALL = {
     "area.map": "manhattan",
     "area.size_m": [200.0, 200.0],
@@ -159,9 +167,12 @@ def test_options_of_the_bayes_filter(name, entry):
     choice = filter_choice(config.filter)
     expected = pytest.approx(other[0] if other else value)
     for case in ("levels-bias20", "satellites-2", "levels-6"):
-        assert at(informed(choice, CASES[case], fixed), path) == expected
+        known = informed(choice, CASES[case], fixed)
+        assert getattr(known, name) == value
+        wide = replace(known, bias_sd_deg=0.0) if "particles" in name else known
+        assert at(wide.over_area(AREA), path) == expected
     usual = filter_choice(load({})[0].filter)
-    assert at(usual.options, path) != expected
+    assert at(usual.over_area(AREA), path) != expected
     with pytest.raises(ConfigError, match="candidate has no such option"):
         load({key: value, "filter.name": "candidate"})
 
@@ -171,7 +182,7 @@ def test_a_grid_has_no_particles(name):
     with pytest.raises(ConfigError, match="grid has no such option"):
         load({f"filter.bayes.{name}": 5000, "filter.name": "grid"})
     config, _ = load({"filter.bayes.switch_mass": 0.9, "filter.name": "grid"})
-    assert filter_choice(config.filter).options.particles.switch_mass == 0.9
+    assert filter_choice(config.filter).switch_mass == 0.9
 
 
 @pytest.mark.parametrize(("name", "entry"), OF_THE_CANDIDATE.items())
@@ -306,7 +317,7 @@ def test_settings_without_a_name_of_their_own_are_not_fixed():
     _, fixed = load({"imu.sigma_trans_m": 0.4, "filter.bayes.map_sd_m": 5.0})
     assert fixed == frozenset()
     _, fixed = load({"imu.sigma_orient_deg": 4.0, "filter.bayes.scale": 0.1})
-    assert fixed == {"imu.sigma_orient_deg", "scale_sd"}
+    assert fixed == {"imu.sigma_orient_deg", "scale"}
     # What a world's own file says holds only where the cases say nothing.
     config, _ = load({})
     assert config.imu.turns == "gyro"

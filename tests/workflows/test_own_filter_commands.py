@@ -12,6 +12,7 @@ from mapfilter.config.sections import FilterSection
 from mapfilter.experiments.sweep.table import read_runs
 from mapfilter.positioning.estimate_store import read_estimate
 from mapfilter.positioning.locators import BUILT_IN, filter_options
+from mapfilter.workflows.world import filter_choice
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "howto" / "own-filter.rst"
 MINE = "my_filter_of_the_docs:MyFilter"
@@ -110,8 +111,18 @@ def test_it_has_no_hindsight(world, here):
 def test_a_configuration_takes_each_built_in_filter_by_its_name(name):
     section = FilterSection(name=name)
     assert filter_options(section.name).name == name
-    if name != "candidate":
+    assert filter_choice(section) == filter_options(name)
+    if hasattr(filter_options(name), "smooth"):
         assert FilterSection(name=name, smooth=True).smooth
+        assert filter_choice(FilterSection(name=name, smooth=True)).smooth
+
+
+def test_a_replay_without_a_map_takes_the_sites_of_the_database(own_world, tmp_path):
+    log = own_world.journeys / "journey-0000-draw-000"
+    given = ["--db", own_world.database, "--log", log, "--filter", "ekf", "--out", tmp_path / "o"]
+    replayed = mapfilter("replay", *given, "--json").json
+    assert (replayed["filter"], replayed["logs"]) == ("ekf", 1)
+    assert (tmp_path / "o" / "track.png").is_file()
 
 
 def test_a_sweep_of_a_filter_without_a_map_takes_the_sites_of_the_database(own_world, tmp_path):

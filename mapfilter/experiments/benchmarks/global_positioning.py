@@ -32,7 +32,7 @@ from mapfilter.experiments.benchmarks.scores import (
     summarise,
 )
 from mapfilter.experiments.benchmarks.world import BenchmarkWorld
-from mapfilter.positioning.bayes.options import BayesFilter, BayesOptions
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.filter import FilterOptions, locate
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.simulation.reports import Levels
@@ -91,14 +91,11 @@ def informed(
     choice: FilterOptions, case: Case, fixed: frozenset[str] = frozenset()
 ) -> FilterOptions:
     """Return a filter with what the case's data sheet states, of options that are not fixed."""
-    options = choice.options if isinstance(choice, BayesFilter) else choice
-    if not isinstance(options, BayesOptions):
+    if not isinstance(choice, BayesFilter):
         return choice
-    known = replace(options, motion=case.stated_to(options.motion, fixed), smooth=case.smooth)
-    if case.satellites is not None:
-        height = {k: v for k, v in TOWN_HEIGHT.items() if k not in fixed}
-        known = replace(known, satellites=replace(options.satellites, **height))
-    return known
+    stated = {**case.data_sheet, **(TOWN_HEIGHT if case.satellites is not None else {})}
+    known: dict[str, Any] = {name: value for name, value in stated.items() if name not in fixed}
+    return replace(choice, smooth=case.smooth, **known)
 
 
 def benchmark(

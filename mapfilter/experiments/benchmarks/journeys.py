@@ -33,7 +33,9 @@ WINDOW_S = 120.0
 """Errors about a spoofer are looked at from its beginning on, for so long."""
 
 HEIGHT_M = 100.0
-TOWN_HEIGHT: Mapping[str, float] = MappingProxyType({"height_m": HEIGHT_M, "height_sd_m": 20.0})
+TOWN_HEIGHT: Mapping[str, float] = MappingProxyType(
+    {"antenna_height_m": HEIGHT_M, "antenna_height_sd_m": 20.0}
+)
 """Height of the town over the ellipsoid, as a map states it, by options of the filter."""
 
 
