@@ -85,11 +85,7 @@ def sweep_plans(
     try:
         for values in itertools.product(*(axes or {}).values()):
             point = dict(zip(axes or {}, values, strict=True))
-            changes = dict(point)
-            if "database.margin_db" in changes:
-                # The margin of a database is read as the filter's.
-                changes["filter.margin_db"] = changes["database.margin_db"]
-            plan = _plan(vary(config, changes), tuple(paths))
+            plan = _plan(_varied(config, point), tuple(paths))
             plans.append(replace(plan, varied=tuple(point.items())))
         _check_effect(plans, axes or {}, faults)
     except ConfigError as error:
@@ -97,6 +93,14 @@ def sweep_plans(
         broken = False
     faults.raise_if_any(InputError if broken else ConfigError)
     return tuple(plans), databases
+
+
+def _varied(config: Config, point: Mapping[str, float]) -> Config:
+    """Return the configuration of a point; the margin of a database is read as the filter's."""
+    changes = dict(point)
+    if "database.margin_db" in changes:
+        changes["filter.margin_db"] = changes["database.margin_db"]
+    return vary(config, changes)
 
 
 def _check_effect(plans: Sequence[SweepPlan], axes: Iterable[str], faults: Faults) -> None:
