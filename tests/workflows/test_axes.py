@@ -28,7 +28,9 @@ def test_each_axis_changes_what_a_sweep_runs(key):
     section, _, _ = key.rpartition(".")
     named = (FilterSection(name=name) for name in BUILT_IN)
     of_filter = (one for one in named if section in dict(option_sections(one)))
-    config = Config().model_copy(update={"filter": next(of_filter, FilterSection())})
+    config = Config().model_copy(
+        update={"filter": next(of_filter, FilterSection(name="candidate"))}
+    )
     value = config
     for part in key.split("."):
         value = getattr(value, part)
