@@ -28,6 +28,7 @@ from mapfilter.experiments.benchmarks.world import (
     write_buildings,
 )
 from mapfilter.experiments.sweep.world import SweepWorld, write_world
+from mapfilter.positioning.locators import filter_options
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import predict
 from mapfilter.propagation.shadowing import named_rng
@@ -289,6 +290,7 @@ def _refused(key: str, config: Config) -> str:
     chosen = config.filter.name
     section, _, _ = key.rpartition(".")
     particles = chosen == "bayes" or key not in _OF_PARTICLES
-    if section in dict(option_sections(config.filter)) and particles:
+    options = None if ":" in chosen else filter_options(chosen)
+    if section in dict(option_sections(config.filter, options)) and particles:
         return ""
     return f"the filter {chosen} has no such option"

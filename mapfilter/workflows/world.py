@@ -300,9 +300,8 @@ def _note(what: str, share: float) -> tuple[str, ...]:
     return () if share >= _ENOUGH else (f"{what} covers {share:.0%} of the area",)
 
 
-def option_sections(section: FilterSection) -> list[tuple[str, Section]]:
-    """Return the sections that hold options of the chosen filter, with their full names."""
-    options = filter_options(section.name)
+def option_sections(section: FilterSection, options: object) -> list[tuple[str, Section]]:
+    """Return the sections that hold a filter's options, with their full names."""
     inner = [(f"filter.{name}", value) for name, value in section if isinstance(value, Section)]
     sections: list[tuple[str, Section]] = [("filter", section), *inner]
     return [(name, part) for name, part in sections if isinstance(options, part.kinds)]
@@ -317,7 +316,7 @@ def filter_choice(section: FilterSection) -> FilterOptions:
         A custom filter cannot be imported.
     """
     options: Any = filter_options(section.name)
-    for _, part in option_sections(section):
+    for _, part in option_sections(section, options):
         shared = {one.name for one in fields(options)} & set(type(part).model_fields)
         options = replace(options, **{name: getattr(part, name) for name in shared})
     if section.smooth:
