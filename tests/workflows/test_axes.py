@@ -8,6 +8,7 @@ from mapfilter.config.sections import Config, FilterSection
 from mapfilter.errors import ConfigError
 from mapfilter.options import fits
 from mapfilter.positioning import BUILT_IN
+from mapfilter.positioning.locators import filter_options
 from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.sweep_plan import _varied
 from mapfilter.workflows.world import filter_choice, option_sections
@@ -26,11 +27,13 @@ def test_numeric_options_of_four_sections_are_axes():
 def test_each_axis_changes_what_a_sweep_runs(key):
     """Journeys, inertial unit or filter of a plan are others with another value."""
     section, _, _ = key.rpartition(".")
-    named = (FilterSection(name=name) for name in BUILT_IN)
-    of_filter = (one for one in named if section in dict(option_sections(one)))
-    config = Config().model_copy(
-        update={"filter": next(of_filter, FilterSection(name="candidate"))}
+    owners = (
+        name
+        for name in BUILT_IN
+        if section in dict(option_sections(FilterSection(), filter_options(name)))
     )
+    chosen = FilterSection(name=next(owners, "candidate"))
+    config = Config().model_copy(update={"filter": chosen})
     value = config
     for part in key.split("."):
         value = getattr(value, part)
