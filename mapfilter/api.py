@@ -304,7 +304,7 @@ def sweep(
     roads: Path | str | Ways,
     filters: Mapping[str, FilterOptions | str],
     *,
-    noises: Sequence[ImuNoise] = (ImuNoise(),),
+    noises: Sequence[ImuNoise] | ImuNoise | None = None,
     routes: int = 10,
     draws: int = 1,
     length_m: float = 1940.0,
@@ -322,7 +322,7 @@ def sweep(
         As for :func:`simulate`.
     filters : mapping of str to options
         Such as ``{"6 deg": BayesFilter(), "10 deg": BayesFilter(heading_sd_deg=10)}``.
-    noises : sequence of ImuNoise
+    noises : sequence of ImuNoise, or one, optional
         See :func:`mapfilter.experiments.sweep.plan.noise_grid` for all combinations.
     routes, draws : int
         Routes, and runs on each of them with every noise.
@@ -351,7 +351,7 @@ def sweep(
             seed=seed,
             varied=varied,
         )
-        for noise, varied in _distinguished(noises)
+        for noise, varied in _distinguished(noises or ImuNoise())
     ]
     network = _network(roads, rasters, "walking")
     world = SweepWorld.of(network, database.plan, {radio.name: rasters})
@@ -375,11 +375,13 @@ def _readings(filters: Mapping[str, Any]) -> tuple[Reading, ...]:
 
 
 def _distinguished(
-    noises: Sequence[ImuNoise],
+    noises: Sequence[ImuNoise] | ImuNoise,
 ) -> list[tuple[ImuNoise, tuple[tuple[str, float], ...]]]:
     """Return each noise with the values of those fields that the table has no column for."""
-    if not noises or len(set(noises)) < len(noises):
-        raise fail(ConfigError, "noises", "one noise or several, each once", f"{len(noises)}")
+    noises = [noises] if isinstance(noises, ImuNoise) else noises
+    if len(set(noises)) < len(noises):
+        again = next(repr(noise) for noise in noises if list(noises).count(noise) > 1)
+        raise fail(ConfigError, "noises", "one noise or several, each once", again)
     other = [
         field.name
         for field in fields(ImuNoise)

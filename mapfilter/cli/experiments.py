@@ -44,7 +44,11 @@ def sweep(
     resume: ResumeOption = False,
     vary: Annotated[
         list[str] | None,
-        typer.Option("--vary", metavar="KEY=V1,V2,...", help="Values of any numeric option."),
+        typer.Option(
+            "--vary",
+            metavar="KEY=V1,V2,...",
+            help="Values of a numeric option that the sweep uses; repeatable.",
+        ),
     ] = None,
     dry_run: DryRunOption = False,
     as_json: JsonOption = False,

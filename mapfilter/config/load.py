@@ -260,9 +260,9 @@ def _fault(where: str, keys: Sequence[str], annotation: Any, detail: Mapping[str
     kind, given = detail["type"], detail["input"]
     wanted = without_none(annotation)
     if kind == "extra_forbidden":
-        close = difflib.get_close_matches(keys[-1], list(wanted.model_fields), n=1)
+        close = difflib.get_close_matches(keys[-1], list(wanted.model_fields), n=2)
         what = "section" if len(keys) == 1 else "key"
-        return Fault(where, f"a known {what}", repr(keys[-1]), f"{close[0]!r}" if close else "")
+        return Fault(where, f"a known {what}", repr(keys[-1]), " or ".join(map(repr, close)))
     if kind == "value_error":
         got = ", ".join(given) if isinstance(given, Mapping) else shown(given)
         return Fault(where, str(detail["ctx"]["error"]), got)

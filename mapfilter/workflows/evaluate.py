@@ -67,6 +67,9 @@ REFUSED: Mapping[str, str] = {
     "filter.smooth": _CASES,
     "filter.bayes.timing_step_m": _NO_TIMING,
     "filter.bayes.timing_sd_m": _NO_TIMING,
+    "filter.kalman.timing_step_m": _NO_TIMING,
+    "filter.kalman.timing_sd_m": _NO_TIMING,
+    "filter.kalman.timing_memory_m": _NO_TIMING,
     "sweep": "there is no grid here; use mapfilter sweep",
     "output.pictures": _PICTURES,
 }
