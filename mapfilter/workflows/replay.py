@@ -226,7 +226,7 @@ def summary_figures(result: ReplayResult) -> dict[str, Any]:
     }
 
 
-def replay_facts(result: ReplayResult) -> dict[str, Any]:
+def replay_figures(result: ReplayResult) -> dict[str, Any]:
     """Return what a replay found, as JSON shows it.
 
     One log gives its own figures, several the sums of all.

@@ -29,7 +29,7 @@ BAD_GEOMETRY = "bad geometry"
 UNSETTLED = "steps that do not converge"
 
 _ITERATIONS = 50
-_SETTLED_M = 1e-9
+_CONVERGED_M = 1e-9
 _LOWEST_RATIO = 1e-7
 
 
@@ -131,7 +131,7 @@ def static_fix(
                 break
             length /= 2
         state, residual = tried, better
-        if np.abs(length * move).max() <= _SETTLED_M * (1 + np.abs(state[free]).max()):
+        if np.abs(length * move).max() <= _CONVERGED_M * (1 + np.abs(state[free]).max()):
             if largest_deviation is not None and values[-1] * largest_deviation < 1:
                 return failed(BAD_GEOMETRY, iteration)
             covariance = (right.T / values**2) @ right
