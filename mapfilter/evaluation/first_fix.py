@@ -1,4 +1,4 @@
-"""How far one travels until it is clear where one is: an ideal filter, tried on drawn journeys.
+"""Distance to the first unambiguous fix: an ideal filter on simulated journeys.
 
 From each start a journey is drawn along the map: straight on where that is possible, now and then
 round a corner. Every place of the first serving cell is a hypothesis; the motion is known without

@@ -60,7 +60,7 @@ def predict(
 def update(
     belief: Gaussian, measurement: CompiledMeasurement, reading: ArrayLike, method: Method
 ) -> tuple[Gaussian, Taken]:
-    """Return the belief after a reading (NaN where absent), and what became of the reading.
+    """Return the belief after a reading (NaN where absent), and the outcome of the update.
 
     Raises
     ------

@@ -55,6 +55,7 @@ def multipath_bias_m(
     Returns
     -------
     (K, S) array
+        Excess of the pseudorange of each of S satellites at each of K epochs, in metres.
     """
     travelled = np.asarray(travelled_m, dtype=np.float64)
     if not (mean_m >= 0 and correlation_m > 0 and (np.diff(travelled) >= 0).all()):

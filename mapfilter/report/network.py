@@ -296,7 +296,7 @@ def _finish(axes: Axes, base: BaseMap, plan: CellPlan, title: str) -> None:
 def plot_landuse(
     landuse: LandUse, lattice: Lattice, base: BaseMap, *, title: str = "Land use"
 ) -> Figure:
-    """Draw the classes beside where one can walk, with each one's share of the area.
+    """Draw the classes beside the walkable places, with the share of each class in the area.
 
     Classes that are nowhere in the area are left out of the legend.
     """

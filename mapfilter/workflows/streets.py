@@ -253,7 +253,7 @@ class Streets:
 
     @property
     def attribution(self) -> str:
-        """Whose map this is, as its licence wants it shown."""
+        """Attribution of the map, as its licence requires."""
         return OSM_ATTRIBUTION if self._has_map else ""
 
     @property
