@@ -1,4 +1,4 @@
-"""Kalman-type filters step by step: predict, then update with whatever was measured; smoothing.
+"""Kalman-type filters step by step: prediction, update with the measurements present, smoothing.
 
 The arithmetic of a step is that of :mod:`mapfilter.filters.trials`, for one belief.
 """

@@ -369,7 +369,7 @@ def plot_twins(
     plan: CellPlan,
     base: BaseMap,
 ) -> Axes:
-    """Draw how alike each point's twin looks, and the worst pairs joined by lines.
+    """Draw the similarity of each point's twin, and the worst pairs joined by lines.
 
     The probability of an error is 0 to 0.5; ``pairs_m``, (n, 4), are east and north of both
     places, the worst first, of which some are drawn.

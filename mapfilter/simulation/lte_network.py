@@ -1,4 +1,4 @@
-"""A hexagonal LTE network as it is received: sites of three sectors, levels, SINR, arrival times.
+"""Reception of a hexagonal LTE network: sites of three sectors, levels, SINR, arrival times.
 
 All sectors send at once and in the same band, so that each is received against all others. All
 times are distances (m), times of arrival times the speed of light.

@@ -212,7 +212,7 @@ class Streets:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was left out, cut out, resampled or assumed."""
+        """Features left out or cut out, rasters resampled, and assumptions."""
         if self.landuse is not None:
             return self.landuse.notes
         roads, notes = self.config.roads, list(self._roads.notes)
