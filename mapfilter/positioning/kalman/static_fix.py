@@ -26,7 +26,7 @@ from mapfilter.positioning.kalman.models import compiled
 
 TOO_FEW = "not enough measurements"
 BAD_GEOMETRY = "bad geometry"
-UNSETTLED = "steps that do not converge"
+NOT_CONVERGED = "steps that do not converge"
 
 _ITERATIONS = 50
 _CONVERGED_M = 1e-9
@@ -48,7 +48,7 @@ class StaticFix:
     iterations : int
         Gauss-Newton steps taken.
     problem : str
-        Why there is no fix: one of :data:`TOO_FEW`, :data:`BAD_GEOMETRY` and :data:`UNSETTLED`;
+        Why there is no fix: one of :data:`TOO_FEW`, :data:`BAD_GEOMETRY` and :data:`NOT_CONVERGED`;
         empty where there is one.
     """
 
@@ -136,7 +136,7 @@ def static_fix(
                 return failed(BAD_GEOMETRY, iteration)
             covariance = (right.T / values**2) @ right
             return StaticFix(state, covariance, True, iteration)
-    return failed(UNSETTLED, _ITERATIONS)
+    return failed(NOT_CONVERGED, _ITERATIONS)
 
 
 class PositionTrack(NamedTuple):
