@@ -232,7 +232,7 @@ def replay(
 ) -> None:
     """Locate one log, or every log of a folder; exit code 3 if done in part."""
     from mapfilter.config.load import load_config
-    from mapfilter.workflows.replay import replay_facts, run_replay
+    from mapfilter.workflows.replay import replay_figures, run_replay
 
     given = seeded(settings, seed, "journeys.seed")
     for key, value in (("database.path", database), ("track.path", log)):
@@ -249,7 +249,7 @@ def replay(
     folder = (out or loaded.output.dir / "replay").absolute()
     with progress_bar("replay") as progress:
         result = run_replay(loaded, folder, progress=progress)
-    print_result(replay_facts(result), as_json)
+    print_result(replay_figures(result), as_json)
     for warning in result.warnings:
         print_message(warning)
     if result.partial:

@@ -152,7 +152,7 @@ def evaluate(
         typer.Option(
             "--world",
             metavar="NAME",
-            help="The simulated world: plain (default), or easy, which flatters.",
+            help="The simulated world: plain (default), or easy (optimistic figures).",
         ),
     ] = None,
     data: Annotated[

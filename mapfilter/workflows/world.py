@@ -84,7 +84,7 @@ def open_by_section(path: Path, section: Rasters) -> RxLevRasters:
 
 
 def planned_cells(config: Config, crs: str, area: Lattice | None = None) -> CellPlan:
-    """Read the cell plan of a configuration; of a public list, only what is near the area.
+    """Read the cell plan of a configuration; of a public list, only the cells near the area.
 
     Raises
     ------

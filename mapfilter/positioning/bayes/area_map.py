@@ -35,7 +35,9 @@ class AreaMap:
     distance_m : ndarray of float32, shape (rows, cols)
         To the nearest way.
     way_id : ndarray of int64, shape (rows, cols)
+        Id of the way of the nearest point; 0 where that belongs to no way.
     on_way : ndarray of bool, shape (rows, cols)
+        Whether the pixel is a point of the database.
     carriers : mapping
         Bands of the cells on each (ARFCN, BSIC); BSIC -1 for all on the carrier.
     floor_dbm : float
@@ -122,7 +124,7 @@ class AreaMap:
 
     @cached_property
     def points(self) -> Floats32:
-        """East and north in the local frame of all points where one can be, shape (2, P)."""
+        """East and north in the local frame of all points on ways, shape (2, P)."""
         row, col = np.nonzero(self.on_way)
         step = self.lattice.resolution_m
         return np.stack([(col + 0.5) * step, (self.lattice.rows - row - 0.5) * step]).astype(

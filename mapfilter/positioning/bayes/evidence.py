@@ -76,7 +76,7 @@ class RadioReading:
 
 
 class Context(NamedTuple):
-    """Facts of an epoch that sources need besides the filter's state.
+    """Quantities of an epoch that sources need besides the filter's state.
 
     ``particle_spacing_m`` is how far the hypotheses nearest to the true position may lie from it;
     ``report_due`` whether the epoch's radio report is used.
@@ -119,7 +119,7 @@ class EvidenceSource(ABC):
 
     @abstractmethod
     def first(self, epoch: Epoch) -> EvidenceUpdate:
-        """Return evidence for a belief that is still to be started, whatever came before."""
+        """Return evidence for a belief that is not started yet, without regard to past epochs."""
 
     def start(self, belief: MapBelief, epoch: Epoch, travelled_m: float) -> tuple[MapBelief, Any]:  # noqa: ARG002
         """Adapt a belief just started; also return the state that depends on it, None if none."""

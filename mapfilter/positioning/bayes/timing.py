@@ -41,6 +41,7 @@ class TimingTerm:
     model : GaussianTerms
         Of east and north in the frame of the hypotheses.
     reading_m : (m,) array
+        Measured distances, or differences of distances.
     weight : float
         Share of the reading that is new, 0 to 1.
     clip_sd : float
