@@ -102,7 +102,7 @@ class SweepSection(Section):
     sigma_trans_m: Axis[NotNegative] | None = None
     sigma_orient_deg: Axis[Degrees] | None = None
     bias_sd_deg: Axis[Degrees] | None = None
-    drift_deg_per_sqrt_s: Axis[Degrees] | None = None
+    drift_deg_per_sqrt_s: Axis[NotNegative] | None = None
     scale: Axis[Below1] | None = None
     prediction_error_db: Axis[NotNegative] | None = None
     report_period_s: Axis[Positive] | None = None
