@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_args
 
 import typer
 
@@ -28,6 +28,7 @@ from mapfilter.cli.options import (
     seeded,
     toml,
 )
+from mapfilter.tracks.schema import Without
 from mapfilter.workflows.terminal import print_message, print_result, progress_bar
 
 
@@ -215,7 +216,7 @@ def replay(
         typer.Option(
             "--without",
             metavar="KINDS",
-            help="What to leave out: gnss (fixes, pseudoranges), ta, tdoa, neighbours, radio.",
+            help=f"What to leave out, with commas between: {', '.join(get_args(Without))}.",
         ),
     ] = None,
     smooth: Annotated[

@@ -29,7 +29,7 @@ from mapfilter.positioning.locators import BUILT_IN, filter_options
 from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
-from mapfilter.tracks.log import Without
+from mapfilter.tracks.schema import Without
 
 
 def _axis_values(value: Any) -> Any:

@@ -28,7 +28,7 @@ from mapfilter.positioning.bayes.evidence import (
 from mapfilter.positioning.bayes.state import FIRST_SPACING_M, BayesState, DeadReckoning
 from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.estimate import UnusedReading
-from mapfilter.tracks.schema import SERVING
+from mapfilter.tracks.schema import SERVING, Kind
 
 _SERVING_NATS = 0.5
 _MAP_NATS_PER_M = 0.03
@@ -86,6 +86,7 @@ class RadioSource(EvidenceSource):
     area: AreaMap
     options: EvidenceOptions
     name: ClassVar[str] = "radio"
+    kinds: ClassVar[frozenset[Kind]] = frozenset({"serving", "neighbour"})
 
     def begin(self) -> RadioHistory:
         """Return the history before the first report."""

@@ -23,6 +23,7 @@ from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Difference, Epoch
 from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.gnss.options import TimingOptions
+from mapfilter.tracks.schema import Kind
 
 
 class TimingState(NamedTuple):
@@ -77,6 +78,7 @@ class TimingSource(EvidenceSource):
     options: TimingOptions
     advances: bool = True
     name: ClassVar[str] = "timing"
+    kinds: ClassVar[frozenset[Kind]] = frozenset({"serving", "neighbour", "tdoa"})
 
     def begin(self) -> TimingState:
         """Return the state before the first reading."""
