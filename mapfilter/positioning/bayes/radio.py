@@ -183,7 +183,7 @@ class RadioSource(EvidenceSource):
     def _placed(
         self, epoch: Epoch, serving: int
     ) -> tuple[dict[int, float], list[tuple[tuple[int, ...], ReportRow]], list[_Unplaced]]:
-        """Sort levels: of one cell and inside the scale, other ones, and those of unknown cells."""
+        """Sort levels: of one cell and inside the scale, other ones, and those without a band."""
         inside: dict[int, float] = {}
         others: list[tuple[tuple[int, ...], ReportRow]] = []
         unplaced: list[_Unplaced] = []
@@ -202,7 +202,8 @@ class RadioSource(EvidenceSource):
                 key = (row.arfcn, -1 if row.bsic is None else row.bsic)
                 bands = tuple(b for b in self.area.carriers.get(key, ()) if b != serving)
             else:
-                bands = ()
+                unplaced.append((row, Reason.NO_CELL))
+                continue
             if not bands:
                 unplaced.append((row, Reason.UNKNOWN_CELL))
             elif not isfinite(row.level_dbm):
