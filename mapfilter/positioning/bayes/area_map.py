@@ -12,6 +12,7 @@ from numba import njit
 from mapfilter._types import Bools, Floats32, Ints, Ints32
 from mapfilter.database.radioroutes import RadioField
 from mapfilter.geodesy import Lattice
+from mapfilter.models.fingerprint import RasterFrame
 from mapfilter.models.street_motion import map_log_likelihood
 from mapfilter.radio.cells import CellPlan
 
@@ -101,6 +102,12 @@ class AreaMap:
         """East and north extent."""
         west, south, east, north = self.lattice.bounds_m
         return east - west, north - south
+
+    @cached_property
+    def frame(self) -> RasterFrame:
+        """Where the lattice's pixels lie in the local frame."""
+        rows, cols, step = self.lattice.rows, self.lattice.cols, self.lattice.resolution_m
+        return RasterFrame(0.0, rows * step, 1 / step, rows, cols)
 
     @cached_property
     def flat_level_dbm(self) -> Floats32:
