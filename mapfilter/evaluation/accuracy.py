@@ -159,7 +159,7 @@ class Outcome:
     unused : dict
         How many readings were not used, by reason.
     unknown_cells : dict
-        How many readings name each serving cell that is not in the database.
+        How many readings name each cell that is not in the database.
     """
 
     final_status: str
