@@ -182,9 +182,10 @@ def evaluate(
         RUNS,
         check_benchmark,
         load_benchmark,
+        main_table,
         run_global_positioning,
     )
-    from mapfilter.workflows.evaluate_audit import run_audit
+    from mapfilter.workflows.evaluate_audit import audit_table, run_audit
     from mapfilter.workflows.evaluate_ottawa import RUNS as OTTAWA_RUNS
     from mapfilter.workflows.evaluate_ottawa import run_ottawa
 
@@ -223,4 +224,6 @@ def evaluate(
             result = run_global_positioning(
                 loaded, folder, cases=cases or (), fixed=fixed, **common
             )
+    if not as_json:
+        result = audit_table(result) if name == "audit" else main_table(result)
     print_result(result, as_json)
