@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from mapfilter.config.fields import Count, FilePath, FilterName, Section, with_options
 from mapfilter.config.inputs import (
@@ -25,7 +25,6 @@ from mapfilter.options import Below1, Degrees, NotNegative, Positive, Seed
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.kalman.filter import KalmanFilter
-from mapfilter.positioning.locators import BUILT_IN, filter_options
 from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
@@ -193,14 +192,6 @@ class FilterSection(Section):
     smooth: bool = False
     bayes: BayesSection = BayesSection()
     kalman: KalmanSection = KalmanSection()
-
-    @model_validator(mode="after")
-    def _smooths(self) -> FilterSection:
-        smoothing = [name for name in BUILT_IN if hasattr(filter_options(name), "smooth")]
-        if self.smooth and self.name not in smoothing:
-            names = ", ".join(smoothing)
-            raise ValueError(f"no smooth (--smooth) with {self.name!r}; {names} can smooth")
-        return self
 
 
 class Output(Section):
