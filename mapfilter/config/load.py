@@ -264,8 +264,9 @@ def _fault(where: str, keys: Sequence[str], annotation: Any, detail: Mapping[str
         what = "section" if len(keys) == 1 else "key"
         return Fault(where, f"a known {what}", repr(keys[-1]), f"{close[0]!r}" if close else "")
     if kind == "value_error":
+        error = detail["ctx"]["error"]
         got = ", ".join(given) if isinstance(given, Mapping) else shown(given)
-        return Fault(where, str(detail["ctx"]["error"]), got)
+        return Fault(where, str(error.args[0]), *error.args[1:] or (got,))
     if kind == "missing" and isinstance(given, Mapping):
         return Fault(where, "a value", "none")
     if kind in ("too_short", "string_too_short") and not given:

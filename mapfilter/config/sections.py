@@ -199,7 +199,8 @@ class FilterSection(Section):
         smoothing = [name for name in BUILT_IN if hasattr(filter_options(name), "smooth")]
         if self.smooth and self.name not in smoothing:
             names = ", ".join(smoothing)
-            raise ValueError(f"no smooth (--smooth) with {self.name!r}; {names} can smooth")
+            expected = f"a filter that can smooth ({names}) with smooth or --smooth"
+            raise ValueError(expected, repr(self.name))
         return self
 
 
