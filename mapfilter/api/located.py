@@ -137,10 +137,10 @@ class Score(Accuracy):
     def __repr__(self) -> str:
         if not self.switched:
             return "Score: the filter never converged"
-        verdict = "right" if self.success else "wrong"
+        outcome = "right" if self.success else "wrong"
         return (
             f"Score: converged after {self.switch_distance_m:.0f} m, "
-            f"{self.error_at_switch_m:.1f} m off ({verdict}); "
+            f"{self.error_at_switch_m:.1f} m off ({outcome}); "
             f"then {self.error_mean_m:.1f} m on average, {self.error_95_m:.1f} m at 95 %"
         )
 

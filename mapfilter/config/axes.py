@@ -31,7 +31,7 @@ _NOT_USED = {
             "filter.bayes.antenna_height_sd_m",
             *(f"filter.kalman.{name}" for name in ("timing_step_m", "timing_sd_m", "fix_sd_m")),
         ),
-        "replay of logs with such measurements, as a sweep simulates none",
+        "an option of replay, as sweeps simulate no such measurement",
     ),
 }
 """Numeric options of these sections that change nothing in a sweep, and what does instead."""
