@@ -52,6 +52,7 @@ _STREET_SD_M = 8.0
 _BETWEEN_STREETS = 0.05
 _BELOW_ROOFS_M = 8.0
 _SLOPE_FROM_M = 100.0
+_RECEIVED_DBM = -104.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,10 +91,10 @@ class RadioModel(Options):
         With every value that is out of range.
     """
 
-    area_sd_db: NotNegative = 4.5
+    area_sd_db: NotNegative = 4.0
     area_length_m: Positive = 90.0
     between_sites: Share = 0.5
-    street_sd_db: NotNegative = 4.0
+    street_sd_db: NotNegative = 3.5
     street_length_m: Positive = 40.0
     own_sd_db: NotNegative = 2.0
     own_length_m: Positive = 12.0
@@ -119,9 +120,10 @@ class Radio:
     model : RadioModel
     seed : int
         Of every draw, each from a stream of its own: adding a cell changes no other.
-    offset_db : float
-        Added to all levels: the mean by which the path loss differs from that of a prediction,
-        which drive tests would have taken out of it.
+    offsets_db : tuple of float
+        Added to the levels of outdoor and of indoor cells: the means by which the path loss differs
+        from that of a prediction, which drive tests would have taken out, see
+        :func:`planners_offsets_db`.
     """
 
     plan: CellPlan
@@ -130,7 +132,7 @@ class Radio:
     streets: StreetLines
     model: RadioModel
     seed: int
-    offset_db: float = 0.0
+    offsets_db: tuple[float, float] = (0.0, 0.0)
 
     def levels_dbm(self, east_m: Floats, north_m: Floats) -> Floats:
         """Return the local mean levels at positions, shape (N, cells), fast fading averaged out."""
@@ -150,7 +152,8 @@ class Radio:
                 )
                 edges[key] = knife_edge_db(fresnel)
             found[:, column] = self._median_of(cell, edges[key], feet, east_m, north_m)
-        return found + self.offset_db
+        offsets_db = np.array([self.offsets_db[cell.indoor] for cell in self.plan.cells])
+        return np.asarray(found + offsets_db)
 
     def shadowing_db(self, east_m: Floats, north_m: Floats) -> Floats:
         """Return the shadowing at positions, shape (N, cells)."""
@@ -253,6 +256,43 @@ class Radio:
     @cached_property
     def _fields(self) -> dict[tuple[float | str, ...], SinusoidField]:
         return {}
+
+
+def planners_offsets_db(
+    plan: CellPlan,
+    lattice: Lattice,
+    heights_m: Floats32 | None,
+    streets: StreetLines,
+    predicted_dbm: Floats,
+    east_m: Floats,
+    north_m: Floats,
+) -> tuple[float, float]:
+    """Return by how much predictions exceed the world's median levels on average.
+
+    Planners tune a model's constant with drive tests, outdoor and indoor cells apart. Nothing that
+    is drawn at random goes in.
+
+    Parameters
+    ----------
+    predicted_dbm : (N, cells) array
+        Levels predicted from the true plan at the positions; NaN where there are none.
+    east_m, north_m : (N,) arrays
+        Positions on the streets.
+
+    Returns
+    -------
+    outdoor_db, indoor_db : float
+    """
+    plainly = RadioModel(guiding_db=0.0, eirp_sd_db=0.0, azimuth_sd_deg=0.0, slope_sd=0.0)
+    radio = Radio(plan, lattice, heights_m, streets, plainly, seed=0)
+    median_dbm = radio.median_dbm(east_m, north_m)
+    received = (median_dbm >= _RECEIVED_DBM) & (predicted_dbm >= _RECEIVED_DBM)
+    found = []
+    for kind in (False, True):
+        own = received & np.array([cell.indoor == kind for cell in plan.cells])
+        excess_db = (predicted_dbm - median_dbm)[own]
+        found.append(float(np.mean(excess_db)) if excess_db.size else 0.0)
+    return found[0], found[1]
 
 
 def _nearness(distance_m: Floats) -> Floats:

@@ -89,7 +89,7 @@ class PedestrianModel(Options):
     start: Literal["street", "indoors", "outside"] = "street"
     indoors_s: NotNegative = 180.0
     indoors_loss_db: NotNegative = 15.0
-    outside_m: Positive = 400.0
+    outside_m: Positive = 250.0
 
 
 @dataclass(frozen=True, eq=False)
