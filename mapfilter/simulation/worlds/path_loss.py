@@ -130,20 +130,18 @@ def fresnel_parameter(
         part = slice(begin, begin + _AT_A_TIME)
         right, up = east_m[part] - mast.east_m, north_m[part] - mast.north_m
         length = np.maximum(np.hypot(right, up), 1.0)
-        steps = max(2, int(np.ceil(length.max() / _RAY_STEP_M)))
-        share = (np.arange(steps) + 0.5) / steps
+        # Samples lie at fixed distances from the mast, whatever other positions there are.
+        before = (np.arange(int(np.ceil(length.max() / _RAY_STEP_M))) + 0.5) * _RAY_STEP_M
+        share = before / length[:, None]
         row, col = lattice.row_col(
-            mast.east_m + np.multiply.outer(right, share),
-            mast.north_m + np.multiply.outer(up, share),
+            mast.east_m + right[:, None] * share, mast.north_m + up[:, None] * share
         )
         there = lattice.contains(row, col)
         roof = np.where(there, heights_m[np.where(there, row, 0), np.where(there, col, 0)], 0.0)
-        before = np.multiply.outer(length, share)
         after = length[:, None] - before
         ray = mast.height_m + (MOBILE_M - mast.height_m) * share
         counts = (roof > 0) & (np.minimum(before, after) > _OWN_BUILDING_M)
-        with np.errstate(divide="ignore"):
-            scale = np.sqrt(2 / wave_m * (1 / np.maximum(before, 1.0) + 1 / np.maximum(after, 1.0)))
+        scale = np.sqrt(2 / wave_m * (1 / before + 1 / np.maximum(after, 1.0)))
         edge = np.where(counts, (roof - ray) * scale, -2.0)
         found[part] = np.maximum(edge.max(axis=1), -2.0)
     return found
