@@ -24,7 +24,7 @@ from mapfilter.simulation.worlds.starts import from_indoors, from_outside
 from mapfilter.simulation.worlds.street_lines import StreetLines
 
 _SPARE = 1.6
-_SMOOTHED_M = 4.0
+_CORNER_M, _SWERVE_M = 2.0, 10.0
 _PARTS = (0.2, 0.4, 0.6, 0.8, 1.0)
 _SLOWEST = 0.4
 _PAUSE_SPREAD = 0.6
@@ -135,7 +135,7 @@ def pedestrian_walk(
         path = with_shortcuts(planned, share, model.length_m, streets, ground, rng)
     else:
         path = planned.cut(model.length_m)
-    path = beside_centre_line(path, model, ground, rng)
+    path = beside_centre_line(path, model, ground, rng).cut(model.length_m)
     off = off_ways_m(path, streets) / (STEP_M * path.east_m.size)
     time_s, east, north = _timed(path, model, rng)
     loss = np.zeros(time_s.size)
@@ -163,12 +163,13 @@ def beside_centre_line(
     process = gauss_markov(along, model.offset_length_m, rng)
     # The distribution function of the normal distribution would make every offset equally likely;
     # this keeps pavements, near the edges, likelier than the middle of the carriageway.
-    wanted = model.offset_share * np.tanh(1.5 * process) * path.half_width_m
-    smooth = _SMOOTHED_M / STEP_M
+    wanted = model.offset_share * np.tanh(2.0 * process) * path.half_width_m
+    # Nobody weaves: sides change within tens of metres.
     limit = model.offset_share * path.half_width_m
-    wanted = np.clip(gaussian_filter1d(wanted, smooth, mode="nearest"), -limit, limit)
-    east = gaussian_filter1d(path.east_m, smooth / 2, mode="nearest")
-    north = gaussian_filter1d(path.north_m, smooth / 2, mode="nearest")
+    wanted = gaussian_filter1d(wanted, _SWERVE_M / STEP_M, mode="nearest")
+    wanted = np.clip(wanted, -limit, limit)
+    east = gaussian_filter1d(path.east_m, _CORNER_M / STEP_M, mode="nearest")
+    north = gaussian_filter1d(path.north_m, _CORNER_M / STEP_M, mode="nearest")
     slope_east, slope_north = np.gradient(east), np.gradient(north)
     length = np.maximum(np.hypot(slope_east, slope_north), 1e-9)
     left_east, left_north = -slope_north / length, slope_east / length
