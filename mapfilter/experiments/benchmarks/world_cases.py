@@ -7,7 +7,7 @@ harsh world differs from ``levels-6`` of the foreign one in the one respect afte
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import radians
 from types import MappingProxyType
 from typing import Literal
@@ -63,6 +63,9 @@ PHONE_UNIT = InertialModel(
 )
 """The unit of a phone, of which nothing is stated."""
 
+_NO_COMPASS_S = 1e9
+"""A time constant that is never over: fused headings start at the compass and integrate."""
+
 _BUSY = HandoverModel(hysteresis_db=1.0, time_to_trigger_s=0.04, load_sd_db=4.0, ping_pong=0.3)
 
 FOREIGN: Mapping[str, WorldCase] = MappingProxyType(
@@ -95,6 +98,7 @@ HARSH: Mapping[str, WorldCase] = MappingProxyType(
                 pedestrian=PedestrianModel(off_ways=0.3, off_ways_exactly=True),
             ),
             WorldCase("phone-imu", inertial=PHONE_UNIT),
+            WorldCase("phone-gyro", inertial=replace(PHONE_UNIT, fusion_s=_NO_COMPASS_S)),
             WorldCase(
                 "reports-5s-2db", data_sheet=_SHEET, phone=PhoneModel(period_s=5.0, scale="2dB")
             ),

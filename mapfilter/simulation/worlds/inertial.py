@@ -1,19 +1,18 @@
 """Dead reckoning of pedestrians as phones and their data sheets have it: steps and headings.
 
 Steps are counted, not measured: the reported distance is the number of steps of an interval times
-an assumed step length. Step detectors of phones miss some per cent of the steps (Brajdic & Harle
-2013, *Walk detection and step counting on unconstrained smartphones*, UbiComp: median errors of 1.3
-% for the best algorithms, more in pockets and bags); lengths estimated without calibration are off
-by up to 15 % from person to person (Weinberg 2002, AN-602: within 8 % for one model after
-calibration; Jahn et al. 2010, *Comparison and evaluation of acceleration based step length
-estimators for handheld devices*, IPIN).
+an assumed step length. Step detectors of phones miss some per cent of the steps (Kang, Huang & Qi
+2018, *A novel walking detection and step counting algorithm using unconstrained smartphones*,
+Sensors 18(1): 95.7 % are counted); lengths are within 8 % after a calibration of the person
+(Weinberg 2002, AN-602) and farther off without one.
 
 Gyros of phones have zero-rate offsets of 1 to 5 deg/s at first and a noise of 4 to 15 mdeg/s/√Hz
 (data sheets of Bosch BMI160, STMicroelectronics LSM6DSO, InvenSense ICM-20948); after calibration
 at rest, some tenths of a degree per second remain and wander with temperature. Cars, rails and
-reinforced concrete turn a compass by tens of degrees while one passes them (Afzal, Renaudin &
-Lachapelle 2011, *Magnetic field based heading estimation for pedestrian navigation environments*,
-IPIN: errors of 20 to 50 deg in urban canyons).
+reinforced concrete turn a compass while one passes them (Afzal, Renaudin & Lachapelle 2011,
+*Magnetic field based heading estimation for pedestrian navigation environments*, IPIN); headings of
+phones indoors have a root-mean-square error of 17 degrees with the best of methods, and more with
+others (Navigation 71(1), 2024, navi.632).
 """
 
 from __future__ import annotations
