@@ -5,13 +5,14 @@ with the fourth power of distance beyond it (Rec. ITU-R P.1411, section 4.1.2, l
 buildings reach into the path, the loss of a single knife edge is added (Rec. ITU-R P.526, section
 4.1), up to the loss over the roofs. The latter has slopes of 3.0, 3.8 and 4.4, which change at
 150 m and 500 m, and passes the site-general NLoS median above roof-tops at 500 m (Rec. ITU-R
-P.1411, table 8: α = 4.39, β = -6.27, γ = 2.30); that a slope grows with distance is the rule in
-measurements (Feuerstein et al. 1994, *Path loss, delay spread, and outage models as functions of
+P.1411, section 4.2.1: α = 4.39, β = -6.27, γ = 2.30). That a slope grows with distance is the rule
+in measurements (Feuerstein et al. 1994, *Path loss, delay spread, and outage models as functions of
 antenna height for microcellular system design*, IEEE Trans. Veh. Technol. 43(3): exponents 2.1 to
 2.2 and 3.3 to 4.2 before and after the breakpoint; Zhang & Andrews 2015, *Downlink cellular network
 analysis with multi-slope path loss models*, IEEE Trans. Commun. 63(5)). Antennas below the roofs,
-such as those indoors, follow the site-general NLoS median of street canyons (table 4: α = 4.00,
-β = 10.2, γ = 2.36).
+such as those indoors, follow the site-general NLoS medians of street canyons (Rec. ITU-R P.1411,
+section 4.1.1): α = 4.00, β = 10.2, γ = 2.36 among high buildings up to 200 m, and α = 5.06, as
+among low ones, beyond.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ MOBILE_M = 1.5
 _RAY_STEP_M = 4.0
 _OWN_BUILDING_M = 8.0
 _AT_A_TIME = 256
+_STREET_BREAK_M = 200.0
 _BREAKS_M, _SLOPES = (150.0, 500.0), (3.0, 3.8, 4.4)
 
 
@@ -80,13 +82,17 @@ def roof_loss_db(distance_m: Floats, frequency_mhz: float) -> Floats:
 def street_loss_db(distance_m: Floats, frequency_mhz: float) -> Floats:
     """Return the loss in dB from an antenna below the roofs, without line of sight.
 
+    Slopes are 4.00 up to 200 m and 5.06 beyond.
+
     Examples
     --------
-    >>> street_loss_db(np.array([100.0]), 1800.0).round(1).tolist()
-    [96.2]
+    >>> street_loss_db(np.array([100.0, 200.0, 400.0]), 1800.0).round(1).tolist()
+    [96.2, 108.3, 123.5]
     """
     distance = np.maximum(distance_m, _SHORTEST_M)
-    return np.asarray(40 * np.log10(distance) + 10.2 + 23.6 * np.log10(frequency_mhz / 1000))
+    near = 40 * np.log10(np.minimum(distance, _STREET_BREAK_M))
+    far = 50.6 * np.log10(np.maximum(distance / _STREET_BREAK_M, 1.0))
+    return np.asarray(near + far + 10.2 + 23.6 * np.log10(frequency_mhz / 1000))
 
 
 def knife_edge_db(fresnel: Floats) -> Floats:
@@ -114,8 +120,8 @@ def fresnel_parameter(
 ) -> Floats:
     """Return the largest Fresnel parameter of the buildings between a mast and positions.
 
-    Buildings within 8 m of either end do not count: the antenna stands on one, and the phone may
-    be at a wall. Outside the lattice there are none.
+    The building on or in which the antenna is does not count, nor do others within 8 m of either
+    end: the phone may be at a wall. Outside the lattice there are none.
 
     Parameters
     ----------
@@ -140,7 +146,8 @@ def fresnel_parameter(
         roof = np.where(there, heights_m[np.where(there, row, 0), np.where(there, col, 0)], 0.0)
         after = length[:, None] - before
         ray = mast.height_m + (MOBILE_M - mast.height_m) * share
-        counts = (roof > 0) & (np.minimum(before, after) > _OWN_BUILDING_M)
+        own = np.logical_and.accumulate(roof > 0, axis=1)
+        counts = (roof > 0) & ~own & (np.minimum(before, after) > _OWN_BUILDING_M)
         scale = np.sqrt(2 / wave_m * (1 / before + 1 / np.maximum(after, 1.0)))
         edge = np.where(counts, (roof - ray) * scale, -2.0)
         found[part] = np.maximum(edge.max(axis=1), -2.0)

@@ -93,6 +93,17 @@ def test_houses_next_to_the_phone_or_the_mast_do_not_count():
     assert fresnel_parameter(heights, LATTICE, mast, *phone, 1800.0)[0] == -2.0
 
 
+def test_the_antennas_own_building_does_not_count():
+    """A wide house about the mast; a second one behind a yard does."""
+    heights = np.zeros((LATTICE.rows, LATTICE.cols), dtype=np.float32)
+    mast = Mast(WEST_M + 102.5, SOUTH_M + 500.0, 4.0)
+    phone = np.array([mast.east_m + 200.0]), np.array([mast.north_m])
+    heights[:, 15:30] = 12.0
+    assert fresnel_parameter(heights, LATTICE, mast, *phone, 1800.0)[0] == -2.0
+    heights[:, 33] = 12.0
+    assert fresnel_parameter(heights, LATTICE, mast, *phone, 1800.0)[0] > 2.0
+
+
 def test_a_pattern_is_half_power_at_its_width_and_limited_behind():
     phases = np.linspace(0, 2 * np.pi, 400, endpoint=False)
     mean = np.mean(
