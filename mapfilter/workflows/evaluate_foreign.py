@@ -10,7 +10,7 @@ from typing import get_args
 
 import numpy as np
 
-from mapfilter._io import ensure_writable_folder, write_json
+from mapfilter._io import atomic_dir, ensure_writable_folder, write_json
 from mapfilter._parallel import Progress, local_executor
 from mapfilter._types import Floats
 from mapfilter.config.load import given_keys
@@ -23,6 +23,7 @@ from mapfilter.experiments.benchmarks.foreign import (
     STREETS,
     VARIANTS,
     ForeignWorld,
+    RouteRuns,
     database_name,
     write_ground,
 )
@@ -41,6 +42,7 @@ from mapfilter.simulation.worlds.faults import GivenInputs, given_inputs
 from mapfilter.simulation.worlds.open_ground import OpenGround
 from mapfilter.simulation.worlds.radio import planners_offsets_db
 from mapfilter.simulation.worlds.street_lines import StreetLines
+from mapfilter.tracks.store import write_log
 from mapfilter.workflows.evaluate import TABLE, EvaluateResult, load_benchmark
 from mapfilter.workflows.terminal import to_jsonable
 from mapfilter.workflows.world import World, filter_choice
@@ -187,6 +189,38 @@ def prepare(
     offsets_db = _drive_test(world, StreetLines(network), seed)
     made = ForeignWorld(name, folder, seed, offsets_db=offsets_db, databases=tuple(databases))
     return made, points
+
+
+def write_journeys(world: ForeignWorld, case: str, count: int, folder: Path) -> GivenInputs:
+    """Write the logs of a case, with their truth; all have the first variant of its fault.
+
+    The database that belongs to them is ``world.folder / database_name(fault, 0)``.
+
+    Parameters
+    ----------
+    world : ForeignWorld
+        From :func:`prepare`, with the databases of this case.
+    count : int
+        Journeys, each with a walk and a radio of its own.
+    folder : Path
+        Gets a folder for each log.
+
+    Returns
+    -------
+    GivenInputs
+        What is wrong with the database, to compare findings with.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be written.
+    """
+    with atomic_dir(folder) as into:
+        for number in range(count):
+            # Routes of the first variant only.
+            _, log = RouteRuns(world, number * VARIANTS).run(CASES_OF[world.name][case])
+            write_log(log, into / f"journey-{number:04d}")
+    return world.given(CASES_OF[world.name][case], 0)
 
 
 def open_ground(world: World) -> OpenGround:

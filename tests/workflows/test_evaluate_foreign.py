@@ -12,14 +12,15 @@ from mapfilter.errors import ConfigError
 from mapfilter.experiments.benchmarks.foreign import RouteRuns
 from mapfilter.experiments.benchmarks.foreign_runs import foreign_benchmark
 from mapfilter.experiments.benchmarks.world_cases import CASES_OF, FOREIGN, HARSH
-from mapfilter.workflows.evaluate_foreign import load_foreign, prepare, run_foreign
+from mapfilter.tracks.store import read_log
+from mapfilter.workflows.evaluate_foreign import load_foreign, prepare, run_foreign, write_journeys
 from mapfilter.workflows.world import World, filter_choice
 
 SMALL = [
     'area.map="manhattan"',
     "area.size_m=600,600",
     "area.resolution_m=10",
-    "cells.sites=1",
+    "cells.sites=2",
     "cells.indoor=1",
     "journeys.length_m=250",
     "filter.bayes.max_particles=4000",
@@ -180,6 +181,20 @@ def test_serving_cells_only(made):
     _, log = RouteRuns(world, 0).run(FOREIGN["cell-6"])
     assert set(log.radio["role"]) == {"serving"}
     assert log.radio["level_dbm"].isna().all()
+
+
+def test_journeys_are_written_with_what_is_wrong(made, tmp_path):
+    world, _ = made
+    found = write_journeys(world, "faults-together", 2, tmp_path / "logs")
+    assert found == world.given(HARSH["faults-together"], 0)
+    names = sorted(folder.name for folder in (tmp_path / "logs").iterdir())
+    assert names == ["journey-0000", "journey-0001"]
+    first, second = (read_log(tmp_path / "logs" / name) for name in names)
+    assert not cells(first) & set(found.silent)
+    assert first.truth is not None
+    assert not same(first.motion, second.motion)
+    _, again = RouteRuns(world, 0).run(HARSH["faults-together"])
+    assert same(first.motion, again.motion)
 
 
 @pytest.mark.parametrize("name", HARSH)

@@ -130,6 +130,24 @@ def test_a_rotated_site_predicts_each_sector_as_the_next_one():
         assert np.array_equal(wrong[name], true[name])
 
 
+def test_faults_together_have_cells_of_their_own():
+    for seed in SEEDS:
+        found = given("faults-together", seed)
+        cells = [cell for names in found.by_fault.values() for cell in names]
+        assert len(cells) == len(set(cells)) == len(found.affected)
+        assert {name: len(names) for name, names in found.by_fault.items()} == {
+            "sectors-swapped": 2,
+            "site-rotated": 3,
+            "cells-off": 1,
+            "cells-biased-10": 1,
+        }
+        differing = {*found.by_fault["sectors-swapped"], *found.by_fault["site-rotated"]}
+        assert set(changed("faults-together", seed)) == differing
+        assert found.silent == found.by_fault["cells-off"]
+        assert tuple(found.offset_db) == found.by_fault["cells-biased-10"]
+        assert found.missing_ways == 0.1
+
+
 def test_a_new_cell_is_not_in_the_plan():
     found = given("new-cell")
     assert set(plan().ids) - set(found.plan.ids) == set(found.affected)
@@ -173,8 +191,8 @@ def test_unknown_faults_and_plans_without_sectors_are_refused():
     omni = replace(
         plan(), cells=tuple(replace(c, azimuth_deg=None, antenna="omni") for c in plan().cells)
     )
-    for name in ("sectors-swapped", "site-rotated"):
-        with pytest.raises(ConfigError, match="two sectors"):
+    for name in ("sectors-swapped", "site-rotated", "faults-together"):
+        with pytest.raises(ConfigError, match="two sectors or more"):
             given_inputs(name, omni, LATTICE, 0)
     with pytest.raises(ConfigError, match="two cells"):
         given_inputs("new-cell", replace(plan(), cells=plan().cells[:1]), LATTICE, 0)
