@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from math import radians
 from types import MappingProxyType
 from typing import Literal
 
@@ -47,7 +46,7 @@ class WorldCase(Case):
     other_city: bool = False
 
 
-_SHEET: Mapping[str, float] = MappingProxyType({"heading_sd_rad": radians(6.0)})
+_SHEET: Mapping[str, float] = MappingProxyType({"heading_sd_deg": 6.0})
 _BIASED = InertialModel(bias_sd_deg=10.0, drift_deg_per_sqrt_s=0.2, scale_sd=0.05)
 
 PHONE_UNIT = InertialModel(
