@@ -36,6 +36,7 @@ from mapfilter.propagation.predict import predict
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.roads.index import inside_areas
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.reports import array_sampler
 from mapfilter.simulation.worlds.faults import GivenInputs, given_inputs
@@ -229,7 +230,7 @@ def open_ground(world: World) -> OpenGround:
     wet = np.zeros(built.shape, dtype=bool)
     source = world.streets.source if world.landuse is None else None
     if source is not None and source.water is not None and source.bridges is not None:
-        wet = source.water.mask(world.lattice)
+        wet = inside_areas(source.water, world.lattice)
         wet &= source.bridges.reaching(world.lattice)[0] < 0
     return OpenGround(world.lattice, ~built & ~wet, built)
 
