@@ -284,7 +284,8 @@ def load_benchmark(
         There is no such world, or a setting is wrong or has no meaning here.
     """
     if world not in WORLDS:
-        raise fail(ConfigError, "--world", " or ".join(WORLDS), repr(world))
+        expected = ", ".join((*WORLDS, "foreign or harsh"))
+        raise fail(ConfigError, "--world", expected, repr(world))
     with as_file(files("mapfilter.data")) as data:
         config = load_config(file, settings, out=out, base=data / f"world-{world}.toml")
     given = given_keys(file, settings)
