@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal
 
@@ -21,7 +21,7 @@ from mapfilter.learning.likelihood import (
 from mapfilter.learning.patterns import Patterns, bearing_places
 from mapfilter.learning.visits import Visits
 
-Kind = Literal["offset", "dead", "moved", "turned", "rotated", "swapped"]
+FaultKind = Literal["offset", "dead", "moved", "turned", "rotated", "swapped"]
 
 PRIOR: Mapping[str, float] = MappingProxyType(
     {
@@ -55,8 +55,8 @@ class Explanation:
         Of the cell, beside the prediction under this hypothesis.
     value : float
         Degrees turned, or metres moved; NaN where it has none.
-    by_journey : (journeys,) array
-        Log-likelihood of each journey's visits at that offset.
+    by_journey, unshifted : (journeys,) arrays
+        Log-likelihood of each journey's visits at that offset, and without any.
     """
 
     kind: str
@@ -65,6 +65,7 @@ class Explanation:
     offset_db: float
     offset_sd_db: float
     by_journey: Floats
+    unshifted: Floats
     value: float = float("nan")
     place_m: tuple[float, float] | None = None
 
@@ -128,7 +129,7 @@ class CellEvidence:
             return None
         nothing = np.full(len(self.visits), np.nan)
         zero = np.zeros(self.scene.journeys)
-        return Explanation("dead", 0.0, nothing, 0.0, np.nan, zero)
+        return Explanation("dead", 0.0, nothing, 0.0, np.nan, zero, zero)
 
     def moved(self) -> Explanation | None:
         """Return the best other place, with the evidence of all of them."""
@@ -152,9 +153,8 @@ class CellEvidence:
         evidence = float(logsumexp(by_place[far])) - np.log(far.sum())
         # Without its buildings a prediction fits worse, wherever the cell is taken to be.
         evidence = max(alone) + evidence - max(here, *alone)
-        return Explanation(
-            "moved", evidence, found.expected, found.offset_db, found.offset_sd_db,
-            found.by_journey, float(away[best]), place,
+        return replace(
+            found, log_evidence=evidence, value=float(away[best]), place_m=place
         )
 
     def _coarse(self, level_dbm: Floats) -> float:
@@ -184,8 +184,10 @@ class CellEvidence:
         each = log_likelihoods(self.visits, level_dbm + self.shift, floor_dbm, noise_db)
         total = self.weight @ each if len(self.visits) else np.zeros(OFFSETS_DB.size)
         mean, spread = posterior_offset(total, sd_db)
-        at = each[:, int(np.argmin(np.abs(OFFSETS_DB - mean)))] * self.weight
-        by_journey = np.bincount(self.visits.journey, at, scene.journeys)
+        journeys = (
+            np.bincount(self.visits.journey, each[:, at] * self.weight, scene.journeys)
+            for at in (int(np.argmin(np.abs(OFFSETS_DB - mean))), OFFSETS_DB.size // 2)
+        )
         return Explanation(
-            kind, marginal(total, sd_db), level_dbm, mean, spread, by_journey, value
+            kind, marginal(total, sd_db), level_dbm, mean, spread, *journeys, value=value
         )

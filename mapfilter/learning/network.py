@@ -14,6 +14,7 @@ from mapfilter.learning.cell_evidence import (
     PRIOR,
     TURNS_DEG,
     CellEvidence,
+    FaultKind,
     Explanation,
     Scene,
 )
@@ -48,7 +49,7 @@ class Finding:
         Where a moved cell stands.
     """
 
-    kind: str
+    kind: FaultKind
     cells: tuple[str, ...]
     value: float
     log_bayes_factor: float
@@ -214,7 +215,11 @@ def _finding(
     ours: dict[int, Explanation],
     usual: dict[int, Explanation],
 ) -> Finding:
-    gain = sum((ours[c].by_journey - usual[c].by_journey for c in cells), np.zeros(scene.journeys))
+    gain = np.zeros(scene.journeys)
+    for c in cells:
+        # With enough visits even a narrow prior lets a cell have its offset.
+        gain += ours[c].by_journey
+        gain -= usual[c].unshifted if kind == "offset" else usual[c].by_journey
     with_visits = {int(j) for c in cells for j in np.unique(evidence[c].visits.journey)}
     return Finding(
         kind,
