@@ -214,7 +214,8 @@ def _pixels_about(
     top, left = lattice.row_col(west - half_width_m, north + half_width_m)
     bottom, right = lattice.row_col(east + half_width_m, south - half_width_m)
     row, col = np.mgrid[
-        max(top, 0) : min(bottom, lattice.rows - 1) + 1, max(left, 0) : min(right, lattice.cols - 1) + 1
+        max(top, 0) : min(bottom, lattice.rows - 1) + 1,
+        max(left, 0) : min(right, lattice.cols - 1) + 1,
     ]
     row, col = row.ravel(), col.ravel()
     places = shapely.points(*lattice.east_north(row, col))

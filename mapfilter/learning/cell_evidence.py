@@ -22,6 +22,7 @@ from mapfilter.learning.patterns import Patterns, bearing_places
 from mapfilter.learning.visits import Visits
 
 FaultKind = Literal["offset", "dead", "moved", "turned", "rotated", "swapped"]
+StateKind = Literal["fine", "offset", "dead", "moved", "turned", "rotated", "swapped"]
 
 PRIOR: Mapping[str, float] = MappingProxyType(
     {
@@ -59,7 +60,7 @@ class Explanation:
         Log-likelihood of each journey's visits at that offset, and without any.
     """
 
-    kind: str
+    kind: StateKind
     log_evidence: float
     expected: Floats
     offset_db: float
@@ -109,22 +110,28 @@ class CellEvidence:
 
     @property
     def planned_deg(self) -> float | None:
+        """Azimuth by the plan; None of a cell that is alike all around."""
         cell = self.scene.patterns.plan.cells[self.cell]
         return None if cell.antenna == "omni" else cell.azimuth_deg
 
     def fine(self, turn_deg: float = 0.0, other: int = -1) -> Explanation:
+        """Return the usual state: turned by an angle, or with the levels of another cell."""
         return self._of("fine", turn_deg, self.scene.noise.cells_sd_db, other)
 
     def offset(self, turn_deg: float = 0.0, other: int = -1) -> Explanation:
+        """Return the same with an offset that is a fault."""
         return self._of("offset", turn_deg, self.scene.noise.fault_sd_db, other)
 
     def mixed(self, turn_deg: float = 0.0, other: int = -1) -> float:
         """Return the evidence of a pattern, with or without an offset."""
         p = PRIOR["offset"]
         fine, offset = self.fine(turn_deg, other), self.offset(turn_deg, other)
-        return float(np.logaddexp(np.log1p(-p) + fine.log_evidence, np.log(p) + offset.log_evidence))
+        return float(
+            np.logaddexp(np.log1p(-p) + fine.log_evidence, np.log(p) + offset.log_evidence)
+        )
 
     def dead(self) -> Explanation | None:
+        """Return that the cell is not on air; None where it was received."""
         if not len(self.visits) or self.visits.received.any():
             return None
         nothing = np.full(len(self.visits), np.nan)
@@ -153,9 +160,7 @@ class CellEvidence:
         evidence = float(logsumexp(by_place[far])) - np.log(far.sum())
         # Without its buildings a prediction fits worse, wherever the cell is taken to be.
         evidence = max(alone) + evidence - max(here, *alone)
-        return replace(
-            found, log_evidence=evidence, value=float(away[best]), place_m=place
-        )
+        return replace(found, log_evidence=evidence, value=float(away[best]), place_m=place)
 
     def _coarse(self, level_dbm: Floats) -> float:
         expected = level_dbm[self.place] + self.shift
@@ -163,7 +168,7 @@ class CellEvidence:
         each = log_likelihoods(self.visits, expected, floor_dbm, sd_db, _COARSE_DB)
         return marginal(self.weight @ each, self.scene.noise.fault_sd_db / 2, _COARSE_DB)
 
-    def _of(self, kind: str, turn_deg: float, sd_db: float, other: int) -> Explanation:
+    def _of(self, kind: StateKind, turn_deg: float, sd_db: float, other: int) -> Explanation:
         key = kind, turn_deg % 360.0, sd_db, other
         if key not in self._known:
             patterns = self.scene.patterns
@@ -177,17 +182,25 @@ class CellEvidence:
         return self._known[key]
 
     def _explained(
-        self, kind: str, level_dbm: Floats, sd_db: float, value: float = float("nan")
+        self, kind: StateKind, level_dbm: Floats, sd_db: float, value: float = float("nan")
     ) -> Explanation:
         scene = self.scene
         floor_dbm, noise_db = scene.patterns.floor_dbm, scene.noise.sd_db
         each = log_likelihoods(self.visits, level_dbm + self.shift, floor_dbm, noise_db)
         total = self.weight @ each if len(self.visits) else np.zeros(OFFSETS_DB.size)
         mean, spread = posterior_offset(total, sd_db)
-        journeys = (
-            np.bincount(self.visits.journey, each[:, at] * self.weight, scene.journeys)
-            for at in (int(np.argmin(np.abs(OFFSETS_DB - mean))), OFFSETS_DB.size // 2)
-        )
+        at = int(np.argmin(np.abs(OFFSETS_DB - mean)))
         return Explanation(
-            kind, marginal(total, sd_db), level_dbm, mean, spread, *journeys, value=value
+            kind,
+            marginal(total, sd_db),
+            level_dbm,
+            mean,
+            spread,
+            self._by_journey(each[:, at]),
+            self._by_journey(each[:, OFFSETS_DB.size // 2]),
+            value,
         )
+
+    def _by_journey(self, each: Floats) -> Floats:
+        counted = np.bincount(self.visits.journey, each * self.weight, self.scene.journeys)
+        return np.asarray(counted, dtype=np.float64)

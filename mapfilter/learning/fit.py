@@ -114,7 +114,7 @@ def _scatter_db(cells: tuple[Explanation, ...]) -> float:
 def _distance_m(visits: Visits, plan: CellPlan) -> Floats:
     east = np.array([cell.east_m for cell in plan.cells])[visits.cell]
     north = np.array([cell.north_m for cell in plan.cells])[visits.cell]
-    return np.hypot(visits.east_m - east, visits.north_m - north)
+    return np.asarray(np.hypot(visits.east_m - east, visits.north_m - north))
 
 
 def _phones(

@@ -103,8 +103,8 @@ def unlisted_cells(journeys: Sequence[Placed], plan: CellPlan) -> tuple[Unlisted
                     seen.setdefault(row.cell, set()).add(number)
     found = []
     for cell in sorted(places, key=lambda name: -len(places[name])):
-        at = np.array(places[cell])
-        known = at[np.isfinite(at).all(axis=1)]
+        every = np.array(places[cell])
+        known = every[np.isfinite(every).all(axis=1)]
         middle = known.mean(axis=0) if len(known) else np.full(2, math.nan)
         found.append(UnlistedCell(cell, len(seen[cell]), float(middle[0]), float(middle[1])))
     return tuple(found)

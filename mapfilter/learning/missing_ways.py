@@ -176,5 +176,5 @@ def _sampled(values: Floats, field: RadioField, place_m: Floats) -> Floats:
     known = np.isfinite(place_m).all(axis=1)
     safe = np.where(known[:, None], place_m, 0.0)
     row, col = field.lattice.row_col(safe[:, 0], safe[:, 1])
-    inside = known & field.lattice.contains(row, col)
+    inside: Bools = np.asarray(known & field.lattice.contains(row, col), dtype=np.bool_)
     return np.where(inside, values[np.where(inside, row, 0), np.where(inside, col, 0)], 0.0)

@@ -9,13 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
-from mapfilter._types import Floats
 from mapfilter.learning.cell_evidence import (
     PRIOR,
     TURNS_DEG,
     CellEvidence,
-    FaultKind,
     Explanation,
+    FaultKind,
     Scene,
 )
 
@@ -81,7 +80,7 @@ class _Case:
 
     score: float
     cells: tuple[Explanation, ...]
-    faults: tuple[tuple[str, tuple[int, ...], float], ...] = ()
+    faults: tuple[tuple[FaultKind, tuple[int, ...], float], ...] = ()
 
 
 def explain(scene: Scene) -> NetworkFit:
@@ -144,7 +143,7 @@ def _turned_case(
     evidence: Sequence[CellEvidence],
     turns_deg: dict[int, float],
     log_prior: float,
-    kind: str,
+    kind: FaultKind,
 ) -> _Case:
     score, cells = log_prior, []
     for cell in mast:
@@ -194,8 +193,14 @@ def _named(
         value = state.offset_db if state.kind == "offset" else state.value
         found.append(
             _finding(
-                scene, evidence, state.kind, (cell,), value, (bayes, float(sure)),
-                {cell: state}, {cell: usual_state},
+                scene,
+                evidence,
+                state.kind,
+                (cell,),
+                value,
+                (bayes, float(sure)),
+                {cell: state},
+                {cell: usual_state},
             )
         )
     return [one for one in found if one.probability >= _SURE]
@@ -208,7 +213,7 @@ def _pairs(count: int) -> int:
 def _finding(
     scene: Scene,
     evidence: Sequence[CellEvidence],
-    kind: str,
+    kind: FaultKind,
     cells: Sequence[int],
     value: float,
     known: tuple[float, float],
@@ -272,8 +277,6 @@ def _across(
         sure = 1 / (1 + np.exp(-min(odds, 700.0)))
         known = float(bayes), float(sure)
         nothing = float("nan")
-        findings.append(
-            _finding(scene, evidence, "swapped", pair, nothing, known, ours, usual)
-        )
+        findings.append(_finding(scene, evidence, "swapped", pair, nothing, known, ours, usual))
         chosen = chosen | ours
     return findings, chosen

@@ -111,9 +111,7 @@ def visits_of(journeys: Sequence[Placed], plan: CellPlan, field: RadioField) -> 
     return Visits(**{name: columns[name].astype(kinds.get(name, np.float64)) for name in names})
 
 
-def predicted_dbm(
-    field: RadioField, plan: CellPlan, east_m: Floats, north_m: Floats
-) -> Floats:
+def predicted_dbm(field: RadioField, plan: CellPlan, east_m: Floats, north_m: Floats) -> Floats:
     """Return the predicted levels of all cells of a plan at positions, shape (N, cells).
 
     NaN where a cell is below the floor of the database.

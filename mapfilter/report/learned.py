@@ -65,8 +65,11 @@ def plot_learned(
             if change.kind == "moved":
                 there = frame(np.array([change.east_m]), np.array([change.north_m]))
                 axes.annotate(
-                    "", (there[0][0], there[1][0]), (x[0], y[0]),
-                    arrowprops={"arrowstyle": "->", "color": colour, "lw": 1.8}, zorder=7,
+                    "",
+                    (there[0][0], there[1][0]),
+                    (x[0], y[0]),
+                    arrowprops={"arrowstyle": "->", "color": colour, "lw": 1.8},
+                    zorder=7,
                 )
         cell = plan[change.cells[0]]
         place = cell.east_m, cell.north_m
@@ -74,8 +77,14 @@ def plot_learned(
     for (east_m, north_m), texts in labels.items():
         x, y = frame(np.array([east_m]), np.array([north_m]))
         axes.annotate(
-            "\n".join(texts), (x[0], y[0]), (10, 8), textcoords="offset points",
-            fontsize=7, color=BLACK, path_effects=HALO, zorder=8,
+            "\n".join(texts),
+            (x[0], y[0]),
+            (10, 8),
+            textcoords="offset points",
+            fontsize=7,
+            color=BLACK,
+            path_effects=HALO,
+            zorder=8,
         )
     kinds = dict.fromkeys(change.kind for change in changes)
     handles = [

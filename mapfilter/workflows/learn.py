@@ -2,43 +2,22 @@
 
 from __future__ import annotations
 
-import hashlib
-import tempfile
 import time
-from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from mapfilter._io import VERSION, ensure_writable_folder, sha256_file
-from mapfilter._parallel import Progress, local_executor, ordered_results
-from mapfilter._resume import FinishedParts
+from mapfilter._io import ensure_writable_folder, sha256_file
+from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
 from mapfilter.database.manifest import MANIFEST, InputFile
-from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
-from mapfilter.errors import ConfigError, InputError, fail
+from mapfilter.errors import ConfigError, fail
 from mapfilter.learning.apply import apply_patch
-from mapfilter.learning.blank import blank_database, blank_log
-from mapfilter.learning.learn import Lesson, changes_of, lesson_of, unlisted_cells
-from mapfilter.learning.missing_ways import missing_ways
-from mapfilter.learning.patch import Patch, read_patch, write_patch
-from mapfilter.learning.phone import PhoneNoise, phone_noise
-from mapfilter.learning.tracks import JourneyTrack, placed
-from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.filter import Filter, FilterOptions, locate
-from mapfilter.propagation.shadowing import named_rng
-from mapfilter.tracks.store import list_logs, read_log
+from mapfilter.learning.patch import read_patch, write_patch
+from mapfilter.learning.phone import PhoneNoise
 from mapfilter.workflows.learn_report import PATCH, write_report
-from mapfilter.workflows.replay import check_logs
-from mapfilter.workflows.world import filter_choice
-
-_LEAST_KNOWN = 0.3
-_STALE_M = 50.0
+from mapfilter.workflows.learn_study import study_logs
 
 
 @dataclass(frozen=True)
@@ -72,18 +51,6 @@ class LearnResult:
     database: Path | None
     out: Path
     seconds: float
-
-
-@dataclass(frozen=True)
-class _Task:
-    """One journey to locate."""
-
-    log: Path
-    database: Path
-    sha256: str
-    choice: FilterOptions
-    seed: int
-    is_blank: bool
 
 
 def run_accept(
@@ -161,183 +128,33 @@ def run_learn(
         written.
     """
     began_s = time.perf_counter()
-    choice = _smoothing(filter_choice(config.filter))
-    path = config.database_path
-    database = open_database(path, verify="full")
-    folders = list_logs(config.track_path)
-    check_logs(folders, database.lattice)
-    _check_apart(path, out)
+    _check_apart(config.database_path, out)
     report = out.with_name(f"{out.name}-report") if accept else out
     ensure_writable_folder(report)
-    key = _key(database, folders, choice, config.journeys.seed, use_truth)
-    with (
-        FinishedParts(report, lambda: key, keep=resume, name="journey") as finished,
-        tempfile.TemporaryDirectory() as scratch,
-        local_executor(workers) as executor,
-    ):
-        study = _Study(
-            database, folders, choice, config.journeys.seed, use_truth, Path(scratch), finished,
-            executor, 2 * workers, progress,
-        )
-        lesson, tracks, notes = study.run()
-    logs = [read_log(folder) for folder in folders]
-    trusted = lesson.trusted.tolist()
-    good = [(log, track) for log, track, use in zip(logs, tracks, trusted, strict=True) if use]
-    ways = missing_ways(database.field(), [pair[1] for pair in good], [pair[0] for pair in good])
-    cells = lesson.learned.network.cells
-    offsets = dict(zip(database.cell_ids, (state.offset_db for state in cells), strict=True))
-    changes = (*changes_of(lesson.learned.network.findings, offsets), *ways)
-    patch = Patch(database.lattice.crs, sha256_file(path / MANIFEST), len(folders), changes)
-    strange = unlisted_cells(
-        [placed(log, track) for log, track in zip(logs, tracks, strict=True)], database.plan
+    taught = study_logs(
+        config, report, use_truth=use_truth, workers=workers, resume=resume, progress=progress
     )
-    phone = phone_noise(good, lesson.learned.phone_db[lesson.trusted], lesson.learned.sd_db)
-    findings = write_report(
-        report, database, lesson, patch, strange, [folder.name for folder in folders], tracks
-    )
-    if changes:
-        write_patch(patch, report / PATCH)
-    changed = None
-    if accept and changes:
+    findings = write_report(taught, report)
+    proposed, changed = bool(taught.patch.changes), None
+    if proposed:
+        write_patch(taught.patch, report / PATCH)
+    if accept and proposed:
         inputs = (InputFile.of("patch", report / PATCH),)
-        changed = apply_patch(database, patch, out, inputs=inputs).path
+        changed = apply_patch(taught.database, taught.patch, out, inputs=inputs).path
     return LearnResult(
-        len(folders),
-        sum(trusted),
+        len(taught.names),
+        int(taught.lesson.trusted.sum()),
         findings,
-        notes,
-        phone,
-        report / PATCH if changes else None,
+        taught.notes,
+        taught.phone,
+        report / PATCH if proposed else None,
         changed,
         report,
         time.perf_counter() - began_s,
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Study:
-    """The passes over all journeys."""
-
-    database: RadioRouteDatabase
-    folders: Sequence[Path]
-    choice: FilterOptions
-    seed: int
-    use_truth: bool
-    scratch: Path
-    finished: FinishedParts
-    executor: Executor
-    in_flight: int
-    progress: Progress | None
-
-    def run(self) -> tuple[Lesson, list[JourneyTrack], tuple[str, ...]]:
-        """Locate by map and dead reckoning, learn, locate with what was learned, learn again."""
-        notes: list[str] = []
-        blank = blank_database(self.database, self.scratch / "blank")
-        tracks = self._tracks(blank, 0, is_blank=True)
-        known = np.mean(np.concatenate([track.radius_m <= _STALE_M for track in tracks]))
-        if known < _LEAST_KNOWN:
-            notes.append(
-                "map and dead reckoning do not place these journeys: they were located with the "
-                "database as it is, whose faults may hide in the tracks"
-            )
-            tracks = self._tracks(self.database, 0, is_blank=False, offset=1)
-        lesson = self._lesson(tracks)
-        changes = changes_of(lesson.learned.network.findings, {})
-        patch = Patch(self.database.lattice.crs, "0" * 64, len(self.folders), changes)
-        patched = apply_patch(self.database, patch, self.scratch / "patched")
-        again = self._tracks(patched, 1, is_blank=False)
-        second = self._lesson(again)
-        # A journey that was lost with the patched database may be right without any.
-        worse = lesson.trusted & ~second.trusted
-        if worse.any():
-            again = [a if w else b for a, b, w in zip(tracks, again, worse, strict=True)]
-            second = self._lesson(again)
-        return second, again, tuple(notes)
-
-    def _lesson(self, tracks: Sequence[JourneyTrack]) -> Lesson:
-        journeys = [
-            placed(read_log(folder), track)
-            for folder, track in zip(self.folders, tracks, strict=True)
-        ]
-        database = self.database
-        lesson = lesson_of(journeys, database.plan, database.field(), database.floor_dbm)
-        if not len(lesson.visits):
-            expected = "levels of cells of the database along a located journey"
-            hint = "logs without levels, or of another network"
-            raise fail(InputError, "logs", expected, "none", hint)
-        return lesson
-
-    def _tracks(
-        self, database: RadioRouteDatabase, number: int, *, is_blank: bool, offset: int = 0
-    ) -> list[JourneyTrack]:
-        """Return the tracks of all journeys over a database; finished ones from disk."""
-        sha256, count = sha256_file(database.path / MANIFEST), len(self.folders)
-        found: dict[int, JourneyTrack] = {}
-        tasks: dict[int, _Task] = {}
-        for i, folder in enumerate(self.folders):
-            part = (2 * number + offset) * count + i
-            kept = self.finished.load(part) if self.finished.keep else None
-            log = read_log(folder)
-            if self.use_truth and len(log.truth) > 1:
-                found[i] = JourneyTrack.of_truth(log)
-            elif kept is not None:
-                found[i] = JourneyTrack.from_bytes(kept)
-            else:
-                tasks[i] = _Task(folder, database.path, sha256, self.choice, self.seed, is_blank)
-        done = ordered_results(
-            self.executor, _located, list(tasks.values()), in_flight=self.in_flight
-        )
-        for at, (i, data) in enumerate(zip(tasks, done, strict=True), start=1):
-            self.finished.save((2 * number + offset) * count + i, data)
-            found[i] = JourneyTrack.from_bytes(data)
-            if self.progress is not None:
-                self.progress(number * count + count - len(tasks) + at, 2 * count)
-        return [found[i] for i in range(count)]
-
-
-def _located(task: _Task) -> bytes:
-    """Locate one journey, on a worker."""
-    log = read_log(task.log)
-    if task.is_blank:
-        log = blank_log(log)
-    rng = named_rng(task.seed, "learn", task.log.name)
-    filter_ = _filter(task.database, task.choice, task.sha256)
-    return JourneyTrack.of_estimate(locate(log, filter_, rng).estimate).to_bytes()
-
-
-@lru_cache(maxsize=2)
-def _filter(database: Path, choice: FilterOptions, sha256: str) -> Filter[Any]:  # noqa: ARG001
-    return choice.over(open_database(database), ways=False)
-
-
-def _smoothing(choice: FilterOptions) -> FilterOptions:
-    if not isinstance(choice, BayesFilter) or choice.name != "bayes":
-        hint = "learning needs smoothed tracks"
-        raise fail(ConfigError, "filter.name", "bayes", choice.name, hint)
-    return replace(choice, smooth=True)
-
-
 def _check_apart(database: Path, out: Path) -> None:
     if out.resolve() == database.resolve():
         hint = "a database is never changed in place"
         raise fail(ConfigError, "--out", "another folder than the database", str(out), hint)
-
-
-def _key(
-    database: RadioRouteDatabase,
-    folders: Sequence[Path],
-    choice: FilterOptions,
-    seed: int,
-    use_truth: bool,
-) -> str:
-    """Return a checksum of everything that the tracks depend on."""
-    parts = [VERSION, sha256_file(database.path / MANIFEST), repr(choice), seed, use_truth]
-    digest = hashlib.sha256(repr(parts).encode())
-    for file in _files(folders):
-        digest.update(f"{file.parent.name}/{file.name} {sha256_file(file)}".encode())
-    return digest.hexdigest()
-
-
-def _files(folders: Sequence[Path]) -> Iterator[Path]:
-    for folder in folders:
-        yield from (file for file in sorted(folder.iterdir()) if file.is_file())

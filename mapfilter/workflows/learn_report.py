@@ -12,11 +12,11 @@ import shapely
 
 from mapfilter._io import atomic_file
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.learning.learn import Lesson, UnlistedCell
-from mapfilter.learning.patch import Change, Patch
-from mapfilter.learning.tracks import JourneyTrack
+from mapfilter.learning.learn import Lesson
+from mapfilter.learning.patch import Change
 from mapfilter.report.canvas import save
 from mapfilter.report.learned import plot_learned
+from mapfilter.workflows.learn_study import Taught
 from mapfilter.workflows.pictures import clear_pictures
 from mapfilter.workflows.served import served_points, street_map
 
@@ -27,51 +27,51 @@ PATCH, FINDINGS, CELLS, JOURNEYS, MAP = (
     "journeys.csv",
     "learned.png",
 )
+_COLUMNS = (
+    "kind",
+    "cells",
+    "value",
+    "unit",
+    "log_bayes_factor",
+    "probability",
+    "journeys",
+    "agreeing",
+    "east_m",
+    "north_m",
+)
 _UNITS = {"offset": "dB", "turned": "deg", "rotated": "deg", "moved": "m", "way": "m"}
 
 
-def write_report(
-    out: Path,
-    database: RadioRouteDatabase,
-    lesson: Lesson,
-    patch: Patch,
-    strange: Sequence[UnlistedCell],
-    names: Sequence[str],
-    tracks: Sequence[JourneyTrack],
-) -> tuple[dict[str, Any], ...]:
+def write_report(taught: Taught, out: Path) -> tuple[dict[str, Any], ...]:
     """Write tables and map into a folder, and return the findings."""
+    database, lesson, patch = taught.database, taught.lesson, taught.patch
     clear_pictures(out, (PATCH, FINDINGS, CELLS, JOURNEYS, MAP))
-    findings = [_finding(change, database) for change in patch.changes]
-    findings += [
-        {
-            "kind": "unlisted",
-            "cells": one.cell,
-            "value": None,
-            "unit": "",
-            "log_bayes_factor": None,
-            "probability": None,
-            "journeys": one.journeys,
-            "agreeing": one.journeys,
-            "east_m": round(one.east_m, 1) if np.isfinite(one.east_m) else None,
-            "north_m": round(one.north_m, 1) if np.isfinite(one.north_m) else None,
-        }
-        for one in strange
-    ]
-    columns = [
-        "kind", "cells", "value", "unit", "log_bayes_factor", "probability", "journeys",
-        "agreeing", "east_m", "north_m",
-    ]
-    _write(pd.DataFrame(findings, columns=columns), out / FINDINGS)
+    findings = findings_of(taught)
+    _write(pd.DataFrame(findings, columns=_COLUMNS), out / FINDINGS)
     _write(_cells(database, lesson), out / CELLS)
-    _write(_journeys(lesson, names), out / JOURNEYS)
+    _write(_journeys(lesson, taught.names), out / JOURNEYS)
     base = street_map(database, served_points(database))
     kept = [
         np.column_stack([track.east_m, track.north_m])
-        for track, use in zip(tracks, lesson.trusted.tolist(), strict=True)
+        for track, use in zip(taught.tracks, lesson.trusted.tolist(), strict=True)
         if use
     ]
     save(plot_learned(patch.changes, database.plan, base, kept), out / MAP)
     return tuple(findings)
+
+
+def findings_of(taught: Taught) -> list[dict[str, Any]]:
+    """Return the findings, one row each: changes first, then cells that the database lacks."""
+    found = [_finding(change, taught.database) for change in taught.patch.changes]
+    for one in taught.unlisted:
+        known = np.isfinite(one.east_m)
+        row = dict.fromkeys(_COLUMNS)
+        row |= {"kind": "unlisted", "cells": one.cell, "unit": ""}
+        row |= {"journeys": one.journeys, "agreeing": one.journeys}
+        row["east_m"] = round(one.east_m, 1) if known else None
+        row["north_m"] = round(one.north_m, 1) if known else None
+        found.append(row)
+    return found
 
 
 def _finding(change: Change, database: RadioRouteDatabase) -> dict[str, Any]:

@@ -20,15 +20,33 @@ def plan_of(sites=((300, 300), (900, 900), (300, 900)), sectors=3, indoor=((900,
         for j in range(sectors):
             cells.append(
                 Cell(
-                    f"S{s}{'ABC'[j]}", f"S{s}", EAST + x, NORTH + y, 30.0, j * 360.0 / sectors,
-                    50.0, 1800.0, arfcn=500 + len(cells), bsic=0,
+                    f"S{s}{'ABC'[j]}",
+                    f"S{s}",
+                    EAST + x,
+                    NORTH + y,
+                    30.0,
+                    j * 360.0 / sectors,
+                    50.0,
+                    1800.0,
+                    arfcn=500 + len(cells),
+                    bsic=0,
                 )
             )
     for i, (x, y) in enumerate(indoor, start=1):
         cells.append(
             Cell(
-                f"I{i}", f"I{i}", EAST + x, NORTH + y, 4.0, None, 35.0, 1800.0, "omni",
-                indoor=True, arfcn=500 + len(cells), bsic=0,
+                f"I{i}",
+                f"I{i}",
+                EAST + x,
+                NORTH + y,
+                4.0,
+                None,
+                35.0,
+                1800.0,
+                "omni",
+                indoor=True,
+                arfcn=500 + len(cells),
+                bsic=0,
             )
         )
     return CellPlan(CRS, tuple(cells))
@@ -67,13 +85,26 @@ def study(given, true, rng, *, journeys=8, silent=(), error_db=6.0, phone_db=3.0
             there = (x + 600.0) % 1200.0, (y + 450.0) % 1200.0
             for n in range(along.size):
                 rows += _visit(
-                    journey, x[n], y[n], true, silent, shadow, error_db, phone, rng,
+                    journey,
+                    x[n],
+                    y[n],
+                    true,
+                    silent,
+                    shadow,
+                    error_db,
+                    phone,
+                    rng,
                     (there[0][n], there[1][n]) if journey in lost else (x[n], y[n]),
                 )
     table = np.array(rows, dtype=float)
     visits = Visits(
-        table[:, 0].astype(np.int64), table[:, 1].astype(np.int64), table[:, 2].astype(np.int64),
-        table[:, 3], table[:, 4], table[:, 5], table[:, 6].astype(bool),
+        table[:, 0].astype(np.int64),
+        table[:, 1].astype(np.int64),
+        table[:, 2].astype(np.int64),
+        table[:, 3],
+        table[:, 4],
+        table[:, 5],
+        table[:, 6].astype(bool),
     )
     key = np.stack([visits.journey, visits.square])
     _, first, place = np.unique(key, axis=1, return_index=True, return_inverse=True)
