@@ -173,8 +173,10 @@ def _off_part(
 
 def _sampled(values: Floats, field: RadioField, place_m: Floats) -> Floats:
     """Return the values of pixels at places; 0 where a place is unknown or beyond the lattice."""
-    known = np.isfinite(place_m).all(axis=1)
+    known: Bools = np.asarray(np.isfinite(place_m).all(axis=1), dtype=np.bool_)
     safe = np.where(known[:, None], place_m, 0.0)
     row, col = field.lattice.row_col(safe[:, 0], safe[:, 1])
-    inside: Bools = np.asarray(known & field.lattice.contains(row, col), dtype=np.bool_)
-    return np.where(inside, values[np.where(inside, row, 0), np.where(inside, col, 0)], 0.0)
+    found = np.zeros(len(place_m))
+    inside = np.flatnonzero(known & np.asarray(field.lattice.contains(row, col)))
+    found[inside] = values[row[inside], col[inside]]
+    return found

@@ -43,6 +43,8 @@ from mapfilter.workflows.world import filter_choice
 
 _LEAST_KNOWN = 0.3
 _KNOWN_M = 50.0
+_PASSES = 3
+"""By the map alone; where that does not do, by the database as it is; by the patched one."""
 
 
 @dataclass(frozen=True)
@@ -169,18 +171,18 @@ class _Study:
         notes: list[str] = []
         blank = blank_database(self.database, self.scratch / "blank")
         tracks = self._tracks(blank, 0, is_blank=True)
-        known = np.mean(np.concatenate([track.radius_m <= _KNOWN_M for track in tracks]))
-        if known < _LEAST_KNOWN:
+        radii_m = np.concatenate([track.radius_m for track in tracks])
+        if np.sum(radii_m <= _KNOWN_M) < _LEAST_KNOWN * radii_m.size:
             notes.append(
                 "map and dead reckoning do not place these journeys: they were located with the "
                 "database as it is, whose faults may hide in the tracks"
             )
-            tracks = self._tracks(self.database, 0, is_blank=False, offset=1)
+            tracks = self._tracks(self.database, 1, is_blank=False)
         lesson = self._lesson(tracks)
         changes = changes_of(lesson.learned.network.findings, {})
         patch = Patch(self.database.lattice.crs, "0" * 64, len(self.folders), changes)
         patched = apply_patch(self.database, patch, self.scratch / "patched")
-        again = self._tracks(patched, 1, is_blank=False)
+        again = self._tracks(patched, 2, is_blank=False)
         second = self._lesson(again)
         # A journey that was lost with the patched database may be right without any.
         worse = lesson.trusted & ~second.trusted
@@ -203,14 +205,14 @@ class _Study:
         return lesson
 
     def _tracks(
-        self, database: RadioRouteDatabase, number: int, *, is_blank: bool, offset: int = 0
+        self, database: RadioRouteDatabase, number: int, *, is_blank: bool
     ) -> list[JourneyTrack]:
         """Return the tracks of all journeys over a database; finished ones from disk."""
         sha256, count = sha256_file(database.path / MANIFEST), len(self.folders)
         found: dict[int, JourneyTrack] = {}
         tasks: dict[int, _Task] = {}
         for i, folder in enumerate(self.folders):
-            part = (2 * number + offset) * count + i
+            part = number * count + i
             kept = self.finished.load(part) if self.finished.keep else None
             log = read_log(folder)
             if self.use_truth and len(log.truth) > 1:
@@ -223,10 +225,10 @@ class _Study:
             self.executor, _located, list(tasks.values()), in_flight=self.in_flight
         )
         for at, (i, data) in enumerate(zip(tasks, done, strict=True), start=1):
-            self.finished.save((2 * number + offset) * count + i, data)
+            self.finished.save(number * count + i, data)
             found[i] = JourneyTrack.from_bytes(data)
             if self.progress is not None:
-                self.progress(number * count + count - len(tasks) + at, 2 * count)
+                self.progress(number * count + count - len(tasks) + at, _PASSES * count)
         return [found[i] for i in range(count)]
 
 

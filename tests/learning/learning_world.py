@@ -3,10 +3,17 @@
 import math
 
 import numpy as np
+import pandas as pd
 
+from mapfilter.database.build import build
+from mapfilter.geodesy import Lattice
 from mapfilter.learning.patterns import Patterns
 from mapfilter.learning.visits import Visits
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.roads.lattice import RouteLattice
+from mapfilter.tracks.log import make_log
 
 CRS = "EPSG:32632"
 EAST, NORTH = 500_000.0, 5_500_000.0  # on the central meridian: grid north is true north
@@ -133,3 +140,87 @@ def _visit(journey, x, y, true, silent, shadow, error_db, phone, rng, place):
         level = found[c] if heard else bound
         rows.append((journey, c, number, EAST + x, NORTH + y, level, heard))
     return rows
+
+
+LATTICE = Lattice(CRS, EAST, NORTH + 1200.0, 20.0, 60, 60)
+
+
+def streets():
+    """Streets every 200 m, along and across, as points of 20 m."""
+    row, col = np.mgrid[0:60, 0:60]
+    on = (row % 10 == 5) | (col % 10 == 5)
+    row, col = (axis[on].astype(np.int32) for axis in (row, col))
+    count = row.size
+    return RouteLattice(
+        LATTICE,
+        row,
+        col,
+        np.arange(1, count + 1),
+        np.zeros(count, np.int16),
+        ("footway",),
+        np.zeros(count, np.float32),
+        np.zeros(count, bool),
+    )
+
+
+def database_of(plan, folder):
+    """The radio-route database that is built of a plan by the oracle's levels."""
+    row, col = np.mgrid[0:60, 0:60]
+    levels = levels_of(plan, *(axis.ravel() for axis in LATTICE.east_north(row, col)))
+    layers = (
+        (name, levels[:, i].reshape(60, 60).astype(np.float32)) for i, name in enumerate(plan.ids)
+    )
+    folder.mkdir(parents=True)
+    write_rasters(folder / "r.tif", LATTICE, layers, plan.ids)
+    out = folder / "database"
+    return build(open_rasters(folder / "r.tif"), plan, streets(), out, floor_dbm=FLOOR_DBM)
+
+
+def log_of(true, rng, *, silent=(), blocks=12, levels=True, crs=CRS):
+    """A walk of some blocks along the streets, a report every 10 m."""
+    corner = rng.integers(0, 6, 2)
+    heading, corners = None, [corner]
+    for _ in range(blocks):
+        ways = [np.array(w) for w in ((0, 1), (1, 0), (0, -1), (-1, 0))]
+        able = [w for w in ways if np.all((corner + w >= 0) & (corner + w <= 5))]
+        able = [w for w in able if heading is None or not np.array_equal(w, -heading)]
+        heading = able[rng.integers(len(able))]
+        corner = corner + heading
+        corners.append(corner)
+    turns = np.array(corners) * 200.0 + 100.0
+    at = np.arange(0.0, 200.0 * blocks + 0.1, 10.0)
+    along = np.arange(len(turns)) * 200.0
+    x, y = (np.interp(at, along, turns[:, axis]) for axis in (0, 1))
+    # The middle of the street's pixels.
+    east, north = EAST + x + 10.0, NORTH + y - 10.0
+    moved = np.column_stack([np.diff(east), np.diff(north)])
+    turned = np.arctan2(moved[:, 1], moved[:, 0]) + 0.05 * rng.standard_normal(len(moved))
+    time_s = np.arange(at.size) * 8.0
+    motion = pd.DataFrame(
+        {
+            "time_s": time_s[1:],
+            "step_m": np.hypot(*moved.T) * (1 + 0.02 * rng.standard_normal(len(moved))),
+            "heading_rad": (turned + math.pi) % (2 * math.pi) - math.pi,
+        }
+    )
+    truth = pd.DataFrame({"time_s": time_s, "east_m": east, "north_m": north})
+    level = np.column_stack([level_dbm(cell, east, north) for cell in true.cells])
+    level = level + 3.0 * rng.standard_normal() + 5.0 * rng.standard_normal(level.shape)
+    level[:, [true.index(name) for name in silent]] = -np.inf
+    rows = []
+    for i in range(at.size):
+        order = np.argsort(-level[i])[:7]
+        for rank, c in enumerate(c for c in order.tolist() if level[i, c] >= FLOOR_DBM):
+            cell = true.cells[c]
+            serving = rank == 0
+            rows.append(
+                {
+                    "time_s": time_s[i],
+                    "role": "serving" if serving else "neighbour",
+                    "cell": cell.id if serving else None,
+                    "arfcn": cell.arfcn,
+                    "bsic": cell.bsic,
+                    "level_dbm": round(level[i, c], 1) if levels else np.nan,
+                }
+            )
+    return make_log(crs, motion=motion, radio=pd.DataFrame(rows), truth=truth)

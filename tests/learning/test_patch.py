@@ -8,54 +8,18 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from learning_world import CRS, EAST, FLOOR_DBM, NORTH, levels_of, plan_of
+from learning_world import CRS, EAST, NORTH, database_of, levels_of, plan_of
 
-from mapfilter.database.build import build
 from mapfilter.database.rewrite import levels_of as stored_levels
 from mapfilter.database.rewrite import rewrite, routes_of
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, InputError, OutputError
-from mapfilter.geodesy import Lattice
 from mapfilter.learning.apply import apply_patch
 from mapfilter.learning.patch import Change, Patch, read_patch, write_patch
-from mapfilter.rasters.geotiff import write_rasters
-from mapfilter.rasters.raster_set import open_rasters
-from mapfilter.roads.lattice import RouteLattice
 from mapfilter.workflows.learn import run_accept
 
 SHA = "0" * 64
-LATTICE = Lattice(CRS, EAST, NORTH + 1200.0, 20.0, 60, 60)
 NUMBER = st.floats(-1e6, 1e6).map(lambda value: round(value, 2))
-
-
-def streets():
-    """Streets every 200 m, along and across."""
-    row, col = np.mgrid[0:60, 0:60]
-    on = (row % 10 == 5) | (col % 10 == 5)
-    row, col = (axis[on].astype(np.int32) for axis in (row, col))
-    count = row.size
-    return RouteLattice(
-        LATTICE,
-        row,
-        col,
-        np.arange(1, count + 1),
-        np.zeros(count, np.int16),
-        ("footway",),
-        np.zeros(count, np.float32),
-        np.zeros(count, bool),
-    )
-
-
-def database_of(plan, folder):
-    row, col = np.mgrid[0:60, 0:60]
-    levels = levels_of(plan, *(axis.ravel() for axis in LATTICE.east_north(row, col)))
-    layers = (
-        (name, levels[:, i].reshape(60, 60).astype(np.float32)) for i, name in enumerate(plan.ids)
-    )
-    folder.mkdir(parents=True)
-    write_rasters(folder / "r.tif", LATTICE, layers, plan.ids)
-    out = folder / "database"
-    return build(open_rasters(folder / "r.tif"), plan, streets(), out, floor_dbm=FLOOR_DBM)
 
 
 @pytest.fixture(scope="module")
