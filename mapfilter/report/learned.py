@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from mapfilter._types import Floats
 from mapfilter.learning.patch import Change
 from mapfilter.radio.cells import CellPlan
-from mapfilter.report.basemap import HALO, BaseMap, draw_base, map_axes
+from mapfilter.report.basemap import HALO, BaseMap, attribute, draw_base, map_axes
 from mapfilter.report.canvas import BLACK, styled
 from mapfilter.report.network import draw_cells
 
@@ -24,7 +24,7 @@ _COLOURS = {
     "swapped": "#009E73",
     "way": "#C00000",
 }
-_LEGEND_IN = 1.8
+_LEGEND_IN = 2.1
 
 
 @styled
@@ -94,7 +94,8 @@ def plot_learned(
         for kind in kinds
     ]
     if handles:
-        axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
+        axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False, fontsize=8)
+    attribute(axes, base)
     axes.set_title("Proposed changes" if changes else "Nothing to change")
     return axes
 
