@@ -94,7 +94,9 @@ def plot_learned(
         for kind in kinds
     ]
     if handles:
-        axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False, fontsize=8)
+        axes.legend(
+            handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False, fontsize=8
+        )
     attribute(axes, base)
     axes.set_title("Proposed changes" if changes else "Nothing to change")
     return axes
