@@ -29,7 +29,7 @@ PATCH, FINDINGS, CELLS, JOURNEYS, MAP = (
 )
 _COLUMNS = (
     "kind",
-    "cells",
+    "cell",
     "value",
     "unit",
     "log_bayes_factor",
@@ -66,7 +66,7 @@ def findings_of(taught: Taught) -> list[dict[str, Any]]:
     for one in taught.unlisted:
         known = np.isfinite(one.east_m)
         row = dict.fromkeys(_COLUMNS)
-        row |= {"kind": "unlisted", "cells": one.cell, "unit": ""}
+        row |= {"kind": "unlisted", "cell": one.cell, "unit": ""}
         row |= {"journeys": one.journeys, "agreeing": one.journeys}
         row["east_m"] = round(one.east_m, 1) if known else None
         row["north_m"] = round(one.north_m, 1) if known else None
@@ -91,7 +91,7 @@ def _finding(change: Change, database: RadioRouteDatabase) -> dict[str, Any]:
         value, place = float(line.length), (middle.x, middle.y)
     return {
         "kind": change.kind,
-        "cells": " ".join(change.cells),
+        "cell": " ".join(change.cells),
         "value": None if value is None else round(value, 1),
         "unit": _UNITS.get(change.kind, ""),
         "log_bayes_factor": round(change.log_bayes_factor, 1),

@@ -8,10 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from learning_world import CRS, database_of, log_of, plan_of
+from typer.testing import CliRunner
 
+from mapfilter.cli import app
 from mapfilter.config.load import load_config
 from mapfilter.database.store import open_database
-from mapfilter.errors import ConfigError, InputError
+from mapfilter.errors import ConfigError, InputError, MapfilterError
 from mapfilter.learning.blank import EVERYWHERE, blank_database, blank_log
 from mapfilter.learning.patch import read_patch
 from mapfilter.radio.cells import CellPlan
@@ -52,7 +54,7 @@ def taught(faulty, tmp_path_factory):
 
 
 def found(result):
-    return {(row["kind"], row["cells"]) for row in result.findings}
+    return {(row["kind"], row["cell"]) for row in result.findings}
 
 
 def test_faults_are_named_with_truth(taught):
@@ -136,7 +138,7 @@ def test_a_cell_that_the_database_lacks_is_named(faulty, tmp_path):
     database_of(less, tmp_path / "less")
     result = run_learn(configured(tmp_path / "less" / "database", logs), tmp_path / "out")
     unlisted = [row for row in result.findings if row["kind"] == "unlisted"]
-    assert [row["cells"] for row in unlisted] == ["I1"]
+    assert [row["cell"] for row in unlisted] == ["I1"]
     cell = plan["I1"]
     assert (
         np.hypot(unlisted[0]["east_m"] - cell.east_m, unlisted[0]["north_m"] - cell.north_m) < 300
@@ -201,3 +203,45 @@ def test_a_blank_database_has_the_points_and_no_radio(faulty, tmp_path):
     assert log.radio["level_dbm"].isna().all()
     assert log.radio["time_s"].is_unique
     assert Path(blank.path).name == "blank"
+
+
+def told(*args):
+    return CliRunner().invoke(app, [str(arg) for arg in args])
+
+
+def test_the_command_line_prints_findings_and_accepts_the_patch(faulty, tmp_path):
+    database, logs = faulty
+    shown = told("learn", database, "--logs", logs, "--out", tmp_path / "learned", "--json")
+    assert shown.exit_code == 0, shown.output
+    found = json.loads(shown.stdout.splitlines()[-1])
+    assert {one["kind"] for one in found["findings"]} == {"offset", "dead"}
+    assert all(one["journeys"] == 8 for one in found["findings"])
+    patch = tmp_path / "learned" / "patch.toml"
+    patch.write_text(patch.read_text().replace("accept = true", "accept = false", 1))
+    out = tmp_path / "after"
+    shown = told("learn", database, "--accept", patch, "--out", out, "--json")
+    accepted = json.loads(shown.stdout.splitlines()[-1])
+    assert (accepted["changes"], accepted["refused"]) == (1, 1)
+    assert accepted["notes"] == []
+    assert open_database(out).manifest["inputs"][-1]["name"] == "patch.toml"
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (("learn", "DB"), "--logs LOGS, or --accept PATCH"),
+        (("learn", "DB", "--accept", "all"), "--logs LOGS, or --accept PATCH"),
+        (("learn", "DB", "--logs", "LOGS", "--accept", "patch.toml"), "all, with --logs"),
+        (("learn", "nowhere", "--logs", "LOGS"), "a database folder"),
+        (("learn", "DB", "--accept", "nowhere.toml"), "a readable file"),
+        (("learn", "DB", "--logs", "nowhere"), "a track log"),
+        (("check", "--db", "DB"), "--db"),
+    ],
+)
+def test_wrong_commands_are_refused(faulty, tmp_path, monkeypatch, args, message):
+    database, logs = faulty
+    monkeypatch.chdir(tmp_path)
+    names = {"DB": database, "LOGS": logs}
+    with pytest.raises(MapfilterError, match=message):
+        raise told(*(names.get(arg, arg) for arg in args)).exception
+    assert not (tmp_path / "learned" / "patch.toml").exists()
