@@ -7,7 +7,7 @@ from grid east; positions are metres in the log's projected CRS.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import Any, Literal
 
@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults
 from mapfilter.geodesy import wrap_rad
+from mapfilter.tracks.technologies import LIMITS
 
 TABLES = ("motion", "radio", "gnss", "pseudoranges", "tdoa", "truth")
 """The tables of a log, in the order in which they are stored."""
@@ -66,6 +67,8 @@ class Column:
         A float64 (missing: NaN), a nullable Int64, or text (missing: None).
     required : bool
         Whether the column must be there and hold a value in every row.
+    optional : bool
+        Whether the column is only in tables in which it was given.
     """
 
     name: str
@@ -75,6 +78,7 @@ class Column:
     hint: str = ""
     kind: Literal["number", "integer", "text"] = "number"
     required: bool = False
+    optional: bool = False
 
 
 def _text(name: str, expected: str, *, required: bool = False) -> Column:
@@ -105,6 +109,11 @@ SCHEMA: dict[str, tuple[Column, ...]] = {
         Column("level_dbm", -200, 0, "dBm in -200..0", "raw RXLEV given for dBm"),
         _integer("censored", -1, 1, "-1, 0 or 1"),
         _integer("timing_advance", 0, 3846, "steps >= 0"),
+        replace(_text("technology", "GSM, UMTS, LTE or NR"), optional=True),
+        *(
+            replace(_integer(name, 0, most, "a whole number >= 0"), optional=True)
+            for name, most in (("mcc", 999), ("mnc", 999), ("lac", 2**24 - 1), ("ci", 2**36 - 1))
+        ),
     ),
     "gnss": (
         _TIME,
@@ -198,14 +207,16 @@ def tidy_table(
         What was ignored, sorted or dropped.
     """
     if given is None:
-        given = pd.DataFrame({column.name: [] for column in SCHEMA[table]})
+        given = pd.DataFrame({c.name: [] for c in SCHEMA[table] if not c.optional})
     given = given.reset_index(drop=True)
     numbers = np.arange(1, len(given) + 1) if row_numbers is None else np.asarray(row_numbers)
     door = _Door(where, numbers, faults)
     notes = _check_columns(table, given, door)
-    tidy = pd.DataFrame({column.name: _column(column, given, door) for column in SCHEMA[table]})
+    columns = [c for c in SCHEMA[table] if c.name in given.columns or not c.optional]
+    tidy = pd.DataFrame({column.name: _column(column, given, door) for column in columns})
     if table == "radio":
         _check_roles(tidy["role"], door)
+        _check_technologies(tidy, door)
         tidy["censored"] = tidy["censored"].fillna(0)
     if table == "gnss":
         _check_covariance(tidy, door)
@@ -221,9 +232,10 @@ def tidy_table(
 
 def _check_columns(table: str, given: pd.DataFrame, door: _Door) -> tuple[str, ...]:
     names = [column.name for column in SCHEMA[table]]
+    usual = [c.name for c in SCHEMA[table] if not c.optional and c.name not in given.columns]
     notes = []
     for name in (str(name) for name in given.columns if name not in names):
-        near = get_close_matches(name, [n for n in names if n not in given.columns], 1, 0.6)
+        near = get_close_matches(name, usual, 1, 0.6)
         if near:
             door.add(f", column {name}", f"columns {', '.join(names)}", name, near[0])
         else:
@@ -307,6 +319,20 @@ def _is_empty(value: Any) -> bool:
 def _check_roles(role: pd.Series, door: _Door) -> None:
     bad = role.notna().to_numpy() & ~role.isin([SERVING, NEIGHBOUR]).to_numpy()
     _add_rows(door, bad, SCHEMA["radio"][1], role)
+
+
+def _check_technologies(radio: pd.DataFrame, door: _Door) -> None:
+    """Note carriers, codes and timing advances that the row's technology does not have."""
+    if "technology" not in radio:
+        return
+    technology = radio["technology"]
+    for family, limits in LIMITS.items():
+        of = (technology == family).to_numpy()
+        for name, most in limits.items():
+            if of.any() and name in radio:
+                value = radio[name].to_numpy(dtype=np.float64, na_value=np.nan)
+                column = Column(name, 0, most, f"0..{most} in {family}")
+                _add_rows(door, of & (value > most), column, radio[name])
 
 
 def _check_covariance(gnss: pd.DataFrame, door: _Door) -> None:

@@ -8,7 +8,7 @@ almanac beside it (``almanac.txt``, YUMA) gives the places of satellites whose r
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from difflib import get_close_matches
 from math import inf, isnan, nan
 from pathlib import Path
@@ -32,6 +32,7 @@ from mapfilter.errors import Faults, InputError, MapfilterError, StoreError, fai
 from mapfilter.gnss.orbits import read_yuma
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.schema import OPTIONAL, SCHEMA, TABLES
+from mapfilter.tracks.sensors import FOLDER, write_sensors
 
 HEAD = "log.json"
 ALMANAC = "almanac.txt"
@@ -53,6 +54,8 @@ def checked_parts(folder: Path, head: dict[str, Any]) -> dict[str, Path]:
     allowed = {f"{table}{suffix}": table for table in TABLES for suffix in _SUFFIXES}
     listed = head["parts"] if isinstance(head["parts"], list) else [head["parts"]]
     for part in listed:
+        if isinstance(part, dict) and str(part.get("path")).startswith(f"{FOLDER}/"):
+            continue
         if not isinstance(part, dict) or part.get("path") not in allowed:
             faults.add(f"{folder / HEAD}, parts", "tables of a log", repr(part))
             continue
@@ -195,6 +198,7 @@ def write_log(
     log: TrackLog,
     folder: str | Path,
     format: Literal["parquet", "csv"] = "parquet",  # noqa: A002
+    sensors: Mapping[str, pd.DataFrame] | None = None,
 ) -> None:
     """Write a log as a folder, in one step; equal logs give equal bytes.
 
@@ -204,6 +208,8 @@ def write_log(
         Replaced when it is there; must be absent, empty or a log that mapfilter wrote.
     format : {"parquet", "csv"}
         Of the tables.
+    sensors : mapping of str to pandas.DataFrame, optional
+        Tables of raw sensors, see :data:`mapfilter.tracks.sensors.SENSOR_COLUMNS`.
 
     Raises
     ------
@@ -225,6 +231,7 @@ def write_log(
                 pq.write_table(_arrow(table, rows), path, compression="zstd")
             part = {"path": path.name, "sha256": sha256_file(path)}
             parts.append(part | {"bytes": path.stat().st_size, "rows": len(rows)})
+        parts += write_sensors(new, sensors or {}, format)
         head: dict[str, Any] = {
             "format": FORMAT,
             "version": VERSION,
@@ -310,7 +317,8 @@ def _no_log(path: Path, expected: str) -> MapfilterError:
 
 
 def _arrow(table: str, rows: pd.DataFrame) -> pa.Table:
-    schema = pa.schema([(column.name, _ARROW[column.kind]) for column in SCHEMA[table]])
+    columns = [column for column in SCHEMA[table] if column.name in rows]
+    schema = pa.schema([(column.name, _ARROW[column.kind]) for column in columns])
     return pa.Table.from_pandas(rows, schema, preserve_index=False).replace_schema_metadata(None)
 
 

@@ -1,0 +1,299 @@
+"""Columns of separated values, read fast; a bad line is counted and located, and loses nothing else.
+
+Quotes are taken away line by line, so one that is never closed ends with its line.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from pyarrow import csv as arrow_csv
+
+from mapfilter._types import Bools, Floats, Ints
+from mapfilter.tracks.readers.recording import Reading
+
+SEPARATORS = ",;\t|"
+_BLOCK_BYTES = 1 << 23
+_LONGEST_LINE = 1 << 16
+_LINE_FEED = 10
+_NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
+_WHOLE = r"^[-+]?\d{1,18}(\.0*)?$"
+_MISSING = ("", "-", "nan", "NaN", "NA", "N/A", "null", "NULL", "None", "none", "#N/A")
+
+
+@dataclass(eq=False)
+class Columns:
+    """Lines of separated values.
+
+    Parameters
+    ----------
+    reading : Reading
+        Takes notes.
+    names : tuple of str
+        Lower case, without blanks around.
+    line : (N,) array of int
+        The file's line of each row.
+    decimal_comma : bool
+        Whether numbers may have a comma for the point.
+    """
+
+    reading: Reading
+    names: tuple[str, ...]
+    line: Ints
+    decimal_comma: bool = False
+    _columns: dict[int, pa.ChunkedArray] = field(default_factory=dict, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+    def has(self, *names: str) -> bool:
+        """Return whether all these columns are there."""
+        return all(name in self.names for name in names)
+
+    def find(self, *names: str) -> str | None:
+        """Return the first of these names that is a column."""
+        return next((name for name in names if name in self.names), None)
+
+    def _raw(self, *names: str) -> pa.ChunkedArray | None:
+        name = self.find(*names)
+        return None if name is None else self._columns.get(self.names.index(name))
+
+    def texts(self, *names: str) -> np.ndarray:
+        """Return the first of these columns that is there as texts, "" where missing."""
+        column = self._raw(*names)
+        if column is None:
+            return np.full(len(self), "", dtype=object)
+        trimmed = pc.utf8_trim_whitespace(column).dictionary_encode().combine_chunks()
+        words = np.array(trimmed.dictionary.to_pylist(), dtype=object)
+        index = trimmed.indices.to_numpy(zero_copy_only=False)
+        return words[index] if len(words) else np.full(len(self), "", dtype=object)
+
+    def number(self, *names: str) -> Floats:
+        """Return the first of these columns that is there as numbers, NaN where missing.
+
+        What is no number is noted and taken for missing.
+        """
+        column = self._raw(*names)
+        if column is None:
+            return np.full(len(self), np.nan)
+        if self.decimal_comma:
+            column = pc.replace_substring(column, ",", ".")
+        numbers = self._cast(column, pa.float64(), _NUMBER, names)
+        return np.asarray(numbers.to_numpy(), dtype=np.float64)
+
+    def whole(self, *names: str) -> tuple[Ints, Bools]:
+        """Return whole numbers exactly (0 where missing), and which of them are there."""
+        column = self._raw(*names)
+        if column is None:
+            return np.zeros(len(self), dtype=np.int64), np.zeros(len(self), dtype=bool)
+        column = pc.replace_substring_regex(pc.utf8_trim_whitespace(column), r"\.0*$", "")
+        numbers = self._cast(column, pa.int64(), _WHOLE, names)
+        there = np.asarray(pc.is_valid(numbers).to_numpy(), dtype=bool)
+        return np.asarray(pc.fill_null(numbers, 0).to_numpy(), dtype=np.int64), there
+
+    def _cast(
+        self, column: pa.ChunkedArray, kind: pa.DataType, pattern: str, names: Sequence[str]
+    ) -> pa.ChunkedArray:
+        try:
+            return pc.cast(column, kind)
+        except pa.ArrowInvalid:
+            pass
+        column = pc.utf8_trim_whitespace(column)
+        missing = pc.is_in(column, pa.array(_MISSING))
+        good = pc.match_substring_regex(column, pattern)
+        if bad := pc.sum(pc.and_not(pc.invert(good), missing)).as_py():
+            self.reading.note(f"{self.find(*names)}: {bad} values are no numbers, taken as missing")
+        column = pc.replace_substring_regex(column, r"^\+", "")
+        return pc.cast(pc.if_else(good, column, None), kind)
+
+
+def header_columns(
+    data: bytes, reading: Reading, first_line: int = 1, *, ragged: int = 0
+) -> Columns:
+    """Read lines of which the first that is not blank names the columns.
+
+    ``ragged`` is the least number of fields of a line whose last fields may be absent; 0 where
+    every line has all fields.
+    """
+    start = 0
+    while start < len(data):
+        end = data.find(b"\n", start)
+        end = len(data) if end < 0 else end
+        header = data[start:end].decode("utf-8", "replace").strip("\n")
+        start, first_line = end + 1, first_line + 1
+        if header.strip():
+            separator = likely_separator(header)
+            names = header_names(header, separator)
+            return value_columns(
+                memoryview(data)[start:], reading, names, separator, first_line, ragged=ragged
+            )
+    return Columns(reading, (), np.zeros(0, dtype=np.int64))
+
+
+def likely_separator(header: str) -> str:
+    """Return the separator that a header line has most often."""
+    return max(SEPARATORS, key=header.count)
+
+
+def header_names(header: str, separator: str) -> tuple[str, ...]:
+    """Return the names in a header line, in lower case."""
+    fields = next(csv.reader([header[:_LONGEST_LINE]], delimiter=separator), [])
+    return tuple(name.strip().lower() for name in fields)
+
+
+def line_columns(
+    lines: Sequence[bytes],
+    numbers: Sequence[int],
+    reading: Reading,
+    names: Sequence[str],
+    separator: str,
+    *,
+    ragged: int = 0,
+) -> Columns:
+    """Read lines picked from a file; ``numbers`` are theirs there."""
+    data = b"\n".join(lines)
+    columns = value_columns(memoryview(data), reading, names, separator, 1, ragged=ragged)
+    places = np.asarray(numbers, dtype=np.int64)
+    columns.line = places[columns.line - 1] if len(places) else columns.line
+    return columns
+
+
+def value_columns(
+    data: memoryview,
+    reading: Reading,
+    names: Sequence[str],
+    separator: str,
+    first_line: int = 1,
+    *,
+    ragged: int = 0,
+) -> Columns:
+    """Read lines of values under known names."""
+    named = tuple(names)
+    lines: list[Ints] = []
+    tables: list[pa.Table] = []
+    for block, line in _blocks(data, first_line):
+        good, rows = _good_lines(block, line, len(named), separator, reading, ragged or len(named))
+        if rows.size:
+            tables.append(_parsed(good, len(named), separator))
+            lines.append(rows)
+    found = Columns(reading, named, np.concatenate(lines) if lines else np.zeros(0, dtype=np.int64))
+    found.decimal_comma = separator != ","
+    if tables:
+        table = pa.concat_tables(tables)
+        found._columns.update(enumerate(table.columns))
+    return found
+
+
+def _blocks(data: memoryview, first_line: int) -> Iterator[tuple[bytes, int]]:
+    """Cut a text into blocks of whole lines; yield each with the number of its first line."""
+    start = 0
+    while start < len(data):
+        end = min(start + _BLOCK_BYTES, len(data))
+        while end < len(data):
+            piece = bytes(data[end : end + _BLOCK_BYTES])
+            cut = piece.find(b"\n")
+            end += cut + 1 if cut >= 0 else len(piece)
+            if cut >= 0:
+                break
+        block = bytes(data[start:end])
+        yield block, first_line
+        first_line += block.count(b"\n")
+        start = end
+
+
+def _good_lines(
+    block: bytes, first_line: int, count: int, separator: str, reading: Reading, least: int
+) -> tuple[bytes, Ints]:
+    """Return the lines that have all fields, and their numbers; refuse the others."""
+    code = np.frombuffer(block, dtype=np.uint8)
+    ends = np.flatnonzero(code == _LINE_FEED)
+    if not len(block) or block[-1] != _LINE_FEED:
+        ends = np.append(ends, len(block))
+    starts = np.concatenate([[0], ends[:-1] + 1]).astype(np.int64)
+    # A sum over separators up to each line's end is cheaper than one for each line.
+    places = np.flatnonzero(code == ord(separator))
+    fields = np.searchsorted(places, ends) - np.searchsorted(places, starts) + 1
+    length = ends - starts
+    right = (fields == count) & (length <= _LONGEST_LINE) & (length > 0)
+    if right.all():
+        reading.rows += len(starts)
+        return block.replace(b'"', b""), first_line + np.arange(len(starts))
+    good: list[bytes] = []
+    rows: list[int] = []
+    for (first, last), number in _runs(right):
+        if number:
+            good.append(block[starts[first] : ends[last - 1]].replace(b'"', b""))
+            rows.extend(range(first_line + first, first_line + last))
+            continue
+        for at in range(first, last):
+            text = block[starts[at] : ends[at]]
+            mended = _mended(text, count, separator, least, first_line + at, reading)
+            if mended is not None:
+                good.append(mended)
+                rows.append(first_line + at)
+    reading.rows += int(right.sum())
+    return b"\n".join(good), np.array(rows, dtype=np.int64)
+
+
+def _runs(right: Bools) -> Iterator[tuple[tuple[int, int], bool]]:
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(right)) + 1, [len(right)]]).tolist()
+    for first, last in pairwise(edges):
+        yield (first, last), bool(right[first])
+
+
+def _mended(
+    text: bytes, count: int, separator: str, least: int, line: int, reading: Reading
+) -> bytes | None:
+    """Return a line with the right number of fields, or refuse it; None for blank lines, too."""
+    if not text.strip():
+        return None
+    reading.rows += 1
+    if len(text) > _LONGEST_LINE:
+        reading.refuse(line, f"longer than {_LONGEST_LINE} characters")
+        return None
+    words = text.decode("utf-8", "replace")
+    fields = words.split(separator)
+    if '"' in words:
+        try:
+            fields = next(csv.reader([words], delimiter=separator), [])
+        except csv.Error:
+            fields = []
+        fields = [value.replace(separator, " ").replace("\n", " ") for value in fields]
+    if len(fields) > count and not any(value.strip() for value in fields[count:]):
+        fields = fields[:count]
+    if least <= len(fields) < count:
+        fields += [""] * (count - len(fields))
+    if len(fields) == count:
+        return separator.join(fields).replace('"', "").encode()
+    few = len(fields) < count
+    hint = "cut off, or another separator" if few else "a separator within a field"
+    reading.refuse(line, f"{'fewer' if few else 'more'} fields than {count} (likely: {hint})")
+    return None
+
+
+def _parsed(block: bytes, count: int, separator: str) -> pa.Table:
+    names = [f"c{i}" for i in range(count)]
+    return arrow_csv.read_csv(
+        pa.BufferReader(block),
+        read_options=arrow_csv.ReadOptions(
+            column_names=names, block_size=len(block) + 2, use_threads=False
+        ),
+        parse_options=arrow_csv.ParseOptions(
+            delimiter=separator, quote_char=False, ignore_empty_lines=count > 1
+        ),
+        convert_options=arrow_csv.ConvertOptions(
+            column_types=dict.fromkeys(names, pa.string()), strings_can_be_null=False
+        ),
+    )
+
+
+def split_blanks(data: bytes) -> bytes:
+    """Return a text in which runs of blanks and tabs are one blank, none at a line's ends."""
+    return re.sub(rb"^ | $", b"", re.sub(rb"[ \t]+", b" ", data), flags=re.MULTILINE)

@@ -1,0 +1,75 @@
+"""The table of formats, finding the format of a file, and reading it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from mapfilter.errors import ConfigError, InputError, fail
+from mapfilter.tracks.readers import (
+    gnettrack,
+)
+from mapfilter.tracks.readers.format import Format, ReadOptions
+from mapfilter.tracks.readers.recording import Reading, Recording
+from mapfilter.tracks.readers.text import Text, read_text
+
+FORMATS: tuple[Format, ...] = (gnettrack.FORMAT,)
+"""All formats, in the order in which a file is compared with them."""
+
+
+def format_named(name: str) -> Format:
+    """Return a format by its name; ConfigError when there is none."""
+    for known in FORMATS:
+        if known.name == name:
+            return known
+    names = ", ".join(known.name for known in FORMATS)
+    raise fail(ConfigError, "--format", f"one of {names}", repr(name))
+
+
+def find_format(text: Text) -> Format | None:
+    """Return the format that a file looks like, or None."""
+    return next((known for known in FORMATS if known.matches(text)), None)
+
+
+def read_recording(
+    path: str | Path, name: str = "", options: ReadOptions | None = None
+) -> Recording:
+    """Read a recording of another program.
+
+    Parameters
+    ----------
+    path : str or Path
+        Plain or gzip.
+    name : str
+        Of a format; "" to find it by the file's content.
+    options : ReadOptions, optional
+
+    Raises
+    ------
+    InputError
+        The file is missing, damaged, of no known format, or holds no usable row.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise fail(InputError, str(path), "a file", "a folder", "name the files in it")
+    text = read_text(path)
+    found = find_format(text)
+    known = format_named(name) if name else found
+    if known is None:
+        titles = ", ".join(other.title for other in FORMATS)
+        got = f"no such file; it begins with {text.first_line[:60]!r}"
+        hint = "a plain CSV: map its columns, or name a --format"
+        raise fail(InputError, str(path), f"a recording in a known format ({titles})", got, hint)
+    reading = Reading(path, notes=list(text.notes))
+    options = options or ReadOptions()
+    try:
+        known.read(text, reading, options)
+        return reading.done(known.name)
+    except InputError as error:
+        if found is None or found is known:
+            raise
+        named = tuple(
+            replace(fault, hint=f"this is {found.title}; use --format {found.name}, or none")
+            for fault in error.faults
+        )
+        raise InputError(named) from error
