@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -286,7 +286,7 @@ def _motion(
     recordings: Sequence[Recording], frame: _Frame, options: CombineOptions, notes: list[str]
 ) -> pd.DataFrame | None:
     """Return motion of the recording that tells it most directly; others stay sensors."""
-    makers = (
+    makers: tuple[tuple[str, Callable[[pd.DataFrame], pd.DataFrame]], ...] = (
         ("motion", lambda rows: rows),
         ("odometry", motion_from_odometry),
         ("poses", motion_from_poses),

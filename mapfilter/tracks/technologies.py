@@ -11,7 +11,10 @@ LIMITS: dict[str, dict[str, int]] = {
     "UMTS": {"arfcn": 16_383, "bsic": 511, "lac": 65_535, "ci": 2**28 - 1},
     "LTE": {"arfcn": 262_143, "bsic": 503, "lac": 65_535, "ci": 2**28 - 1, "timing_advance": 1282},
     "NR": {
-        **{"arfcn": 3_279_165, "bsic": 1007, "lac": 2**24 - 1, "ci": 2**36 - 1},
+        "arfcn": 3_279_165,
+        "bsic": 1007,
+        "lac": 2**24 - 1,
+        "ci": 2**36 - 1,
         "timing_advance": 3846,
     },
 }

@@ -1,4 +1,4 @@
-"""Columns of separated values, read fast; a bad line is counted and located, and loses nothing else.
+"""Columns of separated values, read fast; a bad line is counted, located, and loses nothing else.
 
 Quotes are taken away line by line, so one that is never closed ends with its line.
 """

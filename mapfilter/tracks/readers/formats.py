@@ -6,14 +6,19 @@ from dataclasses import replace
 from pathlib import Path
 
 from mapfilter.errors import ConfigError, InputError, fail
-from mapfilter.tracks.readers import (
-    gnettrack,
-)
+from mapfilter.tracks.readers import cell_csv, gnettrack, gpx, nmea
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recording import Reading, Recording
 from mapfilter.tracks.readers.text import Text, read_text
 
-FORMATS: tuple[Format, ...] = (gnettrack.FORMAT,)
+FORMATS: tuple[Format, ...] = (
+    gnettrack.FORMAT,
+    cell_csv.TOWER_COLLECTOR,
+    cell_csv.UPLOAD,
+    cell_csv.CELL_LIST,
+    gpx.FORMAT,
+    nmea.FORMAT,
+)
 """All formats, in the order in which a file is compared with them."""
 
 

@@ -114,7 +114,8 @@ def _state(rows: Columns, serving: dict[str, Floats]) -> Ints:
         names += [f"ncell{i}", f"nrxlev{i}"]
     columns = {name: rows.texts(name) for name in names if rows.has(name)}
     table = pd.DataFrame({"ci": serving["ci"], **columns})
-    return table.groupby(list(table.columns), sort=False, dropna=False).ngroup().to_numpy()
+    groups = table.groupby(list(table.columns), sort=False, dropna=False)
+    return np.asarray(groups.ngroup(), dtype=np.int64)
 
 
 def _add_serving(

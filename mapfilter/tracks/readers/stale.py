@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from mapfilter._types import Bools, Floats, Ints
@@ -26,7 +28,7 @@ def repeated_readings(state: Ints, time_s: Floats, lat_deg: Floats, lon_deg: Flo
     if not len(state):
         return repeated
     edges = [0, *(np.flatnonzero(np.diff(state)) + 1).tolist(), len(state)]
-    for first, last in zip(edges[:-1], edges[1:], strict=True):
+    for first, last in pairwise(edges):
         rows = slice(first, last)
         lat, lon = lat_deg[rows], lon_deg[rows]
         known = np.isfinite(lat) & np.isfinite(lon)

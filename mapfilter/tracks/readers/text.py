@@ -58,7 +58,7 @@ class Text:
 
 
 def read_text(path: Path) -> Text:
-    """Read a file as text: plain or gzip, UTF-8 or UTF-16, any line ends.
+    r"""Read a file as text: plain or gzip, UTF-8 or UTF-16, any line ends.
 
     Raises
     ------
@@ -69,9 +69,9 @@ def read_text(path: Path) -> Text:
     --------
     >>> import tempfile
     >>> with tempfile.NamedTemporaryFile() as file:
-    ...     _ = Path(file.name).write_bytes("a,b\\r\\n1,2".encode("utf-16"))
+    ...     _ = Path(file.name).write_bytes("a,b\r\n1,2".encode("utf-16"))
     ...     read_text(Path(file.name)).data
-    b'a,b\\n1,2'
+    b'a,b\n1,2'
     """
     try:
         size = path.stat().st_size
