@@ -318,6 +318,12 @@ def _satellites(
     rows = _joined(shifted, "satellites")
     if rows is None:
         return None
+    rank = rows["signal"].fillna("").str.contains("1").map({True: 0, False: 1})
+    order = rows.assign(rank=rank).sort_values(["time_s", "rank"], kind="stable")
+    first = order.drop_duplicates(["time_s", "satellite"]).drop(columns="rank")
+    if len(first) < len(rows):
+        notes.append(f"pseudoranges: {len(rows) - len(first)} of second signals left out")
+    rows = first.reset_index(drop=True)
     orbits = [r.tables["ephemerides"] for r in recordings if "ephemerides" in r.tables]
     places = rows[["x_m", "y_m", "z_m"]]
     if orbits and places.isna().any(axis=None):

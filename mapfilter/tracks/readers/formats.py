@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from mapfilter.errors import ConfigError, InputError, fail
-from mapfilter.tracks.readers import cell_csv, gnettrack, gpx, nmea
+from mapfilter.tracks.readers import cell_csv, gnettrack, gnsslogger, gpx, nmea, rinex
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recording import Reading, Recording
 from mapfilter.tracks.readers.text import Text, read_text
@@ -18,6 +18,9 @@ FORMATS: tuple[Format, ...] = (
     cell_csv.CELL_LIST,
     gpx.FORMAT,
     nmea.FORMAT,
+    gnsslogger.FORMAT,
+    rinex.OBSERVATION,
+    rinex.NAVIGATION,
 )
 """All formats, in the order in which a file is compared with them."""
 
