@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from mapfilter.errors import ConfigError, InputError, fail
-from mapfilter.tracks.readers import cell_csv, gnettrack, gnsslogger, gpx, nmea, rinex
+from mapfilter.tracks.readers import cell_csv, gnettrack, gnsslogger, gpx, indoor, nmea, rinex, smartloc
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recording import Reading, Recording
 from mapfilter.tracks.readers.text import Text, read_text
@@ -21,6 +21,9 @@ FORMATS: tuple[Format, ...] = (
     gnsslogger.FORMAT,
     rinex.OBSERVATION,
     rinex.NAVIGATION,
+    smartloc.FORMAT,
+    smartloc.RAW,
+    indoor.FORMAT,
 )
 """All formats, in the order in which a file is compared with them."""
 
