@@ -34,9 +34,7 @@ def gps_from_utc_s(utc_s: ArrayLike) -> Floats:
     return np.asarray(utc - GPS_EPOCH_UTC_S + leaps)
 
 
-def satellite_states(
-    ephemeris: pd.DataFrame, index: Ints, gps_s: Floats
-) -> tuple[Floats, Floats]:
+def satellite_states(ephemeris: pd.DataFrame, index: Ints, gps_s: Floats) -> tuple[Floats, Floats]:
     """Return positions and clock errors of satellites.
 
     Parameters

@@ -22,7 +22,12 @@ from mapfilter.geodesy import (
 from mapfilter.gnss.broadcast import place_by_broadcast
 from mapfilter.tracks.alignment import Alignment, align
 from mapfilter.tracks.log import TrackLog, make_log
-from mapfilter.tracks.moved import motion_from_course, motion_from_odometry, motion_from_poses
+from mapfilter.tracks.moved import (
+    motion_from_course,
+    motion_from_odometry,
+    motion_from_poses,
+    places_of_poses,
+)
 from mapfilter.tracks.readers.recording import Recording
 from mapfilter.tracks.sensors import SENSOR_COLUMNS
 
@@ -272,6 +277,8 @@ def _truth(
         rows = recording.tables.get("truth", recording.tables.get("true_places"))
         if rows is None and recording.path in options.truth:
             rows, _ = _positions(recording)
+            if rows is None and "poses" in recording.tables:
+                rows = places_of_poses(recording.tables["poses"])
             if rows is None:
                 got = f"a recording of {', '.join(recording.tables)}"
                 raise fail(InputError, str(recording.path), "positions, as the truth", got)
@@ -292,7 +299,7 @@ def _motion(
         ("poses", motion_from_poses),
     )
     for name, make in makers:
-        having = [r for r in recordings if name in r.tables]
+        having = [r for r in recordings if name in r.tables and r.path not in options.truth]
         if not having:
             continue
         for other in having[1:]:

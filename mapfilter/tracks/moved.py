@@ -89,6 +89,16 @@ def _up_axis(along: int) -> Floats:
     return np.array([0.0, 0.0, 1.0])
 
 
+def places_of_poses(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return poses seen from above, as metres east and north of a frame of their own."""
+    place = rows[["x_m", "y_m", "z_m"]].to_numpy(dtype=np.float64)
+    turned = rotation_matrices(rows[["qx", "qy", "qz", "qw"]].to_numpy(dtype=np.float64))
+    in_body = np.einsum("nji,nj->ni", turned[:-1], np.diff(place, axis=0))
+    camera = bool(len(in_body)) and int(np.argmax(np.abs(in_body.sum(axis=0)))) == 2
+    north = place[:, 2] if camera else place[:, 1]
+    return pd.DataFrame({"time_s": rows["time_s"], "east_m": place[:, 0], "north_m": north})
+
+
 def rotation_matrices(quaternions: Floats) -> Floats:
     """Return (N, 3, 3) rotations of quaternions x, y, z, w, which need not be of unit length."""
     norm = np.linalg.norm(quaternions, axis=1, keepdims=True)

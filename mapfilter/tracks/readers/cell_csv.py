@@ -131,9 +131,7 @@ def _add_cells(rows: Columns, reading: Reading, time_s: Floats, dialect: _Dialec
     add_radio(reading, columns, rows.line)
 
 
-def _levels(
-    rows: Columns, reading: Reading, technology: np.ndarray, dialect: _Dialect
-) -> Floats:
+def _levels(rows: Columns, reading: Reading, technology: np.ndarray, dialect: _Dialect) -> Floats:
     """Return levels in dBm; those given as ASU are turned, NaN where neither is known."""
     level = rows.number(*dialect.of("level"))
     asu = np.where(level >= 0, level, rows.number("asu"))

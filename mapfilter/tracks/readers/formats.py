@@ -5,8 +5,22 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from mapfilter.errors import ConfigError, InputError, fail
-from mapfilter.tracks.readers import cell_csv, gnettrack, gnsslogger, gpx, indoor, nmea, rinex, smartloc
+from mapfilter.errors import ConfigError, InputError, MapfilterError, fail
+from mapfilter.tracks.readers import (
+    antennas,
+    cell_csv,
+    gnettrack,
+    gnsslogger,
+    gpx,
+    indoor,
+    nmea,
+    phone_sensors,
+    plain_csv,
+    poses,
+    rinex,
+    smartloc,
+)
+from mapfilter.tracks.readers.columns import header_names, likely_separator
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recording import Reading, Recording
 from mapfilter.tracks.readers.text import Text, read_text
@@ -24,6 +38,12 @@ FORMATS: tuple[Format, ...] = (
     smartloc.FORMAT,
     smartloc.RAW,
     indoor.FORMAT,
+    phone_sensors.PHYPHOX,
+    phone_sensors.SENSOR_LOGGER,
+    antennas.FORMAT,
+    poses.KITTI,
+    poses.TUM,
+    plain_csv.FORMAT,
 )
 """All formats, in the order in which a file is compared with them."""
 
@@ -66,11 +86,10 @@ def read_recording(
     text = read_text(path)
     found = find_format(text)
     known = format_named(name) if name else found
+    if known is None and options is not None and options.columns:
+        known = plain_csv.FORMAT
     if known is None:
-        titles = ", ".join(other.title for other in FORMATS)
-        got = f"no such file; it begins with {text.first_line[:60]!r}"
-        hint = "a plain CSV: map its columns, or name a --format"
-        raise fail(InputError, str(path), f"a recording in a known format ({titles})", got, hint)
+        raise _unknown(path, text)
     reading = Reading(path, notes=list(text.notes))
     options = options or ReadOptions()
     try:
@@ -84,3 +103,15 @@ def read_recording(
             for fault in error.faults
         )
         raise InputError(named) from error
+
+
+def _unknown(path: Path, text: Text) -> MapfilterError:
+    """Return the error for a file of no known format."""
+    names = set(header_names(text.first_line, likely_separator(text.first_line)))
+    fields = {name for some in plain_csv.FIELDS.values() for name in some}
+    hint = ""
+    if len(names) > 1 and names & fields:
+        hint = "a CSV without a column of times, or with other names: --column FIELD=COLUMN"
+    expected = f"a recording in a known format ({', '.join(f.name for f in FORMATS)})"
+    got = f"none of them; it begins with {text.first_line[:60]!r}"
+    return fail(InputError, str(path), expected, got, hint)

@@ -63,9 +63,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: 
         # Programs may write fields that no header names.
         header += tuple(f"unnamed {i}" for i in range(_unnamed(lines, len(header))))
         ragged = min(len(header), 21 if kind == "Raw" else 7)
-        tables[kind] = line_columns(
-            lines, numbers, reading, ("kind", *header), ",", ragged=ragged
-        )
+        tables[kind] = line_columns(lines, numbers, reading, ("kind", *header), ",", ragged=ragged)
     for kind, count in sorted(ignored.items()):
         reading.note(f"{count} rows of {kind!r} are not used")
     if "Fix" in tables:
@@ -149,7 +147,9 @@ def _add_raw(rows: Columns, reading: Reading) -> None:
     state, _ = rows.whole("state")
     svid, has_svid = rows.whole("svid")
     system, has_system = rows.whole("constellationtype")
-    reading.refuse(rows.line[~(has_time & has_bias & has_sent & has_svid)], "Raw: a time is missing")
+    reading.refuse(
+        rows.line[~(has_time & has_bias & has_sent & has_svid)], "Raw: a time is missing"
+    )
     fine_ns = np.nan_to_num(rows.number("timeoffsetnanos")) - np.nan_to_num(
         rows.number("biasnanos")
     )
@@ -206,8 +206,7 @@ FORMAT = Format(
     "gnsslogger",
     "a GnssLogger text log",
     "GnssLogger for Android (versions 1 to 3)",
-    "fixes by provider, pseudoranges of all constellations, accelerometer, gyroscope, "
-    "magnetometer",
+    "fixes by provider, pseudoranges of all constellations, accelerometer, gyroscope, magnetometer",
     _matches,
     _read,
 )

@@ -18,9 +18,7 @@ _SENSORS = {
     "TYPE_MAGNETIC_FIELD": ("magnetometer", "ut"),
 }
 _AXES = ("x", "y", "z")
-_KNOWN = frozenset(
-    {*_SENSORS, "TYPE_ROTATION_VECTOR", "TYPE_WIFI", "TYPE_BEACON", "TYPE_WAYPOINT"}
-)
+_KNOWN = frozenset({*_SENSORS, "TYPE_ROTATION_VECTOR", "TYPE_WIFI", "TYPE_BEACON", "TYPE_WAYPOINT"})
 _OLDEST_S = 5.0
 
 

@@ -115,10 +115,10 @@ def _dates(tables: dict[bytes, Columns]) -> pd.DataFrame:
         parts.append(_days(rmc, [word[2:4] for word in words], [w[:2] for w in words], years, good))
     if len(zda):
         years = zda.number("year")
-        parts.append(
-            _days(zda, zda.texts("month"), zda.texts("day"), years, np.isfinite(years))
-        )
-    rows = pd.concat(parts) if parts else pd.DataFrame({"line": [], "midnight_s": [], "of_day_s": []})
+        parts.append(_days(zda, zda.texts("month"), zda.texts("day"), years, np.isfinite(years)))
+    rows = (
+        pd.concat(parts) if parts else pd.DataFrame({"line": [], "midnight_s": [], "of_day_s": []})
+    )
     return rows.dropna().sort_values("line", kind="stable").reset_index(drop=True)
 
 

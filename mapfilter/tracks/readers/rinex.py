@@ -120,7 +120,9 @@ def _read_observation(text: Text, reading: Reading, options: ReadOptions) -> Non
     epochs(lines, header, reading, rows)
     if not rows:
         return
-    seconds, names, codes, ranges, levels, numbers = (list(column) for column in zip(*rows, strict=True))
+    seconds, names, codes, ranges, levels, numbers = (
+        list(column) for column in zip(*rows, strict=True)
+    )
     elapsed = np.array(seconds) - _SYSTEMS.get(system, 0.0)
     utc = elapsed + GPS_EPOCH_UTC_S if reading.clock.kind == "utc" else utc_from_gps_s(elapsed)
     columns: dict[str, Any] = {
@@ -271,9 +273,7 @@ def _message(name: str, block: Sequence[str], first: int) -> dict[str, Any] | No
         return None
     toc = _gps_seconds(block[0][first - 1 : first + 19].split())
     clock = [_number(block[0][first + 19 + 19 * i :][:19]) for i in range(3)]
-    values = [
-        _number(line[first + 19 * i :][:19]) for line in block[1:7] for i in range(4)
-    ]
+    values = [_number(line[first + 19 * i :][:19]) for line in block[1:7] for i in range(4)]
     found = dict(zip(_ELEMENTS, values, strict=True))
     week = found["week"]
     if name[0] == "C":

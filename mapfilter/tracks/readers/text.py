@@ -14,6 +14,7 @@ _LARGEST_BYTES = 1 << 31
 _LARGEST_UNPACKED_BYTES = 1 << 30
 _HEAD_BYTES = 1 << 16
 _MOST_ZERO_SHARE = 0.05
+_MOST_STRANGE_SHARE = 0.1
 _ARCHIVES = {
     b"PK\x03\x04": "a ZIP archive (or an Excel file)",
     b"\xfd7zXZ": "an XZ archive",
@@ -136,6 +137,10 @@ def _as_utf8(path: Path, data: bytes, notes: list[str]) -> bytes:
             data.decode("utf-8")
         except UnicodeDecodeError:
             notes.append("some bytes are not UTF-8")
+            strange = data[:_HEAD_BYTES].decode("utf-8", "replace").count("\ufffd")
+            if strange > _MOST_STRANGE_SHARE * min(len(data), _HEAD_BYTES):
+                got = "a binary file"
+                raise fail(InputError, str(path), "a recording as text", got) from None
             data = data.decode("utf-8", "replace").encode()
     return data
 
