@@ -29,7 +29,7 @@ def _matches(text: Text) -> bool:
 def _kind(line: bytes) -> bytes:
     if line.startswith(b"#"):
         return b""
-    return (line.split(b"\t", 2) + [b"?", b"?"])[1]
+    return [*line.split(b"\t", 2), b"?", b"?"][1]
 
 
 def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001

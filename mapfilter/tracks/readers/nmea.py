@@ -112,10 +112,10 @@ def _dates(tables: dict[bytes, Columns]) -> pd.DataFrame:
         words = rmc.texts("date")
         years = np.array([_year(word) for word in words])
         good = np.isfinite(years)
-        parts.append(_days(rmc, [word[2:4] for word in words], [w[:2] for w in words], years, good))
+        parts.append(_days(rmc, [word[2:4] for word in words], [word[:2] for word in words], years, good))
     if len(zda):
         years = zda.number("year")
-        parts.append(_days(zda, zda.texts("month"), zda.texts("day"), years, np.isfinite(years)))
+        parts.append(_days(zda, zda.texts("month").tolist(), zda.texts("day").tolist(), years, np.isfinite(years)))
     rows = (
         pd.concat(parts) if parts else pd.DataFrame({"line": [], "midnight_s": [], "of_day_s": []})
     )
@@ -173,7 +173,7 @@ def _degrees(rows: Columns, name: str, sign: str, negative: str) -> Floats:
     value = rows.number(name)
     degrees, minutes = np.divmod(value, 100.0)
     result = np.where(minutes < 60, degrees + minutes / 60, np.nan)
-    return np.where(rows.texts(sign) == negative, -result, result)
+    return np.asarray(np.where(rows.texts(sign) == negative, -result, result))
 
 
 def _gga(rows: Columns, dates: pd.DataFrame) -> pd.DataFrame:

@@ -72,7 +72,8 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
 _KMH = 1 / 3.6
 _CONTENT = (
     ("lat_deg", "lon_deg"), ("east_m", "north_m"), ("step_m",), ("level_dbm",), ("acc_x",),
-    ("gyr_x",), ("mag_x",), ("pressure_hpa",), ("wheel_speed_mps",), ("wheel_speed_kmh",), ("steps",),
+    ("gyr_x",), ("mag_x",), ("pressure_hpa",), ("wheel_speed_mps",), ("wheel_speed_kmh",),
+    ("steps",),
 )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mapfilter._types import Floats
+from mapfilter._types import Floats, Ints
 from mapfilter.errors import MapfilterError
 from mapfilter.tracks.readers.columns import split_blanks, value_columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
@@ -42,7 +42,7 @@ def _is_tum(text: Text) -> bool:
 def _plain(data: bytes) -> memoryview:
     """Return lines separated by single blanks, comments blanked out."""
     blanks = split_blanks(data.replace(b",", b" "))
-    return memoryview(b"\n".join(b"" if l.startswith(b"#") else l for l in blanks.split(b"\n")))
+    return memoryview(b"\n".join(b"" if line.startswith(b"#") else line for line in blanks.split(b"\n")))
 
 
 def _read_kitti(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
@@ -63,7 +63,7 @@ def _read_kitti(text: Text, reading: Reading, options: ReadOptions) -> None:  # 
     _add_poses(reading, time_s[good], place[good], quaternion[good], rows.line[good])
 
 
-def _frame_times(frame: Floats, reading: Reading) -> Floats:
+def _frame_times(frame: Ints, reading: Reading) -> Floats:
     """Return times by ``times.txt`` beside the file, as in KITTI's odometry, else 10 Hz."""
     path = Path(reading.path).parent / "times.txt"
     if path.is_file():
@@ -96,7 +96,7 @@ def _read_tum(text: Text, reading: Reading, options: ReadOptions) -> None:  # no
 
 
 def _add_poses(
-    reading: Reading, time_s: Floats, place: Floats, quaternion: Floats, lines: Floats
+    reading: Reading, time_s: Floats, place: Floats, quaternion: Floats, lines: Ints
 ) -> None:
     columns = {"time_s": time_s, **dict(zip(("x_m", "y_m", "z_m"), place.T, strict=True))}
     columns |= dict(zip(("qx", "qy", "qz", "qw"), quaternion.T, strict=True))

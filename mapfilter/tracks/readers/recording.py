@@ -123,16 +123,13 @@ class Reading:
     crs: str = ""
     tables: dict[str, pd.DataFrame] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
-    _refused: dict[str, tuple[int, tuple[int, ...]]] = field(default_factory=dict)
+    _refused: dict[str, list[Ints]] = field(default_factory=dict)
 
     def refuse(self, lines: ArrayLike, reason: str) -> None:
-        """Count bad rows, and keep the first of their lines."""
+        """Count lines with bad rows, each once for a reason."""
         found = np.atleast_1d(np.asarray(lines, dtype=np.int64))
-        if not found.size:
-            return
-        count, kept = self._refused.get(reason, (0, ()))
-        kept = tuple(sorted({*kept, *found[:_LINES_KEPT].tolist()})[:_LINES_KEPT])
-        self._refused[reason] = (count + found.size, kept)
+        if found.size:
+            self._refused.setdefault(reason, []).append(found)
 
     def note(self, text: str) -> None:
         """Add a remark, once."""
@@ -224,9 +221,10 @@ class Reading:
         InputError
             No row can be used.
         """
+        found = {reason: np.unique(np.concatenate(some)) for reason, some in self._refused.items()}
         refused = tuple(
-            Unusable(reason, count, lines)
-            for reason, (count, lines) in sorted(self._refused.items(), key=lambda r: -r[1][0])
+            Unusable(reason, len(lines), tuple(lines[:_LINES_KEPT].tolist()))
+            for reason, lines in sorted(found.items(), key=lambda one: -len(one[1]))
         )
         if not self.tables:
             raise nothing_usable(self.path, name, self.rows, refused, rows_word)

@@ -89,6 +89,10 @@ def parse_times(texts: np.ndarray, zone: str = "", layout: str = "ISO8601") -> t
     leap = rest.str.contains(r":60(?:\D|$)|_\d\d\.\d\d\.60$", regex=True).to_numpy()
     plain = rest.str.replace(r"([:.])60(?=\D|$)", r"\g<1>59", regex=True) if leap.any() else rest
     aware = plain.str.contains(r"(?:Z|z|[+-]\d\d:?\d\d)\s*$", regex=True).to_numpy()
+    # Other years are beyond the range of timestamps, or no dates.
+    if layout == "ISO8601":
+        plain = plain.str.replace(",", ".", regex=False)
+    plain = plain.where(plain.str.match(r"\s*(?:19|20)\d\d"), "")
     moments = pd.to_datetime(plain, format=layout, utc=True, errors="coerce")
     seconds = (moments - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy(dtype=np.float64)
     seconds = seconds + leap

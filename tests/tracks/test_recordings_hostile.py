@@ -1,0 +1,198 @@
+"""Damaged recordings: every reader reads what is whole, or refuses with a message; none crashes."""
+
+import resource
+import time
+
+import numpy as np
+import pytest
+from fuzz import fuzz
+from made_recordings import COUNT, LAT_DEG, LON_DEG, MADE, START_UTC_S
+
+from mapfilter.errors import InputError, MapfilterError
+from mapfilter.tracks.readers.formats import read_recording
+from mapfilter.tracks.readers.recording import Recording
+from mapfilter.tracks.readers.tables import RECORDED
+
+
+def check(recording: Recording) -> None:
+    """Check what every recording promises, whatever it was read from."""
+    assert recording.tables
+    for table, rows in recording.tables.items():
+        assert len(rows), table
+        if "time_s" in rows:
+            time_s = rows["time_s"].to_numpy()
+            assert np.isfinite(time_s).all()
+            assert (np.diff(time_s) >= 0).all()
+        for known in RECORDED[table]:
+            values = rows[known.name]
+            if known.text:
+                assert not known.required or values.notna().all()
+                continue
+            numbers = values.to_numpy(dtype=float)
+            assert not known.required or np.isfinite(numbers).all(), known.name
+            inside = (numbers >= known.low) & (numbers <= known.high)
+            assert (inside | np.isnan(numbers)).all(), (table, known.name)
+    for found in recording.unusable:
+        assert found.count >= len(found.lines) > 0
+        assert found.reason
+
+
+@pytest.fixture
+def read(tmp_path):
+    def of(name, data):
+        path = tmp_path / MADE[name][0]
+        path.write_bytes(data)
+        recording = read_recording(path)
+        check(recording)
+        return recording
+
+    return of
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_mutations_are_read_or_refused(name, read, mutation_count):
+    sample = MADE[name][1].encode()
+    tally = fuzz(sample, lambda data: read(name, data), mutation_count // 5)
+    assert tally.read > 0
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_mutations_are_read_or_refused_as_the_named_format(name, tmp_path, mutation_count):
+    path = tmp_path / MADE[name][0]
+
+    def read_as(data):
+        path.write_bytes(data)
+        check(read_recording(path, name.partition("/")[0]))
+
+    fuzz(MADE[name][1].encode(), read_as, mutation_count // 5, seed=1)
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_a_file_cut_off_anywhere_keeps_its_whole_rows(name, read):
+    data = MADE[name][1].encode()
+    whole = sum(len(rows) for rows in read(name, data).tables.values())
+    counts = []
+    for end in range(0, len(data), max(1, len(data) // 97)):
+        try:
+            counts.append(sum(len(rows) for rows in read(name, data[:end]).tables.values()))
+        except InputError:
+            counts.append(0)
+    assert max(counts) <= whole
+    # Half a file keeps about half of its rows; there are two ephemerides only.
+    if name != "rinex-nav":
+        assert counts[len(counts) * 3 // 4] >= 0.4 * whole
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_every_format_refuses_every_other_file(name, tmp_path):
+    for other, (file, text) in MADE.items():
+        if other.partition("/")[0] == name.partition("/")[0]:
+            continue
+        path = tmp_path / file
+        path.write_text(text)
+        try:
+            check(read_recording(path, name.partition("/")[0]))
+        except MapfilterError as error:
+            assert f"use --format {other.partition('/')[0]}" in str(error) or other == "csv"
+
+
+COMMA = ["towercollector", "opencellid", "opencellid/mls", "opencellid-cells", "sensorlogger"]
+
+
+@pytest.mark.parametrize("name", COMMA)
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_other_separators_and_decimal_commas_change_nothing(name, separator, read):
+    text = MADE[name][1]
+    plain = read(name, text.encode())
+    other = text.replace(",", separator)
+    tables = read(name, other.encode()).tables
+    for table, rows in plain.tables.items():
+        assert tables[table].equals(rows), table
+    commas = read(name, other.replace(".", ",").encode()).tables
+    for table in set(plain.tables) & {"positions", "cells"}:
+        assert commas[table]["lat_deg"].equals(plain.tables[table]["lat_deg"])
+
+
+@pytest.mark.parametrize("name", COMMA)
+def test_swapped_columns_change_nothing(name, read):
+    text = MADE[name][1]
+    plain = read(name, text.encode())
+    rows = [line.split(",") for line in text.splitlines()]
+    turned = "\n".join(",".join(reversed(row)) for row in rows)
+    for table, expected in plain.tables.items():
+        assert read(name, turned.encode()).tables[table].equals(expected), table
+
+
+def test_latitude_and_longitude_swapped_in_the_file_are_told(read):
+    text = MADE["opencellid"][1]
+    far = text.replace(",24.94", ",124.94")
+    swapped = "\n".join(
+        ",".join([*row[:4], row[5], row[4], *row[6:]]) if i else ",".join(row)
+        for i, row in enumerate(line.split(",") for line in far.splitlines())
+    )
+    recording = read("opencellid", swapped.encode())
+    assert "positions" not in recording.tables
+    assert "latitude and longitude swapped" in recording.unusable[0].reason
+
+
+def test_a_quote_that_is_never_closed_ends_with_its_line(read):
+    lines = MADE["towercollector"][1].splitlines()
+    lines[5] = lines[5].replace('"P"', '"P')
+    lines[7] = lines[7].replace(",LTE", ',"LTE')
+    recording = read("towercollector", "\n".join(lines).encode())
+    assert len(recording.tables["radio"]) == 2 * COUNT
+
+
+def test_a_long_line_is_refused_alone(read):
+    lines = MADE["opencellid"][1].splitlines()
+    lines[5] += "x" * 100_000
+    recording = read("opencellid", "\n".join(lines).encode())
+    assert len(recording.tables["radio"]) == COUNT - 1
+
+
+def test_a_gpx_with_entities_is_not_expanded(read):
+    bomb = '<!DOCTYPE x [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;&a;">]>'
+    data = MADE["gpx"][1].replace("<gpx ", bomb + "<gpx ").encode()
+    with pytest.raises(InputError):
+        read("gpx", data)
+
+
+MANY = 1_000_000
+
+
+def _many(kind):
+    """Return a million rows of a CSV format."""
+    time_ms = START_UTC_S * 1000 + 20 * np.arange(MANY)
+    lat = np.resize(np.char.mod("%.6f", LAT_DEG), MANY)
+    lon = np.resize(np.char.mod("%.6f", LON_DEG), MANY)
+    if kind == "opencellid":
+        head = MADE[kind][1].splitlines()[0]
+        rows = (
+            f"244,91,3021,1170251,{a},{o},-87,{t},6.5,2.2,30.5,LTE+,1,,3021,269"
+            for t, a, o in zip(time_ms.tolist(), lat.tolist(), lon.tolist(), strict=True)
+        )
+    elif kind == "sensorlogger":
+        head = "time,seconds_elapsed,z,y,x"
+        rows = (f"{t}000000,{i}.0,9.81,0.1,0.2" for i, t in enumerate(time_ms.tolist()))
+    else:
+        head = "time,lat,lon,rsrp,mcc,mnc,lac,ci,technology"
+        rows = (
+            f"{t},{a},{o},-87,244,91,3021,1170251,LTE"
+            for t, a, o in zip(time_ms.tolist(), lat.tolist(), lon.tolist(), strict=True)
+        )
+    return "\n".join([head, *rows]).encode()
+
+
+@pytest.mark.skipif("not config.getoption('--mutations') >= 1000", reason="long; --mutations 1000")
+@pytest.mark.parametrize("kind", ["opencellid", "sensorlogger", "csv"])
+def test_a_million_rows_are_read_fast_and_in_little_memory(kind, tmp_path):
+    path = tmp_path / MADE[kind][0]
+    path.write_bytes(_many(kind))
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    began = time.perf_counter()
+    recording = read_recording(path)
+    took_s = time.perf_counter() - began
+    grown_mb = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+    assert recording.rows == MANY
+    assert took_s < 15.0
+    assert grown_mb < 1000.0
