@@ -1,9 +1,12 @@
 """Made recordings, one of each format: a walk of 60 s in Helsinki, a row every 2 s."""
 
+# ruff: noqa: E501, SIM905
+
 import numpy as np
 
 START_UTC_S = 1_777_629_600
 """2026-05-01 10:00:00 UTC."""
+
 
 COUNT = 30
 STEP_S = 2.0
@@ -50,7 +53,9 @@ def towercollector() -> str:
     for i in range(COUNT):
         place = f"{LAT_DEG[i]:.6f},{LON_DEG[i]:.6f},6.4,2.2,30,12.5"
         stamp = f'"{_clock(i, "%Y-%m-%dT%H:%M:%S.000Z")}"'
-        rows.append(f'244,91,3021,1170{i // 10},101,,{LEVEL_DBM[i]},1,{place},{stamp},LTE,false,"P"')
+        rows.append(
+            f'244,91,3021,1170{i // 10},101,,{LEVEL_DBM[i]},1,{place},{stamp},LTE,false,"P"'
+        )
         rows.append(f',,,,202,,{LEVEL_DBM[i] - 8},,{place},{stamp},LTE,true,"P"')
     return _lines(head + "measured_at,net_type,neighboring,device", rows, "\r\n")
 
@@ -253,7 +258,9 @@ def indoor() -> str:
         rows.append(f"{ms}\tTYPE_GYROSCOPE\t0.01\t-0.02\t0.03\t3")
         rows.append(f"{ms}\tTYPE_MAGNETIC_FIELD\t-17.2\t18.1\t-26.3\t3")
         rows.append(f"{ms}\tTYPE_ROTATION_VECTOR\t0.01\t0.03\t-0.39\t3")
-        rows.append(f"{ms}\tTYPE_WIFI\tshop\t0a:74:9c:2e:af:0{i % 9}\t{LEVEL_DBM[i]}\t5765\t{ms - 700}")
+        rows.append(
+            f"{ms}\tTYPE_WIFI\tshop\t0a:74:9c:2e:af:0{i % 9}\t{LEVEL_DBM[i]}\t5765\t{ms - 700}"
+        )
         rows.append(f"{ms}\tTYPE_BEACON\tABC\t1\t{i}\t-56\t-76\t9.5\tE0:78:A3:3E:97:B{i % 9}\t{ms}")
         if i % 5 == 0:
             rows.append(f"{ms}\tTYPE_WAYPOINT\t{100 + 2.2 * i:.3f}\t{50 + i / 10:.3f}")
@@ -268,9 +275,7 @@ def phyphox() -> str:
 
 
 def sensorlogger() -> str:
-    rows = [
-        f"{int(TIMES_S[i])}000000000,{STEP_S * i},9.7{i % 10},0.1,0.2" for i in range(COUNT)
-    ]
+    rows = [f"{int(TIMES_S[i])}000000000,{STEP_S * i},9.7{i % 10},0.1,0.2" for i in range(COUNT)]
     return _lines("time,seconds_elapsed,z,y,x", rows)
 
 

@@ -272,7 +272,7 @@ def test_a_file_without_a_usable_row_is_refused_with_the_reasons(written):
 def test_another_format_is_named(written):
     with pytest.raises(InputError, match="this is a GPX file; use --format gpx"):
         read_recording(written("gpx"), "nmea")
-    with pytest.raises(ConfigError, match="one of .*gnettrack"):
+    with pytest.raises(ConfigError, match=r"one of .*gnettrack"):
         read_recording(written("gpx"), "gpxx")
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.identities import add_radio, technologies
+from mapfilter.tracks.readers.identities import add_radio
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.text import Text
 from mapfilter.tracks.readers.times import parse_times
@@ -55,7 +55,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
             continue
         names = ("role", "mcc", "mnc", "lac", "ci", "level_dbm", "censored")
         columns = {name: [row[name] for row in rows] for name in names}
-        family = technologies(np.array([row["technology"] for row in rows], dtype=object))
+        family = np.array([row["technology"] for row in rows], dtype=object)
         add_radio(reading, {**columns, "time_s": time_s, "technology": family}, lines)
     reading.clock = Clock("utc" if zoned else "local")
 

@@ -13,12 +13,12 @@ from mapfilter.tracks.readers.columns import (
     header_columns,
     header_names,
     likely_separator,
+    only,
 )
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.identities import add_radio, available, technologies
+from mapfilter.tracks.readers.identities import add_radio, available, technology
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.text import Text
-from mapfilter.tracks.readers.times import parse_times
 
 _ASU = {"GSM": (-113.0, 2.0, 31.0), "UMTS": (-120.0, 1.0, 96.0), "LTE": (-140.0, 1.0, 97.0)}
 """Level of ASU 0, step and largest ASU: 3GPP TS 27.007, +CSQ and +CESQ."""
@@ -85,8 +85,8 @@ def _read_measurements(
     text: Text, reading: Reading, options: ReadOptions, dialect: _Dialect
 ) -> None:
     reading.program = dialect.program
-    rows = header_columns(text.data, reading)
-    time_s, zoned = parse_times(rows.texts("measured_at"), options.zone)
+    rows = header_columns(text.data, reading, text.line)
+    time_s, zoned = rows.times("measured_at", zone=options.zone)
     reading.clock = Clock("utc") if zoned else Clock("local", options.zone)
     position = {
         "time_s": time_s,
@@ -98,15 +98,16 @@ def _read_measurements(
         "course_deg": rows.number(*dialect.of("bearing")),
     }
     # Each position is repeated for every cell of a report.
-    table = np.stack([time_s, position["lat_deg"], position["lon_deg"]], axis=1)
-    new = np.ones(len(rows), dtype=bool)
-    new[1:] = (np.diff(np.nan_to_num(table), axis=0) != 0).any(axis=1)
-    reading.add("positions", {k: v[new] for k, v in position.items()}, rows.line[new])
+    new = np.zeros(len(rows), dtype=bool)
+    new[:1] = True
+    for name in ("time_s", "lat_deg", "lon_deg"):
+        new[1:] |= np.diff(np.nan_to_num(position[name])) != 0
+    reading.add("positions", *only(position, rows.line, new))
     _add_cells(rows, reading, time_s, dialect)
 
 
 def _add_cells(rows: Columns, reading: Reading, time_s: Floats, dialect: _Dialect) -> None:
-    technology = technologies(rows.texts(*dialect.of("technology")))
+    families = rows.mapped(technology, *dialect.of("technology"))
     lac = available(*rows.whole(*dialect.of("lac")))
     if rows.has("tac") and rows.has("lac"):
         lac = np.where(np.isnan(lac), available(*rows.whole("tac")), lac)
@@ -114,31 +115,31 @@ def _add_cells(rows: Columns, reading: Reading, time_s: Floats, dialect: _Dialec
     bsic = np.full(len(rows), np.nan)
     for code in codes:
         bsic = np.where(np.isnan(bsic), code, bsic)
-    neighbour = np.isin(rows.texts("neighboring"), ("true", "True", "TRUE", "1"))
+    neighbour = rows.flags("neighboring", true=("true", "True", "TRUE", "1"))
     columns = {
         "time_s": time_s,
-        "role": np.where(neighbour, "neighbour", "serving"),
-        "technology": technology,
+        "role": np.array(["serving", "neighbour"], dtype=object)[neighbour.astype(np.int64)],
+        "technology": families,
         "mcc": available(*rows.whole("mcc")),
         "mnc": available(*rows.whole(*dialect.of("mnc"))),
         "lac": lac,
         "ci": available(*rows.whole(*dialect.of("ci"))),
         "arfcn": available(*rows.whole("arfcn", "channel")),
         "bsic": bsic,
-        "level_dbm": _levels(rows, reading, technology, dialect),
+        "level_dbm": _levels(rows, reading, families, dialect),
         "timing_advance": available(*rows.whole("ta")),
     }
     add_radio(reading, columns, rows.line)
 
 
-def _levels(rows: Columns, reading: Reading, technology: np.ndarray, dialect: _Dialect) -> Floats:
+def _levels(rows: Columns, reading: Reading, families: np.ndarray, dialect: _Dialect) -> Floats:
     """Return levels in dBm; those given as ASU are turned, NaN where neither is known."""
     level = rows.number(*dialect.of("level"))
     asu = np.where(level >= 0, level, rows.number("asu"))
     level = np.where(level < 0, level, np.nan)
     turned = 0
     for family, (lowest, step, most) in _ASU.items():
-        of = np.isnan(level) & (technology == family) & (asu >= 0) & (asu <= most)
+        of = np.isnan(level) & (families == family) & (asu >= 0) & (asu <= most)
         level = np.where(of, lowest + step * asu, level)
         turned += int(of.sum())
     if turned:
@@ -155,9 +156,9 @@ def _is_cell_list(text: Text) -> bool:
 
 def _read_cell_list(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
     reading.program = "OpenCellID or MLS cell list"
-    rows = header_columns(text.data, reading)
+    rows = header_columns(text.data, reading, text.line)
     columns = {
-        "technology": technologies(rows.texts("radio")),
+        "technology": rows.mapped(technology, "radio"),
         "mcc": available(*rows.whole("mcc")),
         "mnc": available(*rows.whole("net", "mnc")),
         "lac": available(*rows.whole("area", "lac")),
@@ -177,6 +178,7 @@ TOWER_COLLECTOR = Format(
     "serving and neighbour cells with identity, levels, timing advance, positions",
     _is_tower_collector,
     _read_tower_collector,
+    by_rows=True,
 )
 UPLOAD = Format(
     "opencellid",
@@ -185,6 +187,7 @@ UPLOAD = Format(
     "cells with identity, PCI or PSC, levels, timing advance, positions, speed and course",
     _is_upload,
     _read_upload,
+    by_rows=True,
 )
 CELL_LIST = Format(
     "opencellid-cells",
@@ -193,4 +196,5 @@ CELL_LIST = Format(
     "cells; no journey: it is named, and left to ``[cells] path``",
     _is_cell_list,
     _read_cell_list,
+    by_rows=True,
 )

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -18,11 +19,13 @@ from pyarrow import csv as arrow_csv
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.tracks.readers.recording import Reading
+from mapfilter.tracks.readers.times import parse_times, unix_seconds
 
 SEPARATORS = ",;\t|"
-_BLOCK_BYTES = 1 << 23
+_BLOCK_BYTES = 1 << 21
 _LONGEST_LINE = 1 << 16
 _LINE_FEED = 10
+_LEAST_UNIX_S = 1e8
 _NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
 _WHOLE = r"^[-+]?\d{1,18}(\.0*)?$"
 _MISSING = ("", "-", "nan", "NaN", "NA", "N/A", "null", "NULL", "None", "none", "#N/A")
@@ -74,6 +77,38 @@ class Columns:
         words = np.array(trimmed.dictionary.to_pylist(), dtype=object)
         index = trimmed.indices.to_numpy(zero_copy_only=False)
         return words[index] if len(words) else np.full(len(self), "", dtype=object)
+
+    def mapped(self, meaning: Callable[[str], Any], *names: str) -> np.ndarray:
+        """Return what each word of a column means; a function of words that are few."""
+        column = self._raw(*names)
+        if column is None:
+            return np.full(len(self), meaning(""), dtype=object)
+        trimmed = pc.utf8_trim_whitespace(column).dictionary_encode().combine_chunks()
+        words = [meaning(word) for word in trimmed.dictionary.to_pylist()]
+        index = trimmed.indices.to_numpy(zero_copy_only=False)
+        found = np.empty(len(words), dtype=object)
+        found[:] = words
+        return found[index] if len(words) else np.full(len(self), meaning(""), dtype=object)
+
+    def flags(self, *names: str, true: Collection[str]) -> Bools:
+        """Return in which rows a column has one of some words."""
+        column = self._raw(*names)
+        if column is None:
+            return np.zeros(len(self), dtype=bool)
+        found = pc.is_in(pc.utf8_trim_whitespace(column), pa.array(list(true)))
+        return np.asarray(found.to_numpy(), dtype=bool)
+
+    def times(self, *names: str, zone: str = "", layout: str = "ISO8601") -> tuple[Floats, bool]:
+        """Return UTC seconds of a column of times, see :func:`parse_times`."""
+        column = self._raw(*names)
+        if column is not None and layout == "ISO8601":
+            try:
+                number = np.asarray(pc.cast(column, pa.float64()).to_numpy(), dtype=np.float64)
+            except pa.ArrowInvalid:
+                pass
+            else:
+                return unix_seconds(np.where(np.abs(number) > _LEAST_UNIX_S, number, np.nan)), True
+        return parse_times(self.texts(*names), zone, layout)
 
     def number(self, *names: str) -> Floats:
         """Return the first of these columns that is there as numbers, NaN where missing.
@@ -135,6 +170,14 @@ def header_columns(
                 memoryview(data)[start:], reading, names, separator, first_line, ragged=ragged
             )
     return Columns(reading, (), np.zeros(0, dtype=np.int64))
+
+
+def only(columns: Mapping[str, Any], lines: Ints, rows: Bools) -> tuple[dict[str, Any], Ints]:
+    """Return some rows of arrays, and their lines; the arrays themselves where all are kept."""
+    if rows.all():
+        return dict(columns), lines
+    kept = {name: v[rows] if np.ndim(v) else v for name, v in columns.items()}
+    return kept, lines[rows]
 
 
 def likely_separator(header: str) -> str:

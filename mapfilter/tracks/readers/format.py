@@ -44,6 +44,8 @@ class Format:
         Whether a file looks like it.
     read : callable
         Reads a text into a :class:`Reading`.
+    by_rows : bool
+        Whether a large file may be read part by part, each below the first line.
     """
 
     name: str
@@ -52,3 +54,4 @@ class Format:
     holds: str
     matches: Callable[[Text], bool]
     read: Callable[[Text, Reading, ReadOptions], None]
+    by_rows: bool = False

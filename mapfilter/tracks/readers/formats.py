@@ -23,7 +23,7 @@ from mapfilter.tracks.readers import (
 from mapfilter.tracks.readers.columns import header_names, likely_separator
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recording import Reading, Recording
-from mapfilter.tracks.readers.text import Text, read_text
+from mapfilter.tracks.readers.text import Text, parts_of, read_text
 
 FORMATS: tuple[Format, ...] = (
     gnettrack.FORMAT,
@@ -93,7 +93,8 @@ def read_recording(
     reading = Reading(path, notes=list(text.notes))
     options = options or ReadOptions()
     try:
-        known.read(text, reading, options)
+        for part in parts_of(text) if known.by_rows else (text,):
+            known.read(part, reading, options)
         return reading.done(known.name)
     except InputError as error:
         if found is None or found is known:

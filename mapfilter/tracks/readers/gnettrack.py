@@ -15,11 +15,10 @@ from mapfilter.tracks.readers.columns import (
     likely_separator,
 )
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.identities import add_radio, available, technologies
+from mapfilter.tracks.readers.identities import add_radio, available, technology
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.stale import repeated_readings
 from mapfilter.tracks.readers.text import Text
-from mapfilter.tracks.readers.times import parse_times
 
 _NEEDED = {"timestamp", "longitude", "latitude", "rawcellid", "networkmode"}
 _KMH = 1 / 3.6
@@ -38,7 +37,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     rows = header_columns(text.data, reading, ragged=_LEAST_FIELDS)
     version = [word for word in rows.texts("version_name")[:1] if word]
     reading.program += f" {version[0]}" if version else ""
-    time_s, zoned = parse_times(rows.texts("timestamp"), options.zone, _LAYOUT)
+    time_s, zoned = rows.times("timestamp", zone=options.zone, layout=_LAYOUT)
     reading.clock = Clock("local", options.zone if zoned else "")
     lat, lon = rows.number("latitude"), rows.number("longitude")
     _add_positions(rows, reading, time_s, lat, lon)
@@ -121,11 +120,11 @@ def _state(rows: Columns, serving: dict[str, Floats]) -> Ints:
 def _add_serving(
     rows: Columns, reading: Reading, time_s: Floats, serving: dict[str, Floats], good: Bools
 ) -> None:
-    technology = technologies(rows.texts("networkmode", "networktech"))
+    families = rows.mapped(technology, "networkmode", "networktech")
     columns = {
         **serving,
         "time_s": time_s,
-        "technology": technology,
+        "technology": families,
         "arfcn": available(*rows.whole("arfcn")),
         "bsic": available(*rows.whole("psc")),
         "level_dbm": rows.number("level", "rsrp"),
@@ -138,8 +137,8 @@ def _add_serving(
 def _add_neighbours(rows: Columns, reading: Reading, time_s: Floats, good: Bools) -> None:
     false = 0
     for i in range(1, _MOST_NEIGHBOURS + 1):
-        technology = rows.texts(f"ntech{i}")
-        there = good & (technology != "")
+        words = rows.texts(f"ntech{i}")
+        there = good & (words != "")
         if not there.any():
             continue
         names = rows.texts(f"ncell{i}")
@@ -149,7 +148,7 @@ def _add_neighbours(rows: Columns, reading: Reading, time_s: Floats, good: Bools
         there &= ~dump
         columns = {
             "time_s": time_s,
-            "technology": technologies(technology),
+            "technology": rows.mapped(technology, f"ntech{i}"),
             "arfcn": available(*rows.whole(f"narfcn{i}")),
             "bsic": _codes(names),
             "level_dbm": rows.number(f"nrxlev{i}"),

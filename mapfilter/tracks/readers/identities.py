@@ -29,19 +29,15 @@ _FAMILIES = {
 _FAMILY = {word: family for family, words in _FAMILIES.items() for word in words}
 
 
-def technologies(texts: np.ndarray) -> np.ndarray:
-    """Return GSM, UMTS, LTE, NR, … for the words of recordings; None where not known.
+def technology(word: str) -> str | None:
+    """Return GSM, UMTS, LTE, NR, … for a word of a recording; None where not known.
 
     Examples
     --------
-    >>> technologies(np.array(["LTE+", "hspa", "4G", "?"], dtype=object)).tolist()
+    >>> [technology(word) for word in ("LTE+", "hspa", "4G", "?")]
     ['LTE', 'UMTS', 'LTE', None]
     """
-    words = pd.Series(texts, dtype=object)
-    known = {word: _FAMILY.get(str(word).strip().upper()) for word in words.unique()}
-    found = np.empty(len(words), dtype=object)
-    found[:] = [known[word] for word in words]
-    return found
+    return _FAMILY.get(word.strip().upper())
 
 
 def available(values: Ints, there: Bools) -> Floats:
@@ -80,14 +76,20 @@ def cell_names(mcc: Floats, mnc: Floats, lac: Floats, ci: Floats) -> np.ndarray:
     >>> cell_names(*np.array([[302.0, np.nan], [720.0, np.nan], [29100.0, np.nan], [7.0, 8.0]]))
     array(['302-720-29100-7', '8'], dtype=object)
     """
-    parts = np.stack([mcc, mnc, lac, ci], axis=1)
-    unique, inverse = np.unique(np.nan_to_num(parts, nan=-1.0), axis=0, return_inverse=True)
-    names = np.empty(len(unique), dtype=object)
+    parts = [np.nan_to_num(part, nan=-1.0) for part in (mcc, mnc, lac, ci)]
+    codes = np.zeros(len(ci), dtype=np.int64)
+    for part in parts:
+        found, values = pd.factorize(part)
+        codes = pd.factorize(codes * len(values) + found)[0]
+    _, first = np.unique(codes, return_index=True)
+    names = np.empty(len(first), dtype=object)
     names[:] = [
-        "-".join(str(int(part)) for part in row if part >= 0) if row[3] >= 0 else None
-        for row in unique
+        "-".join(str(int(part[at])) for part in parts if part[at] >= 0)
+        if parts[3][at] >= 0
+        else None
+        for at in first
     ]
-    return names[inverse.reshape(-1)]
+    return names[codes]
 
 
 def add_radio(reading: Reading, columns: Mapping[str, Any], lines: ArrayLike) -> None:
@@ -99,14 +101,13 @@ def add_radio(reading: Reading, columns: Mapping[str, Any], lines: ArrayLike) ->
     count = len(line)
     given = dict(columns)
     for name in ("mcc", "mnc", "lac", "ci", "arfcn", "bsic", "timing_advance", "level_dbm"):
-        values = np.array(given.get(name, np.full(count, np.nan)), dtype=np.float64)
-        given[name] = values if values.ndim else np.full(count, float(values))
-    technology = given.get("technology")
-    if technology is None:
-        technology = np.full(count, None, dtype=object)
-    given["technology"] = technology
+        given[name] = np.broadcast_to(np.asarray(given.get(name, np.nan), dtype=np.float64), count)
+    families = given.get("technology")
+    if families is None:
+        families = np.full(count, None, dtype=object)
+    given["technology"] = families
     for family, limits in LIMITS.items():
-        of = np.asarray(technology == family, dtype=bool)
+        of = np.asarray(families == family, dtype=bool)
         for name, most in limits.items():
             bad = of & ~np.isnan(given[name]) & ~((given[name] >= 0) & (given[name] <= most))
             if bad.any():
@@ -117,11 +118,13 @@ def add_radio(reading: Reading, columns: Mapping[str, Any], lines: ArrayLike) ->
                 given[name] = np.where(bad, np.nan, given[name])
     if "cell" not in given:
         given["cell"] = cell_names(given["mcc"], given["mnc"], given["lac"], given["ci"])
-    cell = np.array([name is not None and name != "" for name in given["cell"]], dtype=bool)
+    names = np.asarray(given["cell"], dtype=object)
+    cell = ~pd.isna(names) & (names != "")
     known = cell | ~np.isnan(given["level_dbm"]) | ~np.isnan(given["timing_advance"])
     reading.refuse(line[~known], "radio: neither a cell nor a level")
-    kept = {
-        name: np.asarray(values)[known] if np.ndim(values) else values
-        for name, values in given.items()
-    }
-    reading.add("radio", kept, line[known])
+    if not known.all():
+        given = {
+            name: np.asarray(values)[known] if np.ndim(values) else values
+            for name, values in given.items()
+        }
+    reading.add("radio", given, line[known])

@@ -112,10 +112,20 @@ def _dates(tables: dict[bytes, Columns]) -> pd.DataFrame:
         words = rmc.texts("date")
         years = np.array([_year(word) for word in words])
         good = np.isfinite(years)
-        parts.append(_days(rmc, [word[2:4] for word in words], [word[:2] for word in words], years, good))
+        parts.append(
+            _days(rmc, [word[2:4] for word in words], [word[:2] for word in words], years, good)
+        )
     if len(zda):
         years = zda.number("year")
-        parts.append(_days(zda, zda.texts("month").tolist(), zda.texts("day").tolist(), years, np.isfinite(years)))
+        parts.append(
+            _days(
+                zda,
+                zda.texts("month").tolist(),
+                zda.texts("day").tolist(),
+                years,
+                np.isfinite(years),
+            )
+        )
     rows = (
         pd.concat(parts) if parts else pd.DataFrame({"line": [], "midnight_s": [], "of_day_s": []})
     )

@@ -55,7 +55,7 @@ def _is_phyphox(text: Text) -> bool:
 
 def _read_phyphox(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
     reading.program, reading.clock = "phyphox", Clock("monotonic")
-    rows = header_columns(text.data, reading)
+    rows = header_columns(text.data, reading, text.line)
     units = {name: _UNIT.sub("", name).strip() for name in rows.names}
     rows = replace(rows, names=tuple(units[name] for name in rows.names))
     time_s = _phyphox_time(rows.number("time"), reading)
@@ -128,7 +128,7 @@ def _is_sensor_logger(text: Text) -> bool:
 
 def _read_sensor_logger(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
     reading.program, reading.clock = "Sensor Logger", Clock("utc")
-    rows = header_columns(text.data, reading)
+    rows = header_columns(text.data, reading, text.line)
     time_s = unix_seconds(rows.number("time"))
     if rows.has("latitude", "longitude"):
         speed, course = rows.number("speed"), rows.number("bearing")
@@ -187,6 +187,7 @@ PHYPHOX = Format(
     "UTC by ``meta/time.csv`` beside the file",
     _is_phyphox,
     _read_phyphox,
+    by_rows=True,
 )
 SENSOR_LOGGER = Format(
     "sensorlogger",
@@ -195,4 +196,5 @@ SENSOR_LOGGER = Format(
     "accelerometer, gravity, gyroscope, magnetometer, orientation, barometer, steps, positions",
     _is_sensor_logger,
     _read_sensor_logger,
+    by_rows=True,
 )

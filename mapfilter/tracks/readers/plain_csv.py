@@ -15,17 +15,17 @@ from mapfilter.tracks.readers.columns import (
     header_columns,
     header_names,
     likely_separator,
+    only,
 )
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.identities import (
     add_radio,
     available,
     parse_identities,
-    technologies,
+    technology,
 )
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.text import Text
-from mapfilter.tracks.readers.times import parse_times
 
 _UNIX_S = 1e8
 
@@ -111,7 +111,7 @@ def _matches(text: Text) -> bool:
 
 def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     reading.program = "CSV"
-    rows = header_columns(text.data, reading)
+    rows = header_columns(text.data, reading, text.line)
     _check_map(rows, reading, options.columns)
     mapped = _Mapped(rows, options.columns)
     time_s = _times(mapped, reading, options)
@@ -145,7 +145,7 @@ def _add(
 ) -> None:
     """Add the rows of a table that hold something of it."""
     if there.any():
-        reading.add(table, {name: v[there] for name, v in columns.items()}, rows.line[there])
+        reading.add(table, *only(columns, rows.line, there))
 
 
 def _check_map(rows: Columns, reading: Reading, own: Mapping[str, str]) -> None:
@@ -175,7 +175,7 @@ def _times(mapped: _Mapped, reading: Reading, options: ReadOptions) -> Floats:
         reading.clock = Clock("monotonic")
         return number
     reading.notes[:] = [note for note in reading.notes if not note.endswith("taken as missing")]
-    time_s, zoned = parse_times(mapped.texts("time"), options.zone)
+    time_s, zoned = mapped.rows.times(*mapped.names("time"), zone=options.zone)
     reading.clock = Clock("utc") if zoned else Clock("local", options.zone)
     return time_s
 
@@ -227,17 +227,17 @@ def _add_cells(mapped: _Mapped, reading: Reading, time_s: Floats) -> None:
         **{name: mapped.whole(name) for name in ("arfcn", "bsic", "timing_advance")},
     }
     cell = mapped.texts("cell")
-    there = (cell != "") | ~np.isnan(identity["ci"]) | ~np.isnan(columns["level_dbm"])
+    identified = (cell != "") | ~np.isnan(identity["ci"])
+    there = identified | ~np.isnan(columns["level_dbm"])
     if mapped.has("cell"):
         columns["cell"] = cell
     if mapped.has("technology"):
-        columns["technology"] = technologies(mapped.texts("technology"))
-    role = mapped.texts("role")
-    known = np.isin(role, ("serving", "neighbour"))
-    identified = (cell != "") | ~np.isnan(identity["ci"])
-    columns["role"] = np.where(known, role, np.where(identified, "serving", "neighbour"))
-    kept = {name: values[there] for name, values in columns.items()}
-    add_radio(reading, kept, mapped.rows.line[there])
+        columns["technology"] = mapped.rows.mapped(technology, *mapped.names("technology"))
+    serving = mapped.rows.flags(*mapped.names("role"), true=("serving",))
+    neighbour = mapped.rows.flags(*mapped.names("role"), true=("neighbour", "neighbor"))
+    serving |= identified & ~neighbour
+    columns["role"] = np.array(["neighbour", "serving"], dtype=object)[serving.astype(np.int64)]
+    add_radio(reading, *only(columns, mapped.rows.line, there))
 
 
 FORMAT = Format(
@@ -247,4 +247,5 @@ FORMAT = Format(
     "positions, places, motion, wheel speed and yaw rate, cells, inertial sensors, pressure",
     _matches,
     _read,
+    by_rows=True,
 )

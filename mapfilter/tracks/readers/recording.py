@@ -121,7 +121,7 @@ class Reading:
     clock: Clock = field(default_factory=lambda: Clock("utc"))
     program: str = ""
     crs: str = ""
-    tables: dict[str, pd.DataFrame] = field(default_factory=dict)
+    tables: dict[str, list[pd.DataFrame]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     _refused: dict[str, list[Ints]] = field(default_factory=dict)
 
@@ -162,12 +162,12 @@ class Reading:
             good &= self._in_era(checked["time_s"], line, good)
         if not good.any():
             return
-        rows = pd.DataFrame({name: values[good] for name, values in checked.items()})
+        if not good.all():
+            checked = {name: values[good] for name, values in checked.items()}
+        rows = pd.DataFrame(checked, copy=False)
         if "time_s" in rows and (back := int(np.sum(np.diff(rows["time_s"].to_numpy()) < 0))):
             self.note(f"{table}: times go backwards in {back} places; sorted")
-        if table in self.tables:
-            rows = pd.concat([self.tables[table], rows], ignore_index=True)
-        self.tables[table] = rows
+        self.tables.setdefault(table, []).append(rows)
 
     def _check(
         self, table: str, known: Field, checked: dict[str, Any], line: Ints, good: Bools
@@ -175,7 +175,7 @@ class Reading:
         """Refuse rows without a needed value; ignore other values out of range."""
         values = checked[known.name]
         if known.text:
-            missing = np.array([value is None for value in values], dtype=bool)
+            missing = np.asarray(values.codes < 0)
             outside = np.zeros(len(values), dtype=bool)
         else:
             missing = np.isnan(values)
@@ -192,7 +192,7 @@ class Reading:
                 f"{label}: {int(ignored.sum())} values are not {known.expected}, ignored "
                 f"(first in line {first})"
             )
-            values[outside] = np.nan
+            checked[known.name] = np.where(outside, np.nan, values)
         return np.ones(len(line), dtype=bool)
 
     def _in_era(self, time_s: Floats, line: Ints, good: Bools) -> Bools:
@@ -228,8 +228,11 @@ class Reading:
         )
         if not self.tables:
             raise nothing_usable(self.path, name, self.rows, refused, rows_word)
-        tables = {table: self._tidy(table, self.tables.get(table)) for table in RECORDED}
-        kept = {table: rows for table, rows in tables.items() if rows is not None}
+        kept = {
+            table: self._tidy(table, _joined(self.tables.pop(table)))
+            for table in RECORDED
+            if table in self.tables
+        }
         return Recording(
             self.path,
             name,
@@ -242,15 +245,18 @@ class Reading:
             self.crs,
         )
 
-    def _tidy(self, table: str, rows: pd.DataFrame | None) -> pd.DataFrame | None:
-        if rows is None or "time_s" not in rows:
+    def _tidy(self, table: str, rows: pd.DataFrame) -> pd.DataFrame:
+        if "time_s" not in rows:
             return rows
         time = rows["time_s"].to_numpy()
         if (np.diff(time) < 0).any():
             rows = rows.sort_values("time_s", kind="stable", ignore_index=True)
             time = rows["time_s"].to_numpy()
-        if len(time) > 1 and (np.diff(time) == 0).any():
-            duplicate = rows.duplicated().to_numpy()
+        equal = np.flatnonzero(np.diff(time) == 0)
+        if equal.size:
+            among = np.union1d(equal, equal + 1)
+            duplicate = np.zeros(len(rows), dtype=bool)
+            duplicate[among] = rows.iloc[among].duplicated().to_numpy()
             if duplicate.any():
                 self.note(f"{table}: {int(duplicate.sum())} exact duplicate rows dropped")
                 rows = rows[~duplicate].reset_index(drop=True)
@@ -266,18 +272,39 @@ def nothing_usable(
     return fail(InputError, str(path), f"a usable {rows_word} of {name}", got)
 
 
+def _joined(parts: list[pd.DataFrame]) -> pd.DataFrame:
+    """Return parts of a table in one; texts stay categories."""
+    if len(parts) == 1:
+        return parts[0]
+    first = parts[0]
+    texts = [name for name in first.columns if isinstance(first[name].dtype, pd.CategoricalDtype)]
+    words = dict.fromkeys(texts, object)
+    rows = pd.concat([part.astype(words) for part in parts], ignore_index=True)
+    return rows.assign(**{name: _texts(rows[name]) for name in texts})
+
+
 def _values(known: Field, given: Any, count: int) -> Any:
-    """Return a column as float64 with NaN, or as objects with None, for missing values."""
-    if given is None:
-        return np.full(count, None, dtype=object) if known.text else np.full(count, np.nan)
-    if known.text:
-        values = np.empty(count, dtype=object)
-        values[:] = [str(v) if v is not None and v != "" else None for v in _spread(given, count)]
-        return values
-    numbers = np.array(_spread(given, count), dtype=np.float64)
-    numbers[np.isinf(numbers)] = np.nan
-    return numbers
+    """Return a column as float64 with NaN, or as categories, for missing values."""
+    if not known.text:
+        if given is None or np.ndim(given) == 0:
+            return np.broadcast_to(np.float64(np.nan if given is None else given), count)
+        numbers = np.asarray(given, dtype=np.float64)
+        infinite = np.isinf(numbers)
+        return np.where(infinite, np.nan, numbers) if infinite.any() else numbers
+    if given is None or isinstance(given, str):
+        words, code = ([], -1) if given is None else ([given], 0)
+        return _categories(np.full(count, code, dtype=np.int8), words)
+    return _texts(given)
 
 
-def _spread(given: Any, count: int) -> Any:
-    return [given] * count if isinstance(given, str) or np.ndim(given) == 0 else given
+def _texts(given: Any) -> pd.Categorical:
+    """Return texts as categories; an empty text is a missing one."""
+    if isinstance(given, pd.Categorical):
+        return given
+    texts = pd.Series(given, dtype=object)
+    found = pd.Categorical(texts.where(texts != "", None))
+    return _categories(found.codes, found.categories.tolist())
+
+
+def _categories(codes: Any, words: list[str]) -> pd.Categorical:
+    return pd.Categorical.from_codes(codes, pd.Index(words, dtype=object))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +14,7 @@ from mapfilter.errors import InputError, fail
 _LARGEST_BYTES = 1 << 31
 _LARGEST_UNPACKED_BYTES = 1 << 30
 _HEAD_BYTES = 1 << 16
+_PART_BYTES = 1 << 24
 _MOST_ZERO_SHARE = 0.05
 _MOST_STRANGE_SHARE = 0.1
 _ARCHIVES = {
@@ -41,11 +43,14 @@ class Text:
         UTF-8 without a byte order mark; lines end with a line feed.
     notes : tuple of str
         What was changed to make it so.
+    line : int
+        Number of the first line; for a part of a file, one less than that of its first row.
     """
 
     path: Path
     data: bytes = field(repr=False)
     notes: tuple[str, ...] = ()
+    line: int = 1
 
     @cached_property
     def head(self) -> tuple[str, ...]:
@@ -56,6 +61,26 @@ class Text:
     def first_line(self) -> str:
         """The first line that is not blank."""
         return next((line.strip() for line in self.head if line.strip()), "")
+
+
+def parts_of(text: Text) -> Iterator[Text]:
+    """Cut a large text into parts, each below the first line that is not blank."""
+    if len(text.data) <= _PART_BYTES:
+        yield text
+        return
+    begin = len(text.data) - len(text.data.lstrip(b"\n \t"))
+    end = text.data.find(b"\n", begin)
+    header, at = text.data[begin : end + 1], end + 1
+    line = 1 + text.data[:begin].count(b"\n")
+    while end >= 0 and at < len(text.data):
+        cut = text.data.find(b"\n", at + _PART_BYTES)
+        stop = cut + 1 if cut >= 0 else len(text.data)
+        part = text.data[at:stop]
+        yield Text(text.path, header + part, text.notes, line)
+        line += part.count(b"\n")
+        at = stop
+    if end < 0:
+        yield text
 
 
 def read_text(path: Path) -> Text:
