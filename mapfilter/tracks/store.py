@@ -311,7 +311,10 @@ def _no_log(path: Path, expected: str) -> MapfilterError:
         expected = f'{HEAD} with the CRS, such as {{"crs": "EPSG:32635"}}'
         return fail(InputError, str(path), expected, got, "left out when the log was made by hand")
     if path.is_file():
-        return fail(InputError, str(path), expected, "a file", "name the folder that it lies in")
+        hint = "name the folder that it lies in"
+        if path.stem not in TABLES and path.name != HEAD:
+            hint = f"convert it first: mapfilter convert {path.name} --out LOG"
+        return fail(InputError, str(path), expected, "a file", hint)
     got = "a folder without any" if path.is_dir() else "no such folder"
     return fail(InputError, str(path), expected, got)
 

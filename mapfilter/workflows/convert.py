@@ -15,6 +15,7 @@ from mapfilter.tracks.combine import CombineOptions, combine
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.readers.recording import Recording
+from mapfilter.tracks.readers.times import parse_zone
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import check_log_replaceable, write_log
 
@@ -102,6 +103,8 @@ def run_convert(
         nothing is written then.
     """
     options = options or ConvertOptions()
+    if options.zone:
+        parse_zone(options.zone)
     truth = [path for path in options.combine.truth if path not in files]
     every = [*dict.fromkeys(files), *dict.fromkeys(truth)]
     _check_out(out, every)

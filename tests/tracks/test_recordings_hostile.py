@@ -1,14 +1,12 @@
 """Damaged recordings: every reader reads what is whole, or refuses with a message; none crashes."""
 
-import resource
-import time
-
 import numpy as np
 import pytest
 from fuzz import fuzz
-from made_recordings import COUNT, LAT_DEG, LON_DEG, MADE, START_UTC_S
+from made_recordings import COUNT, MADE
 
 from mapfilter.errors import InputError, MapfilterError
+from mapfilter.tracks.readers import text as texts
 from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.readers.recording import Recording
 from mapfilter.tracks.readers.tables import RECORDED
@@ -159,42 +157,18 @@ def test_a_gpx_with_entities_is_not_expanded(read):
         read("gpx", data)
 
 
-MANY = 1_000_000
+BY_PARTS = ["towercollector", "opencellid", "opencellid-cells", "phyphox", "sensorlogger", "csv"]
 
 
-def _many(kind):
-    """Return a million rows of a CSV format."""
-    time_ms = START_UTC_S * 1000 + 20 * np.arange(MANY)
-    lat = np.resize(np.char.mod("%.6f", LAT_DEG), MANY)
-    lon = np.resize(np.char.mod("%.6f", LON_DEG), MANY)
-    if kind == "opencellid":
-        head = MADE[kind][1].splitlines()[0]
-        rows = (
-            f"244,91,3021,1170251,{a},{o},-87,{t},6.5,2.2,30.5,LTE+,1,,3021,269"
-            for t, a, o in zip(time_ms.tolist(), lat.tolist(), lon.tolist(), strict=True)
-        )
-    elif kind == "sensorlogger":
-        head = "time,seconds_elapsed,z,y,x"
-        rows = (f"{t}000000,{i}.0,9.81,0.1,0.2" for i, t in enumerate(time_ms.tolist()))
-    else:
-        head = "time,lat,lon,rsrp,mcc,mnc,lac,ci,technology"
-        rows = (
-            f"{t},{a},{o},-87,244,91,3021,1170251,LTE"
-            for t, a, o in zip(time_ms.tolist(), lat.tolist(), lon.tolist(), strict=True)
-        )
-    return "\n".join([head, *rows]).encode()
-
-
-@pytest.mark.skipif("not config.getoption('--mutations') >= 1000", reason="long; --mutations 1000")
-@pytest.mark.parametrize("kind", ["opencellid", "sensorlogger", "csv"])
-def test_a_million_rows_are_read_fast_and_in_little_memory(kind, tmp_path):
-    path = tmp_path / MADE[kind][0]
-    path.write_bytes(_many(kind))
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    began = time.perf_counter()
-    recording = read_recording(path)
-    took_s = time.perf_counter() - began
-    grown_mb = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
-    assert recording.rows == MANY
-    assert took_s < 15.0
-    assert grown_mb < 1000.0
+@pytest.mark.parametrize("name", BY_PARTS)
+def test_a_large_file_is_read_part_by_part(name, read, monkeypatch):
+    lines = MADE[name][1].splitlines()
+    lines[20] = "bad"
+    data = "\n".join(["", *lines]).encode()
+    whole = read(name, data)
+    monkeypatch.setattr(texts, "_PART_BYTES", 300)
+    parts = read(name, data)
+    assert parts.unusable == whole.unusable
+    assert parts.rows == whole.rows
+    for table, rows in whole.tables.items():
+        assert parts.tables[table].equals(rows), table

@@ -219,7 +219,7 @@ def _accuracy(rows: Columns, dates: pd.DataFrame, first: pd.DataFrame) -> Floats
         return np.full(len(first), np.nan)
     radius = _RADIUS_68 * np.sqrt((rows.number("lat_sd") ** 2 + rows.number("lon_sd") ** 2) / 2)
     known = pd.Series(radius, index=_utc(rows, dates)).groupby(level=0).first()
-    return known.reindex(first["time_s"]).to_numpy(dtype=np.float64)
+    return np.asarray(known.reindex(first["time_s"]), dtype=np.float64)
 
 
 FORMAT = Format(
