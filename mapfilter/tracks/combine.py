@@ -9,18 +9,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import (
-    grid_convergence_rad,
     heading_from_azimuth_rad,
-    project,
-    projected_crs,
-    utm_crs,
     wrap_rad,
 )
-from mapfilter.gnss.broadcast import place_by_broadcast
 from mapfilter.tracks.alignment import Alignment, align
+from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.moved import (
     motion_from_course,
@@ -28,13 +23,14 @@ from mapfilter.tracks.moved import (
     motion_from_poses,
     places_of_poses,
 )
+from mapfilter.tracks.raw_satellites import log_pseudoranges
 from mapfilter.tracks.readers.recording import Recording
 from mapfilter.tracks.sensors import SENSOR_COLUMNS
 
-_LOCAL = "+proj=tmerc +lat_0={lat} +lon_0={lon} +k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=m +type=crs"
 _RADIUS_68 = 1.515
 """Radius of 68 % of a two-dimensional normal distribution, in standard deviations."""
 
+_NO_JOURNEY = {"cells", "ephemerides", "ionosphere"}
 _PROVIDERS = ("gps", "fused", "flp", "network", "nlp")
 _CELL_COLUMNS = ("technology", "mcc", "mnc", "lac", "ci")
 
@@ -83,19 +79,19 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         Clocks cannot be aligned, frames do not fit together, or the tables make no sense.
     """
     options = options or CombineOptions()
-    if not any(set(r.tables) - {"cells", "ephemerides"} for r in recordings):
+    if not any(set(r.tables) - _NO_JOURNEY for r in recordings):
         names = ", ".join(r.path.name for r in recordings)
         expected = "a recording of a journey"
         got = "only lists of cells or orbits"
         raise fail(InputError, names, expected, got, "give a list as [cells] path")
     timed = [r for r in recordings if any("time_s" in rows for rows in r.tables.values())]
-    alignment = align([r for r in timed if set(r.tables) - {"ephemerides"}], options.offsets_s)
-    journey = [r for r in timed if set(r.tables) - {"ephemerides"}]
+    alignment = align([r for r in timed if set(r.tables) - _NO_JOURNEY], options.offsets_s)
+    journey = [r for r in timed if set(r.tables) - _NO_JOURNEY]
     shifted = [
         _shifted(recording, offset)
         for recording, offset in zip(journey, alignment.offsets_s, strict=True)
     ]
-    frame = _Frame(shifted, options)
+    frame = Frame(shifted, options.crs, options.origin_deg)
     notes = [*alignment.notes, *frame.notes]
     for recording in recordings:
         if "cells" in recording.tables:
@@ -152,72 +148,6 @@ def _with_tables(recording: Recording, tables: Mapping[str, pd.DataFrame]) -> Re
     )  # fmt: skip
 
 
-class _Frame:
-    """The CRS of the log, and how positions of recordings come into it."""
-
-    def __init__(self, recordings: Sequence[Recording], options: CombineOptions) -> None:
-        self.notes: list[str] = []
-        self.local = ""
-        places = [
-            r.tables[name][["lat_deg", "lon_deg"]]
-            for r in recordings
-            for name in ("positions", "truth")
-            if name in r.tables
-        ]
-        own = [r for r in recordings if not r.crs and {"places", "true_places"} & set(r.tables)]
-        stated = [r.crs for r in recordings if r.crs]
-        self.lat_deg, self.lon_deg = float("nan"), float("nan")
-        if places:
-            middle = pd.concat(places).median()
-            self.lat_deg, self.lon_deg = float(middle["lat_deg"]), float(middle["lon_deg"])
-        elif options.origin_deg is not None:
-            self.lat_deg, self.lon_deg = options.origin_deg
-        if options.origin_deg is not None:
-            self.local = _LOCAL.format(lat=options.origin_deg[0], lon=options.origin_deg[1])
-        if options.crs:
-            self.crs = projected_crs(options.crs, "--crs")
-        elif own and (options.origin_deg is not None or not places):
-            lat, lon = options.origin_deg or (0.0, 0.0)
-            self.crs = projected_crs(_LOCAL.format(lat=lat, lon=lon))
-            if options.origin_deg is None:
-                self.notes.append(
-                    f"{own[0].path.name}: metres in a frame of its own, placed at latitude 0 and "
-                    "longitude 0; see --origin and --crs"
-                )
-        elif stated:
-            self.crs = projected_crs(stated[0])
-        elif places:
-            self.crs = utm_crs(self.lon_deg, self.lat_deg)
-        else:
-            self.crs = projected_crs(_LOCAL.format(lat=0, lon=0))
-            self.notes.append("no positions: the CRS of the log is a local frame")
-        if own and places and options.origin_deg is None and not options.crs:
-            names = ", ".join(r.path.name for r in own)
-            expected = "one frame of positions"
-            got = "degrees in one file, metres in a frame of its own in this one"
-            raise fail(InputError, names, expected, got, "give --origin LAT,LON of the frame")
-
-    @property
-    def convergence_rad(self) -> float:
-        """Clockwise angle from true north to grid north; 0 where the place is unknown."""
-        if not np.isfinite(self.lat_deg):
-            return 0.0
-        return grid_convergence_rad(self.crs, self.lon_deg, self.lat_deg)
-
-    def east_north(self, rows: pd.DataFrame, crs: str) -> tuple[Floats, Floats]:
-        """Return positions of a table in the log's CRS; ``crs`` is that of its metres."""
-        if "lat_deg" in rows:
-            return project(self.crs, rows["lon_deg"], rows["lat_deg"])
-        east, north = rows["east_m"].to_numpy(), rows["north_m"].to_numpy()
-        source = crs or self.local
-        if not source or source == self.crs:
-            return east, north
-        from pyproj import Transformer
-
-        moved = Transformer.from_crs(source, self.crs, always_xy=True).transform(east, north)
-        return np.asarray(moved[0], dtype=np.float64), np.asarray(moved[1], dtype=np.float64)
-
-
 def _joined(recordings: Sequence[Recording], table: str) -> pd.DataFrame | None:
     parts = [r.tables[table] for r in recordings if table in r.tables]
     if not parts:
@@ -249,7 +179,7 @@ def _positions(recording: Recording) -> tuple[pd.DataFrame | None, str]:
 
 
 def _fixes(
-    recordings: Sequence[Recording], frame: _Frame, options: CombineOptions, notes: list[str]
+    recordings: Sequence[Recording], frame: Frame, options: CombineOptions, notes: list[str]
 ) -> pd.DataFrame | None:
     parts = []
     for recording in recordings:
@@ -270,7 +200,7 @@ def _fixes(
 
 
 def _truth(
-    recordings: Sequence[Recording], frame: _Frame, options: CombineOptions
+    recordings: Sequence[Recording], frame: Frame, options: CombineOptions
 ) -> pd.DataFrame | None:
     parts = []
     for recording in recordings:
@@ -290,7 +220,7 @@ def _truth(
 
 
 def _motion(
-    recordings: Sequence[Recording], frame: _Frame, options: CombineOptions, notes: list[str]
+    recordings: Sequence[Recording], frame: Frame, options: CombineOptions, notes: list[str]
 ) -> pd.DataFrame | None:
     """Return motion of the recording that tells it most directly; others stay sensors."""
     makers: tuple[tuple[str, Callable[[pd.DataFrame], pd.DataFrame]], ...] = (
@@ -325,24 +255,12 @@ def _satellites(
     rows = _joined(shifted, "satellites")
     if rows is None:
         return None
-    rank = rows["signal"].fillna("").str.contains("1").map({True: 0, False: 1})
-    order = rows.assign(rank=rank).sort_values(["time_s", "rank"], kind="stable")
-    first = order.drop_duplicates(["time_s", "satellite"]).drop(columns="rank")
-    if len(first) < len(rows):
-        notes.append(f"pseudoranges: {len(rows) - len(first)} of second signals left out")
-    rows = first.reset_index(drop=True)
-    orbits = [r.tables["ephemerides"] for r in recordings if "ephemerides" in r.tables]
-    places = rows[["x_m", "y_m", "z_m"]]
-    if orbits and places.isna().any(axis=None):
-        every = pd.concat(orbits, ignore_index=True)
-        rows, more = place_by_broadcast(rows, every)
-        notes.extend(more)
-    names = ("time_s", "satellite", "pseudorange_m", "sigma_m", "x_m", "y_m", "z_m")
-    return rows[list(names)]
+    lists = [r for r in recordings if not set(r.tables) - _NO_JOURNEY]
+    return log_pseudoranges([*shifted, *lists], rows, notes)
 
 
 def _sensors(
-    recordings: Sequence[Recording], frame: _Frame, truth: Collection[Path]
+    recordings: Sequence[Recording], frame: Frame, truth: Collection[Path]
 ) -> dict[str, pd.DataFrame]:
     found: dict[str, pd.DataFrame] = {}
     measured = [r for r in recordings if r.path not in truth]
@@ -353,7 +271,7 @@ def _sensors(
     return found
 
 
-def _velocity(recordings: Sequence[Recording], frame: _Frame) -> pd.DataFrame | None:
+def _velocity(recordings: Sequence[Recording], frame: Frame) -> pd.DataFrame | None:
     parts = []
     for recording in recordings:
         rows, _ = _positions(recording)

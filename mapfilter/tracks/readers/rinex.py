@@ -235,6 +235,7 @@ def _read_navigation(text: Text, reading: Reading, options: ReadOptions) -> None
     lines = _Lines(text.data)
     header = _header(lines, reading)
     reading.clock = Clock("gps")
+    _add_ionosphere(header, reading)
     version = _number(header.get("RINEX VERSION / TYPE", [""])[0][:9])
     first = 4 if version >= 3 else 3
     blocks: list[tuple[int, list[str]]] = []
@@ -265,6 +266,20 @@ def _read_navigation(text: Text, reading: Reading, options: ReadOptions) -> None
     if rows:
         columns: dict[str, Any] = {name: [row[name] for row in rows] for name in rows[0]}
         reading.add("ephemerides", columns, numbers)
+
+
+def _add_ionosphere(header: dict[str, list[str]], reading: Reading) -> None:
+    """Add the coefficients of the ionosphere that a header has."""
+    found: dict[str, list[float]] = {}
+    for name, label, key in (("alpha", "ION ALPHA", "GPSA"), ("beta", "ION BETA", "GPSB")):
+        lines = [line[2:50] for line in header.get(label, [])]
+        lines += [line[5:53] for line in header.get("IONOSPHERIC CORR", []) if line[:4] == key]
+        if lines:
+            found[name] = [_number(lines[0][12 * i : 12 * i + 12]) for i in range(4)]
+    if len(found) == 2:
+        columns = {f"{name}{i}": [values[i]] for name, values in found.items() for i in range(4)}
+        if np.isfinite(list(columns.values())).all():
+            reading.add("ionosphere", columns, [1])
 
 
 def _message(name: str, block: Sequence[str], first: int) -> dict[str, Any] | None:

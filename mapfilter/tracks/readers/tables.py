@@ -182,6 +182,9 @@ RECORDED: dict[str, tuple[Field, ...]] = {
         ),
         Field("health"),
     ),
+    "ionosphere": tuple(
+        Field(f"{name}{i}", required=True) for name in ("alpha", "beta") for i in range(4)
+    ),
     "cells": (
         _text("technology"),
         Field("mcc", 0, 999, "0..999", required=True),
@@ -194,7 +197,7 @@ RECORDED: dict[str, tuple[Field, ...]] = {
         Field("samples", 0, 1e12, ">= 0"),
     ),
 }
-"""The columns of each table of a recording; ``cells`` alone have no times."""
+"""The columns of each table of a recording; ``cells`` and ``ionosphere`` have no times."""
 
 SENSORS = (
     *("accelerometer", "linear_acceleration", "gravity", "gyroscope", "magnetometer"),
