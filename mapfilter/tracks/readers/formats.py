@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from mapfilter.errors import ConfigError, InputError, MapfilterError, fail
 from mapfilter.tracks.readers import (
     antennas,
@@ -93,8 +95,10 @@ def read_recording(
     reading = Reading(path, notes=list(text.notes))
     options = options or ReadOptions()
     try:
-        for part in parts_of(text) if known.by_rows else (text,):
-            known.read(part, reading, options)
+        # Numbers of any size occur in damaged files; what comes of them is checked in the end.
+        with np.errstate(all="ignore"):
+            for part in parts_of(text) if known.by_rows else (text,):
+                known.read(part, reading, options)
         return reading.done(known.name)
     except InputError as error:
         if found is None or found is known:
