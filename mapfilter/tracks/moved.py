@@ -114,12 +114,15 @@ def rotation_matrices(quaternions: Floats) -> Floats:
 def motion_from_course(rows: pd.DataFrame, convergence_rad: float) -> pd.DataFrame:
     """Integrate the speed of a receiver, in the direction of its course.
 
-    Intervals of more than 5 s have no step; without a course the heading is unknown.
+    Intervals of more than 5 s and of three usual ones have no step; without a course the heading
+    is unknown.
     """
     rows = rows.drop_duplicates("time_s")
     time = rows["time_s"].to_numpy(dtype=np.float64)
     step = _integrated(time, rows["speed_mps"].to_numpy(dtype=np.float64))
-    step[1:][np.diff(time) > _LONGEST_S] = np.nan
+    between = np.diff(time)
+    longest_s = max(_LONGEST_S, 3 * float(np.median(between))) if between.size else _LONGEST_S
+    step[1:][between > longest_s] = np.nan
     heading = heading_from_azimuth_rad(rows["course_deg"].to_numpy(), convergence_rad)
     return pd.DataFrame(
         {"time_s": time, "step_m": step, "heading_rad": heading, "turn_rad": np.nan}

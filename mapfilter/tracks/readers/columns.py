@@ -1,30 +1,23 @@
-"""Columns of separated values, read fast; a bad line is counted, located, and loses nothing else.
-
-Quotes are taken away line by line, so one that is never closed ends with its line.
-"""
+"""Columns of separated values, read fast; a bad line loses nothing but itself."""
 
 from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-from pyarrow import csv as arrow_csv
 
 from mapfilter._types import Bools, Floats, Ints
+from mapfilter.tracks.readers.lines import LONGEST_LINE, blocks, good_lines, parsed
 from mapfilter.tracks.readers.recording import Reading
 from mapfilter.tracks.readers.times import parse_times, unix_seconds
 
 SEPARATORS = ",;\t|"
-_BLOCK_BYTES = 1 << 21
-_LONGEST_LINE = 1 << 16
-_LINE_FEED = 10
 _LEAST_UNIX_S = 1e8
 _NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
 _WHOLE = r"^[-+]?\d{1,18}(\.0*)?$"
@@ -187,7 +180,7 @@ def likely_separator(header: str) -> str:
 
 def header_names(header: str, separator: str) -> tuple[str, ...]:
     """Return the names in a header line, in lower case."""
-    fields = next(csv.reader([header[:_LONGEST_LINE]], delimiter=separator), [])
+    fields = next(csv.reader([header[:LONGEST_LINE]], delimiter=separator), [])
     return tuple(name.strip().lower() for name in fields)
 
 
@@ -221,10 +214,10 @@ def value_columns(
     named = tuple(names)
     lines: list[Ints] = []
     tables: list[pa.Table] = []
-    for block, line in _blocks(data, first_line):
-        good, rows = _good_lines(block, line, len(named), separator, reading, ragged or len(named))
+    for block, line in blocks(data, first_line):
+        good, rows = good_lines(block, line, len(named), separator, reading, ragged or len(named))
         if rows.size:
-            tables.append(_parsed(good, len(named), separator))
+            tables.append(parsed(good, len(named), separator))
             lines.append(rows)
     found = Columns(reading, named, np.concatenate(lines) if lines else np.zeros(0, dtype=np.int64))
     found.decimal_comma = separator != ","
@@ -232,109 +225,6 @@ def value_columns(
         table = pa.concat_tables(tables)
         found._columns.update(enumerate(table.columns))
     return found
-
-
-def _blocks(data: memoryview, first_line: int) -> Iterator[tuple[bytes, int]]:
-    """Cut a text into blocks of whole lines; yield each with the number of its first line."""
-    start = 0
-    while start < len(data):
-        end = min(start + _BLOCK_BYTES, len(data))
-        while end < len(data):
-            piece = bytes(data[end : end + _BLOCK_BYTES])
-            cut = piece.find(b"\n")
-            end += cut + 1 if cut >= 0 else len(piece)
-            if cut >= 0:
-                break
-        block = bytes(data[start:end])
-        yield block, first_line
-        first_line += block.count(b"\n")
-        start = end
-
-
-def _good_lines(
-    block: bytes, first_line: int, count: int, separator: str, reading: Reading, least: int
-) -> tuple[bytes, Ints]:
-    """Return the lines that have all fields, and their numbers; refuse the others."""
-    code = np.frombuffer(block, dtype=np.uint8)
-    ends = np.flatnonzero(code == _LINE_FEED)
-    if not len(block) or block[-1] != _LINE_FEED:
-        ends = np.append(ends, len(block))
-    starts = np.concatenate([[0], ends[:-1] + 1]).astype(np.int64)
-    # A sum over separators up to each line's end is cheaper than one for each line.
-    places = np.flatnonzero(code == ord(separator))
-    fields = np.searchsorted(places, ends) - np.searchsorted(places, starts) + 1
-    length = ends - starts
-    right = (fields == count) & (length <= _LONGEST_LINE) & (length > 0)
-    if right.all():
-        reading.rows += len(starts)
-        return block.replace(b'"', b""), first_line + np.arange(len(starts))
-    good: list[bytes] = []
-    rows: list[int] = []
-    for (first, last), number in _runs(right):
-        if number:
-            good.append(block[starts[first] : ends[last - 1]].replace(b'"', b""))
-            rows.extend(range(first_line + first, first_line + last))
-            continue
-        for at in range(first, last):
-            text = block[starts[at] : ends[at]]
-            mended = _mended(text, count, separator, least, first_line + at, reading)
-            if mended is not None:
-                good.append(mended)
-                rows.append(first_line + at)
-    reading.rows += int(right.sum())
-    return b"\n".join(good), np.array(rows, dtype=np.int64)
-
-
-def _runs(right: Bools) -> Iterator[tuple[tuple[int, int], bool]]:
-    edges = np.concatenate([[0], np.flatnonzero(np.diff(right)) + 1, [len(right)]]).tolist()
-    for first, last in pairwise(edges):
-        yield (first, last), bool(right[first])
-
-
-def _mended(
-    text: bytes, count: int, separator: str, least: int, line: int, reading: Reading
-) -> bytes | None:
-    """Return a line with the right number of fields, or refuse it; None for blank lines, too."""
-    if not text.strip():
-        return None
-    reading.rows += 1
-    if len(text) > _LONGEST_LINE:
-        reading.refuse(line, f"longer than {_LONGEST_LINE} characters")
-        return None
-    words = text.decode("utf-8", "replace")
-    fields = words.split(separator)
-    if '"' in words:
-        try:
-            fields = next(csv.reader([words], delimiter=separator), [])
-        except csv.Error:
-            fields = []
-        fields = [value.replace(separator, " ").replace("\n", " ") for value in fields]
-    if len(fields) > count and not any(value.strip() for value in fields[count:]):
-        fields = fields[:count]
-    if least <= len(fields) < count:
-        fields += [""] * (count - len(fields))
-    if len(fields) == count:
-        return separator.join(fields).replace('"', "").encode()
-    few = len(fields) < count
-    hint = "cut off, or another separator" if few else "a separator within a field"
-    reading.refuse(line, f"{'fewer' if few else 'more'} fields than {count} (likely: {hint})")
-    return None
-
-
-def _parsed(block: bytes, count: int, separator: str) -> pa.Table:
-    names = [f"c{i}" for i in range(count)]
-    return arrow_csv.read_csv(
-        pa.BufferReader(block),
-        read_options=arrow_csv.ReadOptions(
-            column_names=names, block_size=len(block) + 2, use_threads=False
-        ),
-        parse_options=arrow_csv.ParseOptions(
-            delimiter=separator, quote_char=False, ignore_empty_lines=count > 1
-        ),
-        convert_options=arrow_csv.ConvertOptions(
-            column_types=dict.fromkeys(names, pa.string()), strings_can_be_null=False
-        ),
-    )
 
 
 def split_blanks(data: bytes) -> bytes:

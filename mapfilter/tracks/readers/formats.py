@@ -20,6 +20,7 @@ from mapfilter.tracks.readers import (
     plain_csv,
     poses,
     rinex,
+    rinex_navigation,
     smartloc,
 )
 from mapfilter.tracks.readers.columns import header_names, likely_separator
@@ -35,8 +36,8 @@ FORMATS: tuple[Format, ...] = (
     gpx.FORMAT,
     nmea.FORMAT,
     gnsslogger.FORMAT,
-    rinex.OBSERVATION,
-    rinex.NAVIGATION,
+    rinex.FORMAT,
+    rinex_navigation.FORMAT,
     smartloc.FORMAT,
     smartloc.RAW,
     indoor.FORMAT,

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import InputError, MapfilterError, fail
+from mapfilter.tracks.readers.recorded_values import checked_values, joined_parts
 from mapfilter.tracks.readers.tables import RECORDED, Field
 
 ClockKind = Literal["utc", "gps", "local", "monotonic"]
@@ -150,7 +151,9 @@ class Reading:
             The line of each row.
         """
         line = np.asarray(lines, dtype=np.int64)
-        checked = {f.name: _values(f, columns.get(f.name), len(line)) for f in RECORDED[table]}
+        checked = {
+            f.name: checked_values(f, columns.get(f.name), len(line)) for f in RECORDED[table]
+        }
         good = np.ones(len(line), dtype=bool)
         for known in RECORDED[table]:
             good &= self._check(table, known, checked, line, good)
@@ -229,7 +232,7 @@ class Reading:
         if not self.tables:
             raise nothing_usable(self.path, name, self.rows, refused, rows_word)
         kept = {
-            table: self._tidy(table, _joined(self.tables.pop(table)))
+            table: self._tidy(table, joined_parts(self.tables.pop(table)))
             for table in RECORDED
             if table in self.tables
         }
@@ -270,41 +273,3 @@ def nothing_usable(
     reasons = "; ".join(str(found) for found in list(refused)[:3])
     got = f"none in {rows} rows" + (f": {reasons}" if reasons else "")
     return fail(InputError, str(path), f"a usable {rows_word} of {name}", got)
-
-
-def _joined(parts: list[pd.DataFrame]) -> pd.DataFrame:
-    """Return parts of a table in one; texts stay categories."""
-    if len(parts) == 1:
-        return parts[0]
-    first = parts[0]
-    texts = [name for name in first.columns if isinstance(first[name].dtype, pd.CategoricalDtype)]
-    words = dict.fromkeys(texts, object)
-    rows = pd.concat([part.astype(words) for part in parts], ignore_index=True)
-    return rows.assign(**{name: _texts(rows[name]) for name in texts})
-
-
-def _values(known: Field, given: Any, count: int) -> Any:
-    """Return a column as float64 with NaN, or as categories, for missing values."""
-    if not known.text:
-        if given is None or np.ndim(given) == 0:
-            return np.broadcast_to(np.float64(np.nan if given is None else given), count)
-        numbers = np.asarray(given, dtype=np.float64)
-        infinite = np.isinf(numbers)
-        return np.where(infinite, np.nan, numbers) if infinite.any() else numbers
-    if given is None or isinstance(given, str):
-        words, code = ([], -1) if given is None else ([given], 0)
-        return _categories(np.full(count, code, dtype=np.int8), words)
-    return _texts(given)
-
-
-def _texts(given: Any) -> pd.Categorical:
-    """Return texts as categories; an empty text is a missing one."""
-    if isinstance(given, pd.Categorical):
-        return given
-    texts = pd.Series(given, dtype=object)
-    found = pd.Categorical(texts.where(texts != "", None))
-    return _categories(found.codes, found.categories.tolist())
-
-
-def _categories(codes: Any, words: list[str]) -> pd.Categorical:
-    return pd.Categorical.from_codes(codes, pd.Index(words, dtype=object))

@@ -1,4 +1,4 @@
-"""RINEX 2 and 3: observations of code ranges, and broadcast ephemerides.
+"""RINEX 2 and 3: observations of code ranges.
 
 Lines of fixed columns are read one by one, so that a damaged one loses only itself.
 """
@@ -27,21 +27,10 @@ _CODES = {
     "C": ("C2I", "C1I", "C1P", "C1X", "C2X"),
     "I": ("C5A", "C5C"),
 }
-_ELEMENTS = (
-    *("iode", "crs", "delta_n", "m0"),
-    *("cuc", "eccentricity", "cus", "sqrt_a"),
-    *("toe", "cic", "omega0", "cis"),
-    *("i0", "crc", "omega", "omega_dot"),
-    *("idot", "codes", "week", "flag"),
-    *("accuracy", "health", "tgd", "iodc"),
-)
-_KEPT = (
-    *("crs", "delta_n", "m0", "cuc", "eccentricity", "cus", "sqrt_a", "cic", "omega0", "cis"),
-    *("i0", "crc", "omega", "omega_dot", "idot", "health", "tgd"),
-)
 
 
-def _kind(text: Text) -> str:
+def rinex_kind(text: Text) -> str:
+    """Return the letter of a RINEX file's kind, "" for another file."""
     for line in text.head[:5]:
         if "RINEX VERSION / TYPE" in line[55:90]:
             return line[20:21].upper()
@@ -49,21 +38,18 @@ def _kind(text: Text) -> str:
 
 
 def _is_observation(text: Text) -> bool:
-    return _kind(text) == "O"
+    return rinex_kind(text) == "O"
 
 
-def _is_navigation(text: Text) -> bool:
-    return _kind(text) in ("N", "E", "G")
-
-
-def _number(text: str) -> float:
+def fixed_number(text: str) -> float:
+    """Return a number, perhaps with Fortran's exponent; NaN for another text."""
     text = text.strip()
     return float(text.replace("D", "E").replace("d", "e")) if _NUMBER.fullmatch(text) else np.nan
 
 
-def _gps_seconds(words: Sequence[str]) -> float:
+def gps_seconds(words: Sequence[str]) -> float:
     """Return seconds since 6 January 1980 of year, month, day, hour, minute and second."""
-    values = [_number(word) for word in words]
+    values = [fixed_number(word) for word in words]
     if len(values) != 6 or not all(np.isfinite(values)):
         return float("nan")
     year, month, day, hour, minute, second = values
@@ -78,7 +64,7 @@ def _gps_seconds(words: Sequence[str]) -> float:
     return (moment + timedelta(seconds=second)).timestamp() - GPS_EPOCH_UTC_S
 
 
-class _Lines:
+class Lines:
     """Lines of a file with their numbers, one step at a time."""
 
     def __init__(self, data: bytes) -> None:
@@ -96,7 +82,7 @@ class _Lines:
         return self.lines[self.at - 1] if self.at <= len(self.lines) else ""
 
 
-def _header(lines: _Lines, reading: Reading) -> dict[str, list[str]]:
+def read_header(lines: Lines, reading: Reading) -> dict[str, list[str]]:
     """Return the header's lines by their labels."""
     header: dict[str, list[str]] = {}
     for line in lines:
@@ -110,9 +96,9 @@ def _header(lines: _Lines, reading: Reading) -> dict[str, list[str]]:
 
 
 def _read_observation(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
-    lines = _Lines(text.data)
-    header = _header(lines, reading)
-    version = _number(header.get("RINEX VERSION / TYPE", [""])[0][:9])
+    lines = Lines(text.data)
+    header = read_header(lines, reading)
+    version = fixed_number(header.get("RINEX VERSION / TYPE", [""])[0][:9])
     system = header.get("TIME OF FIRST OBS", [""])[0][48:51].strip() or "GPS"
     reading.clock = Clock("utc" if system in ("GLO", "UTC") else "gps")
     rows: list[tuple[float, str, str, float, float, int]] = []
@@ -145,7 +131,7 @@ def _types3(header: dict[str, list[str]]) -> dict[str, list[str]]:
 
 
 def _epochs3(
-    lines: _Lines,
+    lines: Lines,
     header: dict[str, list[str]],
     reading: Reading,
     rows: list[tuple[float, str, str, float, float, int]],
@@ -157,7 +143,7 @@ def _epochs3(
             continue
         reading.rows += 1
         if line.startswith(">"):
-            second = _gps_seconds(line[1:29].split())
+            second = gps_seconds(line[1:29].split())
             # Flags from 2 on are events: header lines follow, no observations.
             good = bool(np.isfinite(second)) and line[31:32] in ("0", "1", " ", "")
             if not np.isfinite(second):
@@ -185,18 +171,18 @@ def _observe(
         if code not in types:
             continue
         at = 16 * types.index(code)
-        range_m = _number(values[at : at + 14])
+        range_m = fixed_number(values[at : at + 14])
         if np.isfinite(range_m) and range_m != 0:
             level = next((t for t in types if t[0] == "S" and t[1:] == code[1:]), None)
             place = 16 * types.index(level) if level else 0
-            cn0 = _number(values[place : place + 14]) if level else float("nan")
+            cn0 = fixed_number(values[place : place + 14]) if level else float("nan")
             rows.append((second, name, code, range_m, cn0, number))
             return
     reading.refuse(number, "no code range on L1 (E1, B1)")
 
 
 def _epochs2(
-    lines: _Lines,
+    lines: Lines,
     header: dict[str, list[str]],
     reading: Reading,
     rows: list[tuple[float, str, str, float, float, int]],
@@ -207,8 +193,8 @@ def _epochs2(
         if not line.strip():
             continue
         reading.rows += 1
-        second = _gps_seconds(line[:26].split())
-        count = _number(line[29:32])
+        second = gps_seconds(line[:26].split())
+        count = fixed_number(line[29:32])
         flag = line[28:29]
         if not (np.isfinite(second) and 0 < count <= 999):
             reading.refuse(lines.at, "epoch: no date, time and number of satellites")
@@ -231,96 +217,11 @@ def _epochs2(
             _observe(name, values, words, second, number, reading, rows)
 
 
-def _read_navigation(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
-    lines = _Lines(text.data)
-    header = _header(lines, reading)
-    reading.clock = Clock("gps")
-    _add_ionosphere(header, reading)
-    version = _number(header.get("RINEX VERSION / TYPE", [""])[0][:9])
-    first = 4 if version >= 3 else 3
-    blocks: list[tuple[int, list[str]]] = []
-    for line in lines:
-        if not line.strip():
-            continue
-        reading.rows += 1
-        # A message begins with a satellite where its other lines are blank.
-        if line[:first].strip():
-            blocks.append((lines.at, [line]))
-        elif blocks:
-            blocks[-1][1].append(line)
-    rows, numbers, other = [], [], 0
-    for number, block in blocks:
-        name = block[0][:3].strip() if version >= 3 else f"G{block[0][:2].strip():0>2}"
-        name = name.replace(" ", "0")
-        if re.fullmatch(r"[RSI]\d\d", name):
-            other += 1
-            continue
-        row = _message(name, block, first)
-        if row is None:
-            reading.refuse(number, "ephemeris: cut off, or no number where one should be")
-            continue
-        rows.append(row)
-        numbers.append(number)
-    if other:
-        reading.note(f"{other} messages of GLONASS, SBAS or NavIC are not used")
-    if rows:
-        columns: dict[str, Any] = {name: [row[name] for row in rows] for name in rows[0]}
-        reading.add("ephemerides", columns, numbers)
-
-
-def _add_ionosphere(header: dict[str, list[str]], reading: Reading) -> None:
-    """Add the coefficients of the ionosphere that a header has."""
-    found: dict[str, list[float]] = {}
-    for name, label, key in (("alpha", "ION ALPHA", "GPSA"), ("beta", "ION BETA", "GPSB")):
-        lines = [line[2:50] for line in header.get(label, [])]
-        lines += [line[5:53] for line in header.get("IONOSPHERIC CORR", []) if line[:4] == key]
-        if lines:
-            found[name] = [_number(lines[0][12 * i : 12 * i + 12]) for i in range(4)]
-    if len(found) == 2:
-        columns = {f"{name}{i}": [values[i]] for name, values in found.items() for i in range(4)}
-        if np.isfinite(list(columns.values())).all():
-            reading.add("ionosphere", columns, [1])
-
-
-def _message(name: str, block: Sequence[str], first: int) -> dict[str, Any] | None:
-    """Return the elements of one satellite, None where they are not complete."""
-    if not re.fullmatch(r"[GEJC]\d\d", name) or len(block) < 7:
-        return None
-    toc = _gps_seconds(block[0][first - 1 : first + 19].split())
-    clock = [_number(block[0][first + 19 + 19 * i :][:19]) for i in range(3)]
-    values = [_number(line[first + 19 * i :][:19]) for line in block[1:7] for i in range(4)]
-    found = dict(zip(_ELEMENTS, values, strict=True))
-    week = found["week"]
-    if name[0] == "C":
-        # BeiDou's weeks count from 2006, its seconds are 14 behind.
-        week, found["toe"], toc = week + 1356, found["toe"] + 14.0, toc + 14.0
-    if not np.isfinite(week):
-        return None
-    # Weeks may be counted modulo 1024: the one nearest the clock's time is meant.
-    toe = week * 604_800.0 + found["toe"]
-    turns = np.round((toc - toe) / (1024 * 604_800.0)) if np.isfinite(toc + toe) else 0.0
-    toe += turns * 1024 * 604_800.0
-    if not abs(toe - toc) < 86_400.0:
-        return None
-    kept = {key: found[key] for key in _KEPT}
-    clocks = dict(zip(("af0", "af1", "af2"), clock, strict=True))
-    time_s = float(utc_from_gps_s(toc))
-    return {"time_s": time_s, "satellite": name, "toc_s": toc, "toe_s": toe, **clocks, **kept}
-
-
-OBSERVATION = Format(
+FORMAT = Format(
     "rinex-obs",
     "a RINEX observation file",
     "GNSS receivers, converters, GnssLogger (RINEX 2 and 3)",
     "code ranges on L1 (E1, B1), carrier-to-noise density",
     _is_observation,
     _read_observation,
-)
-NAVIGATION = Format(
-    "rinex-nav",
-    "a RINEX navigation file",
-    "GNSS receivers, IGS (RINEX 2 and 3)",
-    "broadcast ephemerides of GPS, Galileo, QZSS and BeiDou, to place satellites of the others",
-    _is_navigation,
-    _read_navigation,
 )
