@@ -162,7 +162,7 @@ def _found(recording: Recording) -> FoundFile:
 
 def _table(name: str, rows: pd.DataFrame) -> FoundTable:
     """Return the rate by the median interval, and the gaps of more than five of them."""
-    if "time_s" not in rows:
+    if "time_s" not in rows or name == "ephemerides":
         return FoundTable(name, len(rows), float("nan"), 0, float("nan"))
     between = np.diff(np.unique(rows["time_s"].to_numpy()))
     if not between.size:

@@ -77,7 +77,7 @@ def test_a_file_cut_off_anywhere_keeps_its_whole_rows(name, read):
             counts.append(0)
     assert max(counts) <= whole
     # Half a file keeps about half of its rows; there are two ephemerides only.
-    if name != "rinex-nav":
+    if not name.startswith("rinex-nav"):
         assert counts[len(counts) * 3 // 4] >= 0.4 * whole
 
 

@@ -17,7 +17,7 @@ FOUND = {
     "cell-belgium-lte/watch/*.gpx.gz": ("gpx", {"positions"}),
     "cell-ottawa-lte/*/*.csv": ("opencellid", {"positions", "radio"}),
     "gnss-android-vehicle/*a.gz": ("nmea", {"positions"}),
-    "gnss-android-vehicle/*n": ("rinex-nav", {"ephemerides"}),
+    "gnss-android-vehicle/*n": ("rinex-nav", {"ephemerides", "ionosphere"}),
     "gnss-android-vehicle/pseudoranges*.gz": ("gnsslogger", {"positions", "satellites"}),
     "gnss-android-vehicle/parser-samples/*logger.txt.gz": (
         "gnsslogger",
