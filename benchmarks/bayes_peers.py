@@ -24,7 +24,7 @@ from mapfilter._types import Floats, Ints
 from mapfilter.database.store import open_database
 from mapfilter.models.fingerprint import log_serving
 from mapfilter.models.street_motion import BIAS, EAST, LOG_SCALE, NORTH, OFF
-from mapfilter.positioning.bayes.options import BayesOptions, open_area
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.tracks.store import read_log
 from mapfilter.workflows.bench_filter import StepInputs, make_world, step_inputs, whole_step
 
@@ -264,7 +264,7 @@ def main() -> None:
     """Print a line for each number of particles and package."""
     with tempfile.TemporaryDirectory(prefix="mapfilter-bench-") as name:
         database, folders = make_world(Path(name), ["journeys.count=1"])
-        model = BayesOptions().over(open_area(open_database(database))).model
+        model = BayesFilter().over(open_database(database)).model
         for count in (10_000, 100_000):
             found = compare(*step_inputs(model, read_log(folders[0]), count))
             for package, ns in found.items():

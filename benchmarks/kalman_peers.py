@@ -19,7 +19,7 @@ from numba import njit
 from mapfilter._types import Floats
 from mapfilter.experiments.papers.fritsche_klein_2009.scene import Layout, Scene, draw, scene
 from mapfilter.filters.gaussian import EKF, RBUKF, Method
-from mapfilter.workflows.bench import estimates, median_rates
+from mapfilter.workflows.bench import estimates, median_seconds
 
 _TRIALS, _PEER_STEPS, _RUNS = 500, 100, 5
 
@@ -53,15 +53,14 @@ def compare(trials: int = _TRIALS, runs: int = _RUNS) -> tuple[dict[str, float],
         results["peer"] = _peer_ekf(given, readings, means[0], first)
 
     steps = trials * Layout().steps
-    rates = median_rates(
-        {
-            "ekf": (ours(EKF), steps),
-            "filterpy ekf": (ekf_peer, _PEER_STEPS),
-            "rbukf": (ours(RBUKF), steps),
-            "filterpy ukf": (lambda: _peer_ukf(given, readings, means[0], first), _PEER_STEPS),
-        },
-        runs,
-    )
+    tasks: dict[str, tuple[Callable[[], object], int]] = {
+        "ekf": (ours(EKF), steps),
+        "filterpy ekf": (ekf_peer, _PEER_STEPS),
+        "rbukf": (ours(RBUKF), steps),
+        "filterpy ukf": (lambda: _peer_ukf(given, readings, means[0], first), _PEER_STEPS),
+    }
+    took_s = median_seconds({name: task for name, (task, _) in tasks.items()}, runs)
+    rates = {name: count / took_s[name] for name, (_, count) in tasks.items()}
     deviation = np.sqrt(np.diagonal(given.assumed.noise)) + 1.0
     off = np.abs(results["ekf"][0, :_PEER_STEPS] - results["peer"]) / deviation
     return rates, float(off.max())

@@ -22,7 +22,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from mapfilter.errors import MapfilterError, OutputError, StoreError, fail
+from mapfilter.errors import (
+    Faults,
+    InputError,
+    MapfilterError,
+    OutputError,
+    StoreError,
+    fail,
+)
 
 _ASIDE = "old"
 _AT_FDCWD = -100
@@ -33,6 +40,20 @@ _WRITE_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO
 
 VERSION = version("mapfilter")
 """Of the program, for the record in what it writes."""
+
+
+def read_input(path: Path, largest_bytes: int, what: str) -> bytes:
+    """Return the bytes of an input file; raise InputError for one that is missing or too large."""
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(largest_bytes + 1)
+    except OSError as error:
+        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
+    if len(data) > largest_bytes:
+        kib = largest_bytes >> 10
+        size = f"{kib >> 10} MiB" if kib >= 1024 else f"{kib} KiB"
+        raise fail(InputError, str(path), f"{what} of at most {size}", "a larger file")
+    return data
 
 
 def sha256_file(path: Path) -> str:
@@ -46,25 +67,17 @@ def atomic_file(path: Path) -> Iterator[Path]:
     """Give a temporary path beside ``path``; rename it into place when the block succeeds.
 
     The temporary path keeps the suffix of ``path``, because drivers choose formats by it. Where
-    ``path`` is a link, its target is replaced.
-
-    Raises
-    ------
-    OutputError
-        The folder cannot be made or written, or writing the file fails, as on a full disk.
+    ``path`` is a link, its target is replaced. Raises OutputError where a file or its folder cannot
+    be written, as on a full disk.
     """
-    target = _behind_link(path)
-    partial = _partial_folder(target)
+    target, partial = _partial_folder(path)
     temporary = partial / path.name
     try:
         with _writing(temporary, path):
             yield temporary
             _sync(temporary)
-        try:
+        with _into_place(path, target):
             temporary.replace(target)
-            _sync(target.parent)
-        except OSError as error:
-            raise _not_writable(path, error) from error
     finally:
         shutil.rmtree(partial, ignore_errors=True)
 
@@ -73,17 +86,12 @@ def atomic_file(path: Path) -> Iterator[Path]:
 def atomic_dir(path: Path) -> Iterator[Path]:
     """Give a temporary folder beside ``path``; exchange it with ``path`` when the block succeeds.
 
-    Where ``path`` is a link, its target is replaced.
-
-    Raises
-    ------
-    OutputError
-        ``path`` is a file, or the folder cannot be made or written.
+    Where ``path`` is a link, its target is replaced. Raises OutputError where ``path`` is a file,
+    or the folder cannot be written.
     """
     if path.exists() and not path.is_dir():
         raise fail(OutputError, str(path), "a folder, or nothing yet", "a file")
-    target = _behind_link(path)
-    partial = _partial_folder(target)
+    target, partial = _partial_folder(path)
     new = partial / "new"
     new.mkdir()
     try:
@@ -92,14 +100,11 @@ def atomic_dir(path: Path) -> Iterator[Path]:
             for inner in sorted(new.rglob("*")):
                 _sync(inner)
             _sync(new)
-        try:
+        with _into_place(path, target):
             if target.exists():
                 _exchange(new, target)
             else:
                 new.rename(target)
-            _sync(target.parent)
-        except OSError as error:
-            raise _not_writable(path, error) from error
     finally:
         shutil.rmtree(partial, ignore_errors=True)
 
@@ -111,37 +116,35 @@ def left_aside(path: Path) -> Path | None:
 
 
 def check_replaceable(folder: Path, head: str, what: str) -> None:
-    """Raise OutputError where a folder holds other files than mapfilter wrote there.
+    """Raise OutputError where a folder, which may be absent, holds files of others.
 
-    Parameters
-    ----------
-    folder : Path
-        May be absent.
-    head : str
-        Name of the JSON file in it with ``format``, which must be ``what``, and ``parts``.
-    what : str
-        Format, as messages name it.
+    Those of mapfilter are listed as ``parts`` in the JSON file ``head``, with ``what`` as format.
     """
     inner = folder.rglob("*") if folder.is_dir() else ()
     found = {p.relative_to(folder).as_posix() for p in inner if p.is_symlink() or not p.is_dir()}
-    if foreign := sorted(found - _listed(folder / head, what)):
+    try:
+        value = read_json(folder / head)
+    except StoreError:
+        value = {}
+    if value.get("format") == what and isinstance(parts := value.get("parts"), list):
+        found -= {head, *(str(part.get("path")) for part in parts if isinstance(part, dict))}
+    if foreign := sorted(found):
         got = f"other files ({', '.join(foreign[:3])}{', …' if len(foreign) > 3 else ''})"
         hint = "a mistyped path; choose another, or move the files away"
         raise fail(OutputError, str(folder), f"a {what}, or nothing yet", got, hint)
 
 
-def _listed(head: Path, what: str) -> set[str]:
-    """Return the names of a head and of the parts that it lists; none when it is no such head."""
-    try:
-        value = read_json(head)
-    except StoreError:
-        return set()
-    if value.get("format") != what or not isinstance(value.get("parts"), list):
-        return set()
-    return {
-        head.name,
-        *(str(part.get("path")) for part in value["parts"] if isinstance(part, dict)),
-    }
+def check_part(file: Path, part: Mapping[str, Any], faults: Faults, *, full: bool = True) -> bool:
+    """Note where a file is missing or has another size (``full``: or SHA-256) than its entry."""
+    size, digest, before = part.get("bytes"), str(part.get("sha256")), len(faults.found)
+    if not file.is_file():
+        faults.add(str(file), f"a file of {size} bytes", "no such file", "not copied whole")
+    elif (found := file.stat().st_size) != size:
+        faults.add(str(file), f"{size} bytes", f"{found} bytes", "cut off or overwritten")
+    elif full and (of_file := sha256_file(file)) != digest:
+        expected, got = f"SHA-256 {digest[:12]}…", f"{of_file[:12]}…"
+        faults.add(str(file), expected, got, "changed after it was written")
+    return len(faults.found) == before
 
 
 def check_version(where: str, found: object, known: int) -> None:
@@ -183,10 +186,6 @@ def ensure_writable_folder(path: Path) -> None:
         raise _not_writable(path, error) from error
 
 
-def _behind_link(path: Path) -> Path:
-    return Path(os.path.realpath(path)) if path.is_symlink() else path
-
-
 @contextlib.contextmanager
 def _writing(temporary: Path, path: Path) -> Iterator[None]:
     """Turn errors in writing ``temporary`` into OutputErrors of ``path``, but not of reading."""
@@ -205,7 +204,18 @@ def _writing(temporary: Path, path: Path) -> Iterator[None]:
         raise _not_writable(path, error) from error
 
 
-def _partial_folder(path: Path) -> Path:
+@contextlib.contextmanager
+def _into_place(path: Path, target: Path) -> Iterator[None]:
+    try:
+        yield
+        _sync(target.parent)
+    except OSError as error:
+        raise _not_writable(path, error) from error
+
+
+def _partial_folder(path: Path) -> tuple[Path, Path]:
+    """Return the target of a path that may be a link, and a new hidden folder beside it."""
+    path = Path(os.path.realpath(path)) if path.is_symlink() else path
     ensure_writable_folder(path.parent)
     prefix = f".{path.name}.partial-"
     for stale in path.parent.glob(f"{glob.escape(prefix)}*"):
@@ -215,18 +225,18 @@ def _partial_folder(path: Path) -> Path:
                 (stale / _ASIDE).rename(path)
             shutil.rmtree(stale, ignore_errors=True)
     try:
-        return Path(tempfile.mkdtemp(prefix=f"{prefix}{os.getpid()}-", dir=path.parent))
+        folder = tempfile.mkdtemp(prefix=f"{prefix}{os.getpid()}-", dir=path.parent)
     except OSError as error:
         raise _not_writable(path, error) from error
+    return path, Path(folder)
 
 
 def _is_alive(pid: str) -> bool:
     try:
-        os.kill(int(pid), 0)
+        with contextlib.suppress(PermissionError):
+            os.kill(int(pid), 0)
     except (ValueError, OverflowError, ProcessLookupError):
         return False
-    except PermissionError:
-        return True
     return True
 
 

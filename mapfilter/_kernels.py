@@ -1,4 +1,4 @@
-"""What compiled kernels share: numbers drawn by counting, and elementary functions that vectorise.
+"""Shared by compiled kernels: counter-based random numbers, elementary functions that vectorise.
 
 A kernel is handed one 64-bit key; the numbers of its i-th element are a hash of key and i, so that
 the order of the work changes nothing. Functions are polynomials in single precision, good to about

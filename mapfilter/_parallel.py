@@ -69,13 +69,8 @@ def local_executor(workers: int) -> Iterator[Executor]:
 def cluster_executor(address: str) -> Iterator[tuple[Executor, int]]:
     """Give an executor of a Dask cluster, and its number of worker threads.
 
-    A worker that dies costs only time: its tasks are repeated by the others.
-
-    Parameters
-    ----------
-    address : str
-        Of a scheduler, such as "tcp://10.0.0.5:8786"; or "local:4" for four workers on this
-        machine.
+    A worker that dies costs only time: its tasks are repeated by the others. The address is that of
+    a scheduler, such as "tcp://10.0.0.5:8786"; or "local:4" for four workers on this machine.
 
     Raises
     ------
@@ -98,15 +93,11 @@ def cluster_executor(address: str) -> Iterator[tuple[Executor, int]]:
                 expected = f"local:N with N in 1..{_MOST_WORKERS}"
                 raise fail(MapfilterError, "cluster", expected, address)
             stack.enter_context(dask.config.set(_QUICK_WORKERS))
-            place = stack.enter_context(
-                LocalCluster(  # type: ignore[no-untyped-call]
-                    n_workers=int(count), threads_per_worker=1, dashboard_address=None
-                )
-            )
+            sizes = {"n_workers": int(count), "threads_per_worker": 1, "dashboard_address": None}
+            place = stack.enter_context(LocalCluster(**sizes))  # type: ignore[no-untyped-call]
         try:
-            client = stack.enter_context(
-                Client(place, timeout=_CONNECT_S)  # type: ignore[no-untyped-call]
-            )
+            client: Any = Client(place, timeout=_CONNECT_S)  # type: ignore[no-untyped-call]
+            stack.enter_context(client)
         except (OSError, ValueError) as error:
             expected = "a Dask scheduler such as tcp://10.0.0.5:8786, or local:N"
             hint = "the scheduler is not running, or another port"
@@ -140,12 +131,8 @@ def ordered_results(
     """Yield ``function(task)`` for every task, in order, with at most ``in_flight`` submitted.
 
     Tasks are taken as they are needed, so memory stays bounded however many there are; four times
-    the number of workers keeps all of them busy. Only for progress they are counted first.
-
-    Raises
-    ------
-    MapfilterError
-        A worker process died.
+    the number of workers keeps all of them busy. Only for progress they are counted first. Raises
+    MapfilterError where a worker process died.
     """
     if progress is not None and not isinstance(tasks, Sized):
         tasks = list(tasks)
@@ -172,17 +159,10 @@ def ordered_results(
 
 
 def _start_worker() -> None:
-    """Ignore Ctrl-C, on which the main process ends its workers."""
+    # The main process ends its workers on Ctrl-C.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _keep_freed_memory()
-
-
-def _keep_freed_memory() -> None:
-    """Make glibc keep freed memory, twice the size of a large freed block.
-
-    Otherwise a worker returns the arrays of each task to the system, and spends a third of its
-    time on new pages.
-    """
+    # After a large freed block glibc keeps twice its size. Otherwise a worker returns the arrays of
+    # each task to the system, and spends a third of its time on new pages.
     np.empty(_LARGE_BLOCK_BYTES, np.uint8)
 
 

@@ -40,14 +40,9 @@ def start_or_resume(
     parts : iterable of Path
         Files of finished parts, complete or not.
     resume : bool
-        Keep the parts, where the head lies there already.
+        Keep the parts, where the head lies there already; it is returned whether they are kept.
     names : mapping of str to str, optional
         The entries of ``head`` to compare, as messages name them; by default all, by their keys.
-
-    Returns
-    -------
-    bool
-        Whether an earlier run is resumed.
 
     Raises
     ------
@@ -82,16 +77,9 @@ class FinishedParts:
     As a context manager it removes the folder when the block succeeds, or fails by an input error
     or because nothing can be written; it stays when the block is interrupted or a worker dies.
 
-    Parameters
-    ----------
-    result : Path
-        The file or folder that is made from the parts.
-    digest : callable
-        Digest of everything that determines the parts, called once, when it is first needed.
-    keep : bool
-        Take over the parts that are there already; otherwise they are removed.
-    name : str
-        What a part is, for the names of folder and files.
+    ``digest`` gives that of everything that determines the parts, and is called once, when it is
+    first needed. With ``keep`` parts that are there already are taken over, else removed; their
+    folder and files are called after ``name``.
     """
 
     def __init__(

@@ -21,7 +21,13 @@ from mapfilter.evaluation.map_bound import MapBound, on_lattice
 from mapfilter.evaluation.map_bound import bound as bound_of
 from mapfilter.evaluation.radio_map import ErrorModel
 from mapfilter.evaluation.success import success_cells
-from mapfilter.experiments.sweep.plan import AS_PREDICTED, Radio, Reading, SweepPlan
+from mapfilter.experiments.sweep.plan import (
+    AS_PREDICTED,
+    NOISE_AXES,
+    Radio,
+    Reading,
+    SweepPlan,
+)
 from mapfilter.experiments.sweep.run import sweep_runs
 from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.positioning import filter as loop
@@ -40,15 +46,6 @@ from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
 from mapfilter.simulation.walking import WalkerModel
 from mapfilter.tracks.log import TrackLog
 
-_NOISE_COLUMNS = (
-    "period_s",
-    "sigma_trans_m",
-    "sigma_orient_deg",
-    "bias_sd_deg",
-    "drift_deg_per_sqrt_s",
-    "scale",
-)
-
 if TYPE_CHECKING:
     import geopandas as gpd
     from matplotlib.axes import Axes
@@ -56,14 +53,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Track:
-    """A log, located: positions, how sure they are, tables and pictures.
+    """A located log: positions with their uncertainty, as tables and pictures.
 
     Parameters
     ----------
     positioned : PositionedTrack
-        The filter's result: an estimate, snapshots of its hypotheses, and processor time.
-    log : TrackLog
-    database : RadioRouteDatabase
+        The filter's result: an estimate, snapshots of its hypotheses, and the processor time of
+        this process in seconds, without reading the database.
     """
 
     positioned: PositionedTrack
@@ -131,7 +127,6 @@ def locate(
     ----------
     log : TrackLog
         In the CRS of the database.
-    database : RadioRouteDatabase
     filter : options, str, Filter or class
         Options such as ``BayesFilter(level_error_db=8.0)``, the name of a filter, or a custom
         filter (see the page "Extending"). The Bayes map filter when left out.
@@ -188,7 +183,6 @@ def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
 
     Parameters
     ----------
-    track : Track or TrackEstimate
     truth : DataFrame or Truth
         Columns ``time_s``, ``east_m`` and ``north_m``, as the table ``truth`` of a log, in the CRS
         of the track.
@@ -231,9 +225,8 @@ def simulate(
     Parameters
     ----------
     rasters : RxLevRasters
-        The levels that the phone receives. Take others than those that a database is built of, or
-        the filter knows the ground truth.
-    cells : CellPlan
+        The levels that the phone receives. Other rasters than those of the database, or
+        the database has no errors.
     roads : path, or Ways
         OpenStreetMap file or vector layer, as for :func:`mapfilter.read_routes`.
     journeys : int
@@ -249,7 +242,9 @@ def simulate(
     walker : WalkerModel, optional
         Place on the street, and stops.
     profile : {"walking", "driving"}
+        Ways that routes may use, and speed.
     seed : int
+        Of routes and noise.
 
     Returns
     -------
@@ -288,18 +283,18 @@ class Sweep:
         return pd.DataFrame([asdict(cell) for cell in success_cells(self.runs)])
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw success over the deviation of headings, one curve for each filter.
+        """Draw success over the deviation of headings.
+
+        There is a curve for each filter, and for each other noise or option that differs.
 
         Parameters
         ----------
         ax : matplotlib Axes, optional
             Where to draw; a new figure when left out.
         """
-        from mapfilter.report.success import plot_success_curves
+        from mapfilter.report.success import plot_success_curves, success_curves
 
-        cells = success_cells(self.runs)
-        names = dict.fromkeys(cell.reading for cell in cells)
-        curves = [(name, [cell for cell in cells if cell.reading == name]) for name in names]
+        curves = success_curves(success_cells(self.runs))
         return plot_success_curves(curves, ax, title="Success over the noise of headings")
 
 
@@ -321,7 +316,6 @@ def sweep(
 
     Parameters
     ----------
-    database : RadioRouteDatabase
     rasters : RxLevRasters
         The levels that the phone receives, with the handovers and fading of ``reports``.
     roads : path, or Ways
@@ -333,8 +327,11 @@ def sweep(
     routes, draws : int
         Routes, and runs on each of them with every noise.
     length_m : float
+        Length of each route.
     reports : ReportModel, optional
+        As for :func:`simulate`.
     seed : int
+        Of routes and noise.
     executor : Executor, optional
         Does the runs, such as a ``ProcessPoolExecutor``; this process when left out.
     """
@@ -386,7 +383,8 @@ def _distinguished(
     other = [
         field.name
         for field in fields(ImuNoise)
-        if field.name not in _NOISE_COLUMNS and len({getattr(n, field.name) for n in noises}) > 1
+        if field.name not in ("period_s", *NOISE_AXES)
+        and len({getattr(n, field.name) for n in noises}) > 1
     ]
     for name in other:
         if not all(isinstance(getattr(noise, name), int | float) for noise in noises):
@@ -406,7 +404,6 @@ class Bound:
     ----------
     found : MapBound
         All figures.
-    database : RadioRouteDatabase
     """
 
     found: MapBound
@@ -430,7 +427,7 @@ class Bound:
             Where to draw; a new figure when left out.
         """
         from mapfilter.report.basemap import BaseMap
-        from mapfilter.report.bound import plot_point_values
+        from mapfilter.report.network import plot_point_values
 
         radio, database = self.found.radio, self.database
         base = BaseMap(radio.lattice.bounds_m, attribution=database.attribution)
@@ -452,7 +449,6 @@ def bound(
 
     Parameters
     ----------
-    database : RadioRouteDatabase
     errors : ErrorModel, optional
         Assumed errors of the predicted levels.
     options : FirstFixOptions, optional

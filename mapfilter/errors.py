@@ -17,7 +17,9 @@ mapfilter.errors.InputError: cells.csv row 3, lat: expected degrees in -90..90, 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from math import isfinite
 
 _MAX_SHOWN = 20
 _MAX_ALIKE = 3
@@ -93,10 +95,27 @@ class Faults:
         """Note one fault."""
         self.found.append(Fault(where, expected, str(got), hint))
 
+    def check_positive(self, where: str, unit: str, **values: float) -> None:
+        """Note each value that is no finite number > 0; its place is ``where`` and its name."""
+        for name, value in values.items():
+            if not (isfinite(value) and value > 0):
+                self.add(f"{where}{name}", f"{unit} > 0", value)
+
     def raise_if_any(self, kind: type[MapfilterError]) -> None:
         """Raise ``kind`` with every fault noted so far, or return when there is none."""
         if self.found:
             raise kind(tuple(self.found))
+
+
+def listed(names: Sequence[str], most: int = 8) -> str:
+    """Return names in one line, the first of many only.
+
+    Examples
+    --------
+    >>> listed(["a", "b", "c"], 2)
+    'a, b and 1 more'
+    """
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def fail(

@@ -143,6 +143,15 @@ def unproject(crs: str, east_m: ArrayLike, north_m: ArrayLike) -> tuple[Floats, 
     return np.asarray(lon, dtype=np.float64), np.asarray(lat, dtype=np.float64)
 
 
+def degree_fault(lat_deg: float, lon_deg: float) -> tuple[str, str, str] | None:
+    """Return (expected, found, likely mistake) where a position is beyond its range, else None."""
+    if abs(lat_deg) <= 90 and abs(lon_deg) <= 180:
+        return None
+    swapped = max(abs(lat_deg), abs(lon_deg)) <= 180
+    hint = "longitude and latitude swapped" if swapped else "metres given for degrees"
+    return "degrees in -90..90 and -180..180", f"{lat_deg:g}, {lon_deg:g}", hint
+
+
 def check_bbox(bbox: tuple[float, float, float, float], where: str = "bbox") -> None:
     """Check a box of west, south, east, north in degrees; raise InputError with its faults."""
     west, south, east, north = bbox

@@ -55,12 +55,13 @@ _LIMITS: dict[type, tuple[str, str, Callable[[Any, Any], Any]]] = {
 }
 _TYPES = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
 _TYPES |= {Path: "a path", NoneType: "nothing", tuple: "a list", dict: "a section"}
+_CONTAINERS = (Literal, tuple, dict)
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*) : .*$")
 
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """In an annotation: what it allows, where the type does not say enough.
+    """In an annotation: the allowed values in words, where the type is not enough.
 
     Parameters
     ----------
@@ -137,6 +138,8 @@ def _annotations(options: Any) -> dict[str, Any]:
 def describe_options(options: type[Options]) -> Iterator[OptionInfo]:
     """Yield what each field of an option dataclass means, in the order of definition.
 
+    Fields that no configuration file can hold, such as arrays, are left out.
+
     Examples
     --------
     >>> from mapfilter.simulation.walking import WalkerModel
@@ -151,6 +154,8 @@ def describe_options(options: type[Options]) -> Iterator[OptionInfo]:
             default = field.default_factory()
         annotation = annotations[field.name]
         bare = plain_types(annotation)
+        if not all(one in _TYPES or get_origin(one) in _CONTAINERS for one in bare):
+            continue
         yield OptionInfo(
             field.name,
             default,

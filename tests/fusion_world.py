@@ -9,12 +9,29 @@ from mapfilter.models.gaussian import stack
 from mapfilter.models.motion import constant_velocity
 from mapfilter.models.ranging import position_fix, pseudoranges, timing_advances
 from mapfilter.models.signal_strength import levels
-from mapfilter.models.state import MOVING, MOVING_CLOCK
+from mapfilter.models.state import MOVING, MOVING_CLOCK, StateLayout
 
+# East, north, up and the clock's bias, each followed by its rate.
+MOVING_3D, MOVING_CLOCK_3D = StateLayout(6, 0, 2, 4), StateLayout(8, 0, 2, 4, 6)
 CASES = json.loads((Path(__file__).parent / "fusion_cases.json").read_text(encoding="utf-8"))
 LAYOUT = CASES["fk_layout"]
 PHI = np.array(CASES["fk_process"]["Phi"])
 Q = np.array(CASES["fk_process"]["GQGt_filter"])
+
+
+def log_likelihood(model, state, reading):
+    """Log density of a reading in states; NaN components are absent."""
+    present = np.isfinite(reading)
+    off = (reading - model.mean(state))[..., present]
+    noise = 2 * np.pi * model.covariance()[np.ix_(present, present)]
+    square = np.einsum("...i,ij,...j->...", off, 2 * np.pi * np.linalg.inv(noise), off)
+    return -0.5 * (square + np.linalg.slogdet(noise)[1])
+
+
+def information(model, state):
+    """Fisher information of a reading in states."""
+    slope = model.jacobian(state)
+    return np.swapaxes(slope, -1, -2) @ np.linalg.solve(model.covariance(), slope)
 
 
 def hybrid(satellites):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import groupby
 from operator import attrgetter
@@ -185,11 +185,6 @@ def paragraphs(result: CheckResult) -> Iterable[str]:
         if more := found[_MOST_ALIKE:]:
             last = f", the last of them {more[-1].where}" if len(more) > 1 else f": {more[0].where}"
             yield f"{more[0].severity} {more[0].code}: {len(more)} more{last}."
-
-
-def listed(ids: Sequence[str], most: int = 8) -> str:
-    """Return ids in one line, the first of many only."""
-    return ", ".join(ids[:most]) + (f" and {len(ids) - most} more" if len(ids) > most else "")
 
 
 def _code(fault: Fault, otherwise: str) -> str:

@@ -1,4 +1,4 @@
-"""The lobe of a raster: how well boresights explain its levels, and what is wrong with azimuths.
+"""Main lobes of rasters, and the mistakes of azimuths that do not agree with them.
 
 A level is explained by ``a + b log10(distance) + c gain(direction - azimuth)``, fitted to the means
 of rings and directions about a place; the correlation of fit and levels is the measure.
@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from operator import itemgetter
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -29,7 +30,7 @@ _FRONT_TO_BACK_DB = 20.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lobe:
-    """How well each boresight explains a raster.
+    """Scores of all boresights for one raster.
 
     Parameters
     ----------
@@ -117,15 +118,6 @@ def _binned(
     return mean, far, full % _DIRECTIONS, weight
 
 
-Mistake = Literal[
-    "azimuth-radians",
-    "azimuth-counter-clockwise",
-    "azimuth-off-by-90",
-    "azimuth-off-by-180",
-    "sector-labels-swapped",
-    "azimuth-off-lobe",
-]
-
 _FAR_OFF_DEG = 45.0
 _WORSE = 0.4
 _CLEAR_SCORE = 0.25
@@ -133,7 +125,7 @@ _CLEAR_CONTRAST_DB = 6.0
 _BETTER = 0.3
 _STRAY_SHARE = 0.1
 
-_READINGS: tuple[tuple[Mistake, str, Callable[[float], float]], ...] = (
+_READINGS: tuple[tuple[str, str, Callable[[float], float]], ...] = (
     ("azimuth-counter-clockwise", "counter-clockwise from north", lambda a: -a),
     ("azimuth-counter-clockwise", "counter-clockwise from east", lambda a: 90 - a),
     ("azimuth-off-by-180", "to be 180° more", lambda a: a + 180),
@@ -141,15 +133,16 @@ _READINGS: tuple[tuple[Mistake, str, Callable[[float], float]], ...] = (
     ("azimuth-off-by-90", "to be 90° less", lambda a: a - 90),
     ("azimuth-radians", "radians", lambda a: float(np.degrees(a))),
 )
-"""What azimuths may have been meant to be: as degrees clockwise from north."""
+"""Likely conventions of wrong azimuths, each with its conversion to degrees from north."""
 
 
-@dataclass(frozen=True, slots=True)
-class AzimuthMistake:
+class AzimuthMistake(NamedTuple):
     """Azimuths that go against the lobes, and what explains it.
 
     Parameters
     ----------
+    mistake : str
+        Code of the finding.
     cells : tuple of str
         Whose azimuths or rasters are concerned.
     reading : str
@@ -160,7 +153,7 @@ class AzimuthMistake:
         The same after the mistake is mended.
     """
 
-    mistake: Mistake
+    mistake: str
     cells: tuple[str, ...]
     reading: str
     offset_deg: float
@@ -233,17 +226,16 @@ def _whole_plan(
         return float(np.mean([lobes[i].score(azimuths[i]) for i in ids]))
 
     as_given = mean_score(azimuth)
-    best: tuple[float, Mistake, str, dict[str, float]] | None = None
+    found: list[tuple[float, str, str, dict[str, float]]] = []
     for mistake, reading, read in _READINGS:
         meant = {i: read(azimuth[i]) % 360 for i in ids}
         score = mean_score(meant)
         stray = sum(_is_off(lobes[i], meant[i]) for i in ids)
-        better = score - as_given > _BETTER and stray <= _STRAY_SHARE * len(ids)
-        if better and (best is None or score > best[0]):
-            best = score, mistake, reading, meant
-    if best is None:
+        if score - as_given > _BETTER and stray <= _STRAY_SHARE * len(ids):
+            found.append((score, mistake, reading, meant))
+    if not found:
         return None
-    _, mistake, reading, meant = best
+    _, mistake, reading, meant = max(found, key=itemgetter(0))
     concerned = tuple(cell.id for cell in wrong)
     off_deg, read_deg = (_median_off(concerned, lobes, some) for some in (azimuth, meant))
     return AzimuthMistake(mistake, concerned, reading, off_deg, read_deg)

@@ -1,4 +1,4 @@
-"""Whether rasters hold what they should: levels or losses of the cells of the plan."""
+"""Checks of raster values: quantity, nodata, constants, copies, and the cells of the plan."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import rasterio
 from rasterio.errors import RasterioError
 
 from mapfilter._types import Floats, Floats32
-from mapfilter.check.findings import Findings, listed
-from mapfilter.errors import InputError
+from mapfilter.check.findings import Findings
+from mapfilter.errors import InputError, listed
 from mapfilter.geodesy import (
     Lattice,
     azimuth_from_heading_deg,
@@ -44,7 +44,7 @@ _LEAST_IN_RING = 50
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RasterSample:
-    """Some pixels of one cell's raster, in equal steps over the raster or about the site.
+    """Sample of one cell's raster, in equal steps over the raster or about the site.
 
     Parameters
     ----------
@@ -210,14 +210,6 @@ def _window(lattice: Lattice, cell: Cell | None) -> tuple[int, int, int, int]:
     return top, left, high, wide
 
 
-_MISREAD: dict[tuple[str, Kind], str] = {
-    ("level", "loss"): "loss-as-level",
-    ("level", "rxlev"): "rxlev-as-level",
-    ("loss", "level"): "level-as-loss",
-    ("loss", "rxlev"): "rxlev-as-loss",
-    ("level", "unclear"): "values-implausible",
-    ("loss", "unclear"): "values-implausible",
-}
 _FALLS = 0.3
 
 
@@ -299,8 +291,9 @@ def sampled(rasters: RxLevRasters, plan: CellPlan | None, findings: Findings) ->
                 evidence = f"The same numbers in all pixels of {len(same)} rasters."
                 findings.add("identical-rasters", f"{where}, cells {listed(same)}", evidence)
         falls = kind == "loss" and _falls_away(samples, plan)
-        code = "field-strength" if falls else _MISREAD.get((rasters.quantity, kind))
-        if code is not None:
+        if falls or kind not in (rasters.quantity, "empty"):
+            code = "field-strength" if falls else f"{kind}-as-{rasters.quantity}"
+            code = "values-implausible" if kind == "unclear" else code
             numbers = np.concatenate([sample.known for sample in samples])
             low, middle, high = np.percentile(numbers, [1, 50, 99])
             evidence = (

@@ -8,7 +8,7 @@ that is explained compares places over the same pixels.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -16,9 +16,10 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from mapfilter._types import Floats, Floats32
-from mapfilter.check.findings import Findings, listed
+from mapfilter.check.findings import Findings
 from mapfilter.check.lobes import Lobe, azimuth_mistakes, find_lobe
 from mapfilter.check.raster_checks import RasterSample, above_free_space_db, falls_with_distance
+from mapfilter.errors import listed
 from mapfilter.radio.cells import Cell, CellPlan
 
 _SIDE = 40
@@ -112,7 +113,7 @@ _FITS = 0.65
 
 
 class _Fit(NamedTuple):
-    """How well a raster is explained by its site, by those about the best place, and by that."""
+    """Fit of a raster to its site, to the sites near the best place, and to that place."""
 
     own: float
     by_site: Mapping[str, float]
@@ -179,47 +180,29 @@ def _fits(seen: Sequence[RasterSample], plan: CellPlan) -> dict[str, _Fit]:
 def _exchanged(fits: Mapping[str, _Fit], site_of: Mapping[str, str]) -> dict[str, str]:
     """Return the site that each exchanged raster belongs to."""
     sites = set(site_of.values())
-    moved = _both_ways(_reassigned(_drawn(fits, site_of, sites, _BETTER), fits, site_of), site_of)
+    moved: dict[str, str] = {}
     # Where two sites exchanged some labels, rasters that prove less by themselves came along.
-    along = _drawn(fits, site_of, set(moved.values()), _MILDLY_BETTER)
-    return _both_ways(_reassigned(along, fits, site_of), site_of)
-
-
-def _drawn(
-    fits: Mapping[str, _Fit], site_of: Mapping[str, str], sites: Set[str], least: float
-) -> list[str]:
-    """Return the rasters of sites that another of those sites explains better."""
-    return [
-        cell_id
-        for cell_id, fit in fits.items()
-        if site_of[cell_id] in sites and any(fit.gain(site) > least for site in sites)
-    ]
-
-
-def _reassigned(
-    ids: Sequence[str], fits: Mapping[str, _Fit], site_of: Mapping[str, str]
-) -> dict[str, str]:
-    """Return the sites that rasters go to when labels are exchanged among them for the best."""
-    if not ids:
-        return {}
-    gain = np.array([[fits[a].gain(site_of[b]) for b in ids] for a in ids])
-    rows, cols = linear_sum_assignment(-gain)
-    return {
-        ids[row]: site_of[ids[col]]
-        for row, col in zip(rows, cols, strict=True)
-        if site_of[ids[row]] != site_of[ids[col]] and gain[row, col] > _MILDLY_BETTER
-    }
-
-
-def _both_ways(moved: Mapping[str, str], site_of: Mapping[str, str]) -> dict[str, str]:
-    """Return the rasters that went to sites from which others came, and the other way round."""
-    kept = dict(moved)
-    while True:
-        left, reached = {site_of[cell_id] for cell_id in kept}, set(kept.values())
-        inner = {i: site for i, site in kept.items() if site in left and site_of[i] in reached}
-        if len(inner) == len(kept):
-            return inner
-        kept = inner
+    for least in (_BETTER, _MILDLY_BETTER):
+        ids = [
+            cell_id
+            for cell_id, fit in fits.items()
+            if site_of[cell_id] in sites and any(fit.gain(site) > least for site in sites)
+        ]
+        gain = np.array([[fits[a].gain(site_of[b]) for b in ids] for a in ids])
+        taken = linear_sum_assignment(-gain.reshape(len(ids), len(ids)))
+        pairs = [
+            (ids[row], site_of[ids[col]], gain[row, col]) for row, col in zip(*taken, strict=True)
+        ]
+        moved = {i: site for i, site, db in pairs if site != site_of[i] and db > _MILDLY_BETTER}
+        # Labels are exchanged where rasters went both ways between sites.
+        while True:
+            left, reached = {site_of[i] for i in moved}, set(moved.values())
+            kept = {i: site for i, site in moved.items() if site in left and site_of[i] in reached}
+            if len(kept) == len(moved):
+                break
+            moved = kept
+        sites = set(moved.values())
+    return moved
 
 
 def _off(
@@ -254,7 +237,7 @@ _TURNS: tuple[tuple[str, Callable[[Floats32], Floats32]], ...] = (
     ("a quarter turn", lambda v: v.T[::-1]),
     ("a quarter turn the other way", lambda v: v.T[:, ::-1]),
 )
-"""How exporters turn rasters, as what undoes it."""
+"""Turns that exporters may have made, each with what undoes it."""
 
 
 def check_against_sites(

@@ -13,6 +13,9 @@ from mapfilter.cli.options import (
     WRONG,
     ClusterOption,
     ConfigOption,
+    DatabaseArgument,
+    DryRunOption,
+    FilterOption,
     JsonOption,
     OutOption,
     PathArgument,
@@ -25,8 +28,7 @@ from mapfilter.cli.options import (
     seeded,
     toml,
 )
-from mapfilter.errors import ConfigError, fail
-from mapfilter.workflows.terminal import print_result, progress_bar, say
+from mapfilter.workflows.terminal import print_message, print_result, progress_bar
 
 
 def check(
@@ -70,9 +72,7 @@ def build(
     config: ConfigOption = None,
     settings: SetOption = None,
     out: OutOption = None,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Only estimate size, memory and time.")
-    ] = False,
+    dry_run: DryRunOption = False,
     workers: WorkersOption = 1,
     cluster: ClusterOption = None,
     resume: ResumeOption = False,
@@ -116,7 +116,7 @@ def merge(
 
 
 def export(
-    database: Annotated[Path, typer.Argument(metavar="DB", callback=given_path)],
+    database: DatabaseArgument,
     to: Annotated[
         Path,
         typer.Option("--to", metavar="FILE", help="A .gpkg or .tif file.", callback=given_path),
@@ -137,7 +137,7 @@ def info(path: PathArgument, as_json: JsonOption = False) -> None:
 
 
 def bound(
-    database: Annotated[Path, typer.Argument(metavar="DB", callback=given_path)],
+    database: DatabaseArgument,
     out: OutOption = None,
     spacing_m: Annotated[
         float, typer.Option("--spacing", metavar="M", help="Metres between the starts of journeys.")
@@ -209,15 +209,7 @@ def replay(
     log: Annotated[
         Path | None, typer.Option("--log", metavar="LOG", help="A log, or a folder of logs.")
     ] = None,
-    filter_name: Annotated[
-        str | None,
-        typer.Option(
-            "--filter",
-            metavar="NAME",
-            help="candidate, bayes, grid or a custom filter, package.module:Name; "
-            "without a map ekf, iekf, rbukf, ukf, ckf.",
-        ),
-    ] = None,
+    filter_name: FilterOption = None,
     without: Annotated[
         str | None,
         typer.Option(
@@ -251,17 +243,14 @@ def replay(
     if without is not None:
         given.append(f"track.without={toml([kind.strip() for kind in without.split(',')])}")
     if smooth:
-        given += ["filter.bayes.smooth=true", "filter.smooth=true"]
+        given.append("filter.smooth=true")
     loaded = load_config(config, given)
     check_custom_filter(loaded)
-    name = loaded.filter.name
-    if smooth and (name in ("candidate", "grid") or ":" in name):
-        raise fail(ConfigError, "--smooth", "bayes, ekf, iekf, rbukf, ukf, ckf", name)
     folder = (out or loaded.output.dir / "replay").absolute()
     with progress_bar("replay") as progress:
         result = run_replay(loaded, folder, progress=progress)
     print_result(replay_facts(result), as_json)
     for warning in result.warnings:
-        say(warning)
+        print_message(warning)
     if result.partial:
         raise typer.Exit(PARTIAL)

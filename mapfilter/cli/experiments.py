@@ -10,8 +10,11 @@ import typer
 
 from mapfilter.cli.options import (
     PARTIAL,
+    BoxOption,
     ClusterOption,
     ConfigOption,
+    DryRunOption,
+    FilterOption,
     JsonOption,
     OutOption,
     ResumeOption,
@@ -26,7 +29,7 @@ from mapfilter.cli.options import (
     toml,
 )
 from mapfilter.experiments.papers import PAPERS
-from mapfilter.workflows.terminal import print_result, rate_bar, say
+from mapfilter.workflows.terminal import print_message, print_result, rate_bar
 
 *_FIRST, _LAST = PAPERS
 
@@ -43,9 +46,7 @@ def sweep(
         list[str] | None,
         typer.Option("--vary", metavar="KEY=V1,V2,...", help="Values of any numeric option."),
     ] = None,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Count the runs and estimate the time, no more.")
-    ] = False,
+    dry_run: DryRunOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Run filters over a grid of noises and options; exit code 3 if it was stopped on the way."""
@@ -63,10 +64,10 @@ def sweep(
                 loaded, axes, workers=workers, cluster=cluster, resume=resume, progress=progress
             )
     except KeyboardInterrupt:
-        say("stopped; finished batches are kept: go on with --resume")
+        print_message("stopped; finished batches are kept: go on with --resume")
         raise typer.Exit(PARTIAL) from None
-    told = asdict(result) | ({} if as_json else {"cells": brief(result.cells)})
-    print_result(told, as_json)
+    shown = asdict(result) | ({} if as_json else {"cells": brief(result.cells)})
+    print_result(shown, as_json)
 
 
 def reproduce(
@@ -76,11 +77,9 @@ def reproduce(
     ],
     area_map: Annotated[
         str | None,
-        typer.Option("--map", metavar="FILE", help="An .osm.pbf file; else a made city."),
+        typer.Option("--map", metavar="FILE", help="An .osm.pbf file; default: a synthetic city."),
     ] = None,
-    bbox: Annotated[
-        str | None, typer.Option("--bbox", metavar="W,S,E,N", help="Degrees; else the map's own.")
-    ] = None,
+    bbox: BoxOption = None,
     layout: Annotated[
         Path | None,
         typer.Option("--layout", metavar="FILE", help="Network and satellites (TOML)."),
@@ -136,23 +135,14 @@ def evaluate(
         Path | None,
         typer.Option("--map", metavar="FILE", help="An OpenStreetMap file.", callback=given_path),
     ] = None,
-    bbox: Annotated[
-        str | None, typer.Option("--bbox", metavar="W,S,E,N", help="The box, in degrees.")
-    ] = None,
+    bbox: BoxOption = None,
     cases: Annotated[
         list[str] | None,
         typer.Option(
             "--case", metavar="NAME", help="A case; repeatable. Default: all without satellites."
         ),
     ] = None,
-    filter_name: Annotated[
-        str | None,
-        typer.Option(
-            "--filter",
-            metavar="NAME",
-            help="bayes (default), grid, candidate or package.module:Name.",
-        ),
-    ] = None,
+    filter_name: FilterOption = None,
     world: Annotated[
         str | None,
         typer.Option(
@@ -164,10 +154,7 @@ def evaluate(
     data: Annotated[
         Path | None,
         typer.Option(
-            "--data",
-            metavar="DIR",
-            help="Folder of the data sets, for ottawa.",
-            callback=given_path,
+            "--data", metavar="DIR", help="Folder of the Ottawa data sets.", callback=given_path
         ),
     ] = None,
     runs: Annotated[

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mapfilter.errors import ConfigError, Faults, fail
+from mapfilter.positioning import BUILT_IN, DEFAULT
 
 if TYPE_CHECKING:
     from mapfilter.config.sections import Config
@@ -47,6 +48,22 @@ ClusterOption = Annotated[
     typer.Option("--cluster", metavar="ADDRESS", help="A Dask scheduler, or local:N."),
 ]
 ResumeOption = Annotated[bool, typer.Option("--resume", help="Go on where it was cut short.")]
+FilterOption = Annotated[
+    str | None,
+    typer.Option(
+        "--filter",
+        metavar="NAME",
+        help=f"{', '.join(BUILT_IN)}, or a custom filter, package.module:Name. Default: {DEFAULT}.",
+    ),
+]
+BoxOption = Annotated[
+    str | None,
+    typer.Option("--bbox", metavar="W,S,E,N", help="Part of the map, in degrees; else all of it."),
+]
+DryRunOption = Annotated[
+    bool, typer.Option("--dry-run", help="Only estimate size or runs, memory and time.")
+]
+DatabaseArgument = Annotated[Path, typer.Argument(metavar="DB", callback=given_path)]
 PathArgument = Annotated[Path, typer.Argument(metavar="PATH", callback=given_path)]
 
 
@@ -58,7 +75,7 @@ def seeded(settings: list[str] | None, seed: int | None, *keys: str) -> list[str
 
 def toml(value: str | list[str]) -> str:
     """Return a text, or a list of texts, as TOML writes it."""
-    # Escapes of JSON in the ASCII form are pairs of surrogates, which TOML does not know.
+    # Escapes of JSON in the ASCII form are pairs of surrogates, which TOML has not.
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 

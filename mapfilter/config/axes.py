@@ -16,19 +16,22 @@ from mapfilter.errors import ConfigError, Faults, MapfilterError, fail
 from mapfilter.options import expected, fits, plain_types
 
 SECTIONS = ("filter", "imu", "journeys", "database")
-"""Sections whose numeric options can be varied."""
+"""Sections whose numeric options can be varied, but for those that a sweep does not use."""
+
+_NOT_USED = {
+    "journeys.count": "sweep.routes",
+    "journeys.draws": "sweep.draws",
+    "journeys.seed": "sweep.seed",
+    "database.floor_dbm": "sweep.databases, each built with its own floor",
+    "database.tile_px": "",
+}
+"""Numeric options of these sections that change nothing in a sweep, and what does instead."""
 
 
 def numeric_keys() -> dict[str, Any]:
-    """Return the keys that can be varied, such as ``filter.bayes.heading_sd_deg``.
-
-    Returns
-    -------
-    dict
-        Annotation of each key, with its limits.
-    """
+    """Return the keys that can be varied, such as ``imu.scale``, with their annotations."""
     options = _options().items()
-    return {key: annotation for key, annotation in options if _is_numeric(annotation)}
+    return {key: found for key, found in options if _is_numeric(found) and key not in _NOT_USED}
 
 
 def _options() -> dict[str, Any]:
@@ -45,7 +48,7 @@ def parse_axis(text: str) -> tuple[str, tuple[float, ...]]:
     Raises
     ------
     ConfigError
-        The text has another form, or as for :func:`check_axis`.
+        The text has another form; as for :func:`check_axis`.
 
     Examples
     --------
@@ -95,14 +98,7 @@ def check_axis(key: str, values: Sequence[float]) -> tuple[float, ...]:
 
 
 def vary(config: Config, changes: Mapping[str, float]) -> Config:
-    """Return a configuration with other values of some options, checked.
-
-    Parameters
-    ----------
-    config : Config
-        Gives all other values.
-    changes : mapping of str to float
-        New values by dotted key.
+    """Return a configuration with other values of some options, by their dotted keys, checked.
 
     Raises
     ------
@@ -144,6 +140,8 @@ def _is_numeric(annotation: Any) -> bool:
 
 def _not_numeric(key: str, known: Mapping[str, Any]) -> MapfilterError:
     """Return the error for a key that cannot be varied, with those that were probably meant."""
+    if key in _NOT_USED:
+        return fail(ConfigError, key, "an option that a sweep uses", repr(key), _NOT_USED[key])
     if annotation := _options().get(key):
         return fail(
             ConfigError, key, "a numeric option", f"an option that is {expected(annotation)}"

@@ -21,6 +21,7 @@ from pydantic import (
 
 from mapfilter._io import path_fault
 from mapfilter.options import Options, Positive, Words, annotations_of, describe_options
+from mapfilter.positioning.locators import BUILT_IN
 
 EMBEDDED_MAP = "helsinki"
 NO_MAP = "none"
@@ -28,8 +29,6 @@ SYNTHETIC_MAP = "synthetic"
 MANHATTAN_MAP = "manhattan"
 SYNTHETIC_MAPS = (SYNTHETIC_MAP, MANHATTAN_MAP)
 MAP_NAMES = (EMBEDDED_MAP, NO_MAP, *SYNTHETIC_MAPS)
-MAP_FILTERS = ("candidate", "bayes", "grid")
-FUSION_FILTERS = ("ekf", "iekf", "rbukf", "ukf", "ckf")
 _NAME = r"[^\W\d]\w*(\.[^\W\d]\w*)*"
 _CUSTOM_FILTER = re.compile(f"{_NAME}:{_NAME}")
 
@@ -56,10 +55,9 @@ def resolve_map(value: Any, info: ValidationInfo) -> Any:
 
 def check_filter_name(value: str) -> str:
     """Check that a filter is built in, or has the form ``package.module:Name``."""
-    known = (*MAP_FILTERS, *FUSION_FILTERS)
-    if value not in known and not _CUSTOM_FILTER.fullmatch(value):
-        names = ", ".join(map(repr, known))
-        raise ValueError(f"{names}, or your own as package.module:Name")
+    if value not in BUILT_IN and not _CUSTOM_FILTER.fullmatch(value):
+        names = ", ".join(map(repr, BUILT_IN))
+        raise ValueError(f"{names}, or a custom filter as package.module:Name")
     return value
 
 
@@ -93,15 +91,7 @@ class Section(BaseModel):
     kinds: ClassVar[tuple[type[Options], ...]] = ()
 
     def of(self, kind: type[OptionsT], **others: Any) -> OptionsT:
-        """Return an option dataclass with the values of this section.
-
-        Parameters
-        ----------
-        kind : type
-            The dataclass.
-        **others
-            Values of further fields; those of neither have their defaults.
-        """
+        """Return an option dataclass with the values of this section, and of further fields."""
         own = type(self).model_fields
         values = {one.name: getattr(self, one.name) for one in fields(kind) if one.name in own}
         return kind(**values | others)
@@ -124,19 +114,13 @@ def field_annotation(section: type[BaseModel], name: str) -> Any:
 
 
 def with_options(
-    *kinds: type[Options], without: Sequence[str] = ()
+    *kinds: type[Options], without: Sequence[str] = (), optional: bool = False
 ) -> Callable[[type[SectionT]], type[SectionT]]:
     """Return a class decorator that gives a section the fields of option dataclasses.
 
-    Names, limits and defaults are those of the dataclasses; what the section defines itself goes
-    first. :meth:`Section.of` returns the dataclasses again.
-
-    Parameters
-    ----------
-    *kinds : type
-        Dataclasses of options.
-    without : sequence of str
-        Fields that no configuration sets.
+    Names, limits and defaults are those of the dataclasses (None if ``optional``), but for fields
+    that the section defines itself and for those in ``without``. :meth:`Section.of` returns the
+    dataclasses again.
     """
 
     def extended(section: type[SectionT]) -> type[SectionT]:
@@ -145,7 +129,8 @@ def with_options(
             annotations = annotations_of(kind)
             for info in describe_options(kind):
                 if info.name not in (*section.model_fields, *without):
-                    given[info.name] = (annotations[info.name], info.default)
+                    wanted = annotations[info.name]
+                    given[info.name] = (wanted | None, None) if optional else (wanted, info.default)
         made = _extended(section, given)
         made.kinds = kinds
         return made

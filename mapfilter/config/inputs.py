@@ -258,7 +258,7 @@ class Tracks(Section):
 
 
 class Roads(Section):
-    """``[roads]``: where one can be.
+    """``[roads]``: ways and squares of the map.
 
     Parameters
     ----------
@@ -274,7 +274,7 @@ class Roads(Section):
     cut_buildings : bool
         Whether points inside buildings are removed.
     cut_water : bool
-        Whether points in rivers and lakes are removed, save on bridges.
+        Whether points in rivers and lakes are removed, except on bridges.
     water_layer : Path, optional
         Vector file of further water, such as the sea.
     water_layer_name : str, optional
@@ -288,7 +288,7 @@ class Roads(Section):
     id_column : str, optional
         Column of the number of the way; by default the file's own, from 1.
     landuse : Path, optional
-        Land-use raster that decides alone on where one can be; ways then only name its points.
+        Land-use raster that alone decides which points belong to the map; ways only name them.
     landuse_table : Path, optional
         Table (CSV) of its codes.
     """
@@ -363,7 +363,7 @@ class Rasters(Section):
         Rasters of the simulated ground truth; by default ``rxlev-ground-truth.tif`` in the output
         folder.
     quantity : {"level", "loss"}, optional
-        What the files hold, where they do not say so.
+        Quantity in the files, where their metadata have none.
     crs : str, optional
         CRS of files without one.
     factor : float

@@ -63,17 +63,7 @@ def load_config(
 def faults_of(
     error: ValidationError, file: Path | None = None, settings: Sequence[str] = ()
 ) -> tuple[Fault, ...]:
-    """Return what pydantic found as faults, one for each field.
-
-    Parameters
-    ----------
-    error : ValidationError
-        From :class:`~mapfilter.config.sections.Config`.
-    file : Path, optional
-        Named as the place of faults that no setting caused.
-    settings : sequence of str
-        As for :func:`load_config`.
-    """
+    """Return the faults of a configuration, one for each field; faults of settings name these."""
     changed = [_keys(setting) for setting in settings]
     faults: dict[tuple[str, ...], Fault] = {}
     for detail in error.errors():
@@ -87,32 +77,22 @@ def faults_of(
 
 
 def given_keys(file: Path | None, settings: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the keys that a file and settings give, such as ``area.map``, sorted.
-
-    Raises
-    ------
-    ConfigError
-        As for :func:`load_config`, of the file and of the settings' form.
-    """
+    """Return the keys that a file and settings give, such as ``area.map``, sorted."""
     return tuple(sorted(_leaves(_values(file, settings))))
 
 
 def load_keys(
     file: Path | None, settings: Sequence[str], out: Path | None, keys: Sequence[str]
 ) -> Config | None:
-    """Return what some keys of a configuration say, however wrong others are.
+    """Return a configuration of some keys alone, whatever faults others have.
 
     Parameters
     ----------
     file, settings, out
         As for :func:`load_config`.
     keys : sequence of str
-        Such as ``database.path``; all others have their defaults.
-
-    Returns
-    -------
-    config : Config or None
-        None where the keys themselves are wrong.
+        Such as ``database.path``; all others have their defaults. Where these keys themselves are
+        wrong, the result is None.
     """
     try:
         values, folder = _given(file, settings, out)

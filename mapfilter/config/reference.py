@@ -22,7 +22,7 @@ _COLUMN = 38
 _WIDTH = 100
 _HEAD = """\
 Every key with its default; keys without one are comments. Lengths are metres, angles degrees,
-times seconds and levels dBm, as the names say. Paths are relative to this file.
+times seconds and levels dBm, by the suffix of the name. Paths are relative to this file.
 """
 _TEXT, _NO_BREAK = '"..."', "\N{NO-BREAK SPACE}"
 _LARGEST = f" and < {2**63}"
@@ -60,7 +60,7 @@ def _table(values: Section, path: str) -> Iterator[str]:
 
 
 def _limits(annotation: Any) -> str:
-    """Return what a key allows, in words that are not broken; nothing where its type says it."""
+    """Return the limits of a key, in words that are not broken; none where there is a type only."""
     words = expected(annotation).replace("'", '"').removesuffix(_LARGEST)
     bare = words in ("a number", "a whole number", "a text", "a path", "a list", "true or false")
     return "" if bare else f"({words})".replace(" ", _NO_BREAK)
@@ -91,7 +91,7 @@ def _entry(key: str, text: str) -> Iterator[str]:
 
 
 def _summary(section: type[Section]) -> str:
-    """Return what a section's docstring says before its parameters, without the section's name."""
+    """Return a section's docstring before its parameters, without the section's name."""
     text, _, _ = cleandoc(section.__doc__ or "").partition("\n\nParameters\n")
     return _plain(" ".join(text.partition(": ")[2].split()))
 

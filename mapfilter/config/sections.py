@@ -6,17 +6,11 @@ Each section is a noun. Lengths, angles and levels carry their unit in the name.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
-from annotated_types import Ge, Le, Lt
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from mapfilter.config.fields import (
-    FilePath,
-    FilterName,
-    Section,
-    with_options,
-)
+from mapfilter.config.fields import Count, FilePath, FilterName, Section, with_options
 from mapfilter.config.inputs import (
     Area,
     BuildingsSection,
@@ -27,13 +21,15 @@ from mapfilter.config.inputs import (
     Rasters,
     Roads,
 )
-from mapfilter.options import NotNegative, Positive, Seed
+from mapfilter.options import Below1, Degrees, NotNegative, Positive, Seed
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.candidate import CandidateFilter
+from mapfilter.positioning.kalman.filter import KalmanFilter
+from mapfilter.positioning.locators import BUILT_IN, filter_options
 from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
-from mapfilter.tracks.log import Kind
+from mapfilter.tracks.log import Without
 
 
 def _axis_values(value: Any) -> Any:
@@ -47,34 +43,22 @@ def _each_once(values: tuple[float, ...]) -> tuple[float, ...]:
     return values
 
 
-_AXIS = (
+_T = TypeVar("_T")
+Axis = Annotated[
+    tuple[_T, ...],
     BeforeValidator(_axis_values),
     Field(strict=False, min_length=1),
     AfterValidator(_each_once),
-)
-_Below1 = Annotated[float, Ge(0), Lt(1)]
-_Degrees = Annotated[float, Ge(0), Le(360)]
-
-NotNegatives = Annotated[tuple[NotNegative, ...], *_AXIS]
-Positives = Annotated[tuple[Positive, ...], *_AXIS]
-Degrees = Annotated[tuple[_Degrees, ...], *_AXIS]
-Shares = Annotated[tuple[_Below1, ...], *_AXIS]
+]
 
 
+@with_options(CandidateFilter, optional=True)
 class ReadingSection(Section):
-    """``[[sweep.readings]]``: a filter by a name, and what it has otherwise than ``[filter]``."""
+    """``[[sweep.readings]]``: a named filter, with the keys that differ from ``[filter]``."""
 
     name: Annotated[str, Field(min_length=1)]
     filter: FilterName | None = None
-    margin_db: NotNegative | None = None
     update_length_m: NotNegative | None = None
-    tracking_length_m: NotNegative | None = None
-    prediction: Literal["last_heading", "displacement"] | None = None
-    duplicates: Literal["set", "list"] | None = None
-    threshold: Annotated[int, Ge(1)] | None = None
-    at_threshold: Literal["switch", "stall"] | None = None
-    switch_check: Literal["next_call", "same_call"] | None = None
-    when_empty: Literal["fail", "reinitialise"] | None = None
 
 
 def _names_once(readings: tuple[ReadingSection, ...]) -> tuple[ReadingSection, ...]:
@@ -90,16 +74,8 @@ class SweepSection(Section):
 
     Parameters
     ----------
-    sigma_trans_m : list of float, optional
-        Values of ``imu.sigma_trans_m``.
-    sigma_orient_deg : list of float, optional
-        Values of ``imu.sigma_orient_deg``.
-    bias_sd_deg : list of float, optional
-        Values of ``imu.bias_sd_deg``.
-    drift_deg_per_sqrt_s : list of float, optional
-        Values of ``imu.drift_deg_per_sqrt_s``.
-    scale : list of float, optional
-        Values of ``imu.scale``.
+    sigma_trans_m, sigma_orient_deg, bias_sd_deg, drift_deg_per_sqrt_s, scale : list of float
+        Values of the key of ``[imu]`` with this name.
     prediction_error_db : list of float, optional
         Standard deviations of the ground truth from the prediction, in place of
         ``journeys.radio``.
@@ -122,27 +98,32 @@ class SweepSection(Section):
         Seed of routes and noise.
     """
 
-    sigma_trans_m: NotNegatives | None = None
-    sigma_orient_deg: Degrees | None = None
-    bias_sd_deg: Degrees | None = None
-    drift_deg_per_sqrt_s: Degrees | None = None
-    scale: Shares | None = None
-    prediction_error_db: NotNegatives | None = None
-    report_period_s: Positives | None = None
-    imu_period_s: Positives | None = None
-    update_length_m: NotNegatives | None = None
+    sigma_trans_m: Axis[NotNegative] | None = None
+    sigma_orient_deg: Axis[Degrees] | None = None
+    bias_sd_deg: Axis[Degrees] | None = None
+    drift_deg_per_sqrt_s: Axis[Degrees] | None = None
+    scale: Axis[Below1] | None = None
+    prediction_error_db: Axis[NotNegative] | None = None
+    report_period_s: Axis[Positive] | None = None
+    imu_period_s: Axis[Positive] | None = None
+    update_length_m: Axis[NotNegative] | None = None
     databases: Files = ()
     readings: Annotated[
         tuple[ReadingSection, ...], Field(strict=False), AfterValidator(_names_once)
     ] = ()
-    routes: Annotated[int, Ge(1), Le(1_000_000)] = 40
-    draws: Annotated[int, Ge(1), Le(1_000_000)] = 10
+    routes: Count = 40
+    draws: Count = 10
     seed: Seed = 0
 
 
-@with_options(BayesFilter)
+@with_options(BayesFilter, without=("smooth",))
 class BayesSection(Section):
-    """``[filter.bayes]``: errors of dead reckoning and of the prediction, weights, particles."""
+    """``[filter.bayes]``: the filters "bayes" and "grid": assumed errors, weights, particles."""
+
+
+@with_options(KalmanFilter, without=("method", "smooth"))
+class KalmanSection(Section):
+    """``[filter.kalman]``: the filters "ekf", "iekf", "rbukf", "ukf" and "ckf"."""
 
 
 @with_options(ReportModel, WalkerModel)
@@ -166,8 +147,8 @@ class Journeys(Section):
         Seed of routes and noise.
     """
 
-    count: Annotated[int, Ge(1), Le(1_000_000)] = 1
-    draws: Annotated[int, Ge(1), Le(1_000_000)] = 1
+    count: Count = 1
+    draws: Count = 1
     length_m: Positive = 1940.0
     speed_mps: Positive = 1.4
     nlos_satellites: bool = False
@@ -191,7 +172,7 @@ class Track(Section):
     """
 
     path: FilePath | None = None
-    without: Annotated[tuple[Kind, ...], Field(strict=False)] = ()
+    without: Annotated[tuple[Without, ...], Field(strict=False)] = ()
 
 
 @with_options(CandidateFilter)
@@ -204,12 +185,21 @@ class FilterSection(Section):
         "bayes", "grid", "candidate" or a custom filter as ``package.module:Name`` (its code is
         run); without a map "ekf", "iekf", "rbukf", "ukf" or "ckf".
     smooth : bool
-        Smooth the track, with ekf, iekf, rbukf, ukf and ckf.
+        Smooth the track by the whole log: all filters but "candidate" and custom ones.
     """
 
     name: FilterName = "bayes"
     smooth: bool = False
     bayes: BayesSection = BayesSection()
+    kalman: KalmanSection = KalmanSection()
+
+    @model_validator(mode="after")
+    def _smooths(self) -> FilterSection:
+        smoothing = [name for name in BUILT_IN if hasattr(filter_options(name), "smooth")]
+        if self.smooth and self.name not in smoothing:
+            names = ", ".join(smoothing)
+            raise ValueError(f"no smooth (--smooth) with {self.name!r}; {names} can smooth")
+        return self
 
 
 class Output(Section):

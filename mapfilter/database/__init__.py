@@ -1,1 +1,1 @@
-"""Radio-route databases: the points where one can be, and the levels of each cell there."""
+"""Radio-route databases: accessible points, and the levels of each cell there."""

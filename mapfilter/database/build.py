@@ -25,12 +25,7 @@ from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.sources import LatticeRoutes, Routes, check_aligned, overlap
 from mapfilter.database.store import open_database
-from mapfilter.database.tiles import (
-    TileRows,
-    TileTask,
-    read_tiles,
-    tile_windows,
-)
+from mapfilter.database.tiles import TileRows, TileTask, read_tiles, tile_windows
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
@@ -145,11 +140,10 @@ def build(
         written = write_parts(folder, crs, ids, made, len(job.windows), writers, progress)
         if written.received == 0:
             expected = f"a level of at least {floor_dbm:g} dBm at a point"
-            hint = "floor too high, or rasters hold no data along the roads"
-            got = "none"
+            got, hint = "none", "floor too high, or rasters hold no data along the roads"
             if not written.points:
-                hint = "roads beside the rasters, or narrower than their pixels"
                 got = "no point of the roads on the rasters"
+                hint = "roads beside the rasters, or narrower than their pixels"
             raise fail(InputError, str(rasters.path), expected, got, hint)
         counts = {
             "points": written.received,
@@ -166,12 +160,8 @@ def build(
 class BuildJob:
     """A build cut into tiles; no tile's points are laid before its turn.
 
-    Parameters
-    ----------
-    plan : CellPlan
-        In the rasters' CRS.
-    windows : tuple of (row, col, rows, cols)
-        Tiles on the rasters' lattice that may hold points, along the Z-order curve.
+    The plan is in the rasters' CRS; ``windows`` are the tiles on the rasters' lattice that may hold
+    points, along the Z-order curve.
     """
 
     rasters: RxLevRasters
@@ -260,7 +250,7 @@ def _aside(function: Callable[[], str]) -> Future[str]:
 
 
 def check_parameters(margin_db: float, floor_dbm: float, tile_px: int) -> None:
-    """Check the ranges of the parameters."""
+    """Raise InputError with every parameter that is out of range."""
     faults = Faults()
     if not (np.isfinite(margin_db) and margin_db >= 0):
         faults.add("margin_db", "dB >= 0", margin_db)

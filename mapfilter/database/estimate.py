@@ -7,6 +7,7 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -90,7 +91,7 @@ def dry_run(
         scale = 1 / share[drawn] / _SAMPLED_TILES
     # The first read opens files and compiles, which is not part of a tile's work.
     read_tile(job.task(int(drawn[0])))
-    found = [_Sample.of(job, number) for number in drawn.tolist()]
+    found = [_sample(job, number) for number in drawn.tolist()]
     points = float(scale @ [tile.places for tile in found])
     if isinstance(job.routes, LatticeRoutes):
         points = float(weight.sum())
@@ -125,8 +126,7 @@ def peak_memory_bytes() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Sample:
+class _Sample(NamedTuple):
     """One tile as it would be written."""
 
     places: int
@@ -135,14 +135,14 @@ class _Sample:
     levels_rows: dict[int, LevelsRows]
     seconds: float
 
-    @classmethod
-    def of(cls, job: BuildJob, number: int) -> _Sample:
-        began_s = time.perf_counter()
-        tile, ids = read_tile(job.task(number)), job.plan.ids
-        points = points_table(tile.places, tile.levels, ids)
-        levels = dict(levels_rows(tile.places, tile.levels))
-        seconds = time.perf_counter() - began_s
-        return cls(tile.places.num_rows, tile.levels.cell.size, points, levels, seconds)
+
+def _sample(job: BuildJob, number: int) -> _Sample:
+    began_s = time.perf_counter()
+    tile, ids = read_tile(job.task(number)), job.plan.ids
+    points = points_table(tile.places, tile.levels, ids)
+    levels = dict(levels_rows(tile.places, tile.levels))
+    seconds = time.perf_counter() - began_s
+    return _Sample(tile.places.num_rows, tile.levels.cell.size, points, levels, seconds)
 
 
 def _bytes(found: list[_Sample], scale: Floats, plan: CellPlan) -> float:

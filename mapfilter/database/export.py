@@ -83,7 +83,11 @@ def export_geopackage(
     if path.suffix.lower() != ".gpkg":
         raise fail(OutputError, str(path), "a name that ends in .gpkg", path.suffix or "no suffix")
     crs = database.lattice.crs
-    layers = {"points": _points(database), "cells": _cells(database)}
+    # A column without any value has no type that a GeoPackage knows.
+    table = pd.DataFrame([asdict(cell) for cell in database.plan.cells]).dropna(axis=1, how="all")
+    place = gpd.points_from_xy(table["east_m"], table["north_m"])
+    plan = gpd.GeoDataFrame(table, geometry=place, crs=crs)
+    layers = {"points": _points(database), "cells": plan}
     # Layers of a GeoPackage are tables, whose names SQLite compares without case.
     names = apart({cell_id: f"cell {cell_id}" for cell_id in cells})
     for cell_id, name in names.items():
@@ -108,14 +112,6 @@ def _points(database: RadioRouteDatabase) -> gpd.GeoDataFrame:
     place = gpd.GeoSeries.from_wkb(table["geometry"])
     frame = gpd.GeoDataFrame(table, geometry=place, crs=database.lattice.crs)
     return frame.sort_values("point", ignore_index=True)
-
-
-def _cells(database: RadioRouteDatabase) -> gpd.GeoDataFrame:
-    table = pd.DataFrame([asdict(cell) for cell in database.plan.cells])
-    # A column without any value has no type that a GeoPackage knows.
-    table = table.dropna(axis="columns", how="all")
-    place = gpd.points_from_xy(table["east_m"], table["north_m"])
-    return gpd.GeoDataFrame(table, geometry=place, crs=database.lattice.crs)
 
 
 @contextmanager

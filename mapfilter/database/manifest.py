@@ -21,20 +21,8 @@ MANIFEST = "manifest.json"
 CELLS = "cells.parquet"
 POINTS = "points.parquet"
 
-InputRole = (
-    Literal[
-        "map",
-        "roads",
-        "tracks",
-        "buildings",
-        "water",
-        "landuse",
-        "landuse_table",
-        "plan",
-        "rasters",
-    ]
-    | Literal["database"]
-)
+_Layers = Literal["map", "roads", "tracks", "buildings", "water", "landuse", "landuse_table"]
+InputRole = _Layers | Literal["plan", "rasters", "database"]
 
 _LONGEST_NAME = 200
 _DAMAGED = "edited or damaged"

@@ -18,17 +18,16 @@ from mapfilter.database.manifest import FORMAT, MANIFEST, POINTS, InputFile
 from mapfilter.database.parquet import Window, WindowReader, point_geometry
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.database.sources import overlap, pixels_between
+from mapfilter.database.sources import note_misaligned, overlap, pixels_between
 from mapfilter.database.store import open_database
 from mapfilter.database.tiles import (
-    TileLevels,
     TileRows,
     received_levels,
     tile_windows,
     z_order,
 )
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 
 _PLACE = ("row", "col", "way_id", "way_class", "on_square", "distance_to_way_m")
@@ -108,27 +107,34 @@ class _Source:
 
     @cached_property
     def _cells(self) -> dict[str, WindowReader]:
+        parts, own = self.database.level_parts, self.database.lattice
         columns = ("row", "col", "level_dbm")
-        return {
-            cell_id: WindowReader(parts, columns, self.database.lattice)
-            for cell_id, parts in self.database.level_parts.items()
-        }
+        return {cell_id: WindowReader(files, columns, own) for cell_id, files in parts.items()}
 
-    def window(self, window: Window) -> Window | None:
-        """Return the part of a window that this database covers."""
-        return overlap(self.lattice, self.database.lattice, window)
+    def places(self, window: Window) -> pa.Table | None:
+        """Return the places in a window; None without any."""
+        rows = self._rows(self._points, window)
+        if not rows:
+            return None
+        row, col = rows["row"], rows["col"]
+        return pa.table(
+            {
+                "point": row * self.lattice.cols + col,
+                "row": row.astype(np.int32),
+                "col": col.astype(np.int32),
+                **{name: rows[name] for name in _PLACE[2:]},
+                "geometry": point_geometry(*self.lattice.east_north(row, col)),
+            }
+        )
 
-    def points(self, window: Window) -> dict[str, Any]:
-        return self._moved(self._points, window)
-
-    def levels(self, window: Window) -> Iterator[tuple[str, dict[str, Any]]]:
-        """Yield the cells with a level in a window, with their rows there."""
+    def levels(self, window: Window) -> Iterator[tuple[str, Ints, Floats]]:
+        """Yield the cells with a level in a window, with the points there and their levels."""
         for cell_id, reader in self._cells.items():
-            found = self._moved(reader, window)
-            if found and found["row"].size:
-                yield cell_id, found
+            rows = self._rows(reader, window)
+            if rows and rows["row"].size:
+                yield cell_id, rows["row"] * self.lattice.cols + rows["col"], rows["level_dbm"]
 
-    def _moved(self, reader: WindowReader, window: Window) -> dict[str, Any]:
+    def _rows(self, reader: WindowReader, window: Window) -> dict[str, Any]:
         down, right = pixels_between(self.lattice, self.database.lattice)
         row, col, rows, cols = window
         found: dict[str, Any] = reader.read((row - down, col - right, rows, cols))
@@ -147,26 +153,21 @@ def _tiles(
     sources = [_Source(database, lattice) for database in databases]
     floor_dbm = databases[0].floor_dbm
     for window in windows:
-        places = _places(sources, lattice, window)
+        inside = [(source, overlap(lattice, source.database.lattice, window)) for source in sources]
+        covering = [(source, part) for source, part in inside if part is not None]
+        places = _places(covering)
         point = places["point"].to_numpy()
-        yield TileRows(places, _levels(sources, plan, point, lattice, window, floor_dbm))
+        by_cell = _levels(covering, plan, point, lattice.cols)
+        cells = sorted(by_cell)
+        level = [by_cell[cell] for cell in cells] or [np.full(point.size, np.nan)]
+        levels = received_levels(np.stack(level), floor_dbm)
+        yield TileRows(places, levels.of_cells(cells) if cells else levels)
 
 
-def _places(sources: Sequence[_Source], lattice: Lattice, window: Window) -> pa.Table:
+def _places(covering: Sequence[tuple[_Source, Window]]) -> pa.Table:
     """Return the places of a tile; of one in several databases, the row of the last one."""
-    tables = [
-        pa.table(
-            {
-                "point": rows["row"] * lattice.cols + rows["col"],
-                "row": rows["row"].astype(np.int32),
-                "col": rows["col"].astype(np.int32),
-                **{name: rows[name] for name in _PLACE[2:]},
-                "geometry": point_geometry(*lattice.east_north(rows["row"], rows["col"])),
-            }
-        )
-        for source in sources
-        if (inside := source.window(window)) is not None and (rows := source.points(inside))
-    ]
+    found = (source.places(window) for source, window in covering)
+    tables = [table for table in found if table is not None]
     if not tables:
         return pa.table({name: np.empty(0, np.int64) for name in ("point", "row", "col")})
     table = pa.concat_tables(tables).unify_dictionaries().combine_chunks()
@@ -179,37 +180,22 @@ def _places(sources: Sequence[_Source], lattice: Lattice, window: Window) -> pa.
 
 
 def _levels(
-    sources: Sequence[_Source],
-    plan: CellPlan,
-    point: Ints,
-    lattice: Lattice,
-    window: Window,
-    floor_dbm: float,
-) -> TileLevels:
-    """Return the levels at the places of a tile."""
+    covering: Sequence[tuple[_Source, Window]], plan: CellPlan, point: Ints, cols: int
+) -> dict[int, Floats]:
+    """Return the levels of each cell at the places of a tile, NaN where unknown."""
     sorter = point.argsort()
-    row, col = np.divmod(point, lattice.cols)
+    row, col = np.divmod(point, cols)
     by_cell: dict[int, Floats] = {}
-    for source in sources:
-        inside = source.window(window)
-        if inside is None:
-            continue
-        own = (row >= inside[0]) & (row < inside[0] + inside[2])
-        own &= (col >= inside[1]) & (col < inside[1] + inside[3])
+    for source, (top, left, height, width) in covering:
+        own = (row >= top) & (row < top + height) & (col >= left) & (col < left + width)
         for cell_id in source.database.cell_ids:
             if cell_id in plan and (older := by_cell.get(plan.index(cell_id))) is not None:
                 older[own] = np.nan
-        for cell_id, rows in source.levels(inside):
-            if cell_id not in plan:
-                continue
-            level = by_cell.setdefault(plan.index(cell_id), np.full(point.size, np.nan))
-            at = np.searchsorted(point, rows["row"] * lattice.cols + rows["col"], sorter=sorter)
-            level[sorter[at]] = rows["level_dbm"]
-    cells = np.array(sorted(by_cell), dtype=np.int32)
-    if not cells.size:
-        return received_levels(np.full((1, point.size), np.nan), floor_dbm)
-    found = received_levels(np.stack([by_cell[cell] for cell in cells.tolist()]), floor_dbm)
-    return found.of_cells(cells.tolist())
+        for cell_id, points, level_dbm in source.levels((top, left, height, width)):
+            if cell_id in plan:
+                level = by_cell.setdefault(plan.index(cell_id), np.full(point.size, np.nan))
+                level[sorter[np.searchsorted(point, points, sorter=sorter)]] = level_dbm
+    return by_cell
 
 
 def _check(
@@ -252,16 +238,9 @@ def _check(
 
 
 def _note_misfit(first: RadioRouteDatabase, other: RadioRouteDatabase, faults: Faults) -> None:
-    a, b, where = first.lattice, other.lattice, f"{other.path}, compared with {first.path}"
+    where = f"{other.path}, compared with {first.path}"
     for name in ("margin_db", "floor_dbm"):
         if getattr(first, name) != getattr(other, name):
             expected = f"{name} {getattr(first, name):g}"
             faults.add(where, expected, f"{getattr(other, name):g}", "built with other parameters")
-    if not same_crs(a.crs, b.crs):
-        faults.add(where, f"one CRS ({a.crs})", b.crs)
-    elif abs(a.resolution_m - b.resolution_m) > 1e-6 * a.resolution_m:
-        faults.add(where, f"{a.resolution_m:g} m pixels", f"{b.resolution_m:g} m")
-    else:
-        shift = np.array([a.north_m - b.north_m, b.west_m - a.west_m]) / a.resolution_m
-        if np.abs(shift - shift.round()).max() > 1e-3:
-            faults.add(where, "pixels that align", "shifted pixels", "rasters of another lattice")
+    note_misaligned(first.lattice, other.lattice, where, "rasters of another lattice", faults)

@@ -13,13 +13,13 @@ from numba import njit
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats, Ints
-from mapfilter.errors import Faults, InputError
+from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CellPointIndex:
-    """Answers "which point is nearest?" exactly; make it with :meth:`of_points`.
+    """Exact search for the nearest point; made by :meth:`of_points`.
 
     Of several points at the same distance the *last* in row-major order wins. A stable ascending
     sort by the weight 1/distance leaves that one last, which is the one that Khalaf-Allah (2007,
@@ -27,16 +27,12 @@ class CellPointIndex:
 
     Parameters
     ----------
-    lattice : Lattice
-        The lattice on whose pixel centres the points lie.
     east_m, north_m : numpy.ndarray, shape (N,)
-        The points, in row-major order.
+        The points, centres of the lattice's pixels in row-major order.
     row_start : numpy.ndarray of int64, shape (row_span + 1,)
-        Where each row's points begin, counted from ``first_row``.
+        Where each row's points begin, counted from ``first_row``, the northernmost with a point.
     col : numpy.ndarray of int64, shape (N,)
         The points' columns, ascending within each row.
-    first_row : int
-        The northernmost row that holds a point.
 
     Examples
     --------
@@ -64,14 +60,14 @@ class CellPointIndex:
             The lengths differ, a point is off the lattice, or they are not in row-major order.
         """
         rows, cols = np.asarray(row, dtype=np.int64), np.asarray(col, dtype=np.int64)
-        faults = Faults()
         if rows.ndim != 1 or rows.shape != cols.shape:
-            faults.add("points", "as many rows as columns", f"{rows.shape} and {cols.shape}")
-        else:
-            if not np.all(lattice.contains(rows, cols)):
-                faults.add("points", "rows and columns on the lattice", "some off the lattice")
-            if np.any(np.diff(rows * lattice.cols + cols) <= 0):
-                faults.add("points", "strictly ascending row-major order", "another order")
+            got = f"{rows.shape} and {cols.shape}"
+            raise fail(InputError, "points", "as many rows as columns", got)
+        faults = Faults()
+        if not np.all(lattice.contains(rows, cols)):
+            faults.add("points", "rows and columns on the lattice", "some off the lattice")
+        if np.any(np.diff(rows * lattice.cols + cols) <= 0):
+            faults.add("points", "strictly ascending row-major order", "another order")
         faults.raise_if_any(InputError)
         east, north = lattice.east_north(rows, cols)
         first, last = (int(rows[0]), int(rows[-1])) if rows.size else (0, -1)
@@ -84,22 +80,10 @@ class CellPointIndex:
     def nearest(
         self, east_m: ArrayLike, north_m: ArrayLike, max_distance_m: float = np.inf
     ) -> tuple[Ints, Floats]:
-        """Return the nearest point of each position and its distance.
+        """Return the nearest point of each position, on the lattice or off it, and its distance.
 
-        Parameters
-        ----------
-        east_m, north_m : array_like, shape (M,) or ()
-            Positions, on the lattice or off it.
-        max_distance_m : float
-            Points farther than this do not count.
-
-        Returns
-        -------
-        index : numpy.ndarray of int64, shape (M,)
-            Row-major rank of the nearest point; -1 when there is none within ``max_distance_m``
-            or the position is not finite.
-        distance_m : numpy.ndarray of float64, shape (M,)
-            Its distance; infinite where ``index`` is -1.
+        Points are row-major ranks; -1, at infinite distance, where there is none within
+        ``max_distance_m`` or the position is not finite. Both results have the shape (M,).
         """
         return _nearest(
             np.atleast_1d(np.asarray(east_m, dtype=np.float64)),

@@ -122,7 +122,7 @@ def point_coordinates(geometry: pa.Array) -> Floats:
     return np.column_stack((points["east"], points["north"]))
 
 
-def geo_metadata(crs: str, bounds_m: tuple[float, float, float, float] | None) -> bytes:
+def geo_metadata(crs: str, bounds_m: Sequence[float] | None) -> bytes:
     """Return the value of the GeoParquet 1.1 key ``geo`` for a ``geometry`` column of points."""
     column: dict[str, Any] = {
         "encoding": "WKB",
@@ -143,17 +143,10 @@ def dictionary(codes: NDArray[Any], names: tuple[str, ...]) -> pa.Array:
 
 
 class WindowReader:
-    """Rows of some parts within windows, columns as asked.
+    """Reads some columns, among them ``row`` and ``col``, of a database's parts by windows.
 
     Points lie along a space-filling curve, so a row group covers a small area. Groups of the window
     that was read last are kept, as its neighbour needs most of them again.
-
-    Parameters
-    ----------
-    columns : sequence of str
-        Among them ``row`` and ``col``.
-    lattice : Lattice
-        The database's.
     """
 
     def __init__(self, parts: Sequence[Path], columns: Sequence[str], lattice: Lattice) -> None:
@@ -180,7 +173,7 @@ class WindowReader:
         meets = (low_row < row + rows) & (high_row >= row)
         meets &= (low_col < col + cols) & (high_col >= col)
         wanted = np.flatnonzero(meets).tolist()
-        self._held = {i: self._held.get(i, None) or self._group(i) for i in wanted}
+        self._held = {i: self._held.get(i) or self._group(i) for i in wanted}
         tables = []
         for table in self._held.values():
             at = table["row"].to_numpy(), table["col"].to_numpy()
@@ -190,12 +183,8 @@ class WindowReader:
         if not tables:
             return {}
         found = pa.concat_tables(tables)
-        return {
-            name: found[name]
-            if pa.types.is_dictionary(found[name].type)
-            else found[name].to_numpy()
-            for name in self._columns
-        }
+        columns = ((name, found[name]) for name in self._columns)
+        return {name: c if pa.types.is_dictionary(c.type) else c.to_numpy() for name, c in columns}
 
     def _group(self, number: int) -> pa.Table:
         part, group = self._groups[number]

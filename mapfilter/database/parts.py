@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -81,27 +81,23 @@ def levels_table(cell_id: str, rows: Sequence[LevelsRows]) -> pa.Table:
 
 
 class PartWriter:
-    """Collects rows, and writes them whenever enough of them are in memory.
+    """Collects rows, and writes them into a folder whenever enough of them are in memory.
 
-    Parameters
-    ----------
-    folder : Path
-        The database folder under construction.
-    writers : int
-        Parts written at a time; they do not depend on it.
+    ``writers`` parts are written at a time; they do not depend on it. ``points`` counts those added
+    and ``received`` those of them with a level; ``parts`` are the manifest's entries at the end.
     """
 
     def __init__(self, folder: Path, crs: str, cell_ids: tuple[str, ...], writers: int = 1) -> None:
-        self._writers = writers
-        self._folder, self._crs, self._cell_ids = folder, crs, cell_ids
+        self._folder, self._crs, self._cell_ids, self._writers = folder, crs, cell_ids, writers
         self._folders = levels_folders(cell_ids)
         self._points: list[pa.Table] = []
         self._levels: dict[int, list[LevelsRows]] = {}
         self._waiting = 0
         self._points_file: pq.ParquetWriter | None = None
-        self._points_written = 0
         self._bounds: tuple[Floats, Floats] = (np.full(2, np.inf), np.full(2, -np.inf))
         self._written: dict[int, list[dict[str, Any]]] = {}
+        self.points, self.received = 0, 0
+        self.parts: list[dict[str, Any]] = []
 
     def __enter__(self) -> PartWriter:
         return self
@@ -114,6 +110,8 @@ class PartWriter:
         """Take the rows of one tile."""
         places, levels = tile.places, tile.levels
         points = points_table(places, levels, self._cell_ids)
+        self.points += places.num_rows
+        self.received += points.num_rows
         if points.num_rows:
             self._points.append(points)
         for cell, rows in levels_rows(places, levels):
@@ -122,20 +120,18 @@ class PartWriter:
         if self._waiting >= ROWS_IN_MEMORY:
             self._flush()
 
-    def finish(self) -> list[dict[str, Any]]:
-        """Write what is left; return the manifest's entries, points first, then cell by cell.
-
-        At least one point must have been added.
-        """
+    def finish(self) -> None:
+        """Write what is left, and list the parts: points first, then cell by cell."""
         self._flush()
-        if self._points_file is not None:
-            bounds = tuple(float(value) for value in np.concatenate(self._bounds))
-            geo = geo_metadata(self._crs, (bounds[0], bounds[1], bounds[2], bounds[3]))
-            self._points_file.add_key_value_metadata({"geo": geo.decode()})
-            self._points_file.close()
-            self._points_file = None
-        points = describe_part(self._folder, self._folder / POINTS, self._points_written)
-        return [points, *(part for cell in sorted(self._written) for part in self._written[cell])]
+        if self._points_file is None:
+            return
+        geo = geo_metadata(self._crs, np.concatenate(self._bounds).tolist())
+        self._points_file.add_key_value_metadata({"geo": geo.decode()})
+        self._points_file.close()
+        self._points_file = None
+        points = describe_part(self._folder, self._folder / POINTS, self.received)
+        every = (self._written[cell] for cell in sorted(self._written))
+        self.parts = [points, *(part for parts in every for part in parts)]
 
     def _flush(self) -> None:
         parts: list[Callable[[], None]] = [self._write_points] if self._points else []
@@ -150,7 +146,6 @@ class PartWriter:
         if self._points_file is None:
             self._points_file = open_writer(table.schema, self._folder / POINTS)
         self._points_file.write_table(table, row_group_size=_ROWS_IN_A_GROUP)
-        self._points_written += table.num_rows
         for chunk in table["geometry"].chunks:
             places = point_coordinates(chunk)
             low, high = self._bounds
@@ -166,17 +161,9 @@ class PartWriter:
         written.append(describe_part(self._folder, file, table.num_rows, cell_id))
 
 
-class Written(NamedTuple):
-    """Manifest entries of the parts written, the points of the tiles, and those with a level."""
-
-    parts: tuple[Mapping[str, Any], ...]
-    points: int
-    received: int
-
-
 @dataclass(frozen=True, slots=True)
 class Head:
-    """Everything in a manifest but the parts."""
+    """Contents of a manifest without its parts."""
 
     lattice: Lattice
     plan: CellPlan
@@ -215,15 +202,12 @@ def write_parts(
     total: int,
     writers: int = 1,
     progress: Progress | None = None,
-) -> Written:
-    """Write points and levels of tiles, as they come, with bounded memory."""
-    points, received = 0, 0
+) -> PartWriter:
+    """Write points and levels of tiles, as they come, with bounded memory; return the writer."""
     with PartWriter(folder, crs, cell_ids, writers) as writer:
         for done, tile in enumerate(tiles, start=1):
             writer.add(tile)
-            points += tile.places.num_rows
-            received += int((tile.levels.best >= 0).sum())
             if progress is not None:
                 progress(done, total)
-        parts = writer.finish() if received else []
-    return Written(tuple(parts), points, received)
+        writer.finish()
+    return writer

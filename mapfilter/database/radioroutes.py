@@ -1,4 +1,4 @@
-"""The radio-route database: the points where one can be, and the levels of each cell there."""
+"""The radio-route database: accessible points, and the levels of each cell there."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from mapfilter._types import Bools, Floats32, Ints, Ints32
@@ -19,6 +19,7 @@ from mapfilter.database.parquet import WindowReader, check_places, read_columns
 from mapfilter.errors import InputError, StoreError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
+from mapfilter.roads.ways import Bounds
 
 Rows = Ints32
 
@@ -57,20 +58,6 @@ class RadioField:
         points = int(self.on_way.sum())
         return f"RadioField({len(self.cell_ids)} cells, {points} points; {self.lattice})"
 
-    def levels_at(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats32:
-        """Return the levels at positions, shape (N, cells); NaN below the floor or off the area.
-
-        Parameters
-        ----------
-        east_m, north_m : array_like, shape (N,)
-            Finite positions; each takes the levels of the pixel that holds it.
-        """
-        row, col = self.lattice.row_col(np.atleast_1d(east_m), np.atleast_1d(north_m))
-        inside = self.lattice.contains(row, col)
-        levels = np.full((row.size, len(self.cell_ids)), np.nan, dtype=np.float32)
-        levels[inside] = self.level_dbm[row[inside], col[inside]]
-        return levels
-
 
 def fill_field(
     window: Lattice,
@@ -81,14 +68,8 @@ def fill_field(
 ) -> RadioField:
     """Spread points over a window and fill the gaps from the nearest point.
 
-    Parameters
-    ----------
-    pixels : tuple of numpy.ndarray, shape (N,) each
-        Rows and columns of the points in the window, at least one.
-    way_id, distance_m : numpy.ndarray, shape (N,)
-        Each point's way, and how far its centre line is.
-    received : sequence of (cell id, row, col, level_dbm)
-        The points at which each cell is received; they are among ``pixels``.
+    ``pixels`` are rows and columns of the points in the window, at least one. ``received`` are the
+    cell id, row, col and level_dbm of the points at which each cell is received, all among these.
     """
     size = (window.rows, window.cols)
     on_way = np.zeros(size, dtype=np.bool_)
@@ -190,7 +171,7 @@ class RadioRouteDatabase:
 
     @property
     def attribution(self) -> str:
-        """Whose map the roads come from; to be shown with every picture of it."""
+        """Attribution of the map that the roads come from; to be shown with every picture of it."""
         return str(self.manifest.get("attribution", ""))
 
     @cached_property
@@ -206,7 +187,7 @@ class RadioRouteDatabase:
     @cached_property
     def _points(self) -> Points:
         file = self.path / POINTS
-        table = read_columns(file, _POINT_COLUMNS)
+        table = read_columns(file, tuple(Points.__dataclass_fields__))
         check_places(file, table, self.lattice)
         order = np.argsort(table["point"].to_numpy())
         server, names = _codes(table["best_server"])
@@ -244,9 +225,8 @@ class RadioRouteDatabase:
 
         Returns
         -------
-        row, col : numpy.ndarray of int32, shape (N,)
+        row, col, level_dbm : numpy.ndarray, shape (N,)
             In row-major order.
-        level_dbm : numpy.ndarray of float32, shape (N,)
 
         Raises
         ------
@@ -259,13 +239,27 @@ class RadioRouteDatabase:
         if cell_id not in self.plan:
             hint = "log and database of different networks or dates"
             raise fail(InputError, str(self.path), "a cell of the database", repr(cell_id), hint)
-        point, row, col, level, below = self._cell_levels(cell_id)
+        columns = {
+            "point": "i8",
+            "row": "i4",
+            "col": "i4",
+            "level_dbm": "f4",
+            "below_best_db": "f4",
+        }
+        tables = []
+        for part in self.level_parts.get(cell_id, ()):
+            tables.append(read_columns(part, tuple(columns)))
+            check_places(part, tables[-1], self.lattice)
+        point, row, col, level, below = (
+            np.concatenate([np.empty(0, kind), *(table[name].to_numpy() for table in tables)])
+            for name, kind in columns.items()
+        )
         # In single precision on both sides, so that 2.4 dB is within 2.4 dB.
         kept = np.flatnonzero(below <= np.float32(margin))
         kept = kept[np.argsort(point[kept])]
         return row[kept], col[kept], level[kept]
 
-    def field(self, bounds_m: tuple[float, float, float, float] | None = None) -> RadioField:
+    def field(self, bounds_m: Bounds | None = None) -> RadioField:
         """Return the levels of all cells over an area, also off the ways.
 
         Only what lies in the area is read, save for rows stored together with it.
@@ -294,16 +288,13 @@ class RadioRouteDatabase:
             parts = self.level_parts.get(cell_id, ())
             found = WindowReader(parts, ("row", "col", "level_dbm"), self.lattice).read(area)
             if found and found["row"].size:
-                received.append(
-                    (cell_id, found["row"] - top, found["col"] - left, found["level_dbm"])
-                )
+                row, col = found["row"] - top, found["col"] - left
+                received.append((cell_id, row, col, found["level_dbm"]))
         on_way_m = np.where(points["on_square"], np.float32(0), points["distance_to_way_m"])
         pixels = points["row"] - top, points["col"] - left
         return fill_field(window, pixels, points["way_id"], on_way_m, received)
 
-    def _window(
-        self, bounds_m: tuple[float, float, float, float] | None
-    ) -> tuple[int, int, Lattice]:
+    def _window(self, bounds_m: Bounds | None) -> tuple[int, int, Lattice]:
         if bounds_m is None:
             return 0, 0, self.lattice
         west, south, east, north = bounds_m
@@ -317,22 +308,6 @@ class RadioRouteDatabase:
             hint = "degrees given for metres, or another CRS"
             raise fail(InputError, "area", f"an area within {covered}", bounds_m, hint)
         return top, left, self.lattice.window(top, left, rows, cols)
-
-    def _cell_levels(self, cell_id: str) -> tuple[Ints, Rows, Rows, Floats32, Floats32]:
-        columns = ["point", "row", "col", "level_dbm", "below_best_db"]
-        kinds = (np.int64, np.int32, np.int32, np.float32, np.float32)
-        tables = []
-        for part in self.level_parts.get(cell_id, ()):
-            tables.append(read_columns(part, columns))
-            check_places(part, tables[-1], self.lattice)
-        point, row, col, level, below = (
-            np.concatenate([np.empty(0, kind), *(table[name].to_numpy() for table in tables)])
-            for name, kind in zip(columns, kinds, strict=True)
-        )
-        return point, row, col, level, below
-
-
-_POINT_COLUMNS = tuple(Points.__dataclass_fields__)
 
 
 def _codes(column: Any) -> tuple[Rows, tuple[str, ...]]:

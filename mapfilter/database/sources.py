@@ -14,16 +14,15 @@ from numpy.typing import NDArray
 from shapely import STRtree
 
 from mapfilter._types import Ints
-from mapfilter.errors import Faults, InputError
+from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, same_crs
-from mapfilter.roads.index import RouteSource, WayIndex
+from mapfilter.roads.index import RouteSource, WayIndex, areas_near
 from mapfilter.roads.lattice import RouteLattice
 
 _ALIGNED_PX = 1e-3
 
-
 RoutePart = RouteLattice | Callable[[], RouteLattice]
-"""The points of one tile, or what lays them; it can be sent to other processes."""
+"""The points of one tile, or a function that makes them in another process."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,7 +33,7 @@ class LatticeRoutes:
 
     @property
     def lattice(self) -> Lattice:
-        """Where the points lie."""
+        """Lattice of the points."""
         return self.points.lattice
 
     def holds(self, window: Lattice) -> bool:
@@ -85,22 +84,23 @@ class LayerRoutes:
     def holds(self, window: Lattice) -> bool:
         """Return whether a way or a square is near a window."""
         squares = self.layers.squares
-        if squares is not None and squares.near(window).geometry.size:
-            return True
-        return bool(self.layers.ways.segments_near(window).size)
+        on_square = squares is not None and areas_near(squares, window).size > 0
+        return on_square or self.layers.ways.segments_near(window).size > 0
 
     def part(self, window: Lattice) -> Callable[[], RouteLattice]:
         """Return what lays the points of a window: the same as of the whole layers."""
         layers = self.layers
-        squares = layers.squares.near(window) if layers.squares else None
-        if squares is not None and not squares.geometry.size:
-            squares = None
+        squares, buildings, water = (
+            STRtree(areas_near(areas, window)) if areas is not None else None
+            for areas in (layers.squares, layers.buildings, layers.water)
+        )
+        squares = squares if squares is not None and len(squares) else None
         near = RouteSource(
             layers.crs,
             _ways_near(layers.ways, window, far=squares is not None),
             squares,
-            layers.buildings.near(window) if layers.buildings else None,
-            layers.water.near(window) if layers.water else None,
+            buildings,
+            water,
             _ways_near(layers.bridges, window, far=False) if layers.bridges else None,
         )
         return partial(near.tile, window)
@@ -112,7 +112,7 @@ class LayerRoutes:
         inside = shapely.intersection(ways.tree.geometries[near], box)
         area = float((shapely.length(inside) * 2 * ways.half_width_m[near]).sum())
         if self.layers.squares is not None:
-            valid = shapely.make_valid(self.layers.squares.near(window).geometry)
+            valid = shapely.make_valid(areas_near(self.layers.squares, window))
             area += float(shapely.area(shapely.intersection(valid, box)).sum())
         return area
 
@@ -120,7 +120,7 @@ class LayerRoutes:
         """Return a checksum of the layers."""
         layers, ways = self.layers, self.layers.ways
         areas = [
-            shapely.to_wkb(area.geometry).tolist() if area is not None else None
+            shapely.to_wkb(area.geometries).tolist() if area is not None else None
             for area in (layers.squares, layers.buildings, layers.water)
         ]
         parts = (ways.ends_m, ways.half_width_m, ways.ways.way_id[ways.way])
@@ -134,23 +134,28 @@ Routes = LatticeRoutes | LayerRoutes
 
 def check_aligned(raster: Lattice, lattice: Lattice, where: str) -> None:
     """Check that a route lattice lies on the pixels of the rasters, and overlaps them."""
-    faults, hint = Faults(), "make the route lattice on the rasters' lattice"
-    if not same_crs(raster.crs, lattice.crs):
-        faults.add(where, f"one CRS ({raster.crs})", lattice.crs, "files of different zones")
-    elif abs(raster.resolution_m - lattice.resolution_m) > 1e-6 * raster.resolution_m:
-        got = f"{raster.resolution_m:g} m and {lattice.resolution_m:g} m"
-        faults.add(where, "one resolution", got, hint)
+    faults = Faults()
+    note_misaligned(
+        raster, lattice, where, "make the route lattice on the rasters' lattice", faults
+    )
     faults.raise_if_any(InputError)
-    down = (raster.north_m - lattice.north_m) / raster.resolution_m
-    right = (lattice.west_m - raster.west_m) / raster.resolution_m
-    row, col = round(down), round(right)
-    if max(abs(down - row), abs(right - col)) > _ALIGNED_PX:
-        got = f"shifted by {right - col:+.3f} and {down - row:+.3f} pixels"
-        faults.add(where, "pixels that align", got, f"half-pixel convention; {hint}")
-    elif overlap(raster, lattice, (0, 0, raster.rows, raster.cols)) is None:
+    if overlap(raster, lattice, (0, 0, raster.rows, raster.cols)) is None:
         got = f"rasters {_box(raster)}, roads {_box(lattice)}"
-        faults.add(where, "areas that overlap", got, "files of different areas")
-    faults.raise_if_any(InputError)
+        raise fail(InputError, where, "areas that overlap", got, "files of different areas")
+
+
+def note_misaligned(a: Lattice, b: Lattice, where: str, hint: str, faults: Faults) -> None:
+    """Note where two lattices differ in CRS or resolution, or are shifted by parts of a pixel."""
+    down, right = (a.north_m - b.north_m) / a.resolution_m, (b.west_m - a.west_m) / a.resolution_m
+    off_px = right - round(right), down - round(down)
+    if not same_crs(a.crs, b.crs):
+        faults.add(where, f"one CRS ({a.crs})", b.crs, "files of different zones")
+    elif abs(a.resolution_m - b.resolution_m) > 1e-6 * a.resolution_m:
+        got = f"{a.resolution_m:g} m and {b.resolution_m:g} m"
+        faults.add(where, "one resolution", got, hint)
+    elif max(abs(off_px[0]), abs(off_px[1])) > _ALIGNED_PX:
+        got = f"shifted by {off_px[0]:+.3f} and {off_px[1]:+.3f} pixels"
+        faults.add(where, "pixels that align", got, f"half-pixel convention; {hint}")
 
 
 def pixels_between(lattice: Lattice, other: Lattice) -> tuple[int, int]:

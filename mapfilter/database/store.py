@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import pyarrow as pa
 
-from mapfilter._io import left_aside, sha256_file
+from mapfilter._io import check_part, left_aside
 from mapfilter.database.manifest import CELLS, MANIFEST, read_manifest
 from mapfilter.database.parquet import count_rows, read_columns, write_columns
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -119,21 +119,14 @@ def info(database: RadioRouteDatabase) -> dict[str, Any]:
 def _check_parts(path: Path, parts: Sequence[Mapping[str, Any]], verify: str) -> None:
     faults = Faults()
     for part in parts:
-        file, size = path / part["path"], part["bytes"]
-        if not file.is_file():
-            faults.add(str(file), f"a file of {size} bytes", "no such file", "not copied whole")
-        elif file.stat().st_size != size:
-            got = f"{file.stat().st_size} bytes"
-            faults.add(str(file), f"{size} bytes", got, "cut off or overwritten")
-        elif verify == "full" and (digest := sha256_file(file)) != part["sha256"]:
-            expected = f"SHA-256 {part['sha256'][:12]}…"
-            faults.add(str(file), expected, f"{digest[:12]}…", "changed after it was written")
-        else:
-            try:
-                rows = count_rows(file)
-            except StoreError as error:
-                faults.found.extend(error.faults)
-                continue
-            if rows != part["rows"]:
-                faults.add(str(file), f"{part['rows']} rows", rows, "parts mixed up")
+        file = path / part["path"]
+        if not check_part(file, part, faults, full=verify == "full"):
+            continue
+        try:
+            rows = count_rows(file)
+        except StoreError as error:
+            faults.found.extend(error.faults)
+            continue
+        if rows != part["rows"]:
+            faults.add(str(file), f"{part['rows']} rows", rows, "parts mixed up")
     faults.raise_if_any(StoreError)

@@ -24,7 +24,7 @@ _AT_LEVELS = ("cell", "which", "level_dbm", "below_best_db")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TileTask:
-    """Everything a worker needs to make a tile; small enough to be sent to it.
+    """Inputs of a tile, small enough to be sent to a worker.
 
     ``plan`` has the cells of the ``rasters`` that reach the tile (any cell where none does), whose
     numbers in the whole plan are ``numbers``; ``window`` lies on the rasters' lattice.
@@ -42,16 +42,9 @@ class TileTask:
 class TileLevels:
     """Levels at a tile's N points: L of them in all.
 
-    Parameters
-    ----------
-    best : numpy.ndarray of int32, shape (N,)
-        Strongest cell, of equals the first in the plan; -1 when none is above the floor.
-    best_level_dbm, margin_db : numpy.ndarray of float32, shape (N,)
-        Its level, and how far it is above the second strongest; NaN without a second one.
-    cell, which : numpy.ndarray of int32, shape (L,)
-        Each level's cell, and its point as an index into the tile's points; sorted by both.
-    level_dbm, below_best_db : numpy.ndarray of float32, shape (L,)
-        Rounded to 0.01 dB.
+    Of each point: the strongest cell (of equals the first in the plan; -1 when none is above the
+    floor), its level, and its margin over the second strongest (NaN without one). Of each level,
+    sorted by both: its cell, and the index of its point; and the level, rounded to 0.01 dB.
     """
 
     best: Ints32

@@ -21,6 +21,12 @@ from mapfilter.positioning.estimate import TrackEstimate
 SUCCESS_RADIUS_M = 50.0
 """An error of at most this at the switch counts as success (section 6.2)."""
 
+RADII = (50, 67, 95)
+"""Per cent of the belief that the radii of an estimate hold."""
+
+_CLAIMS = (Status.CONVERGED, Status.TRACKING)
+_WINDOW_M = 100.0
+
 
 @dataclass(frozen=True, slots=True)
 class Truth:
@@ -110,7 +116,6 @@ def percentile_m(errors_m: Floats, share: float) -> float:
 
 def accuracy(estimate: TrackEstimate, truth: Truth) -> Accuracy:
     """Score one track."""
-    nan = float("nan")
     switch = estimate.converged_at
     if switch is None:
         return Accuracy(False, False, nan, nan, nan, nan, nan, nan, 0)
@@ -154,7 +159,7 @@ class Outcome:
     unused : dict
         How many readings were not used, by reason.
     unknown_cells : dict
-        How many readings name each serving cell that the database does not know.
+        How many readings name each serving cell that is not in the database.
     """
 
     final_status: str
@@ -170,8 +175,7 @@ class Outcome:
 
 
 def outcome(estimate: TrackEstimate) -> Outcome:
-    """Return what came of locating a track."""
-    nan = float("nan")
+    """Summarise a located track."""
     switch = estimate.converged_at
     statuses = Counter(estimate.status)
     located = np.flatnonzero(np.isfinite(estimate.east_m) & np.isfinite(estimate.north_m))[-1:]
@@ -189,13 +193,6 @@ def outcome(estimate: TrackEstimate) -> Outcome:
         dict(sorted(Counter(str(reading.reason) for reading in estimate.unused).items())),
         dict(sorted(Counter(unknown).items())),
     )
-
-
-RADII = (50, 67, 95)
-"""Per cent of the belief that the radii of an estimate hold."""
-
-_CLAIMS = (Status.CONVERGED, Status.TRACKING)
-_WINDOW_M = 100.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -90,18 +90,9 @@ def posterior_bound(
 
 
 def bound_of(covariances: Floats, components: Iterable[int]) -> Floats:
-    """Return the bound on the root mean square error of some components together.
+    """Return the bound on the root mean square error of some components together, shape (K,).
 
-    Parameters
-    ----------
-    covariances : (K, n, n) array
-    components : iterable of int
-        East and north for the position.
-
-    Returns
-    -------
-    (K,) array
-        Root of the sum of their variances.
+    It is the root of the sum of their variances in (K, n, n) covariances.
     """
     return np.asarray(np.sqrt(sum(covariances[:, index, index] for index in components)))
 
@@ -109,11 +100,7 @@ def bound_of(covariances: Floats, components: Iterable[int]) -> Floats:
 def rmse_over_time(estimates: Floats, states: Floats, components: Iterable[int]) -> Floats:
     """Return the root mean square error over trials at each step, shape (K,).
 
-    Parameters
-    ----------
-    estimates, states : (T, K, n) arrays
-    components : iterable of int
-        Whose squared errors are added.
+    Squared errors of the components of (T, K, n) estimates and states are added.
     """
     chosen = list(components)
     error = estimates[..., chosen] - states[..., chosen]

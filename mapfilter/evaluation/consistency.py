@@ -1,4 +1,4 @@
-"""Whether a filter is as sure as it should be: coverage, reliability, ranks and NEES.
+"""Calibration of a filter: coverage, reliability, ranks and NEES.
 
 A filter that reports "95 % within 10 m" must be right in 95 of 100 cases, no more and no less.
 Epochs of one track are not independent; take one, or few, of each track for intervals to hold.
@@ -60,13 +60,13 @@ class Reliability:
 
     Parameters
     ----------
-    said : float
+    predicted : float
         Mean of the probabilities in the bin.
     came_true, low, high : float
         Share of the cases that came true, and its 95 % Wilson interval.
     """
 
-    said: float
+    predicted: float
     cases: int
     came_true: float
     low: float
@@ -88,19 +88,19 @@ def reliability(
     Examples
     --------
     >>> points = reliability([0.1, 0.1, 0.95, 0.95], [False, False, True, True], bins=2)
-    >>> [(round(point.said, 2), point.cases, point.came_true) for point in points]
+    >>> [(round(point.predicted, 2), point.cases, point.came_true) for point in points]
     [(0.1, 2, 0.0), (0.95, 2, 1.0)]
     """
-    said = np.asarray(probabilities, dtype=np.float64)
-    true = np.asarray(outcomes, dtype=np.bool_)[np.isfinite(said)]
-    said = said[np.isfinite(said)]
-    place = np.minimum((said * bins).astype(np.int64), bins - 1)
+    predicted = np.asarray(probabilities, dtype=np.float64)
+    true = np.asarray(outcomes, dtype=np.bool_)[np.isfinite(predicted)]
+    predicted = predicted[np.isfinite(predicted)]
+    place = np.minimum((predicted * bins).astype(np.int64), bins - 1)
     points = []
     for which in np.unique(place):
         here = place == which
         cases, came = int(here.sum()), int(true[here].sum())
         low, high = wilson_interval(came, cases)
-        points.append(Reliability(float(said[here].mean()), cases, came / cases, low, high))
+        points.append(Reliability(float(predicted[here].mean()), cases, came / cases, low, high))
     return tuple(points)
 
 

@@ -8,7 +8,7 @@ judged twice:
 - by cells: those stay at which the serving cell of the truth would serve, too, within the
   database's margin, as in Khalaf-Allah (2007). Serving cells are as predicted. This is exact for
   the journeys that are drawn;
-- by levels: levels with errors as :class:`ErrorModel` tells them are drawn along the journey, and
+- by levels: levels with the errors of an :class:`ErrorModel` are drawn along the journey, and
   hypotheses weighed with their likelihood, the first report in full, later ones with the share of
   an independent look that their distance travelled brings. This weighing is an approximation.
 
@@ -40,14 +40,71 @@ from mapfilter.evaluation.radio_map import (
 )
 from mapfilter.options import Options, Positive
 
+_AT_A_TIME = 128
+_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _AHEAD_STEPS = 6
 _KEEP_ON = 2.5
 _TURN_BACK = 1e-3
 _HOPELESS = 30.0
 
 
-# In the kernels all places are pixels; a hypothesis is a possible start, and its place at any time
-# is that start, moved as the truth has moved.
+@dataclass(frozen=True, slots=True)
+class FirstFixOptions(Options):
+    """Journeys of the ideal filter, and when its position counts as clear.
+
+    Parameters
+    ----------
+    spacing_m : float
+        Of the starts: one in each square of this side that has a point.
+    journeys : int
+        From each start.
+    most_m : float
+        Journeys end here.
+    path_m : float
+        Length over which information is counted and twins are looked for.
+    apart_m : float
+        Twins are at least so far from each other.
+    mass : float
+        Share of the weights within 50 m of the heaviest hypothesis at which levels have decided.
+    """
+
+    spacing_m: Positive = 50.0
+    journeys: Annotated[int, Ge(1), Le(1000)] = 2
+    most_m: Annotated[float, Gt(0), Le(100_000)] = 1500.0
+    path_m: Positive = 100.0
+    apart_m: Positive = 200.0
+    mass: Annotated[float, Ge(0.5), Lt(1)] = 0.95
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FirstFix:
+    """Results of all journeys; S starts with J journeys each.
+
+    Parameters
+    ----------
+    start : numpy.ndarray of int64, shape (S,)
+        Points.
+    cells_m, levels_m : numpy.ndarray, shape (S, J)
+        Metres until it was clear; infinite where it never was.
+    right : numpy.ndarray of bool, shape (S, J)
+        Levels decided for a place at most 50 m off.
+    cells_bits, levels_bits : numpy.ndarray, shape (S, J)
+        Information on the start after ``path_m``, beyond the name of the first serving cell.
+    twin : numpy.ndarray of int64, shape (S, J)
+        The point at least ``apart_m`` away that looks most alike over ``path_m``; -1 where none is
+        left on the map.
+    twin_error : numpy.ndarray, shape (S, J)
+        Probability of taking the twin for the truth, or the reverse: 0.5 is a perfect twin.
+    """
+
+    start: Ints
+    cells_m: Floats
+    levels_m: Floats
+    right: Bools
+    cells_bits: Floats
+    levels_bits: Floats
+    twin: Ints
+    twin_error: Floats
 
 
 @njit(cache=True)
@@ -59,6 +116,7 @@ def walk(rng, on_way, row, col, resolution_m, most_m):  # type: ignore[no-untype
     Returns
     -------
     rows, cols : numpy.ndarray of int64, shape (K,)
+        Pixels, the start first.
     gone_m : numpy.ndarray, shape (K,)
         Metres travelled to each.
     """
@@ -280,74 +338,6 @@ def _without_hopeless(  # type: ignore[no-untyped-def]
     return kept
 
 
-_AT_A_TIME = 128
-_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
-
-
-@dataclass(frozen=True, slots=True)
-class FirstFixOptions(Options):
-    """What is tried, and when it counts as clear.
-
-    Parameters
-    ----------
-    spacing_m : float
-        Of the starts: one in each square of this side that has a point.
-    journeys : int
-        From each start.
-    most_m : float
-        Journeys end here.
-    path_m : float
-        Length over which information is counted and twins are looked for.
-    apart_m : float
-        Twins are at least so far from each other.
-    mass : float
-        Share of the weights within 50 m of the heaviest hypothesis at which levels have decided.
-
-    Raises
-    ------
-    ConfigError
-        With every value that is out of range.
-    """
-
-    spacing_m: Positive = 50.0
-    journeys: Annotated[int, Ge(1), Le(1000)] = 2
-    most_m: Annotated[float, Gt(0), Le(100_000)] = 1500.0
-    path_m: Positive = 100.0
-    apart_m: Positive = 200.0
-    mass: Annotated[float, Ge(0.5), Lt(1)] = 0.95
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FirstFix:
-    """What came of all journeys; S starts with J journeys each.
-
-    Parameters
-    ----------
-    start : numpy.ndarray of int64, shape (S,)
-        Points.
-    cells_m, levels_m : numpy.ndarray, shape (S, J)
-        Metres until it was clear; infinite where it never was.
-    right : numpy.ndarray of bool, shape (S, J)
-        Levels decided for a place at most 50 m off.
-    cells_bits, levels_bits : numpy.ndarray, shape (S, J)
-        Information on the start after ``path_m``, beyond the name of the first serving cell.
-    twin : numpy.ndarray of int64, shape (S, J)
-        The point at least ``apart_m`` away that looks most alike over ``path_m``; -1 where none is
-        left on the map.
-    twin_error : numpy.ndarray, shape (S, J)
-        Probability of taking the twin for the truth, or the reverse: 0.5 is a perfect twin.
-    """
-
-    start: Ints
-    cells_m: Floats
-    levels_m: Floats
-    right: Bools
-    cells_bits: Floats
-    levels_bits: Floats
-    twin: Ints
-    twin_error: Floats
-
-
 def starts(radio: RadioMap, spacing_m: float) -> Ints:
     """Return one point for each square of a side that has any, in row-major order.
 
@@ -356,9 +346,7 @@ def starts(radio: RadioMap, spacing_m: float) -> Ints:
     side_px = max(round(spacing_m / radio.lattice.resolution_m), 1)
     squares_across = radio.lattice.cols // side_px + 1
     square = radio.row // side_px * squares_across + radio.col // side_px
-    mixed = (np.arange(len(radio), dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(
-        40
-    )
+    mixed = (np.arange(len(radio), dtype=np.uint64) * _GOLDEN) >> np.uint64(40)
     order = np.lexsort((mixed, square))
     _, first = np.unique(square[order], return_index=True)
     return np.sort(order[first]).astype(np.int64)
@@ -397,16 +385,9 @@ def first_fix(
         found[part] = _try_all(rng, start[part], options.journeys, own, walked, levels, judgement)
         if progress is not None:
             progress(min(begin + _AT_A_TIME, start.size), start.size)
-    return FirstFix(
-        start,
-        found[..., 0],
-        found[..., 2],
-        found[..., 3] > 0,
-        found[..., 1],
-        found[..., 4],
-        found[..., 5].astype(np.int64),
-        found[..., 6],
-    )
+    cells_m, cells_bits, levels_m, right, levels_bits, twin, error = np.moveaxis(found, 2, 0)
+    ids = twin.astype(np.int64)
+    return FirstFix(start, cells_m, levels_m, right > 0, cells_bits, levels_bits, ids, error)
 
 
 @njit(cache=True)

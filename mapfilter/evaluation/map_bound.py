@@ -1,6 +1,6 @@
 """Where a radio map will work, before anybody drives: all bounds together, by point and by way.
 
-Of two places that differ by levels d, one report with error covariance S tells which it is with
+Of two places that differ by levels d, one report with error covariance S decides which it is with
 a probability of error of at most half the Bhattacharyya coefficient, exp(-d' S⁻¹ d / 8) (Kailath
 1967, "The divergence and Bhattacharyya distance measures in signal selection"). A point's bits are
 minus the logarithm of the mean of these over the places of its cell: with b bits, one place in 2^b
@@ -37,10 +37,24 @@ from mapfilter.rasters.geotiff import new_geotiff
 
 COMPARED = 500
 
+TWIN_ERROR = 0.3
+"""Two places count as twins when they are mistaken for each other with at least this chance."""
+
+BANDS = (
+    ("plane_bound_m", "m"),
+    ("along_bound_m", "m"),
+    ("cell_bits", "bit"),
+    ("level_bits", "bit"),
+    ("cells_to_fix_m", "m"),
+    ("levels_to_fix_m", "m"),
+    ("twin_error", ""),
+)
+"""What the raster holds, in the order of its bands, with units."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Distinctness:
-    """What one report tells at each point, shape (N,) each, in the order of the points.
+    """Information of one report at each point, shape (N,) each, in the order of the points.
 
     Parameters
     ----------
@@ -56,7 +70,7 @@ class Distinctness:
 
 
 def distinctness(radio: RadioMap, errors: ErrorModel) -> Distinctness:
-    """Return what one report tells at every point of a radio map."""
+    """Return the information of one report at every point of a radio map."""
     first, point = radio.points_by_cell()
     counts = np.diff(first)
     chosen = [
@@ -100,22 +114,7 @@ def _mean_overlap(  # type: ignore[no-untyped-def]
     return mean
 
 
-TWIN_ERROR = 0.3
-"""Two places count as twins when they are mistaken for each other with at least this chance."""
-
-BANDS = (
-    ("plane_bound_m", "m"),
-    ("along_bound_m", "m"),
-    ("cell_bits", "bit"),
-    ("level_bits", "bit"),
-    ("cells_to_fix_m", "m"),
-    ("levels_to_fix_m", "m"),
-    ("twin_error", ""),
-)
-"""What the raster holds, in the order of its bands, with units."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class MapBound:
     """What a radio map is good for."""
 
@@ -124,6 +123,11 @@ class MapBound:
     position: PositionBound
     distinct: Distinctness
     fix: FirstFix
+
+    def __repr__(self) -> str:
+        """Return the numbers of points and starts, and the place, in one line."""
+        sizes = f"{self.radio.row.size} points, {self.fix.start.size} starts"
+        return f"<MapBound: {sizes}, {self.radio.lattice}>"
 
     def at_points(self) -> dict[str, Floats]:
         """Return the columns of :data:`BANDS`, shape (N,) each.
@@ -223,7 +227,6 @@ def bound(
 
     Parameters
     ----------
-    database : RadioRouteDatabase
     errors : ErrorModel, optional
         Assumed errors of the predicted levels: 7 dB, correlated over 50 m.
     options : FirstFixOptions, optional
@@ -232,12 +235,6 @@ def bound(
         Of these journeys.
     progress : callable, optional
         Called with starts done and starts in all.
-
-    Returns
-    -------
-    MapBound
-        :meth:`~MapBound.to_dataframe` by point, :meth:`~MapBound.by_way`, and
-        :meth:`~MapBound.twins`: places that look alike.
 
     Raises
     ------

@@ -19,7 +19,7 @@ from mapfilter._types import Floats
 from mapfilter.evaluation.radio_map import MOST_RECEIVED, ErrorModel, RadioMap, received_cells
 
 _STREET_M = 25.0
-# A fit across less than this share of the window says nothing of that direction.
+# A fit across less than this share of the window determines no slope in that direction.
 _NARROW = 0.25
 
 
@@ -30,10 +30,10 @@ class PositionBound:
     Parameters
     ----------
     plane_m : numpy.ndarray
-        Root of the trace of J⁻¹: both directions unknown. Infinite where one direction cannot be
-        told at all.
+        Root of the trace of J⁻¹: both directions unknown. Infinite where levels carry no
+        information along one of them.
     along_m : numpy.ndarray
-        For who knows the street, and only not where along it; infinite likewise.
+        Where the street is known, and only the place along it is not; infinite likewise.
     """
 
     plane_m: Floats
@@ -132,9 +132,9 @@ def _bounds(  # type: ignore[no-untyped-def]
             plane[i] = np.sqrt((j_rr + j_cc) / determinant)
         street = 0.5 * np.arctan2(2 * axis_rc, axis_rr - axis_cc)
         cos, sin = np.cos(street), np.sin(street)
-        told = j_rr * cos * cos + 2 * j_rc * cos * sin + j_cc * sin * sin
-        if axis_rr + axis_cc > 0 and told > 0:
-            along[i] = 1.0 / np.sqrt(told)
+        gained = j_rr * cos * cos + 2 * j_rc * cos * sin + j_cc * sin * sin
+        if axis_rr + axis_cc > 0 and gained > 0:
+            along[i] = 1.0 / np.sqrt(gained)
     return plane, along
 
 

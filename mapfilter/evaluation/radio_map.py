@@ -1,4 +1,4 @@
-"""A radio map as bounds see it: where one can be, what is received there, how wrong that may be."""
+"""Radio maps for bounds: where a phone can be, levels received there, and their errors."""
 
 from __future__ import annotations
 
@@ -37,11 +37,6 @@ class ErrorModel(Options):
         > 0.
     site_share : float
         Share of the variance that is common to a site's cells, at least 0 and below 1.
-
-    Raises
-    ------
-    ConfigError
-        With every value that is out of range.
     """
 
     deviation_db: Positive = 7.0
@@ -115,6 +110,7 @@ class RadioMap:
         first : numpy.ndarray of int64, shape (C + 1,)
             Those of cell c are ``point[first[c]:first[c + 1]]``.
         point : numpy.ndarray of int64
+            Indices of points, cell by cell.
         """
         level = self.level_dbm[self.row, self.col]
         best = level.max(axis=1, keepdims=True)

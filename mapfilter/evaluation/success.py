@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from itertools import takewhile
 from math import sqrt
 from typing import Any
 
@@ -15,6 +16,9 @@ from numpy.typing import ArrayLike
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M, Accuracy
 
 _Z_95 = 1.959963984540054
+
+HEADING = "sigma_orient_deg"
+"""The coordinate over which tables and figures show success."""
 
 
 def wilson_interval(successes: int, runs: int, z: float = _Z_95) -> tuple[float, float]:
@@ -49,7 +53,7 @@ def wilson_interval_of_routes(
     Returns
     -------
     low, high : float
-        NaN for a single route, which tells nothing of others.
+        NaN for a single route.
 
     Examples
     --------
@@ -156,22 +160,31 @@ def _mean(values: Sequence[float]) -> float:
     return float(np.mean(values)) if values else float("nan")
 
 
-COORDINATES = (
-    "database",
-    "radio",
-    "prediction_error_db",
-    "report_period_s",
-    "imu_period_s",
-    "filter",
-    "reading",
-    "update_length_m",
-    "sigma_trans_m",
-    "sigma_orient_deg",
-    "bias_sd_deg",
-    "drift_deg_per_sqrt_s",
-    "scale",
-)
-"""Columns that tell the cells of a grid apart, beside those of varied options."""
+def axes_of(cells: Sequence[SuccessCell], *, by_reading: bool = False) -> list[str]:
+    """Return the coordinates in which cells differ; a varied option stands for its own column.
+
+    Parameters
+    ----------
+    by_reading : bool
+        Where readings differ, leave out what all cells of each reading have in common.
+    """
+    places = [cell.place for cell in cells]
+    names = list(places[0]) if places else []
+    own = {name.partition(".")[2] for name in names if "." in name} - {HEADING}
+    axes = [
+        name
+        for name in names
+        if name not in own and len({repr(place[name]) for place in places}) > 1
+    ]
+    if not (by_reading and "reading" in axes):
+        return axes
+    readings = {cell.reading for cell in cells}
+    return [
+        name
+        for name in axes
+        if name in ("reading", HEADING)
+        or len({(place["reading"], repr(place[name])) for place in places}) > len(readings)
+    ]
 
 
 def varied_keys(runs: pd.DataFrame) -> list[str]:
@@ -232,6 +245,17 @@ class SuccessCell:
     error_95_m: float
     switch_distance_m: float
     varied: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def place(self) -> dict[str, Any]:
+        """Coordinates in the grid, varied options included."""
+        return {name: getattr(self, name) for name in COORDINATES} | self.varied
+
+
+COORDINATES = tuple(
+    takewhile(lambda name: name != "runs", (one.name for one in fields(SuccessCell)))
+)
+"""Columns that define the cells of a grid, beside those of varied options."""
 
 
 def success_cells(runs: pd.DataFrame) -> tuple[SuccessCell, ...]:

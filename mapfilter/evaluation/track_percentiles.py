@@ -46,6 +46,7 @@ def percentile_of_tracks(errors_m: Floats, counted: Bools, share: float) -> Perc
     errors_m : (T, K) array
         By track and epoch; NaN is worse than any error.
     counted : (T, K) array of bool
+        Epochs that count.
 
     Raises
     ------

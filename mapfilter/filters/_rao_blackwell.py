@@ -112,18 +112,11 @@ def propagate(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def gains(slope: Floats, covariance: Floats, noise: Floats) -> tuple[Floats, Floats, Floats, float]:
-    """Return what a linear reading, of slope C (m, n) and noise R, makes of a covariance P.
+    """Return the update of a covariance P by a linear reading of slope C (m, n) and noise R.
 
-    Returns
-    -------
-    inverse : (m, m) array
-        L⁻¹ with ``L Lᵀ = C P Cᵀ + R``.
-    gain : (n, m) array
-        ``P Cᵀ L⁻ᵀ``, the gain for residuals whitened by L⁻¹.
-    updated : (n, n) array
-        ``P - P Cᵀ (L Lᵀ)⁻¹ C P``.
-    log_root : float
-        Logarithm of the determinant of L; NaN where there is none.
+    These are L⁻¹ (m, m) with ``L Lᵀ = C P Cᵀ + R``; ``P Cᵀ L⁻ᵀ`` (n, m), the gain for residuals
+    whitened by L⁻¹; the covariance ``P - P Cᵀ (L Lᵀ)⁻¹ C P``; and the logarithm of the
+    determinant of L, NaN where there is none.
     """
     m, n = slope.shape
     factor, inverse = np.zeros((m, m)), np.zeros((m, m))
@@ -162,22 +155,12 @@ def gains(slope: Floats, covariance: Floats, noise: Floats) -> tuple[Floats, Flo
 
 
 class Weighing(NamedTuple):
-    """A reading of m components as :func:`weigh` takes it.
+    """A reading of m components, all of them present, as :func:`weigh` takes it.
 
-    Parameters
-    ----------
-    slots, uses, rows, patterns
-        As in :class:`mapfilter.filters.trials.CompiledMeasurement`.
-    reading : (m,) array
-        All of it present.
-    inverse : (m, m) array
-        Inverse of the lower Cholesky factor of the reading's covariance.
-    corrected : (u,) integer array
-        Components that are corrected.
-    gain : (u, m) array
-        Their gains for whitened residuals.
-    loading : Entries
-        What else of the state adds to the reading.
+    The first four fields are those of :class:`mapfilter.filters.trials.CompiledMeasurement`.
+    ``inverse`` is that of the lower Cholesky factor of the reading's covariance; ``corrected`` are
+    the components to correct, with their gains for whitened residuals, (u, m); ``loading`` is what
+    else of the state adds to the reading.
     """
 
     slots: Ints

@@ -1,8 +1,7 @@
 """Updates of Kalman-type filters and whole runs of them, compiled, for a block of lanes.
 
-Each update is compiled when it is first wanted, see :func:`kernel_of`. All have the signature
-:data:`UPDATE_SIGNATURE`: a measurement, the problem, a reading (m, W), NaN where absent, and the
-beliefs, which they change.
+Each update has the signature :data:`UPDATE_SIGNATURE`: a measurement, the problem, a reading
+(m, W), NaN where absent, and the beliefs, which it changes.
 """
 
 from __future__ import annotations
@@ -33,6 +32,8 @@ from mapfilter.filters._square_root import (
 )
 from mapfilter.filters.gaussian import Method
 
+_CONVERGED = 1e-9
+_ROUNDING = 1e-8
 VECTOR, MATRIX, BLOCK, INDEX = float64[::1], float64[:, ::1], float64[:, :, ::1], int64[::1]
 TYPES: Any = types
 _SENSOR, _METHOD = (INDEX, INDEX, MATRIX, VECTOR, MATRIX, boolean), (int64, float64, float64)
@@ -43,6 +44,7 @@ _MEASURE = types.FunctionType(MEASURE_SIGNATURE)
 UPDATE_SIGNATURE = void(_MEASURE, _PROBLEM, MATRIX, _LANES)
 RUN = (types.FunctionType(UPDATE_SIGNATURE), _MEASURE, _PROBLEM)
 """What compiled runs take first: the update, the measurement and the problem."""
+_FOUND = TYPES.Tuple((BLOCK, float64[:, :, :, ::1], MATRIX, MATRIX))
 
 
 @kernel
@@ -69,7 +71,7 @@ def _linear(
 def _solve_and_correct(
     present: Bools, noise_factor: Floats, seen: Floats, residual: Floats, lanes: Lanes
 ) -> None:
-    """Take in a whitened linear measurement ``r = A z + v``."""
+    """Update by a whitened linear measurement ``r = A z + v``."""
     information, half, z = solve_lanes(seen, residual)
     evidence_lanes(present, noise_factor, residual, information, half, lanes)
     correct_lanes(information, z, lanes)
@@ -82,10 +84,6 @@ def _linearised(measure: Any, problem: Problem, reading: Floats, lanes: Lanes) -
     points = lanes.mean[problem.uses]
     seen, residual = _linear(measure, problem, points, reading, present, noise_factor, lanes.lower)
     _solve_and_correct(present, noise_factor, seen, residual, lanes)
-
-
-_CONVERGED = 1e-9
-_ROUNDING = 1e-8
 
 
 def _iterated(measure: Any, problem: Problem, reading: Floats, lanes: Lanes) -> None:
@@ -146,7 +144,7 @@ def _iterated(measure: Any, problem: Problem, reading: Floats, lanes: Lanes) -> 
         if open_lanes == 0:
             break
     evidence_lanes(present, noise_factor, r, information, half, lanes)
-    correct_lanes(information, target if problem.iterations == 1 else trial, lanes)
+    correct_lanes(information, trial, lanes)
 
 
 def _by_sigma_points(measure: Any, problem: Problem, reading: Floats, lanes: Lanes) -> None:
@@ -215,7 +213,7 @@ def _compiled(update: Callable[..., None]) -> Callable[..., None]:
 
 
 def kernel_of(method: Method) -> Callable[..., None]:
-    """Return the compiled update; each is compiled when it is first wanted."""
+    """Return the compiled update; each is compiled at its first use."""
     if method.sigma is not None:
         return _compiled(_by_sigma_points)
     return _compiled(_iterated if method.iterations > 1 else _linearised)
@@ -255,9 +253,6 @@ def advance(
                     factor[i, j, w] = lower[i, j, w] if j <= i else 0.0
 
 
-_FOUND = TYPES.Tuple((BLOCK, float64[:, :, :, ::1], MATRIX, MATRIX))
-
-
 @njit([_FOUND(*RUN, BLOCK, MATRIX, BLOCK, boolean)], cache=True, nogil=True, error_model="numpy")
 def run_lanes(
     update: Any,
@@ -270,26 +265,10 @@ def run_lanes(
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Predict and update over all steps.
 
-    Parameters
-    ----------
-    update : callable
-        Of :func:`kernel_of`.
-    measure : callable
-        With :data:`mapfilter._kernels.MEASURE_SIGNATURE`.
-    problem : Problem
-    readings : (K, m, W) array
-        NaN where absent.
-    mean, factor : (n, W) and (n, n, W) arrays
-        The first beliefs; changed.
-    keep : bool
-        Whether to keep covariances.
-
-    Returns
-    -------
-    means : (K, n, W) array
-    covariances : (K or 0, W, n, n) array
-    evidence, nis : (K, W) arrays
-        NaN where an update failed and the prediction was kept.
+    Readings are (K, m, W), NaN where absent; the first beliefs, (n, W) and (n, n, W), are changed.
+    Return means (K, n, W), covariances (K, W, n, n), with K = 0 unless they are kept, and evidence
+    and normalised innovations squared (K, W), NaN where an update failed and the prediction was
+    kept.
     """
     steps, (n, lanes) = readings.shape[0], mean.shape
     means = np.empty((steps, n, lanes))

@@ -26,6 +26,9 @@ from mapfilter._types import Floats, Ints
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
 from mapfilter.options import NotNegative, Options
 
+_UNKNOWN_COVARIANCE_M2: Floats = np.full((2, 2), nan)
+_UNKNOWN_RADII_M: Floats = np.full(3, nan)
+
 
 @dataclass(frozen=True, slots=True)
 class CandidateOptions(Options):
@@ -126,10 +129,6 @@ class CandidateBelief:
     heading_rad: float = nan
 
 
-_UNKNOWN_COVARIANCE_M2: Floats = np.full((2, 2), nan)
-_UNKNOWN_RADII_M: Floats = np.full(3, nan)
-
-
 @dataclass(frozen=True, slots=True)
 class CandidateSearch:
     """Tables 2 and 3 of Khalaf-Allah (2007), as a filter of the common contract.
@@ -139,7 +138,7 @@ class CandidateSearch:
     Parameters
     ----------
     points_of : callable
-        Returns the points of a cell, or None for a cell that the database does not know.
+        Returns the points of a cell, or None for a cell that is not in the database.
     options : CandidateOptions
         The reading of the paper.
     resolution_m : float
@@ -256,8 +255,8 @@ class CandidateSearch:
     ) -> tuple[CandidateBelief, UpdateInfo]:
         """Move and match the one position (Table 3, lines 4–9).
 
-        Table 3 knows no travelled distance: each step moves by its own signed length along its own
-        heading, so steps between two matches add up as vectors.
+        In Table 3 each step moves by its own signed length along its own heading, so steps between
+        two matches add up as vectors.
         """
         length_m = self.options.tracking_length_m
         if belief.travelled_m < (self.options.update_length_m if length_m is None else length_m):

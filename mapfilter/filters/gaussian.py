@@ -17,14 +17,7 @@ from mapfilter.options import Options, Positive
 
 @dataclass(frozen=True, eq=False)
 class Gaussian:
-    """A belief: a mean and a covariance.
-
-    Parameters
-    ----------
-    mean : (n,) array
-    covariance : (n, n) array
-        Symmetric, without negative eigenvalues.
-    """
+    """A belief: mean (n,) and covariance (n, n), symmetric and without negative eigenvalues."""
 
     mean: Floats
     covariance: Floats
@@ -68,23 +61,6 @@ class SigmaPoints(Options):
     def bend_weight(self) -> float:
         """Weight of the squared mean shift in the covariance, β - α²."""
         return self.beta - self.alpha**2
-
-    def weights(self, size: int) -> tuple[Floats, Floats]:
-        """Return the weights of means and of covariances, each (2 n + 1,).
-
-        Examples
-        --------
-        >>> mean, covariance = SigmaPoints(1.0, 2.0, 0.0).weights(2)
-        >>> mean.tolist(), covariance.tolist()
-        ([0.0, 0.25, 0.25, 0.25, 0.25], [2.0, 0.25, 0.25, 0.25, 0.25])
-        """
-        self.spread(size)
-        wide = self.alpha**2 * (size + self.kappa)
-        mean = np.full(2 * size + 1, 1 / (2 * wide))
-        mean[0] = (wide - size) / wide
-        covariance = mean.copy()
-        covariance[0] += 1 - self.alpha**2 + self.beta
-        return mean, covariance
 
 
 CUBATURE = SigmaPoints(1.0, 0.0, 0.0)

@@ -1,8 +1,8 @@
 """Gaussian sums: a belief as a mixture, each component a Kalman-type filter of its own.
 
-Where a start is so vague that measurements bend strongly over it, one Gaussian goes wrong and stays
-so. A Gaussian sum cuts the start into narrow components, updates each by itself and weighs them by
-the evidence of their readings (Alspach & Sorenson 1972). Components that have lost all weight are
+Where the start is so uncertain that measurements are strongly nonlinear over it, a single Gaussian
+diverges. A Gaussian sum cuts the start into narrow components, updates each by itself and weighs
+them by the evidence of their readings (Alspach & Sorenson 1972). Components without weight are
 dropped.
 """
 
@@ -26,21 +26,12 @@ from mapfilter.filters.trials import CompiledMeasurement, checked_sizes, problem
 
 _WIDEST = 0.9
 """Largest deviation of a part, as a share of that of the whole."""
+_FOUND = TYPES.Tuple((MATRIX, BLOCK, VECTOR, INDEX))
 
 
 @dataclass(frozen=True, eq=False)
 class Mixture:
-    """Weighted Gaussians of n components of the state.
-
-    Parameters
-    ----------
-    weights : (c,) array
-        They sum to one.
-    means : (c, n) array
-        Means of the components.
-    covariance : (n, n) array
-        Of each of them.
-    """
+    """Gaussians of weights (c,) that sum to one, means (c, n) and one covariance (n, n)."""
 
     weights: Floats
     means: Floats
@@ -166,9 +157,6 @@ def _moments(
             covariance[j, i] = covariance[i, j]
 
 
-_FOUND = TYPES.Tuple((MATRIX, BLOCK, VECTOR, INDEX))
-
-
 @njit(
     [_FOUND(*RUN, MATRIX, MATRIX, BLOCK, VECTOR, float64)],
     cache=True,
@@ -187,25 +175,10 @@ def _run_mixture(
 ) -> tuple[Floats, Floats, Floats, Ints]:
     """Predict, update and reweigh the components of one belief over all steps.
 
-    Parameters
-    ----------
-    update, measure, problem
-        As :func:`mapfilter.filters._updates.run_lanes` takes them.
-    readings : (K, m) array
-        NaN where absent.
-    mean, factor, weight : (n, W), (n, n, W) and (W,) arrays
-        The first components; changed.
-    least : float
-        Components of less weight are dropped.
-
-    Returns
-    -------
-    means, covariances : (K, n) and (K, n, n) arrays
-        Moments of the mixture.
-    evidence : (K,) array
-        NaN where no component could take the reading.
-    counts : (K,) integer array
-        How many components are left.
+    Readings are (K, m), NaN where absent; the first components, (n, W), (n, n, W) and (W,), are
+    changed, and those of less weight than ``least`` are dropped. Return moments of the mixture,
+    (K, n) and (K, n, n), evidence (K,), NaN where no component could be updated, and the numbers
+    of components left (K,).
     """
     n, (steps, m) = mean.shape[0], readings.shape
     means, covariances = np.empty((steps, n)), np.empty((steps, n, n))
@@ -236,10 +209,8 @@ class MixtureRun:
 
     Parameters
     ----------
-    means : (T, K, n) array
-        Means of the mixtures.
-    covariances : (T, K, n, n) array
-        Covariances of the mixtures.
+    means, covariances : (T, K, n) and (T, K, n, n) arrays
+        Moments of the mixtures.
     evidence : (T, K) array
         Log density of each reading given those before it.
     counts : (T, K) integer array

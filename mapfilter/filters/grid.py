@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isfinite, nan
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +19,11 @@ from scipy.special import ndtr
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
 from mapfilter.filters.hypotheses import BeliefSummary, Bins, empty_summary, summarise
-from mapfilter.filters.particle import ParticleOptions, switched
+from mapfilter.filters.particle import ParticleOptions, PriorT, ReadingT, WeighingModel, switched
 
 _REACH_SD = 4.0
 _READ_INTO_PIXELS = 1 / 6
+_LEAST_MASS = 1e-9
 
 
 def taps(shift_px: float, sd_px: float) -> tuple[int, Floats32]:
@@ -76,12 +77,6 @@ def turned(mass: Floats32, first: int, taps: Floats32, *, circular: bool) -> Flo
     )
 
 
-PriorT = TypeVar("PriorT", contravariant=True)
-ReadingT = TypeVar("ReadingT", contravariant=True)
-
-_LEAST_MASS = 1e-9
-
-
 @dataclass(frozen=True, slots=True)
 class Transport:
     """Effect of one stretch of dead reckoning on mass.
@@ -109,12 +104,8 @@ class Transport:
     come_back: float
 
 
-class GridModel(Protocol[PriorT, ReadingT]):
+class GridModel(WeighingModel[ReadingT], Protocol[PriorT, ReadingT]):
     """Motion, map and measurements, as a grid filter needs them."""
-
-    @property
-    def bins(self) -> Bins:
-        """The area, in bins."""
 
     @property
     def bias_rad(self) -> Floats:
@@ -133,12 +124,6 @@ class GridModel(Protocol[PriorT, ReadingT]):
     def transport(self, east_m: float, north_m: float, length_m: float) -> Transport:
         """Return the effect of a displacement by dead reckoning, of some length."""
 
-    def weigh(self, state: Floats32, log_weight: Floats, reading: ReadingT) -> Reason:
-        """Add a reading's log-likelihood to the log weights, in place; return why not, if so."""
-
-    def can_converge(self, summary: BeliefSummary) -> bool:
-        """Return whether a belief may count as having converged, if it agrees on a place."""
-
 
 @dataclass(frozen=True, eq=False)
 class GridBelief:
@@ -148,8 +133,6 @@ class GridBelief:
     ----------
     on, off : ndarray of float32, shape (B, rows, cols)
         Mass of those on and off the map; together they sum to one after an update.
-    model : GridModel
-        Motion, map and measurements.
     waiting_m : (float, float, float)
         Displacement east and north, and its length, that mass has not been moved by yet.
     travelled_m, log_evidence, status, agreement_start_m
@@ -307,6 +290,4 @@ class GridFilter(Generic[PriorT, ReadingT]):
 
     def locate(self, belief: GridBelief) -> Estimate:
         """Return the leading hypothesis."""
-        found = belief.summary
-        east_m, north_m = float(found.mean[0]), float(found.mean[1])
-        return Estimate(east_m, north_m, found.covariance_m2, found.radii_m)
+        return belief.summary.estimate

@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 
 from mapfilter._types import Floats, Floats32, Ints32
+from mapfilter.filters.contract import Estimate
 
 NEAR_M = 50.0
 SHARES = (0.50, 0.67, 0.95)
@@ -77,21 +78,20 @@ class BeliefSummary(NamedTuple):
 
     @property
     def effective_bins(self) -> float:
-        """Return two to the power of the entropy: how many bins the belief covers."""
+        """Number of bins that the belief covers: two to the power of the entropy."""
         return float(2.0**self.entropy_bits)
+
+    @property
+    def estimate(self) -> Estimate:
+        """The leading hypothesis."""
+        east_m, north_m = float(self.mean[0]), float(self.mean[1])
+        return Estimate(east_m, north_m, self.covariance_m2, self.radii_m)
 
 
 def summarise(state: Floats32, weight: Floats32, bins: Bins) -> BeliefSummary:
-    """Summarise a cloud.
+    """Summarise a cloud (R, N), whose first two rows are east and north; its weights sum to one.
 
-    Parameters
-    ----------
-    state : ndarray of float32, shape (R, N)
-        The first two rows are east and north.
-    weight : ndarray of float32, shape (N,)
-        Summing to one.
-    bins : Bins
-        The area that holds the cloud; what lies beyond counts to the bins at its edge.
+    Particles beyond the bins count to those at the edge.
     """
     return BeliefSummary(*_summarise(state, weight, bins))
 

@@ -18,14 +18,14 @@ from mapfilter.filters.trials import CompiledMeasurement, run_trials
 
 
 class Taken(NamedTuple):
-    """What an update made of a reading.
+    """Outcome of an update.
 
     Parameters
     ----------
     evidence : float
-        Log density of the reading before it was known; NaN where it could not be taken in.
+        Log density of the reading given those before it; NaN where the update failed.
     nis : float
-        Normalised innovation squared, of as many degrees of freedom as components were there.
+        Normalised innovation squared, of as many degrees of freedom as components are present.
     """
 
     evidence: float
@@ -42,14 +42,8 @@ def predict(
 ) -> Gaussian:
     """Return the belief after linear motion: ``Φ m + u``, ``Φ P Φᵀ + Q``.
 
-    Parameters
-    ----------
-    belief : Gaussian
-        Mean m and covariance P.
-    transition, process : (n, n) arrays
-        Φ and Q.
-    shift : (n,) array_like
-        u, such as the displacement by dead reckoning.
+    The transition is Φ, the process noise Q, and the shift u, such as the displacement by dead
+    reckoning.
 
     Examples
     --------

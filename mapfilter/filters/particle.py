@@ -25,6 +25,8 @@ from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
 from mapfilter.options import NotNegative, Options, Positive, Probability
 
 _Count = Annotated[int, Ge(1)]
+PriorT = TypeVar("PriorT", contravariant=True)
+ReadingT = TypeVar("ReadingT", contravariant=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,18 +84,8 @@ def switched(
 ) -> tuple[Status, float]:
     """Return the status after an update, and at which distance the switch rule began to hold.
 
-    Parameters
-    ----------
-    status : Status
-        Before the update.
-    travelled_m : float
-        Distance travelled so far.
-    agreement_start_m : float
-        Distance travelled when the rule began to hold; NaN where it does not.
-    agrees : bool
-        Whether it holds now.
-    hold_m : float
-        For how many metres it must hold.
+    The distance is NaN where the rule does not hold; ``agrees`` is whether it holds now, ``hold_m``
+    for how many metres it must.
 
     Examples
     --------
@@ -110,16 +102,22 @@ def switched(
     return (Status.CONVERGED if held else Status.SEARCHING), since_m
 
 
-PriorT = TypeVar("PriorT", contravariant=True)
-ReadingT = TypeVar("ReadingT", contravariant=True)
-
-
-class ParticleModel(Protocol[PriorT, ReadingT]):
-    """Motion, map and measurements, as a particle filter needs them."""
+class WeighingModel(Protocol[ReadingT]):
+    """Map and measurements, as particle and grid filters need them."""
 
     @property
     def bins(self) -> Bins:
         """The area, in bins."""
+
+    def weigh(self, state: Floats32, log_weight: Floats, reading: ReadingT) -> Reason:
+        """Add a reading's log-likelihood to the log weights, in place; return why not, if so."""
+
+    def can_converge(self, summary: BeliefSummary) -> bool:
+        """Return whether a belief may count as having converged, if it agrees on a place."""
+
+
+class ParticleModel(WeighingModel[ReadingT], Protocol[PriorT, ReadingT]):
+    """Motion, map and measurements, as a particle filter needs them."""
 
     def start(self, prior: PriorT, most: int, rng: np.random.Generator) -> tuple[Floats32, Floats]:
         """Return the first particles, shape (R, N), and their log weights, shape (N,)."""
@@ -128,12 +126,6 @@ class ParticleModel(Protocol[PriorT, ReadingT]):
         self, state: Floats32, log_weight: Floats, motion: MotionStep, key: np.uint64
     ) -> tuple[Floats32, Floats]:
         """Return particles and log weights after a step of finite length."""
-
-    def weigh(self, state: Floats32, log_weight: Floats, reading: ReadingT) -> Reason:
-        """Add a reading's log-likelihood to the log weights, in place; return why not, if so."""
-
-    def can_converge(self, summary: BeliefSummary) -> bool:
-        """Return whether a belief may count as having converged, if it agrees on a place."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,8 +144,6 @@ class ParticleBelief:
         By dead reckoning since the start.
     log_evidence : float
         Log probability of all readings so far.
-    status : Status
-        Where the filter stands.
     agreement_start_m : float
         Distance travelled when the switch rule began to hold; NaN where it does not.
     """
@@ -186,15 +176,7 @@ class ParticleBelief:
 
 @dataclass(frozen=True, slots=True)
 class ParticleFilter(Generic[PriorT, ReadingT]):
-    """A regularised particle filter.
-
-    Parameters
-    ----------
-    model : ParticleModel
-        Motion, map and measurements.
-    options : ParticleOptions
-        Numbers of particles and the switch rule.
-    """
+    """A regularised particle filter for a model."""
 
     model: ParticleModel[PriorT, ReadingT]
     options: ParticleOptions = field(default_factory=ParticleOptions)
@@ -278,6 +260,4 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
 
     def locate(self, belief: ParticleBelief) -> Estimate:
         """Return the leading hypothesis."""
-        found = belief.summary
-        east_m, north_m = float(found.mean[0]), float(found.mean[1])
-        return Estimate(east_m, north_m, found.covariance_m2, found.radii_m)
+        return belief.summary.estimate

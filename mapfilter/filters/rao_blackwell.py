@@ -41,6 +41,8 @@ from mapfilter.filters.resampling import normalise, systematic
 from mapfilter.filters.trials import CompiledMeasurement
 from mapfilter.options import Options, Share
 
+_LOG_TWO_PI = float(np.log(2 * np.pi))
+
 
 @dataclass(frozen=True, slots=True)
 class SirOptions(Options):
@@ -65,9 +67,6 @@ SIR = SirOptions()
 
 REGULARISED = SirOptions(0.5, 0.5)
 """Resampled where half of the particles carry the weight, copies jittered."""
-
-
-_LOG_TWO_PI = float(np.log(2 * np.pi))
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,13 +15,7 @@ from mapfilter._types import Floats, Floats32, Ints32
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def normalise(log_weight: Floats, weight: Floats32) -> tuple[float, float]:
-    """Bring log weights to sum to one, in place, and fill the weights.
-
-    Parameters
-    ----------
-    log_weight : ndarray of float64, shape (N,)
-    weight : ndarray of float32, shape (N,)
-        Filled.
+    """Normalise log weights (N,) in place, and fill the weights (N,), which sum to one.
 
     Returns
     -------
@@ -59,16 +53,9 @@ def normalise(log_weight: Floats, weight: Floats32) -> tuple[float, float]:
 
 @njit(error_model="numpy", cache=True)
 def systematic(weight: Floats32, offset: float, chosen: Ints32) -> None:
-    """Fill which particle each of M new ones copies.
+    """Fill the indices of the particles that M new ones copy, ascending.
 
-    Parameters
-    ----------
-    weight : ndarray of float32, shape (N,)
-        Summing to one.
-    offset : float
-        Uniform in [0, 1).
-    chosen : ndarray of int32, shape (M,)
-        Filled in ascending order.
+    Weights sum to one; ``offset`` is drawn uniformly from [0, 1).
 
     Examples
     --------
@@ -91,17 +78,10 @@ def systematic(weight: Floats32, offset: float, chosen: Ints32) -> None:
 def copy_with_jitter(
     state: Floats32, chosen: Ints32, jitter: Floats32, key: np.uint64, copies: Floats32
 ) -> None:
-    """Copy particles and move each copy by normal noise, so that copies of one part.
+    """Copy the chosen particles of ``state`` (R, N) and move each copy by normal noise.
 
-    Parameters
-    ----------
-    state : ndarray of float32, shape (R, N)
-    chosen : ndarray of int32, shape (M,)
-    jitter : ndarray of float32, shape (R,)
-        Standard deviation for each row; rows of 0, and rows beyond, are copied as they are.
-    key : numpy.uint64
-    copies : ndarray of float32, shape (R, M)
-        Filled.
+    ``jitter`` has the standard deviation for each row; rows of 0, and rows beyond, are copied as
+    they are. The noise is drawn from ``key``.
     """
     rows = state.shape[0]
     for r in range(0, rows, 2):

@@ -59,7 +59,7 @@ class TrialRun:
     means : (T, K, n) array
         Updated means.
     covariances : (T, K, n, n) array
-        Updated covariances; K is 0 unless they were asked for.
+        Updated covariances; K is 0 unless they are kept.
     evidence : (T, K) array
         Log density of each reading given those before it; NaN where an update failed and the
         prediction was kept.
@@ -88,12 +88,8 @@ def run_trials(
 
     Parameters
     ----------
-    measurement : CompiledMeasurement
-        Which readings.
     transition, process : (n, n) arrays
         Φ and Q.
-    method : Method
-        Which update.
     first_mean : (T, n) or (n,) array_like
         The beliefs before the first step.
     first_covariance : (n, n) or (T, n, n) array_like
@@ -111,7 +107,10 @@ def run_trials(
     n = transition.shape[0]
     trials, steps = checked_sizes(measurement, transition, readings)
     starts = np.broadcast_to(np.asarray(first_mean, dtype=np.float64), (trials, n))
-    factors = factors_of(first_covariance, n, trials)
+    given = np.asarray(first_covariance, dtype=np.float64)
+    each = given.ndim == 3 and len(given) == trials
+    factors = np.array([factor_of(one, n) for one in (given if each else [given])])
+    factors = np.broadcast_to(factors.reshape(-1, n, n), (trials, n, n))
     problem = problem_of(measurement, transition, process, method)
     means, found = np.empty((trials, steps, n)), np.empty((trials, steps * covariances, n, n))
     evidence, nis = np.empty((trials, steps)), np.empty((trials, steps))
@@ -137,42 +136,22 @@ def problem_of(
 ) -> Problem:
     """Return measurement, motion and method as the compiled filters take them."""
     row, col = np.nonzero(transition)
-    iterations, spread, bend_weight = method_numbers(method, transition.shape[0])
+    sigma, noise = method.sigma, np.ascontiguousarray(measurement.noise)
     return Problem(
         measurement.slots,
         measurement.uses,
         np.ascontiguousarray(measurement.rows),
         np.ascontiguousarray(measurement.patterns),
-        np.ascontiguousarray(measurement.noise),
-        is_diagonal(measurement.noise),
-        iterations,
-        spread,
-        bend_weight,
+        noise,
+        not np.any(noise - np.diag(np.diagonal(noise))),
+        method.iterations if sigma is None else 1,
+        1.0 if sigma is None else sigma.spread(transition.shape[0]),
+        0.0 if sigma is None else sigma.bend_weight,
         np.ascontiguousarray(row),
         np.ascontiguousarray(col),
         np.ascontiguousarray(transition[row, col]),
         np.ascontiguousarray(process),
     )
-
-
-def factors_of(covariance: ArrayLike, size: int, trials: int) -> Floats:
-    """Return a factor of each trial's covariance, (T, n, n), from one for all or one each."""
-    given = np.asarray(covariance, dtype=np.float64)
-    if given.ndim == 3 and len(given) == trials:
-        return np.array([factor_of(one, size) for one in given]).reshape(trials, size, size)
-    return np.broadcast_to(factor_of(given, size), (trials, size, size))
-
-
-def is_diagonal(matrix: Floats) -> bool:
-    """Return whether a matrix is diagonal."""
-    return not np.any(matrix - np.diag(np.diagonal(matrix)))
-
-
-def method_numbers(method: Method, size: int) -> tuple[int, float, float]:
-    """Return a method as kernels take it: iterations, γ and β - α²."""
-    if method.sigma is not None:
-        return 1, method.sigma.spread(size), method.sigma.bend_weight
-    return method.iterations, 1.0, 0.0
 
 
 def checked_sizes(

@@ -14,17 +14,7 @@ from mapfilter.errors import Faults, InputError, fail
 def elevation_sigma_m(elevation_rad: ArrayLike, zenith_m: float = 2.0) -> Floats:
     """Return the standard deviation of pseudoranges, ``σ / sin(elevation)``.
 
-    Parameters
-    ----------
-    elevation_rad : array_like
-        Above 0.
-    zenith_m : float
-        Deviation overhead.
-
-    Raises
-    ------
-    InputError
-        An elevation is not above the horizon, or the deviation not above 0.
+    σ is that overhead; elevations and deviation must be above 0.
 
     Examples
     --------
@@ -80,14 +70,7 @@ def correlated_along(
 ) -> Floats:
     """Draw standard normal numbers with correlation ``exp(-d / correlation_m)`` along a way.
 
-    Parameters
-    ----------
-    columns : int
-        Independent processes.
-
-    Returns
-    -------
-    (K, columns) array
+    The columns of the result, (K, columns), are independent.
     """
     travelled = np.asarray(travelled_m, dtype=np.float64)
     drawn = rng.standard_normal((travelled.size, columns))

@@ -45,18 +45,13 @@ def ecef_from_lonlat(lon_deg: ArrayLike, lat_deg: ArrayLike, height_m: ArrayLike
 
 @dataclass(frozen=True)
 class LocalFrame:
-    """East, north and up at a place.
-
-    Parameters
-    ----------
-    height_m : float
-        Over the ellipsoid.
+    """East, north and up at a place, at a height over the ellipsoid.
 
     Examples
     --------
-    >>> frame = LocalFrame(4.86, 43.52, 20.0)
-    >>> frame.to_local(frame.to_ecef([100.0, -20.0, 3.0])).round(6).tolist()
-    [100.0, -20.0, 3.0]
+    >>> above = ecef_from_lonlat(4.86, 43.52, 23.0)
+    >>> LocalFrame(4.86, 43.52, 20.0).to_local(above)[2].round(6).item()
+    3.0
     """
 
     lon_deg: float
@@ -92,22 +87,10 @@ class LocalFrame:
         """Turn earth-centred coordinates (..., 3) into east, north and up."""
         return np.asarray((np.asarray(ecef_m, dtype=np.float64) - self.origin_m) @ self.axes.T)
 
-    def to_ecef(self, local_m: ArrayLike) -> Floats:
-        """Turn east, north and up (..., 3) into earth-centred coordinates."""
-        return np.asarray(np.asarray(local_m, dtype=np.float64) @ self.axes + self.origin_m)
-
 
 @dataclass(frozen=True, eq=False)
 class Directions:
-    """Where satellites are seen from a place; both arrays have the same shape.
-
-    Parameters
-    ----------
-    elevation_rad : array
-        Above the horizon.
-    azimuth_rad : array
-        Clockwise from north, in [0, 2π).
-    """
+    """Elevation above the horizon, and azimuth clockwise from north, in [0, 2π), of satellites."""
 
     elevation_rad: Floats
     azimuth_rad: Floats
@@ -145,16 +128,9 @@ def directions(satellites_m: ArrayLike, receiver_m: ArrayLike = (0.0, 0.0, 0.0))
 
 @dataclass(frozen=True)
 class GridFrame:
-    """The surroundings of a place of a projected CRS.
+    """The surroundings of a place of a projected CRS, at a height over the ellipsoid.
 
     Good for some kilometres: after 5 km the ellipsoid has fallen away by 2 m.
-
-    Parameters
-    ----------
-    east_m, north_m : float
-        Of the place.
-    height_m : float
-        Of its origin over the ellipsoid.
 
     Examples
     --------

@@ -29,6 +29,7 @@ from scipy.special import log_ndtr
 
 from mapfilter._kernels import cos_sin32, exp32, log32
 from mapfilter._types import Floats, Floats32, Ints32
+from mapfilter.options import NotNegative, Options, Positive, Share
 
 _F = np.float32
 _STEPS_PER_SD, _REACH_SD = 32, 8
@@ -36,7 +37,7 @@ _STEPS_PER_DB, _REACH_DB = 4, 64
 
 
 @dataclass(frozen=True, slots=True)
-class LevelErrors:
+class LevelErrors(Options):
     """How levels differ from their prediction.
 
     Parameters
@@ -58,13 +59,13 @@ class LevelErrors:
         Exponent of the likelihood; below 1 where the model is not trusted to be exact.
     """
 
-    sd_db: float = 10.0
-    correlation_m: float = 50.0
-    measurement_db: float = 1.5
-    roughness_db: float = 6.0
-    common: float = 0.3
-    clip_sd: float = 3.0
-    weight: float = 0.7
+    sd_db: NotNegative = 10.0
+    correlation_m: Positive = 50.0
+    measurement_db: NotNegative = 1.5
+    roughness_db: NotNegative = 6.0
+    common: Share = 0.3
+    clip_sd: Positive = 3.0
+    weight: Share = 0.7
 
     def offset_variance_db2(self, particle_spacing_m: float) -> float:
         """Return the variance of a prediction so far beside the true position."""
@@ -108,7 +109,6 @@ class BoundReading(NamedTuple):
     ----------
     cells : ndarray of int32, shape (J,)
         Bands of the candidates; the likelihood is the mean over them.
-    level_dbm : float
     censored : int
         -1: the level is below; 1: it is above; 0: it is this.
     sd_db : float
@@ -125,7 +125,7 @@ class BoundReading(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class ServingWeights:
+class ServingWeights(Options):
     """How the serving cell counts.
 
     Parameters
@@ -138,22 +138,13 @@ class ServingWeights:
         Exponent of the likelihood for each metre travelled, because errors last.
     """
 
-    hysteresis_db: float = 2.0
-    sd_db: float = 9.0
-    weight_per_m: float = 1 / 22
+    hysteresis_db: NotNegative = 2.0
+    sd_db: Positive = 9.0
+    weight_per_m: NotNegative = 1 / 22
 
 
 class RasterFrame(NamedTuple):
-    """Where the pixels of a raster lie.
-
-    Parameters
-    ----------
-    west_m, north_m : float
-        Corner of the raster.
-    per_m : float
-        Pixels per metre.
-    rows, cols : int
-    """
+    """Where the pixels of a raster lie: its north-western corner, pixels per metre, and size."""
 
     west_m: float
     north_m: float
@@ -190,19 +181,10 @@ def bound_table() -> Floats32:
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def pixels(state: Floats32, back_east_m: float, back_north_m: float, raster: RasterFrame) -> Ints32:
-    """Find the pixel that holds each hypothesis, or held it some displacement ago.
+    """Return the flat pixel of each hypothesis, or of where it was before a displacement.
 
-    Parameters
-    ----------
-    state : ndarray of float32, shape (5, N)
-    back_east_m, back_north_m : float
-        The displacement by dead reckoning, turned and scaled by each hypothesis's own errors.
-    raster : RasterFrame
-
-    Returns
-    -------
-    ndarray of int32, shape (N,)
-        Flat indices; beyond the edge the edge's.
+    The displacement by dead reckoning is turned and scaled by each hypothesis's own errors. Beyond
+    the edge of the raster pixels are those of the edge.
     """
     east, north, bias, scale = state[0], state[1], state[2], state[3]
     be, bn, zero = _F(back_east_m), _F(back_north_m), _F(0.0)

@@ -11,10 +11,8 @@ from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.models.state import StateLayout, fisher_information
+from mapfilter.models.state import StateLayout
 from mapfilter.models.terms import COLUMNS, measure
-
-_LOG_TWO_PI = float(np.log(2 * np.pi))
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,22 +73,6 @@ class GaussianTerms:
     def covariance(self) -> Floats:
         """Return the covariance of the noise, shape (m, m)."""
         return self.noise
-
-    def information(self, state: ArrayLike) -> Floats:
-        """Return the Fisher information ``Hᵀ R⁻¹ H``, shape (..., n, n)."""
-        return fisher_information(self, np.asarray(state, dtype=np.float64))
-
-    def log_likelihood(self, state: ArrayLike, reading: ArrayLike) -> Floats:
-        """Return the log density of a reading, shape (...); absent (NaN) components count not."""
-        given = np.asarray(reading, dtype=np.float64)
-        present = np.isfinite(given)
-        if present.ndim != 1:
-            raise fail(InputError, "reading", f"shape ({self.size},)", given.shape)
-        residual = (given - self.mean(state))[..., present]
-        factor = np.linalg.cholesky(self.noise[np.ix_(present, present)])
-        whitened = np.linalg.solve(factor, residual[..., None])[..., 0]
-        constant = present.sum() * _LOG_TWO_PI + 2 * np.log(np.diagonal(factor)).sum()
-        return np.asarray(-0.5 * (np.sum(whitened**2, axis=-1) + constant))
 
     def sample(self, state: ArrayLike, rng: np.random.Generator) -> Floats:
         """Draw readings, shape (..., m); components with a step are rounded down to it."""

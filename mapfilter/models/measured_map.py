@@ -52,13 +52,8 @@ class MeasuredMapOptions:
 class MeasuredRows:
     """Rows of earlier sessions, shape (N,) each.
 
-    Parameters
-    ----------
-    cell : ndarray of int
-        Band of the serving cell; -1 for one that is not of the map.
-    east_m, north_m : ndarray
-    timing_advance : ndarray
-        Steps; NaN where it was not reported.
+    ``cell`` is the band of the serving cell, -1 for a cell that is not of the map; the timing
+    advance is in steps, NaN where it was not reported.
     """
 
     cell: Ints
@@ -134,7 +129,7 @@ class ServingStatistics:
         return np.asarray(self.log_share[band][pixel])
 
     def log_advance(self, band: int, pixel: Ints32, steps: float) -> Floats32:
-        """Return the log-likelihood of a timing advance at pixels; 0 where nothing is known."""
+        """Return the log-likelihood of a timing advance at pixels; 0 where none was reported."""
         deviation = self.deviation_steps[band][pixel]
         beside = np.abs(steps - self.advance_steps[band][pixel]) / deviation
         found = -0.5 * np.minimum(beside, _CLIP_SD) ** 2 - np.log(deviation)

@@ -93,7 +93,9 @@ class LinearMotion:
         faults = Faults()
         phi, noise = self.transition, self.noise
         if phi.ndim != 2 or phi.shape[0] != phi.shape[1] or phi.shape != noise.shape:
-            faults.add("motion", "two square matrices alike", f"{phi.shape} and {noise.shape}")
+            faults.add(
+                "motion", "two square matrices of one shape", f"{phi.shape} and {noise.shape}"
+            )
             faults.raise_if_any(InputError)
         if not (np.isfinite(phi).all() and np.isfinite(noise).all()):
             faults.add("motion", "finite numbers", "NaN or infinity")

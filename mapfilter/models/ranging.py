@@ -32,23 +32,11 @@ from mapfilter.models.state import StateLayout
 from mapfilter.models.terms import COMPONENT, DIFFERENCE, RANGE
 
 GSM_STEP_M = SPEED_OF_LIGHT_MPS * 48 / 13 * 1e-6 / 2
-"""About 553 m."""
-
-LTE_STEP_M = SPEED_OF_LIGHT_MPS * 16 / 30.72e6 / 2
-"""About 78 m."""
+"""About 553 m; in LTE a step is 78.1 m."""
 
 
 def pseudoranges(layout: StateLayout, satellites_m: ArrayLike, sigma_m: ArrayLike) -> GaussianTerms:
-    """Return the model of pseudoranges to satellites, for a state with a clock.
-
-    Parameters
-    ----------
-    layout : StateLayout
-        With a clock.
-    satellites_m : (m, 3) array_like
-        Positions of the satellites in the frame of the state.
-    sigma_m : float or (m,) array_like
-        Standard deviations.
+    """Return the model of pseudoranges to satellites (m, 3), in the frame of a state with a clock.
 
     Examples
     --------
@@ -86,8 +74,6 @@ def range_differences(
 
     Parameters
     ----------
-    layout : StateLayout
-        Of the states.
     stations_m : (m, 2) or (m, 3) array_like
         At least two, the reference among them.
     sigma_m : float or (m,) array_like
@@ -127,24 +113,17 @@ def timing_advances(
 
     Parameters
     ----------
-    layout : StateLayout
-        Of the states.
     sites_m : (m, 2) or (m, 3) array_like
         Positions of the base stations; without heights all is in one plane.
-    sigma_m : float or (m,) array_like
-        Standard deviations.
     step_m : float
-        Size of the steps in which a report is drawn: the middle of a step stands for it. 0 for
-        a continuous one. What filters take is not changed by it: add ``step²/12`` to the variance
-        for the rounding.
+        Size of the steps in which reports are drawn, as the middle of a step; 0 for continuous
+        ones. Filters are not affected: add ``step²/12`` to the variance for the rounding.
 
     Examples
     --------
     >>> from mapfilter.models.state import POSITION
     >>> timing_advances(POSITION, [[300.0, 400.0]], 300.0).mean([0.0, 0.0]).tolist()
     [500.0]
-    >>> round(GSM_STEP_M, 1), round(LTE_STEP_M, 1)
-    (553.5, 78.1)
     """
     faults = Faults()
     sites = places("sites_m", sites_m, faults)
@@ -153,17 +132,6 @@ def timing_advances(
         faults.add("step_m", "metres >= 0", step_m)
     rows = terms(layout, RANGE, sites)
     return independent(faults, layout, rows, sigma, "timing advance", step_m)
-
-
-def metres_of_steps(steps: ArrayLike, step_m: float = GSM_STEP_M) -> np.ndarray:
-    """Return the middle of the distances that a reported timing advance covers.
-
-    Examples
-    --------
-    >>> metres_of_steps([0, 2]).round(1).tolist()
-    [276.7, 1383.7]
-    """
-    return (np.asarray(steps, dtype=np.float64) + 0.5) * step_m
 
 
 def position_fix(layout: StateLayout, covariance_m2: ArrayLike) -> GaussianTerms:

@@ -41,8 +41,6 @@ def levels(
 
     Parameters
     ----------
-    layout : StateLayout
-        Of the states.
     sites_m : (m, 2) or (m, 3) array_like
         Positions of the antennas; without heights distances are horizontal.
     sigma_db : float or (m,) array_like
@@ -52,8 +50,8 @@ def levels(
     eirp_dbm : float or (m,) array_like
         P_t.
     boresight_rad : float, (m,) array_like or None
-        Directions of the antennas, counter-clockwise from east; None for antennas that radiate
-        alike all around.
+        Directions of the antennas, counter-clockwise from east; None for omnidirectional
+        antennas.
     beamwidth_rad, max_attenuation_db : float
         φ3dB and A_m of eq. (2), see :func:`mapfilter.radio.antenna.sector_gain_db`.
     pattern_db : (k,) array, optional
@@ -123,9 +121,9 @@ def sampled_pattern(
     depression_rad : float
         Angle below the horizon at which receivers are.
     downtilt_deg : float or None
-        Electrical downtilt wanted.
+        Electrical downtilt.
     samples : int
-        How many angles; with 360, cuts given by the degree are kept as they are.
+        Number of angles; with 360, cuts given by the degree are not interpolated.
     mechanical_downtilt_rad : float
         How far the whole antenna leans forward.
 

@@ -1,20 +1,9 @@
-"""Meaning of the components of a state vector, and protocols of measurements.
-
-A :class:`Likelihood` gives the probability of a reading in a state and draws one. Cell identities,
-censored levels and ambiguous neighbours are only this. A :class:`GaussianMeasurement` is a function
-of the state with additive Gaussian noise; one such object serves five uses: a simulator samples
-it, an extended Kalman filter linearises it, sigma points go through it, particle filters weigh
-with it, and the Cramér-Rao recursion takes its Fisher information.
-
-States are arrays of shape (..., n): every method takes one state or a batch of them.
-"""
+"""Meaning of the components of a state vector, and the protocol of Gaussian measurements."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, TypeVar, runtime_checkable
-
-import numpy as np
+from typing import Protocol, runtime_checkable
 
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
@@ -75,35 +64,15 @@ MOVING = StateLayout(4, 0, 2)
 MOVING_CLOCK = StateLayout(6, 0, 2, clock=4)
 """East, its rate, north, its rate, clock bias, clock drift (Fritsche & Klein 2009, eq. 8)."""
 
-MOVING_3D = StateLayout(6, 0, 2, 4)
-"""East, north and up, each followed by its rate."""
-
-MOVING_CLOCK_3D = StateLayout(8, 0, 2, 4, 6)
-"""East, north, up and clock bias, each followed by its rate."""
-
-
-ReadingT = TypeVar("ReadingT")
-
 
 @runtime_checkable
-class Likelihood(Protocol[ReadingT]):
-    """How probable a reading is, given the state."""
+class GaussianMeasurement(Protocol):
+    """A function of the state with additive Gaussian noise.
 
-    def log_likelihood(self, state: Floats, reading: ReadingT) -> Floats:
-        """Return the natural logarithm of the likelihood, shape (...), in states (..., n).
-
-        What is absent of the reading does not count.
-        """
-
-    def sample(self, state: Floats, rng: np.random.Generator) -> ReadingT:
-        """Draw a reading in a state."""
-
-
-@runtime_checkable
-class GaussianMeasurement(Likelihood[Floats], Protocol):
-    """A function of the state with additive Gaussian noise; readings are (..., m) arrays.
-
-    A component that is absent is NaN in the reading.
+    One such object serves several uses: simulators draw from it, extended Kalman filters linearise
+    it, sigma points go through it, and the Cramér-Rao recursion takes its Fisher information.
+    States are (..., n) arrays: every method takes one state or a batch of them. Readings are
+    (..., m) arrays; absent components are NaN.
     """
 
     def mean(self, state: Floats) -> Floats:
@@ -114,12 +83,3 @@ class GaussianMeasurement(Likelihood[Floats], Protocol):
 
     def covariance(self) -> Floats:
         """Return the covariance of the noise, shape (m, m), in squared units of the reading."""
-
-
-def fisher_information(measurement: GaussianMeasurement, state: Floats) -> Floats:
-    """Return the Fisher information of one reading, ``Hᵀ R⁻¹ H``, (..., n, n), in true states."""
-    slope = measurement.jacobian(state)
-    factor = np.linalg.cholesky(measurement.covariance())
-    # R⁻¹ is never formed.
-    whitened = np.linalg.solve(factor, slope)
-    return np.asarray(np.swapaxes(whitened, -1, -2) @ whitened)

@@ -1,4 +1,4 @@
-"""Motion over a map of streets: dead reckoning with lasting errors, and where one can walk.
+"""Motion over a map of streets: dead reckoning with lasting errors, and the map of ways.
 
 A hypothesis holds its position, the lasting error of its headings, the logarithm of its step scale,
 and how probably it is off the map. One step of dead reckoning (Khalaf-Allah 2007, eqs. 3-10) moves
@@ -23,16 +23,22 @@ from numba import njit
 
 from mapfilter._kernels import cos_sin32, exp32, hashed, log32, normals, uniforms, wrap32
 from mapfilter._types import Floats, Floats32, Ints32
+from mapfilter.options import NotNegative, Options, Positive
 
 EAST, NORTH, BIAS, LOG_SCALE, OFF = range(5)
 """Rows of the state: metres from the frame's origin, radians, a number, a probability."""
 STATES = 5
 
 _F = np.float32
+_HEADING_SD_RAD, _BIAS_SD_RAD, _BIAS_DRIFT_RAD = radians(6.0), radians(3.0), radians(0.05)
+_MOST_SQUARES = 400
+_PARTS = 4
+_MOST_NATS = 14.0
+"""Hypotheses that are less likely than by this many nats are not compared."""
 
 
 @dataclass(frozen=True, slots=True)
-class MotionErrors:
+class MotionErrors(Options):
     """Errors of dead reckoning; those that last are estimated with the position.
 
     Parameters
@@ -53,26 +59,20 @@ class MotionErrors:
         Random walk of that logarithm.
     """
 
-    step_sd_m: float = 0.3
-    typical_step_m: float = 1.4
-    heading_sd_rad: float = radians(6.0)
-    bias_sd_rad: float = radians(3.0)
-    bias_drift_rad_per_sqrt_m: float = radians(0.05)
-    scale_sd: float = 0.02
-    scale_drift_per_sqrt_m: float = 0.0
+    step_sd_m: NotNegative = 0.3
+    typical_step_m: Positive = 1.4
+    heading_sd_rad: NotNegative = _HEADING_SD_RAD
+    bias_sd_rad: NotNegative = _BIAS_SD_RAD
+    bias_drift_rad_per_sqrt_m: NotNegative = _BIAS_DRIFT_RAD
+    scale_sd: NotNegative = 0.02
+    scale_drift_per_sqrt_m: NotNegative = 0.0
 
 
 class MapFactors(NamedTuple):
-    """What the map does to a belief over some length.
+    """Effect of the map on a belief over some length.
 
-    Parameters
-    ----------
-    exponent : float
-        Of the map's likelihood.
-    off : float
-        Likelihood off the map.
-    leave, come_back : float
-        Probabilities of leaving the map and of coming back.
+    These are the exponent of the map's likelihood, the likelihood off the map, and the
+    probabilities of leaving the map and of coming back.
     """
 
     exponent: float
@@ -82,7 +82,7 @@ class MapFactors(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class MapWeights:
+class MapWeights(Options):
     """Weight of the map in the likelihood.
 
     Parameters
@@ -97,11 +97,11 @@ class MapWeights:
         Rates of leaving the map and of coming back.
     """
 
-    sd_m: float = 4.0
-    weight_per_m: float = 1 / 18
-    off_cost_per_m: float = 0.1
-    leave_per_m: float = 1e-3
-    return_per_m: float = 1e-2
+    sd_m: Positive = 4.0
+    weight_per_m: NotNegative = 1 / 18
+    off_cost_per_m: NotNegative = 0.1
+    leave_per_m: NotNegative = 1e-3
+    return_per_m: NotNegative = 1e-2
 
     def over(self, length_m: float) -> MapFactors:
         """Return the factors for a length travelled."""
@@ -129,17 +129,10 @@ def map_log_likelihood(distance_m: Floats32, sd_m: float) -> Floats32:
 def move(
     state: Floats32, step_m: float, heading_rad: float, errors: MotionErrors, key: np.uint64
 ) -> Floats32:
-    """Return all hypotheses after one step; a step of length 0 changes nothing.
+    """Return all hypotheses (5 or more, N) after one measured step; further rows stay.
 
-    Parameters
-    ----------
-    state : ndarray of float32, shape (5 or more, N)
-        Further rows stay.
-    step_m, heading_rad : float
-        As measured; the lasting error is added to the heading.
-    errors : MotionErrors
-    key : numpy.uint64
-        From :func:`mapfilter._kernels.draw_key`.
+    The lasting error is added to the heading. A step of length 0 changes nothing. ``key`` is from
+    :func:`mapfilter._kernels.draw_key`.
     """
     length = abs(step_m)
     root = length**0.5
@@ -186,21 +179,10 @@ def _move(
 def interpolate(
     state: Floats32, raster: Floats32, west_m: float, north_m: float, per_m: float
 ) -> Floats32:
-    """Look positions up in a raster, bilinear between the pixels' centres.
+    """Return a raster's values at hypotheses, bilinear between the pixels' centres.
 
-    Parameters
-    ----------
-    state : ndarray of float32, shape (5, N)
-    raster : ndarray of float32, shape (rows, cols)
-    west_m, north_m : float
-        Centre of the first pixel.
-    per_m : float
-        Pixels per metre.
-
-    Returns
-    -------
-    ndarray of float32, shape (N,)
-        Beyond the raster's edge the edge's values.
+    ``west_m`` and ``north_m`` are the centre of the first pixel, ``per_m`` the pixels per metre.
+    Beyond the raster's edge values are those of the edge.
     """
     rows, cols = raster.shape
     flat = raster.ravel()
@@ -233,15 +215,8 @@ def interpolate(
 def weigh_by_map(log_map: Floats32, off: Floats32, factors: MapFactors, log_weight: Floats) -> None:
     """Add the map's log-likelihood to weights and update the probability of being off, in place.
 
-    Parameters
-    ----------
-    log_map : ndarray of float32, shape (N,)
-        At the hypotheses.
-    off : ndarray of float32, shape (N,)
-        Probability of being off the map.
-    factors : MapFactors
-        For the length of the step.
-    log_weight : ndarray of float64, shape (N,)
+    ``log_map`` is the map's log-likelihood at the hypotheses; the factors are those of the length
+    of the step.
     """
     one, weight, off_cost = _F(1.0), _F(factors.exponent), _F(factors.off)
     leave, come_back = _F(factors.leave), _F(factors.come_back)
@@ -252,12 +227,6 @@ def weigh_by_map(log_map: Floats32, off: Floats32, factors: MapFactors, log_weig
         total = away * off_cost + (one - away) * on
         off[i] = away * off_cost / total
         log_weight[i] += log32(total)
-
-
-_MOST_SQUARES = 400
-_PARTS = 4
-_MOST_NATS = 14.0
-"""What is farther than this many nats is as good as never drawn."""
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
@@ -272,15 +241,16 @@ def draw_ancestors(
 ) -> Ints32:
     """Draw one ancestor of each later hypothesis: backward simulation (Godsill et al. 2004, eq. 6).
 
-    An earlier hypothesis counts by its weight and by how well its own errors of heading and scale
-    bring it, over the displacement by dead reckoning, to the later one. They are sorted by place,
-    so that each later one looks at those nearby only.
+    An earlier hypothesis is weighed by how well its own errors of heading and scale lead it, over
+    the displacement by dead reckoning, to the later one. Hypotheses are sorted by place, and only
+    those nearby are compared.
 
     Parameters
     ----------
-    later : ndarray of float32, shape (5, M)
-    earlier : ndarray of float32, shape (5, N)
+    later, earlier : ndarray of float32, shape (5, M) and (5, N)
+        Hypotheses.
     log_weight : ndarray of float32, shape (N,)
+        Of the earlier ones.
     moved_m : (float, float)
         Displacement east and north by dead reckoning in between.
     variances : (float, float, float)
@@ -288,7 +258,6 @@ def draw_ancestors(
     log_jump : float
         Log density of an unmeasured displacement: where no ancestor is nearer than that, the
         weights alone decide.
-    key : numpy.uint64
 
     Returns
     -------

@@ -28,6 +28,11 @@ from numba import njit
 from mapfilter._kernels import MEASURE_SIGNATURE
 from mapfilter._types import Floats, Ints
 
+COLUMNS = 13
+RANGE, LEVEL, DIFFERENCE, COMPONENT = 0.0, 1.0, 2.0, 3.0
+
+_LOG10_E = 0.4342944819032518
+_TWO_PI = 2 * np.pi
 _LN2 = 0.6931471805599453
 _SQRT_HALF_BITS = 0x3FE6A09E00000000
 _ONE_BITS = 0x3FF0000000000000
@@ -50,17 +55,10 @@ def log_lanes(value: Floats, out: Floats, scratch: Floats) -> None:
         s = f / (2.0 + f)
         z = s * s
         even = z * z
-        t1 = even * (
-            0.3999999999940941908 + even * (0.2222219843214978396 + even * 0.1531383769920937332)
-        )
-        t2 = z * (
-            0.6666666666666735130
-            + even
-            * (
-                0.2857142874366239149
-                + even * (0.1818357216161805012 + even * 0.1479819860511658591)
-            )
-        )
+        odd = 0.2857142874366239149 + even * (0.1818357216161805012 + even * 0.1479819860511658591)
+        t1 = 0.2222219843214978396 + even * 0.1531383769920937332
+        t1 = even * (0.3999999999940941908 + even * t1)
+        t2 = z * (0.6666666666666735130 + even * odd)
         half = 0.5 * f * f
         out[w] = out[w] * _LN2 + (f - (half - s * (half + t1 + t2)))
 
@@ -108,13 +106,6 @@ def atan2_lanes(left: Floats, ahead: Floats, out: Floats) -> None:
         angle = 1.5707963267948966 - angle if abs(left[w]) > abs(ahead[w]) else angle
         angle = 3.141592653589793 - angle if ahead[w] < 0.0 else angle
         out[w] = -angle if left[w] < 0.0 else angle
-
-
-COLUMNS = 13
-RANGE, LEVEL, DIFFERENCE, COMPONENT = 0.0, 1.0, 2.0, 3.0
-
-_LOG10_E = 0.4342944819032518
-_TWO_PI = 2 * np.pi
 
 
 @_kernel

@@ -29,7 +29,6 @@ class TrackState:
     ----------
     belief : object or None
         Of the filter; None before the first epoch that it can start from.
-    status : Status
     hypotheses : int
         Position hypotheses after the last update.
     """
@@ -49,16 +48,12 @@ class BeliefTracker(Filter[TrackState]):
 
     Parameters
     ----------
-    filter : BeliefFilter
-    database : RadioRouteDatabase
     known : callable
         Returns USED for a cell with points, else why the filter cannot start from it.
     reading_of : callable
         Returns what the filter's ``init`` and ``update`` take of an epoch, or None.
-    filter_name : str
     takes : collection of str
         Kinds of measurements that the filter takes.
-    start_by_fix : bool
     ways : bool
         Whether positions are matched to the way of the nearest point.
     """
@@ -125,8 +120,9 @@ class BeliefTracker(Filter[TrackState]):
             if not isinstance(info, UpdateInfo):
                 raise TypeError("update returns (belief, UpdateInfo)")
             status, count, reason = info.status, info.hypotheses, info.reason
-            if reason not in _SILENT:
-                unused.append(_unused(epoch, SERVING, cell, reason))
+            label = _unused(epoch, SERVING, cell, reason)
+            if reason not in _SILENT and label not in unused:
+                unused.append(label)
         elif status is Status.CONVERGED:
             # CONVERGED lasts one epoch, also where the next one has no measurement.
             status = Status.TRACKING

@@ -48,7 +48,7 @@ class CandidateFilter(CandidateOptions):
         return CandidateTracker(
             CandidateSearch(points_of, self, database.lattice.resolution_m),
             database,
-            lambda cell: _known(points_of, cell),
+            startable(points_of),
             serving_cell,
             "candidate",
             takes=("motion", "serving"),
@@ -61,7 +61,6 @@ def cell_points(database: RadioRouteDatabase, margin_db: float | None = None) ->
 
     Parameters
     ----------
-    database : RadioRouteDatabase
     margin_db : float or None
         As for :class:`CandidateFilter`.
     """
@@ -77,11 +76,16 @@ def cell_points(database: RadioRouteDatabase, margin_db: float | None = None) ->
     return points_of
 
 
-def _known(points_of: PointsOf, cell: str) -> Reason:
-    points = points_of(cell)
-    if points is None:
-        return Reason.UNKNOWN_CELL
-    return Reason.USED if len(points) else Reason.NO_POINTS_IN_CELL
+def startable(points_of: PointsOf) -> Callable[[str], Reason]:
+    """Return a function: USED for a cell with points, else why no filter can start from it."""
+
+    def reason(cell: str) -> Reason:
+        points = points_of(cell)
+        if points is None:
+            return Reason.UNKNOWN_CELL
+        return Reason.USED if len(points) else Reason.NO_POINTS_IN_CELL
+
+    return reason
 
 
 @dataclass(frozen=True, eq=False)

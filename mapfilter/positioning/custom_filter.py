@@ -13,10 +13,9 @@ import hashlib
 import inspect
 import sys
 import traceback
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -26,8 +25,8 @@ import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, MapfilterError, fail
-from mapfilter.filters.contract import Reason
 from mapfilter.positioning.belief_tracker import BeliefTracker, TrackState
+from mapfilter.positioning.candidate import cell_points, startable
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import StepOutput
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind, Smoother
@@ -128,7 +127,6 @@ def wrap_user_errors(name: str, owner: object = None) -> Iterator[None]:
 
     Parameters
     ----------
-    name : str
     owner : object
         The filter, or its class, where the name is not that of a module.
 
@@ -177,8 +175,6 @@ def adapted(
 
     Parameters
     ----------
-    made : object
-    database : RadioRouteDatabase
     name : str
         Of the filter, in estimates and in messages of errors in its code.
     ways : bool
@@ -193,7 +189,13 @@ def adapted(
     if not _lacking(made, _EPOCH_FUNCTIONS):
         return CustomEpochFilter(made, name, getattr(made, "crs", database.lattice.crs))
     return CustomTracker(
-        made, database, _cells_with_points(database), _measured, name, start_by_fix=True, ways=ways
+        made,
+        database,
+        startable(cell_points(database)),
+        lambda epoch: epoch if epoch.measured else None,
+        name,
+        start_by_fix=True,
+        ways=ways,
     )
 
 
@@ -217,7 +219,6 @@ class CustomEpochFilter(Filter[Any]):
     ----------
     filter : object
         With ``begin(kinds)`` and ``step(state, epoch, rng)``.
-    filter_name : str
     filter_crs : str
         Of the database.
     """
@@ -267,22 +268,3 @@ class CustomEpochFilter(Filter[Any]):
             if not isinstance(output, StepOutput):
                 raise TypeError("step returns (state, StepOutput)")
             return state, output
-
-
-def _measured(epoch: Epoch) -> Epoch | None:
-    """Return an epoch in which something besides motion was measured."""
-    some = epoch.radio or epoch.ranges or epoch.differences or epoch.fix is not None
-    return epoch if some else None
-
-
-def _cells_with_points(database: RadioRouteDatabase) -> Callable[[str], Reason]:
-    cells = frozenset(database.cell_ids)
-
-    @cache
-    def known(cell: str) -> Reason:
-        if cell not in cells:
-            return Reason.UNKNOWN_CELL
-        row, _, _ = database.cell_points(cell)
-        return Reason.USED if row.size else Reason.NO_POINTS_IN_CELL
-
-    return known

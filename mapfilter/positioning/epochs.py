@@ -1,17 +1,19 @@
-"""A log's tables merged into epochs: what moved, what was received and where GNSS said one is."""
+"""A log's tables merged into epochs: dead reckoning, radio report and GNSS of one moment."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from math import isfinite, nan
-from typing import Any
+from typing import TypeVar
 
 import pandas as pd
 
 from mapfilter.filters.contract import MotionStep
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.schema import SERVING
+from mapfilter.tracks.schema import SCHEMA, SERVING
+
+RowT = TypeVar("RowT")
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,8 +24,6 @@ class ReportRow:
     ----------
     role : str
         ``serving`` or ``neighbour``.
-    cell : str or None
-    arfcn, bsic : int or None
     level_dbm : float
         NaN where it was not reported.
     censored : int
@@ -47,7 +47,6 @@ class GnssFix:
 
     Parameters
     ----------
-    east_m, north_m : float
     var_east_m2, var_north_m2, cov_east_north_m2 : float
         NaN where unknown.
     """
@@ -65,7 +64,6 @@ class Pseudorange:
 
     Parameters
     ----------
-    satellite : str
     range_m : float
         With the receiver's clock in it; NaN where it was not measured.
     sigma_m : float
@@ -86,7 +84,6 @@ class Difference:
 
     Parameters
     ----------
-    cell, reference : str
     difference_m : float
         NaN where it was not measured.
     sigma_m, reference_sigma_m : float
@@ -102,18 +99,14 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class Epoch:
-    """What is known at one moment; first one moves, then one measures.
+    """Motion and measurements of one moment; filters move first, then measure.
 
     Parameters
     ----------
-    time_s : float
     motion : tuple of MotionStep
         Intervals that end now.
     radio : tuple of ReportRow
         The report, of all its rows.
-    fix : GnssFix or None
-    ranges : tuple of Pseudorange
-    differences : tuple of Difference
     """
 
     time_s: float
@@ -123,42 +116,26 @@ class Epoch:
     ranges: tuple[Pseudorange, ...] = ()
     differences: tuple[Difference, ...] = ()
 
+    @property
+    def measured(self) -> bool:
+        """Whether something besides motion was measured."""
+        return any(getattr(self, one.name) for one in fields(self)[2:])
+
 
 def epochs(log: TrackLog) -> list[Epoch]:
     """Merge a log's tables by time."""
-    motion: dict[float, list[MotionStep]] = {}
-    for time_s, *step in _rows(log.motion, ("time_s", "step_m", "heading_rad", "turn_rad")):
-        motion.setdefault(time_s, []).append(MotionStep(*step))
-    radio: dict[float, list[ReportRow]] = {}
-    names = ("time_s", "role", "cell", "arfcn", "bsic", "level_dbm", "censored", "timing_advance")
-    for time_s, role, cell, arfcn, bsic, level_dbm, censored, steps in _rows(log.radio, names):
-        level = float(level_dbm) if level_dbm is not None else nan
-        advance = float(steps) if steps is not None else nan
-        row = ReportRow(role, cell, arfcn, bsic, level, censored or 0, advance)
-        radio.setdefault(time_s, []).append(row)
-    fixes = {
-        time_s: GnssFix(*place)
-        for time_s, *place in _rows(
-            log.gnss,
-            ("time_s", "east_m", "north_m", "var_east_m2", "var_north_m2", "cov_east_north_m2"),
-        )
-    }
-    ranges: dict[float, list[Pseudorange]] = {}
-    received = ("time_s", "satellite", "pseudorange_m", "sigma_m", "x_m", "y_m", "z_m")
-    for time_s, name, range_m, sigma_m, *place_m in _rows(log.pseudoranges, received):
-        row_m = Pseudorange(name, range_m, sigma_m, (place_m[0], place_m[1], place_m[2]))
-        ranges.setdefault(time_s, []).append(row_m)
-    differences: dict[float, list[Difference]] = {}
-    compared = ("time_s", "cell", "reference", "difference_m", "sigma_m", "reference_sigma_m")
-    for time_s, *told in _rows(log.tdoa, compared):
-        differences.setdefault(time_s, []).append(Difference(*told))
+    motion = _by_time(log, "motion", MotionStep)
+    radio = _by_time(log, "radio", _report_row)
+    fixes = _by_time(log, "gnss", GnssFix)
+    ranges = _by_time(log, "pseudoranges", _pseudorange)
+    differences = _by_time(log, "tdoa", Difference)
     times = motion.keys() | radio.keys() | fixes.keys() | ranges.keys() | differences.keys()
     return [
         Epoch(
             time_s,
             tuple(motion.get(time_s, ())),
             tuple(radio.get(time_s, ())),
-            fixes.get(time_s),
+            fixes[time_s][-1] if time_s in fixes else None,
             tuple(ranges.get(time_s, ())),
             tuple(differences.get(time_s, ())),
         )
@@ -166,15 +143,29 @@ def epochs(log: TrackLog) -> list[Epoch]:
     ]
 
 
-def _rows(table: pd.DataFrame, names: Sequence[str]) -> Iterator[tuple[Any, ...]]:
-    columns = []
-    for name in names:
-        column = table[name]
+def _by_time(log: TrackLog, table: str, make: Callable[..., RowT]) -> dict[float, list[RowT]]:
+    """Return what ``make`` makes of the columns of each row, by time."""
+    rows, columns = getattr(log, table), []
+    for column in (rows[column.name] for column in SCHEMA[table][1:]):
         values = column.tolist()
         if str(column.dtype) in ("Int64", "Int8", "object", "str", "string"):
             values = [None if value is pd.NA or value != value else value for value in values]
         columns.append(values)
-    return zip(*columns, strict=True)
+    found: dict[float, list[RowT]] = {}
+    for time_s, *values in zip(rows["time_s"].tolist(), *columns, strict=True):
+        found.setdefault(time_s, []).append(make(*values))
+    return found
+
+
+def _report_row(
+    role: str, cell: str, arfcn: int, bsic: int, level: float, censored: int, steps: int
+) -> ReportRow:
+    level_dbm, advance = (nan if value is None else float(value) for value in (level, steps))
+    return ReportRow(role, cell, arfcn, bsic, level_dbm, censored or 0, advance)
+
+
+def _pseudorange(name: str, range_m: float, sigma_m: float, *place_m: float) -> Pseudorange:
+    return Pseudorange(name, range_m, sigma_m, (place_m[0], place_m[1], place_m[2]))
 
 
 def headed(step: MotionStep, heading_rad: float) -> tuple[MotionStep, float]:
@@ -182,7 +173,6 @@ def headed(step: MotionStep, heading_rad: float) -> tuple[MotionStep, float]:
 
     Parameters
     ----------
-    step : MotionStep
     heading_rad : float
         After the last step; NaN before the first.
 
@@ -190,7 +180,6 @@ def headed(step: MotionStep, heading_rad: float) -> tuple[MotionStep, float]:
     -------
     step : MotionStep
         With a heading; without one where it has neither heading nor turn and none was known.
-    heading_rad : float
     """
     if isfinite(step.heading_rad):
         return step, step.heading_rad

@@ -9,20 +9,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from mapfilter._types import Bools, Floats, Ints
+from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.filters.contract import Reason, Status
 
 if TYPE_CHECKING:
     import geopandas as gpd
 
-_SETTLED_M = 10.0
-"""A fix that tracks with a 95 % radius below is hardly moved by what comes later."""
-
 
 @dataclass(frozen=True, slots=True)
 class Fix:
-    """Position at one epoch; NaN where the filter does not say it.
+    """Position at one epoch; NaN where the filter does not give a value.
 
     Parameters
     ----------
@@ -97,7 +94,6 @@ class StepOutput:
 
     Parameters
     ----------
-    fix : Fix
     evidence : tuple of float, optional
         Runner-up's east, north and mass, entropy in bits, log evidence; of filters that hold
         probabilities.
@@ -112,7 +108,7 @@ class StepOutput:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackEvidence:
-    """How sure a filter that holds probabilities is, as arrays over N epochs; NaN before it starts.
+    """Uncertainty of filters that hold probabilities, over N epochs; NaN before the start.
 
     Parameters
     ----------
@@ -123,9 +119,7 @@ class TrackEvidence:
     entropy_bits : (N,) array
         Of the belief over bins of 25 m.
     log_evidence : (N,) array
-        Log probability of all readings so far; its fall is how surprising they are.
-    settled : (N,) array of bool
-        What comes later will hardly change the epoch's position.
+        Logarithm of the probability of all readings so far.
     """
 
     runner_up_east_m: Floats
@@ -133,7 +127,6 @@ class TrackEvidence:
     runner_up_mass: Floats
     entropy_bits: Floats
     log_evidence: Floats
-    settled: Bools
 
 
 @dataclass(frozen=True)
@@ -153,14 +146,12 @@ class TrackEstimate:
     covariance_m2 : (N, 2, 2) array
     radii_m : (N, 3) array
         For 50, 67 and 95 %.
-    status : tuple of Status
     hypotheses, way_id : (N,) integer arrays
     mass_50m, way_probability : (N,) arrays
-    reason : tuple of Reason
     unused : tuple of UnusedReading
         Every reading not used, and why.
     evidence : TrackEvidence or None
-        What filters that hold probabilities say besides.
+        Only of filters that hold probabilities.
     """
 
     crs: str
@@ -264,14 +255,8 @@ class TrackEstimate:
         estimate = cls.of_fixes(crs, filter_name, fixes, start_utc_s=start_utc_s, unused=unused)
         if not outputs or outputs[0].evidence is None:
             return estimate
-        east_m, north_m, mass, entropy, log_evidence = np.array(
-            [output.evidence for output in outputs], dtype=np.float64
-        ).T
-        tracking = np.array([fix.status is Status.TRACKING for fix in fixes], dtype=np.bool_)
-        settled = tracking & (estimate.radii_m[:, 2] <= _SETTLED_M)
-        return replace(
-            estimate, evidence=TrackEvidence(east_m, north_m, mass, entropy, log_evidence, settled)
-        )
+        columns = np.array([output.evidence for output in outputs], dtype=np.float64).T
+        return replace(estimate, evidence=TrackEvidence(*columns))
 
     @classmethod
     def of_fixes(
@@ -285,24 +270,24 @@ class TrackEstimate:
         evidence: TrackEvidence | None = None,
     ) -> TrackEstimate:
         """Put the fixes of a track together."""
-        count = len(fixes)
+        columns: dict[str, Any] = {
+            one.name: [getattr(fix, one.name) for fix in fixes] for one in fields(Fix)
+        }
+        for name, values in columns.items():
+            if name in ("status", "reason"):
+                columns[name] = tuple(values)
+            else:
+                whole = name in ("hypotheses", "way_id")
+                columns[name] = np.array(values, dtype=np.int64 if whole else np.float64)
+        columns["covariance_m2"] = columns["covariance_m2"].reshape(-1, 2, 2)
+        columns["radii_m"] = columns["radii_m"].reshape(-1, 3)
         return cls(
-            crs,
-            filter_name,
-            start_utc_s,
-            np.array([f.time_s for f in fixes], dtype=np.float64),
-            np.array([f.east_m for f in fixes], dtype=np.float64),
-            np.array([f.north_m for f in fixes], dtype=np.float64),
-            np.array([f.covariance_m2 for f in fixes], dtype=np.float64).reshape(count, 2, 2),
-            np.array([f.radii_m for f in fixes], dtype=np.float64).reshape(count, 3),
-            tuple(f.status for f in fixes),
-            np.array([f.hypotheses for f in fixes], dtype=np.int64),
-            np.array([f.mass_50m for f in fixes], dtype=np.float64),
-            np.array([f.way_id for f in fixes], dtype=np.int64),
-            np.array([f.way_probability for f in fixes], dtype=np.float64),
-            tuple(f.reason for f in fixes),
-            tuple(unused),
-            evidence,
+            crs=crs,
+            filter=filter_name,
+            start_utc_s=start_utc_s,
+            **columns,
+            unused=tuple(unused),
+            evidence=evidence,
         )
 
 
@@ -343,7 +328,7 @@ class PositionedTrack:
     estimate : TrackEstimate
         A fix per epoch and a reason for every reading not used.
     snapshots : tuple of Snapshot
-        What the filter held on its way until it switched (or failed).
+        Hypotheses at some epochs until the filter converged.
     filter_s : float
         Processor time that the filter took, databases already in memory.
     """

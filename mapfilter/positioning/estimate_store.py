@@ -23,12 +23,7 @@ from mapfilter.positioning.estimate import TrackEstimate, TrackEvidence, UnusedR
 VERSION = 1
 _META = b"mapfilter"
 _GPX = "http://www.topografix.com/GPX/1/1"
-_COLUMNS = (
-    "time_s", "east_m", "north_m", "var_east_m2", "var_north_m2", "cov_east_north_m2",
-    "radius_50_m", "radius_67_m", "radius_95_m", "status", "hypotheses", "mass_50m", "way_id",
-    "way_probability", "reason",
-)  # fmt: skip
-
+_COLUMNS = tuple(TrackEstimate.of_fixes("", "", ()).to_dataframe())
 _EVIDENCE = tuple(TrackEvidence.__dataclass_fields__)
 
 
@@ -43,25 +38,7 @@ def write_estimate(estimate: TrackEstimate, path: str | Path) -> None:
     located = np.isfinite(estimate.east_m) & np.isfinite(estimate.north_m)
     points = np.full(len(estimate), None, dtype=object)
     points[located] = shapely.points(estimate.east_m[located], estimate.north_m[located])
-    values = (
-        estimate.time_s,
-        estimate.east_m,
-        estimate.north_m,
-        estimate.covariance_m2[:, 0, 0],
-        estimate.covariance_m2[:, 1, 1],
-        estimate.covariance_m2[:, 0, 1],
-        *estimate.radii_m.T,
-        [str(s) for s in estimate.status],
-        estimate.hypotheses,
-        estimate.mass_50m,
-        estimate.way_id,
-        estimate.way_probability,
-        [str(r) for r in estimate.reason],
-    )
-    columns: dict[str, Any] = dict(zip(_COLUMNS, values, strict=True))
-    if estimate.evidence is not None:
-        columns |= {name: getattr(estimate.evidence, name) for name in _EVIDENCE}
-    frame = geopandas.GeoDataFrame(columns, geometry=points, crs=estimate.crs)
+    frame = geopandas.GeoDataFrame(estimate.to_dataframe(), geometry=points, crs=estimate.crs)
     meta = {
         "version": VERSION,
         "crs": estimate.crs,
@@ -88,7 +65,7 @@ def read_estimate(path: str | Path) -> TrackEstimate:
     """
     path = Path(path)
     try:
-        # pyarrow says of a missing file only its name.
+        # The message of pyarrow for a missing file is only its name.
         with path.open("rb"), pq.ParquetFile(path, page_checksum_verification=True) as source:
             table = source.read()
     except OSError as error:
@@ -112,14 +89,10 @@ def _estimate(table: Any, meta: dict[str, Any], path: Path) -> TrackEstimate:
             faults.add(f"{path}, {name}", "a column of that name", "none")
     faults.raise_if_any(StoreError)
     column = {name: table[name].to_numpy() for name in _COLUMNS}
-    cross = column["cov_east_north_m2"]
-    covariance = np.stack(
-        [
-            np.stack([column["var_east_m2"], cross], -1),
-            np.stack([cross, column["var_north_m2"]], -1),
-        ],
-        axis=-2,
+    east, cross, north = (
+        column[name] for name in ("var_east_m2", "cov_east_north_m2", "var_north_m2")
     )
+    covariance = np.stack([east, cross, cross, north], axis=-1).reshape(-1, 2, 2)
     start = meta["start_utc_s"]
     evidence = None
     if set(_EVIDENCE) <= set(table.column_names):
@@ -167,36 +140,28 @@ def write_geojson(estimate: TrackEstimate, path: str | Path) -> None:
     positions = [
         [round(x, 7), round(y, 7)] for x, y in zip(lon.tolist(), lat.tolist(), strict=True)
     ]
-    features: list[dict[str, object]] = []
+    features = []
     if len(positions) > 1:
-        features.append(
-            {
-                "type": "Feature",
-                "geometry": {"type": "LineString", "coordinates": positions},
-                "properties": {"filter": estimate.filter},
-            }
-        )
+        features.append(_feature("LineString", positions, {"filter": estimate.filter}))
     for index, position in zip(located.tolist(), positions, strict=True):
         radius_m = float(estimate.radii_m[index, 2])
-        features.append(
-            {
-                "type": "Feature",
-                "geometry": {"type": "Point", "coordinates": position},
-                "properties": {
-                    "time_s": round(float(estimate.time_s[index]), 3),
-                    "status": str(estimate.status[index]),
-                    "radius_95_m": round(radius_m, 2) if np.isfinite(radius_m) else None,
-                },
-            }
-        )
+        properties = {
+            "time_s": round(float(estimate.time_s[index]), 3),
+            "status": str(estimate.status[index]),
+            "radius_95_m": round(radius_m, 2) if np.isfinite(radius_m) else None,
+        }
+        features.append(_feature("Point", position, properties))
     with atomic_file(Path(path)) as temporary:
         text = json.dumps({"type": "FeatureCollection", "features": features}, allow_nan=False)
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def _located_lonlat(
-    estimate: TrackEstimate,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _feature(kind: str, coordinates: Any, properties: dict[str, Any]) -> dict[str, Any]:
+    geometry = {"type": kind, "coordinates": coordinates}
+    return {"type": "Feature", "geometry": geometry, "properties": properties}
+
+
+def _located_lonlat(estimate: TrackEstimate) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     located = np.flatnonzero(np.isfinite(estimate.east_m) & np.isfinite(estimate.north_m))
     lon, lat = unproject(estimate.crs, estimate.east_m[located], estimate.north_m[located])
     return located, lon, lat

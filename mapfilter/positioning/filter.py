@@ -1,4 +1,4 @@
-"""The one contract of filters that locate a journey, and the one loop over a log.
+"""The contract of filters over epochs, and the one loop over a log.
 
 A filter is a frozen object. ``begin`` returns the state before the first epoch, and ``step`` takes
 one epoch: state in, state out, with a :class:`StepOutput`. :func:`locate` calls it for every epoch
@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, nan
-from typing import Any, Generic, Literal, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar, get_args
 
 import numpy as np
 
@@ -29,15 +29,13 @@ from mapfilter.positioning.estimate import (
     TrackEstimate,
     UnusedReading,
 )
-from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.schema import SERVING
+from mapfilter.tracks.log import Kind as Kind
+from mapfilter.tracks.log import TrackLog, rows_by_kind
 
-Kind = Literal["motion", "serving", "neighbour", "gnss", "pseudorange", "tdoa"]
-"""What a journey may record."""
-
-ALL_KINDS: frozenset[Kind] = frozenset(
-    ("motion", "serving", "neighbour", "gnss", "pseudorange", "tdoa")
-)
+ALL_KINDS: frozenset[Kind] = frozenset(get_args(Kind))
+_TABLE_OF = {"pseudorange": "pseudoranges"}
+_KEPT = {"motion", "serving", "neighbour"}
+"""Kinds whose rows stay, as they make the epochs."""
 _SNAPSHOT_EVERY_M = 20.0
 
 StateT = TypeVar("StateT")
@@ -152,10 +150,8 @@ def locate(
     ----------
     log : TrackLog
         In the filter's CRS.
-    filter_ : Filter
-    rng : numpy.random.Generator
     snapshots : bool
-        Whether to keep the hypotheses at some epochs until the filter tracks, for figures.
+        Whether to keep the hypotheses at some epochs until the filter first tracks, for figures.
 
     Raises
     ------
@@ -172,64 +168,41 @@ def locate(
     album = _Album(filter_)
     outputs: list[StepOutput] = []
     began_s = time.process_time()
-    for before, after, output in _steps(filter_, filter_.begin(kinds_of(log)), merged, rng):
+    state = filter_.begin(kinds_of(log))
+    for epoch in merged:
+        before = state
+        state, output = filter_.step(before, epoch, rng)
         outputs.append(output)
         if smoother is not None:
-            smoother.add(before, after)
+            smoother.add(before, state)
         if snapshots:
-            album.add(after, merged[len(outputs) - 1], output)
+            album.add(state, epoch, output)
     estimate = estimate_of(filter_, outputs, unused, log.start_utc_s)
     if smoother is not None:
         estimate = smoother.smoothed(estimate, rng)
     return PositionedTrack(estimate, tuple(album.taken), time.process_time() - began_s)
 
 
-def _steps(
-    filter_: Filter[Any], state: Any, merged: Sequence[Epoch], rng: np.random.Generator
-) -> Iterator[tuple[Any, Any, StepOutput]]:
-    for epoch in merged:
-        before = state
-        state, output = filter_.step(before, epoch, rng)
-        yield before, state, output
-
-
 def kinds_of(log: TrackLog) -> frozenset[Kind]:
     """Return which kinds of measurements a log holds."""
-    serving = log.radio["role"] == SERVING
-    rows: dict[Kind, int] = {
-        "motion": len(log.motion),
-        "serving": int(serving.sum()),
-        "neighbour": int((~serving).sum()),
-        "gnss": len(log.gnss),
-        "pseudorange": len(log.pseudoranges),
-        "tdoa": len(log.tdoa),
-    }
-    return frozenset(kind for kind, count in rows.items() if count)
+    return frozenset(kind for kind, rows in rows_by_kind(log).items() if len(rows))
 
 
 def usable_part(log: TrackLog, filter_: Filter[Any]) -> tuple[TrackLog, list[UnusedReading]]:
-    """Take tables that the filter has no use for out of a log, and name each kind once.
+    """Name each kind of measurement that a filter does not use, and take its rows out of the log.
 
-    Neighbours stay, as rows of the reports that the filter takes.
+    Motion and radio reports stay, as they make the epochs.
     """
-    tables = {
-        "neighbour": log.radio[log.radio["role"] != SERVING],
-        "gnss": log.gnss,
-        "pseudorange": log.pseudoranges,
-        "tdoa": log.tdoa,
-    }
+    rows, uses = rows_by_kind(log), set(filter_.uses)
     unused = [
         UnusedReading(
-            float(rows["time_s"].iloc[0]), kind, f"{len(rows)} rows", Reason.NOT_USED_BY_FILTER
+            float(found["time_s"].iloc[0]), kind, f"{len(found)} rows", Reason.NOT_USED_BY_FILTER
         )
-        for kind, rows in tables.items()
-        if kind not in filter_.uses and len(rows)
+        for kind, found in rows.items()
+        if kind not in uses and len(found)
     ]
-    fields = {"gnss": "gnss", "pseudorange": "pseudoranges", "tdoa": "tdoa"}
-    empty = {
-        field: tables[kind].iloc[:0] for kind, field in fields.items() if kind not in filter_.uses
-    }
-    return replace(log, **empty), unused
+    idle = [_TABLE_OF.get(kind, str(kind)) for kind in rows.keys() - uses - _KEPT]
+    return replace(log, **{table: getattr(log, table).iloc[:0] for table in idle}), unused
 
 
 def estimate_of(
@@ -262,7 +235,7 @@ def estimate_of(
 
 
 class _Album:
-    """Hypotheses at chosen epochs until tracking or lost: at a new status, and every 20 m."""
+    """Hypotheses until the filter first tracks or is lost: at a new status, and every 20 m."""
 
     def __init__(self, filter_: Filter[Any]) -> None:
         self.filter, self.travelled_m, self.open = filter_, 0.0, True
@@ -281,15 +254,6 @@ class _Album:
                 return
         self.open = fix.status in (Status.SEARCHING, Status.CONVERGED)
         if fix.status is not Status.TRACKING:
-            self.taken.append(
-                Snapshot(
-                    fix.time_s,
-                    self.travelled_m,
-                    found.east_m,
-                    found.north_m,
-                    found.weight,
-                    fix.east_m,
-                    fix.north_m,
-                    fix.status,
-                )
-            )
+            hypotheses = found.east_m, found.north_m, found.weight
+            at = fix.east_m, fix.north_m, fix.status
+            self.taken.append(Snapshot(fix.time_s, self.travelled_m, *hypotheses, *at))

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from importlib import import_module
 from typing import Any
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, fail
-from mapfilter.filters.gaussian import METHODS
 from mapfilter.options import Options
-from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
-from mapfilter.positioning.candidate import CandidateFilter
+from mapfilter.positioning import BUILT_IN as BUILT_IN
+from mapfilter.positioning import DEFAULT as DEFAULT
 from mapfilter.positioning.custom_filter import adapted, custom_filter, wrap_user_errors
 from mapfilter.positioning.filter import Filter, FilterOptions
-from mapfilter.positioning.kalman.filter import KalmanFilter
-
-DEFAULT = "bayes"
-BUILT_IN = ("bayes", "grid", "candidate", *METHODS)
 
 
 def filter_options(name: str = DEFAULT) -> FilterOptions:
@@ -24,8 +21,8 @@ def filter_options(name: str = DEFAULT) -> FilterOptions:
     Parameters
     ----------
     name : str
-        ``bayes``, ``grid``, ``candidate``, ``ekf``, ``iekf``, ``ukf``, ``ckf``, ``rbukf``, or a
-        custom filter as ``package.module:Name``.
+        One of :data:`mapfilter.positioning.BUILT_IN`, or a custom filter as
+        ``package.module:Name``.
 
     Raises
     ------
@@ -37,19 +34,15 @@ def filter_options(name: str = DEFAULT) -> FilterOptions:
     >>> filter_options("candidate").name
     'candidate'
     """
-    match name:
-        case "bayes":
-            return BayesFilter()
-        case "grid":
-            return GridFilter()
-        case "candidate":
-            return CandidateFilter()
-        case name if name in METHODS:
-            return KalmanFilter(method=name)  # type: ignore[arg-type]
-        case name if ":" in name:
-            return custom_filter(name)
-    expected = f"{', '.join(BUILT_IN)}, or package.module:Name"
-    raise fail(ConfigError, "filter", expected, repr(name))
+    if ":" in name:
+        return custom_filter(name)
+    if name not in BUILT_IN:
+        expected = f"{', '.join(BUILT_IN)}, or package.module:Name"
+        raise fail(ConfigError, "filter", expected, repr(name))
+    module, _, kind = BUILT_IN[name].partition(":")
+    options = getattr(import_module(module), kind)()
+    found: FilterOptions = options if options.name == name else replace(options, method=name)
+    return found
 
 
 def as_filter(given: Any, database: RadioRouteDatabase, *, ways: bool = True) -> Filter[Any]:
@@ -58,10 +51,9 @@ def as_filter(given: Any, database: RadioRouteDatabase, *, ways: bool = True) ->
     Parameters
     ----------
     given : str, options, Filter, or class
-        A name as in :func:`filter_options`; options such as :class:`BayesFilter`; a filter that
-        is already over an area; or a custom filter: a class or function that is called with the
-        database, or what it returned.
-    database : RadioRouteDatabase
+        A name as in :func:`filter_options`; options such as :class:`mapfilter.BayesFilter`; a
+        filter that is already over an area; or a custom filter: a class or function that is called
+        with the database, or what it returned.
     ways : bool
         Whether positions are matched to ways.
 

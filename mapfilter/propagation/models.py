@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Annotated, Literal
 
 import numpy as np
@@ -53,7 +52,7 @@ class PredictionModel(Options):
     """How levels are predicted.
 
     Random clutter (``shadowing_db``) stands for detail in the levels. A prediction that is used
-    for positioning should have none: what is drawn at random is nowhere in the world.
+    for positioning should have none: what is drawn at random is not in the real levels.
 
     Parameters
     ----------
@@ -117,7 +116,7 @@ class PredictionModel(Options):
     def check(self, faults: Faults) -> None:
         """See that the model has a probability of line of sight where one is asked for."""
         if self.line_of_sight == "probability" and not str(self.model).startswith("tr38901"):
-            expected = "buildings, as only tr38901_uma and tr38901_umi tell a probability"
+            expected = "buildings, as only tr38901_uma and tr38901_umi have a probability"
             faults.add("prediction, line_of_sight", expected, "probability")
 
 
@@ -128,7 +127,7 @@ class GroundTruthErrors(Options):
     Parameters
     ----------
     level_error_db : float
-        Standard deviation of a shadowing field that the prediction does not know.
+        Standard deviation of a shadowing field that is not in the prediction.
     correlation_m : float
         Correlation length of that field.
     site_share : float
@@ -188,32 +187,33 @@ class GroundTruthErrors(Options):
         return replace(prediction, **given)
 
 
-Range = tuple[float, float]
-
-_HATA = {"base_height_m": (30.0, 200.0), "mobile_height_m": (1.0, 10.0)}
-_HATA_DISTANCE = {"distance_m": (1000.0, 20000.0)}
-_TR38901 = {"frequency_mhz": (500.0, 1e5), "mobile_height_m": (1.5, 22.5)}
-_TR38901_DISTANCE = {"distance_m": (10.0, 5000.0)}
-
-PUBLISHED: Mapping[ModelName, Mapping[str, Range]] = MappingProxyType(
-    {
-        "friis": {},
-        "log_distance": {},
-        "okumura_hata": {"frequency_mhz": (150.0, 1500.0), **_HATA, **_HATA_DISTANCE},
-        "cost231_hata": {"frequency_mhz": (1500.0, 2000.0), **_HATA, **_HATA_DISTANCE},
-        "cost231_walfisch_ikegami": {
-            "frequency_mhz": (800.0, 2000.0),
-            "base_height_m": (4.0, 50.0),
-            "mobile_height_m": (1.0, 3.0),
-            "distance_m": (20.0, 5000.0),
-        },
-        "tr38901_uma": {**_TR38901, "base_height_m": (25.0, 25.0), **_TR38901_DISTANCE},
-        "tr38901_umi": {**_TR38901, "base_height_m": (10.0, 10.0), **_TR38901_DISTANCE},
-    }
-)
+_HATA = {
+    "base_height_m": (30.0, 200.0),
+    "mobile_height_m": (1.0, 10.0),
+    "distance_m": (1000.0, 20000.0),
+}
+_TR38901 = {
+    "frequency_mhz": (500.0, 1e5),
+    "mobile_height_m": (1.5, 22.5),
+    "distance_m": (10.0, 5000.0),
+}
+PUBLISHED: Mapping[ModelName, Mapping[str, tuple[float, float]]] = {
+    "friis": {},
+    "log_distance": {},
+    "okumura_hata": {"frequency_mhz": (150.0, 1500.0), **_HATA},
+    "cost231_hata": {"frequency_mhz": (1500.0, 2000.0), **_HATA},
+    "cost231_walfisch_ikegami": {
+        "frequency_mhz": (800.0, 2000.0),
+        "base_height_m": (4.0, 50.0),
+        "mobile_height_m": (1.0, 3.0),
+        "distance_m": (20.0, 5000.0),
+    },
+    "tr38901_uma": {**_TR38901, "base_height_m": (25.0, 25.0)},
+    "tr38901_umi": {**_TR38901, "base_height_m": (10.0, 10.0)},
+}
 """The ranges that each model was published for."""
 
-_SCENARIOS: Mapping[str, Scenario] = MappingProxyType({"tr38901_uma": "uma", "tr38901_umi": "umi"})
+_SCENARIOS: Mapping[str, Scenario] = {"tr38901_uma": "uma", "tr38901_umi": "umi"}
 
 
 def path_loss_db(
@@ -283,44 +283,25 @@ def shortest_distance_m(model: PredictionModel) -> float:
 
 
 def outside_published_range(
-    model: ModelName,
-    *,
-    frequency_mhz: float,
-    base_height_m: float,
-    mobile_height_m: float,
-    longest_distance_m: float,
-    nearest_distance_m: float | None = None,
+    model: ModelName, used: Mapping[str, float], nearest_distance_m: float = np.inf
 ) -> tuple[str, ...]:
     """Return remarks on the values that lie outside the range a model was published for.
 
-    ``nearest_distance_m`` and ``longest_distance_m`` limit the distances at which it is used.
+    ``used`` are values by the names in :data:`PUBLISHED`; its ``distance_m`` is the longest one.
 
     Examples
     --------
-    >>> outside_published_range("cost231_walfisch_ikegami", frequency_mhz=2600.0,
-    ...     base_height_m=30.0, mobile_height_m=1.5, longest_distance_m=900.0)
+    >>> used = {"base_height_m": 30.0, "mobile_height_m": 1.5, "distance_m": 900.0}
+    >>> outside_published_range("cost231_walfisch_ikegami", used | {"frequency_mhz": 2600.0})
     ('frequency_mhz 2600 is outside 800..2000',)
-    >>> outside_published_range("tr38901_uma", frequency_mhz=2600.0,
-    ...     base_height_m=30.0, mobile_height_m=1.5, longest_distance_m=900.0)
+    >>> outside_published_range("tr38901_uma", used | {"frequency_mhz": 2600.0})
     ('base_height_m 30 is not 25',)
     """
-    published = PUBLISHED[model]
-    values = {
-        "frequency_mhz": frequency_mhz,
-        "base_height_m": base_height_m,
-        "mobile_height_m": mobile_height_m,
-        "distance_m": longest_distance_m,
-    }
-    remarks = [
-        f"{name} {values[name]:g} is "
-        + (f"outside {low:g}..{high:g}" if low < high else f"not {low:g}")
-        for name, (low, high) in published.items()
-        if not low <= values[name] <= high
-    ]
-    if nearest_distance_m is not None and "distance_m" in published:
-        low, high = published["distance_m"]
-        if nearest_distance_m < low <= longest_distance_m:
-            remarks.append(
-                f"distance_m from {nearest_distance_m:g} on is outside {low:g}..{high:g}"
-            )
+    remarks = []
+    for name, (low, high) in PUBLISHED[model].items():
+        limits = f"outside {low:g}..{high:g}" if low < high else f"not {low:g}"
+        if not low <= used[name] <= high:
+            remarks.append(f"{name} {used[name]:g} is {limits}")
+        if name == "distance_m" and nearest_distance_m < low <= used[name]:
+            remarks.append(f"distance_m from {nearest_distance_m:g} on is {limits}")
     return tuple(remarks)

@@ -14,7 +14,7 @@ import numpy as np
 
 from mapfilter._parallel import Progress
 from mapfilter._types import Bools, Floats, Floats32
-from mapfilter.errors import Faults, InputError
+from mapfilter.errors import Faults, InputError, listed
 from mapfilter.geodesy import Lattice, grid_convergence_rad, heading_from_azimuth_rad, unproject
 from mapfilter.propagation.line_of_sight import (
     check_heights,
@@ -315,22 +315,19 @@ def outside_validity(plan: CellPlan, lattice: Lattice, model: PredictionModel) -
     west, south, east, north = lattice.bounds_m
     ids: dict[str, list[str]] = defaultdict(list)
     for (frequency_mhz, height_m), cells in alike.items():
-        east_m = np.array([cell.east_m for cell in cells])
-        north_m = np.array([cell.north_m for cell in cells])
-        beside_m = np.maximum(np.maximum(west - east_m, east_m - east), 0.0)
-        below_m = np.maximum(np.maximum(south - north_m, north_m - north), 0.0)
+        east_m, north_m = np.array([(cell.east_m, cell.north_m) for cell in cells]).T
+        beside_m, below_m = east_m - east_m.clip(west, east), north_m - north_m.clip(south, north)
         across_m = np.maximum(abs(east_m - west), abs(east_m - east))
         along_m = np.maximum(abs(north_m - south), abs(north_m - north))
-        nearest_m, farthest_m = np.hypot(beside_m, below_m), np.hypot(across_m, along_m)
-        notes = outside_published_range(
-            model.model,
-            frequency_mhz=frequency_mhz,
-            base_height_m=height_m,
-            mobile_height_m=model.mobile_height_m,
-            longest_distance_m=round(float(farthest_m.max())),
-            nearest_distance_m=max(round(float(nearest_m.min())), shortest_distance_m(model)),
-        )
-        for note in notes:
+        used = {
+            "frequency_mhz": frequency_mhz,
+            "base_height_m": height_m,
+            "mobile_height_m": model.mobile_height_m,
+            "distance_m": round(float(np.hypot(across_m, along_m).max())),
+        }
+        closest_m = round(float(np.hypot(beside_m, below_m).min()))
+        nearest_m = max(closest_m, shortest_distance_m(model))
+        for note in outside_published_range(model.model, used, nearest_m):
             ids[note].extend(cell.id for cell in cells)
     return tuple(f"{_named(names)}: {note}" for note, names in ids.items())
 
@@ -351,8 +348,7 @@ def off_frequency(plan: CellPlan, antennas: Antennas) -> tuple[str, ...]:
 def _named(ids: list[str]) -> str:
     if len(ids) == 1:
         return f"cell {ids[0]!r}"
-    shown = ", ".join(repr(name) for name in ids[:_MOST_NAMED])
-    return f"{len(ids)} cells ({shown}{', …' if len(ids) > _MOST_NAMED else ''})"
+    return f"{len(ids)} cells ({listed([repr(name) for name in ids], _MOST_NAMED)})"
 
 
 def _check_antennas(plan: CellPlan, antennas: Antennas | None) -> None:

@@ -10,7 +10,7 @@ Distances below 10 m count as 10 m. Heights less than 0.5 m above the effective 
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,21 +26,15 @@ _ENVIRONMENT_M = 1.0
 _LEAST_EFFECTIVE_M = 0.5
 
 
-class _Terms(NamedTuple):
-    """Constants of one scenario's rows of table 7.4.1-1."""
-
-    constant_db: float
-    near_slope_db: float
-    breakpoint_db: float
-    hidden_constant_db: float
-    hidden_slope_db: float
-    hidden_frequency_db: float
-    hidden_height_db: float
-
-
-_TERMS: dict[Scenario, _Terms] = {
-    "uma": _Terms(28.0, 22.0, 9.0, 13.54, 39.08, 20.0, 0.6),
-    "umi": _Terms(32.4, 21.0, 9.5, 22.4, 35.3, 21.3, 0.3),
+# Rows of table 7.4.1-1: constant, slope by lg d and factor of the breakpoint, with line of sight;
+# constant, slope by lg d, by lg f and by height, without.
+_SEEN: dict[Scenario, tuple[float, float, float]] = {
+    "uma": (28.0, 22.0, 9.0),
+    "umi": (32.4, 21.0, 9.5),
+}
+_HIDDEN: dict[Scenario, tuple[float, float, float, float]] = {
+    "uma": (13.54, 39.08, 20.0, 0.6),
+    "umi": (22.4, 35.3, 21.3, 0.3),
 }
 
 
@@ -48,8 +42,8 @@ def breakpoint_distance_m(
     frequency_mhz: float,
     base_height_m: float,
     mobile_height_m: float,
-    environment_height_m: ArrayLike = _ENVIRONMENT_M,
-) -> Floats:
+    environment_height_m: float = _ENVIRONMENT_M,
+) -> float:
     """Return the breakpoint distance ``d'_BP = 4 (h_BS - h_E)(h_UT - h_E) f_c / c`` in metres.
 
     Table 7.4.1-1, note 1. The effective environment height h_E is 1 m in UMi, and in UMa for
@@ -57,13 +51,14 @@ def breakpoint_distance_m(
 
     Examples
     --------
-    >>> breakpoint_distance_m(2000.0, 25.0, 1.5).item()
+    >>> breakpoint_distance_m(2000.0, 25.0, 1.5)
     320.0
     """
-    environment = np.asarray(environment_height_m, dtype=np.float64)
-    base = np.maximum(base_height_m - environment, _LEAST_EFFECTIVE_M)
-    mobile = np.maximum(mobile_height_m - environment, _LEAST_EFFECTIVE_M)
-    return np.asarray(4 * base * mobile * frequency_mhz * 1e6 / _SPEED_OF_LIGHT_MPS)
+    base, mobile = (
+        max(height_m - environment_height_m, _LEAST_EFFECTIVE_M)
+        for height_m in (base_height_m, mobile_height_m)
+    )
+    return 4 * base * mobile * frequency_mhz * 1e6 / _SPEED_OF_LIGHT_MPS
 
 
 def seen_loss_db(
@@ -72,7 +67,6 @@ def seen_loss_db(
     frequency_mhz: float,
     base_height_m: float,
     mobile_height_m: float,
-    environment_height_m: ArrayLike = _ENVIRONMENT_M,
 ) -> Floats:
     """Return the path loss with line of sight in dB, PL_UMa-LOS or PL_UMi-LOS.
 
@@ -85,23 +79,19 @@ def seen_loss_db(
     ----------
     distance_m : array_like, any shape
         Horizontal distance, d_2D.
-    environment_height_m : array_like
-        Effective environment height, h_E.
 
     Examples
     --------
     >>> seen_loss_db("uma", [100.0, 1000.0], 2000.0, 25.0, 1.5).round(2).tolist()
     [78.28, 108.91]
     """
-    terms = _TERMS[scenario]
+    constant_db, slope_db, breakpoint_db = _SEEN[scenario]
     flat, slant = _distances_m(distance_m, base_height_m, mobile_height_m)
-    break_m = breakpoint_distance_m(
-        frequency_mhz, base_height_m, mobile_height_m, environment_height_m
-    )
+    break_m = breakpoint_distance_m(frequency_mhz, base_height_m, mobile_height_m)
     lg_slant, frequency_db = np.log10(slant), 20 * np.log10(frequency_mhz / 1000)
-    near_db = terms.constant_db + terms.near_slope_db * lg_slant + frequency_db
-    bend_db = terms.breakpoint_db * np.log10(break_m**2 + (base_height_m - mobile_height_m) ** 2)
-    far_db = terms.constant_db + 40 * lg_slant + frequency_db - bend_db
+    near_db = constant_db + slope_db * lg_slant + frequency_db
+    bend_db = breakpoint_db * np.log10(break_m * break_m + (base_height_m - mobile_height_m) ** 2)
+    far_db = constant_db + 40 * lg_slant + frequency_db - bend_db
     return np.asarray(np.where(flat <= break_m, near_db, far_db))
 
 
@@ -111,7 +101,6 @@ def hidden_loss_db(
     frequency_mhz: float,
     base_height_m: float,
     mobile_height_m: float,
-    environment_height_m: ArrayLike = _ENVIRONMENT_M,
 ) -> Floats:
     """Return the path loss without line of sight in dB, PL_UMa-NLOS or PL_UMi-NLOS.
 
@@ -124,17 +113,15 @@ def hidden_loss_db(
     >>> hidden_loss_db("uma", [100.0, 1000.0], 2000.0, 25.0, 1.5).round(2).tolist()
     [98.18, 136.81]
     """
-    terms = _TERMS[scenario]
+    constant_db, slope_db, frequency_db, height_db = _HIDDEN[scenario]
     _, slant = _distances_m(distance_m, base_height_m, mobile_height_m)
     own_db = (
-        terms.hidden_constant_db
-        + terms.hidden_slope_db * np.log10(slant)
-        + terms.hidden_frequency_db * np.log10(frequency_mhz / 1000)
-        - terms.hidden_height_db * (mobile_height_m - 1.5)
+        constant_db
+        + slope_db * np.log10(slant)
+        + frequency_db * np.log10(frequency_mhz / 1000)
+        - height_db * (mobile_height_m - 1.5)
     )
-    seen_db = seen_loss_db(
-        scenario, distance_m, frequency_mhz, base_height_m, mobile_height_m, environment_height_m
-    )
+    seen_db = seen_loss_db(scenario, distance_m, frequency_mhz, base_height_m, mobile_height_m)
     return np.asarray(np.maximum(seen_db, own_db))
 
 

@@ -60,7 +60,7 @@ def vertical_gain_db(
     Parameters
     ----------
     depression_rad : array_like, any shape
-        Angle below the horizon under which the antenna sees the receiver.
+        Angle below the horizon from the antenna to the receiver.
     downtilt_rad : float
         Electrical downtilt: the beam below the horizon, alike all around.
     beamwidth_rad : float

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+from mapfilter._io import read_input
 from mapfilter.errors import Faults, InputError, fail
 
 _LARGEST_BYTES = 1 << 26
@@ -75,20 +76,16 @@ def read_table(path: Path, what: str) -> Table:
         The file is missing, empty, too large or no such text.
     """
     try:
-        if path.stat().st_size > _LARGEST_BYTES:
-            raise fail(InputError, str(path), f"{what} of at most 64 MiB", "a larger file")
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_input(path, _LARGEST_BYTES, what).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         got = f"other bytes at offset {error.start}"
         hint = "saved in a Windows code page, or no text file"
         raise fail(InputError, str(path), "text in UTF-8", got, hint) from error
-    except OSError as error:
-        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
     if "\0" in text:
         raise fail(InputError, str(path), "text in UTF-8", "NUL characters", "no text file")
     head = next((line for line in text.splitlines() if line.strip()), "")
     separator = max(_SEPARATORS, key=head.count)
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
+    reader = csv.reader(io.StringIO(text, newline=None), delimiter=separator)
     lines: list[tuple[int, list[str]]] = []
     fields = 0
     try:
@@ -169,13 +166,14 @@ class Arranged:
     """A table with the fields of a cell plan as columns.
 
     ``shown`` names fields in messages, with the file's own column; ``notes`` counts the values that
-    were filled in.
+    were filled in; ``decimal_comma`` allows commas in numbers.
     """
 
     header: tuple[str, ...]
     rows: tuple[tuple[int, list[str]], ...]
     shown: Mapping[str, str]
     notes: tuple[str, ...]
+    decimal_comma: bool
 
 
 def arrange(
@@ -221,7 +219,8 @@ def arrange(
         for name, count in sorted(filled.items())
     )
     shown = {name: f"{header[at]} ({name})" for name, at in picked.items() if header[at] != name}
-    return Arranged((*fields, "cell") if composed else tuple(fields), tuple(found), shown, notes)
+    names = (*fields, "cell") if composed else tuple(fields)
+    return Arranged(names, tuple(found), shown, notes, table.separator != ",")
 
 
 def _pick(

@@ -13,7 +13,7 @@ from typing import Any
 from pyproj import CRS
 
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import project, projected_crs, unproject
+from mapfilter.geodesy import degree_fault, project, projected_crs, unproject
 from mapfilter.radio.cell_layouts import COLUMNS, Arranged, Layout, arrange, number, read_table
 from mapfilter.radio.cell_rules import ANTENNAS, OPTIONAL, RANGES, antenna_fault, id_fault
 
@@ -58,8 +58,10 @@ def read_plan(
     _check_header(path, arranged.header, known_only=False)
     if not arranged.rows and not faults.found:
         raise fail(InputError, str(path), "at least one cell", "a header without rows")
-    reader = _Reader(path, arranged, crs, table.separator != ",", faults)
-    rows = [reader.row(line, texts) for line, texts in arranged.rows]
+    rows = []
+    for line, texts in arranged.rows:
+        given = {name: text.strip() for name, text in zip(arranged.header, texts, strict=True)}
+        rows.append(_row(f"{path} row {line}", line, given, arranged, faults))
     systems = {row.values.get("crs", crs) for row in rows}
     if len(systems) > 1:
         faults.add(f"{path}, crs", "one CRS in all rows", ", ".join(sorted(systems)))
@@ -86,78 +88,60 @@ def _check_header(path: Path, header: tuple[str, ...], *, known_only: bool) -> N
     faults.raise_if_any(InputError)
 
 
-class _Reader:
-    def __init__(
-        self, path: Path, table: Arranged, crs: str, decimal_comma: bool, faults: Faults
-    ) -> None:
-        self._path, self._header, self._shown = path, table.header, table.shown
-        self._crs, self._decimal_comma, self._faults = crs, decimal_comma, faults
-        self._row = Row(0, {})
+def _row(where: str, line: int, given: Mapping[str, str], table: Arranged, faults: Faults) -> Row:
+    """Return the values of a line that are as they should be."""
+    row = Row(line, {})
+    values = row.values
 
-    def row(self, line: int, texts: list[str]) -> Row:
-        self._row = Row(line, {})
-        given = {name: text.strip() for name, text in zip(self._header, texts, strict=True)}
-        values = self._row.values
-        values["id"] = self._identifier("cell", given["cell"])
-        values["site"] = self._identifier("site", given.get("site") or given["cell"])
-        for name in RANGES:
-            if name not in ("east_m", "north_m"):
-                self._number(name, given.get(name, ""))
-        for name in ("lat", "lon", "east", "north"):
-            if name in given:
-                values[name] = self._parse(name, given[name], "a number")
-        values.setdefault("azimuth_deg", None)
-        indoor = given.get("indoor", "").lower()
-        if indoor not in _TRUE | _FALSE | {""}:
-            self._fault("indoor", "1 or 0, true or false, yes or no", repr(given["indoor"]))
-        values["indoor"] = indoor in _TRUE
-        antenna = given.get("antenna") or ("sector" if given.get("azimuth_deg") else "omni")
-        values["antenna"] = antenna.lower() if antenna.lower() in ANTENNAS else antenna
-        if wrong := antenna_fault(values["antenna"]):
-            self._fault("antenna", *wrong)
-        if given.get("crs"):
-            try:
-                values["crs"] = projected_crs(given["crs"], f"{self._path} row {line}, crs")
-            except InputError as error:
-                self._faults.found.extend(error.faults)
-                self._row.faulty = True
-        return self._row
+    def refuse(name: str, expected: str, got: str, hint: str = "") -> None:
+        faults.add(f"{where}, {table.shown.get(name, name)}", expected, got, hint)
+        row.faulty = True
 
-    def _fault(self, name: str, expected: str, got: str, hint: str = "") -> None:
-        shown = self._shown.get(name, name)
-        self._faults.add(f"{self._path} row {self._row.line}, {shown}", expected, got, hint)
-        self._row.faulty = True
-
-    def _identifier(self, name: str, text: str) -> str:
-        if wrong := id_fault(text):
-            self._fault(name, *wrong)
-        return text
-
-    def _number(self, name: str, text: str) -> None:
-        allowed = RANGES[name]
-        if not text:
-            if name in _REQUIRED:
-                self._fault(name, allowed.expected, "nothing")
-            elif name in OPTIONAL:
-                self._row.values[name] = None
-            return
-        value = self._parse(name, text, allowed.expected)
-        if value is None:
-            return
-        if not allowed.holds(value):
-            self._fault(name, allowed.expected, text, allowed.hint(value))
-        else:
-            self._row.values[name] = int(value) if allowed.whole else value
-
-    def _parse(self, name: str, text: str, expected: str) -> float | None:
-        value = number(text, decimal_comma=self._decimal_comma)
+    def parse(name: str, expected: str) -> float | None:
+        text = given[name]
+        value = number(text, decimal_comma=table.decimal_comma)
         if value is None:
             comma = "," in text and text.replace(",", "", 1).lstrip("-").isdigit()
             got = repr(text[:_LONGEST_SHOWN]) if text else "nothing"
             if text.lower().lstrip("+-") in ("nan", "inf", "infinity"):
                 got = text
-            self._fault(name, expected, got, "a decimal comma" if comma else "")
+            refuse(name, expected, got, "a decimal comma" if comma else "")
         return value
+
+    values["id"], values["site"] = given["cell"], given.get("site") or given["cell"]
+    for name, key in (("cell", "id"), ("site", "site")):
+        if wrong := id_fault(values[key]):
+            refuse(name, *wrong)
+    for name, allowed in RANGES.items():
+        if given.get(name):
+            value = parse(name, allowed.expected)
+            if value is not None and not allowed.holds(value):
+                refuse(name, allowed.expected, given[name], allowed.hint(value))
+            elif value is not None:
+                values[name] = int(value) if allowed.whole else value
+        elif name in _REQUIRED:
+            refuse(name, allowed.expected, "nothing")
+        elif name in OPTIONAL:
+            values[name] = None
+    for name in ("lat", "lon", "east", "north"):
+        if name in given:
+            values[name] = parse(name, "a number")
+    values.setdefault("azimuth_deg", None)
+    indoor = given.get("indoor", "").lower()
+    if indoor not in _TRUE | _FALSE | {""}:
+        refuse("indoor", "1 or 0, true or false, yes or no", repr(given["indoor"]))
+    values["indoor"] = indoor in _TRUE
+    antenna = given.get("antenna") or ("sector" if given.get("azimuth_deg") else "omni")
+    values["antenna"] = antenna.lower() if antenna.lower() in ANTENNAS else antenna
+    if wrong := antenna_fault(values["antenna"]):
+        refuse("antenna", *wrong)
+    if given.get("crs"):
+        try:
+            values["crs"] = projected_crs(given["crs"], f"{where}, crs")
+        except InputError as error:
+            faults.found.extend(error.faults)
+            row.faulty = True
+    return row
 
 
 def _place(path: Path, rows: list[Row], crs: str, faults: Faults) -> None:
@@ -171,7 +155,7 @@ def _place(path: Path, rows: list[Row], crs: str, faults: Faults) -> None:
         values, names, wrong = row.values, "lat, lon", None
         if "lat" in values:
             if values["lat"] is not None and values["lon"] is not None:
-                wrong = _degree_fault(values["lat"], values["lon"], crs)
+                wrong = _place_fault(values["lat"], values["lon"], crs)
         elif values["east"] is not None and values["north"] is not None:
             names, own = "east, north", values.get("crs", crs)
             values["east_m"], values["north_m"] = values["east"], values["north"]
@@ -194,18 +178,14 @@ def _metre_fault(east: float, north: float, crs: str) -> tuple[str, str, str] | 
     return expected, got, "east and north swapped, or another CRS"
 
 
-def _degree_fault(lat: float, lon: float, crs: str) -> tuple[str, str, str] | None:
-    got = f"{lat:g}, {lon:g}"
-    if abs(lat) > 180 or abs(lon) > 180:
-        return "degrees in -90..90 and -180..180", got, "metres given for degrees"
-    if abs(lat) > 90:
-        return "degrees in -90..90 and -180..180", got, "longitude and latitude swapped"
-    if _near(crs, lon, lat):
-        return None
+def _place_fault(lat: float, lon: float, crs: str) -> tuple[str, str, str] | None:
+    wrong = degree_fault(lat, lon)
+    if wrong is not None or _near(crs, lon, lat):
+        return wrong
     hint = "a cell of another place, or another CRS"
     if abs(lon) <= 90 and _near(crs, lat, lon):
         hint = "longitude and latitude swapped"
-    return f"a place where {crs} is used", got, hint
+    return f"a place where {crs} is used", f"{lat:g}, {lon:g}", hint
 
 
 @lru_cache(maxsize=16)

@@ -8,13 +8,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from mapfilter._io import atomic_file
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import project, projected_crs, same_crs, unproject
+from mapfilter.geodesy import project, projected_crs, same_crs, short_crs, unproject
 from mapfilter.radio.cell_layouts import COLUMNS, Layout
 from mapfilter.radio.cell_rules import (
     OPTIONAL,
@@ -93,7 +90,7 @@ class Cell:
     bsic: int | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class CellPlan:
     """The cells of an area, in one projected CRS; checked when it is made.
 
@@ -105,11 +102,6 @@ class CellPlan:
         At least one; ids are unique.
     notes : tuple of str
         What was filled in or left out when it was read.
-
-    Raises
-    ------
-    InputError
-        With every fault of every cell.
     """
 
     crs: str
@@ -125,6 +117,11 @@ class CellPlan:
         object.__setattr__(self, "cells", tuple(self.cells))
         _check_cells(self.cells, lambda i, name: f"cell {self.cells[i].id!r}, {name}", faults)
         faults.raise_if_any(InputError)
+
+    def __repr__(self) -> str:
+        """Return the numbers of cells and sites, and the CRS, in one line."""
+        sites = len({cell.site for cell in self.cells})
+        return f"<CellPlan: {len(self.cells)} cells at {sites} sites, {short_crs(self.crs)}>"
 
     @property
     def ids(self) -> tuple[str, ...]:
@@ -292,11 +289,6 @@ def write_cell_plan(plan: CellPlan, path: Path | str) -> None:
     """Write a cell plan as CSV that :func:`read_cell_plan` reads back.
 
     Positions are longitudes and latitudes with nine decimals (0.1 mm); all else is exact.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
     """
     lon_deg, lat_deg = unproject(
         plan.crs, [cell.east_m for cell in plan.cells], [cell.north_m for cell in plan.cells]
@@ -306,19 +298,7 @@ def write_cell_plan(plan: CellPlan, path: Path | str) -> None:
     writer.writerow(COLUMNS)
     for cell, lon, lat in zip(plan.cells, lon_deg.tolist(), lat_deg.tolist(), strict=True):
         named = {"cell": cell.id, "lat": f"{lat:.9f}", "lon": f"{lon:.9f}"}
-        writer.writerow(
-            named[column] if column in named else _as_text(getattr(cell, column))
-            for column in COLUMNS
-        )
+        named["indoor"] = str(int(cell.indoor))
+        writer.writerow(named.get(column) or getattr(cell, column) for column in COLUMNS)
     with atomic_file(Path(path)) as temporary:
         temporary.write_text(text.getvalue(), encoding="utf-8")
-
-
-def _as_text(value: Any) -> str:
-    if isinstance(value, np.generic):
-        value = value.item()
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return "1" if value else "0"
-    return str(value) if isinstance(value, str) else repr(value)

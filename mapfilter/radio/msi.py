@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mapfilter._io import read_input
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio.antenna import MeasuredAntenna
@@ -31,10 +32,8 @@ _FEWEST_POINTS, _MOST_POINTS = 36, 7200
 _LARGEST_GAP_DEG = 15.0
 _LARGEST_LOSS_DB = 200.0
 _SECTIONS = ("HORIZONTAL", "VERTICAL")
-_GAIN = re.compile(r"\s*([+-]?\d+(?:\.\d+)?)\s*\(?\s*(dbd|dbi)?\s*\)?\s*", re.IGNORECASE)
-_FREQUENCY = re.compile(
-    r"\s*(\d+(?:\.\d+)?)(?:\s*-\s*(\d+(?:\.\d+)?))?\s*(mhz|ghz)?\s*", re.IGNORECASE
-)
+_GAIN = re.compile(r"\s*([+-]?\d+(?:\.\d+)?)\s*\(?\s*(dbd|dbi)?\s*\)?\s*", re.I)
+_FREQUENCY = re.compile(r"\s*(\d+(?:\.\d+)?)(?:\s*-\s*(\d+(?:\.\d+)?))?\s*(mhz|ghz)?\s*", re.I)
 _TILT = re.compile(r"\s*([+-]?\d+(?:\.\d+)?)\b.*")
 
 
@@ -52,14 +51,13 @@ def read_antennas(folder: Path | str, names: Iterable[str]) -> dict[str, Measure
     """
     folder = Path(folder)
     wanted = sorted(set(names) - set(ANTENNAS))
+    faults, inside = Faults(), folder.resolve()
     try:
         files = {file.name: file for file in sorted(folder.iterdir()) if file.is_file()}
     except OSError as error:
         hint = "no folder of antennas there"
         raise fail(InputError, str(folder), "a folder", error.strerror or error, hint) from error
-    inside = folder.resolve()
     by_lower = {name.lower(): file for name, file in files.items()}
-    faults = Faults()
     found: dict[str, MeasuredAntenna] = {}
     for name in wanted:
         file = files.get(name)
@@ -89,11 +87,6 @@ def read_msi(path: Path | str) -> MeasuredAntenna:
     where ``TILT`` is just the word ``ELECTRICAL``, it is where the vertical cut is strongest. A
     vertical cut whose beam lies as far above the horizon as that tilt is below was counted upwards:
     it is turned over, with a note.
-
-    Raises
-    ------
-    InputError
-        The file is missing or damaged; with the row and the likely mistake of every fault.
     """
     path = Path(path)
     header, cuts = _sections(path)
@@ -119,12 +112,7 @@ Row = tuple[int, list[str]]
 
 def _sections(path: Path) -> tuple[dict[str, str], dict[str, tuple[int, str, list[Row]]]]:
     """Split a file into its keywords and, by name, each cut's first row, count and rows."""
-    try:
-        if path.stat().st_size > _LARGEST_BYTES:
-            raise fail(InputError, str(path), "an antenna of at most 1 MiB", "a larger file")
-        data = path.read_bytes()
-    except OSError as error:
-        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
+    data = read_input(path, _LARGEST_BYTES, "an antenna")
     if b"\0" in data:
         raise fail(InputError, str(path), "text", "NUL characters", "no text file, or UTF-16")
     # Comments hold degree signs in any code page; all that counts is ASCII.
@@ -214,8 +202,7 @@ def _gain_dbi(path: Path, header: dict[str, str], faults: Faults) -> float | Non
     if not text:
         return None
     match = _GAIN.fullmatch(text)
-    gain = math.nan if match is None else float(match[1])
-    if match is None or not -20 <= gain <= 60:
+    if match is None or not -20 <= (gain := float(match[1])) <= 60:
         faults.add(f"{path}, GAIN", "a gain in -20..60 with dBd or dBi", repr(text[:40]))
         return None
     return gain if (match[2] or "").lower() == "dbi" else gain + DBI_OVER_DBD
@@ -226,11 +213,10 @@ def _frequency_mhz(path: Path, header: dict[str, str], faults: Faults) -> float 
     text = header.get("FREQUENCY", "")
     if not text:
         return None
-    match = _FREQUENCY.fullmatch(text)
-    scale = 1000.0 if match and (match[3] or "").lower() == "ghz" else 1.0
-    value = math.nan if match is None else scale * float(match[1])
-    if match is not None and match[2] is not None:
-        value = (value + scale * float(match[2])) / 2
+    match, value = _FREQUENCY.fullmatch(text), math.nan
+    if match is not None:
+        scale = 1000.0 if (match[3] or "").lower() == "ghz" else 1.0
+        value = (scale * float(match[1]) + scale * float(match[2] or match[1])) / 2
     if not 10 <= value <= 1e5:
         hint = "GHz or Hz given for MHz" if match else ""
         faults.add(f"{path}, FREQUENCY", "MHz in 10..100000", repr(text[:40]), hint)
@@ -239,7 +225,6 @@ def _frequency_mhz(path: Path, header: dict[str, str], faults: Faults) -> float 
 
 
 def _downtilt_deg(header: dict[str, str], vertical: tuple[Floats, Floats]) -> float:
-    """Return the electrical downtilt of the cuts."""
     for key in ("ELECTRICAL_TILT", "TILT"):
         match = _TILT.fullmatch(header.get(key, ""))
         if match is not None and abs(float(match[1])) <= 90:

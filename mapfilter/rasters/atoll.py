@@ -19,7 +19,6 @@ from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cell_layouts import Table, read_table
 from mapfilter.radio.cell_rules import id_fault
-from mapfilter.rasters.grid_header import GridHeader
 
 INDEX_COLUMNS = ("TX_NAME", "FILE_NAME")
 """Columns that make a table an index of rasters."""
@@ -44,8 +43,8 @@ class IndexRow:
     bits: float | None = None
     area_m: tuple[float, float, float, float] | None = None
 
-    def header(self) -> GridHeader | None:
-        """Return a header in place of a raster's own, if the row holds enough."""
+    def header(self) -> tuple[str, dict[str, str]] | None:
+        """Return the place and values of a header for a raster without one, if there is enough."""
         if self.area_m is None or self.resolution_m is None or self.bits is None:
             return None
         west, south, east, north = self.area_m
@@ -58,7 +57,7 @@ class IndexRow:
             "ULXMAP": repr(west + self.resolution_m / 2),
             "ULYMAP": repr(north - self.resolution_m / 2),
         }
-        return GridHeader(self.where, values)
+        return self.where, values
 
     def check(self, lattice: Lattice, bits: int | None, faults: Faults) -> str:
         """Compare the row with a raster's own header; return a remark, and add to ``faults``."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -29,7 +29,7 @@ _LEAST_NODATA = 250.0
 
 @dataclass(frozen=True, slots=True)
 class Declared:
-    """What a user declares of files that do not state it themselves.
+    """Properties given by the user for files that do not state them.
 
     Parameters
     ----------
@@ -37,11 +37,14 @@ class Declared:
         Projected CRS.
     nodata : float or None
         A number that means no data, besides the files' own.
+    header : (str, mapping of str to str) or None
+        Row of an index of raw pixels, and the keys and values of a header; used where the pixels
+        have none, or one without the place.
     """
 
-    quantity: Quantity | None = None
     crs: str | None = None
     nodata: float | None = None
+    header: tuple[str, Mapping[str, str]] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,24 +105,19 @@ def without_nodata(values: Floats32, nodata: Sequence[float]) -> Floats32:
 
 def check_file(path: Path) -> None:
     """Check that there is a file with something in it."""
-    try:
-        size = path.stat().st_size
-    except OSError as error:
-        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
     if path.is_dir():
         raise fail(InputError, str(path), "a raster file", "a folder")
-    if size == 0:
+    try:
+        with path.open("rb") as stream:
+            empty = not stream.read(1)
+    except OSError as error:
+        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
+    if empty:
         raise fail(InputError, str(path), "a raster file", "an empty file")
 
 
 def check_plausible(values: Floats32, quantity: Quantity, path: Path) -> None:
-    """Check that numbers can be levels, losses or deviations; NaN is ignored.
-
-    Raises
-    ------
-    InputError
-        They cannot; with the likely mistake.
-    """
+    """Check that numbers can be levels, losses or deviations; NaN is ignored."""
     lowest, highest = (extreme.reduce(values, axis=None) for extreme in (np.fmin, np.fmax))
     if np.isnan(lowest):
         return

@@ -26,7 +26,6 @@ from mapfilter.errors import Faults, InputError, OutputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
 from mapfilter.radio.cell_rules import id_fault
 from mapfilter.rasters.files import Declared, Quantity, RasterFile, Window, without_nodata
-from mapfilter.rasters.grid_header import GridHeader
 
 QUANTITY_TAG = "MAPFILTER_QUANTITY"
 """Tag of a file that states which quantity its bands hold."""
@@ -63,7 +62,7 @@ def new_geotiff(
     bands : sequence of (str, str)
         Description and unit of each band.
     overviews : {"average", "nearest"}
-        How coarser levels are made; numbers that stand for names must not be averaged.
+        Resampling of coarser levels; class numbers must not be averaged.
 
     Yields
     ------
@@ -181,24 +180,14 @@ class GeoTiff(RasterFile):
         return values
 
 
-def open_geotiff(
-    path: Path, cell_id: str, declared: Declared, _instead: GridHeader | None = None
-) -> GeoTiff:
-    """Read the header of a GeoTIFF; ``cell_id`` names a single band without a description.
-
-    Raises
-    ------
-    InputError
-        With every fault of the file.
-    """
+def open_geotiff(path: Path, cell_id: str, declared: Declared) -> GeoTiff:
+    """Read the header of a GeoTIFF; ``cell_id`` names a single band without a description."""
     faults = Faults()
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", NotGeoreferencedWarning)
             with rasterio.open(path, driver="GTiff") as source:
-                _check_extent_of_file(path, source, faults)
-                # Other faults of a file that is cut off are of no use.
-                faults.raise_if_any(InputError)
+                _check_extent_of_file(path, source)
                 names = tuple(str(name or "") for name in source.descriptions)
                 described = names != ("",)
                 names = names if described else (cell_id,)
@@ -245,15 +234,7 @@ def _lattice(
             faults.add(f"{where}, CRS", f"{declared}, as declared", crs, "two systems mixed up")
     except InputError as error:
         faults.found.extend(error.faults)
-    if not _check_pixels(where, source, placed, faults) or crs is None:
-        return None
-    corner = source.transform
-    return Lattice(crs, corner.c, corner.f, corner.a, source.height, source.width)
-
-
-def _check_pixels(where: str, source: Any, placed: bool, faults: Faults) -> bool:
     t = source.transform
-    before = len(faults.found)
     if not placed or t.is_identity:
         faults.add(f"{where}, transform", "where the pixels lie", "nothing", "exported without it")
     elif not all(map(math.isfinite, (t.a, t.b, t.c, t.d, t.e, t.f))):
@@ -265,7 +246,9 @@ def _check_pixels(where: str, source: Any, placed: bool, faults: Faults) -> bool
         faults.add(f"{where}, transform", "row 0 in the north, column 0 in the west", got, hint)
     elif abs(t.a + t.e) > _SQUARE_TOLERANCE * t.a:
         faults.add(f"{where}, transform", "square pixels", f"{t.a:g} m x {-t.e:g} m")
-    return len(faults.found) == before
+    elif crs is not None:
+        return Lattice(crs, t.c, t.f, t.a, source.height, source.width)
+    return None
 
 
 def _check_bands(where: str, names: tuple[str, ...], dtypes: Sequence[str], faults: Faults) -> None:
@@ -283,7 +266,7 @@ def _check_bands(where: str, names: tuple[str, ...], dtypes: Sequence[str], faul
         faults.add(f"{where}, bands", "real numbers", kind)
 
 
-def _check_extent_of_file(path: Path, source: Any, faults: Faults) -> None:
+def _check_extent_of_file(path: Path, source: Any) -> None:
     """Compare what the header of a TIFF promises with the bytes that are there."""
     size_bytes = path.stat().st_size
     rows_px, cols_px = source.block_shapes[0]
@@ -295,12 +278,11 @@ def _check_extent_of_file(path: Path, source: Any, faults: Faults) -> None:
     block_bytes = rows_px * cols_px * pixel_bytes * (1 if by_band else source.count)
     if block_bytes > max(size_bytes, _LEAST_BLOCK_BYTES):
         got = f"{rows_px} x {cols_px} pixels of {pixel_bytes} bytes"
-        faults.add(f"{path}, blocks", "blocks under 64 MiB", got, "not tiled, or a damaged header")
-        return
+        hint = "not tiled, or a damaged header"
+        raise fail(InputError, f"{path}, blocks", "blocks under 64 MiB", got, hint)
     if down * across * planes * _INDEX_ENTRY_BYTES > size_bytes:
         got = f"{size_bytes} bytes for {source.height} x {source.width} x {source.count} pixels"
-        faults.add(str(path), "as many bytes as its header needs", got, hint)
-        return
+        raise fail(InputError, str(path), "as many bytes as its header needs", got, hint)
     needed, blocks = 0, down * across
     step = max(1, -(-blocks * planes // _MOST_BLOCKS_LOOKED_AT))
     for band in range(1, planes + 1):
@@ -311,6 +293,6 @@ def _check_extent_of_file(path: Path, source: Any, faults: Faults) -> None:
             length = source.get_tag_item(f"BLOCK_SIZE_{block}", "TIFF", bidx=band)
             needed = max(needed, int(offset or 0) + int(length or 0))
     if needed == 0:
-        faults.add(str(path), "pixels", "a header without any", hint)
-    elif needed > size_bytes:
-        faults.add(str(path), f"at least {needed} bytes", f"{size_bytes} bytes", hint)
+        raise fail(InputError, str(path), "pixels", "a header without any", hint)
+    if needed > size_bytes:
+        raise fail(InputError, str(path), f"at least {needed} bytes", f"{size_bytes} bytes", hint)

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -17,19 +18,42 @@ import numpy as np
 
 from mapfilter._io import sha256_file
 from mapfilter._types import Floats, Floats32
-from mapfilter.errors import Faults, InputError, fail
+from mapfilter.errors import Faults, InputError, fail, listed
 from mapfilter.geodesy import Lattice, projected_crs
+from mapfilter.radio.cell_rules import id_fault
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.files import Declared, Quantity, RasterFile, Window, check_plausible
-from mapfilter.rasters.formats import open_files
+from mapfilter.rasters.atoll import INDEX_SUFFIXES, IndexRow, find_index, read_index
+from mapfilter.rasters.files import (
+    Declared,
+    Quantity,
+    RasterFile,
+    Window,
+    check_file,
+    check_plausible,
+)
+from mapfilter.rasters.geotiff import open_geotiff
+from mapfilter.rasters.plain_grids import open_ascii_grid, open_raw_grid
 from mapfilter.rasters.resampling import Resampling, common_lattice, read_on
 
+Opener = Callable[[Path, str, Declared], RasterFile]
+"""From a file, the cell's id if the file names none, and what the user or an index declares, to the
+opened file; pixels are not read."""
+
+FORMATS: Mapping[str, Opener] = {
+    ".tif": open_geotiff,
+    ".tiff": open_geotiff,
+    ".asc": open_ascii_grid,
+    ".bil": open_raw_grid,
+    ".flt": open_raw_grid,
+}
+"""Formats of raster files by suffix. A new one needs its module and a line here."""
+_MOST_FILES = 100_000
 _LARGEST_READ_BYTES = 4 << 30
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RxLevRasters:
-    """Which cells a set of rasters holds and where; the values stay in the files until read.
+    """Cells and lattice of a set of rasters, whose values stay in the files until they are read.
 
     Parameters
     ----------
@@ -38,20 +62,20 @@ class RxLevRasters:
     cell_ids : tuple of str
         In the order of the files and their bands.
     lattice : Lattice
-        Where the pixels lie, or are put by resampling.
+        Lattice of the pixels, resampled where files differ from it.
     quantity : {"level", "loss", "deviation"}
         Received level (dBm), path loss (dB) that is to be taken from a cell's EIRP, or how far off
         levels may be (dB, one standard deviation).
     files : tuple of RasterFile
-        Where the values are.
+        Files that hold the values.
     parts : tuple of Path
         All files that the set is made of, with headers, CRS files and the index.
     factor : float
         dB (dBm) per unit stored in the files.
     resampling : {"nearest", "bilinear"}
-        How files on another lattice are read.
+        Method for files on another lattice.
     notes : tuple of str
-        What was done to the files: resampled, put on one extent, named by their file.
+        Changes made in reading: resampled, put on one extent, named by their file.
     """
 
     path: Path
@@ -63,6 +87,11 @@ class RxLevRasters:
     factor: float = 1.0
     resampling: Resampling = "nearest"
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """Return name, number of cells, size and place in one line."""
+        held = f"{self.quantity} of {len(self.cell_ids)} cells"
+        return f"<RxLevRasters {self.path.name}: {held}, {self.lattice}>"
 
     def sha256(self) -> str:
         """Return the checksum of the file, or one of the names and checksums of all files."""
@@ -211,7 +240,7 @@ def open_rasters(
     resolution_m : float, optional
         Of the lattice that all files are read on; the finest of them when left out.
     resampling : {"nearest", "bilinear"}
-        How files on another lattice are read; bilinear in dB.
+        Method for files on another lattice; bilinear in dB.
 
     Raises
     ------
@@ -222,33 +251,60 @@ def open_rasters(
     """
     path = Path(path)
     _check_options(crs, factor, nodata, resolution_m)
-    system = projected_crs(crs) if crs is not None else None
-    found = open_files(path, Declared(quantity, system, nodata))
-    lattice, notes = common_lattice(found.files, resolution_m, resampling)
-    index = () if found.index_file is None else (found.index_file,)
+    declared = Declared(projected_crs(crs) if crs is not None else None, nodata)
+    index = find_index(path) if path.is_dir() else None
+    if path.suffix.lower() in INDEX_SUFFIXES and not path.is_dir():
+        check_file(path)
+        index = path
+    sources: list[tuple[Path, IndexRow | None]] = [(path, None)]
+    if index is not None:
+        sources = [(row.path, row) for row in read_index(index)]
+    elif path.is_dir():
+        sources = [(file, None) for file in _listed(path)]
+    faults, notes, files = Faults(), list[str](), list[RasterFile]()
+    for source, row in sources:
+        try:
+            files.append(_open(source, declared, row, notes))
+        except InputError as error:
+            faults.found.extend(error.faults)
+    faults.raise_if_any(InputError)
+    files = _named_by_file(files, notes)
+    _check_ids(path, files)
+    held = _one_quantity(path, files, quantity)
+    lattice, resampled = common_lattice(files, resolution_m, resampling)
+    parts = [part for file in files for part in file.parts]
+    counted = (
+        note if count == 1 else f"{note} ({count} rasters)"
+        for note, count in Counter(notes).items()
+    )
     return RxLevRasters(
         path,
-        tuple(cell_id for file in found.files for cell_id in file.cell_ids),
+        tuple(cell_id for file in files for cell_id in file.cell_ids),
         lattice,
-        found.quantity,
-        found.files,
-        tuple(dict.fromkeys(part for file in found.files for part in file.parts)) + index,
+        held,
+        tuple(files),
+        tuple(dict.fromkeys(parts if index is None else [*parts, index])),
         float(factor),
         resampling,
-        (*found.notes, *notes),
+        (*counted, *resampled),
     )
+
+
+def is_raster_folder(path: Path) -> bool:
+    """Return whether a folder holds rasters."""
+    return path.is_dir() and any(_is_raster(inner) for inner in path.iterdir())
 
 
 def check_against_plan(rasters: RxLevRasters, plan: CellPlan) -> None:
     """Check that rasters and plan hold the same cells."""
     faults, held = Faults(), set(rasters.cell_ids)
-    unknown = [cell_id for cell_id in rasters.cell_ids if cell_id not in plan]
-    missing = [cell_id for cell_id in plan.ids if cell_id not in held]
+    unknown = [repr(cell_id) for cell_id in rasters.cell_ids if cell_id not in plan]
+    missing = [repr(cell_id) for cell_id in plan.ids if cell_id not in held]
     hint = "rasters and plan of different dates or places"
     if unknown:
-        faults.add(str(rasters.path), "cells of the plan only", _listed(unknown), hint)
+        faults.add(str(rasters.path), "cells of the plan only", listed(unknown), hint)
     if missing:
-        got = f"no band for {_listed(missing)}"
+        got = f"no band for {listed(missing)}"
         faults.add(str(rasters.path), "a band for each cell of the plan", got, hint)
     faults.raise_if_any(InputError)
 
@@ -268,6 +324,76 @@ def _check_options(
     faults.raise_if_any(InputError)
 
 
-def _listed(ids: Sequence[str]) -> str:
-    more = f" and {len(ids) - 10} more" if len(ids) > 10 else ""
-    return ", ".join(repr(cell_id) for cell_id in ids[:10]) + more
+def _is_raster(path: Path) -> bool:
+    hidden = path.name.startswith(".")
+    return not hidden and path.suffix.lower() in FORMATS and path.is_file()
+
+
+def _listed(folder: Path) -> list[Path]:
+    found = sorted(path for path in folder.iterdir() if _is_raster(path))
+    if not found:
+        expected = f"raster files ({', '.join(FORMATS)}) or an index of them"
+        raise fail(InputError, str(folder), expected, "none in this folder")
+    if len(found) > _MOST_FILES:
+        raise fail(InputError, str(folder), f"at most {_MOST_FILES} rasters", len(found))
+    return found
+
+
+def _open(path: Path, declared: Declared, row: IndexRow | None, notes: list[str]) -> RasterFile:
+    """Open one file, and compare it with its row of an index."""
+    check_file(path)
+    opener = FORMATS.get(path.suffix.lower(), open_geotiff if row is None else open_raw_grid)
+    if row is None:
+        return opener(path, path.stem, declared)
+    file = opener(path, row.cell_id, replace(declared, header=row.header()))
+    if len(file.cell_ids) > 1:
+        got = f"{len(file.cell_ids)} bands"
+        raise fail(InputError, str(path), "one band per file of an index", got)
+    faults = Faults()
+    if note := row.check(file.lattice, file.bits, faults):
+        notes.append(note)
+    faults.raise_if_any(InputError)
+    return replace(file, cell_ids=(row.cell_id,), described=False)
+
+
+def _named_by_file(files: list[RasterFile], notes: list[str]) -> list[RasterFile]:
+    """Name cells by their files where all descriptions are the same, such as "Band 1"."""
+    single = [file for file in files if file.described and len(file.cell_ids) == 1]
+    if len(single) < 2 or len({file.cell_ids for file in single}) > 1:
+        return files
+    notes.append(f"cells are named by their files: all bands are called {single[0].cell_ids[0]!r}")
+    return [replace(file, cell_ids=(file.path.stem,)) if file in single else file for file in files]
+
+
+def _check_ids(path: Path, files: Sequence[RasterFile]) -> None:
+    faults, first = Faults(), dict[str, Path]()
+    for file in files:
+        for cell_id in file.cell_ids:
+            if wrong := id_fault(cell_id):
+                faults.add(f"{file.path}, name", *wrong)
+            if cell_id in first and first[cell_id] != file.path:
+                got = f"{cell_id!r} in {first[cell_id].name} and {file.path.name}"
+                faults.add(str(path), "each cell once", got)
+            first.setdefault(cell_id, file.path)
+    faults.raise_if_any(InputError)
+
+
+def _one_quantity(path: Path, files: Sequence[RasterFile], declared: Quantity | None) -> Quantity:
+    if declared is not None:
+        for file in files:
+            if file.tagged and file.quantity != declared:
+                expected, got = f"{declared}, as declared", file.quantity
+                hint = "quantity in [rasters] is of other rasters"
+                raise fail(InputError, str(file.path), expected, got, hint)
+        return declared
+    stated = {file.quantity for file in files}
+    known = stated - {None}
+    if len(known) > 1:
+        both = " and ".join(sorted(str(quantity) for quantity in known))
+        raise fail(InputError, str(path), "levels or losses in all files", both)
+    found = known.pop() if known and None not in stated else None
+    if found is None:
+        expected = "a quantity of the bands, levels (dBm) or losses (dB)"
+        hint = "set quantity = level or loss"
+        raise fail(InputError, str(path), expected, "neither tag nor unit", hint)
+    return found

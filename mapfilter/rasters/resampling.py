@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from mapfilter._types import Floats, Floats32, Ints
-from mapfilter.errors import Faults, InputError, fail
+from mapfilter.errors import Faults, InputError, fail, listed
 from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.rasters.files import RasterFile, Window
 
@@ -28,11 +28,6 @@ def common_lattice(
 
     Its pixels are those of most files of the finest resolution, unless another resolution is
     asked for; it covers all files.
-
-    Raises
-    ------
-    InputError
-        The files are in different systems, or far apart.
     """
     lattices, faults = [file.lattice for file in files], Faults()
     first = lattices[0]
@@ -92,14 +87,19 @@ def read_on(
         rows = np.arange(window[2]) + window[0] - shift[0]
         cols = np.arange(window[3]) + window[1] - shift[1]
         return _nearest(file, bands, rows, cols)
-    row = _places(window[0], window[2], lattice, file.lattice, vertical=True)
-    col = _places(window[1], window[3], lattice, file.lattice, vertical=False)
-    nearest = _nearest(file, bands, _holding(row), _holding(col))
+    rows = np.arange(window[0], window[0] + window[2])
+    cols = np.arange(window[1], window[1] + window[3])
+    east_m, north_m = lattice.east_north(rows, cols)
+    # Places in pixels from the file's corner; on an edge, whatever the rounding, the later counts.
+    row = (file.lattice.north_m - north_m) / file.lattice.resolution_m
+    col = (east_m - file.lattice.west_m) / file.lattice.resolution_m
+    held = [np.floor(place + _EDGE_PX).astype(np.int64) for place in (row, col)]
+    nearest = _nearest(file, bands, held[0], held[1])
     return nearest if resampling == "nearest" else _bilinear(file, bands, row, col, nearest)
 
 
 def _names(files: Sequence[RasterFile]) -> str:
-    return ", ".join(file.path.name for file in files[:3]) + (", …" if len(files) > 3 else "")
+    return listed([file.path.name for file in files], 3)
 
 
 def _alike(a_m: float, b_m: float) -> bool:
@@ -142,21 +142,6 @@ def _shift(source: Lattice, target: Lattice) -> tuple[int, int] | None:
     right = (source.west_m - target.west_m) / target.resolution_m
     row, col = round(down), round(right)
     return (row, col) if max(abs(down - row), abs(right - col)) <= _ALIGNED_PX else None
-
-
-def _places(first: int, count: int, target: Lattice, source: Lattice, *, vertical: bool) -> Floats:
-    """Return where the target's centres lie, in pixels from the source's north or west edge."""
-    centre = np.arange(first, first + count) + 0.5
-    if vertical:
-        north_m = target.north_m - centre * target.resolution_m
-        return np.asarray((source.north_m - north_m) / source.resolution_m)
-    east_m = target.west_m + centre * target.resolution_m
-    return np.asarray((east_m - source.west_m) / source.resolution_m)
-
-
-def _holding(place: Floats) -> Ints:
-    """Return the pixels that hold places; on an edge, whatever the rounding, the later one."""
-    return np.floor(place + _EDGE_PX).astype(np.int64)
 
 
 def _nearest(file: RasterFile, bands: Sequence[int], rows: Ints, cols: Ints) -> Floats32:

@@ -29,7 +29,8 @@ Bounds = tuple[float, float, float, float]
 HALO = (withStroke(linewidth=2.5, foreground="white"),)
 """White rim that keeps text and marks readable on any ground."""
 
-_NAME = Look(ha="center", va="center", fontweight="bold", path_effects=HALO)
+MAP_NAME = Look(ha="center", va="center", fontweight="bold", path_effects=HALO)
+"""Bold text on a map."""
 
 OVER_RASTER = "#00000030"
 """Colour of streets that lie over a raster."""
@@ -40,25 +41,11 @@ MAP_IN = 7.0
 _KILOMETRE_FROM_M = 1500.0
 _MOST_PX = 2400
 _ROW_IN, _HEADING_IN = 0.205, 0.55
-_MOST_NAMES = 60
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BaseMap:
     """What lies under the data of a map picture; all in metres of one projected CRS.
-
-    Parameters
-    ----------
-    bounds_m : (west, south, east, north)
-        Extent of the area; its south-western corner is the local origin of the axes.
-    streets : tuple of (k, 2) arrays
-        Lines as east, north.
-    points_m : (n, 2) array or None
-        Places where one can be, as east, north, on a lattice; drawn as pale pixels.
-    attribution : str
-        Whose map it is, such as "© OpenStreetMap contributors"; drawn small in a corner.
-    resolution_m : float
-        Distance between neighbouring points.
 
     Raises
     ------
@@ -67,10 +54,15 @@ class BaseMap:
     """
 
     bounds_m: Bounds
+    """West, south, east, north; the south-western corner is the local origin of the axes."""
     streets: tuple[Floats, ...] = ()
+    """Lines, arrays (k, 2), as east, north."""
     points_m: Floats | None = None
+    """Places where one can be, (n, 2), as east, north, on a lattice; drawn as pale pixels."""
     attribution: str = ""
+    """Owner of the map, such as "© OpenStreetMap contributors"; drawn small in a corner."""
     resolution_m: float = 5.0
+    """Distance between neighbouring points."""
 
     def __post_init__(self) -> None:
         west, south, east, north = self.bounds_m
@@ -90,7 +82,7 @@ class BaseMap:
 
 @dataclass(frozen=True, slots=True)
 class LocalFrame:
-    """Turns metres of the CRS into the units of the axes: m or km from the local origin."""
+    """Conversion of metres of the CRS to the units of the axes: m or km from the local origin."""
 
     west_m: float
     south_m: float
@@ -140,8 +132,7 @@ def draw_base(
 ) -> LocalFrame:
     """Draw streets and points, set extent and labels, and add scale bar and north arrow.
 
-    ``streets`` is their colour; ``scale_bar`` whether to draw the bar and the arrow. By the frame
-    that is returned data are put onto the axes.
+    ``streets`` is their colour. Return the frame, which converts data to the units of the axes.
     """
     frame = local_frame(base)
     if base.points_m is not None and len(base.points_m):
@@ -159,7 +150,7 @@ def draw_base(
         _draw_scale_bar(axes, base.bounds_m[2] - base.bounds_m[0])
         arrow = Look(arrowstyle="-|>", color=BLACK, linewidth=1.4, shrinkA=1)
         at = Look(xycoords="axes fraction", textcoords="offset points", arrowprops=arrow)
-        axes.annotate("N", (0.96, 0.985), (0, -38), **at, **_NAME, fontsize=9.5, zorder=19)
+        axes.annotate("N", (0.96, 0.985), (0, -38), **at, **MAP_NAME, fontsize=9.5, zorder=19)
     return frame
 
 
@@ -240,11 +231,6 @@ def largest(counts: Sequence[int], most: int) -> set[int]:
     return set(np.argsort(-np.asarray(counts), kind="stable")[:most].tolist())
 
 
-def named_groups(counts: Sequence[int]) -> set[int]:
-    """Return the places of the groups to name on the map: not so many that no name is read."""
-    return {i for i in largest(counts, _MOST_NAMES) if counts[i] > 0}
-
-
 def short_names(names: Sequence[str]) -> list[str]:
     """Return names without what they all begin with, up to a hyphen, for want of room on a map.
 
@@ -264,13 +250,6 @@ def short_names(names: Sequence[str]) -> list[str]:
     return [name[cut:] or name for name in names]
 
 
-def name_group(axes: Axes, x: Floats, y: Floats, name: str) -> None:
-    """Write a group's name on that one of its points that lies nearest to their median."""
-    middle = int(np.argmin(np.hypot(x - np.median(x), y - np.median(y))))
-    at = float(x[middle]), float(y[middle])
-    axes.text(*at, name, **_NAME, fontsize=8, zorder=12, clip_on=True)
-
-
 def side_legend(
     axes: Axes,
     heading: str,
@@ -278,9 +257,9 @@ def side_legend(
     counts: Sequence[int],
     marks: Sequence[Line2D],
 ) -> None:
-    """Put a legend to the right of the map: the largest groups that it has room for, and marks.
+    """Put a legend to the right of the map: the largest groups that it has room for, all marks.
 
-    Both are labelled; ``counts`` are the sizes of the groups. Marks are always shown.
+    ``counts`` are the sizes of the groups.
     """
     figure = figure_of(axes)
     room = int((figure.get_figheight() - _HEADING_IN) / _ROW_IN) - len(marks)

@@ -98,6 +98,11 @@ def new_figure(width_in: float, height_in: float) -> Figure:
     return figure
 
 
+def single_axes(given: Axes | None, width_in: float, height_in: float) -> Axes:
+    """Return the axes given, or those of a new figure of a size in inches."""
+    return new_figure(width_in, height_in).subplots() if given is None else given
+
+
 def figure_of(axes: Axes) -> Figure:
     """Return the figure that axes are part of."""
     figure = axes.get_figure(root=True)
@@ -107,19 +112,9 @@ def figure_of(axes: Axes) -> Figure:
 
 @styled
 def save(drawn: Drawn, path: Path) -> Path:
-    """Write a picture as PNG, SVG or PDF, by the suffix of the path, in one step.
+    """Write what a ``plot_*`` function returned as PNG, SVG or PDF, by the suffix, in one step.
 
-    Parameters
-    ----------
-    drawn : Axes or Figure
-        What a ``plot_*`` function returned.
-    path : Path
-        The folder is made where it is missing.
-
-    Returns
-    -------
-    Path
-        ``path``.
+    The folder is made where it is missing; the path is returned.
 
     Raises
     ------
@@ -198,7 +193,7 @@ def legend(axes: Axes, given: Axes | None, most_columns: int) -> None:
 
 
 def distinct_colours(count: int) -> list[str]:
-    """Return colours that tell ``count`` groups apart, also for the colour-blind.
+    """Return colours that distinguish ``count`` groups, also for the colour-blind.
 
     The first seven are those of Okabe and Ito (2008) with a darker yellow, the next eight differ
     from them in lightness, the next 45 are lighter and darker ones of these; then they repeat,

@@ -27,6 +27,7 @@ from mapfilter.report.canvas import (
     draw_shares,
     legend,
     new_figure,
+    single_axes,
     stretches,
     styled,
     tidy,
@@ -94,25 +95,20 @@ def plot_error_panels(
 
 def _draw_panel(axes: Axes, panel: Panel, across: str) -> None:
     for curve in panel.curves:
-        k = np.arange(1, curve.values.size + 1)
-        width = 1.2 if curve.style == "-" else 1.6
-        look = Look(color=curve.colour, linestyle=curve.style, linewidth=width)
-        axes.plot(k, curve.values, label=curve.name, **look)
+        look = Look(color=curve.colour, linestyle=curve.style, label=curve.name)
+        look["linewidth"] = 1.2 if curve.style == "-" else 1.6
+        axes.plot(np.arange(1, curve.values.size + 1), curve.values, **look)
     axes.set_xlim(0, max(curve.values.size for curve in panel.curves))
     if panel.logarithmic:
         axes.set_yscale("log")
         # Powers would need mathematical text, which pictures here go without.
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axes.yaxis.set_minor_formatter(FuncFormatter(_minor_label))
+        twos_and_fives = FuncFormatter(lambda v, _: f"{v:g}" if f"{v:e}"[0] in "25" else "")
+        axes.yaxis.set_minor_formatter(twos_and_fives)
     else:
         axes.set_ylim(panel.bottom, panel.top)
     axes.set(title=panel.title, xlabel=across, ylabel=panel.label)
     tidy(axes)
-
-
-def _minor_label(value: float, _: object) -> str:
-    """Label twos and fives of each decade."""
-    return f"{value:g}" if f"{value:e}"[0] in "25" else ""
 
 
 def curves_of(
@@ -148,21 +144,11 @@ def plot_cumulative(
     most_m: float,
     share: float = 0.9,
 ) -> Axes:
-    """Draw cumulative distributions, a line at a share, and what is claimed for it.
+    """Draw cumulative distributions, a line at a share (0 to 1), and what is claimed for it.
 
-    Parameters
-    ----------
-    curves : sequence of Distribution
-    ax : Axes, optional
-        Drawn on; a figure of its own by default.
-    title : str
-        Above the curves.
-    most_m : float
-        End of the axis of errors.
-    share : float
-        The share, 0 to 1, that the line marks.
+    ``most_m`` is the end of the axis of errors.
     """
-    axes = new_figure(*_SIZE_IN).subplots() if ax is None else ax
+    axes = single_axes(ax, *_SIZE_IN)
     for curve in curves:
         look = Look(color=curve.colour, linestyle=curve.style, linewidth=1.6)
         draw_shares(axes, curve.errors_m, label=curve.name, **look)
@@ -206,10 +192,9 @@ def plot_over_threshold(
 ) -> Axes:
     """Draw percentiles over a threshold of the SINR, with the one that was chosen.
 
-    ``bound`` is the name and value of a figure for comparison; ``ax`` as in
-    :func:`plot_cumulative`.
+    ``bound`` is the name and value of a figure for comparison.
     """
-    axes = new_figure(*_SIZE_IN).subplots() if ax is None else ax
+    axes = single_axes(ax, *_SIZE_IN)
     for line in lines:
         at, colour = line.threshold_db, line.colour
         low, high = [one.low for one in line.found], [one.high for one in line.found]
@@ -248,7 +233,7 @@ def plot_scene(
     azimuths clockwise from north; ``serving`` is the index of a site.
     """
     sites, angles = np.array(sites_m), np.radians(boresights_deg)
-    axes = new_figure(6.4, 6.4).subplots() if ax is None else ax
+    axes = single_axes(ax, 6.4, 6.4)
     arrows = Look(angles="xy", scale_units="xy", scale=1 / 330.0, width=0.006)
     axes.quiver(*sites.T, np.cos(angles), np.sin(angles), color=BLUE, **arrows)
     axes.plot(*sites.T, "o", color=BLACK, markersize=7, label="base station")

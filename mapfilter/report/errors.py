@@ -26,6 +26,7 @@ from mapfilter.report.canvas import (
     bottom_legend,
     legend,
     new_figure,
+    single_axes,
     stretches,
     styled,
     tidy,
@@ -43,22 +44,12 @@ _WIDE, _LEAST_M = 12.0, 0.3
 def plot_error_over_distance(
     estimate: TrackEstimate, truth: Truth, ax: Axes | None = None, *, title: str = ""
 ) -> Axes:
-    """Draw the position error over the metres really travelled.
+    """Draw the position error over the true distance travelled.
 
     The error's axis is logarithmic where hundreds of metres become few; the filter's own radii are
-    a band. Marks the switch from searching to tracking, the 50 m that count as success there, the
-    mean and the 67 and 95 % errors after it, and where the filter was searching or lost.
-
-    Parameters
-    ----------
-    estimate : TrackEstimate
-        Epochs without a position leave a gap.
-    truth : Truth
-        The true path, at least one row.
-    ax : Axes, optional
-        Drawn on; a figure of its own by default.
-    title : str
-        Above the picture; without one, the filter's name.
+    a band; epochs without a position leave a gap. Marks the switch from searching to tracking, the
+    50 m that count as success there, the mean and the 67 and 95 % errors after it, and where the
+    filter was searching or lost. Without a title it is the filter's name.
     """
     distance_m = truth.distance_at(estimate.time_s)
     errors_m = position_errors_m(estimate, truth)
@@ -66,7 +57,7 @@ def plot_error_over_distance(
     score = accuracy(estimate, truth)
     known_m = errors_m[np.isfinite(errors_m)]
     most_m = max(float(known_m.max(initial=0.0)), 1.1 * SUCCESS_RADIUS_M)
-    axes = new_figure(*_SIZE_IN).subplots() if ax is None else ax
+    axes = single_axes(ax, *_SIZE_IN)
     axes.set(xlim=(0.0, length_m), ylim=(0.0, 1.15 * most_m))
     if score.switched and most_m > _WIDE * score.error_95_m:
         # Hundreds of metres while searching would press what follows flat.
@@ -115,18 +106,11 @@ def plot_errors_over_time(
     spans: Sequence[tuple[str, float, float]] = (),
     title: str = "",
 ) -> Axes:
-    """Draw the position errors of several estimates, on a logarithmic axis.
+    """Draw the position errors of up to six estimates, by their names, on a logarithmic axis.
 
-    Parameters
-    ----------
-    estimates : mapping of str to TrackEstimate
-        By their names in the legend; up to six.
-    ax : Axes, optional
-        Drawn on; a figure of its own by default.
-    spans : sequence of (str, float, float)
-        Stretches of time to shade: name, begin and end in seconds.
+    ``spans`` are stretches of time to shade: name, begin and end in seconds.
     """
-    axes = new_figure(*_SIZE_IN).subplots() if ax is None else ax
+    axes = single_axes(ax, *_SIZE_IN)
     for (name, begin_s, end_s), shade in zip(spans, _SPANS, strict=False):
         axes.axvspan(begin_s, end_s, color=shade, linewidth=0, zorder=0, label=name)
     for (name, estimate), colour in zip(estimates.items(), _COLOURS, strict=False):
@@ -146,16 +130,8 @@ def plot_errors_over_time(
 def plot_evidence(estimate: TrackEstimate, truth: Truth | None, *, title: str = "") -> Figure:
     """Draw entropy, the leading hypothesis's and the runner-up's shares, and the status.
 
-    Over the metres really travelled; over seconds where the truth is not known.
-
-    Parameters
-    ----------
-    estimate : TrackEstimate
-        With evidence.
-    truth : Truth or None
-        The true path, where known.
-    title : str
-        Above the picture; without one, the filter's name.
+    Over the true distance travelled; over seconds where the truth is not known. Without a title it
+    is the filter's name.
 
     Raises
     ------

@@ -1,7 +1,6 @@
-"""A network on the map: cells, points by cell (Figs. 2 and 4 of Khalaf-Allah 2007), levels, margin.
+"""A network on the map: cells, best server, levels, margin, land use, bounds at points.
 
-Plots of rasters take them with the lattice on which their pixels lie, (rows, cols); the plan's
-sites, sector azimuths and indoor cells are marked, those outside the map's extent left out.
+Figs. 2 to 4 of Khalaf-Allah (2007) are points by cell (of one site, and of all) and land use.
 """
 
 from __future__ import annotations
@@ -13,18 +12,21 @@ from math import cos, hypot, sin
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap, to_hex
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from mapfilter._types import Floats, Ints
+from mapfilter._types import Floats
 from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice, grid_convergence_rad, heading_from_azimuth_rad, unproject
-from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.radio.cells import CellPlan
 from mapfilter.report.basemap import (
     HALO,
     MAP_IN,
+    MAP_NAME,
     OVER_RASTER,
     BaseMap,
     Bounds,
@@ -32,24 +34,27 @@ from mapfilter.report.basemap import (
     attribute,
     draw_base,
     draw_raster,
+    largest,
     local_frame,
     map_axes,
-    name_group,
-    named_groups,
+    map_height_in,
     shape_faults,
     short_names,
     side_legend,
 )
 from mapfilter.report.canvas import (
     BLACK,
+    BLUE,
     GREY,
     Look,
     distinct_colours,
     figure_of,
     grouped,
     mark,
+    new_figure,
     styled,
 )
+from mapfilter.roads.landuse import LandUse
 
 STEPS_DB = (0.0, 1.0, 3.0, 6.0, 10.0, 15.0, 20.0)
 """Where the classes of margins begin; the last has no end."""
@@ -57,8 +62,12 @@ STEPS_DB = (0.0, 1.0, 3.0, 6.0, 10.0, 15.0, 20.0)
 _ARROW_SHARE = 0.06
 """Length of a sector's arrow, as a share of the extent's diagonal."""
 
-_LEGEND_IN, _WIDE_LEGEND_IN, _BAR_IN = 2.7, 3.4, 1.7
+_LEGEND_IN, _WIDE_LEGEND_IN, _BAR_IN, _POINT_BAR_IN = 2.7, 3.4, 1.7, 1.5
 _ONE_CELL = "#fff7bc"
+_PANEL_IN, _LEGEND_ROW_IN, _COLUMNS = 5.2, 0.24, 4
+_NOT_WALKABLE, _UNKNOWN = "#ececec", "white"
+_MOST_NAMES, _MOST_TWINS = 60, 25
+_SHOWN = (2.0, 98.0)
 
 
 def draw_cells(axes: Axes, frame: LocalFrame, plan: CellPlan, bounds_m: Bounds) -> None:
@@ -80,7 +89,9 @@ def draw_cells(axes: Axes, frame: LocalFrame, plan: CellPlan, bounds_m: Bounds) 
             name = axes.annotate(cell.id, (x, y), (7, 0), textcoords="offset points", zorder=12)
             name.set(va="center", fontsize=8, fontweight="bold", path_effects=HALO)
         elif cell.azimuth_deg is not None:
-            heading_rad = _heading_rad(plan.crs, cell, cell.azimuth_deg)
+            lon_deg, lat_deg = (float(d) for d in unproject(plan.crs, cell.east_m, cell.north_m))
+            convergence_rad = grid_convergence_rad(plan.crs, lon_deg, lat_deg)
+            heading_rad = float(heading_from_azimuth_rad(cell.azimuth_deg, convergence_rad))
             length = length_m / frame.unit_m
             tip = x + length * cos(heading_rad), y + length * sin(heading_rad)
             drawn = axes.annotate("", tip, (x, y), arrowprops=arrow, annotation_clip=False)
@@ -125,8 +136,6 @@ def plot_points_per_cell(
     points_by_cell : mapping from cell id to (east_m, north_m)
         Points of each cell, arrays of equal length in the base map's CRS. The order is that of the
         colours. A point that several cells claim takes the colour of the last.
-    plan, base, ax, title
-        As in :func:`plot_level`.
     counts : sequence of int, optional
         Points of each cell, where only some of them are given to be drawn.
     resolution_m : float
@@ -161,17 +170,7 @@ def plot_best_server(
 ) -> Axes:
     """Draw which cell is received best at every pixel, with each cell's share of the area.
 
-    Parameters
-    ----------
-    best_server : (rows, cols) integer array
-        Index into ``cell_ids``; negative where no cell is received.
-    lattice, plan, base, ax, title
-        As in :func:`plot_level`.
-
-    Raises
-    ------
-    InputError
-        The raster does not fit the lattice or the cells.
+    ``best_server`` is an index into ``cell_ids``; negative where no cell is received.
     """
     faults = shape_faults(best_server, lattice)
     if best_server.size and int(best_server.max()) >= len(cell_ids):
@@ -201,15 +200,21 @@ class _Groups:
         self.colours = distinct_colours(len(cell_ids))
         self.handles: list[Line2D] = []
         self._axes, self._plan, self._ids = axes, plan, cell_ids
-        self._names, self._named = short_names(cell_ids), named_groups(counts)
+        self._names, self._named = short_names(cell_ids), largest(counts, _MOST_NAMES)
 
     def add(self, index: int, amount: str, at: tuple[Floats, Floats]) -> None:
-        """Add a cell to the legend, and name it amid its places unless its own mark does."""
+        """Add a cell to the legend; name it at the place nearest to their median.
+
+        Indoor cells are named at their marks, and so are not named here.
+        """
         name, colour = self._ids[index], self.colours[index]
         self.handles.append(mark(f"{name}: {amount}", "s", 7, color=colour))
         indoor = name in self._plan and self._plan[name].indoor
         if at[0].size and index in self._named and not indoor:
-            name_group(self._axes, *at, self._names[index])
+            x, y = at
+            middle = int(np.argmin(np.hypot(x - np.median(x), y - np.median(y))))
+            look = Look(fontsize=8, zorder=12, clip_on=True) | MAP_NAME
+            self._axes.text(float(x[middle]), float(y[middle]), self._names[index], **look)
 
 
 @styled
@@ -225,27 +230,7 @@ def plot_level(
 ) -> Axes:
     """Draw a level raster, of one cell or of the best server.
 
-    Parameters
-    ----------
-    level_dbm : (rows, cols) array
-        Levels in dBm; NaN where nothing is known.
-    lattice : Lattice
-        Where the pixels lie.
-    plan : CellPlan
-        Sites, sector azimuths and indoor cells to mark; those outside the extent are left out.
-    base : BaseMap
-        The map below.
-    ax : Axes, optional
-        Drawn on; a figure of its own by default.
-    title : str
-        Above the map.
-    range_dbm : (low, high)
-        Levels at the two ends of the color scale.
-
-    Raises
-    ------
-    InputError
-        The raster does not fit the lattice.
+    Levels are NaN where nothing is known; ``range_dbm`` are the two ends of the colour scale.
     """
     shape_faults(level_dbm, lattice).raise_if_any(InputError)
     axes = map_axes(ax, base, _BAR_IN)
@@ -269,18 +254,8 @@ def plot_margin(
 ) -> Axes:
     """Draw the margin in classes, dark where two cells are nearly equal, with each one's share.
 
-    Parameters
-    ----------
-    margin_db : (rows, cols) array
-        Best level above the second best, >= 0; infinite where one cell is received alone, NaN where
-        none is or where it is not to be drawn, such as beside the ways.
-    lattice, plan, base, ax, title
-        As in :func:`plot_level`.
-
-    Raises
-    ------
-    InputError
-        The raster does not fit the lattice, or a margin is negative.
+    The margin, >= 0, is the best level above the second best; infinite where one cell is received
+    alone, NaN where none is or where it is not to be drawn, such as beside the ways.
     """
     faults = shape_faults(margin_db, lattice)
     known = ~np.isnan(margin_db)
@@ -289,9 +264,11 @@ def plot_margin(
     faults.raise_if_any(InputError)
     ramp = matplotlib.colormaps["cividis"](np.linspace(0.0, 0.93, len(STEPS_DB)))
     colours = [*(to_hex(colour) for colour in ramp), _ONE_CELL]
-    counts = np.bincount(_classes(margin_db[known]), minlength=len(colours))
+    classes = np.searchsorted(np.array(STEPS_DB), margin_db[known], side="right") - 1
+    classes[np.isinf(margin_db[known])] = len(STEPS_DB)
+    counts = np.bincount(classes, minlength=len(colours))
     shown = np.ma.masked_array(np.zeros(margin_db.shape, dtype=np.int64), ~known)
-    shown[known] = _classes(margin_db[known])
+    shown[known] = classes
     axes = map_axes(ax, base, _WIDE_LEGEND_IN)
     draw_base(axes, base, streets=OVER_RASTER)
     norm = BoundaryNorm(np.arange(-0.5, len(colours)), len(colours))
@@ -300,20 +277,13 @@ def plot_margin(
     between = [f"{low:g} to {high:g} dB" for low, high in pairwise(STEPS_DB)]
     names = [*between, f"{STEPS_DB[-1]:g} dB and more", "one cell alone"]
     rim = Look(markeredgecolor=GREY, markeredgewidth=0.4)
+    shares = 100 * counts / max(counts.sum(), 1)
     handles = [
         mark(f"{name}: {share:.1f} %", "s", 8, color=colour, **rim)
-        for name, colour, share in zip(
-            names, colours, 100 * counts / max(counts.sum(), 1), strict=True
-        )
+        for name, colour, share in zip(names, colours, shares, strict=True)
     ]
     side_legend(axes, "margin: share of pixels", handles, counts.tolist(), network_legend(plan))
     return axes
-
-
-def _classes(margin_db: NDArray[np.floating]) -> Ints:
-    """Return the class of each margin; the last is that of one cell alone."""
-    found = np.searchsorted(np.array(STEPS_DB), margin_db, side="right") - 1
-    return np.where(np.isinf(margin_db), len(STEPS_DB), found)
 
 
 def _finish(axes: Axes, base: BaseMap, plan: CellPlan, title: str) -> None:
@@ -322,7 +292,94 @@ def _finish(axes: Axes, base: BaseMap, plan: CellPlan, title: str) -> None:
     attribute(axes, base)
 
 
-def _heading_rad(crs: str, cell: Cell, azimuth_deg: float) -> float:
-    lon_deg, lat_deg = unproject(crs, cell.east_m, cell.north_m)
-    convergence_rad = grid_convergence_rad(crs, float(lon_deg), float(lat_deg))
-    return float(heading_from_azimuth_rad(azimuth_deg, convergence_rad))
+@styled
+def plot_landuse(
+    landuse: LandUse, lattice: Lattice, base: BaseMap, *, title: str = "Land use"
+) -> Figure:
+    """Draw the classes beside where one can walk, with each one's share of the area.
+
+    Classes that are nowhere in the area are left out of the legend.
+    """
+    shape_faults(landuse.code, lattice).raise_if_any(InputError)
+    colours = list(landuse.colours) or distinct_colours(len(landuse.names))
+    counts = np.bincount(landuse.code[landuse.code >= 0], minlength=len(landuse.names))
+    there = np.flatnonzero(counts)
+    rows = -(-len(there) // _COLUMNS)
+    height_in = map_height_in(base, _PANEL_IN) + 1.15 + _LEGEND_ROW_IN * rows
+    figure = new_figure(2 * _PANEL_IN + 0.9, height_in)
+    left, right = figure.subplots(1, 2)
+    walkable = np.ma.masked_where(landuse.code < 0, landuse.walkable)
+    panels = (
+        (left, np.ma.masked_less(landuse.code, 0), colours or [_UNKNOWN]),
+        (right, walkable, [_NOT_WALKABLE, BLUE]),
+    )
+    for axes, shown, palette in panels:
+        draw_base(axes, base, streets=OVER_RASTER, scale_bar=axes is left)
+        limits = (-0.5, len(palette) - 0.5)
+        draw_raster(axes, base, lattice, shown, cmap=ListedColormap(palette), clim=limits)
+    left.set_title(title)
+    right.set_title(f"Where one can walk: {100 * landuse.walkable.mean():.1f} % of the area")
+    right.set_ylabel("")
+    right.set_yticklabels([])
+    attribute(right, base)
+    handles = []
+    for code in there:
+        can_walk, share = landuse.can_walk[code], 100 * counts[code] / landuse.code.size
+        label = f"{landuse.names[code]}{' (walkable)' if can_walk else ''}: {share:.1f} %"
+        rim = (BLACK, 1.0) if can_walk else (GREY, 0.4)
+        handles.append(mark(label, "s", 8, color=colours[code], mec=rim[0], mew=rim[1]))
+    where = Look(loc="outside lower center", frameon=False, handletextpad=0.3)
+    figure.legend(handles=handles, ncols=_COLUMNS, **where)
+    return figure
+
+
+@styled
+def plot_point_values(
+    values: NDArray[np.floating],
+    lattice: Lattice,
+    plan: CellPlan,
+    base: BaseMap,
+    ax: Axes | None = None,
+    *,
+    title: str,
+    label: str,
+    limits: tuple[float, float] | None = None,
+) -> Axes:
+    """Draw a figure of every point, such as a bound or the metres to a fix; light is small.
+
+    Values are NaN off the points, and where levels carry no information. ``label`` stands beside
+    the colour scale, ``limits`` are its ends, by default those of nearly all values.
+    """
+    shape_faults(values, lattice).raise_if_any(InputError)
+    known = values[np.isfinite(values)]
+    low, high = limits or (np.percentile(known, _SHOWN) if known.size else (0.0, 1.0))
+    ends = float(low), max(float(high), float(low) + 1e-9)
+    axes = map_axes(ax, base, _POINT_BAR_IN)
+    draw_base(axes, base)
+    image = draw_raster(axes, base, lattice, values, cmap="viridis_r", clim=ends)
+    _finish(axes, base, plan, title)
+    figure_of(axes).colorbar(image, ax=axes, shrink=0.75, label=label, extend="neither")
+    return axes
+
+
+def plot_twins(
+    twin_error: NDArray[np.floating],
+    pairs_m: Floats,
+    lattice: Lattice,
+    plan: CellPlan,
+    base: BaseMap,
+) -> Axes:
+    """Draw how alike each point's twin looks, and the worst pairs joined by lines.
+
+    The probability of an error is 0 to 0.5; ``pairs_m``, (n, 4), are east and north of both
+    places, the worst first, of which some are drawn.
+    """
+    title, label = "Probability of confusion with another place", "probability of an error"
+    look = Look(title=title, label=label, limits=(0.0, 0.5))
+    axes = plot_point_values(twin_error, lattice, plan, base, **look)
+    frame = local_frame(base)
+    ends = [np.column_stack(frame(pair[[0, 2]], pair[[1, 3]])) for pair in pairs_m[:_MOST_TWINS]]
+    axes.add_collection(LineCollection(ends, colors=BLACK, linewidths=0.9, zorder=8))
+    for end in ends:
+        axes.scatter(end[:, 0], end[:, 1], s=10, color=BLACK, zorder=9, linewidths=0)
+    return axes

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
-from mapfilter.evaluation.success import SuccessCell
+from mapfilter.evaluation.success import HEADING, SuccessCell, axes_of
 from mapfilter.report.canvas import (
     BLACK,
     GREY,
@@ -22,6 +23,7 @@ from mapfilter.report.canvas import (
     figure_of,
     legend,
     new_figure,
+    single_axes,
     styled,
     tidy,
 )
@@ -29,6 +31,41 @@ from mapfilter.report.canvas import (
 _SIZE_IN = (8.4, 5.2)
 _RUNS_SIZE_IN = (11.0, 4.6)
 _FARTHEST_M = 200.0
+_UNITS = {
+    "prediction_error_db": "prediction error {:g} dB",
+    "report_period_s": "reports every {:g} s",
+    "imu_period_s": "dead reckoning every {:g} s",
+    "update_length_m": "updates of {:g} m",
+    "sigma_trans_m": "step {:g} m",
+    "bias_sd_deg": "bias {:g}°",
+    "drift_deg_per_sqrt_s": "drift {:g}°/√s",
+    "scale": "scale {:g}",
+}
+
+
+def place_words(at: Mapping[str, Any], axes: Iterable[str]) -> Iterator[str]:
+    """Yield words for a place in a grid, by some of its coordinates."""
+    for axis in axes:
+        if axis in _UNITS and pd.notna(at[axis]):
+            yield _UNITS[axis].format(at[axis])
+        elif axis in ("database", "radio"):
+            yield str(at[axis])
+        elif "." in axis:
+            yield f"{axis} {at[axis]:g}"
+
+
+def success_curves(cells: Sequence[SuccessCell]) -> list[tuple[str, list[SuccessCell]]]:
+    """Return the curves of a grid over the noise of headings, each with its name.
+
+    Cells of one curve differ in that noise alone; filters name the curves, and the other
+    coordinates in which cells of one filter differ.
+    """
+    axes = [axis for axis in axes_of(cells, by_reading=True) if axis.split(".")[-1] != HEADING]
+    curves: dict[str, list[SuccessCell]] = {}
+    for cell in cells:
+        name = ", ".join([cell.reading, *place_words(cell.place, axes)])
+        curves.setdefault(name, []).append(cell)
+    return list(curves.items())
 
 
 @styled
@@ -46,15 +83,13 @@ def plot_success_curves(
     ----------
     curves : sequence of (str, sequence of SuccessCell)
         A name and the cells along the curve; bars are Wilson intervals.
-    ax : Axes, optional
-        Drawn on; a figure of its own by default.
     claims : sequence of (float, float)
         Published: more than this share of success (0 to 1), the second, up to a deviation of
         headings in degrees, the first. Drawn as steps; what lies above them agrees.
     claimant : str
         Who claims, for the legend.
     """
-    axes = new_figure(*_SIZE_IN).subplots() if ax is None else ax
+    axes = single_axes(ax, *_SIZE_IN)
     words = ", ".join(f"over {100 * share:.0f} % up to {deg:g}°" for deg, share in claims)
     name: str | None = f"{claimant}: {words}"
     for deg, share in claims:
@@ -85,23 +120,14 @@ def plot_success_curves(
 
 @styled
 def plot_success_map(cells: Sequence[SuccessCell], ax: Axes | None = None, *, title: str) -> Axes:
-    """Draw success by the deviations of headings (across) and of steps (upwards).
-
-    Parameters
-    ----------
-    cells : sequence of SuccessCell
-        One for each pair of deviations.
-    ax : Axes, optional
-        Drawn on; a figure of its own by default.
-    """
+    """Draw success by the deviations of headings (across) and of steps (upwards), one cell each."""
     orient = sorted({cell.sigma_orient_deg for cell in cells})
     trans = sorted({cell.sigma_trans_m for cell in cells})
     share = np.full((len(trans), len(orient)), np.nan)
     for cell in cells:
         place = trans.index(cell.sigma_trans_m), orient.index(cell.sigma_orient_deg)
         share[place] = 100 * cell.success
-    size_in = max(2.8 + 0.8 * len(orient), 6.0), max(1.9 + 0.55 * len(trans), 3.2)
-    axes = new_figure(*size_in).subplots() if ax is None else ax
+    axes = single_axes(ax, max(2.8 + 0.8 * len(orient), 6.0), max(1.9 + 0.55 * len(trans), 3.2))
     image = axes.imshow(share, origin="lower", cmap="viridis", vmin=0, vmax=100, aspect="auto")
     for (row, col), percent in np.ndenumerate(share):
         if np.isfinite(percent):
@@ -109,9 +135,8 @@ def plot_success_map(cells: Sequence[SuccessCell], ax: Axes | None = None, *, ti
             axes.text(col, row, f"{percent:.0f}", ha="center", va="center", color=colour)
     axes.set_xticks(range(len(orient)), [f"{value:g}" for value in orient])
     axes.set_yticks(range(len(trans)), [f"{value:g}" for value in trans])
-    axes.set_xlabel("standard deviation of the heading / °")
+    axes.set(xlabel="standard deviation of the heading / °", title=title)
     axes.set_ylabel("standard deviation of a step / m")
-    axes.set_title(title)
     figure_of(axes).colorbar(image, ax=axes, label="success / %")
     return axes
 
@@ -122,12 +147,8 @@ def plot_run_distributions(groups: Sequence[tuple[str, pd.DataFrame]], *, title:
 
     The error at the switch and the distance to the switch are shares of *all* runs: a curve that
     ends below 100 % shows how many never switched; what lies beyond 50 m switched wrongly. The
-    mean error after the switch is that of the successful runs.
-
-    Parameters
-    ----------
-    groups : sequence of (str, pandas.DataFrame)
-        A name and the rows of a sweep's table.
+    mean error after the switch is that of the successful runs. A group is a name and the rows of a
+    sweep's table.
     """
     figure = new_figure(*_RUNS_SIZE_IN)
     at_switch, after, distance = figure.subplots(1, 3)

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
-from matplotlib.image import AxesImage
 from matplotlib.ticker import FormatStrFormatter, NullLocator
 from numpy.typing import NDArray
 
@@ -36,8 +35,10 @@ from mapfilter.report.canvas import (
     figure_of,
     grouped,
     new_figure,
+    single_axes,
     styled,
 )
+from mapfilter.survey.measured_map import rms
 
 MAX_CELLS = 4
 
@@ -69,17 +70,10 @@ class SurveyedLevels(NamedTuple):
 
 @styled
 def plot_surveyed_levels(cells: Sequence[SurveyedLevels], base: BaseMap) -> Figure:
-    """Draw up to four cells: the level with the measured points in its colours, the deviation.
+    """Draw one to four cells: the level with the measured points in its colours, the deviation.
 
     A point that vanishes in its surroundings is predicted well. The ends of both scales are those
     of the data of all cells shown.
-
-    Parameters
-    ----------
-    cells : sequence of SurveyedLevels
-        One to four, in the order of the rows.
-    base : BaseMap
-        The map below.
 
     Raises
     ------
@@ -99,14 +93,19 @@ def plot_surveyed_levels(cells: Sequence[SurveyedLevels], base: BaseMap) -> Figu
     panels = figure.subplots(count, 2, squeeze=False)
     for cell, (left, right) in zip(cells, panels, strict=True):
         shown = base.zoomed(_surroundings(cell))
-        levels, deviations = (cell.level_dbm, levels_dbm), (cell.deviation_db, deviations_db)
-        image = _draw_raster(left, cell.lattice, shown, *levels, "viridis", "level / dBm")
-        _draw_raster(right, cell.lattice, shown, *deviations, "magma_r", "deviation / dB")
+        for axes, values, ends, colours, label in (
+            (left, cell.level_dbm, levels_dbm, "viridis", "level / dBm"),
+            (right, cell.deviation_db, deviations_db, "magma_r", "deviation / dB"),
+        ):
+            draw_base(axes, shown, streets=OVER_RASTER, scale_bar=axes is left)
+            axes.set_facecolor(_NO_DATA)
+            look = Look(cmap=colours, clim=ends, zorder=1)
+            image = draw_raster(axes, shown, cell.lattice, values, **look)
+            look = Look(shrink=0.8, pad=0.02, aspect=28)
+            figure.colorbar(image, ax=axes, label=label, **look)
         at = local_frame(shown)(cell.east_m, cell.north_m)
-        rim = Look(edgecolors="white", linewidths=0.25)
-        left.scatter(
-            *at, s=15, c=cell.measured_dbm, cmap=image.cmap, norm=image.norm, zorder=5, **rim
-        )
+        look = Look(cmap="viridis", clim=levels_dbm, edgecolors="white", linewidths=0.25)
+        left.scatter(*at, s=15, c=cell.measured_dbm, zorder=5, **look)
         right.scatter(*at, s=3, color=BLACK, linewidths=0, zorder=5)
         points = grouped(len(cell.measured_dbm))
         left.set_title(f"{cell.cell_id}: level, {points} measurements", fontsize=10)
@@ -129,18 +128,8 @@ def plot_left_out(
 ) -> Axes:
     """Draw measured against predicted levels of sessions that the map was made without.
 
-    Parameters
-    ----------
-    measured_dbm, predicted_dbm : (n,) arrays
-        At least one finite pair.
-    ax : Axes, optional
-        Drawn on; a figure of its own by default.
-    title : str
-        What was left out.
-    trend_dbm : (n,) array, optional
-        What the trend alone predicts, to show what the residuals add.
-    attribution : str
-        Whose measurements they are.
+    Levels are arrays, (n,); ``trend_dbm`` is what the trend alone predicts, to show what the
+    residuals add. ``attribution`` names the owner of the measurements.
 
     Raises
     ------
@@ -155,10 +144,10 @@ def plot_left_out(
     if not (measured_dbm.size and np.isfinite(np.stack([measured_dbm, predicted_dbm])).all()):
         raise fail(InputError, "left-out levels", "finite levels (dBm)", "none, or NaN")
     error_db = measured_dbm - predicted_dbm
-    rmse_db = _rms(error_db)
+    rmse_db = rms(error_db)
     low, high = _range([measured_dbm, predicted_dbm], (-120, -60))
     low, high = low - _RIM_DB, high + _RIM_DB
-    axes = new_figure(*_SCATTER_IN).subplots() if ax is None else ax
+    axes = single_axes(ax, *_SCATTER_IN)
     hexagons = Look(
         gridsize=max(int((high - low) / _BIN_DB), 10),
         extent=(low, high, low, high),
@@ -178,7 +167,7 @@ def plot_left_out(
     axes.set(xlabel="predicted level / dBm", ylabel="measured level / dBm")
     text = f"RMSE {rmse_db:.1f} dB"
     if trend_dbm is not None:
-        text += f" (trend alone {_rms(measured_dbm - trend_dbm):.1f} dB)"
+        text += f" (trend alone {rms(measured_dbm - trend_dbm):.1f} dB)"
     mean_db = round(float(error_db.mean()), 1)
     bias = f"{mean_db:+.1f}".replace("-", "\N{MINUS SIGN}") if mean_db else "0.0"
     text += f"\nbias {bias} dB\n{grouped(error_db.size)} measurements"
@@ -198,23 +187,6 @@ def plot_left_out(
         small = Look(ha="right", va="bottom", fontsize=6.5, color=GREY)
         figure.text(0.995, 0.004, attribution, **small)
     return axes
-
-
-def _draw_raster(
-    axes: Axes,
-    lattice: Lattice,
-    base: BaseMap,
-    values: NDArray[np.floating],
-    ends: tuple[float, float],
-    colours: str,
-    label: str,
-) -> AxesImage:
-    draw_base(axes, base, streets=OVER_RASTER, scale_bar=colours == "viridis")
-    axes.set_facecolor(_NO_DATA)
-    image = draw_raster(axes, base, lattice, values, cmap=colours, clim=ends, zorder=1)
-    look = Look(shrink=0.8, pad=0.02, aspect=28)
-    figure_of(axes).colorbar(image, ax=axes, label=label, **look)
-    return image
 
 
 def _surroundings(cell: SurveyedLevels) -> Bounds:
@@ -244,7 +216,3 @@ def _range(
         return if_empty
     low, high = np.floor(known.min()), np.ceil(known.max())
     return float(low), float(max(high, low + 1))
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -1,35 +1,21 @@
-"""Tables of results: as text, as CSV and as LaTeX."""
+"""Tables of results as CSV and LaTeX."""
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import pandas as pd
 
 from mapfilter._io import atomic_file
 from mapfilter.errors import OutputError, fail
 
-_MOST_CHARACTERS = 10_000
-
 
 def write_table(table: pd.DataFrame, path: Path, *, digits: int | None = 4) -> Path:
     """Write a table as CSV or LaTeX, by the suffix of the path, in one step.
 
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        The index is left out.
-    path : Path
-        Ends in ``.csv`` or ``.tex``; the folder is made where it is missing.
-    digits : int, optional
-        Significant digits of numbers; None for all of them.
-
-    Returns
-    -------
-    Path
-        ``path``.
+    The index is left out, the folder is made where it is missing, and the path is returned;
+    ``digits`` are the significant digits of numbers, None for all of them.
 
     Raises
     ------
@@ -66,33 +52,6 @@ def latex_table(table: pd.DataFrame, *, digits: int | None = 4) -> str:
     columns = "".join("r" if _is_numeric(table[name]) else "l" for name in table)
     shown = _rounded(table, digits)
     return str(shown.to_latex(index=False, escape=True, column_format=columns))
-
-
-def text_table(table: pd.DataFrame, *, digits: int | None = 4) -> str:
-    """Return a table as lines of text, columns of numbers to the right.
-
-    Examples
-    --------
-    >>> rows = {"filter": ["ekf", "particle"], "error_m": [12.3456, 8.0]}
-    >>> print(text_table(pd.DataFrame(rows)))
-    filter    error_m
-    ekf         12.35
-    particle        8
-    """
-    from rich.console import Console
-    from rich.table import Table
-
-    drawn = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="")
-    for name in table:
-        side: Literal["left", "right"] = "right" if _is_numeric(table[name]) else "left"
-        drawn.add_column(str(name), justify=side, no_wrap=True)
-    for row in _rounded(table, digits).itertuples(index=False):
-        drawn.add_row(*row)
-    plain: dict[str, Any] = {"markup": False, "emoji": False, "highlight": False}
-    console = Console(file=io.StringIO(), width=_MOST_CHARACTERS, color_system=None, **plain)
-    with console.capture() as captured:
-        console.print(drawn)
-    return "\n".join(line.rstrip() for line in captured.get().splitlines())
 
 
 def _rounded(table: pd.DataFrame, digits: int | None = 4) -> pd.DataFrame:

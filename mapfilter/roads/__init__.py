@@ -1,1 +1,1 @@
-"""Where one can be: ways, squares, buildings and land use, and the lattice made of them."""
+"""Ways, squares, buildings and land use, and the route lattice made of them."""

@@ -44,12 +44,8 @@ def read_buildings(
 
     Parameters
     ----------
-    path : str or Path
-        An ``.osm.pbf``, ``.osm`` or ``.osm.gz`` file, or the name of an embedded map ("helsinki").
-    crs : str
-        Projected CRS of the result, in metres.
-    bounds_m : tuple of float
-        West, south, east, north of the area in ``crs``. Footprints are not cut at its edge.
+    path, crs, bounds_m
+        As for :func:`mapfilter.roads.osm.read_ways`; footprints are not cut at the area's edge.
     default_height_m, storey_height_m : float
         Heights (m) of buildings without their own.
 
@@ -76,10 +72,8 @@ def read_buildings(
 def check_heights(default_height_m: float, storey_height_m: float) -> None:
     """Check that the heights of buildings without their own are > 0."""
     faults = Faults()
-    heights = {"default_height_m": default_height_m, "storey_height_m": storey_height_m}
-    for name, height_m in heights.items():
-        if not (np.isfinite(height_m) and height_m > 0):
-            faults.add(name, "metres > 0", height_m)
+    heights_m = {"default_height_m": default_height_m, "storey_height_m": storey_height_m}
+    faults.check_positive("", "metres", **heights_m)
     faults.raise_if_any(InputError)
 
 
@@ -87,8 +81,8 @@ def made_buildings(
     crs: str,
     geometry: Geometries,
     bounds_m: Bounds,
-    heights: NDArray[np.object_],
-    levels: NDArray[np.object_],
+    heights: NDArray[np.object_] | None,
+    levels: NDArray[np.object_] | None,
     *,
     default_height_m: float,
     storey_height_m: float,
@@ -96,11 +90,11 @@ def made_buildings(
     """Return the polygons that touch an area, uncut, as buildings.
 
     ``heights`` and ``levels`` are as in maps: texts such as ``12``, ``12.5 m`` or ``40 ft``,
-    numbers, or nothing. The default heights are checked by :func:`check_heights`.
+    numbers, or None. The default heights are checked by :func:`check_heights`.
     """
     footprints, origin = polygons_inside(geometry, bounds_m, cut=False)
-    by_height = _numbers(heights)[origin]
-    by_levels = _numbers(levels)[origin] * storey_height_m
+    by_height = _numbers(heights, len(geometry))[origin]
+    by_levels = _numbers(levels, len(geometry))[origin] * storey_height_m
     height = np.where(np.isfinite(by_height), by_height, by_levels)
     known = np.isfinite(height)
     from_height = int(np.isfinite(by_height).sum())
@@ -150,10 +144,9 @@ def burn(shapes: Iterable[tuple[Any, float]], lattice: Lattice, dtype: str) -> N
     return raster
 
 
-def _numbers(text: NDArray[np.object_]) -> Floats:
-    """Return metres or counts from tags such as ``12``, ``12.5 m`` or ``40 ft``; NaN if none."""
-    values = np.full(len(text), np.nan)
-    for i, entry in enumerate(text):
+def _numbers(text: NDArray[np.object_] | None, count: int) -> Floats:
+    values = np.full(count, np.nan)
+    for i, entry in enumerate(text if text is not None else ()):
         number = np.nan
         if isinstance(entry, int | float | np.number):
             number = float(entry)

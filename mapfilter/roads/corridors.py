@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -23,7 +24,7 @@ from mapfilter.roads.ways import Ways
 
 Place = tuple[float, float]
 
-CORRIDOR_CLASS = "corridor"
+_CLASS = "corridor"
 CORRIDOR_HALF_WIDTH_M = 15.0
 MAX_ACCURACY_M = 50.0
 MAX_GAP_M = 100.0
@@ -71,9 +72,20 @@ class _Net:
             self._next.setdefault(a, set()).add(b)
             self._next.setdefault(b, set()).add(a)
 
-    def take_back(self, vertices: Sequence[tuple[Place, int]]) -> None:
-        """Forget vertices that were added."""
-        for place, moment in vertices:
+    def end(
+        self, before: Place | None, own: Sequence[tuple[Place, int]], joint: Place | None
+    ) -> None:
+        """End a line whose own vertices were added, between older ones or nothing.
+
+        It is accepted where it is long enough or joins what was apart.
+        """
+        places = [place for place, _ in own]
+        length_m = sum(math.dist(a, b) for a, b in itertools.pairwise(places))
+        joins = before is not None and joint is not None and not self.are_joined(before, joint)
+        if length_m >= self.reach_m or joins:
+            self.keep([place for place in (before, *places, joint) if place is not None])
+            return
+        for place, moment in own:
             self._squares[self._square(place)].remove((place, moment))
 
     def are_joined(self, a: Place, b: Place) -> bool:
@@ -103,62 +115,31 @@ class _Net:
         return int(place[0] // self.reach_m), int(place[1] // self.reach_m)
 
 
-class _Track:
-    """The new part of a track, while it grows."""
-
-    def __init__(self, net: _Net) -> None:
-        self._net = net
-        self._own: list[tuple[Place, int]] = []
-        self._joint: Place | None = None
-
-    def goes_on(self, place: Place, moment: int) -> None:
-        """Take a vertex that is new."""
-        self._own.append((place, moment))
-        self._net.add(place, moment)
-
-    def meets(self, joint: Place | None) -> None:
-        """End the new part, at a vertex that is there already or at nothing."""
-        before, places = self._joint, [place for place, _ in self._own]
-        line = [place for place in (before, *places, joint) if place is not None]
-        length_m = sum(math.dist(a, b) for a, b in itertools.pairwise(places))
-        long_enough = length_m >= self._net.reach_m
-        joins = before is not None and joint is not None and not self._net.are_joined(before, joint)
-        if long_enough or joins:
-            self._net.keep(line)
-        else:
-            self._net.take_back(self._own)
-        self._own, self._joint = [], joint
-
-
-def grown_lines(
+def _grown_lines(
     tracks: Sequence[Floats], usable: Sequence[Bools], reach_m: float
 ) -> list[list[Place]]:
     """Return the lines of a network that covers tracks once.
 
-    An end within two reaches of another line is joined to it.
-
-    Parameters
-    ----------
-    tracks : sequence of numpy.ndarray, each of shape (N, 2)
-        Vertices no farther apart than half the reach.
-    usable : sequence of numpy.ndarray of bool, each of shape (N,)
-        Which vertices may be taken; the others interrupt a line.
-    reach_m : float
-        A vertex so near to an older one is not new. New parts that are shorter are left out,
-        unless they join what was apart.
+    Tracks have vertices, shape (N, 2), at most half a reach apart; those that are not usable
+    interrupt a line. A vertex within reach of an older one is not new. New parts shorter than a
+    reach are left out, unless they join what was apart. An end within two reaches of another line
+    is joined to it.
     """
     net, moment = _Net(reach_m), 0
     for vertices, taken in zip(tracks, usable, strict=True):
         moment += _TRAIL
-        track = _Track(net)
+        before: Place | None = None
+        own: list[tuple[Place, int]] = []
         for (x, y), may in zip(vertices.tolist(), taken.tolist(), strict=True):
             moment += 1
             there = net.nearest((x, y), moment - _TRAIL) if may else None
             if may and there is None:
-                track.goes_on((x, y), moment)
+                own.append(((x, y), moment))
+                net.add((x, y), moment)
             else:
-                track.meets(there)
-        track.meets(None)
+                net.end(before, own, there)
+                before, own = there, []
+        net.end(before, own, None)
     for line in tuple(net.lines):
         net.join_end(line[0])
         net.join_end(line[-1])
@@ -258,27 +239,22 @@ def corridors(
     drawn = _drawn_together(pieces, measured, half_width_m)
     passed = _sessions_near(np.concatenate(drawn), measured, of_session, half_width_m)
     kept = np.split(passed >= min_sessions, np.cumsum([len(part) for part in drawn])[:-1])
-    lines = grown_lines(drawn, kept, half_width_m)
+    lines = _grown_lines(drawn, kept, half_width_m)
     if not lines:
         expected = f"a way of at least {half_width_m:g} m that {min_sessions} sessions went along"
         raise fail(InputError, "tracks", expected, "none")
     middle = np.array([line[len(line) // 2] for line in lines])
-    count = len(lines)
-    ways = Ways(
+    ways = Ways.open(
         crs,
-        np.arange(1, count + 1, dtype=np.int64),
-        np.zeros(count, dtype=np.int16),
-        (CORRIDOR_CLASS,),
+        np.arange(1, len(lines) + 1, dtype=np.int64),
+        np.full(len(lines), _CLASS, dtype=object),
         np.array([shapely.LineString(line) for line in lines], dtype=object),
-        np.zeros(count, dtype=np.bool_),
-        np.zeros(count, dtype=np.int8),
     )
     sessions_each = _sessions_near(middle, measured, of_session, half_width_m)
     return Corridors(ways, sessions_each, half_width_m, tuple(notes))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Piece:
+class _Piece(NamedTuple):
     """A part of a session without gaps, sampled evenly: places, directions, weights."""
 
     session: int
@@ -289,9 +265,7 @@ class _Piece:
 
 def _check(sessions: Sequence[Positions], min_sessions: int, **lengths_m: float) -> None:
     faults = Faults()
-    for name, value in lengths_m.items():
-        if not (np.isfinite(value) and value > 0):
-            faults.add(name, "metres > 0", value)
+    faults.check_positive("", "metres", **lengths_m)
     if min_sessions < 1:
         faults.add("min_sessions", "a whole number >= 1", min_sessions)
     for number, positions in enumerate(sessions, start=1):
@@ -319,21 +293,16 @@ def _pieces(
     gaps = np.flatnonzero(np.hypot(*np.diff(place_m, axis=0).T) > max_gap_m) + 1
     pieces, aside = [], int((~good).sum())
     for part in np.split(np.arange(len(place_m)), gaps):
-        kept = part[_moving(place_m[part], step_m)]
+        # Positions at least a step from the last one kept: none of standing still.
+        kept: list[int] = []
+        for i in part.tolist():
+            if not kept or np.hypot(*(place_m[i] - place_m[kept[-1]])) >= step_m:
+                kept.append(i)
         if len(kept) < 2:
             aside += len(part)
             continue
         pieces.append(_sampled(session, place_m[kept], accuracy_m[kept], step_m))
     return pieces, aside
-
-
-def _moving(place_m: Floats, step_m: float) -> Ints:
-    """Return the positions that are a step from the last one taken: none of standing still."""
-    taken: list[int] = []
-    for i, place in enumerate(place_m):
-        if not taken or np.hypot(*(place - place_m[taken[-1]])) >= step_m:
-            taken.append(i)
-    return np.array(taken, dtype=np.int64)
 
 
 def _sampled(session: int, place_m: Floats, accuracy_m: Floats, step_m: float) -> _Piece:
@@ -342,16 +311,12 @@ def _sampled(session: int, place_m: Floats, accuracy_m: Floats, step_m: float) -
     at_m = np.linspace(0.0, length_m[-1], count)
     samples = np.column_stack([np.interp(at_m, length_m, axis) for axis in place_m.T])
     accuracy = np.interp(at_m, length_m, accuracy_m)
-    return _Piece(session, samples, _directions(samples), 1.0 / accuracy**2)
-
-
-def _directions(place_m: Floats) -> Floats:
-    """Return unit vectors along a line, shape (N, 2); (1, 0) where it turns on the spot."""
-    along = np.gradient(place_m, axis=0)
+    # Unit vectors along the line; (1, 0) where it turns on the spot.
+    along = np.gradient(samples, axis=0)
     length = np.hypot(*along.T)[:, None]
     unit: Floats = np.divide(along, length, out=np.zeros_like(along), where=length > 0)
     unit[length[:, 0] == 0, 0] = 1.0
-    return unit
+    return _Piece(session, samples, unit, 1.0 / accuracy**2)
 
 
 def _drawn_together(

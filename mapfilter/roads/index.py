@@ -1,7 +1,4 @@
-"""Indexed ways and areas, from which the points of any tile are made.
-
-Distances from points to the straight segments of ways are exact.
-"""
+"""Indexed ways and areas, from which the points of any tile are made; distances are exact."""
 
 from __future__ import annotations
 
@@ -24,7 +21,6 @@ from mapfilter.roads.ways import Buildings, Geometries, Squares, Water, Ways
 HALF_WIDTH_M = 6.0
 TILE_PX = 512
 SQUARE_CLASS = "square"
-_NO_WIDTHS: Mapping[str, float] = {}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,24 +51,17 @@ class WayIndex:
         cls,
         ways: Ways,
         half_width_m: float = HALF_WIDTH_M,
-        by_class_m: Mapping[str, float] = _NO_WIDTHS,
+        by_class_m: Mapping[str, float] | None = None,
     ) -> WayIndex:
-        """Index the segments of ways.
-
-        Parameters
-        ----------
-        half_width_m : float
-            How far from its centre line a point still belongs to a way.
-        by_class_m : mapping of str to float
-            The same for some classes; 0 leaves the class out.
+        """Index the segments of ways; half widths as for :func:`route_lattice`.
 
         Raises
         ------
         InputError
             A half width is not > 0 (of a class, not >= 0).
         """
-        faults = Faults()
-        note_half_widths(faults, half_width_m, by_class_m)
+        faults, by_class_m = Faults(), by_class_m or {}
+        _note_half_widths(faults, half_width_m, by_class_m)
         faults.raise_if_any(InputError)
         by_code = np.array([by_class_m.get(name, half_width_m) for name in ways.class_names])
         if by_code.size and not by_code.all():
@@ -112,15 +101,10 @@ class WayIndex:
         return self._of_lines(self.ways, parts[line], self.way[segment[pair[line]]], by_code)
 
     def reaching(self, window: Lattice) -> tuple[Ints, Floats]:
-        """Return, of each pixel of a window, the nearest of the ways that it belongs to.
+        """Return, of each pixel of a window, the nearest way that it belongs to, and its distance.
 
-        Returns
-        -------
-        way : numpy.ndarray of int64, shape (rows, cols)
-            Index into ``ways``, -1 where none reaches the pixel's centre; of equally near ways the
-            one with the smallest id.
-        distance_m : numpy.ndarray, shape (rows, cols)
-            Infinite where ``way`` is -1.
+        Ways are indices into ``ways``, -1 where none reaches the pixel's centre: there the distance
+        is infinite. Of equally near ways it is the one with the smallest id.
         """
         size = (window.rows, window.cols)
         segment, distance_m = np.full(size, -1, dtype=np.int64), np.full(size, np.inf)
@@ -138,16 +122,7 @@ class WayIndex:
         return segment, distance_m
 
     def nearest(self, east_m: Floats, north_m: Floats) -> tuple[Ints, Floats]:
-        """Return the nearest way of each position, however far, and its distance.
-
-        Returns
-        -------
-        way : numpy.ndarray of int64, shape (N,)
-            Index into ``ways``, -1 when there are none; of equally near ways the one with the
-            smallest id.
-        distance_m : numpy.ndarray, shape (N,)
-            Infinite where ``way`` is -1.
-        """
+        """Return the nearest way of each position, however far, as :meth:`reaching` does."""
         way = np.full(east_m.size, -1, dtype=np.int64)
         distance = np.full(east_m.size, np.inf)
         if self.way.size and east_m.size:
@@ -161,55 +136,31 @@ class WayIndex:
         return way, distance
 
 
-def note_half_widths(faults: Faults, half_width_m: float, by_class_m: Mapping[str, float]) -> None:
-    """Note half widths that are no lengths; that of a class may be 0."""
-    if not (np.isfinite(half_width_m) and half_width_m > 0):
-        faults.add("half_width_m", "metres > 0", half_width_m)
+def _note_half_widths(faults: Faults, half_width_m: float, by_class_m: Mapping[str, float]) -> None:
+    faults.check_positive("", "metres", half_width_m=half_width_m)
     for name, width_m in by_class_m.items():
         if not (np.isfinite(width_m) and width_m >= 0):
             faults.add(f"half_width_by_class_m, {name}", "metres >= 0", width_m)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class AreaIndex:
-    """Polygons in a search tree, to burn those of a tile."""
-
-    geometry: Geometries
-    tree: STRtree
-
-    @classmethod
-    def of(cls, geometry: Geometries) -> AreaIndex:
-        """Index polygons."""
-        return cls(geometry, STRtree(geometry))
-
-    def near(self, window: Lattice) -> AreaIndex:
-        """Return the polygons about a window, in their order."""
-        near = np.sort(self.tree.query(shapely.box(*window.bounds_m)))
-        return AreaIndex.of(self.geometry[near])
-
-    def mask(self, window: Lattice) -> Bools:
-        """Return which pixel centres of a window lie in a polygon, shape (rows, cols)."""
-        near = np.sort(self.tree.query(shapely.box(*window.bounds_m)))
-        return burn(((shape, 1) for shape in self.geometry[near]), window, "uint8").astype(bool)
+def areas_near(areas: STRtree, window: Lattice) -> Geometries:
+    """Return the polygons about a window, in their order."""
+    near = np.sort(areas.query(shapely.box(*window.bounds_m)))
+    return np.asarray(areas.geometries[near])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RouteSource:
-    """What any tile of a route lattice is made from; it can be sent to other processes.
+    """Indexed layers of a route lattice, for any of its tiles; it can be sent to other processes.
 
-    Parameters
-    ----------
-    crs : str
-        Projected CRS of everything, in metres.
-    bridges : WayIndex or None
-        The parts of the ways that lie in the water, which stay.
+    ``bridges`` are the parts of the ways that lie in the water, which stay.
     """
 
     crs: str
     ways: WayIndex
-    squares: AreaIndex | None
-    buildings: AreaIndex | None
-    water: AreaIndex | None
+    squares: STRtree | None
+    buildings: STRtree | None
+    water: STRtree | None
     bridges: WayIndex | None
 
     @classmethod
@@ -222,24 +173,26 @@ class RouteSource:
         *,
         half_width_by_class_m: Mapping[str, float] | None = None,
         water: Water | None = None,
+        crs: str | None = None,
     ) -> RouteSource:
-        """Index the layers of an area; the parameters are those of :func:`route_lattice`.
+        """Index the layers of an area; parameters and errors as of :func:`route_lattice`.
 
-        Raises
-        ------
-        InputError
-            The CRS differ, or a half width is no length.
+        ``crs`` is that of the lattice; by default that of the ways.
         """
-        faults = Faults()
-        note_crs(faults, ways.crs, {"squares": squares, "buildings": buildings, "water": water})
+        faults, crs = Faults(), crs or ways.crs
+        layers = {"ways": ways, "squares": squares, "buildings": buildings, "water": water}
+        for name, layer in layers.items():
+            if layer is not None and not same_crs(layer.crs, crs):
+                faults.add(f"{name}, crs", crs, layer.crs, "layers of different CRS")
+        _note_half_widths(faults, half_width_m, half_width_by_class_m or {})
         faults.raise_if_any(InputError)
-        index = WayIndex.of(ways, half_width_m, half_width_by_class_m or {})
+        index = WayIndex.of(ways, half_width_m, half_width_by_class_m)
         return cls(
-            ways.crs,
+            crs,
             index,
-            AreaIndex.of(squares.geometry) if squares else None,
-            AreaIndex.of(buildings.footprints) if buildings else None,
-            AreaIndex.of(water.geometry) if water else None,
+            STRtree(squares.geometry) if squares else None,
+            STRtree(buildings.footprints) if buildings else None,
+            STRtree(water.geometry) if water else None,
             index.inside(water.geometry) if water else None,
         )
 
@@ -249,7 +202,7 @@ class RouteSource:
         way, distance_m = self.ways.reaching(window)
         allowed = ((way >= 0) | on_square) & ~_mask(self.buildings, window)
         if self.water is not None and self.bridges is not None:
-            wet = self.water.mask(window)
+            wet = _mask(self.water, window)
             if np.any(wet & allowed):
                 allowed &= ~wet | (self.bridges.reaching(window)[0] >= 0)
         return described(allowed, window, on_square, self.ways, (way, distance_m), SQUARE_CLASS)
@@ -313,19 +266,10 @@ def described(
     )
 
 
-def note_crs(
-    faults: Faults, crs: str, layers: Mapping[str, Ways | Squares | Buildings | Water | None]
-) -> None:
-    """Note layers of another CRS."""
-    for name, layer in layers.items():
-        if layer is not None and not same_crs(layer.crs, crs):
-            faults.add(f"{name}, crs", crs, layer.crs, "layers of different CRS")
-
-
-def _mask(areas: AreaIndex | None, window: Lattice) -> Bools:
-    if areas is None:
-        return np.zeros((window.rows, window.cols), dtype=np.bool_)
-    return areas.mask(window)
+def _mask(areas: STRtree | None, window: Lattice) -> Bools:
+    """Return which pixel centres of a window lie in a polygon, shape (rows, cols)."""
+    near = np.empty(0) if areas is None else areas_near(areas, window)
+    return burn(((shape, 1) for shape in near), window, "uint8").astype(bool)
 
 
 @njit(cache=True)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rasterio.errors import NotGeoreferencedWarning, RasterioError
 from rasterio.windows import Window
 
-from mapfilter._types import Bools, Ints
+from mapfilter._types import Bools
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
 
@@ -27,7 +27,7 @@ _LARGEST_WINDOW_PX = 1 << 24
 _MOST_DIGITS = 10
 _ALIGNED_PX = 1e-3
 _NEARLY_ALL = 0.95
-_MOST_TOLD = 10
+_MOST_SHOWN = 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +63,7 @@ class LandUse:
 
     @property
     def walkable(self) -> Bools:
-        """Where one can walk, shape (rows, cols)."""
+        """Mask of the walkable classes, shape (rows, cols)."""
         # The last entry is that of the negative codes.
         return np.asarray(np.array([*self.can_walk, False])[np.maximum(self.code, -1)])
 
@@ -101,12 +101,12 @@ def read_landuse(path: Path | str, table_path: Path | str, lattice: Lattice) -> 
     unknown.sort(key=lambda pair: -pair[1])
     faults, expected = Faults(), f"classes of {table_path}"
     hint = "a class left out, or colours blended by compression or resampling"
-    for code, count in unknown[:_MOST_TOLD]:
+    for code, count in unknown[:_MOST_SHOWN]:
         shown = f"value {code}"
         if is_colour:
             shown = f"colour {code >> 16},{code >> 8 & 255},{code & 255}"
         faults.add(str(path), expected, f"{shown} at {count} points", hint)
-    if rest := unknown[_MOST_TOLD:]:
+    if rest := unknown[_MOST_SHOWN:]:
         points = sum(count for _, count in rest)
         faults.add(str(path), expected, f"{len(rest)} others at {points} points", hint)
     faults.raise_if_any(InputError)
@@ -196,14 +196,19 @@ def _at_points(
     shape = lattice.rows, lattice.cols
     kind = np.promote_types(np.int32 if colour else source.dtypes[0], np.uint8)
     codes, known = np.zeros(shape, dtype=kind), np.zeros(shape, dtype=np.bool_)
-    rows, cols = _pixels(source, lattice)
+    # The raster's row of each row of the lattice, and its column of each column.
+    east, _ = lattice.east_north(np.zeros(lattice.cols), np.arange(lattice.cols))
+    _, north = lattice.east_north(np.arange(lattice.rows), np.zeros(lattice.rows))
+    transform = source.transform
+    rows = np.floor((north - transform.f) / transform.e).astype(np.int64)
+    cols = np.floor((east - transform.c) / transform.a).astype(np.int64)
     on_rows = np.flatnonzero((rows >= 0) & (rows < source.height))
     on_cols = np.flatnonzero((cols >= 0) & (cols < source.width))
     if not (on_rows.size and on_cols.size):
         return codes, known
     bands = [1, 2, 3] if colour else [1]
     left, width = int(cols[on_cols[0]]), int(np.ptp(cols[on_cols])) + 1
-    down_px = lattice.resolution_m / -source.transform.e
+    down_px = lattice.resolution_m / -transform.e
     at_a_time = max(1, int(_LARGEST_WINDOW_PX / width / max(down_px, 1)))
     for first in range(0, on_rows.size, at_a_time):
         some = on_rows[first : first + at_a_time]
@@ -212,21 +217,11 @@ def _at_points(
         wanted = np.ix_(rows[some] - top, cols[on_cols] - left)
         values = [band[wanted] for band in source.read(bands, window=window)]
         target = np.ix_(some, on_cols)
-        packed = values[0].astype(kind)
+        codes[target] = values[0]
         for band_values in values[1:]:
-            packed = packed * 256 + band_values
-        codes[target] = packed
+            codes[target] = codes[target] * 256 + band_values
         known[target] = (source.read_masks(bands, window=window) > 0).all(axis=0)[wanted]
     return codes, known
-
-
-def _pixels(source: Any, lattice: Lattice) -> tuple[Ints, Ints]:
-    """Return the raster's row of each row of the lattice, and its column of each column."""
-    east, _ = lattice.east_north(np.zeros(lattice.cols), np.arange(lattice.cols))
-    _, north = lattice.east_north(np.arange(lattice.rows), np.zeros(lattice.rows))
-    rows = np.floor((north - source.transform.f) / source.transform.e)
-    cols = np.floor((east - source.transform.c) / source.transform.a)
-    return rows.astype(np.int64), cols.astype(np.int64)
 
 
 def _notes(source: Any, path: Path, lattice: Lattice) -> tuple[str, ...]:

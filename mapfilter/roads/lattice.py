@@ -1,4 +1,4 @@
-"""The route lattice: the points of the radio rasters' lattice where one can be."""
+"""The route lattice: the accessible points of the radio rasters' lattice."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapfilter._types import Bools, Floats, Floats32, Ints, Ints32
-from mapfilter.errors import Faults, InputError
+from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class RouteLattice:
-    """Lattice points where one can walk or drive, in row-major order.
+    """Lattice points that are accessible on foot or by car.
 
     Parameters
     ----------
     lattice : Lattice
-        The lattice on whose pixel centres the points lie.
+        The points are centres of its pixels.
     row, col : numpy.ndarray of int32, shape (N,)
         The points, in strictly ascending row-major order.
     way_id : numpy.ndarray of int64, shape (N,)
@@ -50,16 +50,15 @@ class RouteLattice:
         columns = (self.col, self.way_id, self.way_class, self.distance_to_way_m, self.on_square)
         if any(column.shape != self.row.shape for column in columns):
             shapes = ", ".join(str(column.shape) for column in columns)
-            faults.add("route lattice", f"columns of length {len(self)}", shapes)
-        else:
-            if not np.all(self.lattice.contains(self.row, self.col)):
-                faults.add("route lattice", "points on the lattice", "some off the lattice")
-            if np.any(np.diff(self.point) <= 0):
-                faults.add("route lattice", "ascending row-major order", "another order")
-            if np.any((self.way_class < 0) | (self.way_class >= len(self.class_names))):
-                faults.add("route lattice, way_class", f"0..{len(self.class_names) - 1}", "others")
-            if not np.all(self.distance_to_way_m >= 0):
-                faults.add("route lattice, distance_to_way_m", "metres >= 0", "negative or NaN")
+            raise fail(InputError, "route lattice", f"columns of length {len(self)}", shapes)
+        if not np.all(self.lattice.contains(self.row, self.col)):
+            faults.add("route lattice", "points on the lattice", "some off the lattice")
+        if np.any(np.diff(self.point) <= 0):
+            faults.add("route lattice", "ascending row-major order", "another order")
+        if np.any((self.way_class < 0) | (self.way_class >= len(self.class_names))):
+            faults.add("route lattice, way_class", f"0..{len(self.class_names) - 1}", "others")
+        if not np.all(self.distance_to_way_m >= 0):
+            faults.add("route lattice, distance_to_way_m", "metres >= 0", "negative or NaN")
         faults.raise_if_any(InputError)
 
     def __len__(self) -> int:
@@ -80,7 +79,7 @@ class RouteLattice:
         return east, north
 
     def mask(self) -> Bools:
-        """Return where one can be, shape (lattice.rows, lattice.cols)."""
+        """Return a raster of the points, shape (lattice.rows, lattice.cols)."""
         mask = np.zeros((self.lattice.rows, self.lattice.cols), dtype=np.bool_)
         mask[self.row, self.col] = True
         return mask

@@ -1,6 +1,6 @@
 """Roads, buildings and water from any vector file, such as a shapefile, GeoPackage or GeoJSON.
 
-Lines are ways; polygons in a layer of roads are areas where one can be, as squares are. A layer
+Lines are ways; polygons in a layer of roads are accessible areas, as squares are. A layer
 has no access rules: classes that must not be used are left out by a half width of 0.
 """
 
@@ -82,30 +82,17 @@ def read_layer_roads(
     InputError
         The file, its layer, its CRS or a column is missing or damaged, or no road is in the area.
     """
-    columns = [name for name in (class_column, id_column) if name is not None]
-    found = read_layer(source, crs, bounds_m, layer_name, columns)
-    number = found.number
-    if id_column is not None:
-        number = _ids(found.columns[id_column], f"{found.name}, column {id_column}")
+    found = read_layer(source, crs, bounds_m, layer_name, (class_column, id_column))
+    ids = found.column(id_column)
+    number = found.number if ids is None else _ids(ids, f"{found.name}, column {id_column}")
     lines, origin = lines_inside(found.geometry, bounds_m)
     order = np.argsort(number[origin], kind="stable")
     lines, origin = lines[order], origin[order]
-    words = _classes(found.columns[class_column] if class_column else None, len(number))
-    names, codes = np.unique(words[origin].astype(str), return_inverse=True)
+    words = _classes(found.column(class_column), len(number))
     areas, of_area = polygons_inside(found.geometry, bounds_m, cut=True)
     if not (origin.size or of_area.size):
-        kinds = sorted({shape.geom_type for shape in found.geometry})
-        raise fail(InputError, found.name, "lines or polygons in the area", ", ".join(kinds))
-    none = np.zeros(origin.size, dtype=np.int8)
-    ways = Ways(
-        crs,
-        number[origin],
-        codes.astype(np.int16),
-        tuple(str(name) for name in names),
-        lines,
-        none.astype(bool),
-        none,
-    )
+        raise fail(InputError, found.name, "lines or polygons in the area", found.kinds)
+    ways = Ways.open(crs, number[origin], words[origin], lines)
     squares = Squares(crs, number[of_area], areas)
     return LayerRoads(ways, squares, tuple(map(str, words[of_area])), found.notes)
 
@@ -141,21 +128,18 @@ def read_layer_buildings(
         the area has no polygon.
     """
     check_heights(default_height_m, storey_height_m)
-    columns = [name for name in (height_column, levels_column) if name is not None]
-    found = read_layer(source, crs, bounds_m, layer_name, columns)
-    unknown = np.full(found.number.size, None, dtype=object)
+    found = read_layer(source, crs, bounds_m, layer_name, (height_column, levels_column))
     buildings = made_buildings(
         crs,
         found.geometry,
         bounds_m,
-        found.columns[height_column] if height_column else unknown,
-        found.columns[levels_column] if levels_column else unknown,
+        found.column(height_column),
+        found.column(levels_column),
         default_height_m=default_height_m,
         storey_height_m=storey_height_m,
     )
     if not len(buildings):
-        kinds = ", ".join(sorted({shape.geom_type for shape in found.geometry}))
-        raise fail(InputError, found.name, "polygons in the area", kinds, "another layer")
+        raise fail(InputError, found.name, "polygons in the area", found.kinds, "another layer")
     return buildings
 
 
@@ -174,18 +158,19 @@ def read_layer_water(
     found = read_layer(source, crs, bounds_m, layer_name, may_be_empty=True)
     geometry, _ = polygons_inside(found.geometry, bounds_m, cut=True)
     if found.geometry.size and not geometry.size:
-        kinds = ", ".join(sorted({shape.geom_type for shape in found.geometry}))
-        raise fail(InputError, found.name, "polygons", kinds, "another layer")
+        raise fail(InputError, found.name, "polygons", found.kinds, "another layer")
     return Water(crs, geometry)
 
 
+def _text(value: object) -> str:
+    """Return a column's value as text; whole numbers without decimals."""
+    return str(int(value) if isinstance(value, float) and value.is_integer() else value)
+
+
 def _classes(values: NDArray[np.object_] | None, count: int) -> NDArray[np.object_]:
-    """Return kinds of way as texts; whole numbers without decimals."""
     words = np.full(count, ROAD_CLASS, dtype=object)
     for i, value in enumerate(values if values is not None else ()):
-        is_whole = isinstance(value, float) and value.is_integer()
-        text = str(int(value) if is_whole else value).strip()
-        if value is not None and value == value and text:
+        if value is not None and value == value and (text := _text(value).strip()):
             words[i] = text
     return words
 
@@ -194,7 +179,7 @@ def _ids(values: NDArray[np.object_], where: str) -> Ints:
     numbers = np.zeros(len(values), dtype=np.int64)
     faults = Faults()
     for i, value in enumerate(values):
-        text = str(int(value)) if isinstance(value, float) and value.is_integer() else str(value)
+        text = _text(value)
         if not (text.isascii() and text.isdigit() and 0 < int(text[:20]) < 2**63):
             faults.add(where, "whole numbers > 0", repr(value), "another column")
             break

@@ -10,7 +10,7 @@ import gzip
 import tempfile
 import warnings
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -44,6 +44,7 @@ _LAYERS = ("lines", "multipolygons")
 # Elements cut by the box and empty layers are expected here; other warnings are shown.
 _EXPECTED_WARNINGS = (r".*extend beyond the bounding box", r"Could not find any")
 _WHOLE_WORLD_DEG = 90.0
+_CUT_OFF = "cut off, or another format under this name"
 # Raised in decoding where numbers in a file are damaged.
 _OF_PYTHON = (EOFError, OSError, ValueError, TypeError, LookupError, ArithmeticError, MemoryError)
 _DAMAGES = (*_OF_PYTHON, PBFException, DecodeError, GEOSException)
@@ -68,32 +69,6 @@ class Query:
 
 class _NotOsmError(Exception):
     """Well-formed XML that is no map."""
-
-
-def read_xml(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | None:
-    """Return the ways and areas of an XML map that touch a box, in degrees; None without any.
-
-    Raises
-    ------
-    InputError
-        The map is cut off, damaged or no OpenStreetMap XML, or unpacks to an absurd size.
-    """
-    with tempfile.TemporaryDirectory(prefix="mapfilter-osm-") as folder:
-        plain = _checked(path, Path(folder))
-        settings = Path(folder) / "osmconf.ini"
-        settings.write_text(_settings(query), encoding="utf-8")
-        parts = [_read_layer(plain, path, layer, settings, box, query) for layer in _LAYERS]
-    found = pd.concat([part for part in parts if len(part)]) if any(map(len, parts)) else None
-    return None if found is None else GeoDataFrame(found, geometry="geometry", crs="EPSG:4326")
-
-
-def xml_bounds_deg(path: Path) -> BoxDeg | None:
-    """Return the box in the ``bounds`` of an XML map; None without."""
-    head = _Head()
-    with _faults_of(path), _opened(path) as stream:
-        while head.parser.StartElementHandler is not None and (chunk := stream.read(1 << 16)):
-            head.parser.Parse(chunk)
-    return head.bounds
 
 
 class _Head:
@@ -152,31 +127,23 @@ def _opened(path: Path) -> IO[bytes]:
 @contextlib.contextmanager
 def _faults_of(path: Path) -> Iterator[None]:
     expected = "a whole OpenStreetMap XML file"
-    hint = "cut off, or another format under this name"
     try:
         yield
     except _NotOsmError as error:
         raise fail(InputError, str(path), expected, error, "another kind of XML") from error
     except expat.ExpatError as error:
         where = f"{path} line {error.lineno}"
-        raise fail(InputError, where, expected, expat.ErrorString(error.code), hint) from error
+        got = expat.ErrorString(error.code)
+        raise fail(InputError, where, expected, got, _CUT_OFF) from error
     except (OSError, EOFError, LookupError, ValueError, zlib.error) as error:
-        raise fail(InputError, str(path), expected, error, hint) from error
-
-
-def _settings(query: Query) -> str:
-    """Return GDAL's settings: which tags become columns, and which closed ways are areas."""
-    tags = ",".join(dict.fromkeys((*query.wanted, *query.tags)))
-    layers = "".join(f"\n[{layer}]\nosm_id=yes\nattributes={tags}\n" for layer in _LAYERS)
-    return (
-        f"closed_ways_are_polygons={_AREA_KEYS}\nattribute_name_laundering=no\n"
-        f"report_all_nodes=no\nreport_all_ways=no\n{layers}"
-    )
+        raise fail(InputError, str(path), expected, error, _CUT_OFF) from error
 
 
 def _read_layer(
     plain: Path, path: Path, layer: str, settings: Path, box: BoxDeg | None, query: Query
 ) -> GeoDataFrame:
+    listed = {key: ", ".join(f"'{value}'" for value in of) for key, of in query.wanted.items()}
+    wanted = (f'"{k}" IN ({of})' if of else f'"{k}" IS NOT NULL' for k, of in listed.items())
     try:
         with warnings.catch_warnings():
             # GDAL warns of each area that does not close; what cannot be built is left out.
@@ -185,7 +152,7 @@ def _read_layer(
                 plain,
                 layer=layer,
                 bbox=box,
-                where=_where(query),
+                where=" OR ".join(wanted),
                 CONFIG_FILE=str(settings),
                 MAX_TMPFILE_SIZE=str(_MOST_NODES_IN_MEMORY_MB),
             )
@@ -201,44 +168,6 @@ def _read_layer(
     return found.astype({"id": np.int64})
 
 
-def _where(query: Query) -> str:
-    def condition(key: str, values: tuple[str, ...]) -> str:
-        listed = ", ".join(f"'{value}'" for value in values)
-        return f'"{key}" IN ({listed})' if values else f'"{key}" IS NOT NULL'
-
-    return " OR ".join(condition(key, values) for key, values in query.wanted.items())
-
-
-def read_pbf(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | None:
-    """Return the elements of a PBF map with a node in a box, in degrees; None without any."""
-
-    def read() -> Any:
-        osm = pyrosm.OSM(
-            str(path),
-            bounding_box=list(box) if box else None,
-            complete_relations=True,
-            keep_metadata=False,
-            progress=False,
-        )
-        return osm.get_data_by_custom_criteria(
-            custom_filter={key: list(values) or True for key, values in query.wanted.items()},
-            tags_as_columns=list(query.tags),
-            keep_nodes=False,
-        )
-
-    return _guarded(path, read)
-
-
-def pbf_bounds_deg(path: Path) -> BoxDeg | None:
-    """Return the box in the header of a PBF map; None without, or of the whole world."""
-    header = _guarded(path, lambda: get_bounding_box(str(path)))
-    if header is None:
-        return None
-    west, south, east, north = header.bounds
-    is_telling = east - west < _WHOLE_WORLD_DEG or north - south < _WHOLE_WORLD_DEG
-    return (west, south, east, north) if is_telling else None
-
-
 def _guarded(path: Path, read: Callable[[], Any]) -> Any:
     try:
         with warnings.catch_warnings():
@@ -247,11 +176,7 @@ def _guarded(path: Path, read: Callable[[], Any]) -> Any:
             return read()
     except _DAMAGES as error:
         reason = str(error).split(". ")[0].strip() or type(error).__name__
-        hint = "cut off, or another format under this name"
-        raise fail(InputError, str(path), "a whole .osm.pbf file", reason, hint) from error
-
-
-_ANY_WAY = Query({"highway": ()}, ("highway",))
+        raise fail(InputError, str(path), "a whole .osm.pbf file", reason, _CUT_OFF) from error
 
 
 def is_map(name_or_path: str | Path) -> bool:
@@ -262,11 +187,6 @@ def is_map(name_or_path: str | Path) -> bool:
 
 def resolve_map(name_or_path: str | Path) -> Path:
     """Return the file of a map given by path, or by the name of an embedded map.
-
-    Raises
-    ------
-    InputError
-        There is no such file, it is empty, or of another format.
 
     Examples
     --------
@@ -297,7 +217,7 @@ def map_bounds_deg(name_or_path: str | Path) -> BoxDeg:
     header = _header_bounds_deg(path)
     if header is not None:
         return header
-    found = _read(path, None, _ANY_WAY)
+    found = _read(path, None, Query({"highway": ()}, ("highway",)))
     if found is None or not len(found):
         raise fail(InputError, str(path), "a map with ways", "none")
     west, south, east, north = found.total_bounds
@@ -323,11 +243,6 @@ def read_elements(
 
     Columns are ``id``, ``osm_type`` ("way" or "relation") and each tag of the query, an empty text
     where an element has no such tag.
-
-    Raises
-    ------
-    InputError
-        The map is missing, empty, cut off or of another format.
     """
     path = resolve_map(name_or_path)
     west, south, east, north = bounds_m
@@ -347,7 +262,7 @@ def read_elements(
 def check_on_map(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> None:
     """Raise InputError where a box in metres does not overlap the box in the map's header."""
     header = _header_bounds_deg(resolve_map(name_or_path))
-    if header is not None and not _overlap(box_deg(crs, bounds_m), header):
+    if header is not None and not boxes_overlap(box_deg(crs, bounds_m), header):
         raise nothing_there(name_or_path, crs, bounds_m)
 
 
@@ -355,9 +270,9 @@ def nothing_there(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> Mapfi
     """Return the error for an area in which the map has no ways, with the likely mistake."""
     area, covered = box_deg(crs, bounds_m), map_bounds_deg(name_or_path)
     hint = "the area lies outside the map; name another, or none where other files replace it"
-    if _overlap((area[1], area[0], area[3], area[2]), covered):
+    if boxes_overlap((area[1], area[0], area[3], area[2]), covered):
         hint = "longitude and latitude swapped"
-    elif _overlap(area, covered):
+    elif boxes_overlap(area, covered):
         hint = "the map holds no ways there: cut from a larger one by tags?"
     numbers = ", ".join(f"{value:.4f}" for value in area)
     extent = ", ".join(f"{value:.4f}" for value in covered)
@@ -366,16 +281,61 @@ def nothing_there(name_or_path: str | Path, crs: str, bounds_m: Bounds) -> Mapfi
 
 
 def _header_bounds_deg(path: Path) -> BoxDeg | None:
-    return pbf_bounds_deg(path) if _is_pbf(path) else xml_bounds_deg(path)
-
-
-def _is_pbf(path: Path) -> bool:
-    return path.suffix.lower() == ".pbf"
+    """Return the box in the header of a map; None without, or where a PBF's is the whole world."""
+    if path.suffix.lower() != ".pbf":
+        head = _Head()
+        with _faults_of(path), _opened(path) as stream:
+            while head.parser.StartElementHandler is not None and (chunk := stream.read(1 << 16)):
+                head.parser.Parse(chunk)
+        return head.bounds
+    header = _guarded(path, lambda: get_bounding_box(str(path)))
+    if header is None:
+        return None
+    west, south, east, north = header.bounds
+    is_part = east - west < _WHOLE_WORLD_DEG or north - south < _WHOLE_WORLD_DEG
+    return (west, south, east, north) if is_part else None
 
 
 def _read(path: Path, box: BoxDeg | None, query: Query) -> GeoDataFrame | None:
-    return read_pbf(path, box, query) if _is_pbf(path) else read_xml(path, box, query)
+    """Return the elements of a map that touch a box, in degrees; None without any.
+
+    Of a PBF these are the elements with a node in the box.
+    """
+
+    def from_pbf() -> Any:
+        osm = pyrosm.OSM(
+            str(path),
+            bounding_box=list(box) if box else None,
+            complete_relations=True,
+            keep_metadata=False,
+            progress=False,
+        )
+        return osm.get_data_by_custom_criteria(
+            custom_filter={key: list(values) or True for key, values in query.wanted.items()},
+            tags_as_columns=list(query.tags),
+            keep_nodes=False,
+        )
+
+    if path.suffix.lower() == ".pbf":
+        return _guarded(path, from_pbf)
+    with tempfile.TemporaryDirectory(prefix="mapfilter-osm-") as folder:
+        plain = _checked(path, Path(folder))
+        settings = Path(folder) / "osmconf.ini"
+        # GDAL's settings: which tags become columns, and which closed ways are areas.
+        tags = ",".join(dict.fromkeys((*query.wanted, *query.tags)))
+        layers = "".join(f"\n[{layer}]\nosm_id=yes\nattributes={tags}\n" for layer in _LAYERS)
+        settings.write_text(
+            f"closed_ways_are_polygons={_AREA_KEYS}\nattribute_name_laundering=no\n"
+            f"report_all_nodes=no\nreport_all_ways=no\n{layers}",
+            encoding="utf-8",
+        )
+        parts = [_read_layer(plain, path, layer, settings, box, query) for layer in _LAYERS]
+    if not any(map(len, parts)):
+        return None
+    found = pd.concat([part for part in parts if len(part)])
+    return GeoDataFrame(found, geometry="geometry", crs="EPSG:4326")
 
 
-def _overlap(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
+def boxes_overlap(a: Sequence[float], b: Sequence[float]) -> bool:
+    """Return whether two boxes west, south, east, north have an area in common."""
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]

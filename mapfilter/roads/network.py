@@ -32,14 +32,8 @@ class StreetNetwork:
         The nodes.
     node_a, node_b : numpy.ndarray of int32, shape (E,)
         Ends of each edge; the way is drawn from a to b.
-    length_m : numpy.ndarray, shape (E,)
-        Length of each edge.
-    way_id : numpy.ndarray of int64, shape (E,)
-        The way that the edge belongs to.
-    way_class : numpy.ndarray of int16, shape (E,)
-        Index into ``class_names``.
-    class_names : tuple of str
-        Kinds of way.
+    way_id, way_class, class_names
+        Of the way that each edge belongs to, as in :class:`mapfilter.roads.ways.Ways`.
     oneway : numpy.ndarray of int8, shape (E,)
         1 when only a to b is allowed, -1 when only b to a, 0 when both.
     """
@@ -59,7 +53,7 @@ class StreetNetwork:
     def adjacency(self) -> Any:
         """Lengths between neighbouring nodes (m), ``scipy.sparse.csr_array``, shape (N, N).
 
-        Entry (i, j) exists when one may go from i to j; of parallel edges the shortest counts.
+        Entry (i, j) exists where i to j is allowed; of parallel edges the shortest counts.
         """
         forth, back = self.oneway >= 0, self.oneway <= 0
         start = np.concatenate([self.node_a[forth], self.node_b[back]])

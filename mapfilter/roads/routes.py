@@ -12,7 +12,7 @@ import shapely
 from geopandas import GeoDataFrame
 
 from mapfilter._types import Bools
-from mapfilter.errors import Faults, InputError, fail
+from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.roads.buildings import read_buildings
 from mapfilter.roads.index import (
@@ -21,8 +21,6 @@ from mapfilter.roads.index import (
     RouteSource,
     WayIndex,
     described,
-    note_crs,
-    note_half_widths,
 )
 from mapfilter.roads.landuse import read_landuse
 from mapfilter.roads.lattice import RouteLattice
@@ -50,7 +48,7 @@ def read_routes(
     class_column: str | None = None,
     id_column: str | None = None,
 ) -> RouteLattice:
-    """Read roads and return the lattice points where one can be.
+    """Read roads and return the accessible lattice points.
 
     Parameters
     ----------
@@ -91,7 +89,6 @@ def read_routes(
     >>> len(routes), routes.mask().shape
     (166, (20, 20))
     """
-    by_class_m = half_width_by_class_m or {}
     if roads is None and landuse is None:
         raise fail(InputError, "roads", "a map, a layer or ways; or landuse", "none")
     found = Roads(Ways.none(lattice.crs))
@@ -103,7 +100,7 @@ def read_routes(
             lattice,
             profile=profile,
             half_width_m=half_width_m,
-            half_width_by_class_m=by_class_m,
+            half_width_by_class_m=half_width_by_class_m,
             squares=squares,
             layer_name=layer_name,
             class_column=class_column,
@@ -115,7 +112,7 @@ def read_routes(
             lattice,
             clip_ways(found.ways, lattice.bounds_m),
             half_width_m,
-            half_width_by_class_m=by_class_m,
+            half_width_by_class_m=half_width_by_class_m,
         )
     here = lattice.crs, lattice.bounds_m
     map_file = roads if isinstance(roads, Path | str) and is_map(roads) else None
@@ -133,7 +130,7 @@ def read_routes(
         buildings,
         lattice,
         half_width_m,
-        half_width_by_class_m=by_class_m,
+        half_width_by_class_m=half_width_by_class_m,
         water=water,
     )
 
@@ -240,13 +237,10 @@ def route_lattice(
     Parameters
     ----------
     ways, squares, buildings
-        Of the lattice's area, in its CRS. Ways just outside count for points inside.
-    lattice : Lattice
-        Normally that of the radio rasters.
-    half_width_m : float
-        A point belongs to a way at most this far from its centre line; to the nearest of several.
-    half_width_by_class_m : mapping of str to float, optional
-        The same for some classes of way; 0 leaves the class out.
+        Of the lattice's area, in its CRS. Ways just outside count for points inside; of several
+        near a point it belongs to the nearest.
+    lattice, half_width_m, half_width_by_class_m
+        As for :func:`read_routes`.
     water : Water, optional
         Cut out except on ways that cross it and within their half width: where a way runs through
         water there is a bridge, a pier or a ford.
@@ -258,14 +252,14 @@ def route_lattice(
     InputError
         The CRS differ, a half width is no length, or no point is left.
     """
-    by_class_m = half_width_by_class_m or {}
-    faults = Faults()
-    layers = {"ways": ways, "squares": squares, "buildings": buildings, "water": water}
-    note_crs(faults, lattice.crs, layers)
-    note_half_widths(faults, half_width_m, by_class_m)
-    faults.raise_if_any(InputError)
     source = RouteSource.of(
-        ways, squares, buildings, half_width_m, half_width_by_class_m=by_class_m, water=water
+        ways,
+        squares,
+        buildings,
+        half_width_m,
+        half_width_by_class_m=half_width_by_class_m,
+        water=water,
+        crs=lattice.crs,
     )
     return source.over(lattice, tile_px)
 
@@ -283,7 +277,7 @@ def route_lattice_from_landuse(
     Parameters
     ----------
     mask : numpy.ndarray of bool, shape (lattice.rows, lattice.cols)
-        Where one can be, such as ``LandUse.walkable``.
+        Accessible points, such as ``LandUse.walkable``.
     lattice : Lattice
         Of the mask.
     ways : Ways, optional
@@ -302,7 +296,6 @@ def route_lattice_from_landuse(
         raise fail(InputError, "land-use mask", f"shape {shape}", mask.shape)
     if not mask.any():
         raise fail(InputError, "land use", "a walkable point", "none", "no class is walkable")
-    index = WayIndex.of(
-        Ways.none(lattice.crs) if ways is None else ways, half_width_m, half_width_by_class_m or {}
-    )
+    ways = Ways.none(lattice.crs) if ways is None else ways
+    index = WayIndex.of(ways, half_width_m, half_width_by_class_m)
     return described(mask, lattice, mask, index, index.reaching(lattice), LANDUSE_CLASS)

@@ -24,7 +24,7 @@ from shapely.errors import GEOSException
 
 from mapfilter._types import Ints
 from mapfilter.errors import InputError, MapfilterError, fail
-from mapfilter.roads.maps import box_deg
+from mapfilter.roads.maps import box_deg, boxes_overlap
 from mapfilter.roads.ways import Bounds, Geometries, on_earth
 
 T = TypeVar("T")
@@ -50,20 +50,10 @@ _SHP_LENGTH = slice(24, 28)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Features:
-    """What a layer holds in and about an area.
+    """N features of a layer, in and about an area, in the CRS asked for.
 
-    Parameters
-    ----------
-    name : str
-        The file, for messages.
-    geometry : numpy.ndarray of shapely geometries, shape (N,)
-        In two dimensions and the CRS asked for; they reach beyond the area.
-    number : numpy.ndarray of int64, shape (N,)
-        The features' own numbers in the file (FID), plus 1.
-    columns : mapping of str to numpy.ndarray of object, shape (N,)
-        The columns asked for.
-    notes : tuple of str
-        What was left out.
+    ``name`` is the file, for messages; ``number`` are the features' own numbers in it (FID), plus
+    1; ``notes`` count features left out.
     """
 
     name: str
@@ -72,13 +62,22 @@ class Features:
     columns: Mapping[str, NDArray[np.object_]]
     notes: tuple[str, ...]
 
+    @property
+    def kinds(self) -> str:
+        """Types of geometry, for messages."""
+        return ", ".join(sorted({shape.geom_type for shape in self.geometry}))
+
+    def column(self, name: str | None) -> NDArray[np.object_] | None:
+        """Return a column, or None without a name."""
+        return None if name is None else self.columns[name]
+
 
 def read_layer(
     source: Layer,
     crs: str,
     bounds_m: Bounds,
     layer_name: str | None,
-    columns: Sequence[str] = (),
+    wanted: Sequence[str | None] = (),
     *,
     may_be_empty: bool = False,
 ) -> Features:
@@ -88,14 +87,10 @@ def read_layer(
     ----------
     source : path or GeoDataFrame
         A file, a zipped one, or a folder that is a file geodatabase; or a table in memory.
-    crs : str
-        Projected CRS of the result, in metres.
-    bounds_m : tuple of float
-        West, south, east, north of the area in ``crs``.
-    layer_name : str, optional
-        Needed where the file has several layers.
-    columns : sequence of str
-        Columns to read beside the geometry.
+    crs, bounds_m, layer_name
+        As for :func:`mapfilter.roads.layers.read_layer_roads`.
+    wanted : sequence of str or None
+        Columns to read beside the geometry; None are passed over.
     may_be_empty : bool
         Accept a layer with nothing in the area.
 
@@ -105,6 +100,7 @@ def read_layer(
         The file is missing, damaged or no vector file, has several layers, no CRS, or lacks a
         column, or nothing of it lies in the area.
     """
+    columns = [column for column in wanted if column is not None]
     name, frame, hint = "GeoDataFrame", None, ""
     if isinstance(source, GeoDataFrame):
         frame, hint = source.reset_index(drop=True), "not set; see GeoDataFrame.set_crs"
@@ -130,7 +126,8 @@ def read_layer(
         raise fail(InputError, f"{name}, crs", "a layer with a CRS", "none", hint)
     box = _box(name, crs, bounds_m, source_crs)
     if frame is None:
-        frame = _guarded(name, lambda: _read(path, layer, box, columns))
+        settings = {"columns": columns, "bbox": box, "fid_as_index": True, "force_2d": True}
+        frame = _guarded(name, lambda: pyogrio.read_dataframe(path, layer=layer, **settings))
     found = _features(name, frame, crs, bounds_m, columns)
     if not (found.number.size or may_be_empty):
         raise _nothing_there(name, crs, bounds_m, source_crs, covered)
@@ -174,9 +171,9 @@ def _check_file(path: Path) -> None:
         expected = "a vector file that holds its data itself"
         raise fail(InputError, str(path), expected, "one that leads to other places")
     if path.suffix.lower() == ".shp":
-        told_bytes = 2 * int.from_bytes(head[_SHP_LENGTH], "big")
-        if size_bytes < told_bytes:
-            raise fail(InputError, str(path), f"{told_bytes} bytes", size_bytes, "cut off")
+        stated_bytes = 2 * int.from_bytes(head[_SHP_LENGTH], "big")
+        if size_bytes < stated_bytes:
+            raise fail(InputError, str(path), f"{stated_bytes} bytes", size_bytes, "cut off")
     if zipfile.is_zipfile(path):
         with _guarded(str(path), lambda: zipfile.ZipFile(path)) as archive:
             unpacked_bytes = sum(inner.file_size for inner in archive.infolist())
@@ -225,12 +222,6 @@ def _box(name: str, crs: str, bounds_m: Bounds, source_crs: Any) -> tuple[float,
     return tuple(float(side) for side in box)
 
 
-def _read(path: Path, layer: str, box: tuple[float, ...], columns: Sequence[str]) -> GeoDataFrame:
-    return pyogrio.read_dataframe(
-        path, layer=layer, columns=list(columns), bbox=box, fid_as_index=True, force_2d=True
-    )
-
-
 def _guarded(name: str, read: Callable[[], T]) -> T:
     try:
         with warnings.catch_warnings():
@@ -255,7 +246,7 @@ def _nothing_there(
         west, south, east, north = box_deg(crs, bounds_m)
         if np.any(np.abs(covered) > (_MOST_DEG, 90.0, _MOST_DEG, 90.0)):
             hint = "a CRS in degrees with other numbers: another CRS left out on export"
-        elif south < covered[2] and covered[0] < north and west < covered[3] and covered[1] < east:
+        elif boxes_overlap((south, west, north, east), covered):
             hint = "longitude and latitude swapped"
     expected = f"features in the area; the layer covers {_numbers(covered)}"
     return fail(InputError, where, expected, "none", hint)

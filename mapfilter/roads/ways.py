@@ -27,12 +27,25 @@ class _Layer:
 
     __slots__ = ()
     crs: str
+    geometry: Geometries
 
     def __len__(self) -> int:
-        raise NotImplementedError
+        return int(self.geometry.size)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({len(self)} in {short_crs(self.crs)})"
+
+    def _faults(self, kind: str, *columns: NDArray[Any]) -> Faults:
+        """Return faults of a layer whose columns differ in length, or geometries in kind."""
+        what, faults = type(self).__name__.lower(), Faults()
+        if any(column.shape != (len(self),) for column in columns):
+            lengths = ", ".join(str(column.shape) for column in columns)
+            faults.add(what, f"columns of length {len(self)}", lengths)
+        if np.any(shapely.get_type_id(self.geometry) != shapely.GeometryType[kind.upper()].value):
+            faults.add(f"{what}, geometry", f"only {kind}s", "another kind")
+        elif not np.all(np.isfinite(shapely.get_coordinates(self.geometry))):
+            faults.add(f"{what}, geometry", "finite coordinates", "NaN or infinity")
+        return faults
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -68,11 +81,8 @@ class Ways(_Layer):
     oneway: NDArray[np.int8]
 
     def __post_init__(self) -> None:
-        faults = Faults()
-        _check_lengths(
-            "ways", len(self), faults, self.way_class, self.geometry, self.covered, self.oneway
-        )
-        _check_geometry("ways", self.geometry, "LineString", faults)
+        columns = self.way_id, self.way_class, self.covered, self.oneway
+        faults = self._faults("LineString", *columns)
         if np.any((self.way_class < 0) | (self.way_class >= len(self.class_names))):
             faults.add("ways, way_class", f"0..{len(self.class_names) - 1}", "another code")
         if np.any(self.way_id <= 0):
@@ -80,15 +90,20 @@ class Ways(_Layer):
         faults.raise_if_any(InputError)
 
     @classmethod
+    def open(
+        cls, crs: str, way_id: Ints, classes: NDArray[np.object_], geometry: Geometries
+    ) -> Ways:
+        """Return ways that are neither covered nor one-way; classes are given in words."""
+        names, codes = np.unique(classes.astype(str), return_inverse=True)
+        flag = np.zeros(way_id.size, dtype=np.int8)
+        words = tuple(str(name) for name in names)
+        return cls(crs, way_id, codes.astype(np.int16), words, geometry, flag.astype(bool), flag)
+
+    @classmethod
     def none(cls, crs: str) -> Ways:
         """Return no ways."""
-        number = np.empty(0, dtype=np.int64)
-        lines = np.empty(0, dtype=object)
-        code, flag = number.astype(np.int16), number.astype(np.bool_)
-        return cls(crs, number, code, (), lines, flag, number.astype(np.int8))
-
-    def __len__(self) -> int:
-        return int(self.way_id.size)
+        nothing = np.empty(0, dtype=object)
+        return cls.open(crs, np.empty(0, dtype=np.int64), nothing, nothing)
 
     def select(self, which: Any, geometry: Geometries | None = None) -> Ways:
         """Return the ways chosen by a mask or by indices, with other lines where given."""
@@ -105,12 +120,10 @@ class Ways(_Layer):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Squares(_Layer):
-    """Areas where one may walk in any direction.
+    """Areas that are walked in any direction.
 
     Parameters
     ----------
-    crs : str
-        Projected CRS, in metres.
     area_id : numpy.ndarray of int64, shape (N,)
         The map's own numbers; those of multipolygon relations are negative.
     geometry : numpy.ndarray of shapely.Polygon, shape (N,)
@@ -122,13 +135,7 @@ class Squares(_Layer):
     geometry: Geometries
 
     def __post_init__(self) -> None:
-        faults = Faults()
-        _check_lengths("squares", len(self), faults, self.geometry)
-        _check_geometry("squares", self.geometry, "Polygon", faults)
-        faults.raise_if_any(InputError)
-
-    def __len__(self) -> int:
-        return int(self.area_id.size)
+        self._faults("Polygon", self.area_id).raise_if_any(InputError)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -137,8 +144,6 @@ class Buildings(_Layer):
 
     Parameters
     ----------
-    crs : str
-        Projected CRS, in metres.
     footprints : numpy.ndarray of shapely.Polygon, shape (N,)
         Their ground plans.
     height_m : numpy.ndarray of float64, shape (N,)
@@ -155,15 +160,15 @@ class Buildings(_Layer):
     from_default: int
 
     def __post_init__(self) -> None:
-        faults = Faults()
-        _check_lengths("buildings", self.footprints.size, faults, self.height_m)
-        _check_geometry("buildings", self.footprints, "Polygon", faults)
+        faults = self._faults("Polygon", self.height_m)
         if not np.all(np.isfinite(self.height_m) & (self.height_m > 0)):
             faults.add("buildings, height_m", "metres > 0", "another height")
         faults.raise_if_any(InputError)
 
-    def __len__(self) -> int:
-        return int(self.footprints.size)
+    @property
+    def geometry(self) -> Geometries:  # type: ignore[override]
+        """The footprints."""
+        return self.footprints
 
     @property
     def height_sources(self) -> str:
@@ -176,40 +181,16 @@ class Buildings(_Layer):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Water(_Layer):
-    """Water, where nobody walks or drives except on bridges.
+    """Water, which is crossed on bridges only.
 
-    Parameters
-    ----------
-    crs : str
-        Projected CRS, in metres.
-    geometry : numpy.ndarray of shapely.Polygon, shape (N,)
-        Rivers, lakes and seas; holes (islands) are not part of them.
+    Its polygons are rivers, lakes and seas; holes (islands) are not part of them.
     """
 
     crs: str
     geometry: Geometries
 
     def __post_init__(self) -> None:
-        faults = Faults()
-        _check_geometry("water", self.geometry, "Polygon", faults)
-        faults.raise_if_any(InputError)
-
-    def __len__(self) -> int:
-        return int(self.geometry.size)
-
-
-def _check_lengths(what: str, count: int, faults: Faults, *columns: NDArray[Any]) -> None:
-    if any(column.shape != (count,) for column in columns):
-        lengths = ", ".join(str(column.shape) for column in columns)
-        faults.add(what, f"columns of length {count}", lengths)
-
-
-def _check_geometry(what: str, geometry: Geometries, kind: str, faults: Faults) -> None:
-    wanted = shapely.GeometryType[kind.upper()].value
-    if np.any(shapely.get_type_id(geometry) != wanted):
-        faults.add(f"{what}, geometry", f"only {kind}s", "another kind")
-    elif not np.all(np.isfinite(shapely.get_coordinates(geometry))):
-        faults.add(f"{what}, geometry", "finite coordinates", "NaN or infinity")
+        self._faults("Polygon").raise_if_any(InputError)
 
 
 def on_earth(geometry: Geometries) -> Bools:
@@ -245,12 +226,7 @@ def polygons_inside(
 
     What crosses itself is mended first.
 
-    Parameters
-    ----------
-    bounds_m : tuple of float
-        West, south, east, north.
-    cut : bool
-        Cut them at the edge of the box; else they are kept whole.
+    With ``cut`` they end at the edge of the box; else they are kept whole.
     """
     box = shapely.box(*bounds_m)
     flat, origin = shapely.get_parts(geometry, return_index=True)

@@ -1,4 +1,4 @@
-"""The streets of a made city: quarters between its main roads, cut into blocks.
+"""Streets of a synthetic city: main roads, the quarters between them, and the streets in these.
 
 Quarters are cut across their longer side again and again, as Parish and Müller (2001),
 "Procedural modeling of cities", SIGGRAPH, and those after them do; in an old town by uneven cuts,
@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -20,62 +20,68 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import split
 
 from mapfilter._types import Floats
-from mapfilter.roads.ways import Bounds, Geometries
+from mapfilter.roads.ways import Bounds
+
+Roads = list[tuple[LineString, str]]
+"""Lines with their classes, as OpenStreetMap calls them."""
+
+Quarter = tuple[Polygon, int]
+"""A part of the city that is built in one style."""
+
+OLD_TOWN, INNER, GRID, VILLAS, PARK = range(5)
+
+SNAP_M = 0.01
+"""Corners are rounded to this, so that streets share them exactly."""
 
 _RINGS = (1.0, 2.5, 4.7, 7.6)
 _RING_GROWTH = 1.45
 _QUAY_M = 17.0
 _BRIDGES_APART_M = 420.0
+_CROSSED = 0.45
+_NAME_SHARES = (0.55, 0.3, 0.15)
+_RESIDENTIAL = ("residential", "residential", "residential")
+# Area of a block, least side, how uneven the cuts are, and kinds of street.
+_CUTS: dict[int, tuple[tuple[float, float], float, float, tuple[str, str, str]]] = {
+    OLD_TOWN: ((3200.0, 7000.0), 30.0, 0.3, ("living_street", "pedestrian", "footway")),
+    INNER: ((14000.0, 27000.0), 65.0, 0.2, _RESIDENTIAL),
+    VILLAS: ((18000.0, 34000.0), 70.0, 0.18, _RESIDENTIAL),
+    PARK: ((30000.0, 70000.0), 80.0, 0.3, ("path", "path", "footway")),
+}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Skeleton:
-    """What a city is laid out about, in metres from its centre.
+class Skeleton(NamedTuple):
+    """Layout of a city in metres from its centre.
 
-    Parameters
-    ----------
-    lines : tuple of (LineString, str)
-        Main roads, quays and bridges, each with its class.
-    river, banks : numpy.ndarray of shapely.Polygon, shape (0,) or (1,)
-        The water; the water and the strips up to the middle of the quays.
-    old_town_m : float
-        Radius of the old town.
+    ``roads`` are main roads, quays and bridges. ``banks`` is the ``river`` with the strips up to
+    the middle of the quays; without a river both are empty.
     """
 
-    lines: tuple[tuple[LineString, str], ...]
-    river: Geometries
-    banks: Geometries
+    roads: Roads
+    river: Polygon
+    banks: Polygon
     old_town_m: float
 
 
 def skeleton(box: Bounds, with_river: bool, rng: np.random.Generator) -> Skeleton:
     """Return river, quays, bridges, ring roads and radial roads within a box about (0, 0)."""
-    least_m = min(box[2] - box[0], box[3] - box[1])
-    reach_m = float(np.hypot(box[2] - box[0], box[3] - box[1]))
+    sides_m = box[2] - box[0], box[3] - box[1]
+    least_m, reach_m = min(sides_m), float(np.hypot(*sides_m))
     old_town_m = float(np.clip(0.115 * least_m, 90.0, 350.0))
-    river, banks, middle = None, None, None
+    river, banks, middle = Polygon(), Polygon(), LineString()
     if with_river:
         width_m = float(np.clip(0.036 * least_m, 25.0, 110.0))
         middle = _river_line(reach_m, 1.05 * old_town_m + width_m, least_m, rng)
         river = middle.buffer(width_m / 2, cap_style="flat", quad_segs=4)
         banks = middle.buffer(width_m / 2 + _QUAY_M, cap_style="flat", quad_segs=4)
-    roads = [*_rings(old_town_m, reach_m, rng), *_radials(old_town_m, reach_m, rng)]
-    lines: list[tuple[LineString, str]] = []
+    roads: Roads = []
     crossings: list[LineString] = []
-    for line, name in roads:
-        if banks is None:
-            lines.append((line, name))
-            continue
-        lines += [(part, name) for part in lines_of(line.difference(banks))]
+    for line, name in (*_rings(old_town_m, reach_m, rng), *_radials(old_town_m, reach_m, rng)):
+        roads += [(part, name) for part in lines_of(line.difference(banks))]
         crossings += lines_of(line.intersection(banks))
-    if banks is not None and middle is not None:
-        lines += [(part, "secondary") for part in lines_of(banks.boundary)]
-        lines += [(bridge, "primary") for bridge in _bridges(middle, banks, crossings, box)]
-    none = np.empty(0, dtype=object)
-    if river is None or banks is None:
-        return Skeleton(tuple(lines), none, none, old_town_m)
-    one = [np.array([shape], dtype=object) for shape in (river, banks)]
-    return Skeleton(tuple(lines), one[0], one[1], old_town_m)
+    if with_river:
+        roads += [(part, "secondary") for part in lines_of(banks.boundary)]
+        roads += [(bridge, "primary") for bridge in _bridges(middle, banks, crossings, box)]
+    return Skeleton(roads, river, banks, old_town_m)
 
 
 def _river_line(
@@ -92,9 +98,8 @@ def _river_line(
     return LineString(turned(np.column_stack([along, aside]), turn))
 
 
-def _rings(
-    old_town_m: float, reach_m: float, rng: np.random.Generator
-) -> Iterator[tuple[LineString, str]]:
+def _rings(old_town_m: float, reach_m: float, rng: np.random.Generator) -> Roads:
+    rings: Roads = []
     radii = [old_town_m * share for share in _RINGS]
     while radii[-1] < reach_m:
         radii.append(radii[-1] * _RING_GROWTH)
@@ -105,23 +110,23 @@ def _rings(
             radius += radius_m * share * np.sin(waves * angle + rng.uniform(0, 2 * np.pi))
         corners = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
         corners[-1] = corners[0]
-        yield LineString(corners), "secondary" if i else "tertiary"
+        rings.append((LineString(corners), "secondary" if i else "tertiary"))
+    return rings
 
 
-def _radials(
-    old_town_m: float, reach_m: float, rng: np.random.Generator
-) -> Iterator[tuple[LineString, str]]:
+def _radials(old_town_m: float, reach_m: float, rng: np.random.Generator) -> Roads:
+    radials: Roads = []
     count = int(rng.integers(6, 9))
     first = rng.uniform(0, 2 * np.pi)
-    step_m = 60.0
     for i in range(count):
         angle = first + (i + rng.uniform(-0.18, 0.18)) * 2 * np.pi / count
         # Every second one is a street of the old town, up to its middle.
         start_m = 0.12 * old_town_m if i % 2 else 0.9 * old_town_m
-        along = np.arange(start_m, reach_m, step_m)
+        along = np.arange(start_m, reach_m, 60.0)
         drift = np.cumsum(rng.normal(0, 0.035, along.size)) * np.minimum(along / reach_m, 0.4)
         corners = along[:, None] * np.column_stack([np.cos(angle + drift), np.sin(angle + drift)])
-        yield LineString(corners), "primary"
+        radials.append((LineString(corners), "primary"))
+    return radials
 
 
 def _bridges(
@@ -166,71 +171,19 @@ def lines_of(shape: BaseGeometry) -> list[LineString]:
     ]
 
 
-CLASSES = (
-    "footway",
-    "living_street",
-    "path",
-    "pedestrian",
-    "primary",
-    "residential",
-    "secondary",
-    "service",
-    "tertiary",
-)
-"""Kinds of way, as OpenStreetMap calls them."""
-
-OLD_TOWN, INNER, GRID, VILLAS, PARK = range(5)
-
-SNAP_M = 0.01
-"""Corners are rounded to this, so that streets share them exactly."""
-
-_CROSSED = 0.45
-_NAME_SHARES = (0.55, 0.3, 0.15)
-# Area of a block, least side, how uneven the cuts are, and kinds of street.
-_CUTS: dict[int, tuple[tuple[float, float], float, float, tuple[str, str, str]]] = {
-    OLD_TOWN: (
-        (3200.0, 7000.0),
-        30.0,
-        0.3,
-        ("living_street", "pedestrian", "footway"),
-    ),
-    INNER: ((14000.0, 27000.0), 65.0, 0.2, ("residential", "residential", "residential")),
-    VILLAS: ((18000.0, 34000.0), 70.0, 0.18, ("residential", "residential", "residential")),
-    PARK: ((30000.0, 70000.0), 80.0, 0.3, ("path", "path", "footway")),
-}
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Quarter:
-    """A part of the city that is built in one style."""
-
-    outline: Polygon
-    style: int
-
-
-def quarters(
-    plan: Skeleton, box: Bounds, rng: np.random.Generator
-) -> tuple[list[Quarter], list[tuple[LineString, str]]]:
-    """Cut a box along the main roads, and large parts again, into quarters.
-
-    Returns
-    -------
-    quarters : list of Quarter
-    lines : list of (LineString, str)
-        The further roads between them.
-    """
+def quarters(plan: Skeleton, box: Bounds, rng: np.random.Generator) -> tuple[list[Quarter], Roads]:
+    """Cut a box along the main roads, and large parts again; return further roads, too."""
     edge = shapely.box(*box).exterior
-    noded = shapely.unary_union([edge, *(line for line, _ in plan.lines)], grid_size=SNAP_M)
+    noded = shapely.unary_union([edge, *(line for line, _ in plan.roads)], grid_size=SNAP_M)
     found: list[Quarter] = []
-    lines: list[tuple[LineString, str]] = []
+    roads: Roads = []
     for part in shapely.get_parts(shapely.polygonize([noded])):
-        place = part.representative_point()
-        if shapely.contains(plan.banks, place).any():
+        if plan.banks.contains(part.representative_point()):
             continue
         pieces, cuts = _cut_up(part, (1.5e5, 3.6e5), 220.0, 0.12, rng)
-        lines += [(cut, "tertiary") for cut in cuts]
-        found += [Quarter(piece, _style(piece, plan.old_town_m, rng)) for piece in pieces]
-    return found, lines
+        roads += [(cut, "tertiary") for cut in cuts]
+        found += [(piece, _style(piece, plan.old_town_m, rng)) for piece in pieces]
+    return found, roads
 
 
 def _style(outline: Polygon, old_town_m: float, rng: np.random.Generator) -> int:
@@ -243,13 +196,13 @@ def _style(outline: Polygon, old_town_m: float, rng: np.random.Generator) -> int
     return int(rng.choice([INNER, GRID, VILLAS, PARK], p=shares))
 
 
-def streets(quarter: Quarter, rng: np.random.Generator) -> list[tuple[LineString, str]]:
+def streets(quarter: Quarter, rng: np.random.Generator) -> Roads:
     """Return the streets within a quarter."""
-    style = quarter.style
+    outline, style = quarter
     if style == GRID:
-        return [(line, "residential") for line in _grid(quarter.outline, rng)]
+        return [(line, "residential") for line in _grid(outline, rng)]
     area_m2, least_m, uneven, names = _CUTS[style]
-    _, cuts = _cut_up(quarter.outline, area_m2, least_m, uneven, rng)
+    _, cuts = _cut_up(outline, area_m2, least_m, uneven, rng)
     return [(cut, names[int(rng.choice(3, p=_NAME_SHARES))]) for cut in cuts]
 
 
@@ -258,16 +211,15 @@ def _grid(outline: Polygon, rng: np.random.Generator) -> Iterator[LineString]:
     turn = _direction(outline)
     west, south, east, north = shapely.transform(outline, partial(turned, angle_rad=-turn)).bounds
     deep_m, long_m = rng.uniform(90, 122), rng.uniform(140, 225)
-    rows = _spread(south, north, deep_m)
-    for row in rows[1:-1]:
-        yield from _within(outline, turned(np.array([[west, row], [east, row]]), turn))
-    columns = _spread(west, east, long_m)[1:-1]
+    rows, columns = _spread(south, north, deep_m), _spread(west, east, long_m)[1:-1]
+    lines = [[[west, row], [east, row]] for row in rows[1:-1]]
     for low, high in itertools.pairwise(rows):
         shift_m = rng.uniform(-0.4, 0.4) * long_m if rng.random() < 0.15 else 0.0
         for column in columns + shift_m:
             if rng.random() > 0.05:
-                ends = np.array([[column, low], [column, high]])
-                yield from _within(outline, turned(ends, turn))
+                lines.append([[column, low], [column, high]])
+    for ends in lines:
+        yield from lines_of(LineString(turned(np.array(ends), turn)).intersection(outline))
 
 
 def _spread(low: float, high: float, step_m: float) -> Floats:
@@ -313,14 +265,9 @@ def _about_half(uneven: float, rng: np.random.Generator) -> float:
 
 
 def bend(at: Floats, old_town_m: float, phases: Floats) -> Floats:
-    """Move places a little, most of all in the old town; what crosses goes on crossing.
+    """Move places (N, 2) a little, most of all in the old town; what crosses goes on crossing.
 
-    Parameters
-    ----------
-    at : numpy.ndarray, shape (N, 2)
-        Metres from the centre.
-    phases : numpy.ndarray, shape (2, 3)
-        Of the waves, radians.
+    ``phases`` are those of the waves in radians, shape (2, 3).
     """
     away = np.hypot(at[:, 0], at[:, 1]) / old_town_m
     moved = at.copy()
@@ -340,7 +287,3 @@ def _direction(outline: Polygon) -> float:
     sides = np.diff(corners[:3], axis=0)
     longer = sides[int(np.argmax(np.hypot(sides[:, 0], sides[:, 1])))]
     return float(np.arctan2(longer[1], longer[0]))
-
-
-def _within(outline: Polygon, ends: Floats) -> list[LineString]:
-    return lines_of(LineString(ends).intersection(outline))

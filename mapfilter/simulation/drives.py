@@ -13,15 +13,7 @@ from mapfilter.gnss.noise import correlated_along
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """Where a vehicle truly is at each epoch.
-
-    Parameters
-    ----------
-    time_s : (K,) array
-    place_m : (K, 3) array
-        East, north, up.
-    travelled_m : (K,) array
-    """
+    """Ground truth of a drive at K epochs; ``place_m`` has the columns east, north and up."""
 
     time_s: Floats
     place_m: Floats
@@ -60,10 +52,8 @@ def straight_drive(
     ([10.0, 20.0, 30.0], [100.0, 200.0, 300.0])
     """
     faults = Faults()
-    given = {"length_m": length_m, "duration_s": duration_s, "interval_s": interval_s}
-    for name, value in given.items():
-        if not (np.isfinite(value) and value > 0):
-            faults.add(f"drive, {name}", "a number above 0", value)
+    times_s = {"duration_s": duration_s, "interval_s": interval_s}
+    faults.check_positive("drive, ", "a number", length_m=length_m, **times_s)
     if not np.isfinite(bearing_deg):
         faults.add("drive, bearing_deg", "finite degrees", bearing_deg)
     faults.raise_if_any(InputError)
@@ -78,20 +68,10 @@ def straight_drive(
 def shadowing_db(
     drive: Drive, stations: int, sigma_db: float, correlation_m: float, rng: np.random.Generator
 ) -> Floats:
-    """Draw log-normal shadowing of each station, correlated by ``exp(-d / L)`` along the way.
+    """Draw log-normal shadowing of independent stations, shape (K, stations).
 
-    Parameters
-    ----------
-    stations : int
-        Independent of each other.
-    sigma_db : float
-        Standard deviation; 0 for none.
-    correlation_m : float
-        L.
-
-    Returns
-    -------
-    (K, stations) array
+    Its standard deviation is ``sigma_db``, its correlation along the way ``exp(-d /
+    correlation_m)``.
     """
     return sigma_db * correlated_along(drive.travelled_m, stations, correlation_m, rng)
 

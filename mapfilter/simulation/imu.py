@@ -85,7 +85,7 @@ def noisy_motion(truth: pd.DataFrame, noise: ImuNoise, rng: np.random.Generator)
 
     Returns
     -------
-    motion : pandas.DataFrame
+    pandas.DataFrame
         One row for each interval between two ticks, at the time it ends: step_m and heading_rad of
         the chord with errors, and turn_rad, the change since the last heading (NaN at first).
     """

@@ -1,4 +1,4 @@
-"""Journeys with truth: how a walker or a driver goes along a route through time."""
+"""Ground truth of journeys: the motion of a walker or a driver along a route."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from mapfilter._types import Floats, Ints
+from mapfilter._types import Floats
 from mapfilter.errors import Faults
 from mapfilter.geodesy import wrap_rad
 from mapfilter.options import Options, Positive
@@ -126,29 +126,26 @@ def journey(
     plain = walker.on_centre_line and walker.stop_every_m == 0
     if plan.profile == "driving" or plain:
         distance_m, time_s = speed_profile(along, plan)
-        tick_s = _ticks_s(time_s[-1], plan.period_s)
+        tick_s = ticks_s(time_s, plan.period_s)
         east, north, way_id = along.at(np.interp(tick_s, time_s, distance_m))
-        return _truth(tick_s, east, north, way_id)
-    if rng is None:
+    elif rng is None:
         raise ValueError("a walker beside the centre line, or one that stops, needs rng")
-    path = path_beside(along, walker, rng, inside)
-    walked_m, time_s = with_stops(path.walked_m, path.walked_m / plan.speed_mps, walker, rng)
-    tick_s = _ticks_s(time_s[-1], plan.period_s)
-    at_m = np.interp(tick_s, time_s, walked_m)
-    _, _, way_id = along.at(np.interp(at_m, path.walked_m, path.distance_m))
-    east, north = (np.interp(at_m, path.walked_m, axis) for axis in (path.east_m, path.north_m))
-    return _truth(tick_s, east, north, way_id)
-
-
-def _ticks_s(end_s: float, period_s: float) -> Floats:
-    # A route that takes a whole number of ticks must not lose the last one to rounding.
-    ticks = int(np.floor(end_s / period_s + 1e-9))
-    return np.asarray(np.arange(ticks + 1) * period_s)
-
-
-def _truth(tick_s: Floats, east_m: Floats, north_m: Floats, way_id: Ints) -> pd.DataFrame:
+    else:
+        path = path_beside(along, walker, rng, inside)
+        walked_m, time_s = with_stops(path.walked_m, path.walked_m / plan.speed_mps, walker, rng)
+        tick_s = ticks_s(time_s, plan.period_s)
+        at_m = np.interp(tick_s, time_s, walked_m)
+        _, _, way_id = along.at(np.interp(at_m, path.walked_m, path.distance_m))
+        east, north = (np.interp(at_m, path.walked_m, axis) for axis in (path.east_m, path.north_m))
     ways = pd.array(way_id, "Int64")
-    return pd.DataFrame({"time_s": tick_s, "east_m": east_m, "north_m": north_m, "way_id": ways})
+    return pd.DataFrame({"time_s": tick_s, "east_m": east, "north_m": north, "way_id": ways})
+
+
+def ticks_s(time_s: Floats, period_s: float) -> Floats:
+    """Return times from the first to the last of some, a period apart."""
+    # A whole number of periods must not lose the last tick to rounding.
+    count = int(np.floor((time_s[-1] - time_s[0]) / period_s + 1e-9)) + 1
+    return np.asarray(time_s[0] + np.arange(count) * period_s)
 
 
 def speed_profile(along: Route, plan: JourneyPlan) -> tuple[Floats, Floats]:

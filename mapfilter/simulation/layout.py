@@ -1,6 +1,8 @@
-"""Lays out a cell plan over any area by rule, where no real plan is at hand."""
+"""Cell plans laid out over any area by rule, where no real plan is at hand."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt, find_objects, label
@@ -81,54 +83,6 @@ def lay_out_plan(
     InputError
         The heights do not fit the lattice, or a cell would be none (such as an EIRP of 100 dBm).
     """
-    _check(sites, sectors, indoor, seed)
-    heights = None if heights_m is None else check_heights(heights_m, lattice)
-    rng = np.random.default_rng(seed)
-    masts = _masts(lattice, sites, heights, rng)
-    cells: list[Cell] = []
-    for i, (east_m, north_m) in enumerate(masts, start=1):
-        roof_m = 0.0
-        if heights is not None:
-            roof_m = float(heights[lattice.row_col(east_m, north_m)])
-        for j in range(sectors):
-            azimuth_deg = (first_azimuth_deg + j * 360.0 / sectors) % 360.0
-            cells.append(
-                Cell(
-                    id=f"S{i}{'ABCDEF'[j]}",
-                    site=f"S{i}",
-                    east_m=east_m,
-                    north_m=north_m,
-                    height_m=max(site_height_m, roof_m + _ABOVE_ROOF_M),
-                    azimuth_deg=None if sectors == 1 else azimuth_deg,
-                    antenna="omni" if sectors == 1 else "sector",
-                    eirp_dbm=eirp_dbm,
-                    frequency_mhz=frequency_mhz,
-                    arfcn=_arfcn(len(cells)),
-                    bsic=_bsic(len(cells)),
-                )
-            )
-    for i, (east_m, north_m) in enumerate(_indoor_places(lattice, indoor, heights, masts), 1):
-        cells.append(
-            Cell(
-                id=f"I{i}",
-                site=f"I{i}",
-                east_m=east_m,
-                north_m=north_m,
-                height_m=indoor_height_m,
-                azimuth_deg=None,
-                antenna="omni",
-                eirp_dbm=indoor_eirp_dbm,
-                frequency_mhz=frequency_mhz,
-                indoor=True,
-                penetration_loss_db=penetration_loss_db,
-                arfcn=_arfcn(len(cells)),
-                bsic=_bsic(len(cells)),
-            )
-        )
-    return CellPlan(lattice.crs, tuple(cells))
-
-
-def _check(sites: int, sectors: int, indoor: int, seed: int) -> None:
     faults = Faults()
     if sites < 0 or indoor < 0 or sites + indoor < 1:
         faults.add("cells, sites and indoor", "at least one cell", f"{sites} and {indoor}")
@@ -137,14 +91,43 @@ def _check(sites: int, sectors: int, indoor: int, seed: int) -> None:
     if seed < 0:
         faults.add("cells, seed", "a whole number ≥ 0", seed)
     faults.raise_if_any(ConfigError)
+    heights = None if heights_m is None else check_heights(heights_m, lattice)
+    rng = np.random.default_rng(seed)
+    masts = _masts(lattice, sites, heights, rng)
+    cells: list[Cell] = []
 
+    def add(site: str, letter: str, place: tuple[float, float], **properties: Any) -> None:
+        round_, carrier = divmod(len(cells), _CARRIERS)
+        properties["arfcn"] = _FIRST_ARFCN + _CARRIER_STEP * carrier
+        properties["bsic"] = round_ % _COLOURS
+        cells.append(Cell(site + letter, site, *place, frequency_mhz=frequency_mhz, **properties))
 
-def _arfcn(number: int) -> int:
-    return _FIRST_ARFCN + _CARRIER_STEP * (number % _CARRIERS)
-
-
-def _bsic(number: int) -> int:
-    return (number // _CARRIERS) % _COLOURS
+    for i, place in enumerate(masts, start=1):
+        roof_m = 0.0 if heights is None else float(heights[lattice.row_col(*place)])
+        for j in range(sectors):
+            azimuth_deg = (first_azimuth_deg + j * 360.0 / sectors) % 360.0
+            add(
+                f"S{i}",
+                "ABCDEF"[j],
+                place,
+                height_m=max(site_height_m, roof_m + _ABOVE_ROOF_M),
+                azimuth_deg=None if sectors == 1 else azimuth_deg,
+                antenna="omni" if sectors == 1 else "sector",
+                eirp_dbm=eirp_dbm,
+            )
+    for i, place in enumerate(_indoor_places(lattice, indoor, heights, masts), start=1):
+        add(
+            f"I{i}",
+            "",
+            place,
+            height_m=indoor_height_m,
+            azimuth_deg=None,
+            antenna="omni",
+            eirp_dbm=indoor_eirp_dbm,
+            indoor=True,
+            penetration_loss_db=penetration_loss_db,
+        )
+    return CellPlan(lattice.crs, tuple(cells))
 
 
 def _masts(
@@ -202,10 +185,19 @@ def _indoor_places(
     for place in _building_cores(lattice, heights) if count and heights is not None else []:
         if len(places) < count and all(np.hypot(*np.subtract(place, p)) > apart_m for p in places):
             places.append(place)
-    inside = _interior(lattice)
+    points = _candidates(lattice)
+    west, south, east, north = lattice.bounds_m
+    size_m = np.array([east - west, north - south])
+    off_m = np.abs(points - np.array([west + east, south + north]) / 2)
+    # Not near the edge of the area, where there is room.
+    interior = (off_m <= size_m / 2 - _INTERIOR * size_m).all(axis=1)
+    inside = points[interior] if interior.any() else points
     while len(places) < count:
         taken = [*masts, *places]
-        distance = cKDTree(taken).query(inside)[0] if taken else _edge_distance(lattice, inside)
+        if taken:
+            distance = cKDTree(taken).query(inside)[0]
+        else:
+            distance = np.minimum(inside - (west, south), (east, north) - inside).min(axis=1)
         east_m, north_m = inside[int(np.argmax(distance))]
         places.append((round(float(east_m), 2), round(float(north_m), 2)))
     return places
@@ -224,20 +216,3 @@ def _building_cores(lattice: Lattice, heights: Floats32) -> list[tuple[float, fl
         east_m, north_m = lattice.east_north(int(row) + top, int(col) + left)
         cores.append((float(east_m), float(north_m)))
     return cores
-
-
-def _interior(lattice: Lattice) -> Floats:
-    """Return the candidates that are not near the edge of the area."""
-    points = _candidates(lattice)
-    west, south, east, north = lattice.bounds_m
-    margins = _INTERIOR * (east - west), _INTERIOR * (north - south)
-    inside = (np.abs(points[:, 0] - (west + east) / 2) <= (east - west) / 2 - margins[0]) & (
-        np.abs(points[:, 1] - (south + north) / 2) <= (north - south) / 2 - margins[1]
-    )
-    return points[inside] if inside.any() else points
-
-
-def _edge_distance(lattice: Lattice, points: Floats) -> Floats:
-    west, south, east, north = lattice.bounds_m
-    across = np.minimum(points[:, 0] - west, east - points[:, 0])
-    return np.minimum(across, np.minimum(points[:, 1] - south, north - points[:, 1]))

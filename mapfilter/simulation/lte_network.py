@@ -1,8 +1,7 @@
-"""A hexagonal LTE network as it is received: sites of three sectors, levels, and SINR.
+"""A hexagonal LTE network as it is received: sites of three sectors, levels, SINR, arrival times.
 
-All sectors send at once and in the same band, so that each is received against all others.
-
-All times are distances (m), times of arrival times the speed of light.
+All sectors send at once and in the same band, so that each is received against all others. All
+times are distances (m), times of arrival times the speed of light.
 """
 
 from __future__ import annotations
@@ -26,18 +25,10 @@ _LEAST_DISTANCE_M = 10.0
 
 @dataclass(frozen=True, slots=True)
 class LteRadio:
-    """What all sectors have in common.
+    """Properties of all sectors and receivers of an LTE network.
 
-    Parameters
-    ----------
-    power_dbm : float
-        Of a sector.
-    gain_dbi : float
-        Of its antenna, at boresight.
-    beamwidth_deg, front_to_back_db : float
-        Of its horizontal pattern.
-    noise_figure_db : float
-        Of receivers.
+    Antenna gain is at boresight; beamwidth and front-to-back ratio are of the horizontal pattern.
+    The noise figure is that of receivers.
     """
 
     power_dbm: float = 43.0
@@ -108,17 +99,8 @@ def sites_along(
 ) -> Floats:
     """Draw standard normal numbers for sites, part of which is common: what is near the receiver.
 
-    Parameters
-    ----------
-    travelled_m : (K,) array_like
-    correlation_m : float
-        The correlation along the way is ``exp(-d / correlation_m)``.
-    shared : float
-        Correlation of any two sites.
-
-    Returns
-    -------
-    (K, sites) array
+    The correlation along the way, given as ``travelled_m`` of shape (K,), is
+    ``exp(-d / correlation_m)``; ``shared`` is that of any two sites. The result is (K, sites).
 
     Raises
     ------
@@ -145,12 +127,10 @@ def sector_levels_dbm(
 
     Parameters
     ----------
-    sites_m : (S, 2) array
     boresights_deg : (3,) array_like
         Of the sectors of each site, anticlockwise from east.
-    places_m : (K, 2) array
     seen : (K, S) array of bool
-        Whether a site is in line of sight.
+        Whether each of S sites is in line of sight of each of K places.
     shadowing_db : (K, S) array_like
         Added to all sectors of a site.
 
@@ -176,9 +156,7 @@ def sector_levels_dbm(
 def site_sinr_db(levels_dbm: Floats, noise_dbm: float) -> Floats:
     """Return the SINR of each site's best sector against all other sectors and noise, (..., S).
 
-    Parameters
-    ----------
-    levels_dbm : (..., S, 3) array
+    ``levels_dbm`` are of shape (..., S, 3).
 
     Raises
     ------
@@ -191,10 +169,8 @@ def site_sinr_db(levels_dbm: Floats, noise_dbm: float) -> Floats:
     >>> site_sinr_db(levels, -120.0).round(2).tolist()
     [[-0.02, -0.02]]
     """
-    faults = Faults()
     if np.isnan(levels_dbm).any():
-        faults.add("levels_dbm", "numbers", "NaN")
-    faults.raise_if_any(InputError)
+        raise fail(InputError, "levels_dbm", "numbers", "NaN")
     power = 10 ** (levels_dbm / 10)
     best = power.max(axis=-1)
     others = power.sum(axis=(-2, -1))[..., None] - best + 10 ** (noise_dbm / 10)
@@ -203,7 +179,7 @@ def site_sinr_db(levels_dbm: Floats, noise_dbm: float) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class ArrivalModel:
-    """How a receiver measures times of arrival.
+    """Measurement of times of arrival by a receiver.
 
     Parameters
     ----------
@@ -225,10 +201,8 @@ class ArrivalModel:
 
     def __post_init__(self) -> None:
         faults = Faults()
-        for name in ("bandwidth_hz", "samples", "window_m"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                faults.add(f"arrival, {name}", "a number above 0", value)
+        above_0 = {"bandwidth_hz": self.bandwidth_hz, "samples": self.samples}
+        faults.check_positive("arrival, ", "a number", **above_0, window_m=self.window_m)
         if not (np.isfinite(self.floor_m) and self.floor_m >= 0):
             faults.add("arrival, floor_m", "metres >= 0", self.floor_m)
         if not faults.found and not 2 <= self.cells <= 30:
@@ -286,19 +260,8 @@ def detour_m(
     """Draw the excess of ways without line of sight: exponential, correlated along the way.
 
     Part of a detour is near the receiver and common to all stations; differences of times are free
-    of it.
-
-    Parameters
-    ----------
-    travelled_m : (K,) array_like
-    hidden : (K, S) array of bool
-        Where it is not 0.
-    shared : float
-        Correlation of the normal processes of any two stations, from which the excess is drawn.
-
-    Returns
-    -------
-    (K, S) array
+    of it. Where ``hidden``, of shape (K, S), is false it is 0; ``shared`` is the correlation of the
+    normal processes of any two stations, from which the excess is drawn.
     """
     drawn = sites_along(travelled_m, hidden.shape[1], correlation_m, shared, rng)
     return np.asarray(np.where(hidden, -mean_m * log_ndtr(-drawn), 0.0))

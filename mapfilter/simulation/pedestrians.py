@@ -1,4 +1,4 @@
-"""Pedestrians who follow a gas that diffuses from where they are going.
+"""Pedestrians who follow a gas that diffuses from their destination.
 
 A source at the target gives off gas, which spreads between the houses and decays; nothing passes a
 wall. A pedestrian walks up the gradient: by the shortest way in the large, on smooth curves in the
@@ -32,7 +32,7 @@ class GasGround:
     Parameters
     ----------
     free : (rows, cols) array of bool
-        Where one can walk; what its largest connected part does not hold is left out.
+        Open ground; what its largest connected part does not hold is left out.
     reach_m : float
         L.
 
@@ -48,8 +48,7 @@ class GasGround:
             faults.add("ground, free", f"shape ({lattice.rows}, {lattice.cols})", free.shape)
         elif not free.any():
             faults.add("ground, free", "open cells", "none")
-        if not (np.isfinite(reach_m) and reach_m > 0):
-            faults.add("ground, reach_m", "metres above 0", reach_m)
+        faults.check_positive("ground, ", "metres", reach_m=reach_m)
         faults.raise_if_any(InputError)
         parts, count = ndimage.label(free)
         largest = 1 + int(np.argmax(np.bincount(parts.ravel(), minlength=count + 1)[1:]))
@@ -60,12 +59,8 @@ class GasGround:
         number[self.free] = np.arange(len(self._cell))
         self._number = number
         below, right = self.free[:-1] & self.free[1:], self.free[:, :-1] & self.free[:, 1:]
-        pairs = np.hstack(
-            [
-                [number[:-1][below], number[1:][below]],
-                [number[:, :-1][right], number[:, 1:][right]],
-            ]
-        )
+        down = [number[:-1][below], number[1:][below]]
+        pairs = np.hstack([down, [number[:, :-1][right], number[:, 1:][right]]])
         size = len(self._cell)
         loss = np.bincount(pairs.ravel(), minlength=size) + (lattice.resolution_m / reach_m) ** 2
         row = np.concatenate([pairs[0], pairs[1], np.arange(size)])
@@ -88,9 +83,11 @@ class GasGround:
         InputError
             The target is not on open ground.
         """
-        row, col = self._cell_of(np.asarray(target_m, dtype=np.float64))
+        target = np.asarray(target_m, dtype=np.float64)
+        if not (np.isfinite(target).all() and self.is_free(target)):
+            raise fail(InputError, "target_m", "a place on open ground", target)
         source = np.zeros(len(self._cell))
-        source[self._number[row, col]] = 1.0
+        source[self._number[self.lattice.row_col(*target)]] = 1.0
         gas = np.zeros(self.free.shape)
         gas[self.free] = np.log(np.maximum(self._solver.solve(source), _TINY))
         gradient = np.zeros((*self.free.shape, 2))
@@ -123,22 +120,11 @@ class GasGround:
 
     def is_free(self, place_m: Floats) -> bool:
         """Return whether a place is on open ground."""
-        resolution = self.lattice.resolution_m
-        row = int(np.floor((self.lattice.north_m - place_m[1]) / resolution))
-        return self._is_free(row, int(np.floor((place_m[0] - self.lattice.west_m) / resolution)))
+        return self._is_free(*self.lattice.row_col(*place_m))
 
     def _is_free(self, row: int, col: int) -> bool:
         inside = 0 <= row < self.free.shape[0] and 0 <= col < self.free.shape[1]
         return inside and bool(self.free[row, col])
-
-    def _cell_of(self, place_m: Floats) -> tuple[int, int]:
-        if not (np.isfinite(place_m).all() and self.is_free(place_m)):
-            raise fail(InputError, "target_m", "a place on open ground", place_m)
-        resolution = self.lattice.resolution_m
-        return (
-            int(np.floor((self.lattice.north_m - place_m[1]) / resolution)),
-            int(np.floor((place_m[0] - self.lattice.west_m) / resolution)),
-        )
 
 
 def gas_walk(
@@ -150,15 +136,8 @@ def gas_walk(
 ) -> Floats:
     """Draw a walk from a random place to random targets, one after another.
 
-    Parameters
-    ----------
-    steps : int
-        Epochs; the first one is one interval after the start.
-
-    Returns
-    -------
-    (steps, 2) array
-        East and north.
+    Positions, of shape (steps, 2), are one interval apart; the first one is an interval after the
+    start.
 
     Raises
     ------
@@ -166,9 +145,8 @@ def gas_walk(
         A number is not above 0.
     """
     faults = Faults()
-    for name, value in (("steps", steps), ("speed_mps", speed_mps), ("interval_s", interval_s)):
-        if not (np.isfinite(value) and value > 0):
-            faults.add(f"gas walk, {name}", "a number above 0", value)
+    rates = {"speed_mps": speed_mps, "interval_s": interval_s}
+    faults.check_positive("gas walk, ", "a number", steps=steps, **rates)
     faults.raise_if_any(InputError)
     cell_m = ground.lattice.resolution_m
     pieces = max(1, int(np.ceil(speed_mps * interval_s / (0.5 * cell_m))))

@@ -1,4 +1,4 @@
-"""What a phone reports on its way: serving cell, neighbours without identity, quantised levels."""
+"""Simulated measurement reports: serving cell, neighbours without identity, quantised levels."""
 
 from __future__ import annotations
 
@@ -18,62 +18,8 @@ from mapfilter.options import NotNegative, Options, Positive
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.rxlev import quantise_level_dbm
 from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.simulation.journeys import ticks_s
 from mapfilter.tracks.schema import NEIGHBOUR, SERVING
-
-
-def running_mean_db(level_dbm: Floats, count: int) -> Floats:
-    """Return the mean, in dB, of the last ``count`` reports, or of as many as there are.
-
-    Parameters
-    ----------
-    level_dbm : ndarray, shape (N, cells)
-
-    Examples
-    --------
-    >>> running_mean_db(np.array([[-60.0], [-70.0], [-90.0]]), 2).ravel().tolist()
-    [-60.0, -65.0, -80.0]
-    """
-    total = level_dbm.copy()
-    for back in range(1, min(count, len(total))):
-        total[back:] += level_dbm[:-back]
-    return np.asarray(total / np.minimum(np.arange(len(total)) + 1, count)[:, np.newaxis])
-
-
-def serving_cells(mean_dbm: Floats, received: Bools, hysteresis_db: float) -> Ints:
-    """Return which cell serves at each report: handover with hysteresis.
-
-    A cell serves until the strongest received one is more than ``hysteresis_db`` above it, or until
-    it is not received any more; then the strongest takes over (the first of equals).
-
-    Parameters
-    ----------
-    mean_dbm : ndarray, shape (N, cells)
-    received : ndarray of bool, shape (N, cells)
-
-    Returns
-    -------
-    serving : ndarray of int64, shape (N,)
-        Column of the cell, or -1 when none is received.
-
-    Examples
-    --------
-    >>> mean_dbm = np.array([[-70.0, -80.0], [-80.0, -77.0], [-80.0, -75.0], [-80.0, -82.0]])
-    >>> serving_cells(mean_dbm, np.ones((4, 2), dtype=bool), 4.0).tolist()
-    [0, 0, 1, 1]
-    """
-    audible = np.where(received, mean_dbm, -np.inf)
-    serving = np.full(len(audible), -1, dtype=np.int64)
-    if not audible.size:
-        return serving
-    best = np.argmax(audible, axis=1)
-    now = -1
-    for i, strongest in enumerate(best):
-        lost = now < 0 or not received[i, now]
-        if lost or audible[i, strongest] > audible[i, now] + hysteresis_db:
-            now = int(strongest) if received[i, strongest] else -1
-        serving[i] = now
-    return serving
-
 
 Levels = Callable[[Floats, Floats], NDArray[np.floating]]
 """From east and north (m), shape (N,), to levels (dBm), shape (N, cells); NaN: not received."""
@@ -150,7 +96,7 @@ def reports(
     levels : callable
         From positions to levels, one column for each cell in the plan's order.
     plan : CellPlan
-        Tells the carriers and BSICs by which neighbours are known.
+        Gives the carriers and BSICs that neighbours are reported by.
     rng : numpy.random.Generator
         The draws do not depend on ``model``.
 
@@ -171,13 +117,13 @@ def reports(
     if truth.empty:
         raise fail(InputError, "truth", "at least one row", "none")
     time, east, north = (truth[name].to_numpy() for name in ("time_s", "east_m", "north_m"))
-    # A whole number of periods must not lose the last report to rounding.
-    count = int(np.floor((time[-1] - time[0]) / model.report_period_s + 1e-9)) + 1
-    if count * len(plan) > _MOST_LEVELS:
+    most = (time[-1] - time[0]) / model.report_period_s + 1
+    if most * len(plan) > _MOST_LEVELS:
         expected = f"at most {_MOST_LEVELS:.0e} levels per journey"
-        got = f"{count} reports of {len(plan)} cells"
+        got = f"{most:.0f} reports of {len(plan)} cells"
         raise fail(ConfigError, "ReportModel, report_period_s", expected, got, "a wrong unit")
-    tick_s = time[0] + np.arange(count) * model.report_period_s
+    tick_s = ticks_s(time, model.report_period_s)
+    count = len(tick_s)
     there = np.interp(tick_s, time, east), np.interp(tick_s, time, north)
     level = np.asarray(levels(*there), dtype=np.float64)
     if level.shape != (count, len(plan)):
@@ -194,8 +140,69 @@ def reports(
         serving = serving_cells(mean, np.isfinite(received), model.hysteresis_db)
     else:
         serving = np.where(np.isfinite(received).any(axis=1), np.argmax(received, axis=1), -1)
-    rank = _ranked(received, serving, _shared_carriers(plan), model.max_neighbours)
-    return _table(tick_s, level, rank, plan, model.quantise)
+    rank = _ranked(received, serving, plan, model.max_neighbours)
+    report, place = np.nonzero(rank >= 0)
+    cell = rank[report, place]
+    reported, censored = level[report, cell], np.zeros(len(cell), dtype=np.int8)
+    if model.quantise:
+        reported, censored = quantise_level_dbm(reported)
+    ids = np.array([*plan.ids, None], dtype=object)
+    arfcn = pd.array([c.arfcn for c in plan.cells], dtype="Int64")
+    bsic = pd.array([c.bsic for c in plan.cells], dtype="Int64")
+    return pd.DataFrame(
+        {
+            "time_s": tick_s[report],
+            "role": np.where(place == 0, SERVING, NEIGHBOUR),
+            "cell": pd.Series(ids[np.where(place == 0, cell, -1)], dtype=object),
+            "arfcn": arfcn[cell],
+            "bsic": bsic[cell],
+            "level_dbm": reported,
+            "censored": censored,
+            "timing_advance": pd.array([None] * len(cell), dtype="Int64"),
+        }
+    )
+
+
+def running_mean_db(level_dbm: Floats, count: int) -> Floats:
+    """Return the mean, in dB, of the last ``count`` of N reports, shape (N, cells).
+
+    Examples
+    --------
+    >>> running_mean_db(np.array([[-60.0], [-70.0], [-90.0]]), 2).ravel().tolist()
+    [-60.0, -65.0, -80.0]
+    """
+    total = level_dbm.copy()
+    for back in range(1, min(count, len(total))):
+        total[back:] += level_dbm[:-back]
+    return np.asarray(total / np.minimum(np.arange(len(total)) + 1, count)[:, np.newaxis])
+
+
+def serving_cells(mean_dbm: Floats, received: Bools, hysteresis_db: float) -> Ints:
+    """Return which cell serves at each report: handover with hysteresis.
+
+    A cell serves until the strongest received one is more than ``hysteresis_db`` above it, or until
+    it is not received any more; then the strongest takes over (the first of equals). Means and
+    received are of shape (N, cells); of each report, the column of the cell is returned, or -1
+    when none is received.
+
+    Examples
+    --------
+    >>> mean_dbm = np.array([[-70.0, -80.0], [-80.0, -77.0], [-80.0, -75.0], [-80.0, -82.0]])
+    >>> serving_cells(mean_dbm, np.ones((4, 2), dtype=bool), 4.0).tolist()
+    [0, 0, 1, 1]
+    """
+    audible = np.where(received, mean_dbm, -np.inf)
+    serving = np.full(len(audible), -1, dtype=np.int64)
+    if not audible.size:
+        return serving
+    best = np.argmax(audible, axis=1)
+    now = -1
+    for i, strongest in enumerate(best):
+        lost = now < 0 or not received[i, now]
+        if lost or audible[i, strongest] > audible[i, now] + hysteresis_db:
+            now = int(strongest) if received[i, strongest] else -1
+        serving[i] = now
+    return serving
 
 
 def level_sampler(
@@ -261,30 +268,20 @@ def _window(
     top, left = max(top, 0), max(left, 0)
     bottom, right = min(bottom, lattice.rows - 1), min(right, lattice.cols - 1)
     if bottom < top or right < left:
-        raise fail(
-            InputError, where, f"rasters over {bounds_m}", f"rasters over {lattice.bounds_m}"
-        )
+        got = f"rasters over {lattice.bounds_m}"
+        raise fail(InputError, where, f"rasters over {bounds_m}", got)
     return top, left, bottom - top + 1, right - left + 1
 
 
-def _shared_carriers(plan: CellPlan) -> list[Ints]:
-    shared = (ids for ids in plan.ids_by_carrier.values() if len(ids) > 1)
-    return [np.array([plan.index(cell_id) for cell_id in ids]) for ids in shared]
-
-
-def _ranked(
-    received_dbm: Floats,
-    serving: Ints,
-    shared: list[Ints],
-    max_neighbours: int,
-) -> Ints:
+def _ranked(received_dbm: Floats, serving: Ints, plan: CellPlan, max_neighbours: int) -> Ints:
     """Return the cells of each report, shape (N, 1 + neighbours), -1 where there is none."""
     report = np.arange(len(serving))
     served = serving >= 0
     others = received_dbm.copy()
     # The serving cell drowns those of its own carrier and BSIC.
     others[report[served], serving[served]] = np.inf
-    for group in shared:
+    for ids in (ids for ids in plan.ids_by_carrier.values() if len(ids) > 1):
+        group = np.array([plan.index(cell_id) for cell_id in ids])
         strongest = group[np.argmax(others[:, group], axis=1)]
         kept = others[report, strongest]
         others[:, group] = -np.inf
@@ -294,28 +291,3 @@ def _ranked(
     audible = np.isfinite(np.take_along_axis(others, neighbours, axis=1))
     neighbours = np.where(audible & served[:, np.newaxis], neighbours, -1)
     return np.column_stack([serving, neighbours])
-
-
-def _table(
-    tick_s: Floats, level_dbm: Floats, rank: Ints, plan: CellPlan, quantise: bool
-) -> pd.DataFrame:
-    report, place = np.nonzero(rank >= 0)
-    cell = rank[report, place]
-    reported, censored = level_dbm[report, cell], np.zeros(len(cell), dtype=np.int8)
-    if quantise:
-        reported, censored = quantise_level_dbm(reported)
-    ids = np.array([*plan.ids, None], dtype=object)
-    arfcn = pd.array([c.arfcn for c in plan.cells], dtype="Int64")
-    bsic = pd.array([c.bsic for c in plan.cells], dtype="Int64")
-    return pd.DataFrame(
-        {
-            "time_s": tick_s[report],
-            "role": np.where(place == 0, SERVING, NEIGHBOUR),
-            "cell": pd.Series(ids[np.where(place == 0, cell, -1)], dtype=object),
-            "arfcn": arfcn[cell],
-            "bsic": bsic[cell],
-            "level_dbm": reported,
-            "censored": censored,
-            "timing_advance": pd.array([None] * len(cell), dtype="Int64"),
-        }
-    )

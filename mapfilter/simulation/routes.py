@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from mapfilter._types import Bools, Floats, Ints, Ints32
+from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import InputError, fail
 from mapfilter.roads.network import StreetNetwork
 
@@ -142,10 +142,12 @@ def _leg(
     ):
         length, before = dijkstra(graph, indices=here, return_predecessors=True)
         goals = np.flatnonzero(np.isfinite(length) & (length > 0) & wanted)
-        if goals.size and wanted is not anywhere:
-            return _path(before, here, int(rng.choice(goals)))
         if goals.size:
-            return _path(before, here, int(goals[np.argmax(length[goals])]))
+            at_random = wanted is not anywhere
+            nodes = [int(rng.choice(goals) if at_random else goals[np.argmax(length[goals])])]
+            while (node := int(before[nodes[-1]])) != here:
+                nodes.append(node)
+            return nodes[::-1]
     return None
 
 
@@ -171,17 +173,16 @@ def _without_edge(graph: csr_array, start: int, end: int) -> csr_array:
     return csr_array((lengths, graph.indices, graph.indptr), shape=graph.shape)
 
 
-def _path(before: Ints32, start: int, goal: int) -> list[int]:
-    nodes = [goal]
-    while (node := int(before[nodes[-1]])) != start:
-        nodes.append(node)
-    return nodes[::-1]
-
-
 def _cut(network: StreetNetwork, nodes: list[int], length_m: float) -> Route:
     """Turn nodes into a route and end it at the length."""
     east, north = network.east_m[nodes], network.north_m[nodes]
-    edge = _edges(network, np.asarray(nodes, dtype=np.int64))
+    # The shortest edge between each two successive nodes.
+    size, at = network.east_m.size, np.asarray(nodes, dtype=np.int64)
+    low = np.minimum(network.node_a, network.node_b).astype(np.int64)
+    key = low * size + np.maximum(network.node_a, network.node_b)
+    order = np.lexsort((network.length_m, key))
+    wanted = np.minimum(at[:-1], at[1:]) * size + np.maximum(at[:-1], at[1:])
+    edge = order[np.searchsorted(key[order], wanted)]
     along = np.concatenate([[0.0], np.cumsum(_lengths(east, north))])
     corners = int(np.searchsorted(along, length_m, side="left"))
     return Route(
@@ -195,14 +196,3 @@ def _cut(network: StreetNetwork, nodes: list[int], length_m: float) -> Route:
 
 def _lengths(east_m: Floats, north_m: Floats) -> Floats:
     return np.hypot(np.diff(east_m), np.diff(north_m))
-
-
-def _edges(network: StreetNetwork, nodes: Ints) -> Ints:
-    """Return the shortest edge between each two successive nodes."""
-    size = network.east_m.size
-    low = np.minimum(network.node_a, network.node_b).astype(np.int64)
-    high = np.maximum(network.node_a, network.node_b).astype(np.int64)
-    key = low * size + high
-    order = np.lexsort((network.length_m, key))
-    wanted = np.minimum(nodes[:-1], nodes[1:]) * size + np.maximum(nodes[:-1], nodes[1:])
-    return order[np.searchsorted(key[order], wanted)]

@@ -3,13 +3,6 @@
 Satellites are seen past the buildings by geometry. A pseudorange is the distance, the receiver's
 clock, noise that grows towards the horizon, and echoes, which only make it longer and last for
 metres. Hidden satellites may be received by reflections. A spoofer may put a receiver elsewhere.
-
-A single reflection at a wall on the other side of the street is later by twice the distance to the
-wall times the cosine of the elevation, never earlier (Hsu 2018, *Analysis and modeling GPS NLOS
-effect in highly urbanized area*, GPS Solutions 22:7). Delays by ray tracing in streets follow
-gamma distributions whose shape falls with the depth of the street (Ollander, Bode & Baum 2020,
-*Simulation-based analysis of multipath delay distributions in urban canyons*, ENC); here the shape
-is one, the exponential distribution.
 """
 
 from __future__ import annotations
@@ -30,7 +23,9 @@ from mapfilter.gnss.orbits import Almanac, gps_time, satellite_positions_m
 from mapfilter.gnss.sky import Directions, GridFrame, Skyline, directions, ecef_from_lonlat
 from mapfilter.models.motion import clock_noise
 from mapfilter.options import NotNegative, Options, Positive, Share
+from mapfilter.simulation.journeys import ticks_s
 from mapfilter.tracks.satellites import sent_from_m
+from mapfilter.tracks.schema import PLACE
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,38 +78,21 @@ class NlosModel(Options):
         return np.asarray(self.share * np.clip(ramp, 0.0, 1.0))
 
 
-@dataclass(frozen=True, slots=True)
-class Reflections:
-    """What of K epochs and S satellites would be received by reflections, were they hidden.
-
-    Parameters
-    ----------
-    received : (K, S) array of bool
-    delay_m : (K, S) array
-    """
-
-    received: Bools
-    delay_m: Floats
-
-
 def draw_reflections(
     model: NlosModel, travelled_m: Floats, elevation_rad: Floats, rng: np.random.Generator
-) -> Reflections:
-    """Draw reflections along a path; neither depends on where satellites are hidden.
+) -> tuple[Bools, Floats]:
+    """Draw which satellites would be received by reflections, were they hidden, and the delays (m).
 
-    Parameters
-    ----------
-    travelled_m : (K,) array
-        Distance travelled at each epoch, never decreasing.
-    elevation_rad : (K, S) array
+    Neither depends on where satellites are hidden. ``travelled_m`` of shape (K,) never decreases;
+    ``elevation_rad`` and both results have the shape (K, S).
     """
     satellites = elevation_rad.shape[1]
     level = held_along(travelled_m, satellites, model.memory_m, rng)
     excess = multipath_bias_m(
         travelled_m, satellites, rng, mean_m=1.0, correlation_m=model.delay_memory_m
     )
-    delay_m = model.delay_m * np.cos(elevation_rad) * excess
-    return Reflections(level < model.probability(elevation_rad), delay_m)
+    received = level < model.probability(elevation_rad)
+    return received, model.delay_m * np.cos(elevation_rad) * excess
 
 
 def held_along(
@@ -122,19 +100,9 @@ def held_along(
 ) -> Floats:
     """Draw uniform numbers that hold for exponentially distributed distances along a path.
 
-    Two numbers at a distance d are the same with probability ``exp(-d / memory_m)``, else
-    independent.
-
-    Parameters
-    ----------
-    travelled_m : (K,) array_like
-        Distance travelled at each epoch, never decreasing.
-    columns : int
-        Independent processes.
-
-    Returns
-    -------
-    (K, columns) array
+    Two numbers of a column at a distance d are the same with probability ``exp(-d / memory_m)``,
+    else independent; so are the columns. ``travelled_m`` of shape (K,) never decreases; the result
+    has the shape (K, columns).
     """
     travelled = np.asarray(travelled_m, dtype=np.float64)
     drawn = rng.random((travelled.size, columns))
@@ -146,7 +114,7 @@ def held_along(
 
 @dataclass(frozen=True, slots=True)
 class ReceptionModel(Options):
-    """How a receiver hears satellites.
+    """Reception of satellites by a simulated receiver.
 
     Parameters
     ----------
@@ -250,8 +218,8 @@ def receive(
     if truth.empty:
         raise fail(InputError, "truth", "at least one row", "none")
     time, east, north = (truth[name].to_numpy() for name in ("time_s", "east_m", "north_m"))
-    count = int(np.floor((time[-1] - time[0]) / model.period_s + 1e-9)) + 1
-    tick_s = time[0] + np.arange(count) * model.period_s
+    tick_s = ticks_s(time, model.period_s)
+    count = len(tick_s)
     place = np.stack([np.interp(tick_s, time, axis) for axis in (east, north)], axis=1)
     gone_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(place, axis=0).T))])
     relief = correlated_along(gone_m, 1, model.relief_memory_m, rng)[:, 0]
@@ -265,16 +233,14 @@ def receive(
     hour = max(int(3600 / model.period_s), 1)
     usable = _over_horizon(almanac.usable(), week, tow_s[count // 2 % hour :: hour], frame, model)
     clock_m = _clock_m(count, model, rng)
-    white = rng.standard_normal((count, len(usable.names)))
-    echo = multipath_bias_m(
-        gone_m, len(usable.names), rng, mean_m=1.0, correlation_m=model.echo_memory_m
-    )
-    slots = int(tick_s[-1] // model.hold_s) - int(tick_s[0] // model.hold_s) + 1
-    order = rng.random((slots, len(usable.names)))
+    every = range(len(usable.names))
+    white = rng.standard_normal((count, len(every)))
+    memory_m = model.echo_memory_m
+    echo = multipath_bias_m(gone_m, len(every), rng, mean_m=1.0, correlation_m=memory_m)
+    slot = (tick_s // model.hold_s - tick_s[0] // model.hold_s).astype(int)
+    order = rng.random((int(slot[-1]) + 1, len(every)))
     there = _ecef(crs, place, up_m)
-    satellites = np.stack(
-        [_places(usable, index, week, tow_s, there) for index in range(len(usable.names))], axis=1
-    )
+    satellites = np.stack([_places(usable, i, week, tow_s, there) for i in every], axis=1)
     seen = directions(frame.local.to_local(satellites), frame.local.to_local(there)[:, None])
     open_sky, echo_m = _sky(seen, place, skyline, frame, model)
     range_m = np.linalg.norm(satellites - there[:, None], axis=2)
@@ -283,11 +249,11 @@ def receive(
     audible = open_sky
     if model.nlos is not None:
         # Drawn last: nothing else changes.
-        mirrored = draw_reflections(model.nlos, gone_m, seen.elevation_rad, rng)
+        mirrored, delay_m = draw_reflections(model.nlos, gone_m, seen.elevation_rad, rng)
         hidden = seen.above(model.mask_deg) & ~open_sky & open_sky.any(axis=1, keepdims=True)
-        late_m = model.nlos.noise_factor * sigma_m * white + mirrored.delay_m
+        late_m = model.nlos.noise_factor * sigma_m * white + delay_m
         measured_m = np.where(hidden, range_m + clock_m[:, None] + late_m, measured_m)
-        audible = open_sky | (hidden & mirrored.received)
+        audible = open_sky | (hidden & mirrored)
     if spoofer is not None:
         shift = np.array([spoofer.east_m, spoofer.north_m])
         elsewhere = _ecef(crs, place + shift, up_m)
@@ -295,20 +261,14 @@ def receive(
         on = (tick_s >= spoofer.from_s) & (tick_s < spoofer.from_s + spoofer.lasts_s)
         false_m = false_m + (clock_m + spoofer.clock_m)[:, None] + sigma_m * white
         measured_m = np.where(on[:, None], false_m, measured_m)
-    if model.choice == "highest":
-        prefer = seen.elevation_rad
-    else:
-        prefer = order[(tick_s // model.hold_s - tick_s[0] // model.hold_s).astype(int)]
-    received = _received(audible, prefer, model.most)
-    row, column = np.nonzero(received)
+    prefer = seen.elevation_rad if model.choice == "highest" else order[slot]
+    row, column = np.nonzero(_received(audible, prefer, model.most))
     return pd.DataFrame(
         {
             "time_s": tick_s[row],
             "satellite": np.array(usable.names, dtype=object)[column],
             "pseudorange_m": measured_m[row, column],
-            "x_m": satellites[row, column, 0],
-            "y_m": satellites[row, column, 1],
-            "z_m": satellites[row, column, 2],
+            **dict(zip(PLACE, satellites[row, column].T, strict=True)),
         }
     )
 
@@ -353,7 +313,7 @@ def _sky(
     frame: GridFrame,
     model: ReceptionModel,
 ) -> tuple[Bools, Floats]:
-    """Return who is seen at each epoch, (K, S), and how large echoes are, (K,)."""
+    """Return which satellites are in sight at each epoch, (K, S), and the mean of echoes, (K,)."""
     above = seen.above(model.mask_deg)
     if skyline is None:
         return above, np.zeros(len(place))

@@ -1,4 +1,4 @@
-"""Whole journeys: a route, its truth, what the inertial unit and the phone report."""
+"""Whole journeys: a route, its ground truth, and logs of the inertial unit and the phone."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.network import StreetNetwork
 from mapfilter.simulation.imu import ImuNoise, noisy_motion
-from mapfilter.simulation.journeys import JourneyPlan, journey
+from mapfilter.simulation.journeys import JourneyPlan, journey, ticks_s
 from mapfilter.simulation.reports import Levels, ReportModel, level_sampler, reports
 from mapfilter.simulation.routes import route
 from mapfilter.simulation.walking import Inside
@@ -26,7 +26,7 @@ _MOST_TICKS = 10_000_000
 
 @dataclass(frozen=True, slots=True)
 class SimulationSettings:
-    """Which journeys are made, and how they are sensed.
+    """Number, motion and sensors of simulated journeys.
 
     Parameters
     ----------
@@ -54,9 +54,6 @@ class SimulationSettings:
         for name in ("journeys", "draws"):
             if getattr(self, name) < 1:
                 raise fail(ConfigError, f"journeys, {name}", "at least 1", getattr(self, name))
-        self._check_ticks()
-
-    def _check_ticks(self) -> None:
         journey, faults = self.journey, Faults()
         # Drivers are sampled at every metre.
         speed_mps = journey.speed_mps if journey.profile == "walking" else 1.0
@@ -67,12 +64,9 @@ class SimulationSettings:
         ):
             ticks = journey.length_m / speed_mps / period_s
             if ticks > _MOST_TICKS:
-                got = (
-                    f"{ticks:.1e}: {journey.length_m:g} m at {speed_mps:g} m/s every {period_s:g} s"
-                )
-                faults.add(
-                    name, f"at most {_MOST_TICKS:.0e} times per journey", got, "a wrong unit"
-                )
+                expected = f"at most {_MOST_TICKS:.0e} times per journey"
+                got = f"{ticks:.1e}: {journey.length_m:g} m at {speed_mps:g} m/s every"
+                faults.add(name, expected, f"{got} {period_s:g} s", "a wrong unit")
         faults.raise_if_any(ConfigError)
 
 
@@ -91,7 +85,6 @@ def simulate_journeys(
 
     Parameters
     ----------
-    network : StreetNetwork
     levels : RxLevRasters or callable
         The true levels: rasters, or a function from positions to levels in the plan's order, as
         :func:`mapfilter.simulation.reports.level_sampler` returns it.
@@ -153,11 +146,9 @@ def simulate_log(
 
 
 def at_ticks(truth: pd.DataFrame, period_s: float) -> pd.DataFrame:
-    """Return where one was at the unit's ticks, from the start on."""
+    """Return the true positions at the unit's ticks, from the start on."""
     time_s = truth["time_s"].to_numpy()
-    # A whole number of periods must not lose the last tick to rounding.
-    count = int(np.floor((time_s[-1] - time_s[0]) / period_s + 1e-9)) + 1
-    tick_s = time_s[0] + np.arange(count) * period_s
+    tick_s = ticks_s(time_s, period_s)
     there = {name: np.interp(tick_s, time_s, truth[name]) for name in ("east_m", "north_m")}
     return pd.DataFrame({"time_s": tick_s, **there})
 

@@ -1,11 +1,9 @@
-"""Made cities: streets, squares, houses and a river of an invented place, of any size.
-
-No real map is needed, no place is real, and everything follows from a seed.
-"""
+"""Synthetic cities of any size: streets, squares, houses and a river, all drawn from a seed."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import shapely
@@ -25,13 +23,15 @@ from mapfilter.roads.ways import (
     Ways,
     polygons_inside,
 )
-from mapfilter.simulation.city_buildings import houses, inner_ways, used_blocks
-from mapfilter.simulation.city_network import (
+from mapfilter.simulation.city_blocks import (
+    Pieces,
     blocks_of,
     clear_of_streets,
     connected,
-    drawn,
+    houses,
+    inner_ways,
     noded,
+    uses_of,
     ways_of,
     with_lines,
     without_small_blocks,
@@ -39,8 +39,7 @@ from mapfilter.simulation.city_network import (
 )
 from mapfilter.simulation.city_streets import PARK, bend, quarters, skeleton, streets
 
-LEAST_SIZE_M = 200.0
-LARGEST_SIZE_M = 50_000.0
+_SIZES_M = (200.0, 50_000.0)
 _RIVER_FROM_M = 800.0
 _CORNER_EVERY_M = 20.0
 _EDGE_M = 60.0
@@ -49,14 +48,12 @@ _CHURCH_M = (13.0, 30.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SyntheticCity:
-    """An invented city.
+    """An invented city within ``bounds_m``: west, south, east, north.
 
     Parameters
     ----------
-    bounds_m : tuple of float
-        West, south, east, north.
     ways : Ways
-        All that one may walk along; one connected network.
+        All walkable ways; one connected network.
     water : Water
         The river; empty without one.
     parks : numpy.ndarray of shapely.Polygon
@@ -72,7 +69,7 @@ class SyntheticCity:
 
     @property
     def driving_ways(self) -> Ways:
-        """The ways that one may drive along."""
+        """The ways that are open to cars."""
         names = self.ways.class_names
         drivable = np.array([name in DRIVING_CLASSES for name in names], dtype=np.bool_)
         return self.ways.select(drivable[self.ways.way_class])
@@ -115,48 +112,46 @@ def synthetic_city(lattice: Lattice, seed: int, *, river: bool = True) -> Synthe
     west, south, east, north = lattice.bounds_m
     half_m = np.array([east - west, north - south]) / 2
     off_m = np.round(half_m * rng.uniform(-0.12, 0.12, 2))
-    east_m, north_m = np.array([west + east, south + north]) / 2 + off_m
+    centre_m = np.array([west + east, south + north]) / 2 + off_m
     area = (*(-half_m - off_m), *(half_m - off_m))
     # Bending moves the edge of what is laid out, which is therefore wider than the area.
     box = (*(-half_m - off_m - _EDGE_M), *(half_m - off_m + _EDGE_M))
     plan = skeleton(box, river and 2 * half_m.min() >= _RIVER_FROM_M, rng)
     parts, roads = quarters(plan, box, rng)
-    lines = [*plan.lines, *roads, *(line for part in parts for line in streets(part, rng))]
+    roads = [*plan.roads, *roads, *(line for part in parts for line in streets(part, rng))]
     phases = rng.uniform(0, 2 * np.pi, (2, 3))
 
-    def bent(shapes: Geometries) -> Geometries:
+    def bent(shapes: Any) -> Any:
         many = shapely.segmentize(shapes, _CORNER_EVERY_M)
-        return np.asarray(shapely.transform(many, lambda at: bend(at, plan.old_town_m, phases)))
+        return shapely.transform(many, lambda at: bend(at, plan.old_town_m, phases))
+
+    def placed(shapes: Any) -> Geometries:
+        moved = shapely.transform(np.asarray(shapes, object), lambda at: at + centre_m)
+        return np.asarray(moved)
 
     # Cut at junctions before bending, or ends would no longer lie on the streets that they meet.
-    pieces = noded(drawn(lines))
-    inside = shapely.clip_by_rect(bent(pieces.geometry), *area)
-    pieces = noded(replace(pieces, geometry=inside))
+    pieces = noded(Pieces.of(roads))
+    pieces = noded(replace(pieces, geometry=shapely.clip_by_rect(bent(pieces.geometry), *area)))
     pieces = connected(without_stubs(without_small_blocks(pieces), area))
     blocks = blocks_of(pieces, shapely.box(*area).exterior)
-    river_now, banks = bent(plan.river), bent(plan.banks)
-    dry = ~shapely.contains(shapely.union_all(banks), shapely.point_on_surface(blocks))
-    outlines = bent(np.array([part.outline for part in parts], dtype=object))
-    used = used_blocks(blocks[dry], outlines, np.array([part.style for part in parts]), rng)
-    pieces = connected(with_lines(pieces, drawn(inner_ways(used, rng))))
-    clear = clear_of_streets(used.outline, pieces)
-    footprints, height_m = houses(clear[~used.is_square], used.style[~used.is_square], rng)
-    churches, tower_m = _churches(clear[used.is_square], rng)
-    ways = ways_of(pieces, lattice.crs, east_m, north_m)
-
-    def placed(shapes: Geometries) -> Geometries:
-        return np.asarray(shapely.transform(shapes, lambda at: at + np.array([east_m, north_m])))
-
-    squares = placed(used.outline[used.is_square])
+    blocks = blocks[~shapely.contains(bent(plan.banks), shapely.point_on_surface(blocks))]
+    outlines, styles = zip(*parts, strict=True)
+    style, is_square = uses_of(blocks, bent(np.array(outlines)), np.array(styles), rng)
+    pieces = connected(with_lines(pieces, Pieces.of(inner_ways(blocks, style, is_square, rng))))
+    clear = clear_of_streets(blocks, pieces)
+    footprints, height_m = houses(clear[~is_square], style[~is_square], rng)
+    churches, tower_m = _churches(clear[is_square], rng)
+    ways = ways_of(pieces, lattice.crs, centre_m)
+    squares = placed(blocks[is_square])
     built = placed(np.concatenate([footprints, churches]))
-    water, _ = polygons_inside(placed(river_now), lattice.bounds_m, cut=True)
+    water, _ = polygons_inside(placed([bent(plan.river)]), lattice.bounds_m, cut=True)
     return SyntheticCity(
         lattice.bounds_m,
         ways,
         Squares(lattice.crs, int(ways.way_id.max()) + 1 + np.arange(len(squares)), squares),
         Buildings(lattice.crs, built, np.concatenate([height_m, tower_m]), len(built), 0, 0),
         Water(lattice.crs, water),
-        placed(used.outline[used.style == PARK]),
+        placed(blocks[style == PARK]),
     )
 
 
@@ -175,12 +170,10 @@ def manhattan(
     ----------
     lattice : Lattice
         The area; the first streets to the east and north run along its western and southern edge.
-    block_m : float
-        Side of a block, which is one house.
+    block_m, height_m : float
+        Side and height of a block, which is one house.
     street_m : tuple of float
         Width of the streets that run east-west, and of those that run north-south.
-    height_m : float
-        Of all houses.
 
     Raises
     ------
@@ -200,16 +193,15 @@ def manhattan(
     lines = [LineString([(at, north), (at, south)]) for at in columns]
     lines += [LineString([(west, at), (east, at)]) for at in rows]
     names = ["secondary"] * len(columns) + ["residential"] * len(rows)
-    pieces = noded(drawn(list(zip(lines, names, strict=True))))
-    corner_east, corner_north = (
-        at.ravel() for at in np.meshgrid(columns + street_m[1] / 2, rows + street_m[0] / 2)
-    )
-    blocks = shapely.box(corner_east, corner_north, corner_east + block_m, corner_north + block_m)
+    pieces = noded(Pieces.of(list(zip(lines, names, strict=True))))
+    at = np.meshgrid(columns + street_m[1] / 2, rows + street_m[0] / 2)
+    corner_m = [axis.ravel() for axis in at]
+    blocks = shapely.box(*corner_m, *(axis + block_m for axis in corner_m))
     blocks, _ = polygons_inside(blocks, lattice.bounds_m, cut=True)
     none = np.empty(0, dtype=object)
     return SyntheticCity(
         lattice.bounds_m,
-        ways_of(pieces, lattice.crs, 0.0, 0.0),
+        ways_of(pieces, lattice.crs, np.zeros(2)),
         Squares(lattice.crs, np.empty(0, dtype=np.int64), none),
         Buildings(lattice.crs, blocks, np.full(len(blocks), height_m), len(blocks), 0, 0),
         Water(lattice.crs, none),
@@ -234,11 +226,11 @@ def _check(lattice: Lattice, seed: int, *lengths_m: float) -> None:
     faults = Faults()
     west, south, east, north = lattice.bounds_m
     size_m = east - west, north - south
-    if not (min(size_m) >= LEAST_SIZE_M and max(size_m) <= LARGEST_SIZE_M):
-        expected = f"sides of {LEAST_SIZE_M:g} to {LARGEST_SIZE_M:g} m"
-        faults.add("made city, size_m", expected, f"{size_m[0]:g} x {size_m[1]:g} m")
+    if not (min(size_m) >= _SIZES_M[0] and max(size_m) <= _SIZES_M[1]):
+        expected = f"sides of {_SIZES_M[0]:g} to {_SIZES_M[1]:g} m"
+        faults.add("synthetic city, size_m", expected, f"{size_m[0]:g} x {size_m[1]:g} m")
     if seed < 0:
-        faults.add("made city, seed", "a number >= 0", seed)
+        faults.add("synthetic city, seed", "a number >= 0", seed)
     if not all(np.isfinite(length) and length > 0 for length in lengths_m):
-        faults.add("made city, lengths", "metres > 0", lengths_m)
+        faults.add("synthetic city, lengths", "metres > 0", lengths_m)
     faults.raise_if_any(ConfigError)

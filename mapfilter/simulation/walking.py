@@ -1,11 +1,11 @@
-"""Walkers as they are: beside the centre line of their way, and standing now and then."""
+"""Walkers beside the centre line of their way, who stop now and then."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from annotated_types import Ge, Le
@@ -47,13 +47,12 @@ _SMOOTHED_M = 4.0
 _PARTS = (0.25, 0.5, 0.75, 1.0)
 _CLEARANCE_PX = 7
 
-
 Beside = Annotated[float, Ge(0), Le(50)]
 
 
 @dataclass(frozen=True, slots=True)
 class WalkerModel(Options):
-    """How a walker differs from a point that moves along centre lines at constant speed.
+    """Differences of a walker from a point that moves along centre lines at constant speed.
 
     Parameters
     ----------
@@ -84,7 +83,7 @@ class WalkerModel(Options):
         return self.beside in ("centre", 0)
 
     def offsets_m(self, along: Route) -> Floats:
-        """Return how far from the centre line one walks on each segment of a route."""
+        """Return the distance from the centre line on each segment of a route."""
         if isinstance(self.beside, str):
             by_class = [PAVEMENT_M.get(name, _OTHER_PAVEMENT_M) for name in along.class_names]
             width_m = np.array(by_class)[along.way_class]
@@ -92,18 +91,8 @@ class WalkerModel(Options):
         return np.full(len(along.way_class), float(self.beside))
 
 
-@dataclass(frozen=True, eq=False)
-class WalkedPath:
-    """Where a walker goes, by metres along the route.
-
-    Parameters
-    ----------
-    distance_m : (K,) array
-        Along the centre lines.
-    walked_m : (K,) array
-        Along the path itself.
-    east_m, north_m : (K,) arrays
-    """
+class WalkedPath(NamedTuple):
+    """A walker's path: distance along the route and along the path itself, and position."""
 
     distance_m: Floats
     walked_m: Floats
@@ -121,8 +110,8 @@ def path_beside(
 
     The distance from the centre line follows the class of way and changes its sign where the
     street is crossed, both over about ten metres; corners are cut by as much. Where a building
-    stands on the pavement, one walks closer to the centre line. A walker on the centre line cuts no
-    corners.
+    stands on the pavement, the path is closer to the centre line. A walker on the centre line cuts
+    no corners.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How the level of one cell depends on the place: a trend and residuals about it.
+"""Model of the level of one cell by position: a trend and residuals about it.
 
 A trend is ``offset + slope * covariate``: the covariate is the loss over distance, a prediction, or
 nothing. It is fitted by generalised least squares, because neighbouring levels err together, with
@@ -65,15 +65,18 @@ class Trend:
 
     def design(self, east_m: Floats, north_m: Floats) -> Floats:
         """Return the factors of offset and slope at places, shape (N, 2)."""
-        if self.covariate is None:
-            return np.column_stack([np.ones_like(east_m), np.zeros_like(east_m)])
-        return np.column_stack(
-            [np.ones_like(east_m), self.covariate(east_m, north_m) - self.centre]
-        )
+        values = np.zeros_like(east_m)
+        if self.covariate is not None:
+            values = self.covariate(east_m, north_m) - self.centre
+        return np.column_stack([np.ones_like(east_m), values])
 
     def level_dbm(self, east_m: Floats, north_m: Floats) -> Floats:
         """Return the trend's level at places."""
-        return np.asarray(self.design(east_m, north_m) @ np.array([self.offset_dbm, self.slope]))
+        return np.asarray(self.design(east_m, north_m) @ [self.offset_dbm, self.slope])
+
+    def variance_db2(self, design: Floats) -> Floats:
+        """Return the variance that offset and slope bring to rows of their factors."""
+        return np.asarray(np.einsum("ni,ij,nj->n", design, self.covariance, design))
 
 
 @dataclass(frozen=True)
@@ -241,10 +244,9 @@ class GaussianField:
             places = np.column_stack([east_m[some], north_m[some]])
             found, own = self._process.predict(places, return_std=True)
             design = self._trend.design(east_m[some], north_m[some])
-            unexplained = design - found[:, 1:]
-            spread = np.einsum("ni,ij,nj->n", unexplained, self._trend.covariance, unexplained)
             mean_dbm[some] = design @ [self._trend.offset_dbm, self._trend.slope] + found[:, 0]
-            deviation_db[some] = np.sqrt(own[:, 0] ** 2 + spread)
+            unexplained_db2 = self._trend.variance_db2(design - found[:, 1:])
+            deviation_db[some] = np.sqrt(own[:, 0] ** 2 + unexplained_db2)
         return mean_dbm, deviation_db
 
 
@@ -310,10 +312,8 @@ class TrendField:
 
     def predict(self, east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
         """Return the mean level and the deviation of a new reading at places."""
-        design = self._trend.design(east_m, north_m)
-        spread = np.einsum("ni,ij,nj->n", design, self._trend.covariance, design)
-        level_dbm = design @ [self._trend.offset_dbm, self._trend.slope]
-        return level_dbm, np.sqrt(self._variance_db2 + spread)
+        spread_db2 = self._trend.variance_db2(self._trend.design(east_m, north_m))
+        return self._trend.level_dbm(east_m, north_m), np.sqrt(self._variance_db2 + spread_db2)
 
 
 ResidualField = GaussianField | NeighbourField | TrendField

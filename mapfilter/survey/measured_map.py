@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
-from annotated_types import Ge
+from annotated_types import Ge, Le
 from scipy.spatial import cKDTree
 from threadpoolctl import threadpool_limits
 
@@ -40,6 +40,7 @@ from mapfilter.survey.measurements import Measurements, Points, points_by_cell
 _ROUNDS = 2
 _LOCATED_FROM = 300
 _PHONE_HEIGHT_M = 1.5
+_Count = Annotated[int, Ge(1), Le(1_000_000)]
 _CALIBRATION = {"slope": 1.0, "slope_deviation": 0.2}
 
 
@@ -72,9 +73,9 @@ class SurveyOptions(Options):
     method: Literal["gp", "knn", "trend"] = "gp"
     trend: Literal["path_loss", "mean"] = "path_loss"
     reach_m: Annotated[float, Ge(1)] = 100.0
-    min_points: Annotated[int, Ge(1)] = 3
-    min_points_to_locate: Annotated[int, Ge(3)] = 15
-    neighbours: Annotated[int, Ge(1)] = 8
+    min_points: _Count = 3
+    min_points_to_locate: Annotated[int, Ge(3), Le(1_000_000)] = 15
+    neighbours: _Count = 8
     square_m: Annotated[float, Ge(0.1)] = 10.0
     most_points: Annotated[int, Ge(10)] = 1500
 
@@ -149,7 +150,7 @@ def fit_survey(
     Parameters
     ----------
     plan : CellPlan, optional
-        Where antennas are, for the cells it names; the others are located from their levels.
+        Positions of the antennas it names; the others are located from their levels.
     predicted : mapping of str to callable, optional
         Calibrate predictions: for each cell a function from east and north (m) to the predicted
         level (dBm, NaN where there is none). Offset, slope and residuals are fitted about it.
@@ -311,9 +312,9 @@ class LeftOut:
         relative = np.abs(error_db) / self.deviation_db
         return Validation(
             *counts,
-            _rms(error_db),
-            _rms(self.measured_dbm - self.trend_dbm),
-            _rms(self.measured_dbm - self.mean_dbm),
+            rms(error_db),
+            rms(self.measured_dbm - self.trend_dbm),
+            rms(self.measured_dbm - self.mean_dbm),
             float(np.mean(error_db)),
             float(np.mean(relative <= 1)),
             float(np.mean(relative <= 2)),
@@ -321,7 +322,8 @@ class LeftOut:
         )
 
 
-def _rms(values: Floats) -> float:
+def rms(values: Floats) -> float:
+    """Return the root mean square."""
     return float(np.sqrt(np.mean(values**2)))
 
 

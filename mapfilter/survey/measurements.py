@@ -15,12 +15,13 @@ from mapfilter.geodesy import project, projected_crs, utm_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.survey.measurement_files import (
     DIALECTS,
+    Identity,
+    Rows,
     header_of,
     mapped,
     read_antennas_log,
     read_csv,
 )
-from mapfilter.survey.measurement_rows import Identity, Rows
 
 Format = Literal["auto", "csv", "opencellid", "towercollector", "antennas"]
 
@@ -156,10 +157,8 @@ def read_measurements(
     if faults:
         raise InputError(tuple(faults))
     if crs is None:
-        crs = utm_crs(
-            float(np.median(np.concatenate([table.lon_deg for table in tables]))),
-            float(np.median(np.concatenate([table.lat_deg for table in tables]))),
-        )
+        lat_deg, lon_deg = np.median(np.concatenate([t.columns[1:3] for t in tables], 1), axis=1)
+        crs = utm_crs(float(lon_deg), float(lat_deg))
     return _joined(tables, projected_crs(crs), session_gap_s)
 
 
@@ -204,8 +203,8 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
         stem = table.path.stem
         names += [stem] if count == 1 else [f"{stem}#{i + 1}" for i in range(count)]
     cell = [np.array([places[c] for c in t.cells], dtype=np.int32)[t.cell] for t in tables]
-    lon_deg = np.concatenate([table.lon_deg for table in tables])
-    lat_deg = np.concatenate([table.lat_deg for table in tables])
+    columns = np.ascontiguousarray(np.concatenate([table.columns for table in tables], axis=1))
+    time_s, lat_deg, lon_deg, level_dbm, accuracy_m = columns
     east_m, north_m = project(crs, lon_deg, lat_deg)
     joined = Measurements(
         crs,
@@ -214,11 +213,11 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
         tuple(names),
         np.concatenate(cell),
         np.concatenate(session),
-        np.concatenate([table.time_s for table in tables]),
+        time_s,
         east_m,
         north_m,
-        np.concatenate([table.level_dbm for table in tables]),
-        np.concatenate([table.accuracy_m for table in tables]),
+        level_dbm,
+        accuracy_m,
         tuple(note for table in tables for note in table.notes()),
     )
     placed = np.isfinite(east_m) & np.isfinite(north_m)
@@ -235,7 +234,7 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
 def _sessions(table: Rows, gap_s: float) -> Ints:
     """Return the session of each row of a file, counted from 0 in the order of the rows."""
     named = np.array(table.session)
-    time_s = np.array(table.time_s)
+    time_s = table.columns[0]
     order = np.lexsort((time_s, named))
     with np.errstate(invalid="ignore"):
         begins = (np.diff(named[order]) != 0) | (np.diff(time_s[order]) > gap_s)

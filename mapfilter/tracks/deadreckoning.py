@@ -52,10 +52,6 @@ def steps_between(east_m: ArrayLike, north_m: ArrayLike) -> tuple[Floats, Floats
     Standing still has no direction: such a step takes the last one before it, else the first one
     after it, and NaN when nothing ever moves.
 
-    Returns
-    -------
-    step_m, heading_rad : ndarray, shape (..., T)
-
     Examples
     --------
     >>> step_m, heading_rad = steps_between([0.0, 3.0, 3.0], [0.0, 4.0, 4.0])

@@ -21,20 +21,21 @@ from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import projected_crs, short_crs
 from mapfilter.gnss.orbits import Almanac
 from mapfilter.tracks.satellites import place_satellites
-from mapfilter.tracks.schema import NEIGHBOUR, PLACE, TABLES, tidy_table
+from mapfilter.tracks.schema import NEIGHBOUR, PLACE, SERVING, TABLES, tidy_table
 
-Kind = Literal["gnss", "fixes", "pseudoranges", "ta", "tdoa", "neighbours", "radio"]
+Kind = Literal["motion", "serving", "neighbour", "gnss", "pseudorange", "tdoa"]
+"""Kinds of measurements that a log may hold."""
+Without = Literal["gnss", "fixes", "pseudoranges", "ta", "tdoa", "neighbours", "radio"]
+"""What can be left out of a log."""
 
+# Tables may begin this long after another ends.
 _APART_S = 600.0
-"""Tables may begin this long after another ends."""
+# Between these, one duration is taken for milliseconds of another.
 _TIMES_MS = (300.0, 3000.0)
-"""Between these, one duration is taken for milliseconds of another."""
-
 _EARLY_S = 30.0
 _EARLY_SHARE = 0.1
 _EARLIEST_UTC_S = datetime(1, 1, 1, tzinfo=UTC).timestamp()
 _MOST_S = 1e11
-
 _FEW_ROWS = 10
 _MANY_ROWS = 20
 _FASTEST_MPS = 100.0
@@ -42,26 +43,21 @@ _SLOWEST_MPS = 0.02
 _LONG_S = 60.0
 _MOSTLY = 2 / 3
 _SOMEWHERE_M = 100.0
+# Between these, positions lie apart by the kilometres of the steps, or a part of them.
 _KILO = (100.0, 1200.0)
-"""Between these, positions lie apart by the kilometres of the steps, or a part of them."""
 _FASTEST_KMPS = 0.1
-
 _EXPECTED = "metres moved in each interval"
 
 
-def check_clocks(
+def _check_clocks(
     tables: Mapping[str, pd.DataFrame], names: Mapping[str, str], faults: Faults
 ) -> None:
     """Note tables that do not overlap in time, or last about 1000 times as long as another.
 
-    ``tables`` are sorted by finite ``time_s``; ``names`` are those of the tables in messages, and
-    ``log`` of the whole. At most one fault is added, since it takes two tables to disagree.
+    At most one fault is added, since it takes two tables to disagree.
     """
-    times = {
-        names.get(table, table): np.unique(rows["time_s"].to_numpy())
-        for table, rows in tables.items()
-        if len(rows)
-    }
+    filled = {names.get(table, table): rows for table, rows in tables.items() if len(rows)}
+    times = {name: np.unique(rows["time_s"].to_numpy()) for name, rows in filled.items()}
     if len(times) < 2:
         return
     gap_s = max(time[0] for time in times.values()) - min(time[-1] for time in times.values())
@@ -74,13 +70,10 @@ def check_clocks(
         faults.add(f"{whole}, time_s", "tables that overlap in time", spans, hint)
 
 
-def early_ends(tables: Mapping[str, pd.DataFrame]) -> tuple[str, ...]:
+def _early_ends(tables: Mapping[str, pd.DataFrame]) -> tuple[str, ...]:
     """Return a note where motion or radio ends long before the other one, as if cut off."""
-    ends_s = {
-        table: float(tables[table]["time_s"].iloc[-1])
-        for table in ("motion", "radio")
-        if len(tables[table])
-    }
+    filled = [table for table in ("motion", "radio") if len(tables[table])]
+    ends_s = {table: float(tables[table]["time_s"].iloc[-1]) for table in filled}
     if len(ends_s) < 2:
         return ()
     (first, first_s), (last, last_s) = sorted(ends_s.items(), key=lambda end: end[1])
@@ -90,8 +83,8 @@ def early_ends(tables: Mapping[str, pd.DataFrame]) -> tuple[str, ...]:
     return (f"{first}: ends {last_s - first_s:.0f} s before {last}, as if cut off",)
 
 
-def check_start(
-    start_utc_s: float, tables: Mapping[str, pd.DataFrame], faults: Faults, whole: str = "log"
+def _check_start(
+    start_utc_s: float, tables: Mapping[str, pd.DataFrame], faults: Faults, whole: str
 ) -> None:
     """Note a start or times that are no dates within the years 1 to 9999."""
     if np.isnan(start_utc_s):
@@ -109,11 +102,7 @@ def check_start(
 
 
 def _milliseconds(times: Mapping[str, Floats]) -> str:
-    """Return the hint that one table's times are milliseconds, or an empty text.
-
-    Its duration *and* its typical interval must be about 1000 times those of another table, which
-    a burst of a second in a long log, or a table with rare rows, does not fulfil.
-    """
+    # A burst of a second in a long log, or a table with rare rows, fulfils one of two conditions.
     paced = {name: time for name, time in times.items() if len(time) >= 3}
     low, high = _TIMES_MS
     for name, time in paced.items():
@@ -126,12 +115,8 @@ def _milliseconds(times: Mapping[str, Floats]) -> str:
     return ""
 
 
-def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) -> tuple[str, ...]:
-    """Note steps that are cumulative, backwards or in another unit; return notes on odd ones.
-
-    ``tables`` have finite times, sorted, and ``where`` names the table of motion. Tables of less
-    than ten steps are not checked.
-    """
+def _check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) -> tuple[str, ...]:
+    """Note steps that are cumulative, backwards or in another unit; return notes on odd ones."""
     motion = tables["motion"]
     motion = motion[np.isfinite(motion["step_m"].to_numpy())]
     time_s, step_m = motion["time_s"].to_numpy(), motion["step_m"].to_numpy()
@@ -141,7 +126,7 @@ def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) 
     between_s = np.diff(time_s)
     speed_mps = np.abs(step_m[1:])[between_s > 0] / between_s[between_s > 0]
     typical_mps = float(np.median(speed_mps)) if speed_mps.size else 0.0
-    moving = step_m[step_m != 0]
+    is_slow, moving = typical_mps < _FASTEST_KMPS, step_m[step_m != 0]
     extent_m = _extent_m(tables, float(time_s[0]), float(time_s[-1]))
     column = f"{where}, step_m"
     growth_m = np.diff(step_m)
@@ -157,11 +142,7 @@ def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) 
     elif moving.size >= _FEW_ROWS and np.mean(moving < 0) > _MOSTLY:
         got = f"{int(np.sum(moving < 0))} negative steps of {moving.size}"
         faults.add(column, f"{_EXPECTED} along its heading", got, "a sign the other way round")
-    elif (
-        typical_mps < _FASTEST_KMPS
-        and extent_m > _SOMEWHERE_M
-        and low * moved_m < extent_m <= high * moved_m
-    ):
+    elif is_slow and extent_m > _SOMEWHERE_M and low * moved_m < extent_m <= high * moved_m:
         got = f"{moved_m:.3g} m in all, while positions lie {extent_m:.0f} m apart"
         faults.add(column, _EXPECTED, got, "kilometres given for metres")
     elif lasted_s >= _LONG_S and 0 < moved_m < _SLOWEST_MPS * lasted_s:
@@ -172,13 +153,10 @@ def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) 
 
 def _extent_m(tables: Mapping[str, pd.DataFrame], first_s: float, last_s: float) -> float:
     """Return how far apart true positions or fixes lie within some time."""
-    found = [0.0]
-    for table in ("truth", "gnss"):
-        places = tables[table]
-        places = places[places["time_s"].between(first_s, last_s)]
-        if len(places):
-            found.append(float(np.hypot(np.ptp(places["east_m"]), np.ptp(places["north_m"]))))
-    return max(found)
+    every = (tables[table] for table in ("truth", "gnss"))
+    within = (places[places["time_s"].between(first_s, last_s)] for places in every)
+    extents = (np.hypot(np.ptp(p["east_m"]), np.ptp(p["north_m"])) for p in within if len(p))
+    return float(max(extents, default=0.0))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -252,7 +230,7 @@ class TrackLog:
 def _seconds(
     given: Mapping[str, Any], start_utc_s: float, names: Mapping[str, str], faults: Faults
 ) -> tuple[dict[str, pd.DataFrame], float]:
-    """Return tables with timestamps turned into seconds, and the start in UTC seconds."""
+    """Convert timestamps to seconds; return the tables and the start in UTC seconds."""
     tables: dict[str, pd.DataFrame] = {}
     times: dict[str, pd.Series] = {}
     for table, rows in given.items():
@@ -359,34 +337,42 @@ def make_log(
     every = zip(TABLES, (motion, radio, gnss, pseudoranges, tdoa, truth), strict=True)
     present = {table: rows for table, rows in every if rows is not None}
     given, start_utc_s = _seconds(present, float(start_utc_s), called, faults)
-    tables: dict[str, pd.DataFrame] = {}
-    every_note = tuple(notes)
+    tables, every_note = dict[str, pd.DataFrame](), tuple(notes)
     for table in TABLES:
-        where = called.get(table, table)
-        rows, more = tidy_table(table, given.get(table), where, faults, numbers.get(table))
-        tables[table] = rows
+        name, number = called.get(table, table), numbers.get(table)
+        tables[table], more = tidy_table(table, given.get(table), name, faults, number)
         every_note += more
-    check_start(start_utc_s, tables, faults, whole)
+    _check_start(start_utc_s, tables, faults, whole)
     if not any(fault.where.endswith("time_s") for fault in faults.found):
-        check_clocks(tables, called, faults)
-        every_note += check_steps(tables, called.get("motion", "motion"), faults)
-        every_note += early_ends(tables)
+        _check_clocks(tables, called, faults)
+        every_note += _check_steps(tables, called.get("motion", "motion"), faults)
+        every_note += _early_ends(tables)
     faults.raise_if_any(InputError)
     placeless = int(tables["pseudoranges"][list(PLACE)].isna().any(axis=1).sum())
     if almanac is None and placeless:
-        every_note += (
-            f"pseudoranges: {placeless} rows without the place of their satellite, of no use "
-            "without an almanac beside the log",
-        )
+        why = "without the place of their satellite, of no use without an almanac beside the log"
+        every_note += (f"pseudoranges: {placeless} rows {why}",)
     if almanac is not None:
-        where = called.get("pseudoranges", "pseudoranges")
-        placed, more = place_satellites(tables["pseudoranges"], almanac, start_utc_s, where)
-        tables["pseudoranges"] = placed
+        where, rows = called.get("pseudoranges", "pseudoranges"), tables["pseudoranges"]
+        tables["pseudoranges"], more = place_satellites(rows, almanac, start_utc_s, where)
         every_note += more
     return TrackLog(str(crs), start_utc_s, **tables, notes=tuple(dict.fromkeys(every_note)))
 
 
-def leave_out(log: TrackLog, kinds: Collection[Kind]) -> TrackLog:
+def rows_by_kind(log: TrackLog) -> dict[Kind, pd.DataFrame]:
+    """Return the rows of each kind of measurement."""
+    serving = log.radio["role"] == SERVING
+    return {
+        "motion": log.motion,
+        "serving": log.radio[serving],
+        "neighbour": log.radio[~serving],
+        "gnss": log.gnss,
+        "pseudorange": log.pseudoranges,
+        "tdoa": log.tdoa,
+    }
+
+
+def leave_out(log: TrackLog, kinds: Collection[Without]) -> TrackLog:
     """Return a log without some kinds of measurements; its notes count them.
 
     Parameters
@@ -397,7 +383,6 @@ def leave_out(log: TrackLog, kinds: Collection[Kind]) -> TrackLog:
 
     Examples
     --------
-    >>> from mapfilter.tracks.log import make_log
     >>> received = pd.DataFrame({"time_s": [0.0, 0.0], "role": ["serving", "neighbour"]})
     >>> log = make_log("EPSG:32635", radio=received.assign(timing_advance=[1, None]))
     >>> alone = leave_out(log, ["neighbours", "ta"])

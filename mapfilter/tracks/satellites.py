@@ -36,9 +36,8 @@ def place_satellites(
 
     Returns
     -------
-    rows : pandas.DataFrame
-    notes : tuple of str
-        Satellites that are not in the almanac, or not healthy.
+    (rows, notes) : (pandas.DataFrame, tuple of str)
+        Notes on satellites that are not in the almanac, or not healthy.
 
     Raises
     ------
@@ -90,11 +89,7 @@ def sent_from_m(almanac: Almanac, week: int, second: Floats, range_m: Floats) ->
     second : (K,) array
         Of the week, at reception; may run over its end.
     range_m : (K,) array
-        Tell how long the signal was under way; a usual time where NaN.
-
-    Returns
-    -------
-    (K, 3) array
+        Gives the travel time of the signal; a usual one where NaN.
     """
     way_s = np.where(np.isfinite(range_m), range_m, _USUAL_M) / _LIGHT_MPS
     sent = second - way_s

@@ -30,7 +30,7 @@ SATELLITE = r"[GRECJIS]\d{2}"
 """A satellite's name as in RINEX: the letter of its constellation and two digits."""
 
 PLACE = ("x_m", "y_m", "z_m")
-"""Where a satellite was, earth-centred."""
+"""Position of a satellite, earth-centred."""
 
 SERVING = "serving"
 NEIGHBOUR = "neighbour"
@@ -48,27 +48,17 @@ _TURN_RAD = 2 * np.pi + 1e-9
 # 2.0**63 itself is one more than an int64 holds.
 _LARGEST_ID = float(np.nextafter(2.0**63, 0.0))
 _DEGREES, _SIGMA = "degrees given for radians", "metres in 0.001..100000"
+_NANOSECONDS = "nanoseconds given for metres"
 _RANGE_HINT = "kilometres or seconds for metres, or a leap second or week in the times"
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column of a table.
+    """One column of a table: its inclusive range, and ``expected`` and ``hint`` of messages.
 
-    Parameters
-    ----------
-    name : str
-        With its unit.
-    low, high : float
-        Inclusive range of a value.
-    expected, hint : str
-        Text of an error message on a value outside the range.
-    kind : {"number", "integer", "text"}
-        A float64 (missing: NaN), a nullable Int64, or text (missing: None).
-    required : bool
-        Whether the column must be there and hold a value in every row.
-    optional : bool
-        Whether the column is only in tables in which it was given.
+    Numbers are float64 (missing: NaN), integers nullable Int64, and text is None where missing.
+    Columns that are ``required`` hold a value in every row; ``optional`` ones are only in tables
+    in which they were given.
     """
 
     name: str
@@ -134,9 +124,7 @@ SCHEMA: dict[str, tuple[Column, ...]] = {
         _TIME,
         _text("cell", "a cell id", required=True),
         _text("reference", "a cell id", required=True),
-        Column(
-            "difference_m", -2e5, 2e5, "metres in -200000..200000", "nanoseconds given for metres"
-        ),
+        Column("difference_m", -2e5, 2e5, "metres in -200000..200000", _NANOSECONDS),
         Column("sigma_m", 1e-3, 1e5, _SIGMA),
         Column("reference_sigma_m", 1e-3, 1e5, _SIGMA),
     ),
@@ -187,24 +175,17 @@ def tidy_table(
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
     """Return a table with the columns of the schema, sorted by time, without exact duplicates.
 
+    The notes returned with it are on what was ignored, sorted or dropped. A table with faults only
+    serves to find further ones.
+
     Parameters
     ----------
-    table : str
-        One of :data:`TABLES`.
     given : pandas.DataFrame or None
         Table as read or made; None is an empty one. Values may be text, as from CSV.
     where : str
         Name of the file or table in messages.
-    faults : Faults
-        Collects what is wrong; the table returned then only serves to find further faults.
     row_numbers : (N,) array_like of int, optional
         Number of each row in messages; 1 to N by default.
-
-    Returns
-    -------
-    table : pandas.DataFrame
-    notes : tuple of str
-        What was ignored, sorted or dropped.
     """
     if given is None:
         given = pd.DataFrame({c.name: [] for c in SCHEMA[table] if not c.optional})
@@ -215,7 +196,9 @@ def tidy_table(
     columns = [c for c in SCHEMA[table] if c.name in given.columns or not c.optional]
     tidy = pd.DataFrame({column.name: _column(column, given, door) for column in columns})
     if table == "radio":
-        _check_roles(tidy["role"], door)
+        role = tidy["role"]
+        bad = role.notna().to_numpy() & ~role.isin([SERVING, NEIGHBOUR]).to_numpy()
+        _add_rows(door, bad, SCHEMA["radio"][1], role)
         _check_technologies(tidy, door)
         tidy["censored"] = tidy["censored"].fillna(0)
     if table == "gnss":
@@ -316,11 +299,6 @@ def _is_empty(value: Any) -> bool:
     return value is None or value is pd.NA or (isinstance(value, str) and value == "")
 
 
-def _check_roles(role: pd.Series, door: _Door) -> None:
-    bad = role.notna().to_numpy() & ~role.isin([SERVING, NEIGHBOUR]).to_numpy()
-    _add_rows(door, bad, SCHEMA["radio"][1], role)
-
-
 def _check_technologies(radio: pd.DataFrame, door: _Door) -> None:
     """Note carriers, codes and timing advances that the row's technology does not have."""
     if "technology" not in radio:
@@ -371,10 +349,8 @@ def _check_degrees(table: pd.DataFrame, door: _Door) -> None:
         return
     east, north = table["east_m"].to_numpy(), table["north_m"].to_numpy()
     small = bool(np.all(np.abs(east) <= 180) and np.all(np.abs(north) <= 180))
-    if not small:
-        return
     extent = max(np.ptp(east), np.ptp(north))
-    if 0 < extent < 0.5 and np.ptp(table["time_s"].to_numpy()) >= 10:
+    if small and 0 < extent < 0.5 and np.ptp(table["time_s"].to_numpy()) >= 10:
         got = f"all within {extent:.4g} of ({east[0]:.6g}, {north[0]:.6g})"
         door.add(", east_m and north_m", "metres", got, "degrees given for metres")
 

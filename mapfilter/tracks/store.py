@@ -21,6 +21,7 @@ import pyarrow.parquet as pq
 
 from mapfilter._io import (
     atomic_dir,
+    check_part,
     check_replaceable,
     check_version,
     read_json,
@@ -47,7 +48,7 @@ _KEYS = ("format", "version", "crs", "start_utc_s", "notes", "parts")
 _ARROW = {"number": pa.float64(), "integer": pa.int64(), "text": pa.string()}
 
 
-def checked_parts(folder: Path, head: dict[str, Any]) -> dict[str, Path]:
+def _checked_parts(folder: Path, head: dict[str, Any]) -> dict[str, Path]:
     """Return the tables that the head lists, unless one is missing, cut off or changed."""
     faults = Faults()
     paths = {}
@@ -59,27 +60,18 @@ def checked_parts(folder: Path, head: dict[str, Any]) -> dict[str, Path]:
         if not isinstance(part, dict) or part.get("path") not in allowed:
             faults.add(f"{folder / HEAD}, parts", "tables of a log", repr(part))
             continue
-        name = part["path"]
-        path = folder / name
-        if not path.is_file():
-            faults.add(str(path), "a table of the log", "no such file")
-        elif path.stat().st_size != part.get("bytes"):
-            size, bytes_ = path.stat().st_size, part.get("bytes")
-            hint = "cut off" if isinstance(bytes_, int) and size < bytes_ else "changed by hand"
-            faults.add(str(path), f"{bytes_} bytes", f"{size} bytes", hint)
-        elif sha256_file(path) != part.get("sha256"):
-            faults.add(str(path), f"SHA-256 {part.get('sha256')}", "another", "changed or damaged")
-        paths[allowed[name]] = path
+        paths[allowed[part["path"]]] = path = folder / part["path"]
+        check_part(path, part, faults)
     faults.raise_if_any(StoreError)
     return paths
 
 
-def parts_by_name(folder: Path) -> dict[str, Path]:
+def _parts_by_name(folder: Path) -> dict[str, Path]:
     """Return the tables of a log made by hand; InputError for tables present twice or misspelt."""
     faults = Faults()
     paths = {}
     for table in TABLES:
-        found = [path for path in table_files(folder) if path.stem == table]
+        found = [path for path in _table_files(folder) if path.stem == table]
         if len(found) > 1:
             faults.add(str(folder), f"one file of {table}", "both Parquet and CSV")
         elif found:
@@ -94,7 +86,7 @@ def parts_by_name(folder: Path) -> dict[str, Path]:
     return paths
 
 
-def table_files(folder: Path) -> list[Path]:
+def _table_files(folder: Path) -> list[Path]:
     """Return the files of a folder that have the name of a table of a log."""
     named = (folder / f"{table}{suffix}" for table in TABLES for suffix in _SUFFIXES)
     return [path for path in named if path.is_file()]
@@ -149,7 +141,9 @@ def read_table(table: str, path: Path) -> ReadTable:
 
 
 def _read_csv(table: str, path: Path) -> ReadTable:
-    header, blank_lines = _header(path)
+    with path.open(encoding="utf-8-sig") as stream:
+        every = enumerate(stream)
+        blank_lines, header = next(((n, line) for n, line in every if line.strip()), (0, ""))
     separator = max(_SEPARATORS, key=header.count)
     with warnings.catch_warnings():
         # pandas only warns when rows have more fields than the header, and drops the rest.
@@ -173,15 +167,6 @@ def _read_csv(table: str, path: Path) -> ReadTable:
         for name in rows.columns.intersection(numbers):
             rows[name] = rows[name].str.replace(_DECIMAL_COMMA, r"\1.\2", regex=True)
     return ReadTable(rows, lines, _cut_off(path, separator, header))
-
-
-def _header(path: Path) -> tuple[str, int]:
-    """Return the first line that holds something, and how many blank ones are before it."""
-    with path.open(encoding="utf-8-sig") as stream:
-        for number, line in enumerate(stream):
-            if line.strip():
-                return line, number
-    return "", 0
 
 
 def _cut_off(path: Path, separator: str, header: str) -> tuple[str, ...]:
@@ -228,7 +213,10 @@ def write_log(
             if format == "csv":
                 rows.to_csv(path, index=False, lineterminator="\n")
             else:
-                pq.write_table(_arrow(table, rows), path, compression="zstd")
+                columns = [column for column in SCHEMA[table] if column.name in rows]
+                schema = pa.schema([(column.name, _ARROW[column.kind]) for column in columns])
+                plain = pa.Table.from_pandas(rows, schema, preserve_index=False)
+                pq.write_table(plain.replace_schema_metadata(None), path, compression="zstd")
             part = {"path": path.name, "sha256": sha256_file(path)}
             parts.append(part | {"bytes": path.stat().st_size, "rows": len(rows)})
         parts += write_sensors(new, sensors or {}, format)
@@ -259,11 +247,11 @@ def read_log(folder: str | Path) -> TrackLog:
     where = str(folder / HEAD)
     head = read_json(folder / HEAD)
     start_utc_s = _check_head(head, where)
-    paths = checked_parts(folder, head) if "parts" in head else parts_by_name(folder)
+    paths = _checked_parts(folder, head) if "parts" in head else _parts_by_name(folder)
     tables = {table: read_table(table, path) for table, path in paths.items()}
     notes = [note for read in tables.values() for note in read.notes]
     others = _others(folder, paths.values())
-    ignored = [f"{path}: not a table of a log, not read" for path in others]
+    ignored = (f"{path}: not a table of a log, not read" for path in others)
     beside = folder / ALMANAC
     return make_log(
         head.get("crs"),
@@ -294,7 +282,7 @@ def list_logs(path: str | Path) -> list[Path]:
     inner = sorted(path.iterdir()) if path.is_dir() else []
     faults = Faults()
     for folder in inner:
-        if table_files(folder) and not is_log(folder):
+        if _table_files(folder) and not is_log(folder):
             faults.found.extend(_no_log(folder, "a track log").faults)
     faults.raise_if_any(InputError)
     found = [folder for folder in inner if is_log(folder)]
@@ -305,7 +293,7 @@ def list_logs(path: str | Path) -> list[Path]:
 
 def _no_log(path: Path, expected: str) -> MapfilterError:
     """Return the error for a path that is no log, and what it lacks."""
-    tables = table_files(path)
+    tables = _table_files(path)
     if tables:
         got = f"{tables[0].name} without a {HEAD} beside it"
         expected = f'{HEAD} with the CRS, such as {{"crs": "EPSG:32635"}}'
@@ -317,12 +305,6 @@ def _no_log(path: Path, expected: str) -> MapfilterError:
         return fail(InputError, str(path), expected, "a file", hint)
     got = "a folder without any" if path.is_dir() else "no such folder"
     return fail(InputError, str(path), expected, got)
-
-
-def _arrow(table: str, rows: pd.DataFrame) -> pa.Table:
-    columns = [column for column in SCHEMA[table] if column.name in rows]
-    schema = pa.schema([(column.name, _ARROW[column.kind]) for column in columns])
-    return pa.Table.from_pandas(rows, schema, preserve_index=False).replace_schema_metadata(None)
 
 
 def _check_head(head: dict[str, Any], where: str) -> float:

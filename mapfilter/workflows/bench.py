@@ -20,7 +20,7 @@ from mapfilter.database.build import BuildJob, build
 from mapfilter.database.estimate import dry_run, peak_memory_bytes
 from mapfilter.database.tiles import read_tile
 from mapfilter.errors import ConfigError, fail
-from mapfilter.experiments.papers.fritsche_klein_2009.experiment import bound_curves
+from mapfilter.experiments.papers.fritsche_klein_2009.paper import bound_curves
 from mapfilter.experiments.papers.fritsche_klein_2009.scene import (
     COMBINATIONS,
     Layout,
@@ -92,15 +92,7 @@ class BuildBench:
 def run_bench(
     stage: str, *, rasters: int = 10, side_px: int = 3000, points: int = 100_000, runs: int = 5
 ) -> BuildBench | FilterBench | FusionBench | SweepBench:
-    """Measure a stage on made inputs; a filter and a sweep on the embedded map.
-
-    Raises
-    ------
-    ConfigError
-        There is no such stage.
-    MapfilterError
-        The temporary folder cannot be written.
-    """
+    """Measure a stage on generated inputs; a filter and a sweep on the embedded map."""
     if stage not in STAGES:
         raise fail(ConfigError, "bench", f"one of {', '.join(STAGES)}", repr(stage))
     if stage == "filter":
@@ -162,7 +154,7 @@ def made_routes(lattice: Lattice, points: int) -> RouteLattice:
 
 
 def build_made(rasters_path: Path, points: int) -> int:
-    """Build from made rasters; return the most memory (bytes) that this process has taken."""
+    """Build from generated rasters; return the most memory (bytes) that this process has taken."""
     rasters = open_rasters(rasters_path)
     plan = made_plan(rasters.lattice, len(rasters.cell_ids))
     build(rasters, plan, made_routes(rasters.lattice, points), rasters_path.with_name("peak"))
@@ -193,8 +185,7 @@ def _bench_build(folder: Path, cells: int, side_px: int, points: int, runs: int)
             "build": lambda: build(rasters, plan, routes, folder / "db"),
             "two": in_two,
         }
-        rates = median_rates({name: (task, 1) for name, task in tasks.items()}, runs)
-    seconds = {name: 1 / rate for name, rate in rates.items()}
+        seconds = median_seconds(tasks, runs)
     estimate = dry_run(rasters, plan, routes)
     size = sum(part.stat().st_size for part in (folder / "db").rglob("*.parquet"))
     return BuildBench(
@@ -271,11 +262,9 @@ def bench_fusion(*, runs: int = 5) -> FusionBench:
     def run(method: Method) -> Callable[[], object]:
         return lambda: estimates(given, drawn, method, drawn.first_means, given.first_covariance)
 
-    many = _TRIALS * steps
-    rate = median_rates(
-        {"ekf": (run(EKF), many), "rbukf": (run(RBUKF), many), "table": (_table_3, 1)}, runs
-    )
-    return FusionBench(_TRIALS, steps, runs, rate["ekf"], rate["rbukf"], 1 / rate["table"])
+    took_s = median_seconds({"ekf": run(EKF), "rbukf": run(RBUKF), "table": _table_3}, runs)
+    ekf_per_s, rbukf_per_s = (_TRIALS * steps / took_s[name] for name in ("ekf", "rbukf"))
+    return FusionBench(_TRIALS, steps, runs, ekf_per_s, rbukf_per_s, took_s["table"])
 
 
 def estimates(given: Scene, drawn: Trials, method: Method, means: Floats, first: Floats) -> Floats:
@@ -292,19 +281,21 @@ def estimates(given: Scene, drawn: Trials, method: Method, means: Floats, first:
     return run.means
 
 
-def median_rates(
-    tasks: Mapping[str, tuple[Callable[[], object], int]], runs: int
+def median_seconds(
+    tasks: Mapping[str, Callable[[], object]],
+    runs: int,
+    clock: Callable[[], float] = time.perf_counter,
 ) -> dict[str, float]:
-    """Return how many steps per second tasks of so many steps take; tasks take turns."""
-    rates: dict[str, list[float]] = {name: [] for name in tasks}
+    """Return the median seconds that each task takes over ``runs``; the tasks take turns."""
+    took_s: dict[str, list[float]] = {name: [] for name in tasks}
     for turn in range(runs + 1):
-        for name, (task, count) in tasks.items():
-            began_s = time.perf_counter()
+        for name, task in tasks.items():
+            began_s = clock()
             task()
             # The first of each opens files, compiles and starts processes.
             if turn > 0:
-                rates[name].append(count / (time.perf_counter() - began_s))
-    return {name: median(values) for name, values in rates.items()}
+                took_s[name].append(clock() - began_s)
+    return {name: median(times) for name, times in took_s.items()}
 
 
 def _table_3() -> None:

@@ -26,11 +26,12 @@ from mapfilter.models.fingerprint import LevelReading
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel, Start
-from mapfilter.positioning.bayes.options import BayesOptions, open_area
+from mapfilter.positioning.bayes.options import BayesFilter, open_area
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.filter import locate
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.store import list_logs, read_log
+from mapfilter.workflows.bench import median_seconds
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.simulate import run_simulate
@@ -83,10 +84,11 @@ class FilterBench:
         By number of particles.
     track_s : float
         A walk from an unknown start; median over walks and repetitions.
-    challenged : int
-        Walks with 300 m that nobody measured in their middle, and an alternative because of it.
-    challenged_track_s : float or None
-        These walks; None where none did.
+    with_alternative : int
+        Walks without measurements over 300 m in their middle, after which the filter started an
+        alternative hypothesis.
+    with_alternative_track_s : float or None
+        Time of these walks; None where there is none.
     loaded_memory_bytes, peak_memory_bytes, smoothing_peak_memory_bytes : int
         Of a process that opens the database and locates a walk: its libraries alone, and in all.
     """
@@ -98,8 +100,8 @@ class FilterBench:
     area_km2: float
     steps: list[StepBench]
     track_s: float
-    challenged: int
-    challenged_track_s: float | None
+    with_alternative: int
+    with_alternative_track_s: float | None
     loaded_memory_bytes: int
     peak_memory_bytes: int
     smoothing_peak_memory_bytes: int
@@ -123,23 +125,18 @@ def bench_filter(
         Numbers of particles of the single step.
     settings : sequence of str
         ``section.key=value`` of the world.
-
-    Raises
-    ------
-    MapfilterError
-        The temporary folder cannot be written.
     """
     with tempfile.TemporaryDirectory(prefix="mapfilter-bench-") as name:
         given = [f"journeys.count={tracks}", f"journeys.length_m={length_m}", *settings]
         database, folders = make_world(Path(name), given)
         logs = [read_log(folder) for folder in folders]
         area = open_area(open_database(database))
-        positioner = BayesOptions().over_area(area)
+        positioner = BayesFilter().over_area(area)
         steps = [_step(positioner.model, logs[0], count, runs) for count in particles]
         # The first loads what is compiled.
         timed = [_track(positioner, log) for _ in range(runs + 1) for log in logs][len(logs) :]
         cut = [_track(positioner, _without_middle(log)) for _ in range(runs) for log in logs]
-        challenged = [took_s for took_s, challenges in cut if challenges]
+        lost_s = [took_s for took_s, alternatives in cut if alternatives]
         loaded, peak = locating_memory_bytes(database, folders[0], smooth=False)
         _, smoothing_peak = locating_memory_bytes(database, folders[0], smooth=True)
         east_m, north_m = area.size_m
@@ -151,8 +148,8 @@ def bench_filter(
             area_km2=east_m * north_m / 1e6,
             steps=steps,
             track_s=median(took_s for took_s, _ in timed),
-            challenged=len(challenged) // runs,
-            challenged_track_s=median(challenged) if challenged else None,
+            with_alternative=len(lost_s) // runs,
+            with_alternative_track_s=median(lost_s) if lost_s else None,
             loaded_memory_bytes=loaded,
             peak_memory_bytes=peak,
             smoothing_peak_memory_bytes=smoothing_peak,
@@ -204,19 +201,16 @@ def _step(model: BayesModel, log: TrackLog, count: int, runs: int) -> StepBench:
         moved, _ = filter_.predict(belief, given.motion, rng)
         return filter_.update(moved, given.reading, rng)
 
-    tasks: dict[str, Callable[[], object]] = {
-        "step": lambda: whole_step(given, belief, jitter, rng),
-        "filter": by_filter,
+    def often(task: Callable[[], object]) -> Callable[[], object]:
+        return lambda: [task() for _ in range(_PER_ROW)]
+
+    tasks = {
+        "step": often(lambda: whole_step(given, belief, jitter, rng)),
+        "filter": often(by_filter),
     }
-    took_ns: dict[str, list[float]] = {name: [] for name in tasks}
-    for run in range(runs + 1):
-        for name, task in tasks.items():
-            began_s = time.process_time()
-            for _ in range(_PER_ROW):
-                task()
-            if run > 0:
-                took_ns[name].append(1e9 * (time.process_time() - began_s) / (_PER_ROW * count))
-    return StepBench(count, median(took_ns["step"]), median(took_ns["filter"]))
+    took_s = median_seconds(tasks, runs, time.process_time)
+    step_ns, filter_ns = (1e9 * took_s[name] / (_PER_ROW * count) for name in tasks)
+    return StepBench(count, step_ns, filter_ns)
 
 
 def whole_step(
@@ -238,17 +232,17 @@ def whole_step(
 def _track(positioner: BayesPositioner, log: TrackLog) -> tuple[float, int]:
     """Return the seconds that a walk takes, and how many alternatives were started."""
     rng, merged = np.random.default_rng(2), epochs(log)
-    track, challenges = positioner.begin(), 0
+    track, alternatives = positioner.begin(), 0
     began_s = time.process_time()
     for epoch in merged:
         before = track.alternative
         track, _ = positioner.step(track, epoch, rng)
-        challenges += before is None and track.alternative is not None
-    return time.process_time() - began_s, challenges
+        alternatives += before is None and track.alternative is not None
+    return time.process_time() - began_s, alternatives
 
 
 def _without_middle(log: TrackLog) -> TrackLog:
-    """Return a log that was switched off for a while, and carried on as if nobody had moved."""
+    """Return a log without 300 m of motion and reports in its middle."""
     gone_m = log.motion["step_m"].cumsum()
     whole_m = float(gone_m.iloc[-1])
     off = (gone_m > 0.5 * whole_m) & (gone_m < 0.5 * whole_m + _CUT_M)
@@ -277,6 +271,6 @@ def locating_memory_bytes(database: Path, log: Path, *, smooth: bool) -> tuple[i
 def locate_once(database: Path, log: Path, *, smooth: bool) -> tuple[int, int]:
     """Open, locate, and return this process's peak memory (bytes) before and after."""
     loaded = peak_memory_bytes()
-    positioner = BayesOptions(smooth=smooth).over(open_database(database))
+    positioner = BayesFilter(smooth=smooth).over(open_database(database))
     locate(read_log(log), positioner, np.random.default_rng(0))
     return loaded, peak_memory_bytes()

@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -20,6 +21,7 @@ from mapfilter.experiments.sweep.plan import SweepPlan
 from mapfilter.experiments.sweep.run import sweep
 from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.positioning.filter import locate
+from mapfilter.workflows.bench import median_seconds
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.reproduce import paper_config
@@ -70,19 +72,9 @@ class SweepBench:
 
 
 def bench_sweep(*, runs: int = 3, trials: int = 160) -> SweepBench:
-    """Measure a sweep on the embedded map.
+    """Measure a sweep on the embedded map: medians of so many ``runs``.
 
-    Parameters
-    ----------
-    runs : int
-        Repetitions that the medians are of.
-    trials : int
-        Runs in each of the six cells of the grid.
-
-    Raises
-    ------
-    MapfilterError
-        The temporary folder cannot be written.
+    ``trials`` are the runs in each of the six cells of its grid.
     """
     with tempfile.TemporaryDirectory(prefix="mapfilter-bench-") as name:
         return _bench(Path(name), runs, trials)
@@ -98,26 +90,21 @@ def _bench(folder: Path, repetitions: int, trials: int) -> SweepBench:
     world = sweep_world(config, plan.radios)
     database = config.database_path
     epochs, parts = _parts(plan, world, database)
-    with contextlib.ExitStack() as stack:
-        executors: dict[str, Executor] = {"one": SerialExecutor()}
-        executors["two"] = stack.enter_context(local_executor(_PROCESSES))
-        executors |= stack.enter_context(_dask())
-        took: dict[str, list[float]] = {name: [] for name in executors}
-        for repetition in range(repetitions + 1):
-            for name, executor in executors.items():
-                began_s = time.perf_counter()
-                sweep(
-                    plan,
-                    world,
-                    {plan.databases[0]: database},
-                    folder / name,
-                    executor=executor,
-                    in_flight=3 * _PROCESSES,
-                )
-                # The first of each opens files, compiles and starts processes.
-                if repetition > 0:
-                    took[name].append(time.perf_counter() - began_s)
-    seconds = {name: median(times) for name, times in took.items()}
+    with local_executor(_PROCESSES) as two, _dask() as dask:
+        executors: dict[str, Executor] = {"one": SerialExecutor(), "two": two, **dask}
+        tasks = {
+            name: partial(
+                sweep,
+                plan,
+                world,
+                {plan.databases[0]: database},
+                folder / name,
+                executor=executor,
+                in_flight=3 * _PROCESSES,
+            )
+            for name, executor in executors.items()
+        }
+        seconds = median_seconds(tasks, repetitions)
     dask_s = seconds.get("dask")
     speedup = seconds["one"] / seconds["two"]
     return SweepBench(

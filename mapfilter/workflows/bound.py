@@ -1,4 +1,4 @@
-"""``mapfilter bound``: where a radio-route database will work, before anybody drives."""
+"""``mapfilter bound``: position bounds of a radio-route database, without a journey."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from mapfilter._io import atomic_file, ensure_writable_folder
 from mapfilter._parallel import Progress
@@ -17,8 +16,8 @@ from mapfilter.evaluation.first_fix import FirstFixOptions
 from mapfilter.evaluation.map_bound import TWIN_ERROR, MapBound, bound, on_lattice, write_bound
 from mapfilter.evaluation.radio_map import ErrorModel
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.bound import plot_point_values, plot_twins
 from mapfilter.report.canvas import save
+from mapfilter.report.network import plot_point_values, plot_twins
 
 NOTES = (
     "exact for the error model: the bound from given gradients; bits by the serving cell",
@@ -30,56 +29,43 @@ NOTES = (
 _DECIMALS = 3
 
 _BOUND_TITLE = "Least position error along the street from one report of levels"
-_FIX_TITLE = "Expected metres until an ideal filter knows where it is"
+_FIX_TITLE = "Expected metres to convergence of an ideal filter"
 
 
 @dataclass(frozen=True)
 class BoundResult:
-    """What a database promises; medians and shares over points or journeys.
-
-    Parameters
-    ----------
-    points, cells, ways, starts : int
-        Counts; journeys begin at the starts.
-    plane_bound_m, along_bound_m : float
-        Medians of the position-error bound of one report, of points that have one.
-    without_plane_bound : float
-        Share of points at which levels carry no information along one direction.
-    cell_bits, level_bits : float
-        Mean information of one report.
-    cells_bits_per_m, levels_bits_per_m : float
-        Expected information on the start per metre, over the first ``path_m``.
-    cells_to_fix_m, levels_to_fix_m : float
-        Expected metres to convergence.
-    cells_unclear, levels_unclear : float
-        Share of journeys that never converged.
-    levels_wrong : float
-        Of those that did by levels, the share that did so in a wrong place.
-    twins : float
-        Share of journeys with a twin.
-    notes : tuple of str
-        What is exact and what is approximate.
-    """
+    """What a database promises; medians and shares over points or journeys."""
 
     points: int
     cells: int
     ways: int
     starts: int
+    """Where journeys begin."""
     plane_bound_m: float
+    """Median of the position-error bound of one report, of points that have one."""
     along_bound_m: float
+    """The same along the street."""
     without_plane_bound: float
+    """Share of points at which levels carry no information along one direction."""
     cell_bits: float
+    """Mean information of the serving cell of one report; ``level_bits`` of its levels."""
     level_bits: float
     cells_bits_per_m: float
+    """Expected information on the start per metre, over the first ``path_m``."""
     levels_bits_per_m: float
     cells_to_fix_m: float
+    """Expected metres to convergence."""
     levels_to_fix_m: float
     cells_unclear: float
+    """Share of journeys that never converged."""
     levels_unclear: float
     levels_wrong: float
+    """Of the journeys that converged by levels, the share that did so in a wrong place."""
     twins: float
+    """Share of journeys with a twin."""
     seconds: float
     notes: tuple[str, ...]
+    """What is exact and what is approximate."""
     outputs: tuple[Path, ...]
 
 
@@ -92,37 +78,32 @@ def run_bound(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> BoundResult:
-    """Bound what a database is good for; write a raster, tables by way and of twins, pictures.
-
-    Raises
-    ------
-    MapfilterError
-        The database is missing, damaged or too large, an option is out of range, or the output
-        cannot be written.
-    """
+    """Compute bounds on positioning by a database; write a raster, tables by way and of twins."""
     began_s = time.perf_counter()
     database = open_database(path)
     ensure_writable_folder(out)
     found = bound(database, errors=errors, options=options, seed=seed, progress=progress)
-    radio = found.radio
-    columns = found.at_points()
-    rasters = {name: on_lattice(radio, values) for name, values in columns.items()}
+    radio, ways, twins = found.radio, found.by_way(), found.twins()
+    rasters = {name: on_lattice(radio, values) for name, values in found.at_points().items()}
     write_bound(rasters, radio.lattice, out / "bound.tif", database.attribution)
-    ways, twins = found.by_way(), found.twins()
-    _write_table(ways, out / "ways.parquet")
-    _write_table(twins, out / "twins.parquet")
+    for table, name in ((ways, "ways.parquet"), (twins, "twins.parquet")):
+        with atomic_file(out / name) as temporary:
+            table.to_parquet(temporary, index=False)
     base = BaseMap(radio.lattice.bounds_m, attribution=database.attribution)
     on_map = radio.lattice, database.plan, base
     along, fix = rasters["along_bound_m"], rasters["levels_to_fix_m"]
-    drawn = plot_point_values(along, *on_map, title=_BOUND_TITLE, label="bound / m")
-    save(drawn, out / "position-bound.png")
-    drawn = plot_point_values(fix, *on_map, title=_FIX_TITLE, label="metres to convergence / m")
-    save(drawn, out / "metres-to-fix.png")
     pairs_m = twins[["east_m", "north_m", "twin_east_m", "twin_north_m"]].to_numpy()
-    save(plot_twins(rasters["twin_error"], pairs_m, *on_map), out / "twins.png")
-    tables = ["bound.tif", "ways.parquet", "twins.parquet"]
-    names = [*tables, "position-bound.png", "metres-to-fix.png", "twins.png"]
-    return _summary(found, began_s, tuple(out / name for name in names))
+    label = "distance to convergence / m"
+    pictures = {
+        "position-bound.png": plot_point_values(
+            along, *on_map, title=_BOUND_TITLE, label="bound / m"
+        ),
+        "metres-to-fix.png": plot_point_values(fix, *on_map, title=_FIX_TITLE, label=label),
+        "twins.png": plot_twins(rasters["twin_error"], pairs_m, *on_map),
+    }
+    drawn = [save(picture, out / name) for name, picture in pictures.items()]
+    tables = [out / name for name in ("bound.tif", "ways.parquet", "twins.parquet")]
+    return _summary(found, began_s, (*tables, *drawn))
 
 
 def _summary(found: MapBound, began_s: float, outputs: tuple[Path, ...]) -> BoundResult:
@@ -160,8 +141,3 @@ def _median(values: Floats) -> float:
 
 def _rounded(value: float) -> float:
     return round(float(value), _DECIMALS)
-
-
-def _write_table(table: pd.DataFrame, path: Path) -> None:
-    with atomic_file(path) as temporary:
-        table.to_parquet(temporary, index=False)

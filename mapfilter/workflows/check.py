@@ -1,21 +1,21 @@
-"""``mapfilter check``: all inputs of a configuration looked at together before anything runs."""
+"""``mapfilter check``: all inputs of a configuration checked together before anything runs."""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import rasterio
 from rasterio.errors import RasterioError
 
 from mapfilter._parallel import Progress
-from mapfilter.check.findings import CheckResult, Findings, Severity, listed
+from mapfilter.check.findings import CheckResult, Findings, Severity
 from mapfilter.check.raster_checks import check_ids, is_surveyed, sampled
 from mapfilter.check.site_checks import check_against_sites, check_power
 from mapfilter.config.sections import Config
-from mapfilter.errors import MapfilterError
+from mapfilter.errors import MapfilterError, listed
 from mapfilter.geodesy import Lattice
 from mapfilter.propagation.predict import off_frequency
 from mapfilter.radio.cell_rules import ANTENNAS
@@ -34,226 +34,181 @@ from mapfilter.workflows.world import World, area_lattice, planned_rasters
 _STAGES = 5
 
 
-@dataclass(frozen=True, slots=True)
-class _Inputs:
-    """What could be read of a configuration; None where it could not, or is not there yet."""
-
-    config: Config
-    lattice: Lattice | None
-    rasters: RxLevRasters | None
-
-
 def run_check(config: Config, progress: Progress | None = None) -> CheckResult:
-    """Look at area, map, plan, antennas, rasters, measurements and land use together.
+    """Check area, map, plan, antennas, rasters, measurements and land use together.
 
-    Rasters that are still to be predicted are passed over. Large rasters are looked at in a square
-    of four million pixels about each site.
+    Rasters that are still to be predicted are passed over. Of large rasters a square of four
+    million pixels about each site is checked.
 
     Raises
     ------
     MapfilterError
-        Nothing that has to do with the inputs: what is wrong with them is a finding.
+        Not for wrong inputs: their faults are findings.
     """
-    findings = Findings()
+    check = _Checks(config)
+    findings = check.findings
 
     def done(stages: int) -> None:
         if progress is not None:
             progress(stages, _STAGES)
 
-    rasters = _rasters(config, findings)
-    area = _area(config, rasters, findings)
-    placed = area is not None and (
-        rasters is None or not _says_where(config) or check_rasters_place(rasters, config, findings)
-    )
+    rasters = check.rasters()
+    area = check.area(rasters)
+    placed = area is not None and (rasters is None or check.overlaps(rasters))
     done(1)
     lattice = rasters.lattice if rasters is not None else area
-    inputs = _Inputs(config, lattice if placed or area is None else None, rasters)
-    plan = _plan(inputs, findings)
+    if area is not None and not placed:
+        lattice = None
+    plan = check.plan(lattice)
     done(2)
-    if rasters is not None and inputs.lattice is not None:
-        _check_rasters(rasters, plan, config, findings)
-    elif plan is not None and inputs.lattice is not None:
-        where = _plan_name(config)
-        check_sites(plan, inputs.lattice, where, findings)
-        check_power((), plan, where, findings)
-    ground_truth = _ground_truth(config, findings) if area is not None else None
-    if ground_truth is not None and (
-        not _says_where(config) or check_rasters_place(ground_truth, config, findings)
-    ):
-        plan_there = _plan(_Inputs(config, ground_truth.lattice, ground_truth), findings)
-        _check_rasters(ground_truth, plan_there, config, findings)
+    if rasters is not None and lattice is not None:
+        check.check_rasters(rasters, plan)
+    elif plan is not None and lattice is not None:
+        check_sites(plan, lattice, check.plan_name, findings)
+        check_power((), plan, check.plan_name, findings)
+    ground_truth = check.ground_truth() if area is not None else None
+    if ground_truth is not None and check.overlaps(ground_truth):
+        check.check_rasters(ground_truth, check.plan(ground_truth.lattice))
     done(3)
-    if plan is not None and inputs.lattice is not None:
-        _check_antennas(plan, inputs, findings)
+    if plan is not None and lattice is not None:
+        # Rasters that are there already do not need the antennas.
+        check.check_antennas(plan, lattice, "error" if rasters is None else "warning")
     done(4)
     if area is not None and placed:
-        _check_roads(inputs, area, findings)
+        check.check_roads(area, rasters)
     done(5)
     return findings.result()
 
 
-def _area(config: Config, rasters: RxLevRasters | None, findings: Findings) -> Lattice | None:
-    about = rasters.lattice if rasters is not None else None
-    if config.surveyed_plan is not None:
+class _Checks:
+    """The checks of one configuration, and what they found."""
+
+    def __init__(self, config: Config) -> None:
+        self.config, self.findings = config, Findings()
+        self.plan_name = str(config.surveyed_plan or config.cells.plan or "plan by rule")
+        # Layers and tracks replace the map, so that only a box places the rasters.
+        replaced = config.roads.layer is not None or bool(config.roads.tracks.files)
+        self._is_placed = config.area.has_box or (config.area.has_extent and not replaced)
+
+    @contextmanager
+    def _reported(self, code: str, severity: Severity = "error") -> Iterator[None]:
+        """Turn faults of reading an input into findings, unspecific ones with this code."""
         try:
-            about = survey_inputs(config).lattice
+            yield
         except MapfilterError as error:
-            findings.add_faults(error, "measurements-invalid")
-            if not config.area.has_extent:
-                return None
-    if about is not None and not _says_where(config):
-        return about
-    if findings.found and not config.area.has_extent and config.rasters_path.exists():
-        # Why the rasters, which give the area, cannot be read is reported already.
-        return None
-    try:
-        return area_lattice(config.area)
-    except MapfilterError as error:
-        of_map = all(fault.where.startswith(str(config.area.map)) for fault in error.faults)
-        findings.add_faults(error, "map-invalid" if of_map else "area-invalid")
+            self.findings.add_faults(error, code, severity)
+
+    def rasters(self) -> RxLevRasters | None:
+        path = self.config.rasters_path
+        if path.exists():
+            return self._opened(path, lambda: planned_rasters(self.config))
+        if self.config.rasters.path is not None:
+            self.findings.add("rasters-missing", str(path), "There is nothing yet.", "warning")
         return None
 
-
-def _says_where(config: Config) -> bool:
-    """Return whether box or map place the rasters; layers and tracks replace the map."""
-    area, roads = config.area, config.roads
-    replaced = roads.layer is not None or bool(roads.tracks.files)
-    return area.has_box or (area.has_extent and not replaced)
-
-
-def _rasters(config: Config, findings: Findings) -> RxLevRasters | None:
-    path = config.rasters_path
-    if not path.exists():
-        if config.rasters.path is not None:
-            findings.add("rasters-missing", str(path), "There is nothing yet.", "warning")
-        return None
-    return _opened(path, lambda: planned_rasters(config), findings)
-
-
-def _ground_truth(config: Config, findings: Findings) -> RxLevRasters | None:
-    path = config.rasters.ground_truth
-    if path is None:
-        return None
-    if not path.exists():
-        findings.add("ground-truth-missing", str(path), "There is nothing.", "warning")
-        return None
-    return _opened(path, lambda: open_rasters(path), findings)
-
-
-def _opened(
-    path: Path, open_them: Callable[[], RxLevRasters], findings: Findings
-) -> RxLevRasters | None:
-    try:
-        rasters = open_them()
-    except MapfilterError as error:
-        findings.add_faults(error, "rasters-invalid")
-        return None
-    if rasters.quantity == "deviation":
-        evidence = "The file holds the deviations of a survey, not its levels."
-        findings.add("values-implausible", str(path), evidence)
-        return None
-    return rasters
-
-
-def _plan(inputs: _Inputs, findings: Findings) -> CellPlan | None:
-    surveyed_plan = inputs.config.surveyed_plan
-    if inputs.lattice is None or (surveyed_plan is not None and not surveyed_plan.exists()):
-        return None
-    try:
-        return World(inputs.config, inputs.lattice).plan
-    except MapfilterError as error:
-        findings.add_faults(error, "plan-invalid")
+    def ground_truth(self) -> RxLevRasters | None:
+        path = self.config.rasters.ground_truth
+        if path is None or path.exists():
+            return None if path is None else self._opened(path, lambda: open_rasters(path))
+        self.findings.add("ground-truth-missing", str(path), "There is nothing.", "warning")
         return None
 
+    def _opened(self, path: Path, open_them: Callable[[], RxLevRasters]) -> RxLevRasters | None:
+        with self._reported("rasters-invalid"):
+            rasters = open_them()
+            if rasters.quantity != "deviation":
+                return rasters
+            evidence = "The file holds the deviations of a survey, not its levels."
+            self.findings.add("values-implausible", str(path), evidence)
+        return None
 
-def _check_rasters(
-    rasters: RxLevRasters, plan: CellPlan | None, config: Config, findings: Findings
-) -> None:
-    check_pixels(rasters, findings)
-    before = len(findings.found)
-    samples = sampled(rasters, plan, findings)
-    as_declared = len(findings.found) == before
-    if plan is None:
-        return
-    name, where = _plan_name(config), str(rasters.path)
-    check_ids(rasters, plan, name, findings)
-    if config.surveyed_plan is not None and config.cells.plan is None:
-        # Antennas were located from the same levels, and may well stand outside.
-        return
-    outside = check_sites(plan, rasters.lattice, name, findings)
-    if is_surveyed(rasters):
-        # Measured along some ways only; its lobes say nothing, nor is the plan's EIRP measured.
-        return
-    in_place = check_against_sites(samples, plan, outside, where, findings)
-    levels = in_place if rasters.quantity == "level" and as_declared else []
-    check_power(levels, plan, name, findings)
-
-
-def _check_antennas(plan: CellPlan, inputs: _Inputs, findings: Findings) -> None:
-    named = sorted({cell.antenna for cell in plan.cells} - set(ANTENNAS))
-    if not named or inputs.lattice is None:
-        return
-    # Rasters that are there already do not need them.
-    severity: Severity = "error" if inputs.rasters is None else "warning"
-    if inputs.config.cells.antennas is None:
-        evidence = f"It names pattern files ({listed(named)}), and cells.antennas no folder."
-        evidence += "".join(_misspelt(named))
-        findings.add("antenna-missing", _plan_name(inputs.config), evidence, severity)
-        return
-    try:
-        antennas = World(inputs.config, inputs.lattice).antennas
-    except MapfilterError as error:
-        findings.add_faults(error, "antenna-invalid", severity)
-        return
-    for note in off_frequency(plan, antennas):
-        findings.add("antenna-frequency", _plan_name(inputs.config), f"{note}.", "warning")
-
-
-def _misspelt(named: Sequence[str]) -> Iterator[str]:
-    """Yield what names that are nearly those of antennas by formula may mean."""
-    for name in named:
-        for close in difflib.get_close_matches(name.lower(), ANTENNAS, n=1):
-            yield f" Did you mean {close!r} where it says {name!r}?"
-
-
-def _check_roads(inputs: _Inputs, area: Lattice, findings: Findings) -> None:
-    config, rasters = inputs.config, inputs.rasters
-    lattice = rasters.lattice if rasters is not None and not config.area.has_box else area
-    world = World(config, lattice)
-    if config.roads.landuse is None:
+    def area(self, rasters: RxLevRasters | None) -> Lattice | None:
+        config = self.config
+        about = rasters.lattice if rasters is not None else None
+        if config.surveyed_plan is not None:
+            try:
+                about = survey_inputs(config).lattice
+            except MapfilterError as error:
+                self.findings.add_faults(error, "measurements-invalid")
+                if not config.area.has_extent:
+                    return None
+        if about is not None and not self._is_placed:
+            return about
+        if self.findings.found and not config.area.has_extent and config.rasters_path.exists():
+            # Why the rasters, which give the area, cannot be read is reported already.
+            return None
         try:
-            ways = world.ways
+            return area_lattice(config.area)
         except MapfilterError as error:
-            findings.add_faults(error, "roads-invalid")
+            of_map = all(fault.where.startswith(str(config.area.map)) for fault in error.faults)
+            self.findings.add_faults(error, "map-invalid" if of_map else "area-invalid")
+            return None
+
+    def overlaps(self, rasters: RxLevRasters) -> bool:
+        return not self._is_placed or check_rasters_place(rasters, self.config, self.findings)
+
+    def plan(self, lattice: Lattice | None) -> CellPlan | None:
+        surveyed_plan = self.config.surveyed_plan
+        if lattice is not None and (surveyed_plan is None or surveyed_plan.exists()):
+            with self._reported("plan-invalid"):
+                return World(self.config, lattice).plan
+        return None
+
+    def check_rasters(self, rasters: RxLevRasters, plan: CellPlan | None) -> None:
+        config, findings = self.config, self.findings
+        check_pixels(rasters, findings)
+        before = len(findings.found)
+        samples = sampled(rasters, plan, findings)
+        as_declared = len(findings.found) == before
+        if plan is None:
             return
-        if rasters is not None:
-            files = (config.roads.layer, *config.roads.tracks.files)
-            source = next((str(path) for path in files if path is not None), config.area.map)
-            check_ways(ways, rasters, f"{source} and {rasters.path}", findings)
-        if gaps := world.streets.gaps:
-            findings.add("ways-with-gaps", "roads.half_width_m", f"{_sentence(gaps)}.", "warning")
-        return
-    try:
-        _ = world.landuse
-    except MapfilterError as error:
-        findings.add_faults(error, "landuse-invalid")
-        return
-    if rasters is not None:
-        _check_landuse_pixels(config.roads.landuse, rasters, findings)
+        check_ids(rasters, plan, self.plan_name, findings)
+        if config.surveyed_plan is not None and config.cells.plan is None:
+            # Antennas were located from the same levels, and may well stand outside.
+            return
+        outside = check_sites(plan, rasters.lattice, self.plan_name, findings)
+        if is_surveyed(rasters):
+            # Measured along some ways only: without lobes, and without the plan's EIRP.
+            return
+        in_place = check_against_sites(samples, plan, outside, str(rasters.path), findings)
+        levels = in_place if rasters.quantity == "level" and as_declared else []
+        check_power(levels, plan, self.plan_name, findings)
 
+    def check_antennas(self, plan: CellPlan, lattice: Lattice, severity: Severity) -> None:
+        named = sorted({cell.antenna for cell in plan.cells} - set(ANTENNAS))
+        if not named:
+            return
+        if self.config.cells.antennas is None:
+            evidence = f"It names pattern files ({listed(named)}), and cells.antennas no folder."
+            for name in named:
+                for close in difflib.get_close_matches(name.lower(), ANTENNAS, n=1):
+                    evidence += f" Did you mean {close!r} in place of {name!r}?"
+            self.findings.add("antenna-missing", self.plan_name, evidence, severity)
+            return
+        with self._reported("antenna-invalid", severity):
+            for note in off_frequency(plan, World(self.config, lattice).antennas):
+                self.findings.add("antenna-frequency", self.plan_name, f"{note}.", "warning")
 
-def _check_landuse_pixels(path: Path, rasters: RxLevRasters, findings: Findings) -> None:
-    try:
-        with rasterio.open(path) as source:
-            transform = source.transform
-    except RasterioError:
-        return
-    check_same_pixels(str(path), (transform.c, transform.a, transform.f), rasters, findings)
-
-
-def _sentence(note: str) -> str:
-    return note[:1].upper() + note[1:]
-
-
-def _plan_name(config: Config) -> str:
-    return str(config.surveyed_plan or config.cells.plan or "plan by rule")
+    def check_roads(self, area: Lattice, rasters: RxLevRasters | None) -> None:
+        config, landuse = self.config, self.config.roads.landuse
+        lattice = rasters.lattice if rasters is not None and not config.area.has_box else area
+        world = World(config, lattice)
+        if landuse is None:
+            with self._reported("roads-invalid"):
+                ways = world.ways
+                if rasters is not None:
+                    files = (config.roads.layer, *config.roads.tracks.files)
+                    source = next(
+                        (str(path) for path in files if path is not None), config.area.map
+                    )
+                    check_ways(ways, rasters, f"{source} and {rasters.path}", self.findings)
+                if gaps := world.streets.gaps:
+                    sentence = f"{gaps[:1].upper()}{gaps[1:]}."
+                    self.findings.add("ways-with-gaps", "roads.half_width_m", sentence, "warning")
+            return
+        with self._reported("landuse-invalid"):
+            _ = world.landuse
+            if rasters is not None:
+                with suppress(RasterioError), rasterio.open(landuse) as source:
+                    grid = source.transform.c, source.transform.a, source.transform.f
+                    check_same_pixels(str(landuse), grid, rasters, self.findings)

@@ -1,4 +1,4 @@
-"""Whether plan, rasters, area and roads are at the same place, and on the same pixels."""
+"""Checks that plan, rasters, area and roads are at the same place and on the same pixels."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 import shapely
 
 from mapfilter._types import Bools, Floats
-from mapfilter.check.findings import Findings, listed
+from mapfilter.check.findings import Findings
 from mapfilter.config.inputs import Area
 from mapfilter.config.sections import Config
-from mapfilter.errors import InputError
+from mapfilter.errors import InputError, listed
 from mapfilter.geodesy import Lattice, project, projected_crs, same_crs, unproject, utm_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
-from mapfilter.roads.maps import box_deg, map_bounds_deg
+from mapfilter.roads.maps import box_deg, boxes_overlap, map_bounds_deg
 from mapfilter.roads.ways import Ways
 from mapfilter.workflows.world import area_lattice, outside_m
 
@@ -32,15 +32,8 @@ _NEARLY_ALL = 0.9
 
 
 def check_rasters_place(rasters: RxLevRasters, config: Config, findings: Findings) -> bool:
-    """Check that rasters and area overlap, and whether their numbers fit another CRS.
-
-    Returns
-    -------
-    bool
-        Whether they do, so that it makes sense to look at more.
-    """
-    lattice, area = rasters.lattice, config.area
-    where = str(rasters.path)
+    """Return whether rasters and area overlap; if not, find a CRS in which they would."""
+    lattice, area, where = rasters.lattice, config.area, str(rasters.path)
     if area.crs is not None:
         wanted = projected_crs(area.crs, "area.crs")
         if not same_crs(wanted, lattice.crs):
@@ -49,11 +42,13 @@ def check_rasters_place(rasters: RxLevRasters, config: Config, findings: Finding
             return False
     box = box_deg(lattice.crs, lattice.bounds_m)
     wanted_box = _area_box(area)
-    if _overlap(box, wanted_box):
+    if boxes_overlap(box, wanted_box):
         return True
     seen = f"The rasters cover {_shown(box)}, the area {_shown(wanted_box)} (degrees)."
     for crs in _other_systems(wanted_box):
-        if not same_crs(crs, lattice.crs) and _overlap(box_deg(crs, lattice.bounds_m), wanted_box):
+        if not same_crs(crs, lattice.crs) and boxes_overlap(
+            box_deg(crs, lattice.bounds_m), wanted_box
+        ):
             evidence = f"{seen} As numbers of {crs} instead of {lattice.crs} they would overlap."
             findings.add("crs-mixed", where, evidence)
             return False
@@ -62,22 +57,17 @@ def check_rasters_place(rasters: RxLevRasters, config: Config, findings: Finding
 
 
 def check_sites(plan: CellPlan, lattice: Lattice, where: str, findings: Findings) -> frozenset[str]:
-    """Check that sites lie in the area, and which mistake explains those that do not.
-
-    Returns
-    -------
-    frozenset of str
-        Ids of the cells that lie outside.
-    """
+    """Return the ids of cells outside the area; report them with the mistake that explains it."""
     east = np.array([cell.east_m for cell in plan.cells])
     north = np.array([cell.north_m for cell in plan.cells])
     outside = ~_inside(east, north, lattice)
     if not outside.any():
         return frozenset()
     ids = [cell.id for cell, out in zip(plan.cells, outside, strict=True) if out]
-    beyond_m = outside_m(east, north, lattice)[outside]
+    beyond_m = outside_m(east, north, lattice)[outside].max()
+    far = f"{beyond_m / 1000:.1f} km" if beyond_m >= 10_000 else f"{beyond_m:.0f} m"
     named = f"{where}, cells {listed(ids)}"
-    seen = f"{len(ids)} of {len(plan)} cells lie up to {_metres(beyond_m.max())} outside the area."
+    seen = f"{len(ids)} of {len(plan)} cells lie up to {far} outside the area."
     for code, words, move in _moves(lattice):
         moved = _inside(*move(east[outside], north[outside]), lattice)
         if moved.mean() >= _NEARLY_ALL:
@@ -89,30 +79,24 @@ def check_sites(plan: CellPlan, lattice: Lattice, where: str, findings: Findings
 
 
 def check_pixels(rasters: RxLevRasters, findings: Findings) -> None:
-    """Check whether rasters are half a pixel off one another, or off multiples of their own pixels.
+    """Check whether rasters are half a pixel off one another, or off multiples of their pixels.
 
     The lattice of an area lies on multiples of its pixels, and so do those of nearly all exports.
     """
     lattice = rasters.lattice
-    names: list[str] = []
-    steps: list[tuple[float, float]] = []
-    for file in rasters.files:
-        step = _half_step(file.lattice, lattice.west_m, lattice.north_m)
-        if step is not None:
-            names.append(file.path.name)
-            steps.append(step)
-    if names:
-        evidence = f"{_step(steps[0])} off the other rasters."
-        where = f"{rasters.path}, {listed(names)}"
-        findings.add("half-pixel-shift", where, evidence, "warning")
+    corner = lattice.west_m, lattice.north_m
+    off = {file.path.name: _half_step(file.lattice, *corner) for file in rasters.files}
+    off = {name: step for name, step in off.items() if step}
+    where, step = str(rasters.path), _half_step(lattice, 0.0, 0.0)
+    if off:
+        where = f"{rasters.path}, {listed(list(off))}"
+        evidence = f"{next(iter(off.values()))} off the other rasters."
+    elif step:
+        evidence = f"{step} off multiples of {lattice.resolution_m:g} m: their corner is "
+        evidence += f"{lattice.west_m:.10g}, {lattice.north_m:.10g}."
+    else:
         return
-    step = _half_step(lattice, 0.0, 0.0)
-    if step is not None:
-        corner = f"{lattice.west_m:.10g}, {lattice.north_m:.10g}"
-        evidence = (
-            f"{_step(step)} off multiples of {lattice.resolution_m:g} m: their corner is {corner}."
-        )
-        findings.add("half-pixel-shift", str(rasters.path), evidence, "warning")
+    findings.add("half-pixel-shift", where, evidence, "warning")
 
 
 def check_same_pixels(
@@ -120,20 +104,13 @@ def check_same_pixels(
 ) -> None:
     """Check whether another raster of the same resolution is half a pixel off the levels.
 
-    Parameters
-    ----------
-    transform : sequence of float
-        West edge, pixel width, north edge.
+    ``transform`` is its west edge, pixel width and north edge.
     """
-    lattice = rasters.lattice
     west_m, side_m, north_m = transform
-    if not math.isclose(side_m, lattice.resolution_m, rel_tol=_SAME_SIDE):
-        return
-    step = _half_step(lattice, west_m, north_m)
-    if step is not None:
-        where = f"{rasters.path} and {path}"
-        evidence = f"The first lie {_step(step)} off the pixels of the second."
-        findings.add("half-pixel-shift", where, evidence, "warning")
+    same_side = math.isclose(side_m, rasters.lattice.resolution_m, rel_tol=_SAME_SIDE)
+    if same_side and (step := _half_step(rasters.lattice, west_m, north_m)):
+        evidence = f"The first lie {step} off the pixels of the second."
+        findings.add("half-pixel-shift", f"{rasters.path} and {path}", evidence, "warning")
 
 
 def check_ways(ways: Ways, rasters: RxLevRasters, where: str, findings: Findings) -> None:
@@ -142,10 +119,8 @@ def check_ways(ways: Ways, rasters: RxLevRasters, where: str, findings: Findings
     inside = shapely.clip_by_rect(ways.geometry, *rasters.lattice.bounds_m)
     outside_m = length_m - float(shapely.length(inside).sum())
     if outside_m > _OUTSIDE_SHARE * length_m:
-        evidence = (
-            f"{outside_m / 1000:.1f} of {length_m / 1000:.1f} km of ways in the area lie outside "
-            f"the rasters."
-        )
+        share = f"{outside_m / 1000:.1f} of {length_m / 1000:.1f} km"
+        evidence = f"{share} of ways in the area lie outside the rasters."
         nothing = outside_m > (1 - _OUTSIDE_SHARE) * length_m
         findings.add("roads-outside-rasters", where, evidence, "error" if nothing else "warning")
 
@@ -155,10 +130,6 @@ def _area_box(area: Area) -> BoxDeg:
         lattice = area_lattice(area)
         return box_deg(lattice.crs, lattice.bounds_m)
     return map_bounds_deg(area.map)
-
-
-def _overlap(a: BoxDeg, b: BoxDeg) -> bool:
-    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
 def _inside(east: Floats, north: Floats, lattice: Lattice) -> Bools:
@@ -175,11 +146,10 @@ def _other_systems(box: BoxDeg) -> Iterator[str]:
 
 
 def _moves(lattice: Lattice) -> Iterator[tuple[str, str, Move]]:
-    """Yield mistakes that may have moved sites: code, words, and what undoes them."""
+    """Yield mistakes that may have moved sites: code, words, and the move that undoes them."""
 
     def swapped_degrees(east: Floats, north: Floats) -> tuple[Floats, Floats]:
-        lon, lat = unproject(lattice.crs, east, north)
-        return _projected(lattice.crs, lat, lon)
+        return _projected(lattice.crs, *unproject(lattice.crs, east, north)[::-1])
 
     def mirrored(east: Floats, north: Floats) -> tuple[Floats, Floats]:
         lon, lat = unproject(lattice.crs, east, north)
@@ -191,8 +161,8 @@ def _moves(lattice: Lattice) -> Iterator[tuple[str, str, Move]]:
     for crs in _other_systems(box):
         if same_crs(crs, lattice.crs):
             continue
-        said_other = f"With their numbers read as {lattice.crs}, not {crs}"
-        yield "crs-mixed", said_other, _read_as(crs, lattice.crs)
+        words = f"With their numbers read as {lattice.crs}, not {crs}"
+        yield "crs-mixed", words, _read_as(crs, lattice.crs)
         yield "crs-mixed", f"With their numbers read as {crs}", _read_as(lattice.crs, crs)
     yield "lon-lat-swapped", "With the other sign of longitude", mirrored
 
@@ -215,22 +185,15 @@ def _projected(crs: str, lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
     return np.where(on_earth, east, np.inf), np.where(on_earth, north, np.inf)
 
 
-def _half_step(lattice: Lattice, west_m: float, north_m: float) -> tuple[float, float] | None:
+def _half_step(lattice: Lattice, west_m: float, north_m: float) -> str:
     """Return by which parts of a pixel a lattice is off a corner, if that is half of one."""
-    right = (lattice.west_m - west_m) / lattice.resolution_m
-    up = (lattice.north_m - north_m) / lattice.resolution_m
-    off = right - math.floor(right), up - math.floor(up)
-    half = [abs(part - 0.5) <= _HALF_TOLERANCE_PX for part in off]
-    whole = [min(part, 1 - part) <= _HALF_TOLERANCE_PX for part in off]
-    return off if any(half) and all(h or w for h, w in zip(half, whole, strict=True)) else None
-
-
-def _step(off: tuple[float, float]) -> str:
-    return f"{off[0] % 1:.2f} pixels east and {off[1] % 1:.2f} north"
-
-
-def _metres(value: float) -> str:
-    return f"{value / 1000:.1f} km" if value >= 10_000 else f"{value:.0f} m"
+    right = (lattice.west_m - west_m) / lattice.resolution_m % 1
+    up = (lattice.north_m - north_m) / lattice.resolution_m % 1
+    half = [abs(part - 0.5) <= _HALF_TOLERANCE_PX for part in (right, up)]
+    whole = [min(part, 1 - part) <= _HALF_TOLERANCE_PX for part in (right, up)]
+    if any(half) and all(h or w for h, w in zip(half, whole, strict=True)):
+        return f"{right % 1:.2f} pixels east and {up % 1:.2f} north"
+    return ""
 
 
 def _shown(box: BoxDeg) -> str:

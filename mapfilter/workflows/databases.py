@@ -1,11 +1,10 @@
-"""``mapfilter merge``, ``export`` and ``info``: what can be done with databases and other files."""
+"""``mapfilter merge``, ``export`` and ``info``: databases merged, exported and described."""
 
 from __future__ import annotations
 
 import time
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +18,7 @@ from mapfilter.database.manifest import MANIFEST
 from mapfilter.database.merge import merge
 from mapfilter.database.store import info, open_database
 from mapfilter.errors import ConfigError, InputError, fail
-from mapfilter.rasters.formats import is_raster_folder
-from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.rasters.raster_set import is_raster_folder, open_rasters
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import is_log, read_log
 
@@ -29,55 +27,25 @@ _INDEX_COLUMN = b"TX_NAME"
 _LONGEST_LINE_BYTES = 1 << 16
 
 
-@dataclass(frozen=True)
-class MergeResult:
-    """What was merged.
-
-    Parameters
-    ----------
-    points, cells : int
-        Of the new database.
-    seconds : float
-        Wall time.
-    """
-
-    points: int
-    cells: int
-    database: Path
-    seconds: float
-
-
 def run_merge(
     databases: Sequence[Path],
     out: Path,
     *,
     without: Sequence[str] = (),
     progress: Progress | None = None,
-) -> MergeResult:
-    """Merge databases; within its area the word of a later one on its own cells counts.
-
-    Raises
-    ------
-    MapfilterError
-        A database is missing or damaged, they do not fit each other, or the output cannot be
-        written.
-    """
+) -> dict[str, Any]:
+    """Merge databases; within its area a later one overrides earlier ones in its own cells."""
     began_s = time.perf_counter()
     opened = [open_database(path, verify="full") for path in databases]
     ensure_writable_folder(out.parent)
     merged = merge(opened, out, without=without, progress=progress)
     points = int(merged.manifest["counts"]["points"])
-    return MergeResult(points, len(merged.cell_ids), out, time.perf_counter() - began_s)
+    seconds = time.perf_counter() - began_s
+    return {"points": points, "cells": len(merged.cell_ids), "database": out, "seconds": seconds}
 
 
 def run_export(database: Path, to: Path) -> dict[str, Any]:
-    """Write a database as GeoPackage, or its best server and margin as GeoTIFF.
-
-    Raises
-    ------
-    MapfilterError
-        The database is missing or damaged, the file's kind is unknown, or it cannot be written.
-    """
+    """Write a database as GeoPackage, or its best server and margin as GeoTIFF."""
     from mapfilter.database.export import export_cog, export_geopackage
 
     kind = to.suffix.lower()
@@ -94,13 +62,7 @@ def run_export(database: Path, to: Path) -> dict[str, Any]:
 
 
 def run_info(path: Path) -> dict[str, Any]:
-    """Return what is at a path, ready for JSON; a database's checksums are compared.
-
-    Raises
-    ------
-    MapfilterError
-        It is nothing that mapfilter reads, or it is damaged.
-    """
+    """Describe the file or folder at a path, ready for JSON; compare a database's checksums."""
     if not path.exists():
         raise fail(InputError, str(path), "a database, raster file or log", "nothing there")
     if path.is_file():
@@ -121,7 +83,7 @@ def run_info(path: Path) -> dict[str, Any]:
 
 
 def _no_raster(path: Path) -> str:
-    """Return what a file is for that is no raster, or an empty text."""
+    """Return the use of a file that is not a raster, or an empty text."""
     name = path.name.lower()
     if name.endswith(_MAPS):
         return "a map; use it as area.map"

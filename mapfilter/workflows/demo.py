@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress
@@ -19,66 +19,14 @@ from mapfilter.workflows.simulate import run_simulate
 
 _STAGES = ("predict", "build", "simulate", "replay")
 _OLD_FILTER = "candidate"
-
-
-@dataclass(frozen=True)
-class FilterFigures:
-    """How a filter found the walk.
-
-    Parameters
-    ----------
-    switched : bool
-        Whether the filter went over to tracking.
-    switch_distance_m, error_at_switch_m : float
-        After how many metres, and how far off; NaN if it never switched.
-    error_mean_m, error_67_m, error_95_m : float
-        Over the track from the switch on.
-    """
-
-    switched: bool
-    switch_distance_m: float
-    error_at_switch_m: float
-    error_mean_m: float
-    error_67_m: float
-    error_95_m: float
-
-
-@dataclass(frozen=True)
-class DemoResult:
-    """What the demo found: the figures are the Bayes map filter's.
-
-    Parameters
-    ----------
-    points, cells : int
-        Of the radio-route database.
-    track_m : float
-        Length of the walk.
-    switched : bool
-        Whether the filter went over to tracking.
-    switch_distance_m, error_at_switch_m : float
-        After how many metres, and how far off; NaN if it never switched.
-    error_mean_m, error_67_m, error_95_m : float
-        Over the track from the switch on.
-    candidate : FilterFigures
-        The same walk by the filter of Khalaf-Allah (2007), which takes no levels.
-    seconds : dict
-        Wall time of each stage.
-    outputs : tuple of Path
-        What was written; look at the pictures.
-    """
-
-    points: int
-    cells: int
-    track_m: float
-    switched: bool
-    switch_distance_m: float
-    error_at_switch_m: float
-    error_mean_m: float
-    error_67_m: float
-    error_95_m: float
-    candidate: FilterFigures
-    seconds: dict[str, float]
-    outputs: tuple[Path, ...]
+_FIGURES = (
+    "switched",
+    "switch_distance_m",
+    "error_at_switch_m",
+    "error_mean_m",
+    "error_67_m",
+    "error_95_m",
+)
 
 
 def run_demo(
@@ -87,7 +35,7 @@ def run_demo(
     *,
     seed: int | None = None,
     progress: Progress | None = None,
-) -> DemoResult:
+) -> dict[str, Any]:
     """Predict, build, simulate a walk and replay it by two filters, with the pictures of each.
 
     Parameters
@@ -101,20 +49,18 @@ def run_demo(
     progress : callable, optional
         Called with stages done and stages in all.
 
-    Raises
-    ------
-    MapfilterError
-        A setting is wrong, or the output cannot be written.
+    Returns
+    -------
+    dict
+        Points and cells of the database, length of the walk, whether, where and how accurately the
+        Bayes filter switched to tracking, its errors from then on (as in ``Accuracy``), the same
+        figures of the candidate filter, wall time of each stage, and all files written.
     """
     ensure_writable_folder(out)
     seeds = [] if seed is None else [f"journeys.seed={seed}"]
     with resources.as_file(resources.files("mapfilter.data")) as data:
-        config = load_config(
-            data / "demo.toml",
-            [*settings, *seeds],
-            out=out,
-            base=data / "world-plain.toml",
-        )
+        plain = data / "world-plain.toml"
+        config = load_config(data / "demo.toml", [*settings, *seeds], out=out, base=plain)
     seconds: dict[str, float] = {}
 
     @contextmanager
@@ -136,26 +82,20 @@ def run_demo(
         old_filter = config.filter.model_copy(update={"name": _OLD_FILTER})
         old_config = config.model_copy(update={"filter": old_filter})
         old = run_replay(old_config, out / _OLD_FILTER).logs[0]
-    files_written = [predicted.rasters, predicted.ground_truth, predicted.plan, built.database]
-    return DemoResult(
-        points=built.points,
-        cells=built.cells,
-        track_m=simulated.track_m,
-        **asdict(_figures(walk)),
-        candidate=_figures(old),
-        seconds=seconds,
-        outputs=(
-            *(f for f in files_written if f is not None),
-            simulated.path,
-            *built.pictures,
-            *walk.outputs,
-            *old.outputs,
-        ),
-    )
+    files = [predicted.rasters, predicted.ground_truth, predicted.plan, built.database]
+    pictures = (simulated.path, *built.pictures, *walk.outputs, *old.outputs)
+    return {
+        "points": built.points,
+        "cells": built.cells,
+        "track_m": simulated.track_m,
+        **_figures(walk),
+        "candidate": _figures(old),
+        "seconds": seconds,
+        "outputs": (*(file for file in files if file is not None), *pictures),
+    }
 
 
-def _figures(walk: ReplayedLog) -> FilterFigures:
-    score = walk.accuracy
-    if score is None:
+def _figures(walk: ReplayedLog) -> dict[str, Any]:
+    if walk.accuracy is None:
         raise AssertionError("a simulated walk has its truth")
-    return FilterFigures(*(getattr(score, one.name) for one in fields(FilterFigures)))
+    return {name: getattr(walk.accuracy, name) for name in _FIGURES}

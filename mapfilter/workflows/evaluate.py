@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Literal, get_args
 
 from mapfilter._io import ensure_writable_folder, write_json
 from mapfilter._parallel import Progress, local_executor
@@ -29,6 +28,7 @@ from mapfilter.experiments.benchmarks.world import (
     write_buildings,
 )
 from mapfilter.experiments.sweep.world import SweepWorld, write_world
+from mapfilter.filters.gaussian import METHODS
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import predict
 from mapfilter.propagation.shadowing import named_rng
@@ -44,21 +44,65 @@ NAMES = ("global-positioning", "audit", "ottawa")
 RUNS = 20
 TABLE = "table.json"
 _MISSING = 0.1
+WORLDS = ("easy", "plain")
+
+_DRAWN = "is drawn for each run; use --seed"
+_CASES = "is what the cases vary; use --case"
+_PREDICTS = "levels are predicted here, and the ground truth is drawn"
+_NO_JOURNEYS = "journeys are simulated here"
+_RUNS = "use --runs"
+_NO_TIMING = "no timing advances are simulated"
+_PICTURES = "no pictures are drawn here"
+REFUSED: Mapping[str, str] = {
+    "prediction.ground_truth.write": _PREDICTS,
+    "prediction.ground_truth.seed": _DRAWN,
+    "prediction.survey": _PREDICTS,
+    "rasters": _PREDICTS,
+    "database.path": "the database is built here",
+    "journeys.count": _RUNS,
+    "journeys.draws": _RUNS,
+    "journeys.seed": _DRAWN,
+    "journeys.radio": "the ground truth is what is received",
+    "track": _NO_JOURNEYS,
+    "filter.smooth": _CASES,
+    "filter.bayes.timing_step_m": _NO_TIMING,
+    "filter.bayes.timing_sd_m": _NO_TIMING,
+    "sweep": "there is no grid here; use mapfilter sweep",
+    "output.pictures": _PICTURES,
+}
+"""Settings, or sections of them, that have no meaning here, and why."""
+
+_OF_WALKERS = frozenset(
+    f"journeys.{name}"
+    for name in ("speed_mps", "beside", "change_side_m", "stop_every_m", "stop_s")
+)
+
+_OF_PARTICLES = frozenset(f"filter.bayes.{name}_particles" for name in ("max", "min_search", "min"))
+
+_STATED = (
+    "step_sd_m",
+    "heading_sd_deg",
+    "bias_sd_deg",
+    "drift_deg_per_sqrt_m",
+    "scale",
+    "antenna_height_m",
+    "antenna_height_sd_m",
+)
+_OF_THE_CASES: Mapping[str, str] = {
+    "prediction.ground_truth.level_error_db": "level_error_db",
+    "journeys.length_m": "length_m",
+    "imu.sigma_orient_deg": "imu.sigma_orient_deg",
+    "imu.bias_sd_deg": "imu.bias_sd_deg",
+    "imu.drift_deg_per_sqrt_s": "imu.drift_deg_per_sqrt_s",
+    "imu.scale": "imu.scale",
+    **{f"filter.bayes.{name}": name for name in _STATED},
+}
+"""Settings that hold in all cases once they are given, and the cases' own names for them."""
 
 
 @dataclass(frozen=True)
 class EvaluateResult:
-    """What a benchmark found.
-
-    Parameters
-    ----------
-    map : str
-        Name of the map's file.
-    points : int
-        Of the database.
-    seconds : float
-        Wall time.
-    """
+    """Results of a benchmark: the map's file, points of the database, all cases, wall time."""
 
     map: str
     seed: int
@@ -69,37 +113,30 @@ class EvaluateResult:
 
 
 def check_benchmark(name: str, data: Path | None = None) -> None:
-    """See that there is such a benchmark, and data where it needs them.
-
-    Raises
-    ------
-    ConfigError
-        There is not.
-    """
+    """Check that there is such a benchmark, and data where it needs them; ConfigError if not."""
     if name not in NAMES:
         raise fail(ConfigError, "evaluate", ", ".join(NAMES), name)
     if name == "ottawa" and data is None:
         raise fail(ConfigError, "--data", "the folder of the data sets", "none")
 
 
-def check_cases(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the cases that are asked for, or all but those with satellites.
-
-    Raises
-    ------
-    ConfigError
-        There is no such case.
-    """
+def check_names(names: Sequence[str], known: Collection[str]) -> tuple[str, ...]:
+    """Return the cases that are asked for, each once; ConfigError with all that are not known."""
     faults = Faults()
     for name in names:
-        if name not in CASES:
-            faults.add("--case", ", ".join(CASES), repr(name))
+        if name not in known:
+            faults.add("--case", ", ".join(known), repr(name))
     faults.raise_if_any(ConfigError)
-    return tuple(dict.fromkeys(names)) or USUAL
+    return tuple(dict.fromkeys(names))
+
+
+def check_cases(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the cases that are asked for, or all but those with satellites."""
+    return check_names(names, CASES) or USUAL
 
 
 def _check_lengths(names: Sequence[str], fixed: frozenset[str]) -> None:
-    """See that no length was set for cases that have their own."""
+    """Check that no length was set for cases that have their own."""
     own = [name for name in names if CASES[name].recovery_within_m > 0]
     if own and "length_m" in fixed:
         expected = f"none, as {' and '.join(own)} walk 800 m and 1 km"
@@ -127,10 +164,8 @@ def run_global_positioning(
         From :func:`mapfilter.workflows.evaluate.load_benchmark`.
     out : Path
         Gets the world, the finished batches and ``table.json``.
-    runs : int
-        Routes for each case.
-    seed : int
-        Of routes, ground truth and noise.
+    runs, seed : int
+        Routes for each case; seed of routes, ground truth and noise.
     cases : sequence of str
         All without satellites if there is none.
     workers : int
@@ -199,87 +234,24 @@ def _world(world: World, folder: Path, seed: int) -> tuple[BenchmarkWorld, int]:
     network = street_network(world.ways, world.routes)
     streets = SweepWorld(network, world.plan, world.lattice, {}, world.heights_m)
     write_world(streets, folder / STREETS)
-    errors, settings = (
-        config.prediction.ground_truth.of(GroundTruthErrors),
-        simulation_settings(config),
-    )
+    errors = config.prediction.ground_truth.of(GroundTruthErrors)
+    settings = simulation_settings(config)
     settings = replace(settings, reports=replace(settings.reports, radio="ground_truth"))
     reception = ReceptionModel(nlos=NlosModel() if config.journeys.nlos_satellites else None)
     return BenchmarkWorld(folder, model, errors, settings, antennas, reception), count
 
 
-WorldName = Literal["easy", "plain"]
-WORLDS: tuple[str, ...] = get_args(WorldName)
-
-_DRAWN = "is drawn for each run; use --seed"
-_CASES = "is what the cases vary; use --case"
-_PREDICTS = "levels are predicted here, and the ground truth is drawn"
-_NO_JOURNEYS = "journeys are simulated here"
-_RUNS = "use --runs"
-_NO_TIMING = "no timing advances are simulated"
-_PICTURES = "no pictures are drawn here"
-REFUSED: Mapping[str, str] = {
-    "prediction.ground_truth.write": _PREDICTS,
-    "prediction.ground_truth.seed": _DRAWN,
-    "prediction.survey": _PREDICTS,
-    "rasters": _PREDICTS,
-    "database.path": "the database is built here",
-    "journeys.count": _RUNS,
-    "journeys.draws": _RUNS,
-    "journeys.seed": _DRAWN,
-    "journeys.radio": "the ground truth is what is received",
-    "track": _NO_JOURNEYS,
-    "filter.smooth": _CASES,
-    "filter.bayes.smooth": _CASES,
-    "filter.bayes.timing_step_m": _NO_TIMING,
-    "filter.bayes.timing_sd_m": _NO_TIMING,
-    "sweep": "there is no grid here; use mapfilter sweep",
-    "output.pictures": _PICTURES,
-}
-"""Settings, or sections of them, that have no meaning here, and why."""
-
-_OF_WALKERS = frozenset(
-    f"journeys.{name}"
-    for name in ("speed_mps", "beside", "change_side_m", "stop_every_m", "stop_s")
-)
-
-_OF_PARTICLES = frozenset(f"filter.bayes.{name}_particles" for name in ("max", "min_search", "min"))
-
-_OF_THE_CASES: Mapping[str, str] = {
-    "prediction.ground_truth.level_error_db": "level_error_db",
-    "journeys.length_m": "length_m",
-    "imu.sigma_orient_deg": "imu.sigma_orient_deg",
-    "imu.bias_sd_deg": "imu.bias_sd_deg",
-    "imu.drift_deg_per_sqrt_s": "imu.drift_deg_per_sqrt_s",
-    "imu.scale": "imu.scale",
-    "filter.bayes.step_sd_m": "step_sd_m",
-    "filter.bayes.heading_sd_deg": "heading_sd_rad",
-    "filter.bayes.bias_sd_deg": "bias_sd_rad",
-    "filter.bayes.drift_deg_per_sqrt_m": "bias_drift_rad_per_sqrt_m",
-    "filter.bayes.scale": "scale_sd",
-    "filter.bayes.antenna_height_m": "height_m",
-    "filter.bayes.antenna_height_sd_m": "height_sd_m",
-}
-"""Settings that hold in all cases once they are given, and the cases' own names for them."""
-
-
 def load_benchmark(
     world: str, file: Path | None, settings: Sequence[str], *, out: Path | None = None
 ) -> tuple[Config, frozenset[str]]:
-    """Load a benchmark's configuration over that of a simulated world.
-
-    Parameters
-    ----------
-    world : str
-        One of :data:`WORLDS`.
-    file, settings, out
-        As for :func:`mapfilter.config.load.load_config`.
+    """Load a benchmark's configuration over that of a simulated world, one of :data:`WORLDS`.
 
     Returns
     -------
     config : Config
+        From file and settings, as by :func:`mapfilter.config.load.load_config`.
     fixed : frozenset of str
-        What the cases must not change, as it was set.
+        Names of what was set, and the cases must not change.
 
     Raises
     ------
@@ -316,10 +288,9 @@ def _refused(key: str, config: Config) -> str:
     if not key.startswith("filter.") or key == "filter.name":
         return ""
     chosen = config.filter.name
-    of_bayes = key.startswith("filter.bayes.")
+    *_, section, _ = key.split(".")
+    sections = {"candidate": "filter", "bayes": "bayes", "grid": "bayes"}
     particles = chosen == "bayes" or key not in _OF_PARTICLES
-    if chosen in ("bayes", "grid") and of_bayes and particles:
-        return ""
-    if chosen == "candidate" and not of_bayes:
+    if sections.get(chosen, "kalman" if chosen in METHODS else "") == section and particles:
         return ""
     return f"the filter {chosen} has no such option"

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from mapfilter._io import write_json
 from mapfilter._parallel import Progress, part_of
-from mapfilter.errors import ConfigError, Faults
 from mapfilter.experiments.benchmarks.scores import CaseResult
-from mapfilter.workflows.evaluate import TABLE, load_benchmark, run_global_positioning
+from mapfilter.workflows.evaluate import TABLE, check_names, load_benchmark, run_global_positioning
 from mapfilter.workflows.terminal import to_jsonable
 
 _GYRO = {
@@ -45,89 +44,92 @@ class Change:
 
     Parameters
     ----------
-    what : str
-        The change in words.
-    settings : mapping of str to str
-        The change as settings.
+    change : str
+        In words.
     world : {"easy", "plain"}
         That is changed.
     case : str
         Of the benchmark.
+    settings : dict of str to str
+        The change as settings.
     """
 
     name: str
-    what: str
-    settings: Mapping[str, str]
+    change: str
     world: str = "easy"
     case: str = "levels-6"
+    settings: dict[str, str] = field(default_factory=dict)
 
 
 CHANGES = {
     change.name: change
     for change in (
-        Change("easy", "nothing", {}),
-        Change("own-clutter", "the ground truth's clutter is its own", _CLUTTER),
-        Change("no-clutter", "prediction without random clutter", {"prediction.shadowing_db": "0"}),
+        Change("easy", "nothing"),
+        Change("own-clutter", "the ground truth's clutter is its own", settings=_CLUTTER),
+        Change(
+            "no-clutter",
+            "prediction without random clutter",
+            settings={"prediction.shadowing_db": "0"},
+        ),
         Change(
             "noisy-truth",
             "the same, and 6 dB more of shadowing in the ground truth",
-            {"prediction.shadowing_db": "0", "prediction.ground_truth.level_error_db": "9.22"},
+            settings={
+                "prediction.shadowing_db": "0",
+                "prediction.ground_truth.level_error_db": "9.22",
+            },
         ),
-        Change("heading", "heading error of 10°, correlated over 20 s", _HEADING),
-        Change("gyro", "no compass; a gyro's errors accumulate", _GYRO, case="levels-nocompass"),
-        Change("beside", "8 m beside the centre line", _BESIDE),
-        Change("scale", "step scale wanders by 10 % over 15 s", _SCALE),
-        Change("fading", "4 dB of fading", _FADING),
-        Change("model", "another propagation model, other streets and roofs", _MODEL),
-        Change("lengths", "shadowing of 15 m and of 100 m", _LENGTHS),
-        Change("phone", "the phone's levels are off by 4 dB", {"journeys.phone_offset_sd_db": "4"}),
-        Change("stops", "a stop of 20 s every 300 m", {"journeys.stop_every_m": "300"}),
+        Change("heading", "heading error of 10°, correlated over 20 s", settings=_HEADING),
+        Change(
+            "gyro",
+            "no compass; a gyro's errors accumulate",
+            case="levels-nocompass",
+            settings=_GYRO,
+        ),
+        Change("beside", "8 m beside the centre line", settings=_BESIDE),
+        Change("scale", "step scale wanders by 10 % over 15 s", settings=_SCALE),
+        Change("fading", "4 dB of fading", settings=_FADING),
+        Change("model", "another propagation model, other streets and roofs", settings=_MODEL),
+        Change("lengths", "shadowing of 15 m and of 100 m", settings=_LENGTHS),
+        Change(
+            "phone",
+            "the phone's levels are off by 4 dB",
+            settings={"journeys.phone_offset_sd_db": "4"},
+        ),
+        Change("stops", "a stop of 20 s every 300 m", settings={"journeys.stop_every_m": "300"}),
         Change(
             "all-but-gyro",
             "own clutter, heading, beside, scale and fading",
-            {**_CLUTTER, **_HEADING, **_BESIDE, **_SCALE, **_FADING},
+            settings=_CLUTTER | _HEADING | _BESIDE | _SCALE | _FADING,
         ),
-        Change("plain", "the plain world", {}, "plain"),
+        Change("plain", "the plain world", "plain"),
         Change(
             "plain-clutter",
             "the plain world, prediction with 6 dB of random clutter",
-            {"prediction.shadowing_db": "6"},
             "plain",
+            settings={"prediction.shadowing_db": "6"},
         ),
         Change(
             "plain-noisy-truth",
             "the plain world, 6 dB more of shadowing in the ground truth",
-            {"prediction.ground_truth.level_error_db": "7.81"},
             "plain",
+            settings={"prediction.ground_truth.level_error_db": "7.81"},
         ),
     )
 }
 """All rows by name, in the order of the table."""
 
 
-@dataclass(frozen=True)
-class AuditRow:
-    """One row of the table."""
+@dataclass(frozen=True, kw_only=True)
+class AuditRow(Change):
+    """One row of the table: a change, and the benchmark's result with it."""
 
-    name: str
-    change: str
-    world: str
-    case: str
-    settings: dict[str, str]
     result: CaseResult
 
 
 @dataclass(frozen=True)
 class AuditResult:
-    """What each change does to the benchmark.
-
-    Parameters
-    ----------
-    map : str
-        Name of the map's file.
-    seconds : float
-        Wall time.
-    """
+    """Results of the audit: the map's file, a row for each change, wall time."""
 
     map: str
     seed: int
@@ -170,14 +172,9 @@ def run_audit(
         There is no such row, or as the benchmark raises it.
     """
     began_s = time.perf_counter()
-    faults = Faults()
-    for name in names:
-        if name not in CHANGES:
-            faults.add("--case", ", ".join(CHANGES), repr(name))
-    faults.raise_if_any(ConfigError)
-    wanted = [CHANGES[name] for name in dict.fromkeys(names)] or list(CHANGES.values())
+    wanted = check_names(names, CHANGES) or tuple(CHANGES)
     rows, map_name = [], ""
-    for number, change in enumerate(wanted):
+    for number, change in enumerate(CHANGES[name] for name in wanted):
         given = [*settings, *(f"{key}={value}" for key, value in change.settings.items())]
         loaded, fixed = load_benchmark(change.world, config, given)
         result = run_global_positioning(
@@ -192,16 +189,7 @@ def run_audit(
             fixed=fixed,
         )
         map_name = result.map
-        rows.append(
-            AuditRow(
-                change.name,
-                change.what,
-                change.world,
-                change.case,
-                dict(change.settings),
-                result.cases[0],
-            )
-        )
+        rows.append(AuditRow(**vars(change), result=result.cases[0]))
     audit = AuditResult(map_name, seed, tuple(rows), time.perf_counter() - began_s, out)
     write_json(out / TABLE, to_jsonable(audit))
     return audit

@@ -56,15 +56,7 @@ _COLOURS = {"bayes": BLUE, "smoothed": GREEN, "centroid": GREY}
 
 @dataclass(frozen=True)
 class OttawaResult:
-    """What came of all sessions.
-
-    Parameters
-    ----------
-    seed, runs : int
-        Of the noise; draws of it for each session.
-    seconds : float
-        Wall time.
-    """
+    """Results of all sessions: seed and draws of the noise, tables, wall time."""
 
     seed: int
     runs: int
@@ -76,16 +68,9 @@ class OttawaResult:
 
 @dataclass(frozen=True)
 class Task:
-    """One session to be left out and found.
+    """One session to be left out and found on the map that the others make.
 
-    Parameters
-    ----------
-    session : Path
-        Its file.
-    others : tuple of Path
-        Of those that make the map.
-    folder : Path
-        Gets survey, database and what came out.
+    ``folder`` gets survey, database and results.
     """
 
     part: str
@@ -98,7 +83,7 @@ class Task:
 
     @property
     def result(self) -> Path:
-        """File of what came out."""
+        """File of the results."""
         return self.folder / FOUND
 
 
@@ -134,12 +119,9 @@ def run_ottawa(
 
     Raises
     ------
-    InputError
-        The data set is not there, or a file of it is no session.
-    ConfigError
-        There is something else to resume.
-    OutputError
-        The output cannot be written.
+    MapfilterError
+        The data set is not there, a file of it is no session, there is something else to resume, or
+        the output cannot be written.
     """
     began_s = time.perf_counter()
     chosen = options or OttawaOptions()
@@ -163,41 +145,32 @@ def run_ottawa(
     todo = [task for task in tasks if not (resume and task.result.is_file())]
     before = len(tasks) - len(todo)
 
-    def tell(done: int, _: int) -> None:
+    def report(done: int, _: int) -> None:
         if progress is not None:
             progress(before + done, len(tasks))
 
-    tell(0, 0)
+    report(0, 0)
     with local_executor(workers) as executor:
-        for _ in ordered_results(
-            executor, find_left_out, todo, in_flight=2 * workers, progress=tell
-        ):
-            pass
+        list(ordered_results(executor, find_left_out, todo, in_flight=2 * workers, progress=report))
     rows: list[PartRow] = []
-    told: list[SessionRow] = []
+    sessions: list[SessionRow] = []
     for part in parts:
         every = [read_left_out(task.result) for task in tasks if task.part == part]
         found = [one for left_out in every for one in left_out.found]
         centroid_m = {left_out.session: left_out.centroid_m for left_out in every}
         rows += part_rows(part, found, centroid_m)
-        told += session_rows(found, centroid_m)
+        sessions += session_rows(found, centroid_m)
         title = f"Ottawa, {part}: real phones, each session on the map of the others"
         picture = out / part / PICTURE
         save(plot_cumulative(_curves(every), title=title, most_m=_MOST_M, share=0.95), picture)
     seconds = time.perf_counter() - began_s
-    result = OttawaResult(seed, runs, tuple(rows), tuple(told), seconds, out)
+    result = OttawaResult(seed, runs, tuple(rows), tuple(sessions), seconds, out)
     write_json(out / TABLE, to_jsonable(result))
     return result
 
 
 def find_left_out(task: Task) -> None:
-    """Make the map of the other sessions, find the one that was left out, and keep what came out.
-
-    Raises
-    ------
-    MapfilterError
-        A file is no session, or the output cannot be written.
-    """
+    """Make the map of the other sessions, find the one that was left out, and keep the results."""
     session, others = read_session(task.session), [read_session(file) for file in task.others]
     surveyed, database = _map_of(others, task.folder)
     positioner = surveyed_positioner(
@@ -229,7 +202,7 @@ def _session_files(data: Path, part: str) -> list[Path]:
 def _map_of(others: Sequence[Session], folder: Path) -> tuple[Path, Path]:
     """Make levels, ways and database of sessions, as drive tests without a street map are."""
     files = [str(other.path) for other in others]
-    # The trend stays where nobody measured: not measured there is not the same as not received.
+    # The trend stays where there is no measurement, which does not mean that nothing is received.
     survey = {"files": files, "cross_validate": False, "fill": True}
     config = Config.model_validate(
         {
@@ -251,9 +224,10 @@ def _curves(every: Sequence[LeftOut]) -> list[Distribution]:
     for left_out in every:
         for one in left_out.found:
             errors_m.setdefault(one.method, []).append(one.error_m)
-    told = {name: np.concatenate([np.empty(0), *errors_m[name]]) for name in _COLOURS}
-    return [
-        Distribution(f"{name}, median {np.median(told[name]):.0f} m", told[name], colour)
-        for name, colour in _COLOURS.items()
-        if told[name].size
-    ]
+    curves = []
+    for name, colour in _COLOURS.items():
+        errors = np.concatenate([np.empty(0), *errors_m[name]])
+        if errors.size:
+            label = f"{name}, median {np.median(errors):.0f} m"
+            curves.append(Distribution(label, errors, colour))
+    return curves

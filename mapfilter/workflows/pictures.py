@@ -1,10 +1,11 @@
-"""Which pictures a database gets, and the rasters that it was built from."""
+"""Pictures of a database and of located logs; removal of those of an older run."""
 
 from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,12 +20,16 @@ from mapfilter.geodesy import Lattice
 from mapfilter.positioning.estimate import PositionedTrack, Snapshot
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.belief import MAX_PANELS, plot_belief, plot_candidates
-from mapfilter.report.canvas import BLUE, ORANGE, save
+from mapfilter.report.canvas import BLUE, ORANGE, Drawn, save
 from mapfilter.report.errors import plot_error_over_distance, plot_evidence
-from mapfilter.report.landuse import plot_landuse
-from mapfilter.report.network import plot_best_server, plot_level, plot_margin, plot_points_per_cell
-from mapfilter.report.track import plot_track
+from mapfilter.report.network import (
+    plot_best_server,
+    plot_landuse,
+    plot_level,
+    plot_margin,
+    plot_points_per_cell,
+)
+from mapfilter.report.track import MAX_PANELS, plot_belief, plot_candidates, plot_track
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.ways import Buildings
@@ -44,49 +49,60 @@ FIGURES = "figures.json"
 SUMMARY = "summary.json"
 
 PICTURES = ("candidates.png", "belief.png", "track.png", "error.png", "evidence.png")
+NETWORK_PICTURES = (
+    "coverage.png",
+    "best-server.png",
+    "margin.png",
+    "points-per-cell.png",
+    "points-of-one-site.png",
+    "land-use.png",
+)
 
 _OF_ONE_LOG = {*ESTIMATES, FIGURES, *PICTURES}
+_NEARLY_ALL = (1.0, 99.0)
+_IF_NONE_DBM = (-110.0, -50.0)
+_SQUARE_M = 5.0
 
 
 def clear_results(out: Path) -> None:
-    """Remove what an older replay wrote into a folder, so that no figures of two replays mix.
+    """Remove the files of an older replay from a folder, so that no figures of two replays mix.
 
-    A folder in it is one of that replay's when it is called as the log that its figures are of,
-    and holds nothing else. All other files stay.
+    A folder in it is removed where it is named as the log of its figures and holds nothing else.
+    All other files stay.
 
     Raises
     ------
     OutputError
         A file cannot be removed.
     """
-    try:
-        for name in (*_OF_ONE_LOG, SUMMARY):
-            (out / name).unlink(missing_ok=True)
-        for inner in sorted(out.iterdir()):
-            if _is_result(inner):
-                for file in inner.iterdir():
-                    file.unlink()
-                inner.rmdir()
-    except OSError as error:
-        what = error.strerror or error
-        raise fail(OutputError, str(error.filename or out), "a place to write", what) from error
+    clear_pictures(out, (*_OF_ONE_LOG, SUMMARY))
+    with _removal(out):
+        for inner in filter(_is_result, sorted(out.iterdir())):
+            for file in inner.iterdir():
+                file.unlink()
+            inner.rmdir()
 
 
-def clear_pictures(folder: Path, names: Sequence[str]) -> None:
-    """Remove older pictures from a folder, so that none shows what is gone.
+def clear_pictures(folder: Path, names: Iterable[str]) -> None:
+    """Remove files of an older run from a folder.
 
     Raises
     ------
     OutputError
         One cannot be removed.
     """
-    try:
+    with _removal(folder):
         for name in names:
             (folder / name).unlink(missing_ok=True)
+
+
+@contextmanager
+def _removal(folder: Path) -> Iterator[None]:
+    try:
+        yield
     except OSError as error:
-        what = error.strerror or error
-        where = str(error.filename or folder)
-        raise fail(OutputError, where, "a picture that can be removed", what) from error
+        what, where = error.strerror or error, error.filename or folder
+        raise fail(OutputError, str(where), "a file that can be removed", what) from error
 
 
 def _is_result(folder: Path) -> bool:
@@ -98,26 +114,6 @@ def _is_result(folder: Path) -> bool:
     except (ValueError, AttributeError, RecursionError):
         return False
     return of == folder.name and {file.name for file in folder.iterdir()} <= _OF_ONE_LOG
-
-
-NETWORK_PICTURES = (
-    "coverage.png",
-    "best-server.png",
-    "margin.png",
-    "points-per-cell.png",
-    "points-of-one-site.png",
-    "land-use.png",
-)
-
-_TITLES = (
-    "Level of the best server",
-    "Best server",
-    "Margin of the best server over the second",
-    "Points by best server",
-    "Land use",
-)
-_NEARLY_ALL = (1.0, 99.0)
-_IF_NONE_DBM = (-110.0, -50.0)
 
 
 def draw_network(
@@ -139,21 +135,14 @@ def draw_network(
 
     Parameters
     ----------
-    rasters : RxLevRasters
-        Levels or losses.
     folder : Path
         Made where it is missing; pictures of an older database in it are removed.
     area : Lattice, optional
         The part of the database's lattice that its roads were laid on, when that is not all.
     landuse : LandUse, optional
-        On that part: what the points were made from.
+        On that part: the classes that the points were laid on.
     buildings : Buildings, optional
         Without ``landuse``: drawn beside ways and squares.
-
-    Returns
-    -------
-    tuple of Path
-        The pictures, in this order.
 
     Raises
     ------
@@ -167,29 +156,31 @@ def draw_network(
     ensure_writable_folder(folder)
     clear_pictures(folder, NETWORK_PICTURES)
     everywhere = served_points(database, within)
-    window, points, told = everywhere.crowded_window(database.lattice), everywhere, ""
+    window, points, where = everywhere.crowded_window(), everywhere, ""
     if window != within:
         points = served_points(database, window)
         share = 100 * points.counts.sum() // everywhere.counts.sum()
-        told = f", where {share} % of the points lie"
+        where = f", where {share} % of the points lie"
     shown = database.lattice.window(*window)
     at_points = shown.rows * shown.cols * len(rasters.cell_ids) > MOST_READ_PX
     best = points.best if at_points else best_servers(rasters, database, shown)
     lattice, plan = best.lattice, database.plan
-    base = BaseMap(lattice.bounds_m, attribution=database.attribution)
-    drawn = [folder / name for name in NETWORK_PICTURES[:4]]
-    titles = [f"{title}{told}" for title in _TITLES]
-    ends_dbm = _ends(best.level_dbm)
-    on_map = lattice, plan, base
-    level = plot_level(best.level_dbm, *on_map, title=titles[0], range_dbm=ends_dbm)
-    save(level, drawn[0])
-    save(plot_best_server(best.server, plan.ids, *on_map, title=titles[1]), drawn[1])
-    save(plot_margin(best.margin_db, *on_map, title=titles[2]), drawn[2])
-    _draw_points(database, points, database.cell_ids, drawn[3], titles[3])
+    drawn: list[Path] = []
+
+    def keep(picture: Drawn, number: int) -> None:
+        drawn.append(save(picture, folder / NETWORK_PICTURES[number]))
+
+    on_map = lattice, plan, BaseMap(lattice.bounds_m, attribution=database.attribution)
+    title, ends_dbm = f"Level of the best server{where}", _ends(best.level_dbm)
+    keep(plot_level(best.level_dbm, *on_map, title=title, range_dbm=ends_dbm), 0)
+    keep(plot_best_server(best.server, plan.ids, *on_map, title=f"Best server{where}"), 1)
+    title = f"Margin of the best server over the second{where}"
+    keep(plot_margin(best.margin_db, *on_map, title=title), 2)
+    title = f"Points by best server{where}"
+    keep(_plot_points(database, points, database.cell_ids, title), 3)
     site, cells = Counter(cell.site for cell in plan.cells).most_common(1)[0]
     if cells > 1:
-        drawn.append(folder / NETWORK_PICTURES[4])
-        draw_site(database, everywhere, site, drawn[-1])
+        keep(_plot_site(database, everywhere, site), 4)
     classes = None
     if landuse is not None:
         _, step = thinned_lattice(shown)
@@ -199,37 +190,43 @@ def draw_network(
     elif buildings is not None and len(buildings):
         classes = land_use_of_map(points, buildings)
     if classes is not None:
-        drawn.append(folder / NETWORK_PICTURES[5])
-        below = BaseMap(points.best.lattice.bounds_m, attribution=database.attribution)
-        save(plot_landuse(classes, points.best.lattice, below, title=titles[4]), drawn[-1])
+        lattice = points.best.lattice
+        base = BaseMap(lattice.bounds_m, attribution=database.attribution)
+        keep(plot_landuse(classes, lattice, base, title=f"Land use{where}"), 5)
     return tuple(drawn)
 
 
-def draw_site(database: RadioRouteDatabase, points: ServedPoints, site: str, path: Path) -> None:
+def _plot_site(database: RadioRouteDatabase, points: ServedPoints, site: str) -> Drawn:
     """Draw the points that the sectors of one site serve best (the paper's Fig. 2).
 
     In an area that had to be thinned, only the surroundings of these points are shown.
     """
-    plan, lattice = database.plan, database.lattice
+    plan = database.plan
     cells = [cell.id for cell in plan.cells if cell.site == site]
     own = np.isin(points.best.server, [plan.index(cell_id) for cell_id in cells])
     row, col = np.nonzero(own)
-    if points.best.lattice.resolution_m > lattice.resolution_m and row.size:
+    if points.step > 1 and row.size:
         rows, cols = ((int(at.min()), int(at.max())) for at in (row, col))
-        points = served_points(database, points.window_about(rows, cols, lattice))
-    _draw_points(database, points, cells, path, f"Points served by site {site}")
+        points = served_points(database, points.window_about(rows, cols))
+    return _plot_points(database, points, cells, f"Points served by site {site}")
+
+
+def _plot_points(
+    database: RadioRouteDatabase, points: ServedPoints, cells: Sequence[str], title: str
+) -> Drawn:
+    numbers = [database.plan.index(cell_id) for cell_id in cells]
+    return plot_points_per_cell(
+        {cell_id: points.places(number) for cell_id, number in zip(cells, numbers, strict=True)},
+        database.plan,
+        street_map(database, points),
+        title=title,
+        counts=points.counts[numbers].tolist(),
+        resolution_m=points.best.lattice.resolution_m,
+    )
 
 
 def land_use_of_map(points: ServedPoints, buildings: Buildings) -> LandUse:
-    """Return the land use of a street map: ways, squares, buildings, and the rest.
-
-    Parameters
-    ----------
-    points : ServedPoints
-        What is walkable.
-    buildings : Buildings
-        In the CRS of the points.
-    """
+    """Return the land use of a street map: ways, squares, buildings, and the rest."""
     code = np.where(rasterise_heights(buildings, points.best.lattice) > 0, 2, 3).astype(np.int16)
     there = points.best.server >= 0
     code[there] = np.where(points.on_square[there], 1, 0)
@@ -249,28 +246,6 @@ def _ends(level_dbm: Floats32) -> tuple[float, float]:
     return float(low), float(max(high, low + 10))
 
 
-def _draw_points(
-    database: RadioRouteDatabase,
-    points: ServedPoints,
-    cells: Sequence[str],
-    path: Path,
-    title: str,
-) -> None:
-    numbers = [database.plan.index(cell_id) for cell_id in cells]
-    drawn = plot_points_per_cell(
-        {cell_id: points.places(number) for cell_id, number in zip(cells, numbers, strict=True)},
-        database.plan,
-        street_map(database, points),
-        title=title,
-        counts=points.counts[numbers].tolist(),
-        resolution_m=points.best.lattice.resolution_m,
-    )
-    save(drawn, path)
-
-
-_SQUARE_M = 5.0
-
-
 def draw_track(
     database: RadioRouteDatabase, log: TrackLog, track: PositionedTrack, folder: Path
 ) -> tuple[Path, ...]:
@@ -279,20 +254,20 @@ def draw_track(
     Of the candidate filter these are candidates thinning out (Fig. 1 of the paper).
     """
     base, truth = street_map(database, served_points(database)), Truth.of_table(log.truth)
-    drawn = []
     estimate, evidence = track.estimate, track.estimate.evidence
+    drawn: dict[str, Drawn] = {}
     if track.snapshots and evidence is None:
-        chosen = choose_snapshots(track.snapshots, _candidates)
-        drawn.append(save(plot_candidates(chosen, truth, base), folder / "candidates.png"))
+        chosen = choose_snapshots(track.snapshots, lambda one: one.weight.size)
+        drawn["candidates.png"] = plot_candidates(chosen, truth, base)
     elif track.snapshots:
         chosen = choose_snapshots(track.snapshots, _places)
-        drawn.append(save(plot_belief(chosen, truth, base), folder / "belief.png"))
-    drawn.append(save(plot_track(estimate, truth, base), folder / "track.png"))
+        drawn["belief.png"] = plot_belief(chosen, truth, base)
+    drawn["track.png"] = plot_track(estimate, truth, base)
     if truth is not None:
-        drawn.append(save(plot_error_over_distance(estimate, truth), folder / "error.png"))
+        drawn["error.png"] = plot_error_over_distance(estimate, truth)
     if evidence is not None and len(estimate):
-        drawn.append(save(plot_evidence(estimate, truth), folder / "evidence.png"))
-    return tuple(drawn)
+        drawn["evidence.png"] = plot_evidence(estimate, truth)
+    return tuple(save(picture, folder / name) for name, picture in drawn.items())
 
 
 def choose_snapshots(
@@ -300,8 +275,7 @@ def choose_snapshots(
 ) -> list[Snapshot]:
     """Choose at most six: the first, the last, and between them even steps of the thinning out.
 
-    Steps are even in the logarithm of ``spread``, the number of places that a belief is spread
-    over, because that is how it falls.
+    Steps are even in the logarithm of ``spread``, the number of places in a belief.
     """
     if len(snapshots) <= MAX_PANELS:
         return list(snapshots)
@@ -315,12 +289,8 @@ def choose_snapshots(
     return [snapshots[i] for i in sorted(chosen)]
 
 
-def _candidates(snapshot: Snapshot) -> float:
-    return float(snapshot.hypothesis_east_m.size)
-
-
 def _places(snapshot: Snapshot) -> float:
-    """Return the effective number of squares that a belief of probabilities is spread over."""
+    """Return the effective number of squares in a belief (the exponential of its entropy)."""
     if not snapshot.weight.size:
         return 0.0
     at_m = np.array([snapshot.hypothesis_east_m, snapshot.hypothesis_north_m])

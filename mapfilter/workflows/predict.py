@@ -25,6 +25,9 @@ from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.workflows.world import World, check_cells_near, map_cover
 
+if TYPE_CHECKING:
+    from mapfilter.workflows.survey import SurveyResult
+
 _PREDICTION_TAG = "PREDICTION_SHA256"
 
 
@@ -94,47 +97,27 @@ def check_only_own_replaced(*paths: Path) -> None:
     faults.raise_if_any(OutputError)
 
 
-if TYPE_CHECKING:
-    from mapfilter.workflows.survey import SurveyResult
-
-
 @dataclass(frozen=True)
 class PredictResult:
-    """What was predicted.
-
-    Parameters
-    ----------
-    cells, rows, cols : int
-        Counts of cells and pixels.
-    rasters : Path
-        The predicted levels.
-    ground_truth : Path or None
-        The levels of the simulated ground truth, where asked for.
-    plan : Path
-        The cell plan used, as CSV.
-    notes : tuple of str
-        How much of the area the map covers if not nearly all, where building heights come from,
-        what lies outside the model's published range, and which antennas were measured at another
-        frequency.
-    """
+    """Size and files of a prediction."""
 
     cells: int
     rows: int
     cols: int
     rasters: Path
+    """The predicted levels."""
     ground_truth: Path | None
+    """The levels of the simulated ground truth, where asked for."""
     plan: Path
+    """The cell plan used, as CSV."""
     notes: tuple[str, ...]
+    """How much of the area the map covers if not nearly all, where building heights come from,
+    what lies outside the model's published range, and which antennas were measured at another
+    frequency."""
 
 
 def run_predict(config: Config, progress: Progress | None = None) -> PredictResult | SurveyResult:
-    """Predict every cell of the plan over the area, or make the map of a survey's measurements.
-
-    Raises
-    ------
-    MapfilterError
-        The area, map or plan is wrong, or the output cannot be written.
-    """
+    """Predict every cell of the plan over the area, or make the map of a survey's measurements."""
     target, ground_truth = config.rasters_path, config.ground_truth_path
     surveyed, both = config.prediction.model == "survey", config.prediction.ground_truth.write
     check_only_own_replaced(
@@ -158,27 +141,17 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
         *outside_validity(plan, lattice, model),
         *off_frequency(plan, antennas),
     )
-    heights_m = world.heights_m
-    wanted = 2 if both else 1
+    parts = 2 if both else 1
     tags = {"SOFTWARE": f"mapfilter {VERSION}", "MODEL": model.model, "MAP": world.map_name}
-    levels = predict(
-        plan, lattice, heights_m, model, part_of(progress, 0, wanted), antennas=antennas
-    )
+    given = plan, lattice, world.heights_m, model
+    levels = predict(*given, part_of(progress, 0, parts), antennas=antennas)
     write_rasters(target, lattice, levels, plan.ids, tags)
-    if wanted == 2:
+    if both:
         errors = config.prediction.ground_truth.of(GroundTruthErrors)
-        real = simulate_ground_truth(
-            plan, lattice, heights_m, model, errors, part_of(progress, 1, wanted), antennas=antennas
-        )
+        part = part_of(progress, 1, parts)
+        real = simulate_ground_truth(*given, errors, part, antennas=antennas)
         write_rasters(ground_truth, lattice, real, plan.ids, {**tags, **ground_truth_tags(target)})
     plan_path = config.output.dir / "cells.csv"
     write_cell_plan(plan, plan_path)
-    return PredictResult(
-        len(plan),
-        lattice.rows,
-        lattice.cols,
-        target,
-        ground_truth if wanted == 2 else None,
-        plan_path,
-        notes,
-    )
+    size = len(plan), lattice.rows, lattice.cols
+    return PredictResult(*size, target, ground_truth if both else None, plan_path, notes)

@@ -6,8 +6,9 @@ import hashlib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -15,16 +16,16 @@ from mapfilter._io import ensure_writable_folder, path_fault, shown, write_json
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats
 from mapfilter.config.sections import Config
+from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
 from mapfilter.evaluation.accuracy import Accuracy, Outcome, Truth, accuracy, outcome
 from mapfilter.evaluation.success import SuccessSummary, summarise
 from mapfilter.filters.contract import Reason
-from mapfilter.filters.gaussian import METHODS
 from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
-from mapfilter.positioning.filter import Filter, locate
+from mapfilter.positioning.filter import Filter, FilterOptions, locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.report.canvas import save
@@ -82,7 +83,7 @@ def lacking(log: TrackLog, estimate: TrackEstimate) -> str:
         lacks.append("no motion")
     elif not (moved & log.motion["heading_rad"].notna()).any():
         turns = log.motion["turn_rad"].notna().any()
-        lacks.append("no heading" + (" (turns alone do not tell it)" if turns else ""))
+        lacks.append("no heading" + (" (turns alone do not give one)" if turns else ""))
     return " and ".join(lacks)
 
 
@@ -178,19 +179,19 @@ class ReplayResult:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What was done in part only: cells unknown to the database, logs that lack something."""
-        told = []
+        found = []
         unknown = _sum(log.outcome.unknown_cells for log in self.logs)
         if unknown:
             verb = "cell is" if len(unknown) == 1 else "cells are"
             where = _named([log.name for log in self.logs if log.outcome.unknown_cells])
-            told.append(
+            found.append(
                 f"{len(unknown)} {verb} unknown to the database ({_named(list(unknown))}; in "
                 f"{where}); their readings are labelled {Reason.UNKNOWN_CELL}"
             )
         for lack in sorted({log.lack for log in self.logs if log.lack}):
             names = [log.name for log in self.logs if log.lack == lack]
-            told.append(f"nothing is located in {_named(names)}: {lack}")
-        return tuple(told)
+            found.append(f"nothing is located in {_named(names)}: {lack}")
+        return tuple(found)
 
 
 def route_of(log: TrackLog) -> str:
@@ -263,10 +264,6 @@ def _shared_notes(logs: Sequence[ReplayedLog]) -> list[str]:
     return [f"{note} (in {_named(names)})" for note, names in owners.items()]
 
 
-SITE_FILTERS = tuple(METHODS)
-"""Filters that need the sites of a cell plan, and no database."""
-
-
 def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -> ReplayResult:
     """Locate the log or logs of a configuration and write estimates, figures and pictures.
 
@@ -285,9 +282,20 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         The database, the cell plan, an antenna or a log is missing or damaged, or the output
         cannot be written.
     """
-    replay = _Sites(config) if config.filter.name in SITE_FILTERS else _OnDatabase(config)
+    options = filter_choice(config.filter)
+    database = _database(config, options)
     folders = list_logs(config.track_path)
-    replay.check(folders)
+
+    @cache
+    def over(crs: str) -> Filter[Any]:
+        if database is not None and not isinstance(options, KalmanFilter):
+            return options.over(database)
+        plan = planned_cells(config, crs) if database is None else database.plan
+        return cast(KalmanFilter, options).over_sites(plan, plan_antennas(config, plan))
+
+    if database is not None:
+        check_logs(folders, database.lattice)
+        over(database.lattice.crs)
     ensure_writable_folder(out)
     clear_results(out)
     logs: list[ReplayedLog] = []
@@ -296,10 +304,16 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         log = leave_out(read_log(folder), config.track.without)
         rng = named_rng(config.journeys.seed, "replay", folder.name)
         drawn = wanted == "all" or (wanted == "first" and not index)
-        track = locate(log, replay.filter_for(log), rng, snapshots=drawn)
+        filter_ = over(log.crs if database is None else database.lattice.crs)
+        track = locate(log, filter_, rng, snapshots=drawn)
         into = out if len(folders) == 1 else out / folder.name
-        pictures = replay.draw(log, track, into) if drawn else ()
-        lack = replay.lack(log, track.estimate)
+        if database is None:
+            pictures = _draw_errors(log, track, into) if drawn else ()
+        else:
+            pictures = draw_track(database, log, track, into) if drawn else ()
+        lack = lacking(log, track.estimate)
+        if isinstance(options, KalmanFilter):
+            lack = "" if track.estimate.converged_at is not None else "too little was measured"
         logs.append(_write(folder.name, log, track, into, pictures, lack))
         if progress is not None:
             progress(index + 1, len(folders))
@@ -309,56 +323,22 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
     return result
 
 
-class _OnDatabase:
-    """Replays by a filter over a radio-route database."""
-
-    def __init__(self, config: Config) -> None:
-        self.database = open_database(config.database_path, verify="full")
-        self.options = filter_choice(config.filter)
-        self.filter: Filter[Any] | None = None
-
-    def check(self, folders: Sequence[Path]) -> None:
-        check_logs(folders, self.database.lattice)
-        self.filter = self.options.over(self.database)
-
-    def filter_for(self, log: TrackLog) -> Filter[Any]:  # noqa: ARG002
-        if self.filter is None:
-            raise AssertionError("checked before")
-        return self.filter
-
-    def draw(self, log: TrackLog, track: PositionedTrack, into: Path) -> tuple[Path, ...]:
-        return draw_track(self.database, log, track, into)
-
-    def lack(self, log: TrackLog, estimate: TrackEstimate) -> str:
-        return lacking(log, estimate)
-
-
-class _Sites:
-    """Replays by a Kalman-type filter over the sites of a cell plan."""
-
-    def __init__(self, config: Config) -> None:
-        if config.cells.plan is None:
-            hint = "filters without a map take the sites from there"
+def _database(config: Config, options: FilterOptions) -> RadioRouteDatabase | None:
+    """Open the database, unless the filter only needs sites, and a cell plan has them."""
+    if isinstance(options, KalmanFilter):
+        if config.cells.plan is not None:
+            return None
+        if config.database.path is None:
+            hint = "filters without a map take the sites from there, or from a database (--db)"
             raise fail(ConfigError, "cells.plan", "a cell plan", "none", hint)
-        self.config = config
+    return open_database(config.database_path, verify="full")
 
-    def check(self, folders: Sequence[Path]) -> None:
-        """Accept logs in any CRS: the plan is projected to theirs."""
 
-    def filter_for(self, log: TrackLog) -> Filter[Any]:
-        section = self.config.filter
-        options = KalmanFilter(method=section.name, smooth=section.smooth)  # type: ignore[arg-type]
-        plan = planned_cells(self.config, log.crs)
-        return options.over_sites(plan, plan_antennas(self.config, plan))
-
-    def draw(self, log: TrackLog, track: PositionedTrack, into: Path) -> tuple[Path, ...]:
-        truth = Truth.of_table(log.truth)
-        if truth is None:
-            return ()
-        return (save(plot_error_over_distance(track.estimate, truth), into / "error.png"),)
-
-    def lack(self, log: TrackLog, estimate: TrackEstimate) -> str:  # noqa: ARG002
-        return "" if estimate.converged_at is not None else "too little was measured"
+def _draw_errors(log: TrackLog, track: PositionedTrack, into: Path) -> tuple[Path, ...]:
+    truth = Truth.of_table(log.truth)
+    if truth is None:
+        return ()
+    return (save(plot_error_over_distance(track.estimate, truth), into / "error.png"),)
 
 
 def _write(

@@ -48,10 +48,8 @@ def run_reproduce(
 
     Parameters
     ----------
-    name : str
-        One of :data:`mapfilter.experiments.papers.PAPERS`.
-    out : Path
-        Folder of everything.
+    name, out
+        One of :data:`mapfilter.experiments.papers.PAPERS`; folder of everything.
     map_name, bbox
         Only for papers that run on a map: as ``area.map``, by default a synthetic city; west,
         south, east, north in degrees.
@@ -60,11 +58,8 @@ def run_reproduce(
         :class:`mapfilter.experiments.papers.fritsche_klein_2009.scene.Layout`.
     trials : int, optional
         Trials, or runs in each cell of a grid; the paper's by default.
-    seed : int
-    workers, cluster
-        As for :func:`mapfilter.workflows.sweep.run_sweep`.
-    progress : callable, optional
-        Called with parts of the work done and parts in all.
+    workers, cluster, progress
+        As for :func:`mapfilter.workflows.sweep.run_sweep`; progress counts parts of the work.
 
     Returns
     -------

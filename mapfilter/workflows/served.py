@@ -1,4 +1,4 @@
-"""Which cell serves where, thinned to what a picture can show, whatever the size of the area."""
+"""Best servers of rasters and points of a database, thinned to what a picture can show."""
 
 from __future__ import annotations
 
@@ -36,24 +36,15 @@ Window = tuple[int, int, int, int]
 
 @dataclass(frozen=True, eq=False)
 class BestServers:
-    """The strongest cell at every pixel of an area, thinned to what a picture shows.
-
-    Parameters
-    ----------
-    lattice : Lattice
-        Of the arrays.
-    server : numpy.ndarray of int32, shape (rows, cols)
-        Index into the database's cells; -1 where none is received.
-    level_dbm : numpy.ndarray of float32, shape (rows, cols)
-        NaN where nothing is predicted.
-    margin_db : numpy.ndarray of float32, shape (rows, cols)
-        Above the second best; infinite where there is none, NaN where none is received.
-    """
+    """The strongest cell at every pixel of an area, thinned to what a picture shows."""
 
     lattice: Lattice
     server: Ints32
+    """Index into the database's cells, (rows, cols); -1 where none is received."""
     level_dbm: Floats32
+    """NaN where nothing is predicted."""
     margin_db: Floats32
+    """Above the second best; infinite where there is none, NaN where none is received."""
 
     @classmethod
     def nowhere(cls, lattice: Lattice) -> BestServers:
@@ -65,25 +56,19 @@ class BestServers:
 
 @dataclass(frozen=True, eq=False)
 class ServedPoints:
-    """The points of a database, at most one for each pixel of a picture.
-
-    Parameters
-    ----------
-    window : (row, col, rows, cols)
-        Where they lie on the database's lattice.
-    best : BestServers
-        At the pixels that hold a point.
-    number : numpy.ndarray of int64, shape (rows, cols)
-        Points at each pixel.
-    counts : numpy.ndarray of int64, shape (cells,)
-        Points that each cell serves best, all of them.
-    """
+    """The points of a database, at most one for each pixel of a picture."""
 
     window: Window
+    """Where they lie on the database's lattice."""
+    step: int
+    """Pixels of that lattice along a side of a pixel of the picture."""
     best: BestServers
+    """At the pixels that hold a point."""
     number: Ints
+    """Points at each pixel."""
     on_square: Bools
     counts: Ints
+    """Points that each cell serves best, all of them."""
 
     def places(self, cell: int | None = None) -> tuple[Floats, Floats]:
         """Return east and north of the points, or of those that a cell serves."""
@@ -92,46 +77,26 @@ class ServedPoints:
         east_m, north_m = self.best.lattice.east_north(row, col)
         return np.asarray(east_m), np.asarray(north_m)
 
-    def window_about(
-        self, rows: tuple[int, int], cols: tuple[int, int], lattice: Lattice
-    ) -> Window:
-        """Return a window of the database's lattice that holds some pixels with room about them.
-
-        Parameters
-        ----------
-        rows, cols : (first, last)
-            Of the pixels.
-        lattice : Lattice
-            The database's.
-        """
-        step = round(self.best.lattice.resolution_m / lattice.resolution_m)
+    def window_about(self, rows: tuple[int, int], cols: tuple[int, int]) -> Window:
+        """Return a window of the database's lattice about some pixels (first, last), with room."""
         around = int(_AROUND * max(rows[1] - rows[0], cols[1] - cols[0], _LEAST_PX)) + 1
         top, left, high, wide = self.window
-        first_row, first_col = max(rows[0] - around, 0), max(cols[0] - around, 0)
-        last_row = min(step * (rows[1] + around + 1), high)
-        last_col = min(step * (cols[1] + around + 1), wide)
-        first_row, first_col = step * first_row, step * first_col
+        first_row = self.step * max(rows[0] - around, 0)
+        first_col = self.step * max(cols[0] - around, 0)
+        last_row = min(self.step * (rows[1] + around + 1), high)
+        last_col = min(self.step * (cols[1] + around + 1), wide)
         return top + first_row, left + first_col, last_row - first_row, last_col - first_col
 
-    def crowded_window(self, lattice: Lattice) -> Window:
-        """Return a window that holds nearly all points, where most of the area is empty.
-
-        Else, as where that is more than half of the area, all of it.
-
-        Parameters
-        ----------
-        lattice : Lattice
-            The database's.
-        """
+    def crowded_window(self) -> Window:
+        """Return a window of nearly all points; the whole if that is less than twice as large."""
         if not self.number.any():
             return self.window
         low, high = _NEARLY_ALL
         ends = []
         for axis in (1, 0):
             share = np.cumsum(self.number.sum(axis=axis)) / self.number.sum()
-            first, last = int(np.argmax(share > low)), int(np.argmax(share >= high))
-            ends.append((first, last))
-        found = self.window_about(ends[0], ends[1], lattice)
+            ends.append((int(np.argmax(share > low)), int(np.argmax(share >= high))))
+        found = self.window_about(*ends)
         is_small = 2 * found[2] * found[3] < self.window[2] * self.window[3]
         return found if is_small else self.window
 
@@ -224,18 +189,11 @@ def served_points(database: RadioRouteDatabase, window: Window | None = None) ->
         on_square[at] = read["on_square"]
         np.add.at(number, at, 1)
         counts += np.bincount(server, minlength=len(counts))
-    return ServedPoints((top, left, rows, cols), best, number, on_square, counts)
+    return ServedPoints((top, left, rows, cols), step, best, number, on_square, counts)
 
 
 def common_window(lattice: Lattice, part: Lattice, where: str) -> Window:
-    """Return the pixels of a lattice that lie on another: row, col, rows, cols.
-
-    Parameters
-    ----------
-    lattice, part : Lattice
-        Such as those of rasters and of a database.
-    where : str
-        What the second is of.
+    """Return the window of a lattice that lies on another, which ``where`` names.
 
     Raises
     ------
@@ -250,7 +208,7 @@ def common_window(lattice: Lattice, part: Lattice, where: str) -> Window:
 
 
 def street_map(database: RadioRouteDatabase, points: ServedPoints) -> BaseMap:
-    """Return the base map of some points: they, and whose map they come from."""
+    """Return the base map of some points, with the attribution of their database."""
     lattice = points.best.lattice
     return BaseMap(
         lattice.bounds_m,

@@ -24,31 +24,18 @@ from mapfilter.workflows.world import World, check_cells_near, planned_rasters
 
 @dataclass(frozen=True)
 class SimulateResult:
-    """What was simulated.
-
-    Parameters
-    ----------
-    logs : int
-        Journeys times draws.
-    track_m : float
-        True length of each journey.
-    path : Path
-        Folder that holds one log folder for each.
-    """
+    """Number, length and folder of simulated journeys."""
 
     logs: int
+    """Journeys times draws."""
     track_m: float
+    """True length of each journey."""
     path: Path
+    """Folder that holds one log folder for each."""
 
 
 def run_simulate(config: Config, progress: Progress | None = None) -> SimulateResult:
-    """Simulate journeys and write their logs; a folder of older logs is replaced as a whole.
-
-    Raises
-    ------
-    MapfilterError
-        The area, map, plan or rasters are wrong, or the output cannot be written.
-    """
+    """Simulate journeys and write their logs; a folder of older logs is replaced as a whole."""
     world = World.of(config)
     settings = simulation_settings(config)
     as_predicted = settings.reports.radio == "as_predicted"
@@ -78,7 +65,7 @@ def run_simulate(config: Config, progress: Progress | None = None) -> SimulateRe
 
 
 def _check_replaceable(folder: Path) -> None:
-    """See that nothing but logs that mapfilter wrote is lost when a folder is replaced."""
+    """Check that a folder to be replaced holds nothing but logs that mapfilter wrote."""
     for inner in sorted(folder.iterdir()) if folder.is_dir() else ():
         if not is_log(inner):
             expected = "a folder of logs, or nothing yet"

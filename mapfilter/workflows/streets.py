@@ -1,7 +1,8 @@
-"""Where one can be in the area of a configuration, from whatever files it names."""
+"""Lattice, ways, squares, buildings and water of the area of a configuration."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -28,6 +29,7 @@ from mapfilter.survey.measurements import Measurements, read_measurements
 
 LARGEST_AREA_PX = 400_000_000
 EARTH_RADIUS_M = 6_371_000.0
+OSM_ATTRIBUTION = "© OpenStreetMap contributors (ODbL)"
 
 _SHORT_M = 100.0
 _SCALE_TOLERANCE = 0.03
@@ -63,22 +65,19 @@ def area_lattice(area: Area, *, on_map: bool = True) -> Lattice:
         crs = projected_crs(area.crs, "area.crs") if area.crs else utm_crs(*centre)
         edges = project(crs, [west, east, east, west], [south, south, north, north])
         bounds_m = (*np.min(edges, axis=1), *np.max(edges, axis=1))
-    faults = Faults()
     if not np.all(np.isfinite(bounds_m)):
-        faults.add("area", f"a box that {crs} can show", bounds_m, "a CRS of another region")
-        faults.raise_if_any(InputError)
+        expected = f"a box that {crs} can show"
+        raise fail(InputError, "area", expected, bounds_m, "a CRS of another region")
+    faults = Faults()
     width_m, height_m = bounds_m[2] - bounds_m[0], bounds_m[3] - bounds_m[1]
     if max(width_m, height_m) < area.resolution_m:
         expected = f"metres, at most the area's {max(width_m, height_m):.0f}"
         faults.add("area.resolution_m", expected, area.resolution_m, "a resolution in another unit")
     pixels = width_m * height_m / area.resolution_m**2
     if pixels > LARGEST_AREA_PX:
-        faults.add(
-            "area",
-            f"at most {LARGEST_AREA_PX:.0e} pixels",
-            f"{pixels:.1e} at {area.resolution_m:g} m",
-            "a box or a resolution in the wrong unit",
-        )
+        expected, got = f"at most {LARGEST_AREA_PX:.0e} pixels", f"{pixels:.1e}"
+        hint = "a box or a resolution in the wrong unit"
+        faults.add("area", expected, f"{got} at {area.resolution_m:g} m", hint)
     faults.raise_if_any(ConfigError)
     if on_map and area.map_is_a_file:
         check_on_map(area.map, crs, bounds_m)
@@ -131,7 +130,7 @@ def check_scale(crs: str, bounds_m: tuple[float, float, float, float], where: st
 
 
 def city_of(area: Area, crs: str) -> SyntheticCity | None:
-    """Return the city that is made for an area, in a CRS; None where a map or nothing is named.
+    """Return the synthetic city of an area, in a CRS; None where a map or nothing is named.
 
     It fills the area as configured, whatever part of it rasters cover.
 
@@ -142,29 +141,18 @@ def city_of(area: Area, crs: str) -> SyntheticCity | None:
     """
     if area.map not in SYNTHETIC_MAPS:
         return None
-    return _made(area.model_copy(update={"crs": crs}))
+    return _synthetic(area.model_copy(update={"crs": crs}))
 
 
 @lru_cache(maxsize=2)
-def _made(area: Area) -> SyntheticCity:
+def _synthetic(area: Area) -> SyntheticCity:
     lattice = area_lattice(area)
-    if area.map == SYNTHETIC_MAP:
-        return synthetic_city(lattice, area.seed)
-    return manhattan(lattice)
-
-
-OSM_ATTRIBUTION = "© OpenStreetMap contributors (ODbL)"
+    return synthetic_city(lattice, area.seed) if area.map == SYNTHETIC_MAP else manhattan(lattice)
 
 
 @dataclass(frozen=True)
 class Streets:
-    """Ways, squares, buildings and water of an area; each is read when it is first asked for.
-
-    Parameters
-    ----------
-    lattice : Lattice
-        Of the area.
-    """
+    """Ways, squares, buildings and water of an area; each is read when it is first asked for."""
 
     config: Config
     lattice: Lattice
@@ -227,15 +215,15 @@ class Streets:
         """What was left out, cut out, resampled or assumed."""
         if self.landuse is not None:
             return self.landuse.notes
-        roads, told = self.config.roads, list(self._roads.notes)
-        told += unused_classes(self._roads.ways, roads.half_width_by_class_m)
+        roads, notes = self.config.roads, list(self._roads.notes)
+        notes += unused_classes(self._roads.ways, roads.half_width_by_class_m)
         if self.gaps:
-            told.append(self.gaps)
+            notes.append(self.gaps)
         if roads.cut_buildings and len(self.buildings):
-            told.append(f"{len(self.buildings)} buildings cut out")
+            notes.append(f"{len(self.buildings)} buildings cut out")
         if self._water is not None:
-            told.append(f"{len(self._water)} waters cut out, save under bridges")
-        return tuple(told)
+            notes.append(f"{len(self._water)} waters cut out, save under bridges")
+        return tuple(notes)
 
     @property
     def gaps(self) -> str:
@@ -288,7 +276,11 @@ class Streets:
             wide_m = within_reach_m(lattice.bounds_m, roads.half_width_m, by_class_m)
             return _corridors(self.config, lattice.crs, wide_m)
         if roads.layer is None and self._city is not None:
-            return _made_roads(self._city, self.config)
+            walking, squares = roads.profile == "walking", self._city.squares
+            ways = self._city.ways if walking else self._city.driving_ways
+            area = self.config.area
+            note = f"streets of a city that does not exist: {area.map}, seed {area.seed}"
+            return Roads(ways, squares if roads.squares and walking else None, (note,))
         if roads.layer is None and not self._has_map:
             if roads.landuse is not None:
                 return Roads(Ways.none(lattice.crs))
@@ -324,35 +316,25 @@ class Streets:
         return Water(crs, np.concatenate([water.geometry for water in waters]))
 
 
-def _made_roads(city: SyntheticCity, config: Config) -> Roads:
-    """Return the ways and squares of a made city that a profile may use."""
-    area, roads = config.area, config.roads
-    walking = roads.profile == "walking"
-    ways = city.ways if walking else city.driving_ways
-    squares = city.squares if roads.squares and walking else None
-    return Roads(
-        ways, squares, (f"streets of a city that does not exist: {area.map}, seed {area.seed}",)
-    )
-
-
 def _parts(path: Path) -> list[Path]:
-    """Return the files of a folder, or of a shapefile what it keeps beside itself."""
+    """Return the files of a folder, or a file, a shapefile with its table."""
     if path.is_dir():
         return sorted(inner for inner in path.iterdir() if inner.is_file())
     table = path.with_suffix(".dbf")
     return [path, table] if path.suffix.lower() == ".shp" and table.is_file() else [path]
 
 
+def measurements_of(config: Config, files: Sequence[Path], crs: str | None) -> Measurements:
+    """Read measurements as the section of the survey describes them."""
+    survey = config.prediction.survey
+    columns, gap_s = survey.columns.given or None, survey.session_gap_s
+    return read_measurements(files, crs, format=survey.format, columns=columns, session_gap_s=gap_s)
+
+
 def _corridors(config: Config, crs: str, bounds_m: Bounds) -> Roads:
-    """Return the ways that the tracks of measurements make, cut to a box."""
-    tracks, survey = config.roads.tracks, config.prediction.survey
-    read = read_measurements(
-        tracks.files,
-        crs,
-        format=survey.format,
-        columns=survey.columns.given or None,
-        session_gap_s=survey.session_gap_s,
-    )
+    """Return the ways along the tracks of measurements, cut to a box."""
+    tracks = config.roads.tracks
+    read = measurements_of(config, tracks.files, crs)
     found = corridors(
         crs,
         [_positions(read, session) for session in range(len(read.sessions))],
@@ -369,7 +351,7 @@ def _corridors(config: Config, crs: str, bounds_m: Bounds) -> Roads:
 
 
 def _positions(read: Measurements, session: int) -> Positions:
-    """Return the places of a session, in the order of time; a report's rows share one."""
+    """Return the positions of a session, in the order of time; a report's rows share one."""
     own = np.flatnonzero(read.session == session)
     own = own[np.argsort(read.time_s[own], kind="stable")]
     moved = np.hypot(np.diff(read.east_m[own]), np.diff(read.north_m[own])) > 0

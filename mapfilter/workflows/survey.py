@@ -28,10 +28,11 @@ from mapfilter.survey.measured_map import (
     fit_survey,
     leave_out,
 )
-from mapfilter.survey.measurements import Measurements, named_after, read_measurements
+from mapfilter.survey.measurements import Measurements, named_after
 from mapfilter.survey.survey_rasters import predicted_levels, surveyed_plan, write_survey
 from mapfilter.workflows.pictures import clear_pictures
 from mapfilter.workflows.served import thinned_lattice
+from mapfilter.workflows.streets import measurements_of
 from mapfilter.workflows.world import (
     LARGEST_AREA_PX,
     area_lattice,
@@ -49,27 +50,15 @@ _CELLS = 3
 
 @dataclass(frozen=True, eq=False)
 class SurveyEvidence:
-    """A survey as written, and what it was made from.
-
-    Parameters
-    ----------
-    measurements : Measurements
-        In the CRS of the rasters.
-    reach_m : float
-        Places farther from every reading of a cell count as not measured.
-    levels, deviations : RxLevRasters
-        On one lattice.
-    left_out : LeftOut, optional
-        What left-out sessions showed.
-    attribution : str
-        Whose measurements they are.
-    """
+    """A survey as written, with its measurements; all in one CRS, rasters on one lattice."""
 
     measurements: Measurements
     reach_m: float
+    """Places farther from every reading of a cell count as not measured."""
     levels: RxLevRasters
     deviations: RxLevRasters
     left_out: LeftOut | None = None
+    """Measured and predicted levels of left-out sessions."""
     attribution: str = ""
 
 
@@ -87,26 +76,21 @@ def draw_survey(survey: SurveyEvidence, folder: Path) -> tuple[Path, ...]:
     """
     levels, left_out_levels = (folder / name for name in SURVEY_PICTURES)
     save(plot_surveyed_levels(*_surveyed(survey)), levels)
-    told = survey.left_out
-    if told is None or not len(told):
+    left_out = survey.left_out
+    if left_out is None or not len(left_out):
         return (levels,)
+    folds, sessions = left_out.folds, left_out.sessions
+    parts = f"{sessions} sessions" + (f" in {folds} groups" if folds < sessions else "")
+    if sessions == 1:
+        parts = f"{folds} parts of one session"
     drawn = plot_left_out(
-        told.measured_dbm,
-        told.predicted_dbm,
-        title=_named(told),
-        trend_dbm=told.trend_dbm,
+        left_out.measured_dbm,
+        left_out.predicted_dbm,
+        title=f"{parts}, each predicted from the others",
+        trend_dbm=left_out.trend_dbm,
         attribution=survey.attribution,
     )
     return levels, save(drawn, left_out_levels)
-
-
-def _named(left_out: LeftOut) -> str:
-    """Return what was left out, as a title."""
-    folds, sessions = left_out.folds, left_out.sessions
-    if sessions == 1:
-        return f"{folds} parts of one session, each predicted from the others"
-    groups = f" in {folds} groups" if folds < sessions else ""
-    return f"{sessions} sessions{groups}, each predicted from the others"
 
 
 def _surveyed(survey: SurveyEvidence) -> tuple[list[SurveyedLevels], BaseMap]:
@@ -114,23 +98,21 @@ def _surveyed(survey: SurveyEvidence) -> tuple[list[SurveyedLevels], BaseMap]:
     rows, whole = survey.measurements, survey.levels.lattice
     near = outside_m(rows.east_m, rows.north_m, whole) <= survey.reach_m
     counts = np.bincount(rows.cell[near], minlength=len(rows.cell_ids))
-    shown = [
-        index
-        for index in np.argsort(-counts, kind="stable").tolist()
-        if counts[index] and rows.cell_ids[index] in survey.levels.cell_ids
-    ][:_CELLS]
-    if not shown:
+    cells: list[SurveyedLevels] = []
+    for index in np.argsort(-counts, kind="stable").tolist():
+        if counts[index] and rows.cell_ids[index] in survey.levels.cell_ids:
+            own = rows.where(near & (rows.cell == index))
+            cells.append(_cell(survey, own, rows.cell_ids[index]))
+        if len(cells) == _CELLS:
+            break
+    if not cells:
         expected = "measurements of cells of the survey's rasters"
         raise fail(InputError, str(survey.levels.path), expected, "none", "rasters of another area")
-    cells = [
-        _cell(survey, rows.where(near & (rows.cell == index)), rows.cell_ids[index])
-        for index in shown
-    ]
     return cells, BaseMap(whole.bounds_m, attribution=survey.attribution)
 
 
 def _cell(survey: SurveyEvidence, own: Measurements, cell_id: str) -> SurveyedLevels:
-    """Return the map about a cell's own measurements, thinned to what a picture can show."""
+    """Return the map about a cell's measurements, thinned to what a picture can show."""
     whole = survey.levels.lattice
     row, col = whole.row_col(own.east_m, own.north_m)
     around = ceil(survey.reach_m / whole.resolution_m)
@@ -148,39 +130,26 @@ def _cell(survey: SurveyEvidence, own: Measurements, cell_id: str) -> SurveyedLe
 
 @dataclass(frozen=True)
 class SurveyResult:
-    """What was made of a survey.
-
-    Parameters
-    ----------
-    cells, rows, cols : int
-        Counts of cells and pixels.
-    measurements, sessions : int
-        Levels that the map was made from, and the sessions they come from.
-    rasters, deviation : Path
-        Mean levels, and how far off they may be.
-    ground_truth : None
-        A survey has no simulated ground truth.
-    plan : Path
-        The surveyed cells, as CSV: what ``mapfilter build`` takes with these rasters.
-    validation : Validation or None
-        How well left-out sessions were told.
-    notes : tuple of str
-        Rows and cells left out, and what was estimated.
-    pictures : tuple of Path
-        What was drawn of it, in the folder ``pictures`` of the output.
-    """
+    """Size, files and validation of the map of a survey."""
 
     cells: int
     rows: int
     cols: int
     measurements: int
+    """Levels that the map was made from."""
     sessions: int
     rasters: Path
+    """Mean levels."""
     deviation: Path
+    """Standard deviations of the levels."""
     ground_truth: None
+    """A survey has no simulated ground truth."""
     plan: Path
+    """The surveyed cells, as CSV: what ``mapfilter build`` takes with these rasters."""
     validation: Validation | None
+    """Errors of the prediction of left-out sessions."""
     notes: tuple[str, ...]
+    """Rows and cells left out, and what was estimated."""
     pictures: tuple[Path, ...] = ()
 
 
@@ -189,12 +158,6 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
 
     Without an area the lattice covers the measurements; with rasters to calibrate it is theirs.
     With cross-validation the deviations are stretched to what left-out sessions showed.
-
-    Raises
-    ------
-    MapfilterError
-        Measurements, area, plan or rasters are wrong or do not fit each other, or the output
-        cannot be written.
     """
     section = config.prediction.survey
     options = section.of(SurveyOptions)
@@ -233,69 +196,52 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         frequency_mhz=config.cells.frequency_mhz,
     )
     write_cell_plan(cells, plan_path)
-    evidence = SurveyEvidence(
-        measurements, options.reach_m, open_rasters(target), open_rasters(deviation), left_out
-    )
+    pictures: tuple[Path, ...] = ()
+    clear_pictures(config.pictures_path, SURVEY_PICTURES)
+    if config.output.pictures != "none":
+        rasters = open_rasters(target), open_rasters(deviation)
+        evidence = SurveyEvidence(measurements, options.reach_m, *rasters, left_out)
+        pictures = draw_survey(evidence, config.pictures_path)
     return SurveyResult(
-        len(ids),
-        lattice.rows,
-        lattice.cols,
-        len(measurements),
-        len(np.unique(measurements.session)),
-        target,
-        deviation,
-        None,
-        plan_path,
-        validation,
-        (*measurements.notes, *survey.notes, *_advice(config, survey, factor)),
-        _draw(config, evidence),
+        cells=len(ids),
+        rows=lattice.rows,
+        cols=lattice.cols,
+        measurements=len(measurements),
+        sessions=len(np.unique(measurements.session)),
+        rasters=target,
+        deviation=deviation,
+        ground_truth=None,
+        plan=plan_path,
+        validation=validation,
+        notes=(*measurements.notes, *survey.notes, *_advice(config, survey, factor)),
+        pictures=pictures,
     )
-
-
-def _draw(config: Config, evidence: SurveyEvidence) -> tuple[Path, ...]:
-    """Draw the survey; pictures of an older one are removed in any case."""
-    folder = config.pictures_path
-    clear_pictures(folder, SURVEY_PICTURES)
-    return () if config.output.pictures == "none" else draw_survey(evidence, folder)
 
 
 @dataclass(frozen=True, eq=False)
 class SurveyInputs:
-    """What a survey is made of.
-
-    Parameters
-    ----------
-    measurements : Measurements
-        In the CRS of the lattice.
-    plan : CellPlan or None
-        Of the cells whose antennas are known.
-    lattice : Lattice
-        Of the rasters to be made.
-    predicted : RxLevRasters or None
-        To calibrate.
-    """
+    """Measurements, plan, lattice and rasters that a survey is made of; all in one CRS."""
 
     measurements: Measurements
     plan: CellPlan | None
+    """Of the cells whose antennas are known."""
     lattice: Lattice
+    """Of the rasters to be made."""
     predicted: RxLevRasters | None
+    """To calibrate."""
 
 
 def survey_inputs(config: Config) -> SurveyInputs:
-    """Read what the survey of a configuration is made of.
-
-    Raises
-    ------
-    MapfilterError
-        Measurements, area, plan or rasters are wrong or do not fit each other.
-    """
+    """Read what the survey of a configuration is made of."""
     section = config.prediction.survey
     if not section.files:
         raise fail(ConfigError, "prediction.survey.files", "measurement files", "none")
     predicted = None
     if section.calibrate is not None:
         predicted = open_by_section(section.calibrate, config.rasters)
-    given = _given_lattice(config, predicted)
+    given = predicted.lattice if predicted is not None else None
+    if predicted is None and config.area.has_box:
+        given = area_lattice(config.area, on_map=False)
     measurements, plan = _measurements(config, given)
     reach_m = section.of(SurveyOptions).reach_m
     lattice = given or _lattice_about(measurements, reach_m, config.area.resolution_m)
@@ -312,13 +258,7 @@ def _measurements(config: Config, lattice: Lattice | None) -> tuple[Measurements
     crs = lattice.crs if lattice is not None else None
     if crs is None and config.area.crs is not None:
         crs = projected_crs(config.area.crs, "area.crs")
-    found = read_measurements(
-        section.files,
-        crs,
-        format=section.format,
-        columns=section.columns.given or None,
-        session_gap_s=section.session_gap_s,
-    ).accurate(section.max_accuracy_m)
+    found = measurements_of(config, section.files, crs).accurate(section.max_accuracy_m)
     if not len(found):
         expected = f"positions accurate to {section.max_accuracy_m:g} m"
         raise fail(InputError, "measurements", expected, "none")
@@ -328,23 +268,11 @@ def _measurements(config: Config, lattice: Lattice | None) -> tuple[Measurements
     return named_after(found, plan), plan
 
 
-def _given_lattice(config: Config, rasters: RxLevRasters | None) -> Lattice | None:
-    if rasters is not None:
-        return rasters.lattice
-    area = config.area
-    if not area.has_box:
-        return None
-    return area_lattice(area, on_map=False)
-
-
 def _lattice_about(measurements: Measurements, reach_m: float, resolution_m: float) -> Lattice:
-    bounds_m = (
-        float(measurements.east_m.min()) - reach_m,
-        float(measurements.north_m.min()) - reach_m,
-        float(measurements.east_m.max()) + reach_m,
-        float(measurements.north_m.max()) + reach_m,
-    )
-    width_m, height_m = bounds_m[2] - bounds_m[0], bounds_m[3] - bounds_m[1]
+    at_m = np.array([measurements.east_m, measurements.north_m])
+    west, south = (at_m.min(axis=1) - reach_m).tolist()
+    east, north = (at_m.max(axis=1) + reach_m).tolist()
+    bounds_m, width_m, height_m = (west, south, east, north), east - west, north - south
     pixels = width_m * height_m / resolution_m**2
     if pixels > LARGEST_AREA_PX:
         expected = f"at most {LARGEST_AREA_PX:.0e} pixels about all measurements"
@@ -355,17 +283,10 @@ def _lattice_about(measurements: Measurements, reach_m: float, resolution_m: flo
     return Lattice.covering(measurements.crs, bounds_m, resolution_m)
 
 
-def _check_inside(measurements: Measurements, lattice: Lattice, reach_m: float) -> None:
-    west, south, east, north = lattice.bounds_m
-    inside = (
-        (measurements.east_m > west - reach_m)
-        & (measurements.east_m < east + reach_m)
-        & (measurements.north_m > south - reach_m)
-        & (measurements.north_m < north + reach_m)
-    )
-    if not inside.any():
+def _check_inside(rows: Measurements, lattice: Lattice, reach_m: float) -> None:
+    if not (outside_m(rows.east_m, rows.north_m, lattice) < reach_m).any():
         bounds = ", ".join(f"{value:.0f}" for value in lattice.bounds_m)
-        place = f"about {measurements.east_m.mean():.0f}, {measurements.north_m.mean():.0f}"
+        place = f"about {rows.east_m.mean():.0f}, {rows.north_m.mean():.0f}"
         hint = "latitude and longitude swapped, or another area"
         raise fail(InputError, "measurements", f"some in the area {bounds}", place, hint)
 
@@ -376,19 +297,19 @@ def _predicted(
     if rasters is None:
         return None
     if plan is None and rasters.quantity == "loss":
-        hint = "the cell plan says what to take the losses from"
+        hint = "levels are the EIRP of each cell less its loss"
         raise fail(ConfigError, "cells.plan", "the plan of the losses to calibrate", "none", hint)
     return predicted_levels(rasters, plan)
 
 
 def _advice(config: Config, survey: Survey, factor: float) -> list[str]:
     weakest_dbm = min(float(cell.points.level_dbm.min()) for cell in survey.cells.values())
-    told = []
+    notes = []
     if factor != 1.0:
-        told.append(f"deviations multiplied by {factor:.2f}, as left-out sessions showed")
+        notes.append(f"deviations multiplied by {factor:.2f}, as left-out sessions showed")
     if weakest_dbm < config.database.floor_dbm:
-        told.append(
+        notes.append(
             f"levels down to {weakest_dbm:.0f} dBm were measured, below database.floor_dbm = "
             f"{config.database.floor_dbm:g}: build leaves out what is weaker than that"
         )
-    return told
+    return notes

@@ -18,29 +18,37 @@ from mapfilter.config.axes import parse_axis
 from mapfilter.config.load import load_config, load_keys
 from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, Faults
-from mapfilter.evaluation.success import COORDINATES, SuccessCell, success_cells, varied_keys
+from mapfilter.evaluation.success import (
+    COORDINATES,
+    HEADING,
+    SuccessCell,
+    axes_of,
+    success_cells,
+    varied_keys,
+)
+from mapfilter.experiments.sweep.plan import NOISE_AXES
 from mapfilter.experiments.sweep.run import seconds_per_run, sweep
 from mapfilter.experiments.sweep.table import read_runs
-from mapfilter.report.canvas import save
-from mapfilter.report.success import plot_run_distributions, plot_success_curves, plot_success_map
+from mapfilter.report.canvas import Drawn, save
+from mapfilter.report.success import (
+    place_words,
+    plot_run_distributions,
+    plot_success_curves,
+    plot_success_map,
+)
 from mapfilter.report.table import write_table
 from mapfilter.workflows.sweep_plan import sweep_databases, sweep_plans, sweep_world
 
-_NOISES = ("sigma_trans_m", "sigma_orient_deg")
-_UNITS = {
-    "prediction_error_db": "prediction error {:g} dB",
-    "report_period_s": "reports every {:g} s",
-    "imu_period_s": "dead reckoning every {:g} s",
-    "update_length_m": "updates of {:g} m",
-    "bias_sd_deg": "bias {:g}°",
-    "drift_deg_per_sqrt_s": "drift {:g}°/√s",
-    "scale": "scale {:g}",
-}
+_WHITE = {f"{section}{name}" for section in ("", "imu.") for name in NOISE_AXES[:2]}
 _MOST_CURVES, _MOST_GROUPS = 8, 16
+_PLACES = ("sweep.databases", "database.path", "output.dir")
+
+
+_FOUND = ("runs", "success", "low", "high", "wrong", "error_mean_m", "switch_distance_m")
 
 
 def draw_sweep(runs: pd.DataFrame, out: Path) -> tuple[Path, ...]:
-    """Draw curves, a map and distributions for each group of a sweep; groups differ in all but σ.
+    """Draw curves, a map and distributions for each group of a sweep.
 
     Returns
     -------
@@ -48,75 +56,41 @@ def draw_sweep(runs: pd.DataFrame, out: Path) -> tuple[Path, ...]:
         ``success.png``, ``success-map.png`` and ``distributions.png``, with numbers before the
         ending where there are several groups, of which the first 16 are drawn.
     """
-    drawn: list[Path] = []
+    pictures: list[Path] = []
     groups = list(groups_of(runs))[:_MOST_GROUPS]
     for number, (title, rows) in enumerate(groups, start=1):
+        cells = success_cells(rows)
+        curves: dict[str, list[SuccessCell]] = {}
+        for cell in sorted(cells, key=lambda one: one.sigma_trans_m):
+            curves.setdefault(f"step {cell.sigma_trans_m:g} m", []).append(cell)
+        one_step = rows[rows["sigma_trans_m"] == rows["sigma_trans_m"].min()]
+        by_heading = [(f"heading {sigma:g}°", some) for sigma, some in one_step.groupby(HEADING)]
+        drawn: dict[str, Drawn] = {
+            "success": plot_success_curves(list(curves.items())[:_MOST_CURVES], title=title),
+            "success-map": plot_success_map(cells, title=title),
+            "distributions": plot_run_distributions(by_heading[:_MOST_CURVES], title=title),
+        }
         tail = f"-{number}" if len(groups) > 1 else ""
-        drawn += draw_group(rows, out, tail, title)
-    return tuple(drawn)
-
-
-def draw_group(rows: pd.DataFrame, out: Path, tail: str, title: str) -> list[Path]:
-    """Draw the pictures of runs that differ in white noise only."""
-    names = ("success", "success-map", "distributions")
-    paths = [out / f"{name}{tail}.png" for name in names]
-    cells = success_cells(rows)
-    by_step = _by_step(cells)
-    save(plot_success_curves(list(by_step.items())[:_MOST_CURVES], title=title), paths[0])
-    save(plot_success_map(cells, title=title), paths[1])
-    one = rows[rows["sigma_trans_m"] == sorted(rows["sigma_trans_m"].unique())[0]]
-    by_heading = [(f"heading {sigma:g}°", some) for sigma, some in one.groupby("sigma_orient_deg")]
-    save(plot_run_distributions(by_heading[:_MOST_CURVES], title=title), paths[2])
-    return paths
+        pictures += [save(picture, out / f"{name}{tail}.png") for name, picture in drawn.items()]
+    return tuple(pictures)
 
 
 def groups_of(runs: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
     """Yield the runs by all coordinates but the white noises, each with a title."""
-    white = {*_NOISES, *(f"imu.{name}" for name in _NOISES)}
-    axes = [name for name in (*COORDINATES, *varied_keys(runs)) if name not in white]
+    axes = [name for name in (*COORDINATES, *varied_keys(runs)) if name not in _WHITE]
     several = [name for name in axes if runs[name].nunique(dropna=False) > 1]
     for place, rows in runs.groupby(axes, sort=False, dropna=False):
         at = dict(zip(axes, place, strict=True))
-        yield _title(at, several), rows
-
-
-def _title(at: Mapping[str, object], several: list[str]) -> str:
-    name, reading = at["filter"], at["reading"]
-    parts = [f"{name} filter" if reading == name else f"{name} filter: {reading}"]
-    for axis in several:
-        if axis in _UNITS and pd.notna(at[axis]):
-            parts.append(_UNITS[axis].format(at[axis]))
-        elif axis in ("database", "radio"):
-            parts.append(str(at[axis]))
-        elif "." in axis:
-            parts.append(f"{axis} {at[axis]:g}")
-    return ", ".join(parts)
-
-
-def _by_step(cells: tuple[SuccessCell, ...]) -> dict[str, list[SuccessCell]]:
-    curves: dict[str, list[SuccessCell]] = {}
-    for cell in sorted(cells, key=lambda one: one.sigma_trans_m):
-        curves.setdefault(f"step {cell.sigma_trans_m:g} m", []).append(cell)
-    return curves
-
-
-_PLACES = ("sweep.databases", "database.path", "output.dir")
+        name, reading = at["filter"], at["reading"]
+        named = f"{name} filter" if reading == name else f"{name} filter: {reading}"
+        yield ", ".join([named, *place_words(at, several)]), rows
 
 
 @dataclass(frozen=True)
 class SweepResult:
-    """What a sweep found.
+    """Results of a sweep.
 
-    Parameters
-    ----------
-    cells : tuple of SuccessCell
-        One for each cell of the grid.
-    table : Path
-        One row for each run.
-    tables : tuple of Path
-        One row for each cell of the grid, as CSV and as LaTeX.
-    seconds : float
-        Wall time.
+    ``table`` has one row for each run, ``tables`` (CSV, LaTeX) one for each cell of the grid.
     """
 
     runs: int
@@ -130,17 +104,9 @@ class SweepResult:
 def load_sweep(
     file: Path | None, settings: Sequence[str] = (), *, out: Path | None = None
 ) -> Config:
-    """Read and check the configuration of a sweep.
+    """Read and check the configuration of a sweep, as :func:`mapfilter.config.load.load_config`.
 
-    Parameters
-    ----------
-    file, settings, out
-        As for :func:`mapfilter.config.load.load_config`.
-
-    Raises
-    ------
-    ConfigError
-        With every fault of the configuration, databases that are not there included.
+    Databases that are not there are reported with the faults of the configuration.
     """
     try:
         return load_config(file, settings, out=out)
@@ -173,16 +139,10 @@ def vary_axes(given: Sequence[str]) -> dict[str, tuple[float, ...]]:
 
 @dataclass(frozen=True)
 class SweepForecast:
-    """What a sweep would take.
+    """Runs of a sweep, combinations of varied options, and estimated times.
 
-    Parameters
-    ----------
-    points : int
-        Combinations of varied options.
-    seconds_per_run : float
-        Of one process, from a short trial.
-    seconds : float
-        Of the whole sweep by that many workers, without predictions, tables and pictures.
+    ``seconds_per_run`` is that of one process, from a short trial, and ``seconds`` that of the
+    whole sweep by its workers, without predictions, tables and pictures.
     """
 
     runs: int
@@ -194,18 +154,7 @@ class SweepForecast:
 def forecast_sweep(
     config: Config, axes: Mapping[str, Sequence[float]] | None = None, *, workers: int = 1
 ) -> SweepForecast:
-    """Check a sweep's inputs, count its runs, and estimate its time from a few of them.
-
-    Parameters
-    ----------
-    config, axes, workers
-        As for :func:`run_sweep`.
-
-    Raises
-    ------
-    MapfilterError
-        Plan, databases, area, map or rasters are wrong.
-    """
+    """Check the inputs of :func:`run_sweep`, count its runs, and estimate its time from a few."""
     plans, databases = sweep_plans(config, axes)
     world = sweep_world(config, plans[0].radios)
     folders = {name: database.path for name, database in databases.items()}
@@ -281,21 +230,10 @@ def sweep_executor(workers: int, cluster: str | None) -> Iterator[tuple[Executor
         yield executor, (2 if cluster is None else 3) * at_once
 
 
-_FOUND = ("runs", "success", "low", "high", "wrong", "error_mean_m", "switch_distance_m")
-_ACROSS, _NAME = "sigma_orient_deg", "reading"
-
-
 def cell_table(cells: Sequence[SuccessCell]) -> pd.DataFrame:
     """Return one row for each cell: coordinates in which the cells differ, and main figures."""
-    rows = [_place(cell) for cell in cells]
-    names = [*_different(rows), *_FOUND]
-    return pd.DataFrame(
-        [
-            [{**row, **asdict(cell)}[name] for name in names]
-            for row, cell in zip(rows, cells, strict=True)
-        ],
-        columns=names,
-    )
+    names = [*axes_of(cells), *_FOUND]
+    return pd.DataFrame([asdict(cell) | cell.place for cell in cells])[names]
 
 
 def brief(cells: Sequence[SuccessCell]) -> list[dict[str, Any]]:
@@ -314,44 +252,16 @@ def brief(cells: Sequence[SuccessCell]) -> list[dict[str, Any]]:
     >>> list(brief([cell, replace(cell, sigma_trans_m=0.4)])[0])[:3]
     ['sigma_trans_m', 'runs', 'success']
     """
-    places = [_place(cell) for cell in cells]
-    axes = _different(places)
-    if _NAME in axes:
-        # A reading's name stands for what belongs to it.
-        axes = [name for name in axes if name in (_NAME, _ACROSS) or not _belongs(places, name)]
-    if _ACROSS not in axes:
-        return [
-            {name: place[name] for name in axes} | {name: getattr(cell, name) for name in _FOUND}
-            for place, cell in zip(places, cells, strict=True)
-        ]
-    axes = [name for name in axes if name not in (_ACROSS, f"imu.{_ACROSS}")]
+    axes = axes_of(cells, by_reading=True)
+    if HEADING not in axes:
+        names = [*axes, *_FOUND]
+        return [{name: (asdict(cell) | cell.place)[name] for name in names} for cell in cells]
+    axes = [name for name in axes if name not in (HEADING, f"imu.{HEADING}")]
     degrees = sorted({cell.sigma_orient_deg for cell in cells})
     names = [f"{'' if number else 'success at '}{deg:g}°" for number, deg in enumerate(degrees)]
     rows: dict[str, dict[str, Any]] = {}
-    for place, cell in zip(places, cells, strict=True):
-        at = {name: place[name] for name in axes}
+    for cell in cells:
+        at = {name: cell.place[name] for name in axes}
         row = rows.setdefault(repr(at), {**at, "runs": cell.runs, **dict.fromkeys(names)})
         row[names[degrees.index(cell.sigma_orient_deg)]] = round(cell.success, 3)
     return list(rows.values())
-
-
-def _place(cell: SuccessCell) -> dict[str, Any]:
-    """Return the coordinates of a cell, varied options included."""
-    return {name: getattr(cell, name) for name in COORDINATES} | cell.varied
-
-
-def _different(places: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return the coordinates in which cells differ; a varied option stands for its own column."""
-    varied = {key.partition(".")[2] for key in (places[0] if places else ()) if "." in key}
-    return [
-        name
-        for name in (places[0] if places else ())
-        if len({repr(place[name]) for place in places}) > 1
-        and (name == _ACROSS or name not in varied)
-    ]
-
-
-def _belongs(places: Sequence[Mapping[str, Any]], axis: str) -> bool:
-    """Check that all cells of a reading have one value of a coordinate."""
-    values = {(place[_NAME], repr(place[axis])) for place in places}
-    return len(values) == len({place[_NAME] for place in places})

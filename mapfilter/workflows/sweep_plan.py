@@ -19,18 +19,19 @@ from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
 from mapfilter.experiments.sweep.plan import (
     AS_PREDICTED,
+    NOISE_AXES,
     Radio,
     Reading,
     SweepPlan,
     noise_grid,
 )
-from mapfilter.experiments.sweep.world import SweepWorld
+from mapfilter.experiments.sweep.world import SweepWorld, all_levels_dbm
 from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.geodesy import Lattice, same_crs
 from mapfilter.propagation.models import GroundTruthErrors
 from mapfilter.propagation.shadowing import site_shadowing
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan
+from mapfilter.rasters.raster_set import check_against_plan
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.reports import ReportModel
@@ -40,7 +41,6 @@ from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.world import World, check_cells_near, filter_choice, planned_rasters
 
 GROUND_TRUTH = "ground truth"
-_NOISE = ("sigma_trans_m", "sigma_orient_deg", "bias_sd_deg", "drift_deg_per_sqrt_s", "scale")
 
 
 def sweep_databases(config: Config) -> dict[str, Path]:
@@ -77,7 +77,9 @@ def sweep_plans(
             databases[name] = open_database(path, verify="full")
         except MapfilterError as error:
             faults.found.extend(error.faults)
-    _check_resolutions(databases, faults)
+    resolutions_m = {name: database.lattice.resolution_m for name, database in databases.items()}
+    if len(set(resolutions_m.values())) > 1:
+        faults.add("sweep.databases", "databases of one resolution", resolutions_m)
     broken = bool(faults.found)
     plans: list[SweepPlan] = []
     try:
@@ -114,19 +116,15 @@ def _check_effect(plans: Sequence[SweepPlan], axes: Iterable[str], faults: Fault
             faults.add(f"--vary {key}", expected, "one without effect", hint)
 
 
-def _check_resolutions(databases: Mapping[str, RadioRouteDatabase], faults: Faults) -> None:
-    found = {name: database.lattice.resolution_m for name, database in databases.items()}
-    if len(set(found.values())) > 1:
-        faults.add("sweep.databases", "databases of one resolution", found)
-
-
 def _plan(config: Config, databases: tuple[str, ...]) -> SweepPlan:
     section, settings = config.sweep, simulation_settings(config)
     readings, reports = _readings(config), settings.reports
     # No candidate filter uses neighbours, and the serving cell does not depend on them.
     if all(one.choice.name == "candidate" for one in readings):
         reports = replace(reports, max_neighbours=0)
-    noise = {name: _axis(getattr(section, name), getattr(settings.imu, name)) for name in _NOISE}
+    noise = {
+        name: _axis(getattr(section, name), getattr(settings.imu, name)) for name in NOISE_AXES
+    }
     return SweepPlan(
         readings=readings,
         databases=databases,
@@ -206,7 +204,7 @@ def sweep_world(config: Config, radios: Sequence[Radio]) -> SweepWorld:
         expected = "ground truth rasters on the lattice of the predicted ones"
         raise fail(InputError, str(config.ground_truth_path), expected, "another")
     check_cells_near(world.plan, world.lattice, str(config.cells.plan or "cells"))
-    levels_dbm = {real: _levels(rasters, world.plan) for real, rasters in opened.items()}
+    levels_dbm = {real: all_levels_dbm(rasters, world.plan) for real, rasters in opened.items()}
     received = {
         radio.name: _predicted(
             config, radio, levels_dbm[radio.name == GROUND_TRUTH], lattices[0], world.plan
@@ -217,10 +215,6 @@ def sweep_world(config: Config, radios: Sequence[Radio]) -> SweepWorld:
     heights_m = rasterise_heights(world.buildings, lattices[0]) if on_pavement else None
     network = street_network(world.ways, world.routes)
     return SweepWorld(network, world.plan, lattices[0], received, heights_m)
-
-
-def _levels(rasters: RxLevRasters, plan: CellPlan) -> Floats32:
-    return np.asarray(rasters.read_levels_dbm(plan, None, plan.ids), dtype=np.float32)
 
 
 def _predicted(

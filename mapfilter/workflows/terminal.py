@@ -1,4 +1,4 @@
-"""What commands and pipelines show: results on stdout, everything else on stderr."""
+"""Output of commands and pipelines: results on stdout, everything else on stderr."""
 
 from __future__ import annotations
 
@@ -21,7 +21,14 @@ if TYPE_CHECKING:
     from mapfilter.config.sections import Config
 
 
-def say(text: str, kind: str = "") -> None:
+WRONG = 2
+"""Exit code: the input or the command is wrong, or the machine too small for it."""
+
+_NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_MAX_TABLE_WIDTH = 200
+
+
+def print_message(text: str, kind: str = "") -> None:
     """Write lines to stderr, each with the program's name and ``kind`` before it."""
     for line in text.splitlines():
         sys.stderr.write(f"mapfilter: {kind}{line}\n")
@@ -29,13 +36,11 @@ def say(text: str, kind: str = "") -> None:
 
 def print_result(result: Any, as_json: bool) -> None:
     """Print a result on stdout: one JSON line, or one line for each figure."""
-    from mapfilter.workflows.terminal import text_lines, to_jsonable
-
     found = to_jsonable(result)
-    if as_json:
-        sys.stdout.write(json.dumps(found, ensure_ascii=False, allow_nan=False) + "\n")
-        return
-    for line in text_lines(found):
+    lines = (
+        [json.dumps(found, ensure_ascii=False, allow_nan=False)] if as_json else text_lines(found)
+    )
+    for line in lines:
         sys.stdout.write(line + "\n")
 
 
@@ -54,7 +59,7 @@ def progress_bar(label: str) -> Iterator[Progress | None]:
 
 
 def rate_text(per_s: float, unit: str) -> str:
-    """Return a rate by the second, or by the minute where that is clearer.
+    """Format a rate per second, or per minute below one per second.
 
     Examples
     --------
@@ -66,33 +71,31 @@ def rate_text(per_s: float, unit: str) -> str:
 
 @contextlib.contextmanager
 def rate_bar(label: str, unit: str, every_s: float = 30.0) -> Iterator[Progress]:
-    """Show progress, rate and time left on stderr: a bar, or a line now and then without terminal.
+    """Show progress, rate and time left on stderr: a bar, or without terminal a line now and then.
 
-    Parameters
-    ----------
-    label, unit : str
-        What is done, and what is counted.
-    every_s : float
-        Seconds between two lines.
+    ``unit`` is what is counted; ``every_s`` the seconds between two lines.
     """
-    began_s = told_s = time.monotonic()
+    bar: Any = None
+    task: Any = None
+    began_s = printed_s = time.monotonic()
     first = -1
 
-    def rate(done: int) -> float:
-        return (done - first) / max(time.monotonic() - began_s, 1e-6)
-
-    def tell(done: int, total: int) -> None:
-        nonlocal began_s, first, told_s
+    def show(done: int, total: int) -> None:
+        nonlocal began_s, first, printed_s
+        now_s = time.monotonic()
         if first < 0:
-            began_s, first = time.monotonic(), done
-        if time.monotonic() - told_s >= every_s and done > first:
-            told_s = time.monotonic()
-            left_s = (total - done) / rate(done)
-            many = f"{done} of {total} {unit}, {rate_text(rate(done), unit)}, {left_s:.0f} s left"
-            say(f"{label}: {many}")
+            began_s, first = now_s, done
+        per_s = (done - first) / max(now_s - began_s, 1e-6)
+        if bar is not None:
+            bar.update(task, completed=done, total=total, rate=rate_text(per_s, unit))
+        elif now_s - printed_s >= every_s and done > first:
+            printed_s = now_s
+            left_s = (total - done) / per_s
+            many = f"{done} of {total} {unit}, {rate_text(per_s, unit)}, {left_s:.0f} s left"
+            print_message(f"{label}: {many}")
 
     if not sys.stderr.isatty():
-        yield tell
+        yield show
         return
     from rich.console import Console
     from rich.progress import Progress as Bar
@@ -100,25 +103,11 @@ def rate_bar(label: str, unit: str, every_s: float = 30.0) -> Iterator[Progress]
 
     columns = (*Bar.get_default_columns(), TextColumn("{task.fields[rate]}"))
     # Steps may lie minutes apart; with rich's usual 30 s there would be no time left.
-    with Bar(
-        *columns, console=Console(stderr=True), transient=True, speed_estimate_period=86_400.0
-    ) as bar:
+    console = Console(stderr=True)
+    bar = Bar(*columns, console=console, transient=True, speed_estimate_period=86_400.0)
+    with bar:
         task = bar.add_task(label, total=None, rate="")
-
-        def show(done: int, total: int) -> None:
-            nonlocal began_s, first
-            if first < 0:
-                began_s, first = time.monotonic(), done
-            told = rate_text(rate(done), unit)
-            bar.update(task, completed=done, total=total, rate=told)
-
         yield show
-
-
-WRONG = 2
-"""Exit code: the input or the command is wrong, or the machine too small for it."""
-
-_NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def guarded(run: Callable[[], int | None]) -> int:
@@ -126,23 +115,20 @@ def guarded(run: Callable[[], int | None]) -> int:
     try:
         return run() or 0
     except MapfilterError as error:
-        say(str(error), "error: ")
+        print_message(str(error), "error: ")
     except MemoryError:
         hint = "too large an area, too fine a resolution, or a value in the wrong unit"
-        say(f"memory: expected enough of it, found none left (likely: {hint})", "error: ")
+        print_message(f"memory: expected enough of it, found none left (likely: {hint})", "error: ")
     except OSError as error:
         if error.errno not in _NO_SPACE:
             raise
         where = error.filename or "the output"
-        say(f"{where}: expected space on the disk, found none left", "error: ")
+        print_message(f"{where}: expected space on the disk, found none left", "error: ")
     return WRONG
 
 
-_WIDEST = 200
-
-
 def to_jsonable(value: Any) -> Any:
-    """Turn a result into what JSON knows: paths become text; NaN and infinity become None.
+    """Convert a result to JSON types: paths become text; NaN and infinity become None.
 
     Examples
     --------
@@ -189,24 +175,16 @@ def text_lines(found: Mapping[str, Any], indent: str = "") -> Iterator[str]:
         if isinstance(value, Mapping):
             yield f"{indent}{key}:"
             yield from text_lines(value, indent + "  ")
-        elif isinstance(value, list) and (table := _table(value)):
-            yield f"{indent}{key}:"
-            yield from (f"{indent}  {line}" for line in table)
         elif isinstance(value, list):
             yield f"{indent}{key}:"
-            for item in value:
-                shown = (
-                    ", ".join(f"{k} {_short(v, k)}" for k, v in item.items())
-                    if isinstance(item, Mapping)
-                    else _short(item, key)
-                )
-                yield f"{indent}  {shown}"
+            for line in _table(value) or (_one_line(item, key) for item in value):
+                yield f"{indent}  {line}"
         else:
             yield f"{indent}{key}: {_short(value, key)}"
 
 
 def _table(rows: list[Any]) -> list[str]:
-    """Return the lines of a table, numbers to the right; none where it is not one."""
+    """Return the lines of a table, numbers to the right; none where the rows are not alike."""
     if len(rows) < 2 or not all(
         isinstance(row, Mapping) and row.keys() == rows[0].keys() for row in rows
     ):
@@ -214,7 +192,7 @@ def _table(rows: list[Any]) -> list[str]:
     names = [name for name in rows[0] if any(row[name] not in (None, "") for row in rows)]
     lines = [names, *([_short(row[name], name) for name in names] for row in rows)]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    if sum(widths) + 2 * len(widths) > _WIDEST:
+    if sum(widths) + 2 * len(widths) > _MAX_TABLE_WIDTH:
         return []
     texts = [any(isinstance(row[name], str) for row in rows) for name in names]
     return [
@@ -226,8 +204,14 @@ def _table(rows: list[Any]) -> list[str]:
     ]
 
 
+def _one_line(item: Any, name: str) -> str:
+    if isinstance(item, Mapping):
+        return ", ".join(f"{key} {_short(value, key)}" for key, value in item.items())
+    return _short(item, name)
+
+
 def _short(value: Any, name: str) -> str:
-    """Return a figure rounded to what one reads: metres to decimetres, degrees to as much."""
+    """Format a figure: four digits, large ones and degrees to decimetres."""
     if value is None:
         return "-"
     if isinstance(value, float):
@@ -241,7 +225,7 @@ Stage = Callable[["Config"], Any]
 
 
 def run_pipeline(stages: Mapping[str, Stage], file: Path, argv: Sequence[str] | None = None) -> int:
-    """Run all stages, print what each found, and return the exit code: 0, 2, or 3 for partly done.
+    """Run all stages, print their results, and return the exit code: 0, 2, or 3 for partly done.
 
     Parameters
     ----------

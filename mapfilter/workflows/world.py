@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
 
 from mapfilter._types import Floats
+from mapfilter.config.fields import Section
 from mapfilter.config.inputs import Area, Rasters
 from mapfilter.config.sections import Config, FilterSection
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes, Routes
-from mapfilter.errors import ConfigError, InputError, fail
+from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice, unproject
-from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
-from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.filter import FilterOptions
 from mapfilter.positioning.locators import filter_options
 from mapfilter.radio.antenna import MeasuredAntenna
@@ -34,6 +34,14 @@ from mapfilter.workflows.streets import LARGEST_AREA_PX as LARGEST_AREA_PX
 from mapfilter.workflows.streets import Streets
 from mapfilter.workflows.streets import area_lattice as area_lattice
 from mapfilter.workflows.streets import check_scale as check_scale
+
+FARTHEST_M = 50_000.0
+"""No cell is received from farther away."""
+
+_ENOUGH = 0.95
+_ABOUT_WAYS_M = 100.0
+_SAMPLES = 64
+_NAMED = 3
 
 
 def planned_rasters(config: Config) -> RxLevRasters:
@@ -133,7 +141,7 @@ class World:
 
     @cached_property
     def streets(self) -> Streets:
-        """The layers that say where one can be."""
+        """The layers of ways, squares and buildings."""
         return Streets(self.config, self.lattice)
 
     @property
@@ -164,7 +172,7 @@ class World:
 
     @cached_property
     def routes(self) -> RouteLattice:
-        """Where one can be: near ways and in squares, or from a land-use raster."""
+        """Walkable or drivable points: near ways and in squares, or of a land-use raster."""
         if self.landuse is None:
             return self.streets.source.over(self.lattice)
         roads = self.config.roads
@@ -178,7 +186,7 @@ class World:
 
     @cached_property
     def route_tiles(self) -> Routes:
-        """The same points, laid tile by tile when they are wanted."""
+        """The same points, laid tile by tile on request."""
         if self.landuse is not None:
             return LatticeRoutes(self.routes)
         return LayerRoutes(self.streets.source, self.lattice)
@@ -207,15 +215,6 @@ class World:
     def antennas(self) -> dict[str, MeasuredAntenna]:
         """The measured antennas that the plan names."""
         return plan_antennas(self.config, self.plan)
-
-
-FARTHEST_M = 50_000.0
-"""No cell is received from farther away."""
-
-_ENOUGH = 0.95
-_ABOUT_WAYS_M = 100.0
-_SAMPLES = 64
-_NAMED = 3
 
 
 def check_cells_near(plan: CellPlan, lattice: Lattice, where: str) -> None:
@@ -257,7 +256,7 @@ def outside_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> Floats:
 
 
 def map_cover(world: World) -> tuple[str, ...]:
-    """Return a note when the ways of a map extend over but a part of the area that is asked for.
+    """Return a note when the ways of a map cover only a part of the requested area.
 
     The extent in a map's header is only a reason to look: maps often hold more, as whole ways are
     kept. The share is that of the ways' convex hull, 100 m about it included.
@@ -288,7 +287,7 @@ def _declared_share(area: Area, lattice: Lattice) -> float:
 
 
 def raster_cover(area: Area, lattice: Lattice) -> tuple[str, ...]:
-    """Return a note when rasters, cut to ``lattice``, cover but a part of the area asked for."""
+    """Return a note when rasters, cut to ``lattice``, cover only a part of the requested area."""
     if not area.has_box:
         return ()
     wanted = area_lattice(area.model_copy(update={"crs": lattice.crs}))
@@ -302,21 +301,19 @@ def _note(what: str, share: float) -> tuple[str, ...]:
 
 
 def filter_choice(section: FilterSection) -> FilterOptions:
-    """Return the options of the filter that a configuration names.
+    """Return the options of the filter that a configuration names, with the values of its section.
 
     Raises
     ------
     ConfigError
-        The filter takes no database, or a custom filter cannot be imported.
+        A custom filter cannot be imported.
     """
-    match section.name:
-        case "candidate":
-            return section.of(CandidateFilter)
-        case "bayes":
-            return section.bayes.of(BayesFilter)
-        case "grid":
-            return section.bayes.of(GridFilter)
-        case name if ":" in name:
-            return filter_options(name)
-        case name:
-            raise fail(ConfigError, "filter.name", "a filter that takes a database", repr(name))
+    options: Any = filter_options(section.name)
+    for part in (section, *(value for _, value in section if isinstance(value, Section))):
+        if isinstance(options, part.kinds):
+            shared = {one.name for one in fields(options)} & set(type(part).model_fields)
+            options = replace(options, **{name: getattr(part, name) for name in shared})
+    if section.smooth:
+        options = replace(options, smooth=True)
+    chosen: FilterOptions = options
+    return chosen

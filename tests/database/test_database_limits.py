@@ -229,9 +229,6 @@ def test_a_field_of_two_points_by_hand():
         [[1.5, 6.5, 2 + diagonal, 7.0], [6.5, 1.5 + diagonal, 7.0, 2.0]],
         rtol=1e-6,
     )
-    # Positions take the pixel that holds them; the northern edge is row 0.
-    levels = field.levels_at([0.1, 19.9, 19.9, -0.1, 10.0], [19.9, 10.1, 20.1, 15.0, 12.0])
-    np.testing.assert_array_equal(levels[:, 1], [-80, -60, NAN, NAN, -60])
 
 
 def test_an_edited_manifest_names_what_is_twice_or_elsewhere(tmp_path):

@@ -58,15 +58,6 @@ def test_other_pixels_hold_what_a_nearest_point_holds(database, field):
         assert (same & np.isclose(expected, field.distance_to_way_m[row, col])).any()
 
 
-def test_levels_at_positions(field):
-    east, north = LATTICE.east_north(np.array([3, 20]), np.array([7, 30]))
-    levels = field.levels_at(east + 2.0, north - 2.0)
-    np.testing.assert_array_equal(levels, field.level_dbm[[3, 20], [7, 30]])
-    west, _, _, top = LATTICE.bounds_m
-    assert np.isnan(field.levels_at([west - 1.0], [top - 1.0])).all()
-    assert field.levels_at(float(east[0]), float(north[0])).shape == (1, 3)
-
-
 def test_a_part_of_the_area(database, field):
     west, _, _, north = LATTICE.bounds_m
     part = database.field((west + 30, north - 90, west + 120, north - 10))

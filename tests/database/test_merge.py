@@ -132,7 +132,7 @@ def test_databases_that_do_not_fit(world, database, tmp_path):
         open_rasters(tmp_path / "s.tif"), world.plan, make_routes(shifted), tmp_path / "db",
         floor_dbm=FLOOR_DBM,
     )  # fmt: skip
-    with pytest.raises(InputError, match="shifted pixels"):
+    with pytest.raises(InputError, match="pixels that align, found shifted by"):
         merge([database, other], tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

@@ -36,7 +36,7 @@ def test_a_calibrated_probability_comes_true_as_often():
     points = reliability(said, RNG.random(20_000) < said)
     assert sum(point.cases for point in points) == 20_000
     # Of ten intervals of 95 % one may miss.
-    assert sum(point.low <= point.said <= point.high for point in points) >= 9
+    assert sum(point.low <= point.predicted <= point.high for point in points) >= 9
 
 
 def test_overconfidence_shows():

@@ -175,6 +175,8 @@ def test_equal_seeds_give_equal_bounds_and_tables_say_where_nothing_was_tried():
         map_bound(radio, ErrorModel(), options, np.random.default_rng(5)) for _ in range(2)
     )
     assert first.by_way().equals(again.by_way())
+    assert repr(first).startswith("<MapBound: ")
+    assert "\n" not in repr(first)
     columns = first.at_points()
     assert list(columns) == [name for name, _ in BANDS]
     assert all(values.shape == (len(radio),) for values in columns.values())

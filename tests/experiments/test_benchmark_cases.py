@@ -1,14 +1,13 @@
 """Cases of the benchmark: errors of the unit, and what the filter is given of them."""
 
 from dataclasses import fields, replace
-from math import radians, sqrt
+from math import sqrt
 
 import pytest
 
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.global_positioning import informed
-from mapfilter.models.street_motion import MotionErrors
-from mapfilter.positioning.bayes.options import BayesOptions
+from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.simulation.imu import ImuNoise
 
@@ -24,11 +23,17 @@ COMPASS_DEG = {
     **dict.fromkeys(("levels-nocompass", "levels-missing10", "levels-error10", "smooth-6"), 6),
     **dict.fromkeys(("recovery-levels", "recovery-cell"), 6),
 }
-DEFAULTS = MotionErrors()
+DEFAULTS = BayesFilter()
 
 
 def known(name, options=None, fixed=frozenset()):
-    return informed(options or BayesOptions(), CASES[name], fixed)
+    return informed(options or DEFAULTS, CASES[name], fixed)
+
+
+def sheet(name):
+    """What a case states besides dead reckoning."""
+    height = {"antenna_height_m": 100.0, "antenna_height_sd_m": 20.0}
+    return {"smooth": CASES[name].smooth} | (height if CASES[name].satellites is not None else {})
 
 
 def test_all_cases_are_looked_at():
@@ -40,7 +45,7 @@ def test_all_cases_are_looked_at():
 def test_a_compass_has_its_stated_noise_and_the_filter_its_own_defaults(name, deg):
     errors = CASES[name].errors_in(ImuNoise())
     assert errors == replace(ImuNoise(), sigma_orient_deg=deg)
-    assert known(name).motion == replace(DEFAULTS, heading_sd_rad=radians(deg))
+    assert known(name) == replace(DEFAULTS, **sheet(name), heading_sd_deg=deg)
 
 
 @pytest.mark.parametrize(
@@ -57,16 +62,16 @@ def test_a_biased_unit_is_stated_to_be_one(names, bias_sd_deg, drift_deg, scale)
             drift_deg_per_sqrt_s=drift_deg,
             scale=scale,
         )
-        motion = known(name).motion
+        found = known(name)
         # A drift by the second at 1.4 m/s, by the metre.
-        drift = radians(drift_deg) / sqrt(1.4)
-        assert motion.bias_drift_rad_per_sqrt_m == pytest.approx(drift, rel=1e-12)
-        assert motion == replace(
+        assert found.drift_deg_per_sqrt_m == pytest.approx(drift_deg / sqrt(1.4), rel=1e-12)
+        assert found == replace(
             DEFAULTS,
-            heading_sd_rad=radians(6),
-            bias_sd_rad=radians(bias_sd_deg),
-            bias_drift_rad_per_sqrt_m=motion.bias_drift_rad_per_sqrt_m,
-            scale_sd=scale,
+            **sheet(name),
+            heading_sd_deg=6.0,
+            bias_sd_deg=bias_sd_deg,
+            drift_deg_per_sqrt_m=found.drift_deg_per_sqrt_m,
+            scale=scale,
         )
 
 
@@ -94,28 +99,21 @@ def test_what_cases_differ_in_beside_dead_reckoning():
 @pytest.mark.parametrize("name", CASES)
 def test_nothing_but_the_sheet_reaches_the_filter(name):
     """All other options are those that were chosen, whatever the ground truth is like."""
-    chosen = replace(
-        BayesOptions(),
-        motion=MotionErrors(step_sd_m=0.77, bias_sd_rad=0.5, scale_sd=0.3),
-        grid=True,
-    )
+    chosen = GridFilter(step_sd_m=0.77, bias_sd_deg=28.0, scale=0.3, level_error_db=9.0)
     found, case = known(name, chosen), CASES[name]
-    for field in fields(BayesOptions):
-        if field.name not in ("motion", "smooth", "satellites"):
-            assert getattr(found, field.name) == getattr(chosen, field.name)
-    assert found.motion == replace(chosen.motion, **case.data_sheet)
-    assert found.motion.step_sd_m == 0.77
-    assert found.smooth is case.smooth
-    sheet = {} if case.satellites is None else {"height_m": 100.0, "height_sd_m": 20.0}
-    assert found.satellites == replace(chosen.satellites, **sheet)
+    stated = {"heading_sd_deg", "bias_sd_deg", "drift_deg_per_sqrt_m", "scale"}
+    assert set(case.data_sheet) <= stated
+    assert found == replace(chosen, **case.data_sheet, **sheet(name))
+    assert (type(found), found.step_sd_m) == (GridFilter, 0.77)
 
 
 def test_what_was_set_is_not_changed_by_a_sheet():
-    own = BayesOptions(motion=MotionErrors(heading_sd_rad=0.5, bias_sd_rad=0.25))
-    found = known("levels-bias10", own, frozenset({"heading_sd_rad", "height_m"})).motion
-    assert (found.heading_sd_rad, found.bias_sd_rad) == (0.5, radians(10))
-    sky = known("satellites-2", fixed=frozenset({"height_m"})).satellites
-    assert sky == replace(BayesOptions().satellites, height_sd_m=20.0)
+    own = BayesFilter(heading_sd_deg=30.0, bias_sd_deg=15.0)
+    found = known("levels-bias10", own, frozenset({"heading_sd_deg", "antenna_height_m"}))
+    assert (found.heading_sd_deg, found.bias_sd_deg) == (30.0, 10.0)
+    own = BayesFilter(antenna_height_m=7.0)
+    sky = known("satellites-2", own, frozenset({"antenna_height_m"}))
+    assert (sky.antenna_height_m, sky.antenna_height_sd_m) == (7.0, 20.0)
     world = ImuNoise(sigma_orient_deg=40.0, scale=0.01)
     errors = CASES["levels-bias10"].errors_in(world, frozenset({"imu.sigma_orient_deg"}))
     assert (errors.sigma_orient_deg, errors.scale) == (40.0, 0.05)
@@ -145,4 +143,4 @@ def test_the_candidate_filter_takes_no_sheet():
 def test_sheets_and_errors_name_what_there_is():
     for case in CASES.values():
         assert set(case.imu) <= {f.name for f in fields(ImuNoise)}
-        assert set(case.data_sheet) <= {f.name for f in fields(MotionErrors)}
+        assert set(case.data_sheet) <= {f.name for f in fields(BayesFilter)}

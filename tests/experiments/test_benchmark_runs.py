@@ -10,7 +10,7 @@ from mapfilter.experiments.benchmarks import global_positioning
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.global_positioning import Batch, informed, run_batch
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.bayes.options import BayesOptions
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate import Fix, PositionedTrack, TrackEstimate
 from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.journeys import JourneyPlan
@@ -18,7 +18,7 @@ from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.satellites import ReceptionModel
 from mapfilter.simulation.simulate import SimulationSettings
 
-CHOICE = BayesOptions()
+CHOICE = BayesFilter()
 WORLD = SimulationSettings(journey=JourneyPlan(length_m=70.0))
 
 
@@ -118,12 +118,12 @@ def test_each_case_is_run_with_its_own_sheet():
     for name, (choice, _) in zip(names, world.opened, strict=True):
         assert choice == informed(CHOICE, CASES[name])
     assert world.opened[2][0].smooth
-    sheetless = frozenset({"heading_sd_rad", "bias_sd_rad"})
+    sheetless = frozenset({"heading_sd_deg", "bias_sd_deg"})
     world, _ = run("levels-bias20", fixed=sheetless)
-    motion = world.opened[0][0].motion
-    assert motion.heading_sd_rad == BayesOptions().motion.heading_sd_rad
-    assert motion.bias_sd_rad == BayesOptions().motion.bias_sd_rad
-    assert motion.scale_sd == 0.1
+    choice = world.opened[0][0]
+    assert choice.heading_sd_deg == CHOICE.heading_sd_deg
+    assert choice.bias_sd_deg == CHOICE.bias_sd_deg
+    assert choice.scale == 0.1
 
 
 def test_errors_of_the_world_never_reach_the_filter():
@@ -143,8 +143,7 @@ def test_errors_of_the_world_never_reach_the_filter():
 
 
 def test_options_of_the_filter_never_reach_the_world():
-    motion = replace(BayesOptions().motion, step_sd_m=3.0, bias_sd_rad=1.0)
-    other = replace(BayesOptions(), motion=motion)
+    other = BayesFilter(step_sd_m=3.0, bias_sd_deg=57.0)
     first, _ = run("levels-6", "levels-nocompass")
     second, _ = run("levels-6", "levels-nocompass", choice=other)
     assert first.opened != second.opened

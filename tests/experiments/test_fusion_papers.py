@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from mapfilter.errors import InputError
+from mapfilter.errors import ConfigError
 from mapfilter.evaluation.bounds import bound_of, rmse_over_time
 from mapfilter.experiments.papers import zhang_2006 as zhang
-from mapfilter.experiments.papers.fritsche_klein_2009.experiment import TABLE_III, bound_curves
+from mapfilter.experiments.papers.fritsche_klein_2009.paper import TABLE_III, bound_curves
 from mapfilter.experiments.papers.fritsche_klein_2009.scene import (
     COMBINATIONS,
     Layout,
@@ -14,6 +14,7 @@ from mapfilter.experiments.papers.fritsche_klein_2009.scene import (
     hard_layout,
     scene,
 )
+from mapfilter.experiments.papers.paper import true_states
 from mapfilter.filters.gaussian import EKF, RBUKF
 from mapfilter.filters.gaussian_sum import run_mixtures, split
 from mapfilter.filters.kalman import smooth
@@ -26,6 +27,10 @@ PCRLB = {
     "hybrid1": {"location_m": 71.9, "velocity_mps": 3.39, "bias_m": 33.2, "drift_mps": 1.81},
     "hybrid2": {"location_m": 47.4, "velocity_mps": 2.54, "bias_m": 4.04, "drift_mps": 0.93},
 }
+
+
+def zhang_states(trials, rng):
+    return true_states(zhang.MOTION, np.array(zhang.START), trials, zhang.STEPS, rng)
 
 
 def drawn(name, trials, seed=1, layout=None):
@@ -101,7 +106,7 @@ BOUNDS_M = {
 
 @pytest.mark.parametrize(("sigma_db", "name"), BOUNDS_M)
 def test_bounds_of_zhang_are_those_measured_before(sigma_db, name):
-    states = zhang.true_states(100, np.random.default_rng(1))
+    states = zhang_states(100, np.random.default_rng(1))
     found = bound_of(zhang.bounds(states, name, sigma_db), zhang.POSITION)[[9, 99, 399]]
     # The last digit is printed to 0.1 m.
     np.testing.assert_allclose(found, BOUNDS_M[sigma_db, name], rtol=0.005)
@@ -109,7 +114,7 @@ def test_bounds_of_zhang_are_those_measured_before(sigma_db, name):
 
 def test_filters_of_zhang():
     rng = np.random.default_rng(3)
-    states = zhang.true_states(150, rng)
+    states = zhang_states(150, rng)
     fused = bound_of(zhang.bounds(states, "fusion", 4.0), zhang.POSITION)
     levels_only = bound_of(zhang.bounds(states, "rss", 4.0), zhang.POSITION)
     start = zhang.started_from_fix(150, rng)
@@ -127,9 +132,9 @@ def test_filters_of_zhang():
 
 
 def test_a_layout_that_is_none_is_refused():
-    with pytest.raises(InputError, match="one direction for each site"):
+    with pytest.raises(ConfigError, match="one direction for each site"):
         Layout(boresights_deg=(1.0,))
-    with pytest.raises(InputError, match="serving"):
+    with pytest.raises(ConfigError, match="serving"):
         Layout(serving=7)
-    with pytest.raises(InputError, match="steps"):
+    with pytest.raises(ConfigError, match="steps"):
         Layout(steps=0)

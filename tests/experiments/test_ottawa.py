@@ -24,7 +24,6 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
     step_factor_of,
 )
 from mapfilter.experiments.benchmarks.ottawa_table import read_left_out
-from mapfilter.filters.particle import ParticleOptions
 from mapfilter.geodesy import Lattice, unproject
 from mapfilter.models.fingerprint import LevelReading
 from mapfilter.models.measured_map import MeasuredMapOptions, MeasuredRows, ServingStatistics
@@ -39,10 +38,7 @@ ANTENNAS = {1: (-60.0, 40.0), 2: (300.0, 460.0), 3: (520.0, -40.0)}
 STEP_M, SPEED_MPS = 20.0, 4.0
 CHOSEN = OttawaOptions()
 QUICK = replace(
-    CHOSEN,
-    filter=replace(
-        CHOSEN.filter, particles=ParticleOptions(max_particles=2000, min_search_particles=1500)
-    ),
+    CHOSEN, filter=replace(CHOSEN.filter, max_particles=2000, min_search_particles=1500)
 )
 """A fifteenth of the particles."""
 

@@ -186,7 +186,10 @@ def test_which_rows_make_maps_of_what_was_heard(tmp_path, monkeypatch):
     assert sites.tolist() == [1, 0, 1]
     assert lattice is area.lattice
     assert heard is options.serving_map
-    assert (made.model.motion, made.model.level_sd_db) == (options.filter.motion, None)
+    assert (made.model.motion, made.model.level_sd_db) == (
+        options.positioner(area).model.motion,
+        None,
+    )
 
 
 S, C, T, L = Status.SEARCHING, Status.CONVERGED, Status.TRACKING, Status.LOST

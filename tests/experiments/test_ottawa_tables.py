@@ -3,6 +3,7 @@
 import json
 from dataclasses import asdict, replace
 from math import isnan, nan, radians
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -34,13 +35,15 @@ def test_the_options_that_were_chosen():
     assert (FOLDER, LEFT_OUT) == ("cell-ottawa-lte", ("OpenCellID_20200830",))
     assert (GOOD_M, MAP_M, LONGEST_GAP_S, METHODS) == (20.0, 50.0, 30.0, ("bayes", "smoothed"))
     options = OttawaOptions()
-    assert asdict(options.filter.motion) == {
+    area = SimpleNamespace(size_m=(100.0, 100.0))
+    model = options.positioner(area).model
+    assert asdict(model.motion) == {
         "step_sd_m": 1.0, "typical_step_m": 14.0, "heading_sd_rad": radians(10),
         "bias_sd_rad": radians(6), "bias_drift_rad_per_sqrt_m": radians(0.2), "scale_sd": 0.15,
         "scale_drift_per_sqrt_m": 0.005,
     }  # fmt: skip
-    assert options.filter.map.sd_m == 16.0
-    particles, evidence = options.filter.particles, options.filter.evidence
+    assert model.weights.sd_m == 16.0
+    particles, evidence = options.filter, model.evidence
     assert (particles.max_particles, particles.min_search_particles) == (10_000, 7_000)
     assert evidence.serving.weight_per_m == 1 / 150
     levels = evidence.levels
@@ -159,5 +162,5 @@ def test_what_came_of_a_session_is_read_as_it_was_written(tmp_path):
 )  # fmt: skip
 def test_what_is_damaged_is_told(tmp_path, text):
     (tmp_path / "found.json").write_text(text)
-    with pytest.raises(StoreError, match="what came of a session"):
+    with pytest.raises(StoreError, match="the results of a session"):
         read_left_out(tmp_path / "found.json")

@@ -10,7 +10,8 @@ from mapfilter._parallel import SerialExecutor
 from mapfilter.errors import InputError
 from mapfilter.experiments.papers.paper import PaperSettings
 from mapfilter.experiments.papers.tesa import experiment as tesa
-from mapfilter.experiments.papers.tesa import models, scene
+from mapfilter.experiments.papers.tesa import scene
+from mapfilter.experiments.papers.tesa.paper import estimate
 from mapfilter.models.signal_strength import levels
 from mapfilter.models.state import POSITION_CLOCK_3D
 from mapfilter.simulation.drives import (
@@ -53,7 +54,7 @@ def test_the_scene():
 def test_readings_are_what_filters_take_them_for():
     found, rng = scene.tesa_scene(), np.random.default_rng(1)
     ranges, level, shadow = scene.draw_readings(found, rng)
-    model = models.measurements(found, "identity", 1.0)[300]
+    model = tesa.measurements(found, "identity", 1.0)[300]
     clock = ranges[300] - np.linalg.norm(found.satellites_m[300] - found.drive.place_m[300], axis=1)
     state = np.array([*found.drive.place_m[300], clock.mean()])
     mean, slope = np.empty((12, 1)), np.zeros((12, 4, 1))
@@ -67,30 +68,30 @@ def test_readings_are_what_filters_take_them_for():
 def test_only_the_known_bearing_model_depends_on_the_bearing():
     east_north = np.ix_((0, 1), (0, 1))
     for beta in (None, 1.0):
-        identity = models.assumed("identity", beta).motion.noise
+        identity = tesa.assumed("identity", beta).motion.noise
         np.testing.assert_array_equal(identity[east_north], 25.0**2 * np.eye(2))
-        noise = models.assumed("velocity", beta).motion.noise
+        noise = tesa.assumed("velocity", beta).motion.noise
         np.testing.assert_array_equal(noise[:2, :2], noise[2:4, 2:4])
         assert not noise[:2, 2:4].any()
-    known = models.assumed("known-bearing").motion.noise[east_north]
+    known = tesa.assumed("known-bearing").motion.noise[east_north]
     ahead, left = ahead_and_left(scene.BEARING_DEG)
     assert (ahead @ known @ ahead, left @ known @ left) == pytest.approx((625.0, 25.0))
 
 
 def test_shadowing_is_a_state_of_each_station_in_the_velocity_model():
-    known = models.assumed("velocity", 4.0)
+    known = tesa.assumed("velocity", 4.0)
     assert known.layout.size == 13
     # Stationary: the process keeps the variance that it starts with.
     phi, noise, first = known.motion.transition, known.motion.noise, known.first_covariance
     own = np.ix_(known.shadowing, known.shadowing)
     np.testing.assert_allclose((phi @ first @ phi.T + noise)[own], 16.0 * np.eye(7))
     assert phi[6, 6] == pytest.approx(np.exp(-50 / 3.6 / 100))
-    adds = models.loading(known, 12)
+    adds = known.loading(12)
     assert not adds[:5].any()
     np.testing.assert_array_equal(adds[5:, 6:], np.eye(7))
     for motion, beta in (("velocity", None), ("identity", 4.0)):
-        assert models.loading(models.assumed(motion, beta), 12) is None
-    model = models.measurements(scene.tesa_scene(), "velocity", 4.0)[0]
+        assert tesa.assumed(motion, beta).loading(12) is None
+    model = tesa.measurements(scene.tesa_scene(), "velocity", 4.0)[0]
     assert np.sqrt(np.diag(model.noise)[5:]) == pytest.approx(0.29)
 
 
@@ -101,7 +102,7 @@ def test_filters_start_around_a_drawn_start():
     # 3.6 standard deviations of the mean.
     assert (np.abs(starts.mean(axis=0)) < [4.0, 4.0, 0.8]).all()
     for motion in ("velocity", "identity", "known-bearing"):
-        known = models.assumed(motion, 1.0)
+        known = tesa.assumed(motion, 1.0)
         mean = known.first_mean(starts[0])
         np.testing.assert_array_equal(mean[list(known.sampled)], starts[0])
         assert np.count_nonzero(mean) == 3
@@ -154,10 +155,10 @@ def test_estimates_of_means():
     rng = np.random.default_rng(5)
     inside = 0
     for _ in range(400):
-        found = tesa.estimate(rng.normal(3.0, 2.0, 50))
+        found = estimate(rng.normal(3.0, 2.0, 50))
         inside += found.low < 3.0 < found.high
     assert 0.91 < inside / 400 < 0.98
-    whole, cut = (tesa.estimate(np.array([0.7, 0.9, 1.0]), 0.0, most) for most in (2.0, 1.0))
+    whole, cut = (estimate(np.array([0.7, 0.9, 1.0]), 0.0, most) for most in (2.0, 1.0))
     assert whole.high > 1.0
     assert cut == (whole.value, whole.low, 1.0)
 

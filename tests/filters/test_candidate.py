@@ -13,13 +13,13 @@ from math import hypot, nan, pi
 
 import numpy as np
 import pytest
+from belief_events import Event, run
 from hypothesis import given
 from hypothesis import strategies as st
 
 from mapfilter.errors import ConfigError
 from mapfilter.filters.candidate import CandidateBelief, CandidateOptions, CandidateSearch, Mode
 from mapfilter.filters.contract import MotionStep, Reason, Status
-from mapfilter.testing import Event, run
 
 RNG = np.random.default_rng(0)
 POINTS = [(0.0, 10.0), (5.0, 10.0), (0.0, 0.0), (5.0, 0.0), (10.0, 0.0), (15.0, 0.0)]

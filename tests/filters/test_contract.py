@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from belief_events import Event, run
 
 from mapfilter.database.nearest import CellPointIndex
 from mapfilter.filters.candidate import CandidateOptions, CandidateSearch
@@ -27,7 +28,6 @@ from mapfilter.filters.contract import (
     UpdateInfo,
 )
 from mapfilter.geodesy import Lattice, wrap_rad
-from mapfilter.testing import Event, run
 
 LATTICE = Lattice("EPSG:32629", 5_000.0, 8_000.0, 5.0, 60, 70)
 

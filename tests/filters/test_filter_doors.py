@@ -26,7 +26,12 @@ from mapfilter.filters.gaussian_sum import split
 from mapfilter.filters.kalman import smooth
 from mapfilter.filters.particle import ParticleOptions, switched
 from mapfilter.filters.rao_blackwell import REGULARISED, SIR, SirOptions, init
-from mapfilter.filters.trials import factors_of, is_diagonal, method_numbers
+from mapfilter.filters.trials import problem_of, run_trials
+from mapfilter.models.ranging import position_fix
+from mapfilter.models.state import POSITION
+from mapfilter.positioning.kalman.models import compiled
+
+READING = position_fix(POSITION, np.eye(2))
 
 
 def test_the_usual_options():
@@ -69,13 +74,16 @@ def test_where_sigma_points_lie():
     points = SigmaPoints(0.5, 1.0, 1.0)
     assert points.spread(3) == 1.0
     assert points.bend_weight == 0.75
-    mean, covariance = points.weights(3)
-    # n + λ = 1, λ = -2.
-    assert mean.tolist() == [-2.0, *[0.5] * 6]
-    assert covariance.tolist() == [-2.0 + 1 - 0.25 + 1, *[0.5] * 6]
     assert SigmaPoints(2.0, 0.0, -1.0).spread(2) == 2.0
-    assert method_numbers(Method("far", SigmaPoints(2.0, 5.0, 2.0)), 2) == (1, 4.0, 1.0)
-    assert method_numbers(IEKF, 4) == (30, 1.0, 0.0)
+    for method, numbers in (
+        (Method("far", SigmaPoints(2.0, 5.0, 2.0)), (1, 4.0, 1.0)),
+        (IEKF, (30, 1.0, 0.0)),
+    ):
+        problem = problem_of(compiled(READING), np.eye(2), np.zeros((2, 2)), method)
+        assert (problem.iterations, problem.spread, problem.bend_weight) == numbers
+        assert problem.diagonal
+    correlated = position_fix(POSITION, [[1.0, 1e-9], [1e-9, 1.0]])
+    assert not problem_of(compiled(correlated), np.eye(2), np.zeros((2, 2)), IEKF).diagonal
 
 
 def test_factors_of_covariances():
@@ -95,12 +103,12 @@ def test_factors_of_covariances():
     # Rounding may leave a negative eigenvalue of a billionth for each component.
     assert factor_of([[1.0, 1.0 + 1.9e-9], [1.0 + 1.9e-9, 1.0]], 2).shape == (2, 2)
     assert factor_of([[1.0, 0.5], [0.5 * (1 + 0.9e-9), 1.0]], 2).shape == (2, 2)
-    for given in (np.eye(2), [np.eye(2)] * 3):
-        np.testing.assert_array_equal(factors_of(given, 2, 3), [np.eye(2)] * 3)
-    two = factors_of([4.0 * np.eye(2), 9.0 * np.eye(2)], 2, 2)
-    np.testing.assert_array_equal(two, [2.0 * np.eye(2), 3.0 * np.eye(2)])
-    assert is_diagonal(np.diag([1.0, 2.0]))
-    assert not is_diagonal(np.array([[1.0, 0.0], [1e-9, 1.0]]))
+    # One covariance for all trials, or each its own.
+    still = compiled(READING), np.eye(2), np.zeros((2, 2)), EKF, np.zeros(2)
+    nothing = np.full((2, 1, 2), np.nan)
+    for given in (4.0 * np.eye(2), [4.0 * np.eye(2), 9.0 * np.eye(2)]):
+        found = run_trials(*still, given, nothing, covariances=True).covariances[:, 0]
+        np.testing.assert_allclose(found, np.broadcast_to(given, (2, 2, 2)))
     belief = kalman.as_belief([1, 2], [[1, 0], [0, 0]])
     assert (belief.mean.tolist(), belief.covariance.tolist()) == ([1.0, 2.0], [[1.0, 0], [0, 0]])
 
@@ -216,7 +224,7 @@ DOORS = {
     "SigmaPoints, beta": (lambda: SigmaPoints(1.0, nan), ConfigError),
     "SigmaPoints, kappa": (lambda: SigmaPoints(1.0, 2.0, inf), ConfigError),
     "kappa: expected more than -2": (lambda: SigmaPoints(1.0, 2.0, -2.0).spread(2), InputError),
-    "kappa: expected more than -3": (lambda: SigmaPoints(1.0, 2.0, -3.5).weights(3), InputError),
+    "kappa: expected more than -3": (lambda: SigmaPoints(1.0, 2.0, -3.5).spread(3), InputError),
     "Method, iterations: expected a whole number >= 1": (
         lambda: Method("none", iterations=0),
         ConfigError,

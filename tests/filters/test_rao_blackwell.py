@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from fusion_world import MOVING_CLOCK_3D, log_likelihood
 
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.filters import kalman
@@ -12,7 +13,7 @@ from mapfilter.models.gaussian import stack
 from mapfilter.models.motion import clock_motion, constant_velocity, random_walk, together
 from mapfilter.models.ranging import position_fix, pseudoranges, range_differences
 from mapfilter.models.signal_strength import levels
-from mapfilter.models.state import MOVING_CLOCK, MOVING_CLOCK_3D, POSITION_CLOCK_3D, StateLayout
+from mapfilter.models.state import MOVING_CLOCK, POSITION_CLOCK_3D, StateLayout
 from mapfilter.positioning.kalman.models import compiled
 
 AWAY = np.array(
@@ -116,7 +117,7 @@ def test_levels_and_one_satellite_against_a_grid():
     for k, value in enumerate(bias):
         state = np.stack([east, north, np.full(east.shape, value)], axis=-1)
         prior = -0.5 * np.sum((state - mean) ** 2 / np.diagonal(covariance), axis=-1)
-        log_density[..., k] = prior + both.log_likelihood(state, reading)
+        log_density[..., k] = prior + log_likelihood(both, state, reading)
     density = np.exp(log_density - log_density.max())
     density /= density.sum()
     told = np.array(

@@ -4,9 +4,9 @@ from math import nan
 
 import numpy as np
 import pytest
+from belief_events import Event, Step, run, step
 
 from mapfilter.filters.contract import MotionStep, Reason, Status, UpdateInfo
-from mapfilter.testing import Event, Step, run, step
 
 MOVE = MotionStep(1.0, 0.5)
 

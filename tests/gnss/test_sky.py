@@ -86,9 +86,9 @@ def test_frames_of_the_reference():
 def test_local_frames_keep_lengths_and_come_back(lon, lat, east, north):
     frame = LocalFrame(lon, lat, 100.0)
     np.testing.assert_allclose(frame.axes @ frame.axes.T, np.eye(3), atol=1e-12)
-    there = frame.to_ecef([east, north, 50.0])
+    there = frame.origin_m + [east, north, 50.0] @ frame.axes
     np.testing.assert_allclose(frame.to_local(there), [east, north, 50.0], atol=1e-6)
-    up = GEODETIC.transform(*frame.to_ecef([0.0, 0.0, 10.0]))[2]
+    up = GEODETIC.transform(*(frame.origin_m + 10.0 * frame.axes[2]))[2]
     assert up == pytest.approx(110.0, abs=1e-3)
 
 

@@ -4,14 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from fusion_world import MOVING_3D, MOVING_CLOCK_3D
 
 from mapfilter.errors import InputError
 from mapfilter.models.gaussian import stack
 from mapfilter.models.ranging import (
     GSM_STEP_M,
-    LTE_STEP_M,
     difference_covariance,
-    metres_of_steps,
     position_fix,
     pseudoranges,
     range_differences,
@@ -20,9 +19,7 @@ from mapfilter.models.ranging import (
 from mapfilter.models.signal_strength import levels, sampled_pattern
 from mapfilter.models.state import (
     MOVING,
-    MOVING_3D,
     MOVING_CLOCK,
-    MOVING_CLOCK_3D,
     POSITION,
     POSITION_CLOCK_3D,
     StateLayout,
@@ -120,11 +117,8 @@ def test_a_stack_keeps_each_model_its_pattern():
 
 
 def test_the_steps_of_timing_advances():
-    # 48/13 µs and 16/30.72 µs there and back.
+    # 48/13 µs there and back.
     assert pytest.approx(553.4629994, abs=1e-6) == GSM_STEP_M
-    assert pytest.approx(78.0709526, abs=1e-6) == LTE_STEP_M
-    assert metres_of_steps(2) == pytest.approx(2.5 * 553.4629994)
-    assert metres_of_steps([0, 3], 10.0).tolist() == [5.0, 35.0]
 
 
 def test_a_drawn_step_is_the_middle_of_what_it_covers_and_never_below_the_first():
@@ -250,9 +244,6 @@ DOORS = {
     ),
     "state: expected shape .*, 2., found": lambda: timing_advances(POSITION, ORIGIN, 1).mean(3),
     "state: expected shape": lambda: timing_advances(POSITION, ORIGIN, 1).jacobian(np.zeros(4)),
-    "reading: expected shape .1,": lambda: timing_advances(POSITION, ORIGIN, 1).log_likelihood(
-        np.zeros(2), np.zeros((3, 1))
-    ),
 }
 
 

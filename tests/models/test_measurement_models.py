@@ -4,16 +4,18 @@ import math
 
 import numpy as np
 import pytest
-from fusion_world import CASES, LAYOUT, hybrid, zhang
+from fusion_world import CASES, LAYOUT, MOVING_3D, MOVING_CLOCK_3D, hybrid, zhang
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapfilter.errors import InputError
+from mapfilter.evaluation.bounds import expected_information
+from mapfilter.filters.gaussian import EKF
+from mapfilter.filters.trials import run_trials
 from mapfilter.models.gaussian import stack
 from mapfilter.models.ranging import (
     GSM_STEP_M,
     difference_covariance,
-    metres_of_steps,
     position_fix,
     pseudoranges,
     range_differences,
@@ -22,17 +24,14 @@ from mapfilter.models.ranging import (
 from mapfilter.models.signal_strength import levels, sampled_pattern
 from mapfilter.models.state import (
     MOVING,
-    MOVING_3D,
     MOVING_CLOCK,
-    MOVING_CLOCK_3D,
     POSITION,
     POSITION_CLOCK_3D,
     GaussianMeasurement,
-    Likelihood,
     StateLayout,
-    fisher_information,
 )
 from mapfilter.models.terms import atan2_lanes, log_lanes
+from mapfilter.positioning.kalman.models import compiled
 from mapfilter.radio.antenna import MeasuredAntenna, sector_gain_db
 
 
@@ -192,16 +191,17 @@ def test_turning_the_world_turns_nothing_that_is_measured():
 
 def test_likelihood_is_the_density_and_absent_components_do_not_count():
     model = position_fix(POSITION, [[9.0, 2.0], [2.0, 4.0]])
+    still = np.eye(2), np.zeros((2, 2)), EKF, np.zeros(2), np.zeros((2, 2))
+
+    def evidence(readings):
+        return run_trials(compiled(model), *still, np.array(readings)[:, None]).evidence[:, 0]
+
     grid = np.arange(-15.0, 15.0, 0.25)
-    east, north = np.meshgrid(grid, grid)
-    density = [
-        np.exp(model.log_likelihood(np.zeros(2), np.array(reading)))
-        for reading in zip(east.ravel(), north.ravel(), strict=True)
-    ]
+    density = np.exp(evidence(np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)))
     assert np.sum(density) * 0.25**2 == pytest.approx(1.0, abs=1e-4)
-    alone = model.log_likelihood(np.zeros(2), np.array([1.5, np.nan]))
+    alone, nothing = evidence([[1.5, np.nan], [np.nan, np.nan]])
     assert alone == pytest.approx(-0.5 * (1.5**2 / 9 + math.log(2 * math.pi * 9)))
-    assert model.log_likelihood(np.zeros(2), np.full(2, np.nan)) == 0.0
+    assert nothing == 0.0
 
 
 def test_samples_have_the_mean_and_the_covariance():
@@ -239,16 +239,17 @@ def test_a_leaning_antenna_is_seen_from_above():
 def test_timing_advance_comes_in_steps_on_request():
     model = timing_advances(POSITION, [[0.0, 0.0]], 1e-6, step_m=GSM_STEP_M)
     drawn = model.sample(np.array([[100.0, 0.0], [600.0, 0.0]]), np.random.default_rng(0))
-    np.testing.assert_allclose(drawn[:, 0], metres_of_steps([0, 1]))
+    np.testing.assert_allclose(drawn[:, 0], [0.5 * GSM_STEP_M, 1.5 * GSM_STEP_M])
 
 
 def test_information_is_that_of_a_linear_reading():
     model = position_fix(MOVING, [[4.0, 0.0], [0.0, 9.0]])
-    np.testing.assert_allclose(np.diag(model.information(np.zeros(4))), [0.25, 0.0, 1 / 9, 0.0])
+    states = np.zeros((2, 5, 4))
+    once = expected_information(model, states)
+    np.testing.assert_allclose(np.diag(once[3]), [0.25, 0.0, 1 / 9, 0.0])
     assert isinstance(model, GaussianMeasurement)
-    assert isinstance(model, Likelihood)
-    twice = fisher_information(stack([model, model]), np.zeros((5, 4)))
-    np.testing.assert_allclose(twice[3], 2 * model.information(np.zeros(4)))
+    twice = expected_information(stack([model, model]), states)
+    np.testing.assert_allclose(twice[3], 2 * once[3])
 
 
 BAD = {

@@ -107,7 +107,7 @@ def test_what_lies_on_the_border_is_taken():
 
 
 DOORS = {
-    "motion: expected two square matrices alike": lambda: LinearMotion(np.eye(2), np.eye(3)),
+    "motion: expected two square matrices of one shape": lambda: LinearMotion(np.eye(2), np.eye(3)),
     "motion: expected two square": lambda: LinearMotion(np.ones(3), np.ones(3)),
     "motion: expected two square matrices": lambda: LinearMotion(np.ones((2, 3)), np.ones((2, 3))),
     "motion: expected finite numbers": lambda: LinearMotion(np.full((2, 2), INF), I2),

@@ -5,12 +5,11 @@ import pandas as pd
 from cross_world import CRS, walk_log
 
 from mapfilter.gnss.orbits import gps_time, joined, nominal_galileo, nominal_gps
-from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.simulation.satellites import ReceptionModel, receive
 from mapfilter.tracks.log import make_log
 
 START_UTC_S = 1_700_000_000.0
-HEIGHTS = GnssOptions(height_m=100.0, height_sd_m=20.0)
+HEIGHTS = {"antenna_height_m": 100.0, "antenna_height_sd_m": 20.0}
 
 
 def sky_table(truth, seed=0, spoofer=None, **model):

@@ -15,7 +15,7 @@ from mapfilter.filters.particle import ParticleFilter, ParticleOptions
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel, Start
-from mapfilter.positioning.bayes.options import BayesOptions, open_area
+from mapfilter.positioning.bayes.options import BayesFilter, open_area
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.filter import estimate_of, locate
 from mapfilter.testing import ContractError, check_belief_filter
@@ -32,7 +32,9 @@ def area(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def positioner(area):
-    return BayesOptions(particles=FEW).over_area(area)
+    return BayesFilter(max_particles=4000, min_search_particles=2000, min_particles=500).over_area(
+        area
+    )
 
 
 def filters(area):

@@ -11,11 +11,11 @@ from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Status
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.positioning.bayes.alternative import AlternativeRules
-from mapfilter.positioning.bayes.options import BayesOptions, open_area
+from mapfilter.positioning.bayes.options import BayesFilter, open_area
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.filter import locate
 
-FEW = ParticleOptions(max_particles=4000, min_search_particles=2000, min_particles=500)
+FEW = BayesFilter(max_particles=4000, min_search_particles=2000, min_particles=500)
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +32,7 @@ def off_m(log, fix):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_search_without_the_true_place_is_taken_over(area, seed):
-    positioner = BayesOptions(particles=FEW).over_area(area)
+    positioner = FEW.over_area(area)
     log, rng = walk_log(), np.random.default_rng(seed)
     track, switches = positioner.begin(), []
     for number, epoch in enumerate(epochs(log)):
@@ -54,7 +54,7 @@ def test_a_search_without_the_true_place_is_taken_over(area, seed):
 
 def test_a_belief_with_a_large_cusum_does_not_converge(area):
     never = AlternativeRules(start_cusum=1e9, start_cusum_cells=1e9, converge_cusum=-1.0)
-    positioner = replace(BayesOptions(particles=FEW).over_area(area), rules=never)
+    positioner = replace(FEW.over_area(area), rules=never)
     estimate = locate(walk_log(), positioner, np.random.default_rng(0)).estimate
     assert set(estimate.status) == {Status.SEARCHING}
     assert estimate.mass_50m[-1] > 0.99

@@ -92,9 +92,9 @@ def test_weights_are_those_of_the_reference():
         told = CASES[name][filter_name]
         if filter_name.startswith("rbukf") and "weights" in told:
             sigma = reference_method(filter_name).sigma
-            mean, covariance = sigma.weights(6)
-            np.testing.assert_allclose(mean, told["weights"][0], rtol=1e-10, atol=1e-15)
-            np.testing.assert_allclose(covariance, told["weights"][1], rtol=1e-10, atol=1e-15)
+            (mean, side, *_), (covariance, *_) = told["weights"]
+            assert sigma.spread(6) ** 2 == pytest.approx(1 / (2 * side), rel=1e-10)
+            assert sigma.bend_weight == pytest.approx(covariance - mean - 1, abs=1e-8)
 
 
 def textbook(motion, model, readings, mean, covariance):

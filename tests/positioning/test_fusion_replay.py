@@ -17,7 +17,7 @@ from mapfilter.models.state import MOVING, POSITION
 from mapfilter.positioning.filter import locate
 from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.filter import KalmanFilter
-from mapfilter.positioning.kalman.models import FusionOptions, SiteModels, compiled
+from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels, compiled
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.tracks.log import make_log
@@ -50,7 +50,7 @@ def drive(seed, *, steps=120, speed=1.5, named=True, plan=PLAN):
     heading = rng.uniform(-np.pi, np.pi) + np.cumsum(rng.normal(0, 0.02, steps))
     ways = speed * np.column_stack([np.cos(heading), np.sin(heading)])
     truth = np.array([EAST, NORTH]) + rng.uniform(-900, 900, 2) + np.cumsum(ways, axis=0)
-    model = SiteModels(plan, FusionOptions()).of(POSITION, plan.ids, ())
+    model = SiteModels(plan, KalmanOptions()).of(POSITION, plan.ids, ())
     lasting, error = np.exp(-speed / 50), rng.normal(0, 7, model.size)
     rows, serving = [], None
     for k, expected in enumerate(model.mean(truth)):
@@ -119,10 +119,10 @@ def test_measured_antennas_are_those_of_their_files():
     antenna = MeasuredAntenna("made", angle, loss, *vertical)
     plan = CellPlan(CRS, (cell("A", (0, 0), azimuth_deg=90.0, antenna="made"),))
     with pytest.raises(InputError, match=r"cell 'A', antenna.*no folder of antennas"):
-        SiteModels(plan, FusionOptions())
-    sites = SiteModels(plan, FusionOptions(), {"made": antenna})
+        SiteModels(plan, KalmanOptions())
+    sites = SiteModels(plan, KalmanOptions(), {"made": antenna})
     round_about = SiteModels(
-        CellPlan(CRS, (cell("A", (0, 0), azimuth_deg=90.0, antenna="omni"),)), FusionOptions()
+        CellPlan(CRS, (cell("A", (0, 0), azimuth_deg=90.0, antenna="omni"),)), KalmanOptions()
     )
     for bearing in (0.0, 40.0, 150.0, 280.0):
         way = np.radians(90.0 - bearing) + sites.convergence_rad
@@ -136,7 +136,7 @@ def test_measured_antennas_are_those_of_their_files():
 def test_a_belief_holds_both_places_that_readings_allow():
     """Two sites on a line: what is left of it looks like what is right."""
     plan = CellPlan(CRS, (cell("A", (0, 0)), cell("B", (900, 0))))
-    sites = SiteModels(plan, FusionOptions())
+    sites = SiteModels(plan, KalmanOptions())
     truth = np.array([EAST + 300, NORTH + 900])
     model = sites.of(POSITION, ("A", "B"), ())
     levels = model.mean(truth)
@@ -215,9 +215,9 @@ def test_hindsight_is_the_smoother_of_the_filter():
     gnss, _, truth = fixes()
     log = make_log(CRS, gnss=gnss)
     plain, later = located(log), located(log, smooth=True)
-    options = FusionOptions()
-    motion = constant_velocity(1.0, options.acceleration, noise="continuous")
-    start = [options.start_sigma_m, options.speed_sigma_mps] * 2
+    options = KalmanOptions()
+    motion = constant_velocity(1.0, options.acceleration_mps_per_sqrt_s, noise="continuous")
+    start = [options.start_sd_m, options.speed_sd_mps] * 2
     shifted = gnss[["east_m", "north_m"]].to_numpy() - [EAST, NORTH]
     mean = np.array([shifted[0, 0], 0.0, shifted[0, 1], 0.0])
     model = compiled(position_fix(MOVING, np.eye(2) * 400.0))

@@ -1,7 +1,7 @@
 """A Kalman-type filter's walk step by step: motion, starts, noise that lasts, statuses."""
 
 from dataclasses import asdict, replace
-from math import cos, hypot, inf, log10, nan, pi, sin
+from math import cos, hypot, inf, log10, nan, pi, radians, sin
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from mapfilter.models.state import MOVING, POSITION
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.kalman.belief import SumBelief
 from mapfilter.positioning.kalman.filter import KalmanSmoother, KalmanState, _Step
-from mapfilter.positioning.kalman.models import FusionOptions, SiteModels
+from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
 from mapfilter.radio.cells import Cell, CellPlan
 
@@ -32,7 +32,7 @@ PLAN = CellPlan(CRS, (
     cell("A", 0.0, arfcn=600, bsic=1), cell("B", 2000.0, arfcn=601, bsic=2),
     cell("C", 3000.0, antenna="sector", azimuth_deg=90.0, arfcn=601, bsic=3),
 ))  # fmt: skip
-SITES = SiteModels(PLAN, FusionOptions())
+SITES = SiteModels(PLAN, KalmanOptions())
 NOTHING = SiteReadings((), (), (), (), ())
 
 
@@ -49,18 +49,23 @@ def started(reckoned=True, **more):
 
 
 def test_the_usual_options():
-    assert asdict(FusionOptions()) == {
-        "level_sigma_db": 9.0, "timing_step_m": pytest.approx(553.46, abs=0.01),
-        "timing_sigma_m": 200.0, "level_memory_m": 100.0, "timing_memory_m": 500.0,
-        "fix_sigma_m": 10.0, "acceleration": 0.7, "speed_sigma_mps": 8.0, "step_sigma_m": 0.3,
-        "heading_sigma_rad": 0.2, "drift_m": 0.3, "start_sigma_m": 1500.0, "start_parts": 11,
-        "start_spacing_m": 600.0, "reach_m": 35_000.0, "converged_radius_m": 1000.0,
+    assert asdict(KalmanOptions()) == {
+        "level_error_db": 9.0, "timing_step_m": pytest.approx(553.46, abs=0.01),
+        "timing_sd_m": 200.0, "level_memory_m": 100.0, "timing_memory_m": 500.0,
+        "fix_sd_m": 10.0, "acceleration_mps_per_sqrt_s": 0.7, "speed_sd_mps": 8.0, "step_sd_m": 0.3,
+        "heading_sd_deg": 11.459155902616464, "drift_m_per_sqrt_s": 0.3, "start_sd_m": 1500.0,
+        "start_parts": 11, "start_spacing_m": 600.0, "reach_m": 35_000.0,
+        "converged_radius_m": 1000.0,
     }  # fmt: skip
-    for name in asdict(FusionOptions()):
+    for name in asdict(KalmanOptions()):
         for value in (0, -1.0, inf, nan):
-            with pytest.raises(ConfigError, match=f"FusionOptions, {name}: expected a .*number >"):
-                FusionOptions(**{name: value})
-        assert getattr(FusionOptions(**{name: 7}), name) == 7
+            with pytest.raises(ConfigError, match=f"KalmanOptions, {name}: expected a .*r (>|in)"):
+                KalmanOptions(**{name: value})
+        assert getattr(KalmanOptions(**{name: 7}), name) == 7
+    with pytest.raises(ConfigError, match=r"start_parts: expected a whole number in 1\.\.100"):
+        KalmanOptions(start_parts=101)
+    # To the last digit what it was in radians.
+    assert radians(KalmanOptions().heading_sd_deg) == 0.2
 
 
 def test_steps_shift_and_spread():
@@ -139,7 +144,7 @@ def test_where_a_belief_starts():
         about.moments.covariance, 1500.0**2 * np.eye(2), rtol=1e-6, atol=1e-3
     )
     on_circle = walk()._start(None, SiteReadings(("B",), (-70.0,), ("A",), (2,), ()))
-    radius = 2.5 * FusionOptions().timing_step_m
+    radius = 2.5 * KalmanOptions().timing_step_m
     # 8 694 m around by 600 m.
     assert on_circle.means.shape == (14, 2)
     np.testing.assert_allclose(on_circle.weights, 1 / 14)
@@ -151,14 +156,14 @@ def test_where_a_belief_starts():
     assert near.weights.size == 8
     far = walk()._start(None, SiteReadings((), (), ("A",), (60,), ()))
     assert far.weights.size == 64
-    around = 0.7 * 2 * pi * 60.5 * FusionOptions().timing_step_m / 64
+    around = 0.7 * 2 * pi * 60.5 * KalmanOptions().timing_step_m / 64
     np.testing.assert_allclose(far.covariances[0], around**2 * np.eye(2))
 
 
 def test_errors_that_last_are_told_once():
     made = walk()
     model = SITES.of(POSITION, ("A",), ("B",))
-    sigma = hypot(200.0, FusionOptions().timing_step_m / 12**0.5)
+    sigma = hypot(200.0, KalmanOptions().timing_step_m / 12**0.5)
     np.testing.assert_allclose(model.noise, np.diag([81.0, sigma**2]))
     # Before the first report nothing has been told.
     np.testing.assert_allclose(made._aged(model, [100.0, 500.0]).noise, model.noise)
@@ -189,20 +194,20 @@ def test_noise_of_fixes():
 
 def test_statuses():
     made = started()
-    made._tell(1000.1)
+    made._set_status(1000.1)
     assert made.status is Status.SEARCHING
-    made._tell(1000.0)
+    made._set_status(1000.0)
     assert made.status is Status.CONVERGED
-    made._tell(5000.0)
+    made._set_status(5000.0)
     assert made.status is Status.TRACKING
     made.recent_nis = [5.1] * 9
-    made._tell(5.0)
+    made._set_status(5.0)
     assert made.status is Status.TRACKING
     made.recent_nis = [5.0] * 10
-    made._tell(5.0)
+    made._set_status(5.0)
     assert made.status is Status.TRACKING
     made.recent_nis = [0.0] * 9 + [50.1]
-    made._tell(5.0)
+    made._set_status(5.0)
     assert made.status is Status.LOST
     # Ten readings are remembered, each by its square for one component.
     for _ in range(12):
@@ -274,7 +279,7 @@ def test_levels_fall_as_cost_231_hata_says():
     near = SITES.of(POSITION, ("A",), ()).mean([[EAST + 20.0, NORTH], [EAST + 3.0, NORTH]])
     assert near[0] == near[1]
     low = SiteModels(CellPlan(CRS, (cell("L", 0.0, height_m=4.0, indoor=True,
-                                         penetration_loss_db=15.0),)), FusionOptions())  # fmt: skip
+                                         penetration_loss_db=15.0),)), KalmanOptions())  # fmt: skip
     at_10 = 46.3 + 33.9 * log10(1800.0) - 13.82 * log10(10.0) - lift
     found = low.of(POSITION, ("L",), ()).mean([EAST + 1000.0, NORTH])[0]
     assert found == pytest.approx(50.0 - at_10 - 15.0, abs=1e-6)

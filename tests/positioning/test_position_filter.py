@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
+from fusion_world import MOVING_CLOCK_3D
 
 from mapfilter.errors import InputError
 from mapfilter.filters.gaussian import EKF
 from mapfilter.filters.trials import run_trials
 from mapfilter.models.motion import clock_motion, constant_velocity, together
 from mapfilter.models.ranging import pseudoranges
-from mapfilter.models.state import MOVING, MOVING_CLOCK_3D, POSITION_CLOCK_3D, StateLayout
+from mapfilter.models.state import MOVING, POSITION_CLOCK_3D, StateLayout
 from mapfilter.positioning.kalman.models import compiled
 from mapfilter.positioning.kalman.static_fix import StaticFix, filter_fixes, static_fix
 

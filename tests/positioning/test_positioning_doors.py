@@ -1,6 +1,6 @@
 """Defaults of positioning, limits of its options, and thresholds of its decisions."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import inf, nan, radians
 
 import numpy as np
@@ -24,7 +24,7 @@ from mapfilter.positioning.bayes.alternative import (
     resolve_alternative,
 )
 from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.options import BayesFilter, BayesOptions, GridFilter
+from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.bayes.radio import EvidenceOptions, RadioHistory
 from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
 from mapfilter.positioning.bayes.timing import TimingState
@@ -61,13 +61,16 @@ def test_the_usual_options():
     evidence = EvidenceOptions()
     assert (evidence.spacing_m, evidence.first_m, evidence.use_levels) == (5.0, 25.0, True)
     assert (evidence.serving, evidence.levels) == (ServingWeights(), LevelErrors())
-    options = BayesOptions()
-    assert (options.motion, options.map, options.evidence) == (
-        MotionErrors(), MapWeights(), evidence,
-    )  # fmt: skip
-    assert (options.particles, options.challenge) == (ParticleOptions(), AlternativeRules())
-    assert (options.satellites, options.timing) == (GnssOptions(), TimingOptions())
-    assert (options.smooth, options.grid) == (False, False)
+    bound = BayesFilter(bias_sd_deg=1.5).over_area(small_area.make_area())
+    model = bound.model
+    narrow = MotionErrors(bias_sd_rad=radians(1.5))
+    assert (model.motion, model.weights, model.evidence) == (narrow, MapWeights(), evidence)
+    more = 4 / 3
+    few = ParticleOptions(int(20_000 * more**0.5), int(12_000 * more**0.5), 1000)
+    assert (bound.options, bound.rules) == (few, AlternativeRules())
+    # The step of timing advance is rounded to decimetres in the options.
+    assert (bound.satellites, bound.timing) == (GnssOptions(), TimingOptions(step_m=553.5))
+    assert (bound.smooth, bound.grid) == (False, False)
     reading = RadioReading()
     assert (reading.serving, reading.serving_weight, reading.levels, reading.bounds) == (
         -1, 0.0, None, (),
@@ -96,7 +99,7 @@ def test_the_state_before_the_first_epoch():
 
 
 def test_each_source_of_evidence_begins_with_its_own_state():
-    positioner = BayesOptions().over_area(small_area.make_area())
+    positioner = BayesFilter().over_area(small_area.make_area())
     assert [source.name for source in positioner.sources] == [
         "gnss",
         "timing",
@@ -119,8 +122,9 @@ def test_when_satellites_are_compared_again():
 
 def test_wide_errors_get_more_particles():
     def numbers(bias_sd_deg, scale_sd):
-        motion = MotionErrors(bias_sd_rad=radians(bias_sd_deg), scale_sd=scale_sd)
-        found = BayesOptions(motion=motion, particles=ParticleOptions(1000, 600, 10))._particles
+        given = {"max_particles": 1000, "min_search_particles": 600, "min_particles": 10}
+        options = BayesFilter(bias_sd_deg=bias_sd_deg, scale=scale_sd, **given)
+        found = options.over_area(small_area.make_area()).options
         return found.max_particles, found.min_search_particles, found.min_particles
 
     assert numbers(1.5, 0.015) == (1000, 600, 10)
@@ -134,11 +138,22 @@ def test_wide_errors_get_more_particles():
 def test_the_names_of_filters():
     assert CandidateFilter().name == "candidate"
     assert CandidateFilter().margin_db is None
-    assert (BayesOptions().name, BayesFilter().name) == ("bayes", "bayes")
-    assert (BayesOptions(grid=True).name, GridFilter().name) == ("grid", "grid")
-    timing = TimingOptions(step_m=553.5)
-    assert BayesFilter().options == BayesOptions(timing=timing)
-    assert GridFilter().options == BayesOptions(timing=timing, grid=True)
+    area = small_area.make_area()
+    assert BayesFilter().name == BayesFilter().over_area(area).name == "bayes"
+    assert GridFilter().name == GridFilter().over_area(area).name == "grid"
+    assert replace(GridFilter().over_area(area), grid=False) == BayesFilter().over_area(area)
+
+
+@pytest.mark.parametrize(
+    ("given", "fault"),
+    [
+        ({"antenna_height_m": 10_001.0}, "antenna_height_m: expected a number in -10000..10000"),
+        ({"min_particles": 200, "max_particles": 150}, "expected min_particles <= max_particles"),
+    ],
+)
+def test_limits_are_those_of_the_parts(given, fault):
+    with pytest.raises(ConfigError, match=fault):
+        BayesFilter(**given)
 
 
 POSITIVE = ("zenith_m", "echo_memory_m", "fix_memory_m", "clock_sd_m", "trust_grows_s")

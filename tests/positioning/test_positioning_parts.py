@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 import scalar_oracle as oracle
 import small_area
+from fusion_world import MOVING_3D
 from scipy.special import ndtr
 
 from mapfilter.errors import InputError
 from mapfilter.filters.contract import MotionStep
 from mapfilter.models.motion import random_walk
 from mapfilter.models.ranging import pseudoranges, timing_advances
-from mapfilter.models.state import MOVING_3D, POSITION, POSITION_CLOCK_3D
+from mapfilter.models.state import POSITION, POSITION_CLOCK_3D
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel, Start
@@ -29,7 +30,6 @@ from mapfilter.positioning.kalman.static_fix import (
     filter_fixes,
     static_fix,
 )
-from mapfilter.positioning.matched_way import matched_way
 
 
 def fix_at(dx, dy, **variances):
@@ -128,11 +128,11 @@ def test_the_way_that_holds_the_largest_share():
     for r, c, w in zip((row, 0, 6), (col, 0, 8), weight, strict=True):
         mass[ids[r, c]] = mass.get(ids[r, c], 0.0) + w
     best = max(mass, key=mass.get)
-    found = matched_way(area, east.astype("f4"), north.astype("f4"), weight)
+    found = area.matched_way(east.astype("f4"), north.astype("f4"), weight)
     assert found == (best, pytest.approx(min(mass[best], 1.0)))
     # Beyond the edges those of the edge.
     for place, at in (((-50.0, 999.0), (0, 0)), ((999.0, -50.0), (6, 8)), ((-1.0, -1.0), (6, 0))):
-        one = matched_way(area, *np.array([[place[0]], [place[1]]], "f4"), np.ones(1, "f4"))
+        one = area.matched_way(*np.array([[place[0]], [place[1]]], "f4"), np.ones(1, "f4"))
         assert one == (ids[at], 1.0)
 
 

@@ -10,14 +10,13 @@ from cross_world import CRS, EAST, LATTICE, NORTH, SOUTH, make_database, walk_lo
 from sky_world import HEIGHTS, START_UTC_S, no_rows, off_m, sky_log, sky_table
 
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.filters.particle import ParticleOptions
-from mapfilter.positioning.bayes.options import BayesOptions, open_area
+from mapfilter.positioning.bayes.options import BayesFilter, GridFilter, open_area
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow, epochs
 from mapfilter.positioning.filter import estimate_of, locate
 from mapfilter.simulation.satellites import Spoofer
 from mapfilter.tracks.log import make_log
 
-FEW = ParticleOptions(max_particles=2000, min_search_particles=1000, min_particles=300)
+FEW = {"max_particles": 2000, "min_search_particles": 1000, "min_particles": 300}
 LONG = ((EAST, 90.0), (NORTH, 90.0), (SOUTH, 90.0), (EAST, 200.0))
 
 
@@ -28,7 +27,7 @@ def area(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def positioner(area):
-    return BayesOptions(particles=FEW, satellites=HEIGHTS).over_area(area)
+    return BayesFilter(**FEW, **HEIGHTS).over_area(area)
 
 
 def found(positioner, log, seed=0):
@@ -191,7 +190,7 @@ def test_a_start_eighteen_seconds_off_is_rejected_epoch_by_epoch(positioner):
 
 
 def test_the_exact_filter_tells_that_it_takes_no_pseudoranges(area):
-    grid = BayesOptions(grid=True).over_area(area)
+    grid = GridFilter().over_area(area)
     log = sky_log(legs=((EAST, 30.0),), most=2)
     estimate = found(grid, log)
     reasons = {u.reason for u in estimate.unused if u.kind == "pseudorange"}
@@ -219,7 +218,7 @@ def test_hindsight_and_turns_alone_take_satellites_too(positioner):
 
 
 def test_the_exact_filter_takes_fixes_and_rejects_lies(area):
-    grid = BayesOptions(grid=True, particles=FEW).over_area(area)
+    grid = GridFilter(**FEW).over_area(area)
     log = walk_log(((EAST, 90.0),))
     fixes = log.truth[["time_s", "east_m", "north_m"]].assign(var_east_m2=9.0, var_north_m2=9.0)
     fixes.loc[fixes["time_s"] > 40, "north_m"] += 400.0
@@ -228,9 +227,9 @@ def test_the_exact_filter_takes_fixes_and_rejects_lies(area):
     assert {u.reason for u in estimate.unused if u.kind == "gnss"} >= {Reason.REJECTED_BY_EVIDENCE}
 
 
-@pytest.mark.parametrize("grid", [False, True])
-def test_a_fix_of_no_place_is_no_fix_before_a_start_neither(area, grid):
-    positioner = BayesOptions(particles=FEW, satellites=HEIGHTS, grid=grid).over_area(area)
+@pytest.mark.parametrize("kind", [BayesFilter, GridFilter])
+def test_a_fix_of_no_place_is_no_fix_before_a_start_neither(area, kind):
+    positioner = kind(**FEW, **HEIGHTS).over_area(area)
     row = ReportRow("serving", "W", None, None, np.nan, 0)
     blank, report = Epoch(0.0, fix=GnssFix(np.nan, 1.0)), Epoch(1.0, radio=(row,))
     rng, other = np.random.default_rng(0), np.random.default_rng(0)

@@ -9,9 +9,8 @@ import pytest
 from cross_world import CRS, LATTICE, make_database, walk_log
 
 from mapfilter.filters.contract import Reason
-from mapfilter.filters.particle import ParticleOptions
 from mapfilter.positioning.bayes import filter as bayes
-from mapfilter.positioning.bayes.options import BayesOptions, open_area
+from mapfilter.positioning.bayes.options import BayesFilter, open_area
 from mapfilter.positioning.bayes.timing import TimingSource, TimingState
 from mapfilter.positioning.epochs import Difference, Epoch, ReportRow
 from mapfilter.positioning.filter import locate
@@ -109,8 +108,8 @@ def test_times_of_arrival_shorten_the_search(area):
         for cell in ("E", "NW")
     ]  # fmt: skip
     with_them = replace(log, tdoa=make_log(CRS, tdoa=pd.concat(rows)).tdoa)
-    few = ParticleOptions(max_particles=2000, min_search_particles=1000, min_particles=300)
-    positioner = BayesOptions(particles=few).over_area(area)
+    few = BayesFilter(max_particles=2000, min_search_particles=1000, min_particles=300)
+    positioner = few.over_area(area)
     switch = [
         locate(one, positioner, np.random.default_rng(1)).estimate.converged_at
         for one in (log, with_them)
@@ -134,6 +133,6 @@ def test_differences_between_reports_of_levels_do_not_make_it_a_log_of_cells(
     rows = pd.DataFrame({"time_s": log.truth["time_s"], "cell": "E", "reference": "W"})
     radio = log.radio.assign(level_dbm=level_dbm)
     told = make_log(CRS, motion=log.motion, radio=radio, tdoa=rows.assign(difference_m=0.0))
-    few = ParticleOptions(max_particles=500, min_search_particles=300, min_particles=100)
-    locate(told, BayesOptions(particles=few).over_area(area), np.random.default_rng(1))
+    few = BayesFilter(max_particles=500, min_search_particles=300, min_particles=100)
+    locate(told, few.over_area(area), np.random.default_rng(1))
     assert seen == {np.isnan(level_dbm)}

@@ -128,13 +128,8 @@ def test_never_below_free_space_and_rising_with_distance(
 
 
 def test_what_is_extrapolated_is_told() -> None:
-    notes = outside_published_range(
-        "cost231_hata",
-        frequency_mhz=900.0,
-        base_height_m=20.0,
-        mobile_height_m=1.5,
-        longest_distance_m=500.0,
-    )
+    used = {"base_height_m": 20.0, "mobile_height_m": 1.5, "distance_m": 500.0}
+    notes = outside_published_range("cost231_hata", used | {"frequency_mhz": 900.0})
     assert notes == (
         "frequency_mhz 900 is outside 1500..2000",
         "base_height_m 20 is outside 30..200",

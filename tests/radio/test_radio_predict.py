@@ -238,8 +238,8 @@ def test_what_is_extrapolated_is_told_by_cell() -> None:
     many = CellPlan(CRS, tuple(replace(low, id=name) for name in "abcd"))
     hata = replace(PLAIN, model="cost231_hata")
     assert outside_validity(many, LATTICE, hata) == (
-        "4 cells ('a', 'b', 'c', …): base_height_m 3 is outside 30..200",
-        "4 cells ('a', 'b', 'c', …): distance_m 821 is outside 1000..20000",
+        "4 cells ('a', 'b', 'c' and 1 more): base_height_m 3 is outside 30..200",
+        "4 cells ('a', 'b', 'c' and 1 more): distance_m 821 is outside 1000..20000",
     )
     wide = replace(LATTICE, resolution_m=100.0)
     assert outside_validity(CellPlan(CRS, (OMNI,)), wide, hata) == (

@@ -13,7 +13,7 @@ from mapfilter.rasters import geotiff
 from mapfilter.rasters.geotiff import (
     QUANTITY_TAG,
     _check_extent_of_file,
-    _check_pixels,
+    _lattice,
     _quantity,
     write_rasters,
 )
@@ -24,9 +24,20 @@ LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 6, 8)
 
 
 def complaints(check, *arguments):
+    try:
+        check(*arguments)
+    except InputError as error:
+        return [f"{fault.expected}; {fault.hint}" for fault in error.faults]
+    return []
+
+
+def placed(transform, known):
+    """Return where the pixels of a file lie, whose transform is known or is GDAL's default."""
     faults = Faults()
-    check(*arguments, faults)
-    return [f"{fault.expected}; {fault.hint}" for fault in faults.found]
+    header = SimpleNamespace(transform=transform, crs=None, height=6, width=8)
+    lattice = _lattice("a.tif", header, CRS, known, faults)
+    faults.raise_if_any(InputError)
+    return lattice
 
 
 @pytest.mark.parametrize(
@@ -46,14 +57,14 @@ def complaints(check, *arguments):
     ],
 )
 def test_where_the_pixels_lie(transform, said):
-    found = complaints(_check_pixels, "a.tif", SimpleNamespace(transform=transform), True)
+    found = complaints(placed, transform, True)
     assert len(found) == len(said)
     assert all(one.startswith(other) for one, other in zip(found, said, strict=True))
-    faults = Faults()
-    assert _check_pixels("a.tif", SimpleNamespace(transform=transform), True, faults) is not bool(
-        said
-    )
-    assert not _check_pixels("a.tif", SimpleNamespace(transform=transform), False, Faults())
+    if not said:
+        side_m = LATTICE.resolution_m
+        assert placed(transform, True) == Lattice(CRS, transform.c, transform.f, side_m, 6, 8)
+    (unplaced,) = complaints(placed, transform, False)
+    assert unplaced.startswith("where the pixels lie")
 
 
 def source(height, width, block, count=1, interleaving="band", kinds=("float32",), blocks=None):

@@ -9,7 +9,7 @@ from raster_files import INDEX_HEADER, write_bil
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters.atoll import IndexRow, find_index, read_index
-from mapfilter.rasters.plain_grids import grid_lattice
+from mapfilter.rasters.plain_grids import GridHeader
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 6, 8)
@@ -111,7 +111,7 @@ def test_rows_of_an_index_against_the_rasters():
 def test_what_stands_in_for_a_header():
     header = row().header()
     assert header is not None
-    assert grid_lattice(header, CRS, 6, 8, Faults()) == LATTICE
-    assert [float(header.values[key]) for key in ("NROWS", "NCOLS", "NBITS")] == [6, 8, 16]
+    assert GridHeader(*header).lattice(CRS, 6, 8) == LATTICE
+    assert [float(header[1][key]) for key in ("NROWS", "NCOLS", "NBITS")] == [6, 8, 16]
     for missing in ("resolution_m", "bits", "area_m"):
         assert row(**{missing: None}).header() is None

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from raster_files import write_ascii, write_bil
 
-from mapfilter.errors import Faults, InputError
+from mapfilter.errors import InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters.files import Declared, check_plausible, without_nodata
-from mapfilter.rasters.plain_grids import GridHeader, grid_lattice, open_ascii_grid
+from mapfilter.rasters.plain_grids import GridHeader, open_ascii_grid
 from mapfilter.rasters.raster_set import open_rasters
 
 CRS = "EPSG:32635"
@@ -80,10 +80,10 @@ HEADER = {
 
 def placed(**changes):
     values = {key: text for key, text in (HEADER | changes).items() if text}
-    faults = Faults()
     rows, cols = (int(values[key]) for key in ("NROWS", "NCOLS"))
-    lattice = grid_lattice(GridHeader("a.hdr", values), CRS, rows, cols, faults)
-    return lattice, [fault.expected for fault in faults.found]
+    header = GridHeader("a.hdr", values)
+    lattice = header.lattice(CRS, rows, cols)
+    return lattice, [fault.expected for fault in header.faults.found]
 
 
 def test_places_by_corner_centre_and_upper_centre_are_one():
@@ -125,17 +125,16 @@ def test_places_that_just_are():
 
 @pytest.mark.parametrize(("text", "value"), [("10000000", 10_000_000), ("3,0", 3), ("2", 2)])
 def test_whole_numbers(text, value):
-    faults = Faults()
     header = GridHeader("a.hdr", {"NROWS": text})
-    assert header.whole("NROWS", faults, low=2) == value
-    assert faults.found == []
+    assert header.whole("NROWS", low=2) == value
+    assert header.faults.found == []
 
 
 @pytest.mark.parametrize("text", ["10000001", "1", "2.5", "1_0", "nan", "x"])
 def test_whole_numbers_that_are_none(text):
-    faults = Faults()
-    assert GridHeader("a.hdr", {"NROWS": text}).whole("NROWS", faults, low=2) is None
-    assert len(faults.found) == 1
+    header = GridHeader("a.hdr", {"NROWS": text})
+    assert header.whole("NROWS", low=2) is None
+    assert len(header.faults.found) == 1
 
 
 def test_a_header_is_the_first_two_words_of_each_line_and_the_first_of_each_key():

@@ -140,7 +140,9 @@ def test_other_resolutions_are_named():
     files = [made()] + [made(coarse, path=Path(f"{n}.tif")) for n in "abcd"]
     lattice, notes = common_lattice(files, None, "nearest")
     assert lattice == LATTICE
-    assert notes == ("4 of 5 rasters resampled (nearest) from 10 m to 5 m: a.tif, b.tif, c.tif, …",)
+    assert notes == (
+        "4 of 5 rasters resampled (nearest) from 10 m to 5 m: a.tif, b.tif, c.tif and 1 more",
+    )
     lattice, notes = common_lattice(files, 10.0, "nearest")
     assert lattice == coarse
     assert notes == ("1 of 5 rasters resampled (nearest) from 5 m to 10 m: a.tif",)

@@ -309,3 +309,10 @@ def test_cells_of_rasters_and_plan_are_compared_both_ways(written: Path) -> None
         check_against_plan(open_rasters(written), CellPlan("EPSG:32635", cells))
     assert "found 'C'" in str(caught.value)
     assert "no band for 'D'" in str(caught.value)
+
+
+def test_a_set_and_a_plan_are_printed_in_one_line(written: Path) -> None:
+    held = "level of 3 cells, 300 x 280 pixels of 5 m (1.4 x 1.5 km), EPSG:32635"
+    assert repr(open_rasters(written)) == f"<RxLevRasters rxlev.tif: {held}>"
+    cells = tuple(Cell(i, "S", 0.0, 0.0, 30.0, 0.0, 50.0, 1800.0) for i in IDS)
+    assert repr(CellPlan(LATTICE.crs, cells)) == "<CellPlan: 3 cells at 1 sites, EPSG:32635>"

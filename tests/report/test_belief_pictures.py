@@ -12,9 +12,9 @@ from mapfilter.evaluation.accuracy import Truth
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import Fix, Snapshot, TrackEstimate, TrackEvidence
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.belief import plot_belief
 from mapfilter.report.canvas import BLUE, save
 from mapfilter.report.errors import plot_error_over_distance, plot_evidence
+from mapfilter.report.track import plot_belief
 from mapfilter.workflows.pictures import choose_snapshots
 
 STREET = np.array([[0.0, 100.0], [400.0, 100.0]])
@@ -46,8 +46,7 @@ def estimate() -> TrackEstimate:
     ]  # fmt: skip
     half = np.linspace(0.0, 0.5, COUNT)
     nowhere = np.full(COUNT, np.nan)
-    settled = np.zeros(COUNT, dtype=np.bool_)
-    evidence = TrackEvidence(nowhere, nowhere, half, 9 - 18 * half, -half, settled)
+    evidence = TrackEvidence(nowhere, nowhere, half, 9 - 18 * half, -half)
     return TrackEstimate.of_fixes("EPSG:32635", "bayes", fixes, evidence=evidence)
 
 

@@ -15,8 +15,7 @@ from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.report.basemap import BaseMap, draw_base, largest
 from mapfilter.report.canvas import BLUE, ORANGE, save
-from mapfilter.report.landuse import plot_landuse
-from mapfilter.report.network import plot_margin
+from mapfilter.report.network import plot_landuse, plot_margin
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.routes import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings
@@ -246,7 +245,7 @@ def test_pictures_show_where_nearly_all_points_lie(drive, most_px, tmp_path, mon
     rasters, database = drive
     whole = served_points(database)
     assert whole.number.sum() == 3631
-    top, left, rows, cols = whole.crowded_window(database.lattice)
+    top, left, rows, cols = whole.crowded_window()
     # Two hundredths of the points may lie outside; some room is about the others.
     assert 0 <= top <= 20
     assert 0 <= left <= 30
@@ -265,7 +264,7 @@ def test_pictures_show_where_nearly_all_points_lie(drive, most_px, tmp_path, mon
 
 def test_an_area_full_of_points_is_shown_whole(network):
     points = served_points(network[1])
-    assert points.crowded_window(LATTICE) == (0, 0, 40, 50)
+    assert points.crowded_window() == (0, 0, 40, 50)
 
 
 def test_rasters_of_another_place_are_told(network, tmp_path):

@@ -8,9 +8,8 @@ from mapfilter.evaluation.accuracy import Truth
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import Fix, Snapshot, TrackEstimate
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.belief import plot_candidates
 from mapfilter.report.canvas import save
-from mapfilter.report.track import plot_track
+from mapfilter.report.track import plot_candidates, plot_track
 
 CRS = "EPSG:32635"
 EAST_M, NORTH_M = 385_000.0, 6_672_000.0

@@ -1,5 +1,7 @@
 """Pictures of sweeps: they are drawn of few cells and of many, and of runs that never switched."""
 
+from dataclasses import replace
+
 import matplotlib.image
 import numpy as np
 import pandas as pd
@@ -11,6 +13,7 @@ from mapfilter.report.success import (
     plot_run_distributions,
     plot_success_curves,
     plot_success_map,
+    success_curves,
 )
 
 CLAIMS = ((3.0, 0.8), (6.0, 0.65))
@@ -20,7 +23,7 @@ def cell(sigma_deg, sigma_m, success):
     place = dict.fromkeys(SuccessCell.__dataclass_fields__, 0.0)
     place |= {"sigma_orient_deg": sigma_deg, "sigma_trans_m": sigma_m, "success": success}
     place |= {"low": max(success - 0.1, 0.0), "high": min(success + 0.1, 1.0)}
-    return SuccessCell(**place)
+    return SuccessCell(**place | {"varied": {}})
 
 
 def grid(orient=6, trans=3):
@@ -61,6 +64,33 @@ def test_a_legend_of_long_names_stays_within_the_picture(tmp_path):
         path,
     )
     assert (matplotlib.image.imread(path)[:, [0, 1, -2, -1], :3] == 1.0).all()
+
+
+def test_cells_of_one_curve_differ_in_the_noise_of_headings_alone():
+    steps = [cell(3.0 * i, 0.2 * j, 0.5) for i in range(3) for j in range(2)]
+    named = [replace(one, reading=name) for name in ("set", "list") for one in steps]
+    curves = dict(success_curves(named))
+    assert list(curves) == [
+        "set, step 0 m",
+        "set, step 0.2 m",
+        "list, step 0 m",
+        "list, step 0.2 m",
+    ]
+    for cells in curves.values():
+        assert [one.sigma_orient_deg for one in cells] == [0.0, 3.0, 6.0]
+        assert len({(one.reading, one.sigma_trans_m) for one in cells}) == 1
+
+
+def test_what_belongs_to_a_filter_is_not_in_the_name_of_its_curve():
+    cells = [replace(cell(3.0 * i, 0.2, 0.5), varied={}) for i in range(2)]
+    both = [*(replace(one, reading="a", update_length_m=5.0) for one in cells)]
+    both += [replace(one, reading="b", update_length_m=22.0) for one in cells]
+    assert [name for name, _ in success_curves(both)] == ["a", "b"]
+    varied = [replace(one, varied={"filter.bayes.scale": at}) for at in (0.1, 0.2) for one in both]
+    assert [name for name, _ in success_curves(varied)] == [
+        f"{name}, filter.bayes.scale {at}" for at in (0.1, 0.2) for name in ("a", "b")
+    ]
+    assert success_curves([]) == []
 
 
 def test_equal_curves_give_equal_bytes(tmp_path):

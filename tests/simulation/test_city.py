@@ -122,7 +122,7 @@ def test_manhattan_is_what_it_says():
 
 @pytest.mark.parametrize(("size_m", "seed"), [(100.0, 0), (60_000.0, 0), (600.0, -1)])
 def test_what_cannot_be_a_city_is_refused(size_m, seed):
-    with pytest.raises(ConfigError, match="made city"):
+    with pytest.raises(ConfigError, match="synthetic city"):
         synthetic_city(lattice(size_m), seed)
 
 

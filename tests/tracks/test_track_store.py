@@ -210,6 +210,7 @@ def test_cut_off_missing_and_changed_parts_are_all_named(log, tmp_path, form):
     content = bytearray(motion.read_bytes())
     content[-1] ^= 1
     motion.write_bytes(bytes(content))
+    size = (folder / f"truth.{form}").stat().st_size
     (folder / f"truth.{form}").unlink()
     with pytest.raises(StoreError) as caught:
         read_log(folder)
@@ -217,7 +218,7 @@ def test_cut_off_missing_and_changed_parts_are_all_named(log, tmp_path, form):
     assert f"radio.{form}" in message
     assert "likely: cut off" in message
     assert f"motion.{form}: expected SHA-256" in message
-    assert f"truth.{form}: expected a table of the log, found no such file" in message
+    assert f"truth.{form}: expected a file of {size} bytes, found no such file" in message
 
 
 def test_a_cut_off_head(log, tmp_path):

@@ -4,7 +4,10 @@ Each entry is a setting's other value, the settings that it needs beside it, and
 must arrive.
 """
 
+from dataclasses import fields
 from math import radians
+
+from mapfilter.positioning.kalman.models import KalmanOptions
 
 REFUSED_SECTIONS = ("prediction.survey.", "rasters.", "track.", "sweep.")
 REFUSED = {
@@ -16,7 +19,6 @@ REFUSED = {
     "journeys.seed",
     "journeys.radio",
     "filter.smooth",
-    "filter.bayes.smooth",
     "filter.bayes.timing_step_m",
     "filter.bayes.timing_sd_m",
     "output.pictures",
@@ -34,26 +36,28 @@ OF_THE_CANDIDATE = {
     "when_empty": ("reinitialise", "when_empty"),
 }
 
+OF_KALMAN = tuple(field.name for field in fields(KalmanOptions))
+
 # Name of the setting: its value, the option, and the option's value where it has another unit.
 OF_BAYES = {
-    "step_sd_m": (0.7, "motion.step_sd_m"),
-    "heading_sd_deg": (7.0, "motion.heading_sd_rad", radians(7)),
-    "bias_sd_deg": (8.0, "motion.bias_sd_rad", radians(8)),
-    "drift_deg_per_sqrt_m": (0.3, "motion.bias_drift_rad_per_sqrt_m", radians(0.3)),
-    "scale": (0.07, "motion.scale_sd"),
-    "map_sd_m": (5.0, "map.sd_m"),
-    "map_weight_per_m": (0.2, "map.weight_per_m"),
-    "off_cost_per_m": (0.3, "map.off_cost_per_m"),
-    "levels": (False, "evidence.use_levels"),
-    "level_error_db": (8.0, "evidence.levels.sd_db"),
-    "level_correlation_m": (70.0, "evidence.levels.correlation_m"),
-    "level_weight": (0.6, "evidence.levels.weight"),
-    "report_spacing_m": (9.0, "evidence.spacing_m"),
-    "max_particles": (15000, "particles.max_particles"),
-    "min_search_particles": (9000, "particles.min_search_particles"),
-    "min_particles": (700, "particles.min_particles"),
-    "switch_mass": (0.9, "particles.switch_mass"),
-    "switch_hold_m": (11.0, "particles.switch_hold_m"),
+    "step_sd_m": (0.7, "model.motion.step_sd_m"),
+    "heading_sd_deg": (7.0, "model.motion.heading_sd_rad", radians(7)),
+    "bias_sd_deg": (8.0, "model.motion.bias_sd_rad", radians(8)),
+    "drift_deg_per_sqrt_m": (0.3, "model.motion.bias_drift_rad_per_sqrt_m", radians(0.3)),
+    "scale": (0.07, "model.motion.scale_sd"),
+    "map_sd_m": (5.0, "model.weights.sd_m"),
+    "map_weight_per_m": (0.2, "model.weights.weight_per_m"),
+    "off_cost_per_m": (0.3, "model.weights.off_cost_per_m"),
+    "levels": (False, "model.evidence.use_levels"),
+    "level_error_db": (8.0, "model.evidence.levels.sd_db"),
+    "level_correlation_m": (70.0, "model.evidence.levels.correlation_m"),
+    "level_weight": (0.6, "model.evidence.levels.weight"),
+    "report_spacing_m": (9.0, "model.evidence.spacing_m"),
+    "max_particles": (15000, "options.max_particles"),
+    "min_search_particles": (9000, "options.min_search_particles"),
+    "min_particles": (700, "options.min_particles"),
+    "switch_mass": (0.9, "options.switch_mass"),
+    "switch_hold_m": (11.0, "options.switch_hold_m"),
     "satellite_sd_m": (3.0, "satellites.zenith_m"),
     "antenna_height_m": (55.0, "satellites.height_m"),
     "antenna_height_sd_m": (33.0, "satellites.height_sd_m"),

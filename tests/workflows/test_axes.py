@@ -4,17 +4,46 @@ import pytest
 
 from mapfilter.config.axes import check_axis, numeric_keys, parse_axis, vary
 from mapfilter.config.load import load_config
-from mapfilter.config.sections import Config
+from mapfilter.config.sections import Config, FilterSection
 from mapfilter.errors import ConfigError
+from mapfilter.options import fits
+from mapfilter.workflows.simulate import simulation_settings
+from mapfilter.workflows.sweep_plan import _varied
+from mapfilter.workflows.world import filter_choice
 
 
-def test_every_numeric_option_of_four_sections_is_an_axis():
+def test_numeric_options_of_four_sections_are_axes():
     keys = numeric_keys()
-    wanted = ("filter.margin_db", "imu.scale", "journeys.stop_s", "database.floor_dbm")
+    wanted = ("filter.margin_db", "imu.scale", "journeys.stop_s", "database.margin_db")
     assert set(wanted) <= set(keys)
     assert {key.partition(".")[0] for key in keys} == {"filter", "imu", "journeys", "database"}
-    assert any(key.startswith("filter.bayes.") for key in keys)
+    assert {"filter.bayes.heading_sd_deg", "filter.kalman.level_error_db"} <= set(keys)
     assert not {"filter.smooth", "filter.name", "imu.turns", "database.path"} & set(keys)
+
+
+@pytest.mark.parametrize("key", numeric_keys())
+def test_each_axis_changes_what_a_sweep_runs(key):
+    """Journeys, inertial unit or filter of a plan are others with another value."""
+    _, parent, *_ = (*key.split("."), "")
+    name = {"bayes": "bayes", "kalman": "ekf"}.get(parent, "candidate")
+    config = Config().model_copy(update={"filter": FilterSection(name=name)})
+    value = config
+    for part in key.split("."):
+        value = getattr(value, part)
+    values = (value or 0) + 1, (value or 0) / 2, (value or 0) + 0.25
+    other = next(one for one in values if fits(numeric_keys()[key], one) and one != value)
+    before, after = (
+        (simulation_settings(one), filter_choice(one.filter))
+        for one in (config, _varied(config, {key: other}))
+    )
+    assert before != after
+
+
+@pytest.mark.parametrize("key", ["journeys.count", "journeys.seed", "database.tile_px"])
+def test_what_a_sweep_does_not_use_is_no_axis(key):
+    assert key not in numeric_keys()
+    with pytest.raises(ConfigError, match="expected an option that a sweep uses"):
+        check_axis(key, [1.0])
 
 
 @pytest.mark.parametrize("key", numeric_keys())

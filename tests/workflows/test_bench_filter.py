@@ -18,5 +18,5 @@ def test_a_small_bench():
     step = found.steps[0]
     assert min(step.step_ns, step.filter_ns) > 0
     assert found.track_s > 0
-    assert found.challenged in (0, 1)
+    assert found.with_alternative in (0, 1)
     assert 50e6 < found.loaded_memory_bytes < found.peak_memory_bytes < 2e9

@@ -158,4 +158,4 @@ def test_a_misspelt_antenna(world):
     outcome = mapfilter("check", "-c", world.toml, "--json")
     (finding,) = outcome.json["findings"]
     assert (finding["code"], finding["severity"]) == ("antenna-missing", "warning")
-    assert "Did you mean 'sector' where it says 'sectr'?" in finding["evidence"]
+    assert "Did you mean 'sector' in place of 'sectr'?" in finding["evidence"]

@@ -163,7 +163,7 @@ def test_several_logs_are_summed_up_without_truth(own_world, replay, tmp_path):
     ("columns", "lack"),
     [
         (["time_s", "step_m"], "no heading"),
-        (["time_s", "step_m", "turn_rad"], "no heading (turns alone do not tell it)"),
+        (["time_s", "step_m", "turn_rad"], "no heading (turns alone do not give one)"),
         (["time_s", "heading_rad"], "no motion"),
     ],
 )

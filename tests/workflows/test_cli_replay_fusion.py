@@ -16,7 +16,7 @@ from mapfilter.positioning.estimate_store import read_estimate
 from mapfilter.positioning.filter import locate
 from mapfilter.positioning.kalman.belief import gaussian_radii_m
 from mapfilter.positioning.kalman.filter import KalmanFilter
-from mapfilter.positioning.kalman.models import FusionOptions, SiteModels
+from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.store import write_log
@@ -44,7 +44,7 @@ def walk(seed=1, steps=200, *, motion=False, gnss=False, timing=True, levels=Tru
     truth = np.array([500_300.0, 4_600_300.0]) + np.outer(
         1.5 * time_s, [np.cos(heading), np.sin(heading)]
     )
-    options = FusionOptions()
+    options = KalmanOptions()
     sites = SiteModels(PLAN, options)
     model = sites.of(POSITION, tuple(SITES), ())
     heard, lasting = model.mean(truth), np.exp(-1.5 / 50)

@@ -1,6 +1,7 @@
 """Every setting of a configuration: the benchmark honours it or refuses it."""
 
 import json
+from dataclasses import replace
 from functools import reduce
 
 import numpy as np
@@ -9,6 +10,7 @@ from benchmark_settings import (
     GROUND_TRUTH_BESIDE,
     OF_BAYES,
     OF_JOURNEYS,
+    OF_KALMAN,
     OF_THE_CANDIDATE,
     OF_THE_GROUND_TRUTH,
     OF_THE_MAP,
@@ -25,12 +27,19 @@ from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.global_positioning import informed
+from mapfilter.geodesy import Lattice
+from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.simulation.imu import ImuNoise
 from mapfilter.workflows.evaluate import _refused, load_benchmark
 from mapfilter.workflows.evaluate import _world as prepare_world
 from mapfilter.workflows.world import World, filter_choice
 
+LATTICE = Lattice("EPSG:32629", 500_000.0, 4_500_000.0, 10.0, 2, 2)
+EMPTY = np.zeros((2, 2), dtype=np.float32)
+AREA = AreaMap(
+    LATTICE, (), frozenset(), EMPTY[..., None], EMPTY, EMPTY.astype(int), EMPTY > 0, {}, -110.0
+)
 SMALL = {
     "area.map": "manhattan",
     "area.size_m": [200.0, 200.0],
@@ -93,6 +102,7 @@ def test_every_setting_is_known_to_be_honoured_or_refused():
         *(f"prediction.ground_truth.{name}" for name in OF_THE_GROUND_TRUTH),
         *(f"filter.{name}" for name in OF_THE_CANDIDATE),
         *(f"filter.bayes.{name}" for name in OF_BAYES),
+        *(f"filter.kalman.{name}" for name in OF_KALMAN),
     }
     every = list(leaves())
     as_for_a_build = {key for key in every if key.startswith(READ_AS_FOR_A_BUILD)}
@@ -126,7 +136,8 @@ def test_what_has_no_meaning_is_refused_by_name(key, world, tmp_path):
         ('rasters.path="there.tif"', "predicted here"),
         ('prediction.model="survey"', "predicted here"),
         ('track.path="there"', "simulated here"),
-        ("filter.bayes.smooth=true", "--case"),
+        ("filter.smooth=true", "--case"),
+        ("filter.kalman.fix_sd_m=3", "bayes has no such option"),
         ("filter.bayes.timing_sd_m=100.0", "no timing advances"),
         ("sweep.scale=[0.1]", "mapfilter sweep"),
         ('output.pictures="none"', "no pictures"),
@@ -156,9 +167,12 @@ def test_options_of_the_bayes_filter(name, entry):
     choice = filter_choice(config.filter)
     expected = pytest.approx(other[0] if other else value)
     for case in ("levels-bias20", "satellites-2", "levels-6"):
-        assert at(informed(choice, CASES[case], fixed), path) == expected
+        known = informed(choice, CASES[case], fixed)
+        assert getattr(known, name) == value
+        wide = replace(known, bias_sd_deg=0.0) if "particles" in name else known
+        assert at(wide.over_area(AREA), path) == expected
     usual = filter_choice(load({})[0].filter)
-    assert at(usual.options, path) != expected
+    assert at(usual.over_area(AREA), path) != expected
     with pytest.raises(ConfigError, match="candidate has no such option"):
         load({key: value, "filter.name": "candidate"})
 
@@ -168,7 +182,7 @@ def test_a_grid_has_no_particles(name):
     with pytest.raises(ConfigError, match="grid has no such option"):
         load({f"filter.bayes.{name}": 5000, "filter.name": "grid"})
     config, _ = load({"filter.bayes.switch_mass": 0.9, "filter.name": "grid"})
-    assert filter_choice(config.filter).options.particles.switch_mass == 0.9
+    assert filter_choice(config.filter).switch_mass == 0.9
 
 
 @pytest.mark.parametrize(("name", "entry"), OF_THE_CANDIDATE.items())
@@ -181,6 +195,19 @@ def test_options_of_the_candidate_filter(name, entry):
     for other in ("bayes", "grid", "mine:Filter"):
         with pytest.raises(ConfigError, match="has no such option"):
             load({f"filter.{name}": value, "filter.name": other})
+
+
+@pytest.mark.parametrize("name", OF_KALMAN)
+def test_options_of_the_kalman_type_filters(name):
+    key = f"filter.kalman.{name}"
+    config, _ = load({key: 7, "filter.name": "ukf"})
+    choice = filter_choice(config.filter)
+    assert (choice.method, getattr(choice, name)) == ("ukf", 7)
+    for other in ("bayes", "candidate", "mine:Filter"):
+        with pytest.raises(ConfigError, match="has no such option"):
+            load({key: 7, "filter.name": other})
+    with pytest.raises(ConfigError, match="ekf has no such option"):
+        load({"filter.bayes.step_sd_m": 7, "filter.name": "ekf"})
 
 
 def test_the_filters_name():
@@ -290,7 +317,7 @@ def test_settings_without_a_name_of_their_own_are_not_fixed():
     _, fixed = load({"imu.sigma_trans_m": 0.4, "filter.bayes.map_sd_m": 5.0})
     assert fixed == frozenset()
     _, fixed = load({"imu.sigma_orient_deg": 4.0, "filter.bayes.scale": 0.1})
-    assert fixed == {"imu.sigma_orient_deg", "scale_sd"}
+    assert fixed == {"imu.sigma_orient_deg", "scale"}
     # What a world's own file says holds only where the cases say nothing.
     config, _ = load({})
     assert config.imu.turns == "gyro"

@@ -58,4 +58,4 @@ def test_driving_needs_no_footways():
 def test_a_city_that_is_too_small_is_refused(tmp_path):
     given = ["--set", "area.map=synthetic", "--set", "area.size_m=50,50"]
     refused = mapfilter("predict", *given, "--set", f"output.dir={tmp_path}")
-    assert_refused(refused, "made city, size_m", "sides of 200 to 50000 m")
+    assert_refused(refused, "synthetic city, size_m", "sides of 200 to 50000 m")

@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 from command_line import assert_done, assert_refused, mapfilter, settings
 
-from mapfilter.config.fields import FUSION_FILTERS
+from mapfilter.config.sections import FilterSection
 from mapfilter.experiments.sweep.table import read_runs
 from mapfilter.positioning.estimate_store import read_estimate
-from mapfilter.workflows.replay import SITE_FILTERS as REPLAYED
+from mapfilter.positioning.locators import BUILT_IN, filter_options
+from mapfilter.workflows.world import filter_choice
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "howto" / "own-filter.rst"
 MINE = "my_filter_of_the_docs:MyFilter"
@@ -106,14 +107,36 @@ def test_it_has_no_hindsight(world, here):
     assert_refused(told, "--smooth", MINE)
 
 
-def test_filters_without_a_map_are_those_that_replay_has():
-    assert set(FUSION_FILTERS) == set(REPLAYED)
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_a_configuration_takes_each_built_in_filter_by_its_name(name):
+    section = FilterSection(name=name)
+    assert filter_options(section.name).name == name
+    assert filter_choice(section) == filter_options(name)
+    if hasattr(filter_options(name), "smooth"):
+        assert FilterSection(name=name, smooth=True).smooth
+        assert filter_choice(FilterSection(name=name, smooth=True)).smooth
 
 
-@pytest.mark.parametrize("command", ["sweep", "evaluate"])
-def test_a_filter_without_a_map_is_refused_where_there_is_one(command, own_world, tmp_path):
-    ekf = settings(filter__name="ekf") if command == "sweep" else ["--filter", "ekf"]
-    name = ["global-positioning"] if command == "evaluate" else []
-    file = own_world.benchmark_toml if name else own_world.toml
-    told = mapfilter(command, *name, "-c", file, *ekf, "--out", tmp_path / "out")
-    assert_refused(told, "a filter that takes a database", "ekf")
+def test_a_replay_without_a_map_takes_the_sites_of_the_database(own_world, tmp_path):
+    log = own_world.journeys / "journey-0000-draw-000"
+    given = ["--db", own_world.database, "--log", log, "--filter", "ekf", "--out", tmp_path / "o"]
+    replayed = mapfilter("replay", *given, "--json").json
+    assert (replayed["filter"], replayed["logs"]) == ("ekf", 1)
+    assert (tmp_path / "o" / "track.png").is_file()
+
+
+def test_a_sweep_of_a_filter_without_a_map_takes_the_sites_of_the_database(own_world, tmp_path):
+    place = settings(database__path=own_world.database, rasters__path=own_world.rasters)
+    ekf = [*GRID, *place, *settings(filter__name="ekf"), "--vary", "filter.kalman.step_sd_m=0.3,3"]
+    assert_done(mapfilter("sweep", "-c", own_world.toml, *ekf, "--out", tmp_path))
+    runs = read_runs(tmp_path / "sweep" / "runs.parquet")
+    assert set(runs["filter"]) == {"ekf"}
+    assert sorted(set(runs["filter.kalman.step_sd_m"])) == [0.3, 3.0]
+
+
+def test_a_benchmark_of_a_filter_without_a_map(own_world, tmp_path):
+    given = [*settings(area__resolution_m=10), "--filter", "ekf", "--runs", 1, "--workers", 1]
+    given += ["--world", "easy", "--case", "levels-6", "--out", tmp_path, "--json"]
+    told = mapfilter("evaluate", "global-positioning", "-c", own_world.benchmark_toml, *given)
+    (case,) = assert_done(told).json["cases"]
+    assert case["filter"] == "ekf"

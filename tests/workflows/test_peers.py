@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mapfilter.database.store import open_database
-from mapfilter.positioning.bayes.options import BayesOptions
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.tracks.store import read_log
 from mapfilter.workflows import bench_filter
 
@@ -23,7 +23,7 @@ SMALL = (
 @pytest.fixture(scope="module")
 def world(tmp_path_factory):
     database, folders = bench_filter.make_world(tmp_path_factory.mktemp("bench"), SMALL)
-    model = BayesOptions().over(open_database(database)).model
+    model = BayesFilter().over(open_database(database)).model
     return model, read_log(folders[0])
 
 

@@ -49,3 +49,14 @@ def test_rows_of_other_figures_and_of_long_texts_are_lines():
 def test_columns_without_anything_are_left_out():
     rows = [{"a": 1, "b": None, "c": ""}, {"a": 20, "b": None, "c": ""}]
     assert list(text_lines({"rows": rows})) == ["rows:", "   a", "   1", "  20"]
+
+
+def test_numbers_are_to_the_right_also_where_some_are_missing():
+    rows = [
+        {"filter": "ekf", "above_db": None, "error_m": 12.34567},
+        {"filter": "p_f", "above_db": -17.0, "error_m": None},
+    ]
+    assert list(text_lines({"rows": rows}))[2:] == [
+        "  ekf            -    12.35",
+        "  p_f          -17        -",
+    ]

@@ -9,11 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from math import radians
 from types import MappingProxyType
 from typing import Any
 
-from mapfilter.models.street_motion import MotionErrors
 from mapfilter.simulation.imu import ImuNoise
 
 _WALKING_MPS = 1.4
@@ -30,8 +28,8 @@ class Case:
         Errors of dead reckoning in which the case differs from the simulated world, by their names
         in :class:`mapfilter.simulation.imu.ImuNoise`.
     data_sheet : mapping of str to float
-        What is stated of the dead reckoning, by the names of
-        :class:`mapfilter.models.street_motion.MotionErrors`.
+        What is stated of the dead reckoning, as options of
+        :class:`mapfilter.positioning.bayes.options.BayesFilter`.
     levels : bool
         Whether the phone reports levels and neighbours, or only its serving cell.
     compass : bool
@@ -49,6 +47,10 @@ class Case:
         How many satellites the phone receives at most; None without a receiver.
     spoofed : bool
         Whether a spoofer shifts their position for a while.
+
+    Notes
+    -----
+    ``fixed`` are names of errors and options that were set for all cases.
     """
 
     name: str
@@ -64,32 +66,14 @@ class Case:
     spoofed: bool = False
 
     def errors_in(self, world: ImuNoise, fixed: frozenset[str] = frozenset()) -> ImuNoise:
-        """Return the errors of dead reckoning: the world's, with those of the case.
-
-        Parameters
-        ----------
-        fixed : frozenset of str
-            Names that were set for all cases.
-        """
+        """Return the world's errors of dead reckoning with those of the case that are not fixed."""
         changes: dict[str, Any] = {k: v for k, v in self.imu.items() if f"imu.{k}" not in fixed}
         return replace(world, **changes)
-
-    def stated_to(self, motion: MotionErrors, fixed: frozenset[str] = frozenset()) -> MotionErrors:
-        """Return the filter's options of dead reckoning with what the data sheet states.
-
-        Parameters
-        ----------
-        motion : MotionErrors
-            The filter's own.
-        fixed : frozenset of str
-            Names that were set for all cases.
-        """
-        return replace(motion, **{k: v for k, v in self.data_sheet.items() if k not in fixed})
 
 
 def _compass(sd_deg: float) -> tuple[Mapping[str, float], Mapping[str, float]]:
     """Return errors and data sheet of a compass of some accuracy."""
-    return {"sigma_orient_deg": sd_deg}, {"heading_sd_rad": radians(sd_deg)}
+    return {"sigma_orient_deg": sd_deg}, {"heading_sd_deg": sd_deg}
 
 
 def _biased(
@@ -106,9 +90,9 @@ def _biased(
         },
         {
             **sheet,
-            "bias_sd_rad": radians(bias_sd_deg),
-            "bias_drift_rad_per_sqrt_m": radians(drift_deg_per_sqrt_s) / _WALKING_MPS**0.5,
-            "scale_sd": scale,
+            "bias_sd_deg": bias_sd_deg,
+            "drift_deg_per_sqrt_m": drift_deg_per_sqrt_s / _WALKING_MPS**0.5,
+            "scale": scale,
         },
     )
 

@@ -32,7 +32,7 @@ from mapfilter.experiments.benchmarks.scores import (
     summarise,
 )
 from mapfilter.experiments.benchmarks.world import BenchmarkWorld
-from mapfilter.positioning.bayes.options import BayesFilter, BayesOptions
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.filter import FilterOptions, locate
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.simulation.reports import Levels
@@ -44,15 +44,7 @@ _VERSION = 2
 
 @dataclass(frozen=True)
 class Batch:
-    """Runs of all cases over some routes.
-
-    Parameters
-    ----------
-    first, end : int
-        Numbers of the routes.
-    fixed : frozenset of str
-        Options of the filter and errors of dead reckoning that were set for all cases.
-    """
+    """Runs of all cases over the routes from ``first`` to before ``end``."""
 
     world: BenchmarkWorld
     choice: FilterOptions
@@ -98,25 +90,12 @@ def _run_route(batch: Batch, route: int) -> list[Row]:
 def informed(
     choice: FilterOptions, case: Case, fixed: frozenset[str] = frozenset()
 ) -> FilterOptions:
-    """Return a filter with what the case's data sheet states; nothing else is known to it.
-
-    Parameters
-    ----------
-    fixed : frozenset of str
-        Options that were set for all cases.
-    """
-    if isinstance(choice, BayesFilter):
-        choice = choice.options
-    match choice:
-        case BayesOptions() as options:
-            known = replace(
-                options, motion=case.stated_to(options.motion, fixed), smooth=case.smooth
-            )
-            if case.satellites is not None:
-                height = {k: v for k, v in TOWN_HEIGHT.items() if k not in fixed}
-                known = replace(known, satellites=replace(options.satellites, **height))
-            return known
-    return choice
+    """Return a filter with what the case's data sheet states, of options that are not fixed."""
+    if not isinstance(choice, BayesFilter):
+        return choice
+    stated = {**case.data_sheet, **(TOWN_HEIGHT if case.satellites is not None else {})}
+    known: dict[str, Any] = {name: value for name, value in stated.items() if name not in fixed}
+    return replace(choice, smooth=case.smooth, **known)
 
 
 def benchmark(
@@ -133,27 +112,11 @@ def benchmark(
     progress: Progress | None = None,
     fixed: frozenset[str] = frozenset(),
 ) -> list[CaseResult]:
-    """Run the cases and return one row of the table for each.
+    """Run the cases, on so many routes each, and return one row of the table for each.
 
-    Parameters
-    ----------
-    cases : sequence of str
-        Names out of :data:`mapfilter.experiments.benchmarks.cases.CASES`.
-    runs : int
-        Routes for each case, each with a ground truth of its own.
-    out : Path
-        Folder in which finished batches are kept.
-    resume : bool
-        Keep what the same benchmark has finished.
-    progress : callable, optional
-        Called with batches done and batches in all.
-    fixed : frozenset of str
-        Options of the filter and errors of dead reckoning that hold in all cases.
-
-    Raises
-    ------
-    ConfigError
-        There is something else to resume.
+    Finished batches are kept in ``out``; to resume another benchmark is a ConfigError. ``progress``
+    counts batches; ``fixed`` are options of the filter and errors of dead reckoning that hold in
+    all cases.
     """
     head = {
         "version": _VERSION,
@@ -165,30 +128,28 @@ def benchmark(
     }
     (out / BATCHES).mkdir(parents=True, exist_ok=True)
     start_or_resume(out / HEAD, head, (out / BATCHES).glob("*.json"), resume=resume)
-    tasks, kept = [], dict[int, list[Row]]()
+    parts, tasks = [], []
     for first in range(0, runs, ROUTES_PER_BATCH):
         end = min(first + ROUTES_PER_BATCH, runs)
-        done = _finished(out / BATCHES / f"{first:06d}.json", (end - first) * len(cases))
-        if resume and done is not None:
-            kept[first] = done
-        else:
-            tasks.append(Batch(world, choice, tuple(cases), seed, first, end, fixed))
+        parts.append(out / BATCHES / f"{first:06d}.json")
+        if not (resume and len(_rows(parts[-1])) == (end - first) * len(cases)):
+            tasks.append((parts[-1], Batch(world, choice, tuple(cases), seed, first, end, fixed)))
     results = ordered_results(
-        executor or SerialExecutor(), run_batch, tasks, in_flight=in_flight, progress=progress
+        executor or SerialExecutor(),
+        run_batch,
+        [task for _, task in tasks],
+        in_flight=in_flight,
+        progress=progress,
     )
-    for task, rows in zip(tasks, results, strict=True):
-        write_json(out / BATCHES / f"{task.first:06d}.json", {"rows": rows})
-        kept[task.first] = rows
-    every = [row for first in sorted(kept) for row in kept[first]]
+    for (part, _), rows in zip(tasks, results, strict=True):
+        write_json(part, {"rows": rows})
+    every = [row for part in parts for row in _rows(part)]
     return [
         summarise(CASES[name], choice.name, [row for row in every if row["case"] == name])
         for name in cases
     ]
 
 
-def _finished(file: Path, rows: int) -> list[Any] | None:
-    """Return the rows of a batch that was finished, or None."""
-    if not file.is_file():
-        return None
-    found = read_json(file).get("rows")
-    return found if isinstance(found, list) and len(found) == rows else None
+def _rows(part: Path) -> list[Any]:
+    found = read_json(part).get("rows") if part.is_file() else None
+    return found if isinstance(found, list) else []

@@ -26,19 +26,22 @@ from mapfilter.tracks.log import TrackLog, make_log
 _BEFORE_M = 800.0
 _AFTER_M = 1000.0
 _NEAREST_M, _FARTHEST_M = 200.0, 1000.0
+START_UTC_S = 1_700_000_000.0
+DAY_S = 86_400.0
+SPOOFED_M, SPOOFED_S = 500.0, 60.0
+WINDOW_S = 120.0
+"""Errors about a spoofer are looked at from its beginning on, for so long."""
+
+HEIGHT_M = 100.0
+TOWN_HEIGHT: Mapping[str, float] = MappingProxyType(
+    {"antenna_height_m": HEIGHT_M, "antenna_height_sd_m": 20.0}
+)
+"""Height of the town over the ellipsoid, as a map states it, by options of the filter."""
 
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """A journey's truth.
-
-    Parameters
-    ----------
-    truth : pandas.DataFrame
-        time_s, east_m, north_m, way_id.
-    displaced_at_s : float
-        Time of the last row before the displacement; infinite without one.
-    """
+    """A journey's truth, with the time of the last row before a displacement; infinite without."""
 
     truth: pd.DataFrame
     displaced_at_s: float = float("inf")
@@ -52,7 +55,7 @@ class Walk:
 
 
 def walk(streets: SweepWorld, plan: JourneyPlan, seed: int, number: int) -> Walk:
-    """Walk along a random route, 1 940 m unless the plan says otherwise."""
+    """Walk along a random route, of the plan's length."""
     along = route(streets.network, plan.length_m, named_rng(seed, "route", str(number)))
     return Walk(journey(along, plan, named_rng(seed, "walker", str(number)), streets.inside))
 
@@ -93,20 +96,10 @@ def log_of(
     number: int,
     fixed: frozenset[str] = frozenset(),
 ) -> TrackLog:
-    """Return what the phone and its unit report of a walk.
+    """Return the log of a walk, route ``number`` of the benchmark, in the ground truth's levels.
 
-    Cases of one noise have the same noise, and all the same reports.
-
-    Parameters
-    ----------
-    levels : callable
-        The ground truth's.
-    settings : SimulationSettings
-        Of the world: reports, and errors of dead reckoning.
-    seed, number : int
-        Of the benchmark and of the route.
-    fixed : frozenset of str
-        Errors of dead reckoning that the case does not change.
+    Cases of one noise have the same noise, and all the same reports. ``fixed`` are errors of dead
+    reckoning that the case does not change.
     """
     truth, plan = walked.truth, streets.plan
     radio = reports(truth, levels, plan, settings.reports, named_rng(seed, "radio", str(number)))
@@ -124,7 +117,7 @@ def log_of(
     if not case.compass:
         motion["heading_rad"] = np.nan
     log = make_log(streets.network.crs, motion=motion, radio=radio)
-    # The truth of a displacement is not a path that anybody walked.
+    # The truth of a displacement is no path.
     return replace(log, truth=truth)
 
 
@@ -140,17 +133,6 @@ def _as_walked(walked: Walk) -> pd.DataFrame:
         for name, axis in ((name, truth[name].to_numpy()) for name in ("east_m", "north_m"))
     }
     return truth.assign(**moved)
-
-
-START_UTC_S = 1_700_000_000.0
-DAY_S = 86_400.0
-SPOOFED_M, SPOOFED_S = 500.0, 60.0
-WINDOW_S = 120.0
-"""Errors about a spoofer are looked at from its beginning on, for so long."""
-
-HEIGHT_M = 100.0
-TOWN_HEIGHT: Mapping[str, float] = MappingProxyType({"height_m": HEIGHT_M, "height_sd_m": 20.0})
-"""What a map states of the town's height over the ellipsoid, as options of the filter."""
 
 
 def spoofer_of(walked: Walk, seed: int, number: int) -> Spoofer:
@@ -177,19 +159,11 @@ def with_satellites(
     number: int,
     model: ReceptionModel | None = None,
 ) -> TrackLog:
-    """Return a walk's log with what its receiver hears of satellites.
+    """Return a walk's log with pseudoranges to as many satellites as the case has.
 
-    All cases of a walk see the same sky, clock and noise; those of more satellites hear others
-    beside the same ones.
-
-    Parameters
-    ----------
-    case : Case
-        Its number of satellites replaces the model's.
-    seed, number : int
-        Of the benchmark, of the route.
-    model : ReceptionModel, optional
-        By default one without reflections; the height is always the benchmark's.
+    All cases of a walk see the same sky, clock and noise; those of more satellites receive others
+    beside the same ones. The height is always the benchmark's; without a model nothing is
+    reflected.
     """
     if case.satellites is None:
         return log
@@ -207,5 +181,5 @@ def with_satellites(
         rng,
         spoofer_of(walked, seed, number) if case.spoofed else None,
     )
-    told = make_log(log.crs, pseudoranges=ranges, start_utc_s=start_utc_s)
-    return replace(log, pseudoranges=told.pseudoranges, start_utc_s=start_utc_s)
+    checked = make_log(log.crs, pseudoranges=ranges, start_utc_s=start_utc_s)
+    return replace(log, pseudoranges=checked.pseudoranges, start_utc_s=start_utc_s)

@@ -1,6 +1,6 @@
 """Real phones in Ottawa: each session is found on the map that the other sessions made.
 
-A phone tells its serving cell, RSRP and timing advance; speed and bearing by GNSS, with noise and
+A phone reports its serving cell, RSRP and timing advance; speed and bearing by GNSS, with noise and
 bias added, are its dead reckoning. Positions by GNSS are the truth where they are good enough.
 """
 
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from math import radians
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -25,15 +24,12 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
     site_of,
 )
 from mapfilter.filters.contract import Status
-from mapfilter.filters.particle import ParticleOptions
-from mapfilter.models.fingerprint import LevelErrors, ServingWeights
+from mapfilter.models.fingerprint import ServingWeights
 from mapfilter.models.measured_map import MeasuredMapOptions, MeasuredRows, ServingStatistics
-from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import MeasuredMapModel
-from mapfilter.positioning.bayes.options import BayesOptions, open_area
-from mapfilter.positioning.bayes.radio import EvidenceOptions
+from mapfilter.positioning.bayes.options import BayesFilter, open_area
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.filter import locate
 from mapfilter.propagation.shadowing import named_rng
@@ -62,32 +58,57 @@ class OttawaOptions:
 
     Parameters
     ----------
+    filter : BayesFilter
+        The next four are further errors that only this filter sets.
+    typical_step_m : float
+        Length of the step that ``filter.step_sd_m`` is of.
+    scale_drift_per_sqrt_m : float
+        Random walk of the logarithm of the step scale.
+    serving_weight_per_m : float
+        Weight of a serving cell for each metre travelled.
+    measurement_db : float
+        Deviation of a level besides the error of the map.
     unmeasured_db : float
         Deviation of a level where its cell was not measured, and only its trend is known.
     """
 
-    filter: BayesOptions = field(
-        default_factory=lambda: BayesOptions(
-            motion=MotionErrors(
-                step_sd_m=1.0,
-                typical_step_m=14.0,
-                heading_sd_rad=radians(10.0),
-                bias_sd_rad=radians(6.0),
-                bias_drift_rad_per_sqrt_m=radians(0.2),
-                scale_sd=0.15,
-                scale_drift_per_sqrt_m=0.005,
-            ),
-            map=MapWeights(sd_m=16.0),
-            particles=ParticleOptions(max_particles=10_000, min_search_particles=7_000),
-            evidence=EvidenceOptions(
-                serving=ServingWeights(weight_per_m=1 / 150),
-                levels=LevelErrors(sd_db=5.0, correlation_m=100.0, measurement_db=3.0),
-            ),
+    filter: BayesFilter = field(
+        default_factory=lambda: BayesFilter(
+            step_sd_m=1.0,
+            heading_sd_deg=10.0,
+            bias_sd_deg=6.0,
+            drift_deg_per_sqrt_m=0.2,
+            scale=0.15,
+            map_sd_m=16.0,
+            level_error_db=5.0,
+            level_correlation_m=100.0,
+            max_particles=10_000,
+            min_search_particles=7_000,
         )
     )
+    typical_step_m: float = 14.0
+    scale_drift_per_sqrt_m: float = 0.005
+    serving_weight_per_m: float = 1 / 150
+    measurement_db: float = 3.0
     unmeasured_db: float = 8.0
     serving_map: MeasuredMapOptions = field(default_factory=MeasuredMapOptions)
     errors: ReckoningErrors = field(default_factory=ReckoningErrors)
+
+    def positioner(self, area: AreaMap) -> BayesPositioner:
+        """Return the filter over an area, whose maps are not yet those of the sessions."""
+        bound = self.filter.over_area(area)
+        motion = replace(
+            bound.model.motion,
+            typical_step_m=self.typical_step_m,
+            scale_drift_per_sqrt_m=self.scale_drift_per_sqrt_m,
+        )
+        evidence = bound.model.evidence
+        evidence = replace(
+            evidence,
+            serving=ServingWeights(weight_per_m=self.serving_weight_per_m),
+            levels=replace(evidence.levels, measurement_db=self.measurement_db),
+        )
+        return replace(bound, model=replace(bound.model, motion=motion, evidence=evidence))
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,24 +150,21 @@ def surveyed_positioner(
     options: OttawaOptions,
     deviation: RxLevRasters | None = None,
 ) -> BayesPositioner:
-    """Return the filter over a map that sessions made.
+    """Return the filter over the database that other sessions made.
 
-    Parameters
-    ----------
-    database : RadioRouteDatabase
-        Of the other sessions.
-    deviation : RxLevRasters, optional
-        By how much a new reading differs from the map of levels, as the survey tells it; no value
-        where a cell was not measured.
+    ``deviation``, of the survey, is by how much a new reading differs from the map of levels; it
+    has no value where a cell was not measured.
     """
-    area, chosen, level_sd_db = open_area(database), options.filter, None
+    area, level_sd_db = open_area(database), None
+    bound = options.positioner(area)
+    evidence = bound.model.evidence
     if deviation is not None:
         level_sd_db = _level_sd_db(deviation, area, options.unmeasured_db)
-        levels = chosen.evidence.levels
+        levels = evidence.levels
         usual_db = float(np.nanmedian(deviation.read()))
         lasting_db2 = usual_db**2 - levels.measurement_db**2
         levels = replace(levels, sd_db=max(lasting_db2, 1.0) ** 0.5)
-        chosen = replace(chosen, evidence=replace(chosen.evidence, levels=levels))
+        evidence = replace(evidence, levels=levels)
     crs = database.lattice.crs
     places = np.concatenate([other.places(crs) for other in others])
     good = np.concatenate([other.accuracy_m for other in others]) <= MAP_M
@@ -157,13 +175,13 @@ def surveyed_positioner(
     serving_model = ServingStatistics.of_rows(rows, area.lattice, sites, options.serving_map)
     model = MeasuredMapModel(
         area,
-        chosen.motion,
-        chosen.map,
-        chosen.evidence,
+        bound.model.motion,
+        bound.model.weights,
+        evidence,
         serving_model=serving_model,
         level_sd_db=level_sd_db,
     )
-    return replace(chosen.over_area(area), model=model)
+    return replace(bound, model=model)
 
 
 def _level_sd_db(deviation: RxLevRasters, area: AreaMap, unmeasured_db: float) -> Floats32:
@@ -247,7 +265,7 @@ def _scored(
 
 
 def _on_map(positioner: BayesPositioner, places: Floats) -> float:
+    """Return the share of places within 50 m of the map."""
     area = positioner.area
-    points = area.points.T + np.array(area.origin_m)
-    away_m, _ = cKDTree(points).query(places)
+    away_m, _ = cKDTree(area.points.T + np.array(area.origin_m)).query(places)
     return float(np.mean(away_m <= _ON_MAP_M)) if len(places) else float("nan")

@@ -1,4 +1,4 @@
-"""Sessions of a phone that logged its serving cell: what is measured, and what is only truth.
+"""Sessions of a phone that logged its serving cell: measurements and ground truth.
 
 Speed and bearing by GNSS stand in for steps and headings, after stated errors have been added;
 positions are truth alone.
@@ -21,7 +21,7 @@ from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.schema import SERVING
 
 LONGEST_GAP_S = 30.0
-"""Nothing is known of the way over a longer silence."""
+"""Over a longer silence the way is not known."""
 _MOST_STEPS = 1282
 _GOOD_M, _MOVED_M = 20.0, 4.0
 _IDENTITY = ("mcc", "mnc", "lac", "cellid")
@@ -31,7 +31,7 @@ _COLUMNS = (*_IDENTITY, *_GNSS, "signal", "ta")
 
 @dataclass(frozen=True, slots=True)
 class ReckoningErrors:
-    """What is added to speed and bearing.
+    """Errors that are added to speed and bearing.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class Session:
     level_dbm : ndarray
         RSRP.
     timing_advance : ndarray
-        Steps; NaN where it was not told.
+        Steps; NaN where it was not reported.
     """
 
     name: str
@@ -107,7 +107,7 @@ def read_session(path: Path) -> Session:
     if len(numbers) < 2:
         raise fail(InputError, str(path), "two rows or more", len(numbers))
     steps = _column(numbers, "ta")
-    told = (steps >= 0) & (steps <= _MOST_STEPS)
+    reported = (steps >= 0) & (steps <= _MOST_STEPS)
     identity = numbers[list(_IDENTITY)].astype(np.int64)
     return Session(
         path.stem,
@@ -120,7 +120,7 @@ def read_session(path: Path) -> Session:
         _column(numbers, "direction"),
         tuple("-".join(map(str, row)) for row in identity.itertuples(index=False)),
         _column(numbers, "signal"),
-        np.where(told, steps, np.nan),
+        np.where(reported, steps, np.nan),
     )
 
 
@@ -132,17 +132,11 @@ def session_log(
     *,
     step_factor: float = 1.0,
 ) -> TrackLog:
-    """Return what a phone without GNSS would have logged, with the truth beside it.
+    """Return the log, in a CRS, of a phone without GNSS, with the ground truth.
 
-    Between two rows one goes half of the time by the first one's speed and bearing and half by the
-    second one's. Over a silence of more than 30 s no step is known.
-
-    Parameters
-    ----------
-    crs : str
-        Of the log.
-    step_factor : float
-        That all steps are multiplied by, as :func:`step_factor_of` learns it of other sessions.
+    Between two rows, speed and bearing are those of the first for half of the time, then those of
+    the second. Over a silence of more than 30 s no step is known. All steps are multiplied by the
+    factor that :func:`step_factor_of` learns from other sessions.
     """
     time_s = session.time_s - session.time_s[0]
     half_s = np.diff(time_s) / 2
@@ -150,8 +144,10 @@ def session_log(
     step_m, heading = _reckoned(session, crs)
     bias = errors.bias_rad * rng.choice([-1.0, 1.0])
     step_m = step_factor * step_m * (1 + errors.step_share * rng.standard_normal(ends.size))
-    told = heading + bias + errors.heading_sd_rad * rng.standard_normal(ends.size)
-    motion = pd.DataFrame({"time_s": ends, "step_m": step_m, "heading_rad": _wrapped(told)})
+    measured = heading + bias + errors.heading_sd_rad * rng.standard_normal(ends.size)
+    motion = pd.DataFrame(
+        {"time_s": ends, "step_m": step_m, "heading_rad": np.angle(np.exp(1j * measured))}
+    )
     radio = pd.DataFrame(
         {
             "time_s": time_s,
@@ -169,23 +165,18 @@ def session_log(
 def step_factor_of(others: Sequence[Session], crs: str) -> float:
     """Return how many times longer true ways are than speed times time, which GNSS smooths.
 
-    The median over all intervals of sessions between fixes that are good enough, on which one
-    moved.
-
-    Parameters
-    ----------
-    others : sequence of Session
-        Of the same receiver, but not the one that is to be found.
+    It is the median over all intervals with motion between good fixes, of sessions of the same
+    receiver other than the one that is to be found.
     """
     ratios = []
     for other in others:
         step_m, heading = _reckoned(other, crs)
         halves_m = step_m[:, np.newaxis] * np.column_stack([np.cos(heading), np.sin(heading)])
-        said_m = np.hypot(*(halves_m[0::2] + halves_m[1::2]).T)
+        reckoned_m = np.hypot(*(halves_m[0::2] + halves_m[1::2]).T)
         true_m = np.hypot(*np.diff(other.places(crs), axis=0).T)
         good = np.maximum(other.accuracy_m[:-1], other.accuracy_m[1:]) <= _GOOD_M
-        moved = good & (said_m > _MOVED_M)
-        ratios.append(true_m[moved] / said_m[moved])
+        moved = good & (reckoned_m > _MOVED_M)
+        ratios.append(true_m[moved] / reckoned_m[moved])
     every = np.concatenate([np.empty(0), *ratios])
     return float(np.median(every)) if every.size else 1.0
 
@@ -226,7 +217,3 @@ def centroids(others: Sequence[Session], crs: str, accuracy_m: float) -> dict[st
 
 def _column(table: pd.DataFrame, name: str) -> Floats:
     return np.asarray(table[name], dtype=np.float64)
-
-
-def _wrapped(angle_rad: Floats) -> Floats:
-    return np.asarray(np.angle(np.exp(1j * angle_rad)), dtype=np.float64)

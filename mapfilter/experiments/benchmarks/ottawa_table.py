@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from math import isfinite, nan
 from pathlib import Path
@@ -21,12 +21,12 @@ _MAPPED_SHARE = 0.5
 
 @dataclass(frozen=True)
 class PartRow:
-    """What one method makes of one part.
+    """Accuracy of one method on one part.
 
     Parameters
     ----------
     method : str
-        ``bayes``: from CONVERGED on; ``smoothed``: whole tracks in hindsight; both also as
+        ``bayes``: from CONVERGED on; ``smoothed``: whole tracks, smoothed; both also as
         ``-mapped``, of the sessions of which at least half lies within 50 m of where others were;
         ``centroid``: the mean place of the serving cell's rows.
     unit_count : int
@@ -60,7 +60,7 @@ class PartRow:
 
 @dataclass(frozen=True)
 class SessionRow:
-    """What came of one session, over all draws of the noise.
+    """Results of one session, over all draws of the noise.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class SessionRow:
     n : int
         Fixes scored from CONVERGED on.
     smoothed_m : float
-        Median error of the whole track in hindsight.
+        Median error of the whole smoothed track.
     lost : int
         Epochs that were LOST.
     """
@@ -95,15 +95,7 @@ class SessionRow:
 def part_rows(
     part: str, found: Sequence[FoundSession], centroid_m: dict[str, Floats]
 ) -> list[PartRow]:
-    """Put the sessions of a part together.
-
-    Parameters
-    ----------
-    found : sequence of FoundSession
-        Of this part, by all methods.
-    centroid_m : dict of str to ndarray
-        Errors of the centroids, by session.
-    """
+    """Summarise the sessions of a part; ``centroid_m`` are errors of the centroids, by session."""
     mapped = {one.session for one in found if one.on_map >= _MAPPED_SHARE}
     rows = []
     for method in METHODS:
@@ -112,23 +104,24 @@ def part_rows(
         if mapped and len(mapped) < len(centroid_m):
             some = [one for one in own if one.session in mapped]
             rows.append(_row(part, f"{method}-mapped", some, centroid_m))
-    every = np.concatenate([np.empty(0), *centroid_m.values()])
-    told = _errors(every)
-    nan = float("nan")
+    every = _joined(centroid_m.values())
+    errors = _errors(every)
     rows.append(
-        PartRow(part, "centroid", len(centroid_m), every.size, *told, nan, nan, nan, nan, told[0])
+        PartRow(
+            part, "centroid", len(centroid_m), every.size, *errors, nan, nan, nan, nan, errors[0]
+        )
     )
     return rows
 
 
 def session_rows(found: Sequence[FoundSession], centroid_m: dict[str, Floats]) -> list[SessionRow]:
-    """Tell what came of each session, in the order of their names."""
+    """Summarise each session, in the order of their names."""
     rows = []
     for name in sorted({one.session for one in found}):
         own = [one for one in found if one.session == name and one.method == "bayes"]
-        behind = [one for one in found if one.session == name and one.method == "smoothed"]
+        smoothed = [one for one in found if one.session == name and one.method == "smoothed"]
         converged = [one for one in own if one.converged]
-        errors = np.concatenate([one.error_m for one in own])
+        errors = _joined(one.error_m for one in own)
         rows.append(
             SessionRow(
                 own[0].part,
@@ -137,12 +130,12 @@ def session_rows(found: Sequence[FoundSession], centroid_m: dict[str, Floats]) -
                 len(own),
                 len(converged),
                 sum(one.success for one in own),
-                _median([one.switch_m for one in converged]),
-                _median([one.error_at_switch_m for one in converged]),
+                _median(np.array([one.switch_m for one in converged])),
+                _median(np.array([one.error_at_switch_m for one in converged])),
                 errors.size,
                 _median(errors),
-                _share([one.covered for one in own]),
-                _median(np.concatenate([np.empty(0), *(one.error_m for one in behind)])),
+                _mean(_joined(one.covered for one in own)),
+                _median(_joined(one.error_m for one in smoothed)),
                 _median(centroid_m[name]),
                 sum(one.lost for one in own),
             )
@@ -160,52 +153,43 @@ def _row(
         low, high = wilson_interval(sum(good), len(found))
     else:
         low, high = wilson_interval_of_routes(good, runs)
-    errors = np.concatenate([np.empty(0), *(one.error_m for one in found)])
-    baseline = np.concatenate([np.empty(0), *(centroid_m[name] for name in names)])
+    errors = _joined(one.error_m for one in found)
     return PartRow(
         part,
         method,
         len(names),
         errors.size,
         *_errors(errors),
-        sum(good) / len(found) if found else float("nan"),
+        sum(good) / len(found) if found else nan,
         low,
         high,
-        _share([one.covered for one in found]),
-        _median(baseline),
+        _mean(_joined(one.covered for one in found)),
+        _median(_joined(centroid_m[name] for name in names)),
     )
+
+
+def _joined(parts: Iterable[Floats | Bools]) -> Floats:
+    return np.concatenate([np.empty(0), *parts])
 
 
 def _errors(errors_m: Floats) -> tuple[float, float, float]:
-    if not errors_m.size:
-        return float("nan"), float("nan"), float("nan")
-    return (
-        float(np.median(errors_m)),
-        float(np.mean(errors_m)),
-        float(np.quantile(errors_m, 0.95)),
-    )
+    """Return median, mean and 95 % of errors; NaN without any."""
+    p95_m = float(np.quantile(errors_m, 0.95)) if errors_m.size else nan
+    return _median(errors_m), _mean(errors_m), p95_m
 
 
-def _median(values: Sequence[float] | Floats) -> float:
-    known = np.asarray(values, dtype=np.float64)
-    known = known[np.isfinite(known)]
-    return float(np.median(known)) if known.size else float("nan")
+def _median(values: Floats) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if known.size else nan
 
 
-def _share(covered: Sequence[Bools]) -> float:
-    every = np.concatenate([np.empty(0, dtype=np.bool_), *covered])
-    return float(np.mean(every)) if every.size else float("nan")
+def _mean(values: Floats) -> float:
+    return float(np.mean(values)) if values.size else nan
 
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """One session, found several times.
-
-    Parameters
-    ----------
-    centroid_m : ndarray
-        Errors of the centroids of its serving cells.
-    """
+    """One session, found several times, and errors of the centroids of its serving cells."""
 
     session: str
     centroid_m: Floats
@@ -213,13 +197,7 @@ class LeftOut:
 
 
 def write_left_out(left_out: LeftOut, file: Path) -> None:
-    """Write what came of a session.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """Write the results of a session."""
     rows = [
         {one.name: _plain(getattr(found, one.name)) for one in fields(FoundSession)}
         for found in left_out.found
@@ -229,22 +207,16 @@ def write_left_out(left_out: LeftOut, file: Path) -> None:
 
 
 def read_left_out(file: Path) -> LeftOut:
-    """Read what came of a session.
-
-    Raises
-    ------
-    StoreError
-        The file is missing or damaged.
-    """
-    told = read_json(file)
+    """Read the results of a session; a missing or damaged file is a StoreError."""
+    read = read_json(file)
     try:
         found = tuple(
             FoundSession(**{name: _read(name, value) for name, value in row.items()})
-            for row in told["found"]
+            for row in read["found"]
         )
-        return LeftOut(told["session"], np.array(told["centroid_m"], dtype=np.float64), found)
+        return LeftOut(read["session"], np.array(read["centroid_m"], dtype=np.float64), found)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise fail(StoreError, str(file), "what came of a session", error, "cut off") from error
+        raise fail(StoreError, str(file), "the results of a session", error, "cut off") from error
 
 
 def _plain(value: Any) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,12 +20,13 @@ from mapfilter.evaluation.accuracy import (
 )
 from mapfilter.evaluation.success import wilson_interval_of_routes
 from mapfilter.experiments.benchmarks.cases import Case
-from mapfilter.experiments.benchmarks.journeys import Walk
+from mapfilter.experiments.benchmarks.journeys import WINDOW_S, Walk
+from mapfilter.experiments.sweep.journeys import truth_of
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import PositionedTrack
 
 _STAY_S = 10.0
-_WINDOW_S = 120.0
+_ERRORS = ("error_mean_m", "error_67_m", "error_95_m")
 Row = dict[str, Any]
 
 
@@ -111,15 +112,13 @@ def score(case: Case, walked: Walk, found: PositionedTrack) -> Row:
     After a displacement nothing is claimed fairly until it has been noticed: claims are scored up
     to it.
     """
-    estimate, truth = found.estimate, _truth(walked)
+    estimate, truth = found.estimate, truth_of(walked.truth)
     errors_m = position_errors_m(estimate, truth)
     claims = score_claims(estimate, truth, until_s=walked.displaced_at_s)
-    row: Row = {"case": case.name, "seconds": found.filter_s}
-    row |= {
-        "km": claims.km,
-        "epochs": claims.epochs,
-        "claimed": claims.claimed,
-        "within_50m": claims.within_50m,
+    row: Row = {
+        "case": case.name,
+        "seconds": found.filter_s,
+        **{name: getattr(claims, name) for name in ("km", "epochs", "claimed", "within_50m")},
         **{f"covered_{share}": held for share, held in zip(RADII, claims.covered, strict=True)},
         "false_converged": claims.false_starts,
         "false_lost": claims.false_lost,
@@ -133,9 +132,7 @@ def score(case: Case, walked: Walk, found: PositionedTrack) -> Row:
         "success": scored.success,
         "wrong": bool(scored.error_at_switch_m > SUCCESS_RADIUS_M),
         "switch_m": _finite(scored.switch_distance_m),
-        "error_mean_m": _finite(scored.error_mean_m),
-        "error_67_m": _finite(scored.error_67_m),
-        "error_95_m": _finite(scored.error_95_m),
+        **{name: _finite(getattr(scored, name)) for name in _ERRORS},
     }
     if case.smooth:
         row |= _errors(errors_m[np.isfinite(errors_m)])
@@ -144,65 +141,52 @@ def score(case: Case, walked: Walk, found: PositionedTrack) -> Row:
 
 def summarise(case: Case, filter_name: str, rows: Sequence[Mapping[str, Any]]) -> CaseResult:
     """Put the runs of a case together."""
-    runs, good = len(rows), [row for row in rows if row["success"]]
-    switch_m = [row["switch_m"] for row in rows if row["switch_m"] is not None]
-    worst_m = [row["worst_100m_m"] for row in rows if row["worst_100m_m"] is not None]
-    km = _total(rows, "km")
-    success_low, success_high = _interval([int(row["success"]) for row in rows], [1] * runs)
-    wrong_low, wrong_high = _interval([int(row["wrong"]) for row in rows], [1] * runs)
-    claimed = [int(row["claimed"]) for row in rows]
-    near_low, near_high = _interval([int(row["within_50m"]) for row in rows], claimed)
-    held_low, held_high = _interval([int(row["covered_95"]) for row in rows], claimed)
+    runs, km = len(rows), _total(rows, "km")
+    good = [row for row in rows if row["success"]]
+    switch_m, worst_m = (_known(row[name] for row in rows) for name in ("switch_m", "worst_100m_m"))
+    of_runs, of_claims = [1] * runs, [int(row["claimed"]) for row in rows]
+    figures: dict[str, Any] = {}
+    for figure, column, totals in (
+        ("success", "success", of_runs),
+        ("wrong", "wrong", of_runs),
+        ("within_50m", "within_50m", of_claims),
+        ("coverage_95", "covered_95", of_claims),
+    ):
+        low, high = _interval([int(row[column]) for row in rows], totals)
+        share = _ratio(_total(rows, column), sum(totals))
+        figures |= {figure: share, f"{figure}_low": low, f"{figure}_high": high}
+    for name in _ERRORS:
+        figures[name] = _mean(_known(row[name] for row in good))
+    for name in ("false_converged", "false_lost"):
+        figures[f"{name}_per_journey"] = _ratio(_total(rows, name), runs)
+        figures[f"{name}_per_km"] = _ratio(_total(rows, name), km)
     return CaseResult(
         name=case.name,
         filter=filter_name,
         runs=runs,
-        success=_ratio(len(good), runs),
-        success_low=success_low,
-        success_high=success_high,
-        wrong=_mean([row["wrong"] for row in rows]),
-        wrong_low=wrong_low,
-        wrong_high=wrong_high,
         switch_mean_m=_mean(switch_m),
-        switch_p90_m=percentile_m(np.array(switch_m, dtype=np.float64), 0.9),
-        error_mean_m=_mean([row["error_mean_m"] for row in good]),
-        error_67_m=_mean([row["error_67_m"] for row in good]),
-        error_95_m=_mean([row["error_95_m"] for row in good]),
+        switch_p90_m=percentile_m(switch_m, 0.9),
         worst_100m_mean_m=_mean(worst_m),
-        worst_100m_95_m=percentile_m(np.array(worst_m, dtype=np.float64), 0.95),
-        claimed=_ratio(sum(claimed), _total(rows, "epochs")),
-        within_50m=_ratio(_total(rows, "within_50m"), sum(claimed)),
-        within_50m_low=near_low,
-        within_50m_high=near_high,
-        coverage_50=_ratio(_total(rows, "covered_50"), sum(claimed)),
-        coverage_67=_ratio(_total(rows, "covered_67"), sum(claimed)),
-        coverage_95=_ratio(_total(rows, "covered_95"), sum(claimed)),
-        coverage_95_low=held_low,
-        coverage_95_high=held_high,
-        false_converged_per_journey=_ratio(_total(rows, "false_converged"), runs),
-        false_converged_per_km=_ratio(_total(rows, "false_converged"), km),
-        false_lost_per_journey=_ratio(_total(rows, "false_lost"), runs),
-        false_lost_per_km=_ratio(_total(rows, "false_lost"), km),
+        worst_100m_95_m=percentile_m(worst_m, 0.95),
+        claimed=_ratio(sum(of_claims), _total(rows, "epochs")),
+        coverage_50=_ratio(_total(rows, "covered_50"), sum(of_claims)),
+        coverage_67=_ratio(_total(rows, "covered_67"), sum(of_claims)),
         lost_per_km=_ratio(_total(rows, "lost"), km),
         seconds_per_track=float(np.median([row["seconds"] for row in rows])) if runs else 0.0,
-        window_median_m=_mean([row.get("window_median_m") for row in rows]),
+        window_median_m=_mean(_known(row.get("window_median_m") for row in rows)),
+        **figures,
     )
 
 
 def score_window(walked: Walk, found: PositionedTrack, from_s: float) -> Row:
     """Score the two minutes from a time on, where a position is known."""
     estimate = found.estimate
-    errors_m = position_errors_m(estimate, _truth(walked))
+    errors_m = position_errors_m(estimate, truth_of(walked.truth))
     known = np.array([status is not Status.SEARCHING for status in estimate.status], dtype=bool)
-    at = (estimate.time_s >= from_s) & (estimate.time_s < from_s + _WINDOW_S) & known
+    at = (estimate.time_s >= from_s) & (estimate.time_s < from_s + WINDOW_S) & known
     inside = errors_m[at]
     inside = inside[np.isfinite(inside)]
     return {"window_median_m": _finite(float(np.median(inside))) if inside.size else None}
-
-
-def _truth(walked: Walk) -> Truth:
-    names = ("time_s", "east_m", "north_m")
-    return Truth(*(np.asarray(walked.truth[name], dtype=np.float64) for name in names))
 
 
 def _recovered(case: Case, walked: Walk, truth: Truth, time_s: Floats, errors_m: Floats) -> Row:
@@ -225,15 +209,12 @@ def _recovered(case: Case, walked: Walk, truth: Truth, time_s: Floats, errors_m:
             row["switch_m"] = float(gone_m[begin])
             row["success"] = row["switch_m"] <= case.recovery_within_m
             return row | _errors(errors_m[after[begin:]])
-    return row | {f"error_{name}_m": None for name in ("mean", "67", "95")}
+    return row | dict.fromkeys(_ERRORS)
 
 
 def _errors(errors_m: Floats) -> Row:
-    return {
-        "error_mean_m": _finite(float(np.mean(errors_m))) if errors_m.size else None,
-        "error_67_m": _finite(percentile_m(errors_m, 0.67)),
-        "error_95_m": _finite(percentile_m(errors_m, 0.95)),
-    }
+    values = _mean(errors_m), percentile_m(errors_m, 0.67), percentile_m(errors_m, 0.95)
+    return dict(zip(_ERRORS, map(_finite, values), strict=True))
 
 
 def _interval(counts: Sequence[int], totals: Sequence[int]) -> tuple[float, float]:
@@ -256,6 +237,9 @@ def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _mean(values: Sequence[float | bool | None]) -> float:
-    known = [float(value) for value in values if value is not None]
-    return float(np.mean(known)) if known else float("nan")
+def _known(values: Iterable[float | None]) -> Floats:
+    return np.array([value for value in values if value is not None], dtype=np.float64)
+
+
+def _mean(values: Floats) -> float:
+    return float(np.mean(values)) if values.size else float("nan")

@@ -16,15 +16,12 @@ import shapely
 from shapely import STRtree
 
 from mapfilter._io import atomic_file, sha256_file
-from mapfilter.database.store import open_database
 from mapfilter.experiments.benchmarks.cases import Case
-from mapfilter.experiments.sweep.world import SweepWorld, open_world
+from mapfilter.experiments.sweep.world import SweepWorld, opened_filter, opened_world
 from mapfilter.gnss.sky import Skyline
 from mapfilter.positioning.filter import Filter, FilterOptions
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
-from mapfilter.propagation.predict import (
-    simulate_ground_truth,
-)
+from mapfilter.propagation.predict import simulate_ground_truth
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.ways import Buildings, Ways
@@ -50,7 +47,7 @@ class BenchmarkWorld:
     errors : GroundTruthErrors
         How the ground truth differs; its seed is drawn anew for each ground truth.
     settings : SimulationSettings
-        How one walks, what is reported, and the errors of dead reckoning.
+        The walker, the reports, and the errors of dead reckoning.
     antennas : mapping of str to MeasuredAntenna
         That the cell plan names.
     reception : ReceptionModel
@@ -76,12 +73,12 @@ class BenchmarkWorld:
     def streets(self) -> SweepWorld:
         """Streets, cells and building heights."""
         folder = self.folder / STREETS
-        return _streets(folder, sha256_file(folder / "world.json"))
+        return opened_world(folder, sha256_file(folder / "world.json"))
 
     def filter(self, choice: FilterOptions, *, thinned: bool) -> Filter[Any]:
         """Return the filter over the city, with the databases read once by each process."""
         folder = self.folder / (THINNED if thinned else FULL)
-        return _filter(folder, choice, sha256_file(folder / "manifest.json"))
+        return opened_filter(folder, sha256_file(folder / "manifest.json"), choice)
 
     def skyline(self, case: Case) -> Skyline | None:
         """Return the buildings that hide satellites, where a case has any satellites."""
@@ -91,13 +88,7 @@ class BenchmarkWorld:
         return _skyline(file, sha256_file(file))
 
     def ground_truth(self, seed: int, level_error_db: float | None = None) -> Levels:
-        """Draw how the cells are really received.
-
-        Parameters
-        ----------
-        level_error_db : float, optional
-            Deviation of the shadowing, in place of the world's.
-        """
+        """Draw the levels that are received, by default with the world's deviation in dB."""
         errors = replace(self.errors, seed=seed)
         if level_error_db is not None:
             errors = replace(errors, level_error_db=level_error_db)
@@ -126,16 +117,6 @@ def _skyline(path: Path, sha256: str) -> Skyline | None:  # noqa: ARG001
     table = pq.read_table(path)
     footprints = shapely.from_wkb(table["footprint"].to_numpy())
     return Skyline(footprints, table["height_m"].to_numpy()) if len(footprints) else None
-
-
-@lru_cache(maxsize=1)
-def _streets(folder: Path, sha256: str) -> SweepWorld:  # noqa: ARG001
-    return open_world(folder)
-
-
-@lru_cache(maxsize=32)
-def _filter(database: Path, choice: FilterOptions, sha256: str) -> Filter[Any]:  # noqa: ARG001
-    return choice.over(open_database(database), ways=False)
 
 
 def without_ways(

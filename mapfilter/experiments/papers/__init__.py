@@ -25,13 +25,7 @@ PAPERS = {
 
 
 def find_paper(name: str) -> Paper[Any]:
-    """Return a paper by its name.
-
-    Raises
-    ------
-    ConfigError
-        There is no such paper.
-    """
+    """Return a paper by its name; ConfigError where there is none."""
     if name not in PAPERS:
         raise fail(ConfigError, "reproduce", f"one of {', '.join(PAPERS)}", repr(name))
     paper: Paper[Any] = import_module(f"{__name__}.{PAPERS[name]}").PAPER

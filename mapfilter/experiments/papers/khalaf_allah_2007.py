@@ -96,7 +96,7 @@ def plans(trials: int, seed: int) -> tuple[SweepPlan, ...]:
         report_periods_s=(ROW_PERIOD_S,),
         routes=routes,
         draws=-(-trials // routes),
-        # The filter knows no neighbours, and which cell serves does not depend on them.
+        # The filter uses no neighbours, and which cell serves does not depend on them.
         reports=ReportModel(max_neighbours=0),
         seed=seed,
     )
@@ -133,19 +133,18 @@ def _reading(name: str, options: CandidateFilter, margin_db: float = 0.0) -> Rea
 
 
 def fits(cells: Iterable[SuccessCell]) -> tuple[Fit, ...]:
-    """Return how near each reading comes to the paper's claims, the nearest first.
+    """Return how near each reading comes to the paper's claims, the nearest first."""
+    found = [_fit(name, some) for name, some in _by_reading(cells).items()]
+    return tuple(sorted(found, key=lambda fit: fit.misfit))
 
-    Parameters
-    ----------
-    cells : iterable of SuccessCell
-        Of the steps' noise that all readings share.
-    """
-    by_reading: dict[str, list[SuccessCell]] = {}
+
+def _by_reading(cells: Iterable[SuccessCell]) -> dict[str, list[SuccessCell]]:
+    """Return the cells of the steps' noise that all readings share, by reading."""
+    found: dict[str, list[SuccessCell]] = {}
     for cell in cells:
         if cell.sigma_trans_m == ONE_SIGMA_TRANS_M:
-            by_reading.setdefault(cell.reading, []).append(cell)
-    found = [_fit(name, some) for name, some in by_reading.items()]
-    return tuple(sorted(found, key=lambda fit: fit.misfit))
+            found.setdefault(cell.reading, []).append(cell)
+    return found
 
 
 def _fit(name: str, cells: Sequence[SuccessCell]) -> Fit:
@@ -209,11 +208,8 @@ def tables(run: PaperRun) -> dict[str, pd.DataFrame]:
     rows = [{"reading": "Khalaf-Allah 2007"} | published | claims]
     for fit in run.fits:
         errors = {name: f"{getattr(fit, name):.1f}" for name in TABLE_4_M}
-        rows.append(
-            {"reading": fit.reading}
-            | errors
-            | {name: f"{getattr(fit, name):.3f}" for name in shares}
-        )
+        success = {name: f"{getattr(fit, name):.3f}" for name in shares}
+        rows.append({"reading": fit.reading} | errors | success)
     return {"table-4": pd.DataFrame(rows)}
 
 
@@ -231,12 +227,9 @@ def pictures(run: PaperRun) -> Iterator[Picture]:
             for at in SIGMA_TRANS_M
         ]
         yield file, plot_success_curves(curves, title=titles[name], **look)
-    shared: dict[str, list[SuccessCell]] = {}
-    for cell in run.cells:
-        if cell.sigma_trans_m == ONE_SIGMA_TRANS_M:
-            shared.setdefault(cell.reading, []).append(cell)
     title = f"{place}: readings of the paper, steps of ± {ONE_SIGMA_TRANS_M:g} m"
-    yield "readings", plot_success_curves(list(shared.items()), title=title, **look)
+    shared = list(_by_reading(run.cells).items())
+    yield "readings", plot_success_curves(shared, title=title, **look)
     yield "success-map", plot_success_map(by_reading[MAIN], title=titles[MAIN])
     runs = run.runs
     rows = runs[(runs["reading"] == MAIN) & (runs["sigma_trans_m"] == ONE_SIGMA_TRANS_M)]

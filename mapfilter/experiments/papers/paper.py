@@ -1,4 +1,4 @@
-"""What all papers share: how one is run, and what comes of it."""
+"""What all papers share: how one is run, and what its run gives."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+import numpy as np
 import pandas as pd
 
 from mapfilter._parallel import Progress
+from mapfilter._types import Floats
 from mapfilter.experiments.sweep.plan import SweepPlan
+from mapfilter.models.motion import LinearMotion
 from mapfilter.report.canvas import Drawn
 
 Run = TypeVar("Run")
@@ -22,7 +25,7 @@ Picture = tuple[str, Drawn]
 
 @dataclass(frozen=True)
 class PaperSettings:
-    """What a paper's experiments are run with.
+    """Settings of a paper's experiments.
 
     Parameters
     ----------
@@ -72,7 +75,7 @@ class Paper(Generic[Run]):
     trial_limits : (int, int or None)
         Least and most trials.
     why : str
-        Why others are refused.
+        Reason of the limits, for the error message.
     options : tuple of str
         Options of the command line that not all papers take.
     """
@@ -88,3 +91,34 @@ class Paper(Generic[Run]):
     trial_limits: tuple[int, int | None] = (1, None)
     why: str = ""
     options: tuple[str, ...] = ()
+
+
+def true_states(
+    motion: LinearMotion, start: Floats, trials: int, steps: int, rng: np.random.Generator
+) -> Floats:
+    """Draw true states at k = 1 ... K of all trials from one start (n,), shape (T, K, n)."""
+    states = np.empty((trials, steps, start.size))
+    now = np.tile(start, (trials, 1))
+    for k in range(steps):
+        now = motion.sample(now, rng)
+        states[:, k] = now
+    return states
+
+
+def share_beyond(means: Floats, states: Floats, far_m: float) -> float:
+    """Return the share of trials whose position, components 0 and 2, is far off at the end."""
+    off_m = (means - states)[:, -1][:, [0, 2]]
+    return float(np.mean(np.hypot(*off_m.T) > far_m))
+
+
+def interval_columns(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a row for a table: each interval as two columns named after the figure before it."""
+    found: dict[str, Any] = {}
+    last = ""
+    for name, value in row.items():
+        if isinstance(value, tuple):
+            found |= {f"{last}_low": value[0], f"{last}_high": value[1]}
+        else:
+            found[name] = value
+            last = name
+    return found

@@ -20,12 +20,18 @@ from mapfilter.evaluation.bounds import (
     posterior_bound,
     rmse_over_time,
 )
-from mapfilter.experiments.papers.paper import Paper, PaperSettings, Picture
+from mapfilter.experiments.papers.paper import (
+    Paper,
+    PaperSettings,
+    Picture,
+    share_beyond,
+    true_states,
+)
 from mapfilter.filters.gaussian import EKF, IEKF, UKF, Method
 from mapfilter.filters.gaussian_sum import run_mixtures, split
 from mapfilter.filters.trials import run_trials
 from mapfilter.models.gaussian import GaussianTerms, stack
-from mapfilter.models.motion import LinearMotion, constant_velocity
+from mapfilter.models.motion import constant_velocity
 from mapfilter.models.ranging import timing_advances
 from mapfilter.models.signal_strength import levels
 from mapfilter.models.state import MOVING
@@ -44,6 +50,12 @@ LOSS_AT_KM_DB, EXPONENT = 132.85, 3.8
 PRIOR_POSITION_M, PRIOR_VELOCITY_MPS = 5000.0, 50.0
 SITES_M = ((0.0, 0.0), (6000.0, 0.0), (3000.0, 6000.0))
 """Not in the paper: a triangle around the road."""
+
+MOTION = constant_velocity(INTERVAL_S, ACCELERATION_MPS2)
+"""Eqs. 1 and 2."""
+
+PRIOR = np.diag(np.square([PRIOR_POSITION_M, PRIOR_VELOCITY_MPS] * 2))
+"""P(0) of section 4."""
 
 SIGMAS_DB = (0.4, 4.0, 40.0)
 STEPS = 400
@@ -75,11 +87,6 @@ ASSUMPTIONS = (
 )
 
 
-def motion() -> LinearMotion:
-    """Return the paper's motion (eqs. 1 and 2)."""
-    return constant_velocity(INTERVAL_S, ACCELERATION_MPS2)
-
-
 def measurement(combination: Combination, sigma_db: float = SIGMA_RSS_DB) -> GaussianTerms:
     """Return timing advances, losses, or both (eq. 4)."""
     advances = timing_advances(MOVING, SITES_M, SIGMA_TA_M)
@@ -88,26 +95,10 @@ def measurement(combination: Combination, sigma_db: float = SIGMA_RSS_DB) -> Gau
     return stack({"fusion": [advances, losses], "ta": [advances], "rss": [losses]}[combination])
 
 
-def prior_covariance() -> Floats:
-    """Return P(0) of section 4."""
-    return np.diag(np.square([PRIOR_POSITION_M, PRIOR_VELOCITY_MPS] * 2))
-
-
-def true_states(trials: int, rng: np.random.Generator, steps: int = STEPS) -> Floats:
-    """Draw true states at k = 1 ... K, shape (T, K, 4)."""
-    states, model = np.empty((trials, steps, 4)), motion()
-    now = np.tile(np.array(START), (trials, 1))
-    for k in range(steps):
-        now = model.sample(now, rng)
-        states[:, k] = now
-    return states
-
-
 def bounds(states: Floats, combination: Combination, sigma_db: float) -> Floats:
     """Return the bound on the covariance at each step, shape (K, 4, 4)."""
     information = expected_information(measurement(combination, sigma_db), states)
-    model = motion()
-    return posterior_bound(model.transition, model.noise, prior_covariance(), information)
+    return posterior_bound(MOTION.transition, MOTION.noise, PRIOR, information)
 
 
 class Started(NamedTuple):
@@ -136,9 +127,8 @@ def started_from_fix(trials: int, rng: np.random.Generator) -> Started:
 
 def started_wide(trials: int, rng: np.random.Generator) -> Started:
     """Draw starts from P(0) about the truth."""
-    covariance = prior_covariance()
-    drawn = rng.standard_normal((trials, 4)) * np.sqrt(np.diagonal(covariance))
-    return Started(np.array(START) + drawn, covariance)
+    drawn = rng.standard_normal((trials, 4)) * np.sqrt(np.diagonal(PRIOR))
+    return Started(np.array(START) + drawn, PRIOR)
 
 
 def run_filter(
@@ -149,11 +139,9 @@ def run_filter(
     rng: np.random.Generator,
 ) -> Floats:
     """Draw readings at σ_l 4 dB and run a filter over them; return its means, (T, K, 4)."""
-    given, model = measurement(combination), motion()
+    given, moving = measurement(combination), (MOTION.transition, MOTION.noise)
     readings = given.sample(states, rng)
-    first = start.means, start.covariance
-    moving = model.transition, model.noise
-    return run_trials(compiled(given), *moving, method, *first, readings).means
+    return run_trials(compiled(given), *moving, method, *start, readings).means
 
 
 def run_sum(
@@ -164,10 +152,9 @@ def run_sum(
     parts: int = 9,
 ) -> Floats:
     """Run a Gaussian sum of EKFs from a wide start, cut into ``parts`` along east and north."""
-    given, model = measurement(combination), motion()
+    given, moving = measurement(combination), (MOTION.transition, MOTION.noise)
     readings = given.sample(states, rng)
     first = split(np.zeros(4), start.covariance, {0: parts, 2: parts})
-    moving = model.transition, model.noise
     return run_mixtures(compiled(given), *moving, EKF, first, start.means, readings).means
 
 
@@ -175,17 +162,10 @@ def run_sum(
 class PaperRun:
     """Curves over k = 1 ... 400; the first index of each is k = 1.
 
-    Parameters
-    ----------
-    trials : int
-    bounds : dict
-        By σ_l in dB, then by combination, the bound's covariances (K, 4, 4).
-    from_fix, velocity_from_fix : dict
-        By combination the position and the velocity error of the EKF started from a fix.
-    wide : dict
-        By combination, then filter, the position error from the wide start.
-    astray : dict
-        By combination, then filter, the share of trials more than 1 km off at the end of that.
+    ``bounds``: by σ_l in dB, then by combination, the bound's covariances (K, 4, 4). By combination
+    ``from_fix`` and ``velocity_from_fix`` are the errors of the EKF started from a fix; ``wide``,
+    by filter, the position error from the wide start, and ``astray`` the share of its trials more
+    than 1 km off at the end.
     """
 
     trials: int
@@ -200,7 +180,7 @@ def run_paper(settings: PaperSettings) -> PaperRun:
     """Run bounds and filters of all figures, and the wide starts."""
     trials, progress = settings.trials, settings.progress
     truth_rng, rng = np.random.default_rng(settings.seed).spawn(2)
-    states = true_states(trials, truth_rng)
+    states = true_states(MOTION, np.array(START), trials, STEPS, truth_rng)
     found: dict[float, dict[str, Floats]] = {
         sigma: {name: bounds(states, name, sigma) for name in COMBINATIONS} for sigma in SIGMAS_DB
     }
@@ -215,10 +195,7 @@ def run_paper(settings: PaperSettings) -> PaperRun:
         run.wide[name] = {
             one: rmse_over_time(means, states, POSITION) for one, means in wide.items()
         }
-        off_m = {one: (means - states)[:, -1][:, list(POSITION)] for one, means in wide.items()}
-        run.astray[name] = {
-            one: float(np.mean(np.hypot(*off.T) > FAR_M)) for one, off in off_m.items()
-        }
+        run.astray[name] = {one: share_beyond(own, states, FAR_M) for one, own in wide.items()}
         if progress is not None:
             progress(done, len(COMBINATIONS))
     return run

@@ -1,1 +1,1 @@
-"""Many runs over a grid of settings: the plan, the runs, and one tidy table of what came out."""
+"""Many runs over a grid of settings: the plan, the runs, and one tidy table of results."""

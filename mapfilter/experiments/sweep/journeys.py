@@ -36,7 +36,7 @@ def radio_rng(seed: int, route: int, radio: Radio, report_period_s: float) -> np
 
 def imu_rng(seed: int, run: Run) -> np.random.Generator:
     """Return the generator of a run's inertial unit: of its noise, not of filter and database."""
-    values = (*_noise(run), run.imu_period_s)
+    values = (*run.noises, run.imu_period_s)
     return named_rng(seed, "imu", str(run.route), str(run.draw), *map(_value, values))
 
 
@@ -44,19 +44,8 @@ def filter_rng(seed: int, run: Run) -> np.random.Generator:
     """Return the generator of a run's filter."""
     reading = run.reading
     names = run.radio.stream, run.database, reading.name
-    values = reading.update_length_m, run.report_period_s, run.imu_period_s, *_noise(run)
+    values = reading.update_length_m, run.report_period_s, run.imu_period_s, *run.noises
     return named_rng(seed, "filter", str(run.route), str(run.draw), *names, *map(_value, values))
-
-
-def _noise(run: Run) -> tuple[float, ...]:
-    noise = run.noise
-    return (
-        noise.sigma_trans_m,
-        noise.sigma_orient_deg,
-        noise.bias_sd_deg,
-        noise.drift_deg_per_sqrt_s,
-        noise.scale,
-    )
 
 
 def _value(number: float) -> str:
@@ -65,13 +54,7 @@ def _value(number: float) -> str:
 
 
 def true_path(world: SweepWorld, plan: SweepPlan, number: int) -> pd.DataFrame:
-    """Draw a route and return the truth of the journey along it.
-
-    Raises
-    ------
-    InputError
-        One cannot go as far as the plan wants.
-    """
+    """Draw a route and return the truth of the journey along it."""
     settings, seed = plan.journey, plan.seed
     rng = route_rng(seed, number)
     along = route(world.network, settings.length_m, rng, leg_m=settings.leg_m)
@@ -109,5 +92,4 @@ def sensed(plan: SweepPlan, log: TrackLog, run: Run) -> TrackLog:
 
 def truth_of(truth: pd.DataFrame) -> Truth:
     """Return the truth of a journey as scores take it."""
-    east_m, north_m = (np.asarray(truth[name], np.float64) for name in ("east_m", "north_m"))
-    return Truth(np.asarray(truth["time_s"], np.float64), east_m, north_m)
+    return Truth(*(np.asarray(truth[name], np.float64) for name in ("time_s", "east_m", "north_m")))

@@ -9,6 +9,9 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from math import ceil, isfinite, prod
+from typing import Any
+
+import numpy as np
 
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.positioning.filter import FilterOptions
@@ -18,6 +21,9 @@ from mapfilter.simulation.reports import ReportModel
 
 AS_PREDICTED = "as_predicted"
 """The radio world in which each place is served by the cell predicted best there."""
+
+NOISE_AXES = ("sigma_trans_m", "sigma_orient_deg", "bias_sd_deg", "drift_deg_per_sqrt_s", "scale")
+"""Errors of dead reckoning that are axes of the grid, and columns of its table."""
 
 LONGEST_BATCH = 100
 SHORTEST_BATCH = 24
@@ -29,14 +35,9 @@ _MOST_RUNS = 100_000_000
 
 @dataclass(frozen=True, slots=True)
 class Radio:
-    """A set of levels that the phone receives, by name.
+    """Levels that the phone receives: ``as_predicted``, or a simulated ground truth by its name.
 
-    Parameters
-    ----------
-    name : str
-        ``as_predicted``, or that of a set of simulated ground truth levels.
-    prediction_error_db : float
-        Deviation of the ground truth from the prediction; NaN where it is not known.
+    ``prediction_error_db`` is its deviation from the prediction; NaN where that is unknown.
     """
 
     name: str = AS_PREDICTED
@@ -50,13 +51,7 @@ class Radio:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One filter with its options, by the name that tables and figures call it.
-
-    Parameters
-    ----------
-    update_length_m : float
-        Of the filter; NaN where it knows none.
-    """
+    """A filter with its options, its name in tables, and its update length; NaN without one."""
 
     name: str
     choice: FilterOptions
@@ -76,6 +71,11 @@ class Run:
     database: str
     reading: Reading
 
+    @property
+    def noises(self) -> tuple[float, ...]:
+        """Errors of dead reckoning, in the order of :data:`NOISE_AXES`."""
+        return tuple(getattr(self.noise, name) for name in NOISE_AXES)
+
 
 @dataclass(frozen=True)
 class SweepPlan:
@@ -84,7 +84,7 @@ class SweepPlan:
     Parameters
     ----------
     readings : tuple of Reading
-        Filters; their names with their update lengths tell them apart.
+        Filters, each of another name or update length.
     databases : tuple of str
         Names of the radio-route databases.
     noises : tuple of ImuNoise
@@ -188,11 +188,8 @@ class SweepPlan:
     def select(self, first: int, end: int) -> Iterator[Run]:
         """Yield the runs of a batch. Those of one route lie together, however long their grid."""
         for number in range(first, end):
-            rest, place = number, []
-            for length in reversed(self.shape):
-                rest, index = divmod(rest, length)
-                place.append(index)
-            reading, database, draw, noise, imu, route, period, radio = place
+            place = map(int, np.unravel_index(number, self.shape))
+            radio, period, route, imu, noise, draw, database, reading = place
             period_s = self.report_periods_s[period]
             yield Run(
                 self.radios[radio],
@@ -233,17 +230,11 @@ def noise_grid(
     [0.0, 3.0, 0.0, 3.0]
     """
     axes = sigma_trans_m, sigma_orient_deg, bias_sd_deg, drift_deg_per_sqrt_s, scale
-    return tuple(
-        replace(
-            others or ImuNoise(),
-            sigma_trans_m=float(step_m),
-            sigma_orient_deg=float(heading_deg),
-            bias_sd_deg=float(bias_deg),
-            drift_deg_per_sqrt_s=float(drift),
-            scale=float(scale_sd),
-        )
-        for step_m, heading_deg, bias_deg, drift, scale_sd in itertools.product(*axes)
-    )
+    found = []
+    for values in itertools.product(*axes):
+        chosen: dict[str, Any] = dict(zip(NOISE_AXES, map(float, values), strict=True))
+        found.append(replace(others or ImuNoise(), **chosen))
+    return tuple(found)
 
 
 def _plain(value: object) -> object:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 import pyarrow as pa
@@ -20,14 +19,12 @@ from mapfilter._io import ensure_writable_folder, sha256_file
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter._resume import start_or_resume
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.database.store import open_database
-from mapfilter.errors import StoreError, fail
 from mapfilter.evaluation.accuracy import accuracy
 from mapfilter.experiments.sweep import table
 from mapfilter.experiments.sweep.journeys import filter_rng, radio_log, sensed, true_path, truth_of
 from mapfilter.experiments.sweep.plan import Radio, Run, SweepPlan
-from mapfilter.experiments.sweep.world import SweepWorld, open_world, write_world
-from mapfilter.positioning.filter import Filter, FilterOptions, locate
+from mapfilter.experiments.sweep.world import SweepWorld, opened_filter, opened_world, write_world
+from mapfilter.positioning.filter import locate
 from mapfilter.tracks.log import TrackLog
 
 RUNS = "runs.parquet"
@@ -41,24 +38,16 @@ _DETERMINED_BY = {
     "databases_sha256": "database",
     "version": "version of mapfilter",
 }
-_WORLDS, _LOCATORS, _PATHS = 1, 32, 2
+_PATHS = 2
 _TRIAL_RUNS = 8
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Runs that one worker does in one go.
+    """Runs, from ``first`` to before ``end``, that one worker does in one go.
 
-    Parameters
-    ----------
-    world : Path
-        Folder of the world.
-    world_sha256 : str
-        By which no worker takes an older world for this one.
-    databases : tuple of (Path, str)
-        Folder and SHA-256 of the manifest of each, in the order of the plan's names.
-    first, end : int
-        Numbers of the runs.
+    Folders of the world and the databases, in the order of the plan's names, stand with the SHA-256
+    of their heads, by which no worker takes older ones for these.
     """
 
     plan: SweepPlan
@@ -73,11 +62,6 @@ def run_batch(batch: Batch) -> pa.Table:
     """Do the runs of a batch and return their rows.
 
     World and databases are opened once by each worker and kept.
-
-    Raises
-    ------
-    MapfilterError
-        World or database cannot be read.
     """
     plan = batch.plan
     databases = dict(zip(plan.databases, batch.databases, strict=True))
@@ -87,7 +71,7 @@ def run_batch(batch: Batch) -> pa.Table:
         log = _radio_log(batch.world, batch.world_sha256, plan, route, radio, period_s)
         truth = truth_of(log.truth)
         for run in alike:
-            filter_ = _filter(*databases[run.database], run.reading.choice)
+            filter_ = opened_filter(*databases[run.database], run.reading.choice)
             found = locate(sensed(plan, log, run), filter_, filter_rng(plan.seed, run)).estimate
             last = str(found.status[-1]) if len(found) else ""
             rows.append(table.row(run, accuracy(found, truth), last, plan.varied))
@@ -105,7 +89,7 @@ def sweep(
     resume: bool = False,
     progress: Progress | None = None,
 ) -> Path:
-    """Do all runs of a sweep and return the path of their table.
+    """Do all runs of a sweep and return the path of their table, for :func:`.table.read_runs`.
 
     Parameters
     ----------
@@ -127,18 +111,10 @@ def sweep(
     progress : callable, optional
         Called with runs done and runs in all.
 
-    Returns
-    -------
-    Path
-        Of the table; :func:`mapfilter.experiments.sweep.table.read_runs` returns it as a data
-        frame.
-
     Raises
     ------
-    ConfigError
-        There is something else to resume.
     MapfilterError
-        A database cannot be read, or the output cannot be written.
+        There is something else to resume, a database cannot be read, or the output not written.
     """
     grid = (plans,) if isinstance(plans, SweepPlan) else tuple(plans)
     schema = table.schema_of(key for key, _ in grid[0].varied)
@@ -237,21 +213,9 @@ def _journey(run: Run) -> tuple[Radio, float, int]:
     return run.radio, run.report_period_s, run.route
 
 
-@lru_cache(maxsize=_WORLDS)
-def _world(folder: Path, sha256: str) -> SweepWorld:
-    if sha256_file(folder / "world.json") != sha256:
-        raise fail(StoreError, str(folder), "the world of this sweep", "another", "two at once")
-    return open_world(folder)
-
-
-@lru_cache(maxsize=_LOCATORS)
-def _filter(path: Path, sha256: str, choice: FilterOptions) -> Filter[Any]:  # noqa: ARG001
-    return choice.over(open_database(path), ways=False)
-
-
 @lru_cache(maxsize=_PATHS)
 def _true_path(folder: Path, sha256: str, plan: SweepPlan, number: int) -> pd.DataFrame:
-    return true_path(_world(folder, sha256), plan, number)
+    return true_path(opened_world(folder, sha256), plan, number)
 
 
 @lru_cache(maxsize=_PATHS)
@@ -259,4 +223,4 @@ def _radio_log(
     folder: Path, sha256: str, plan: SweepPlan, number: int, radio: Radio, report_period_s: float
 ) -> TrackLog:
     truth = _true_path(folder, sha256, plan, number)
-    return radio_log(_world(folder, sha256), plan, truth, number, radio, report_period_s)
+    return radio_log(opened_world(folder, sha256), plan, truth, number, radio, report_period_s)

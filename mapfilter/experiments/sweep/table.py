@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import astuple
+from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any
 
@@ -14,42 +14,31 @@ import pyarrow.parquet as pq
 from mapfilter._io import atomic_file
 from mapfilter.errors import StoreError, fail
 from mapfilter.evaluation.accuracy import Accuracy
+from mapfilter.evaluation.success import COORDINATES, SuccessCell
 from mapfilter.experiments.sweep.plan import Run
 
-_TEXT, _FLOAT, _INT, _BOOL = pa.string(), pa.float64(), pa.int32(), pa.bool_()
+_TYPES = {"str": pa.string(), "float": pa.float64(), "int": pa.int32(), "bool": pa.bool_()}
+
+
+def _columns(of: type) -> list[tuple[str, pa.DataType]]:
+    """Return columns for the fields of a dataclass, by their annotations."""
+    return [(field.name, _TYPES[str(field.type)]) for field in fields(of) if field.type in _TYPES]
+
 
 SCHEMA = pa.schema(
     [
-        ("database", _TEXT),
-        ("radio", _TEXT),
-        ("prediction_error_db", _FLOAT),
-        ("report_period_s", _FLOAT),
-        ("imu_period_s", _FLOAT),
-        ("filter", _TEXT),
-        ("reading", _TEXT),
-        ("update_length_m", _FLOAT),
-        ("sigma_trans_m", _FLOAT),
-        ("sigma_orient_deg", _FLOAT),
-        ("bias_sd_deg", _FLOAT),
-        ("drift_deg_per_sqrt_s", _FLOAT),
-        ("scale", _FLOAT),
-        ("route", _INT),
-        ("draw", _INT),
-        ("switched", _BOOL),
-        ("success", _BOOL),
-        ("switch_time_s", _FLOAT),
-        ("switch_distance_m", _FLOAT),
-        ("error_at_switch_m", _FLOAT),
-        ("error_mean_m", _FLOAT),
-        ("error_67_m", _FLOAT),
-        ("error_95_m", _FLOAT),
-        ("scored_epochs", _INT),
-        ("final_status", _TEXT),
+        *_columns(SuccessCell)[: len(COORDINATES)],
+        ("route", pa.int32()),
+        ("draw", pa.int32()),
+        *_columns(Accuracy),
+        ("final_status", pa.string()),
     ]
 )
 """Columns: coordinates of the run in the grid, then its results; null where undefined.
 
-Varied options are further columns, named by their dotted keys, before ``route``.
+The coordinates are those of :class:`mapfilter.evaluation.success.SuccessCell`, the results are
+those of :class:`mapfilter.evaluation.accuracy.Accuracy`. Varied options are further columns, named
+by their dotted keys, before ``route``.
 """
 
 _GROUP_ROWS = 100_000
@@ -60,7 +49,7 @@ def schema_of(varied: Iterable[str]) -> pa.Schema:
     """Return the columns of a sweep that varies some options."""
     schema = SCHEMA
     for place, key in enumerate(varied):
-        schema = schema.insert(_VARIED_AT + place, pa.field(key, _FLOAT))
+        schema = schema.insert(_VARIED_AT + place, pa.field(key, pa.float64()))
     return schema
 
 
@@ -68,7 +57,7 @@ def row(
     run: Run, score: Accuracy, final_status: str, varied: Iterable[tuple[str, float]] = ()
 ) -> tuple[Any, ...]:
     """Return a run's row, in the order of :func:`schema_of`."""
-    noise, reading = run.noise, run.reading
+    reading = run.reading
     return (
         run.database,
         run.radio.name,
@@ -78,11 +67,7 @@ def row(
         reading.choice.name,
         reading.name,
         reading.update_length_m,
-        noise.sigma_trans_m,
-        noise.sigma_orient_deg,
-        noise.bias_sd_deg,
-        noise.drift_deg_per_sqrt_s,
-        noise.scale,
+        *run.noises,
         *(float(value) for _, value in varied),
         run.route,
         run.draw,

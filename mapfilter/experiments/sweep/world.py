@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,10 @@ import numpy as np
 
 from mapfilter._io import atomic_dir, read_json, sha256_file, write_json
 from mapfilter._types import Floats32
-from mapfilter.database.store import read_cells, write_cells
+from mapfilter.database.store import open_database, read_cells, write_cells
 from mapfilter.errors import InputError, StoreError, fail
 from mapfilter.geodesy import Lattice
+from mapfilter.positioning.filter import Filter, FilterOptions
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.network import StreetNetwork
@@ -58,10 +60,7 @@ class SweepWorld:
         lattices = {one.lattice for one in rasters.values()}
         if len(lattices) != 1:
             raise fail(InputError, "rasters", "one lattice for all", f"{len(lattices)} of them")
-        levels_dbm = {
-            name: np.asarray(one.read_levels_dbm(plan, None, plan.ids), dtype=np.float32)
-            for name, one in rasters.items()
-        }
+        levels_dbm = {name: all_levels_dbm(one, plan) for name, one in rasters.items()}
         return cls(network, plan, lattices.pop(), levels_dbm, heights_m)
 
     @property
@@ -72,14 +71,13 @@ class SweepWorld:
         return inside_buildings(self.heights_m, self.lattice)
 
 
-def write_world(world: SweepWorld, folder: Path) -> str:
-    """Write a world, and return the SHA-256 by which it is known.
+def all_levels_dbm(rasters: RxLevRasters, plan: CellPlan) -> Floats32:
+    """Read the levels of all cells of a plan, in its order, shape (cells, rows, cols)."""
+    return np.asarray(rasters.read_levels_dbm(plan, None, plan.ids), dtype=np.float32)
 
-    Raises
-    ------
-    OutputError
-        The folder cannot be written.
-    """
+
+def write_world(world: SweepWorld, folder: Path) -> str:
+    """Write a world, and return the SHA-256 of its head."""
     names = sorted(world.levels_dbm)
     with atomic_dir(folder) as into:
         write_cells(world.plan, into / _CELLS)
@@ -109,13 +107,7 @@ def write_world(world: SweepWorld, folder: Path) -> str:
 
 
 def open_world(folder: Path) -> SweepWorld:
-    """Open a world; its levels are mapped into memory, not read.
-
-    Raises
-    ------
-    StoreError
-        Something of it is missing or damaged.
-    """
+    """Open a world; its levels are mapped into memory, not read. A damaged one is a StoreError."""
     head = read_json(folder / _HEAD)
     try:
         lattice = Lattice(
@@ -140,6 +132,20 @@ def open_world(folder: Path) -> SweepWorld:
         raise fail(StoreError, str(folder), "the world of a sweep", error, "cut off") from error
     cells = read_cells(folder / _CELLS, lattice.crs)
     return SweepWorld(network, cells, lattice, levels, heights_m)
+
+
+@lru_cache(maxsize=1)
+def opened_world(folder: Path, sha256: str) -> SweepWorld:
+    """Open a world once in each process; another one by now is a StoreError."""
+    if sha256_file(folder / _HEAD) != sha256:
+        raise fail(StoreError, str(folder), "the world of this sweep", "another", "two at once")
+    return open_world(folder)
+
+
+@lru_cache(maxsize=32)
+def opened_filter(database: Path, sha256: str, choice: FilterOptions) -> Filter[Any]:  # noqa: ARG001
+    """Return a filter over a database, by the SHA-256 of its manifest, once in each process."""
+    return choice.over(open_database(database), ways=False)
 
 
 def _levels(number: int) -> str:

@@ -40,6 +40,7 @@ from mapfilter.filters.contract import Status
 from mapfilter.filters.grid import GridBelief
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
+from mapfilter.options import NotNegative, Options, Share
 
 MapBelief = ParticleBelief | GridBelief
 
@@ -49,7 +50,7 @@ _LEARNT_OVER_M = 300.0
 
 
 @dataclass(frozen=True, slots=True)
-class AlternativeRules:
+class AlternativeRules(Options):
     """Thresholds for starting, preferring and abandoning an alternative.
 
     Log Bayes factors are in favour of the alternative.
@@ -76,14 +77,14 @@ class AlternativeRules:
         Lead over its alternative, as a log Bayes factor, that a belief needs to converge.
     """
 
-    start_cusum: float = 5.0
-    start_cusum_cells: float = 2.5
+    start_cusum: NotNegative = 5.0
+    start_cusum_cells: NotNegative = 2.5
     search_threshold: float = 4.0
     lost_threshold: float = 10.0
     lost_threshold_cells: float = 6.0
-    confirm_mass: float = 0.9
+    confirm_mass: Share = 0.9
     abandon_threshold: float = -25.0
-    abandon_after_m: float = 800.0
+    abandon_after_m: NotNegative = 800.0
     converge_cusum: float = 2.5
     converge_threshold: float = 2.0
 

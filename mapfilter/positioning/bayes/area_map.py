@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 
 from mapfilter._types import Bools, Floats32, Ints, Ints32
 from mapfilter.database.radioroutes import RadioField
@@ -116,8 +117,8 @@ class AreaMap:
 
     @cached_property
     def way_rank(self) -> Ints32:
-        """Index into ``way_ids`` of each pixel, shape (rows * cols,)."""
-        return np.searchsorted(self.way_ids, self.way_id).astype(np.int32).ravel()
+        """Index into ``way_ids`` of each pixel, shape (rows, cols)."""
+        return np.searchsorted(self.way_ids, self.way_id).astype(np.int32)
 
     @cached_property
     def points(self) -> Floats32:
@@ -132,6 +133,25 @@ class AreaMap:
         """Return the map's log-likelihood at every pixel."""
         return map_log_likelihood(self.distance_m, sd_m)
 
+    def matched_way(
+        self, east_m: Floats32, north_m: Floats32, weight: Floats32
+    ) -> tuple[int, float]:
+        """Return the way whose nearest points hold the largest share of a belief, and that share.
+
+        Parameters
+        ----------
+        east_m, north_m, weight : ndarray of float32, shape (N,)
+            In the local frame; weights sum to one.
+
+        Returns
+        -------
+        way_id : int
+            0 where the largest share lies in squares, off all ways.
+        """
+        per_m, count = 1 / self.lattice.resolution_m, len(self.way_ids)
+        rank, share = _heaviest(east_m, north_m, weight, self.way_rank, count, per_m)
+        return int(self.way_ids[rank]), min(float(share), 1.0)
+
 
 def _carriers(plan: CellPlan, cell_ids: Iterable[str]) -> dict[tuple[int, int], tuple[int, ...]]:
     band_of = {cell: band for band, cell in enumerate(cell_ids)}
@@ -144,3 +164,22 @@ def _carriers(plan: CellPlan, cell_ids: Iterable[str]) -> dict[tuple[int, int], 
         for key in keys:
             found[key] = (*found.get(key, ()), band)
     return found
+
+
+@njit(error_model="numpy", cache=True)
+def _heaviest(
+    east_m: Floats32,
+    north_m: Floats32,
+    weight: Floats32,
+    way_rank: Ints32,
+    ways: int,
+    per_m: float,
+) -> tuple[int, float]:
+    rows, cols = way_rank.shape
+    mass = np.zeros(ways, dtype=np.float32)
+    for i in range(weight.size):
+        col = min(max(int(east_m[i] * per_m), 0), cols - 1)
+        row = rows - 1 - min(max(int(north_m[i] * per_m), 0), rows - 1)
+        mass[way_rank[row, col]] += weight[i]
+    best = int(np.argmax(mass))
+    return best, mass[best]

@@ -76,7 +76,7 @@ class RadioReading:
 
 
 class Context(NamedTuple):
-    """What sources need to know of an epoch beyond the filter's state.
+    """Facts of an epoch that sources need besides the filter's state.
 
     ``particle_spacing_m`` is how far the hypotheses nearest to the true position may lie from it;
     ``report_due`` whether the epoch's radio report is used.

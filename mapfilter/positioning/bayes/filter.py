@@ -98,12 +98,9 @@ class BayesPositioner(Filter[BayesState]):
     def _radio(self) -> RadioSource:
         return RadioSource(self.area, self.model.evidence)
 
-    def filter_for(self, compass: bool) -> BeliefFilter[Start, MapBelief, RadioReading]:
-        """Return the filter of a single belief, for headings with or without a compass."""
-        return self._filters[compass]
-
     @cached_property
-    def _filters(self) -> dict[bool, BeliefFilter[Start, Any, RadioReading]]:
+    def filters(self) -> dict[bool, BeliefFilter[Start, Any, RadioReading]]:
+        """The filters of a single belief, for headings with and without a compass."""
         known = self.options
         if self.grid:
             grids = {compass: StreetGrid(self.model, compass) for compass in (True, False)}
@@ -125,7 +122,7 @@ class BayesPositioner(Filter[BayesState]):
         self, east_m: float, north_m: float, sd_m: float, rng: np.random.Generator
     ) -> BayesState:
         """Return the state at a known start, in the CRS of the database."""
-        belief = self.filter_for(True).init(Start(None, True, east_m, north_m, sd_m), rng)
+        belief = self.filters[True].init(Start(None, True, east_m, north_m, sd_m), rng)
         belief = replace(belief, status=Status.TRACKING)
         return replace(self.begin(), belief=belief, status=Status.TRACKING)
 
@@ -167,7 +164,7 @@ class BayesPositioner(Filter[BayesState]):
         state = small.begin_at(west, south, 1.0, rng)
         state, _ = small.step(state, Epoch(0.0, (MotionStep(1.0, 0.0),)), rng)
         if state.belief is not None and model.area.cell_ids:
-            small.filter_for(True).update(state.belief, _every_kind(), rng)
+            small.filters[True].update(state.belief, _every_kind(), rng)
 
     def smoother(self) -> BayesSmoother | None:
         """Return a new smoother if positions are to be smoothed."""
@@ -199,7 +196,7 @@ class BayesPositioner(Filter[BayesState]):
                 if compass and not isfinite(raw.heading_rad) and reckoning.travelled_m == 0:
                     # Nothing has moved yet, so headings can still be relative to the first one.
                     compass, belief = False, self._without_compass(belief, rng)
-                predict = self.filter_for(compass).predict
+                predict = self.filters[compass].predict
                 belief, why = predict(belief, step, rng)
                 reckoning = reckoning.moved(step)
                 if alternative is not None:
@@ -249,7 +246,7 @@ class BayesPositioner(Filter[BayesState]):
         reading = joined(updates)
         if reading is None:
             return None
-        belief = self.filter_for(state.compass).init(Start(reading, state.compass), rng)
+        belief = self.filters[state.compass].init(Start(reading, state.compass), rng)
         states = {}
         for source in self.sources:
             belief, own = source.start(belief, epoch, state.reckoning.travelled_m)
@@ -269,7 +266,7 @@ class BayesPositioner(Filter[BayesState]):
         reading = joined(updates)
         if reading is None:
             return state, Reason.USED
-        update = self.filter_for(state.compass).update
+        update = self.filters[state.compass].update
         belief, info = update(before, reading, rng)
         if info.reason is not Reason.USED:
             return replace(state, belief=belief), info.reason

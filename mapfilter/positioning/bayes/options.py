@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from math import radians
 from typing import Annotated
 
 from annotated_types import Ge, Gt, Le
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.errors import Faults
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.fingerprint import LevelErrors
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.options import Below1, NotNegative, Options, Positive, Probability
-from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel
@@ -24,78 +24,6 @@ _NARROW_BIAS_RAD, _NARROW_SCALE = radians(1.5), 0.015
 _MOST_TIMES = 5.0
 
 Particles = Annotated[int, Ge(10), Le(10_000_000)]
-
-
-@dataclass(frozen=True, slots=True)
-class BayesOptions:
-    """Options of the Bayes map filter.
-
-    Parameters
-    ----------
-    motion : MotionErrors
-        How wrong dead reckoning is.
-    map : MapWeights
-        How much the streets count.
-    evidence : EvidenceOptions
-        How much serving cells and levels count.
-    particles : ParticleOptions
-        Numbers of particles, and the switch rule. The numbers are those for a compass and a step
-        length that are nearly right; wide errors get up to five times as many.
-    challenge : AlternativeRules
-        When a belief in doubt is challenged, and when it is replaced.
-    satellites : GnssOptions
-        How far pseudoranges and fixes are trusted.
-    timing : TimingOptions
-        How far timing advances and time differences are trusted.
-    smooth : bool
-        Whether positions are smoothed by the whole log.
-    grid : bool
-        The exact filter on the lattice in place of particles: slow, and without the step scale.
-    """
-
-    motion: MotionErrors = field(default_factory=MotionErrors)
-    map: MapWeights = field(default_factory=MapWeights)
-    evidence: EvidenceOptions = field(default_factory=EvidenceOptions)
-    particles: ParticleOptions = field(default_factory=ParticleOptions)
-    challenge: AlternativeRules = field(default_factory=AlternativeRules)
-    satellites: GnssOptions = field(default_factory=GnssOptions)
-    timing: TimingOptions = field(default_factory=TimingOptions)
-    smooth: bool = False
-    grid: bool = False
-
-    @property
-    def name(self) -> str:
-        """The filter's name."""
-        return "grid" if self.grid else "bayes"
-
-    def over(self, database: RadioRouteDatabase, *, ways: bool = True) -> BayesPositioner:  # noqa: ARG002
-        """Return the filter over the area of a database, which is read as a whole."""
-        return self.over_area(open_area(database))
-
-    def over_area(self, area: AreaMap) -> BayesPositioner:
-        """Return the filter over an area."""
-        model = BayesModel(area, self.motion, self.map, self.evidence)
-        return BayesPositioner(
-            model,
-            self._particles,
-            self.challenge,
-            self.grid,
-            self.satellites,
-            self.timing,
-            self.smooth,
-        )
-
-    @property
-    def _particles(self) -> ParticleOptions:
-        """Numbers that cover the lasting errors of heading and scale, too."""
-        motion, given = self.motion, self.particles
-        width = (motion.bias_sd_rad / _NARROW_BIAS_RAD) * (motion.scale_sd / _NARROW_SCALE)
-        times = min(max(width**0.5, 1.0), _MOST_TIMES)
-        return replace(
-            given,
-            max_particles=int(times * given.max_particles),
-            min_search_particles=int(times * given.min_search_particles),
-        )
 
 
 def open_area(database: RadioRouteDatabase) -> AreaMap:
@@ -183,53 +111,65 @@ class BayesFilter(Options):
     switch_hold_m: NotNegative = 14.0
     smooth: bool = False
     satellite_sd_m: Positive = 2.0
-    antenna_height_m: float = 100.0
+    antenna_height_m: Annotated[float, Ge(-1e4), Le(1e4)] = 100.0
     antenna_height_sd_m: NotNegative = 200.0
     timing_step_m: Positive = 553.5
     timing_sd_m: Positive = 200.0
+
+    def check(self, faults: Faults) -> None:
+        """Add a least number of particles above the largest."""
+        if self.min_particles > self.max_particles:
+            where = f"{type(self).__name__}, min_particles and max_particles"
+            found = f"{self.min_particles} and {self.max_particles}"
+            faults.add(where, "min_particles <= max_particles", found)
 
     @property
     def name(self) -> str:
         """The filter's name."""
         return "bayes"
 
-    def over(self, database: RadioRouteDatabase, *, ways: bool = True) -> BayesPositioner:
+    def over(self, database: RadioRouteDatabase, *, ways: bool = True) -> BayesPositioner:  # noqa: ARG002
         """Return the filter over the area of a database, which is read as a whole."""
-        return self.options.over(database, ways=ways)
+        return self.over_area(open_area(database))
 
-    @property
-    def options(self) -> BayesOptions:
-        """The options of its parts, in SI units."""
-        return BayesOptions(
-            MotionErrors(
-                step_sd_m=self.step_sd_m,
-                heading_sd_rad=radians(self.heading_sd_deg),
-                bias_sd_rad=radians(self.bias_sd_deg),
-                bias_drift_rad_per_sqrt_m=radians(self.drift_deg_per_sqrt_m),
-                scale_sd=self.scale,
-            ),
-            MapWeights(self.map_sd_m, self.map_weight_per_m, self.off_cost_per_m),
-            EvidenceOptions(
-                levels=LevelErrors(
-                    sd_db=self.level_error_db,
-                    correlation_m=self.level_correlation_m,
-                    weight=self.level_weight,
-                ),
-                spacing_m=self.report_spacing_m,
-                use_levels=self.levels,
-            ),
-            ParticleOptions(
-                max_particles=self.max_particles,
-                min_search_particles=self.min_search_particles,
-                min_particles=self.min_particles,
-                switch_mass=self.switch_mass,
-                switch_hold_m=self.switch_hold_m,
-            ),
-            satellites=GnssOptions(
-                zenith_m=self.satellite_sd_m,
-                height_m=self.antenna_height_m,
-                height_sd_m=self.antenna_height_sd_m,
-            ),
+    def over_area(self, area: AreaMap) -> BayesPositioner:
+        """Return the filter over an area."""
+        motion = MotionErrors(
+            step_sd_m=self.step_sd_m,
+            heading_sd_rad=radians(self.heading_sd_deg),
+            bias_sd_rad=radians(self.bias_sd_deg),
+            bias_drift_rad_per_sqrt_m=radians(self.drift_deg_per_sqrt_m),
+            scale_sd=self.scale,
+        )
+        weights = MapWeights(self.map_sd_m, self.map_weight_per_m, self.off_cost_per_m)
+        levels = LevelErrors(
+            sd_db=self.level_error_db,
+            correlation_m=self.level_correlation_m,
+            weight=self.level_weight,
+        )
+        evidence = EvidenceOptions(
+            levels=levels, spacing_m=self.report_spacing_m, use_levels=self.levels
+        )
+        # The numbers of particles are those for small lasting errors; wide ones take more.
+        width = (motion.bias_sd_rad / _NARROW_BIAS_RAD) * (motion.scale_sd / _NARROW_SCALE)
+        times = min(max(width**0.5, 1.0), _MOST_TIMES)
+        particles = ParticleOptions(
+            max_particles=int(times * self.max_particles),
+            min_search_particles=int(times * self.min_search_particles),
+            min_particles=self.min_particles,
+            switch_mass=self.switch_mass,
+            switch_hold_m=self.switch_hold_m,
+        )
+        satellites = GnssOptions(
+            zenith_m=self.satellite_sd_m,
+            height_m=self.antenna_height_m,
+            height_sd_m=self.antenna_height_sd_m,
+        )
+        return BayesPositioner(
+            BayesModel(area, motion, weights, evidence),
+            particles,
+            grid=self.name == "grid",
+            satellites=satellites,
             timing=TimingOptions(step_m=self.timing_step_m, advance_sd_m=self.timing_sd_m),
             smooth=self.smooth,
         )
@@ -246,8 +186,3 @@ class GridFilter(BayesFilter):
     def name(self) -> str:
         """The filter's name."""
         return "grid"
-
-    @property
-    def options(self) -> BayesOptions:
-        """The options of its parts, in SI units."""
-        return replace(super(GridFilter, self).options, grid=True)

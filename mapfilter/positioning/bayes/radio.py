@@ -17,6 +17,7 @@ import numpy as np
 from mapfilter._types import Floats
 from mapfilter.filters.contract import Reason
 from mapfilter.models.fingerprint import BoundReading, LevelErrors, LevelReading, ServingWeights
+from mapfilter.options import NotNegative, Options
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import (
     Context,
@@ -35,7 +36,7 @@ _MAP_NATS_PER_M = 0.03
 
 
 @dataclass(frozen=True, slots=True)
-class EvidenceOptions:
+class EvidenceOptions(Options):
     """Weights of radio reports.
 
     Parameters
@@ -50,8 +51,8 @@ class EvidenceOptions:
 
     serving: ServingWeights = field(default_factory=ServingWeights)
     levels: LevelErrors = field(default_factory=LevelErrors)
-    spacing_m: float = 5.0
-    first_m: float = 25.0
+    spacing_m: NotNegative = 5.0
+    first_m: NotNegative = 25.0
     use_levels: bool = True
 
 

@@ -23,10 +23,11 @@ from mapfilter.positioning.bayes.alternative import MapBelief
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.positioning.matched_way import matched_way
 
 _MAX_BYTES = 400 * 2**20
 _JUMPS = 1e-4
+_PLACE = ("east_m", "north_m", "covariance_m2", "radii_m", "mass_50m")
+_SMOOTHED = (*_PLACE, "way_id", "way_probability")
 
 
 class Kept(NamedTuple):
@@ -124,29 +125,14 @@ class BayesSmoother:
         west, south = area.origin_m
         bins = Bins.over((0.0, 0.0, *area.size_m))
         weight = np.full(paths, 1 / paths, dtype=np.float32)
-        names = (
-            "east_m",
-            "north_m",
-            "covariance_m2",
-            "radii_m",
-            "mass_50m",
-            "way_id",
-            "way_probability",
-        )
-        new = {name: getattr(estimate, name).copy() for name in names}
+        new = {name: getattr(estimate, name).copy() for name in _SMOOTHED}
         for index in range(kept[0].epoch, len(estimate)):
             place = _between(kept, states, moved, index)
             found = summarise(place, weight, bins)
-            way = matched_way(area, place[0], place[1], weight)
-            values = (
-                found.mean[0] + west,
-                found.mean[1] + south,
-                found.covariance_m2,
-                found.radii_m,
-                found.mass_50m,
-                *way,
-            )
-            for name, value in zip(names, values, strict=True):
+            way = area.matched_way(place[0], place[1], weight)
+            mean = found.mean[0] + west, found.mean[1] + south
+            values = (*mean, found.covariance_m2, found.radii_m, found.mass_50m, *way)
+            for name, value in zip(_SMOOTHED, values, strict=True):
                 new[name][index] = value
         return replace(estimate, **new)
 

@@ -13,7 +13,6 @@ from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, EvidenceCusum, MapBelief
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
-from mapfilter.positioning.matched_way import matched_way
 
 FIRST_SPACING_M = 5.0
 """Assumed distance between hypotheses before there are any."""
@@ -101,13 +100,13 @@ def step_output(
     reason: Reason,
     unused: tuple[UnusedReading, ...],
 ) -> StepOutput:
-    """Summarise the leading belief; ``reason`` tells whether the epoch's report was used."""
+    """Summarise the leading belief; ``reason`` is whether the epoch's report was used."""
     belief, (west, south) = state.leading, area.origin_m
     if belief is None:
         summary, count, way = empty_summary(STATES), 0, (0, nan)
     else:
         summary, count = belief.summary, belief.log_weight.size
-        way = matched_way(area, belief.state[0], belief.state[1], belief.weight)
+        way = area.matched_way(belief.state[0], belief.state[1], belief.weight)
     fix = Fix(
         time_s,
         float(summary.mean[0]) + west,

@@ -61,13 +61,11 @@ class FixTerm:
 
     def log_likelihood(self, state: Floats32) -> Floats:
         """Return the log-likelihood of each hypothesis."""
-        fix, (west, south) = self.fix, self.origin_m
+        fix, (west, south) = widened(self.fix, 1.0), self.origin_m
         dx = state[EAST] - _F(fix.east_m - west)
         dy = state[NORTH] - _F(fix.north_m - south)
-        known = isfinite(fix.var_east_m2) and isfinite(fix.var_north_m2)
-        var_x = max(fix.var_east_m2, 1.0) if known else _FIX_SD_M**2
-        var_y = max(fix.var_north_m2, 1.0) if known else _FIX_SD_M**2
-        cross = fix.cov_east_north_m2 if known and isfinite(fix.cov_east_north_m2) else 0.0
+        var_x, var_y = max(fix.var_east_m2, 1.0), max(fix.var_north_m2, 1.0)
+        cross = fix.cov_east_north_m2 if isfinite(fix.cov_east_north_m2) else 0.0
         cross = float(np.clip(cross, -0.99 * sqrt(var_x * var_y), 0.99 * sqrt(var_x * var_y)))
         det = var_x * var_y - cross**2
         square = (var_y * dx**2 - 2 * cross * dx * dy + var_x * dy**2) / det

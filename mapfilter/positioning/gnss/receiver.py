@@ -39,19 +39,11 @@ Unused = tuple[str, str, Reason]
 
 @dataclass(frozen=True, eq=False)
 class Sky:
-    """Satellites received at one epoch, in true east, north and up about a place.
+    """Satellites (m, 3) received at one epoch, in true east, north and up about a place.
 
-    Parameters
-    ----------
-    names : tuple of str
-    satellites_m : (m, 3) array
-    elevation_rad : (m,) array
-    range_m, sigma_m : (m,) array
-        Pseudoranges, and standard deviations of their noise; NaN if not reported.
-    origin_m : (float, float)
-        The place, in the frame of the hypotheses.
-    true_from_grid : (2, 2) array
-        Rotation by the grid convergence.
+    ``sigma_m`` are standard deviations of the pseudoranges' noise, NaN if not reported;
+    ``origin_m`` is the place in the frame of the hypotheses, and ``true_from_grid`` (2, 2) the
+    rotation by the grid convergence.
     """
 
     names: tuple[str, ...]
@@ -203,7 +195,6 @@ def weighed(
         At the time of the pseudoranges.
     place : (2, N) array
         East and north of the hypotheses in their frame.
-    log_weight : (N,) array
     rows : (3, N) array
         Clock and height of the hypotheses.
     free : int

@@ -1,11 +1,12 @@
 """A belief as a Gaussian sum whose parts are Kalman-type filters, step by step over a log.
 
-A start that is known to a kilometre is cut into narrow parts (:mod:`mapfilter.filters.gaussian_sum`
-tells why); a start from a fix has one. Parts without weight are dropped, and one that has come to
-lie on a heavier one is given to it, so that a converged belief is one Gaussian again.
+A start with an uncertainty of a kilometre is cut into narrow parts (see
+:mod:`mapfilter.filters.gaussian_sum`); a start from a fix is one part. Parts without weight are
+dropped, and parts that have come to lie on a heavier one are merged into it, so that a converged
+belief is one Gaussian again.
 
 Parts never branch: each that is left at the end has one past, which the Rauch-Tung-Striebel
-smoother goes back over; the weights at the end say which past it was.
+smoother goes back over, and which counts by the part's weight at the end.
 """
 
 from __future__ import annotations
@@ -27,20 +28,15 @@ _NEAR = 0.1
 """Squared distance, in a heavier part's deviations, at which another is the same."""
 _ALIKE = 0.2
 """Largest difference of the logarithms of their volumes then."""
+_ANGLES = np.pi * (np.arange(256) + 0.5) / 256
+_SHARES = np.array([0.50, 0.67, 0.95])
 
 
 @dataclass(frozen=True, eq=False)
 class SumBelief:
-    """Weighted Gaussians of a state of n components.
+    """Gaussians of weights (c,) that sum to one, means (c, n) and covariances (c, n, n).
 
-    Parameters
-    ----------
-    weights : (c,) array
-        They sum to one.
-    means : (c, n) array
-    covariances : (c, n, n) array
-    parts : (c,) integer array
-        Which of the first parts each of them is.
+    ``parts`` (c,) is the index of each of them among the parts of the start.
     """
 
     weights: Floats
@@ -100,10 +96,10 @@ class SumBelief:
     def update(
         self, measurement: CompiledMeasurement, reading: ArrayLike, method: Method
     ) -> tuple[SumBelief, Taken]:
-        """Return the belief after a reading (NaN where absent), and the news.
+        """Return the belief after a reading (NaN where absent), and what became of the reading.
 
-        Each part takes the reading in by the method and gains weight by its evidence; one that
-        cannot has none left. Where no part can, nothing changes and the news say so.
+        Each part is updated by the method and weighed by its evidence; a part whose update fails
+        loses its weight. Where all updates fail, nothing changes.
 
         Raises
         ------
@@ -111,11 +107,9 @@ class SumBelief:
             Sizes do not fit or the reading is infinite.
         """
         count, n = self.means.shape
-        given = np.asarray(reading, dtype=np.float64)
-        run = run_trials(
-            measurement, np.eye(n), np.zeros((n, n)), method, self.means, self.covariances,
-            np.tile(given, (count, 1, 1)), covariances=True,
-        )  # fmt: skip
+        given = np.tile(np.asarray(reading, dtype=np.float64), (count, 1, 1))
+        still, start = (np.eye(n), np.zeros((n, n))), (self.means, self.covariances)
+        run = run_trials(measurement, *still, method, *start, given, covariances=True)
         own = run.evidence[:, 0]
         taken = np.isfinite(own)
         if not taken.any():
@@ -131,16 +125,13 @@ class SumBelief:
         return updated._lessened(), Taken(float(most + np.log(total)), nis)
 
     def _lessened(self) -> SumBelief:
-        """Drop parts without weight; give those on top of heavier ones to them."""
+        """Drop parts without weight, and merge parts that lie on heavier ones into these."""
         if self.weights.size == 1:
             return self
         order = np.argsort(-self.weights, kind="stable")
         order = order[self.weights[order] >= min(_LEAST_WEIGHT, self.weights.max())]
-        weights, means, covariances = (
-            self.weights[order],
-            self.means[order],
-            self.covariances[order],
-        )
+        weights, means = self.weights[order], self.means[order]
+        covariances = self.covariances[order]
         volume = np.linalg.slogdet(covariances)[1]
         kept = np.ones(order.size, dtype=np.bool_)
         for heavy in range(order.size):
@@ -152,15 +143,13 @@ class SumBelief:
             same[: heavy + 1] = False
             weights[heavy] += weights[same].sum()
             kept &= ~same
-        return SumBelief(
-            weights[kept] / weights[kept].sum(), means[kept], covariances[kept],
-            self.parts[order][kept],
-        )  # fmt: skip
+        weights = weights[kept] / weights[kept].sum()
+        return SumBelief(weights, means[kept], covariances[kept], self.parts[order][kept])
 
 
 @dataclass(eq=False)
 class FusionHistory:
-    """Beliefs after each epoch, and the motion that led to them; grows as the filter goes."""
+    """Beliefs after each epoch, and the motion that led to them."""
 
     beliefs: list[SumBelief] = field(default_factory=list)
     transitions: list[Floats] = field(default_factory=list)
@@ -168,7 +157,7 @@ class FusionHistory:
     shifts: list[Floats] = field(default_factory=list)
 
     def add(self, belief: SumBelief, transition: Floats, process: Floats, shift: Floats) -> None:
-        """Take in an epoch: how one moved to it, and what is known after its readings."""
+        """Record an epoch: the belief after it, and the motion that led to it."""
         self.beliefs.append(belief)
         self.transitions.append(transition)
         self.processes.append(process)
@@ -181,7 +170,7 @@ class FusionHistory:
         last = self.beliefs[-1]
         phi = np.array(self.transitions[1:]).reshape(-1, *self.transitions[0].shape)
         noise = np.array(self.processes[1:]).reshape(phi.shape)
-        # Known shifts are taken off, so that what is left is linear.
+        # Without the shifts, which are given, the motion is linear.
         moved = _moved(self.transitions, self.shifts)
         means, covariances = [], []
         for belief in self.beliefs:
@@ -189,11 +178,11 @@ class FusionHistory:
             means.append(belief.means[at])
             covariances.append(belief.covariances[at])
         found = smooth(phi, noise, np.stack(means, axis=1) - moved, np.stack(covariances, axis=1))
-        return [
-            SumBelief(last.weights, found.means[:, k] + moved[k], found.covariances[:, k],
-                      last.parts).moments
-            for k in range(len(self.beliefs))
-        ]  # fmt: skip
+        later = (
+            SumBelief(last.weights, found.means[:, k] + shift, found.covariances[:, k], last.parts)
+            for k, shift in enumerate(moved)
+        )
+        return [belief.moments for belief in later]
 
 
 def _moved(transitions: list[Floats], shifts: list[Floats]) -> Floats:
@@ -205,21 +194,11 @@ def _moved(transitions: list[Floats], shifts: list[Floats]) -> Floats:
     return np.array(found)
 
 
-_ANGLES = np.pi * (np.arange(256) + 0.5) / 256
-_SHARES = np.array([0.50, 0.67, 0.95])
-
-
 def gaussian_radii_m(covariance_m2: Floats, within_m: float) -> tuple[Floats, float]:
     """Return the radii that hold 50, 67 and 95 %, and the share within a distance.
 
     In polar coordinates, ``P(r > R) = 1/(π sqrt(ab)) ∫ exp(-R² q / 2) / q dθ`` over half a turn,
     ``q = cos²θ/a + sin²θ/b``, with the eigenvalues a and b of the covariance.
-
-    Parameters
-    ----------
-    covariance_m2 : (2, 2) array
-        East, north.
-    within_m : float
 
     Examples
     --------
@@ -249,7 +228,7 @@ def share_within(covariance_m2: Floats, within_m: float) -> float:
 
 def _spread(covariance_m2: Floats) -> tuple[float, float]:
     values = np.maximum(np.linalg.eigvalsh(covariance_m2), 1e-6)
-    # Ratios beyond this are a line as far as any radius can tell.
+    # Ratios beyond this are a line for any radius.
     return float(values[1]), float(max(values[0], 1e-4 * values[1]))
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import cos, inf, isfinite, nan, pi, sin
+from math import cos, inf, isfinite, nan, pi, radians, sin
 from typing import Any, Literal
 
 import numpy as np
@@ -31,7 +31,7 @@ from mapfilter.positioning.kalman.belief import (
     gaussian_radii_m,
     share_within,
 )
-from mapfilter.positioning.kalman.models import FusionOptions, SiteModels, compiled
+from mapfilter.positioning.kalman.models import KalmanOptions, SiteModels, compiled
 from mapfilter.positioning.kalman.readings import SiteReadings, site_readings
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
@@ -44,11 +44,11 @@ _WALK_MPS = 1.5
 
 
 @dataclass(frozen=True, slots=True)
-class KalmanFilter(FusionOptions):
+class KalmanFilter(KalmanOptions):
     """A Kalman-type filter over GNSS fixes, timing advances, levels and dead reckoning.
 
-    It needs no map, only the sites of the cells. Parameters besides these are those of
-    :class:`mapfilter.positioning.kalman.models.FusionOptions`.
+    It needs no map, only the sites of the cells. Further parameters are those of
+    :class:`mapfilter.positioning.kalman.models.KalmanOptions`.
 
     Parameters
     ----------
@@ -74,17 +74,9 @@ class KalmanFilter(FusionOptions):
     def over_sites(
         self, plan: CellPlan, antennas: Mapping[str, MeasuredAntenna] | None = None
     ) -> KalmanTracker:
-        """Return the filter over the sites of a cell plan.
-
-        Parameters
-        ----------
-        plan : CellPlan
-        antennas : mapping of str to MeasuredAntenna, optional
-            As for :class:`mapfilter.positioning.kalman.models.SiteModels`.
-        """
-        return KalmanTracker(
-            SiteModels(plan, self, antennas), plan.crs, METHODS[self.method], self.smooth
-        )
+        """Return the filter over the sites of a cell plan, with the antennas that cells name."""
+        sites = SiteModels(plan, self, antennas)
+        return KalmanTracker(sites, METHODS[self.method], self.smooth)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,10 +90,9 @@ class KalmanState:
     belief : SumBelief or None
         None before the first measurement that it can start from.
     time_s : float
-        Of the last epoch.
+        Time of the last epoch.
     moved_m : float
-        Travelled since levels or timing advances were last used.
-    status : Status
+        Distance travelled since levels or timing advances were last used.
     recent_nis : tuple of float
         Normalised innovations squared of the last measurements, per component.
     motion : tuple of arrays
@@ -119,18 +110,9 @@ class KalmanState:
 
 @dataclass(frozen=True, eq=False)
 class KalmanTracker(Filter[KalmanState]):
-    """A Kalman-type filter over the sites of an area.
-
-    Parameters
-    ----------
-    sites : SiteModels
-    sites_crs : str
-    method : Method
-    smooth : bool
-    """
+    """A Kalman-type filter over the sites of a cell plan."""
 
     sites: SiteModels
-    sites_crs: str
     method: Method
     smooth: bool = False
 
@@ -142,7 +124,7 @@ class KalmanTracker(Filter[KalmanState]):
     @property
     def crs(self) -> str:
         """CRS of the sites."""
-        return self.sites_crs
+        return self.sites.plan.crs
 
     @property
     def uses(self) -> Collection[Kind]:
@@ -246,11 +228,12 @@ class _Step:
             return transition, noise, shift
         if self.layout is MOVING:
             if elapsed_s > 0:
-                motion = constant_velocity(elapsed_s, self.options.acceleration, noise="continuous")
+                root = self.options.acceleration_mps_per_sqrt_s
+                motion = constant_velocity(elapsed_s, root, noise="continuous")
                 transition, noise = motion.transition, motion.noise
                 self.moved_m += self._speed_mps() * elapsed_s
         else:
-            noise = self.options.drift_m**2 * elapsed_s * np.eye(2)
+            noise = self.options.drift_m_per_sqrt_s**2 * elapsed_s * np.eye(2)
             for step in epoch.motion:
                 moved, spread = self._step(epoch, step)
                 shift, noise = shift + moved, noise + spread
@@ -275,8 +258,8 @@ class _Step:
             return np.zeros(2), step.step_m**2 * np.eye(2)
         along = np.array([cos(step.heading_rad), sin(step.heading_rad)])
         across = np.array([-along[1], along[0]])
-        cross_m = step.step_m * self.options.heading_sigma_rad
-        noise = self.options.step_sigma_m**2 * np.outer(along, along)
+        cross_m = step.step_m * radians(self.options.heading_sd_deg)
+        noise = self.options.step_sd_m**2 * np.outer(along, along)
         return step.step_m * along, noise + cross_m**2 * np.outer(across, across)
 
     def _measure(self, epoch: Epoch, given: SiteReadings) -> Reason:
@@ -310,40 +293,34 @@ class _Step:
         options, east, north = self.options, *self.where
         mean, deviation = np.zeros(self.layout.size), np.zeros(self.layout.size)
         deviation[list(self.layout.velocity if self.layout is MOVING else ())] = (
-            options.speed_sigma_mps
+            options.speed_sd_mps
         )
         if fix is not None:
             mean[self.where] = fix.east_m, fix.north_m
-            deviation[self.where] = options.start_sigma_m
+            deviation[self.where] = options.start_sd_m
             return SumBelief.start(mean, np.diag(deviation**2))
         cell = self.sites.cells[(given.timed or given.cells)[0]]
         mean[self.where] = cell.east_m, cell.north_m
         if not given.timed:
-            deviation[self.where] = options.start_sigma_m
+            deviation[self.where] = options.start_sd_m
             parts = {east: options.start_parts, north: options.start_parts}
             return SumBelief.start(mean, np.diag(deviation**2), parts)
         radius_m = (given.steps[0] + 0.5) * options.timing_step_m
         count = min(max(round(2 * pi * radius_m / options.start_spacing_m), 8), _MOST_PARTS)
         deviation[self.where] = max(options.start_spacing_m, 0.7 * 2 * pi * radius_m / count)
         angle = 2 * pi * np.arange(count) / count
-        return SumBelief.around(
-            mean, np.diag(deviation**2),
-            {east: cell.east_m + radius_m * np.cos(angle),
-             north: cell.north_m + radius_m * np.sin(angle)},
-        )  # fmt: skip
+        places = {
+            east: cell.east_m + radius_m * np.cos(angle),
+            north: cell.north_m + radius_m * np.sin(angle),
+        }
+        return SumBelief.around(mean, np.diag(deviation**2), places)
 
     def _update_fix(self, fix: GnssFix) -> bool:
-        noise = np.array(
-            [
-                [fix.var_east_m2, fix.cov_east_north_m2],
-                [fix.cov_east_north_m2, fix.var_north_m2],
-            ]
-        )
-        if not isfinite(fix.cov_east_north_m2):
-            noise[0, 1] = noise[1, 0] = 0.0
+        cross_m2 = fix.cov_east_north_m2 if isfinite(fix.cov_east_north_m2) else 0.0
+        noise = np.array([[fix.var_east_m2, cross_m2], [cross_m2, fix.var_north_m2]])
         sure = np.isfinite(noise).all() and noise[0, 0] > 0 and np.linalg.det(noise) > 0
         if not sure:
-            noise = np.eye(2) * self.options.fix_sigma_m**2
+            noise = np.eye(2) * self.options.fix_sd_m**2
         return self._update(position_fix(self.layout, noise), [fix.east_m, fix.north_m])
 
     def _update(self, model: GaussianTerms, reading: Sequence[float]) -> bool:
@@ -362,17 +339,14 @@ class _Step:
         if self.belief is None:
             return Fix.nowhere(time_s, self.status, reason)
         place = _place(self.belief.moments, self.where)
-        self._tell(float(place["radii_m"][2]))
+        self._set_status(float(place["radii_m"][2]))
         count = self.belief.weights.size
         if count > 1:
             lead = self.belief.leading.covariance[np.ix_(self.where, self.where)]
             place["mass_50m"] = share_within(lead, _WITHIN_M) * float(self.belief.weights.max())
-        return Fix(
-            time_s, **place, status=self.status, hypotheses=count, way_id=0, way_probability=nan,
-            reason=reason,
-        )  # fmt: skip
+        return Fix(time_s, **place, status=self.status, hypotheses=count, reason=reason)
 
-    def _tell(self, radius_m: float) -> None:
+    def _set_status(self, radius_m: float) -> None:
         """Update the status: converged by the radius, lost by the innovations."""
         lost = len(self.recent_nis) == _WINDOW and float(np.mean(self.recent_nis)) > _LOST_NIS
         if self.status is Status.SEARCHING:
@@ -388,6 +362,11 @@ def _place(belief: Gaussian, where: list[int]) -> dict[str, Any]:
     radii, mass = gaussian_radii_m(covariance, _WITHIN_M)
     east_m, north_m = (float(value) for value in belief.mean[where])
     return {
-        "east_m": east_m, "north_m": north_m, "covariance_m2": covariance, "radii_m": radii,
+        "east_m": east_m,
+        "north_m": north_m,
+        "covariance_m2": covariance,
+        "radii_m": radii,
         "mass_50m": mass,
-    }  # fmt: skip
+        "way_id": 0,
+        "way_probability": nan,
+    }

@@ -1,9 +1,9 @@
-"""What of an epoch's report a Kalman-type filter can take, and why not of the rest."""
+"""Levels and timing advances of an epoch's report that a Kalman-type filter can use."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import isfinite
+from typing import NamedTuple
 
 from mapfilter.filters.contract import Reason
 from mapfilter.positioning.epochs import Epoch, ReportRow
@@ -12,20 +12,8 @@ from mapfilter.positioning.kalman.models import SiteModels
 from mapfilter.tracks.schema import NEIGHBOUR, SERVING
 
 
-@dataclass(frozen=True, slots=True)
-class SiteReadings:
-    """Readings of cells whose sites are known.
-
-    Parameters
-    ----------
-    cells : tuple of str
-        Whose levels were received.
-    levels_dbm : tuple of float
-    timed : tuple of str
-        Whose timing advances were reported.
-    steps : tuple of int
-    unused : tuple of UnusedReading
-    """
+class SiteReadings(NamedTuple):
+    """Levels and timing advances (in steps) of cells whose sites are known, and unused rows."""
 
     cells: tuple[str, ...]
     levels_dbm: tuple[float, ...]
@@ -35,15 +23,10 @@ class SiteReadings:
 
 
 def site_readings(sites: SiteModels, epoch: Epoch) -> SiteReadings:
-    """Sort an epoch's report.
+    """Return the readings of an epoch's report.
 
-    A row without a cell is that cell of the plan whose carrier and BSIC it has, near the serving
-    one; where there are several, it is left out.
-
-    Parameters
-    ----------
-    sites : SiteModels
-    epoch : Epoch
+    A row without a cell identity is assigned to the cell of the plan with its carrier and BSIC,
+    near the serving cell; where there are several, it is left out.
     """
     timed = {
         row.cell: int(row.timing_advance)
@@ -62,10 +45,8 @@ def site_readings(sites: SiteModels, epoch: Epoch) -> SiteReadings:
             kind = SERVING if row.role == SERVING else NEIGHBOUR
             unused.append(UnusedReading(epoch.time_s, kind, _what(row), reason))
     known = {name: steps for name, steps in timed.items() if name in sites.cells}
-    return SiteReadings(
-        tuple(name for name, _ in received), tuple(level for _, level in received), tuple(known),
-        tuple(known.values()), tuple(unused),
-    )  # fmt: skip
+    cells, levels_dbm = tuple(name for name, _ in received), tuple(level for _, level in received)
+    return SiteReadings(cells, levels_dbm, tuple(known), tuple(known.values()), tuple(unused))
 
 
 def _cell(sites: SiteModels, row: ReportRow, serving: str | None) -> tuple[str | None, Reason]:

@@ -73,14 +73,12 @@ def static_fix(
 
     Parameters
     ----------
-    measurement : GaussianMeasurement
-        What is expected of a reading in a state.
     reading : (m,) array_like
         NaN where absent.
     start : (n,) array_like
-        Where to begin; components that are not solved for stay as they are.
+        First state; components that are not solved for keep its values.
     unknowns : sequence of int, optional
-        Components to solve for; all without.
+        Components to solve for; by default all.
     largest_deviation : float, optional
         Largest standard deviation in any direction of the unknowns that is still a fix; a worse one
         is bad geometry. Without it only a reading that leaves a direction undetermined is.
@@ -168,8 +166,6 @@ def filter_fixes(
 
     Parameters
     ----------
-    layout : StateLayout
-        Of the filter.
     motion : LinearMotion
         Over one epoch.
     first_mean, first_covariance : (n,) and (n, n) array_like

@@ -1,20 +1,24 @@
-"""DLR: hybrid positioning by satellites and LTE time differences of arrival."""
+"""DLR: filters by satellites and LTE time differences of arrival, and their errors on tracks."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from mapfilter._parallel import ordered_results
 from mapfilter._types import Bools, Floats, Ints
-from mapfilter.experiments.papers.dlr import filters
+from mapfilter.evaluation.track_percentiles import Percentile, percentile_of_tracks
 from mapfilter.experiments.papers.dlr.scene import (
+    ARRIVAL,
+    CLOCK_M,
+    DETOUR_M,
     ECHO_M,
     EDGE,
+    HEIGHT_M,
     NEAR,
     THRESHOLD_DB,
     Readings,
@@ -26,10 +30,35 @@ from mapfilter.experiments.papers.dlr.scene import (
     draw_track,
 )
 from mapfilter.experiments.papers.paper import PaperSettings
+from mapfilter.filters import gaussian, rao_blackwell
+from mapfilter.filters.kalman import predict, update
+from mapfilter.models.gaussian import GaussianTerms, stack
+from mapfilter.models.motion import LinearMotion, constant_velocity, random_walk, together
+from mapfilter.models.ranging import pseudoranges, range_differences
 from mapfilter.models.state import POSITION_CLOCK_3D, StateLayout
+from mapfilter.positioning.kalman.models import compiled
+from mapfilter.positioning.kalman.static_fix import TOO_FEW, StaticFix, filter_fixes, static_fix
 
+Mobility = Literal["diagonal", "discretised"]
 Name = Literal["static", "pkf", "ekf", "pf"]
 Systems = Literal["none", "gps", "gps+galileo"]
+
+HYBRID = StateLayout(7, 0, 2, 4, 6)
+"""East, north and up, each followed by its rate; clock bias."""
+
+FIXES = StateLayout(6, 0, 2, 4)
+"""The same without a clock, which static fixes have solved for already."""
+
+FLAT = StateLayout(4, 0, 2, height_m=HEIGHT_M)
+"""East and north, each followed by its rate, at a known height: for time differences alone."""
+
+PLACE = StateLayout(2, 0, 1, height_m=HEIGHT_M)
+"""East and north at a known height: what two time differences solve for."""
+
+PARTICLES = 10_000
+DRIFT_M, DRIFT_MPS = 0.3, 0.3
+FIRST_M, FIRST_UP_M, FIRST_MPS, FIRST_UP_MPS, FIRST_CLOCK_M = 10.0, 2.0, 1.0, 0.1, 3e5
+THREE = 3
 
 FEW = 4
 """Fewer satellites than this are a critical situation."""
@@ -64,7 +93,7 @@ class Run(NamedTuple):
     where: Where | None = None
     above_db: float | None = None
     open_sky: bool = False
-    mobility: filters.Mobility = "diagonal"
+    mobility: Mobility = "diagonal"
 
 
 STATIC, PKF, EKF, PF = Run("static"), Run("pkf"), Run("ekf"), Run("pf")
@@ -89,6 +118,135 @@ OVER_TIME = (EKF, AT_NEAR, AT_EDGE)
 """What Fig. 12 compares."""
 
 
+class Epoch(NamedTuple):
+    """What a filter takes in at one moment; without a model nothing is measured."""
+
+    model: GaussianTerms | None
+    reading: Floats
+
+
+def motion(layout: StateLayout, mobility: Mobility = "diagonal") -> LinearMotion:
+    """Return the paper's mobility model, eq. 21, and a random walk of a clock.
+
+    Its Q is diagonal, as in the paper, or that of white accelerations, properly discretised.
+    """
+    axes = 2 if layout.up is None else 3
+    moving = constant_velocity(1.0, DRIFT_MPS, axes, "continuous")
+    if mobility == "diagonal":
+        noise = np.diag(np.square([DRIFT_M, DRIFT_MPS] * axes))
+        moving = LinearMotion(moving.transition, noise)
+    if layout.clock is None:
+        return moving
+    return together([moving, random_walk(1.0, CLOCK_M, dimensions=1)])
+
+
+def start(layout: StateLayout, about_m: Floats) -> gaussian.Gaussian:
+    """Return the belief before the first epoch, about a place (east, north)."""
+    mean, deviation = [about_m[0], 0.0, about_m[1], 0.0], [FIRST_M, FIRST_MPS] * 2
+    if layout.up is not None:
+        mean += [HEIGHT_M, 0.0]
+        deviation += [FIRST_UP_M, FIRST_UP_MPS]
+    if layout.clock is not None:
+        mean.append(0.0)
+        deviation.append(FIRST_CLOCK_M)
+    return gaussian.Gaussian(np.array(mean), np.diag(np.square(deviation)))
+
+
+def satellites(
+    layout: StateLayout, places_m: Floats, sigma_m: Floats, ranges_m: Floats
+) -> list[Epoch]:
+    """Return each epoch's pseudoranges: those of (K, S) that are not NaN."""
+    found = []
+    for row in ranges_m:
+        seen = np.isfinite(row)
+        model = pseudoranges(layout, places_m[seen], sigma_m[seen]) if seen.any() else None
+        found.append(Epoch(model, row[seen]))
+    return found
+
+
+def differences(
+    layout: StateLayout,
+    stations_m: Floats,
+    sinr_db: Floats,
+    times_m: Floats,
+    above_db: float | None = None,
+) -> list[Epoch]:
+    """Return each epoch's time differences of stations, (K, B); the best one is the reference.
+
+    Stations with a SINR below ``above_db`` are dropped; without it the three best are taken,
+    however bad.
+    """
+    found = []
+    for sinr, times in zip(sinr_db, times_m, strict=True):
+        best = np.argsort(-sinr, kind="stable")
+        used = best[:THREE] if above_db is None else best[sinr[best] >= above_db]
+        if used.size < 2:
+            found.append(Epoch(None, np.zeros(0)))
+            continue
+        sigma = np.hypot(ARRIVAL.sigma_m(sinr[used]), DETOUR_M)
+        model = range_differences(layout, stations_m[used], sigma)
+        found.append(Epoch(model, times[used[1:]] - times[used[0]]))
+    return found
+
+
+def joined(first: Sequence[Epoch], second: Sequence[Epoch]) -> list[Epoch]:
+    """Put two kinds of measurements together, epoch by epoch."""
+    found = []
+    for one, other in zip(first, second, strict=True):
+        models = [epoch.model for epoch in (one, other) if epoch.model is not None]
+        model = stack(models) if models else None
+        found.append(Epoch(model, np.concatenate([one.reading, other.reading])))
+    return found
+
+
+def run_static(layout: StateLayout, epochs: Sequence[Epoch]) -> list[StaticFix]:
+    """Solve each epoch from the middle of the scene: position and clock, or east and north."""
+    begin = np.array([0.0, 0.0, HEIGHT_M, 0.0])[: layout.size]
+    unknown = np.full((layout.size, layout.size), np.nan)
+    nothing = StaticFix(np.full(layout.size, np.nan), unknown, False, 0, TOO_FEW)
+    return [
+        nothing if epoch.model is None else static_fix(epoch.model, epoch.reading, begin)
+        for epoch in epochs
+    ]
+
+
+def run_ekf(
+    layout: StateLayout, epochs: Sequence[Epoch], about_m: Floats, mobility: Mobility = "diagonal"
+) -> Floats:
+    """Filter measurements by an extended Kalman filter; return positions, (K, 2)."""
+    belief, moving = start(layout, about_m), motion(layout, mobility)
+    found = np.empty((len(epochs), 2))
+    for k, epoch in enumerate(epochs):
+        belief = predict(belief, moving.transition, moving.noise)
+        if epoch.model is not None:
+            belief, _ = update(belief, compiled(epoch.model), epoch.reading, gaussian.EKF)
+        found[k] = belief.mean[[0, 2]]
+    return found
+
+
+def run_pf(
+    layout: StateLayout,
+    epochs: Sequence[Epoch],
+    about_m: Floats,
+    rng: np.random.Generator,
+    particles: int = PARTICLES,
+) -> Floats:
+    """Filter measurements by particles of the position, drawn anew at every reading (SIR).
+
+    Velocity and clock are Gaussians given a particle's path; returns positions, (K, 2).
+    """
+    first, moving = start(layout, about_m), motion(layout)
+    sampled = (0, 2) if layout.up is None else (0, 2, 4)
+    belief = rao_blackwell.init(first.mean, first.covariance, sampled, particles, rng)
+    found = np.empty((len(epochs), 2))
+    for k, epoch in enumerate(epochs):
+        belief = rao_blackwell.predict(belief, moving.transition, moving.noise, rng)
+        if epoch.model is not None:
+            belief, _ = rao_blackwell.update(belief, compiled(epoch.model), epoch.reading, rng)
+        found[k] = belief.mean()[[0, 2]]
+    return found
+
+
 class TrackErrors(NamedTuple):
     """The errors of all filters on one track, (runs, K); NaN where there is no static fix.
 
@@ -107,53 +265,55 @@ def errors_of(
     readings: Readings,
     about_m: Floats,
     rng: np.random.Generator,
-    particles: int = filters.PARTICLES,
+    particles: int = PARTICLES,
 ) -> Floats:
     """Return a filter's error at each epoch, (K,); ``about_m`` is where its belief begins."""
-    no_clock = run.satellites == "none"
+    clock = run.satellites != "none"
     if run.filter in ("static", "pkf"):
-        layout = filters.PLACE if no_clock else POSITION_CLOCK_3D
+        layout = POSITION_CLOCK_3D if clock else PLACE
+        fixes = run_static(layout, _epochs(run, layout, scene, track, readings))
+        if run.filter == "static":
+            found = np.array([fix.state[:2] for fix in fixes])
+        else:
+            layout = FIXES if clock else FLAT
+            first = start(layout, about_m)
+            own = filter_fixes(layout, motion(layout), first.mean, first.covariance, fixes)
+            found = own.means[:, [0, 2]]
     else:
-        layout = filters.FLAT if no_clock else filters.HYBRID
-    epochs = _epochs(run, layout, scene, track, readings)
-    match run.filter:
-        case "static":
-            found = np.array([fix.state[:2] for fix in filters.run_static(layout, epochs)])
-        case "pkf":
-            fixes = filters.run_static(layout, epochs)
-            found = filters.run_pkf(filters.FLAT if no_clock else filters.FIXES, fixes, about_m)
-        case "ekf":
-            found = filters.run_ekf(layout, epochs, about_m, run.mobility)
-        case "pf":
-            found = filters.run_pf(layout, epochs, about_m, rng, particles)
+        layout = HYBRID if clock else FLAT
+        epochs = _epochs(run, layout, scene, track, readings)
+        if run.filter == "ekf":
+            found = run_ekf(layout, epochs, about_m, run.mobility)
+        else:
+            found = run_pf(layout, epochs, about_m, rng, particles)
     return np.asarray(np.hypot(*(found - track.place_m[:, :2]).T))
 
 
 def _epochs(
     run: Run, layout: StateLayout, scene: Scene, track: Track, readings: Readings
-) -> list[filters.Epoch]:
-    seen: list[filters.Epoch] = []
+) -> list[Epoch]:
+    seen: list[Epoch] = []
     if run.satellites != "none":
         used = track.gps if run.satellites == "gps" else np.ones_like(track.gps)
         ranges = readings.open_m if run.open_sky else readings.ranges_m
         sigma = track.sigma_m if run.open_sky else np.hypot(track.sigma_m, ECHO_M)
-        seen = filters.satellites(layout, track.satellites_m[used], sigma[used], ranges[:, used])
+        seen = satellites(layout, track.satellites_m[used], sigma[used], ranges[:, used])
     if run.where is None:
         return seen
     stations, sinr = scene.stations_m[run.where], track.sinr_db[run.where]
     times = readings.times_m[run.where]
-    received = filters.differences(layout, stations, sinr, times, run.above_db)
-    return filters.joined(seen, received) if seen else received
+    received = differences(layout, stations, sinr, times, run.above_db)
+    return joined(seen, received) if seen else received
 
 
 def track_errors(
-    trial: int, seed: int, particles: int = filters.PARTICLES, runs: Sequence[Run] = RUNS
+    trial: int, seed: int, particles: int = PARTICLES, runs: Sequence[Run] = RUNS
 ) -> TrackErrors:
     """Draw a track and its readings, and run all filters over it."""
     scene, (track, rng) = _scene(), _track(trial, seed)
     drawn, first, *streams = rng.spawn(2 + len(runs))
     readings = draw_readings(scene, track, drawn)
-    about = track.place_m[0, :2] + filters.FIRST_M * first.standard_normal(2)
+    about = track.place_m[0, :2] + FIRST_M * first.standard_normal(2)
     found = [
         errors_of(run, scene, track, readings, about, own, particles)
         for run, own in zip(runs, streams, strict=True)
@@ -167,25 +327,17 @@ def errors_over_time(draw: int, trial: int, seed: int) -> Floats:
     scene, (track, _) = _scene(), _track(trial, seed)
     rng = np.random.default_rng([seed, trial, 1 + draw])
     readings = draw_readings(scene, track, rng)
-    about = track.place_m[0, :2] + filters.FIRST_M * rng.standard_normal(2)
+    about = track.place_m[0, :2] + FIRST_M * rng.standard_normal(2)
     return np.array([errors_of(run, scene, track, readings, about, rng) for run in OVER_TIME])
 
 
 @dataclass(frozen=True, eq=False)
 class PaperRun:
-    """Errors of all tracks.
+    """Errors of all tracks: by run, (T, K).
 
-    Parameters
-    ----------
-    errors_m : dict
-        By run, (T, K).
-    satellites, gps : (T, K) integer arrays
-    shown : int
-        The track whose errors are shown over time.
-    over_time_m : (draws, 3, K) array
-        Errors of :data:`OVER_TIME` on it.
-    walks_m : list of (K, 2) arrays
-        Where each track goes, east and north.
+    ``satellites`` and ``gps``, (T, K), are how many are seen, of both systems and of GPS;
+    ``over_time_m``, (draws, 3, K), errors of :data:`OVER_TIME` on the track ``shown``; ``walks_m``,
+    (K, 2) each, the tracks, east and north.
     """
 
     errors_m: dict[Run, Floats]
@@ -195,20 +347,23 @@ class PaperRun:
     over_time_m: Floats
     walks_m: list[Floats]
 
-    @property
-    def every(self) -> Bools:
-        """All epochs."""
-        return np.ones(self.satellites.shape, dtype=np.bool_)
+    @cached_property
+    def epochs(self) -> dict[str, Bools]:
+        """Sets of epochs, (T, K) each.
 
-    @property
-    def fixed(self) -> Bools:
-        """Epochs with a static fix."""
-        return np.isfinite(self.errors_m[STATIC])
+        All; those with a static fix of both systems; those with fewer than four satellites of both
+        systems, and of GPS.
+        """
+        return {
+            "every": np.ones(self.satellites.shape, dtype=np.bool_),
+            "fixed": np.isfinite(self.errors_m[STATIC]),
+            "critical": self.satellites < FEW,
+            "gps_critical": self.gps < FEW,
+        }
 
-    @property
-    def critical(self) -> Bools:
-        """Epochs with fewer than four satellites."""
-        return self.satellites < FEW
+    def error_90(self, key: Run, epochs: str) -> Percentile:
+        """Return the 90 % error of a filter on a set of epochs."""
+        return percentile_of_tracks(self.errors_m[key], self.epochs[epochs], SHARE)
 
 
 def run_paper(settings: PaperSettings) -> PaperRun:

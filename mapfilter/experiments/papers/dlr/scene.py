@@ -121,22 +121,12 @@ class Scene(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """A walk, the sky over it, and how base stations are received on the way.
+    """A walk, (K, 3), the sky over it, and how base stations are received on the way.
 
-    Parameters
-    ----------
-    place_m : (K, 3) array
-    travelled_m : (K,) array
-    satellites_m : (S, 3) array
-        Above the mask; they stay where they are during a track.
-    gps : (S,) array of bool
-        The others are Galileo's.
-    sigma_m : (S,) array
-        Deviation of the pseudoranges in the open.
-    seen : (K, S) array of bool
-        Not behind a house.
-    stations_seen, sinr_db : dict
-        By where the canyon lies, (K, B): line of sight, and SINR of the best sector.
+    Satellites, (S, 3), are those above the mask; they do not move during a track. Those that are
+    not of GPS are of Galileo; ``sigma_m``, (S,), is the deviation of pseudoranges in the open, and
+    ``seen``, (K, S), whether no house is in between. By where the canyon lies, (K, B), there are
+    the line of sight to stations and the SINR of the best sector.
     """
 
     place_m: Floats

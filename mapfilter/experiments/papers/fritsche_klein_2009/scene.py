@@ -7,14 +7,16 @@ paper (Fig. 1), not printed. The default layout is a choice that brings out its 
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
+from annotated_types import Ge, Gt, Le
 
 from mapfilter._types import Floats
-from mapfilter.errors import Faults, InputError, fail
+from mapfilter.errors import ConfigError, Faults, InputError, fail
+from mapfilter.experiments.papers.paper import true_states
 from mapfilter.models.gaussian import GaussianTerms, stack
 from mapfilter.models.motion import (
     LinearMotion,
@@ -26,6 +28,7 @@ from mapfilter.models.motion import (
 from mapfilter.models.ranging import pseudoranges, timing_advances
 from mapfilter.models.signal_strength import levels
 from mapfilter.models.state import MOVING, MOVING_CLOCK, StateLayout
+from mapfilter.options import Options, Positive, Words
 
 Combination = Literal["gsm", "hybrid1", "hybrid2"]
 COMBINATIONS: tuple[Combination, ...] = ("gsm", "hybrid1", "hybrid2")
@@ -49,12 +52,12 @@ MOTION_FACTOR, CLOCK_FACTOR = 100.0, 5.0
 SITES_EAST_M = (750.0, 957.0, 1523.0, 1730.0, 1164.0, 391.0, 184.0)
 SITES_NORTH_M = (1000.0, 1773.0, 1207.0, 1980.0, 2545.0, 2338.0, 1566.0)
 SITES_M = tuple(zip(SITES_EAST_M, SITES_NORTH_M, strict=True))
-MOST_STEPS = 10_000
+Numbers = Annotated[tuple[float, ...], Words("finite numbers")]
 
 
 @dataclass(frozen=True)
-class Layout:
-    """What stands where.
+class Layout(Options):
+    """Where the base stations and satellites are.
 
     Parameters
     ----------
@@ -67,39 +70,29 @@ class Layout:
     satellite_azimuths_deg : tuple of float
         Clockwise from north; the first is that of Hybrid 1.
     satellite_elevation_deg, satellite_distance_m : float
+        Of all satellites, as seen from the origin.
     steps : int
         Of 0.48 s each.
     """
 
-    sites_m: tuple[tuple[float, float], ...] = SITES_M
-    boresights_deg: tuple[float, ...] = (270.0, 270.0, 270.0, 150.0, 30.0, 30.0, 270.0)
-    serving: int = 0
-    satellite_azimuths_deg: tuple[float, ...] = (12.0, 190.0)
-    satellite_elevation_deg: float = 45.0
-    satellite_distance_m: float = 2e7
-    steps: int = 300
+    sites_m: Annotated[tuple[tuple[float, float], ...], Words("pairs of finite numbers")] = SITES_M
+    boresights_deg: Numbers = (270.0, 270.0, 270.0, 150.0, 30.0, 30.0, 270.0)
+    serving: Annotated[int, Ge(0)] = 0
+    satellite_azimuths_deg: Numbers = (12.0, 190.0)
+    satellite_elevation_deg: Annotated[float, Gt(0), Le(90)] = 45.0
+    satellite_distance_m: Positive = 2e7
+    steps: Annotated[int, Ge(1), Le(10_000)] = 300
 
-    def __post_init__(self) -> None:
-        faults = Faults()
+    def check(self, faults: Faults) -> None:
+        """Add faults of fields that do not go together."""
         count = len(self.sites_m)
         if count != len(self.boresights_deg) or not count:
             faults.add("layout", "one direction for each site", f"{len(self.boresights_deg)}")
-        if not (_whole(self.serving) and 0 <= self.serving < count):
+        if not self.serving < count:
             faults.add("layout, serving", f"a site in 0..{count - 1}", self.serving)
-        numbers = [*np.ravel(self.sites_m), *self.boresights_deg, *self.satellite_azimuths_deg]
-        if not np.isfinite(np.array(numbers, dtype=np.float64)).all():
-            faults.add("layout", "finite numbers", "NaN or infinity")
         if len(self.satellite_azimuths_deg) < 2:
             got = len(self.satellite_azimuths_deg)
             faults.add("layout, satellite_azimuths_deg", "two or more", got)
-        if not 0 < self.satellite_elevation_deg <= 90:
-            got_deg = self.satellite_elevation_deg
-            faults.add("layout, satellite_elevation_deg", "degrees in 0..90", got_deg)
-        if not 0 < self.satellite_distance_m < np.inf:
-            faults.add("layout, satellite_distance_m", "metres above 0", self.satellite_distance_m)
-        if not (_whole(self.steps) and 1 <= self.steps <= MOST_STEPS):
-            faults.add("layout, steps", f"a whole number in 1..{MOST_STEPS}", self.steps)
-        faults.raise_if_any(InputError)
 
     def satellites_m(self, count: int) -> Floats:
         """Return the positions of the first satellites in east, north, up, shape (count, 3)."""
@@ -108,10 +101,6 @@ class Layout:
         flat = np.cos(elevation) * np.stack([np.sin(azimuth), np.cos(azimuth)], axis=-1)
         up = np.full((len(azimuth), 1), np.sin(elevation))
         return self.satellite_distance_m * np.hstack([flat, up])
-
-
-def _whole(value: object) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
 
 
 def read_layout(path: Path) -> Layout:
@@ -132,15 +121,10 @@ def read_layout(path: Path) -> Layout:
     if unknown := sorted(set(given) - set(known)):
         raise fail(InputError, str(path), f"keys among {', '.join(known)}", ", ".join(unknown))
     try:
-        if "sites_m" in given:
-            given["sites_m"] = tuple((float(e), float(n)) for e, n in given["sites_m"])
-        for name in ("boresights_deg", "satellite_azimuths_deg"):
-            if name in given:
-                given[name] = tuple(float(value) for value in given[name])
         return Layout(**given)
-    except (TypeError, ValueError) as error:
-        expected = "numbers, and pairs of them for sites_m"
-        raise fail(InputError, str(path), expected, error) from error
+    except ConfigError as error:
+        faults = (replace(fault, where=f"{path}, {fault.where}") for fault in error.faults)
+        raise InputError(tuple(faults)) from None
 
 
 def hard_layout(distance_m: float = 1000.0) -> Layout:
@@ -233,11 +217,7 @@ def draw(given: Scene, trials: int, steps: int, rng: np.random.Generator) -> Tri
     """
     n = given.layout.size
     start = np.array(START[:n])
-    states = np.empty((trials, steps, n))
-    now = np.tile(start, (trials, 1))
-    for k in range(steps):
-        now = given.truth.sample(now, rng)
-        states[:, k] = now
+    states = true_states(given.truth, start, trials, steps, rng)
     readings = given.measurement.sample(states, rng)
     deviation = np.sqrt(np.diagonal(given.first_covariance))
     unit = rng.standard_normal((trials, n))

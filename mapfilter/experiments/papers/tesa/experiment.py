@@ -1,32 +1,140 @@
-"""TESA: GNSS and GSM fused by a Rao-Blackwellised particle filter; its two scenarios."""
+"""TESA: the filters of its two scenarios and a halt, and their errors.
+
+Filters get what is available to a receiver, with two exceptions: the law and the correlation
+distance of the shadowing are those of the simulation, and the known-bearing model, as its name
+states, takes the bearing of the road from it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from scipy.special import stdtrit
 
 from mapfilter._parallel import ordered_results
 from mapfilter._types import Floats
 from mapfilter.experiments.papers.paper import PaperSettings
-from mapfilter.experiments.papers.tesa.models import Motion, assumed, loading, measurements
 from mapfilter.experiments.papers.tesa.scene import (
+    BEARING_DEG,
     BETA_DB,
     BETAS_DB,
+    CLOCK_M,
+    CORRELATION_M,
+    EIRP_DBM,
+    START_HORIZONTAL_M,
+    START_UP_M,
+    STATIONS_LEFT_M,
     Scene,
     draw_readings,
     draw_start_m,
+    loss_at_km_db,
     tesa_scene,
 )
 from mapfilter.filters import rao_blackwell
-from mapfilter.filters.rao_blackwell import SIR, SirOptions
 from mapfilter.filters.trials import CompiledMeasurement
+from mapfilter.models.gaussian import stack
+from mapfilter.models.motion import LinearMotion, constant_velocity, random_walk, together
+from mapfilter.models.ranging import pseudoranges
+from mapfilter.models.signal_strength import levels
+from mapfilter.models.state import POSITION_CLOCK_3D, StateLayout
+from mapfilter.positioning.kalman.models import compiled
+from mapfilter.simulation.drives import ahead_and_left
 
+Motion = Literal["velocity", "identity", "known-bearing"]
+
+VELOCITY: Motion = "velocity"
+IDENTITY: Motion = "identity"
+KNOWN_BEARING: Motion = "known-bearing"
+
+SPEED_MPS = 50.0 / 3.6
+"""The paper's v_mobile; the true speed is 13.1 m/s."""
+
+INTERVAL_S = 1.0
+ACCELERATION_MPS2 = 0.5
+STEP_M, ACROSS_M, UP_M = 25.0, 5.0, 0.5
+FIRST_CLOCK_M = 3e5
+LEAST_SIGMA_DB = 0.5
+RECEIVER_SIGMA_DB = 0.29
 PARTICLES = 10_000
-AVAILABLE_M = 100.0
+
+
+@dataclass(frozen=True, eq=False)
+class Assumed:
+    """State, motion and initial uncertainty that a filter assumes.
+
+    ``sampled`` are the components with particles (east, north, up), ``shadowing`` those that are
+    the shadowing of the stations in dB; none where it is taken as white.
+    """
+
+    layout: StateLayout
+    motion: LinearMotion
+    first_covariance: Floats
+    sampled: tuple[int, ...] = (0, 1, 2)
+    shadowing: tuple[int, ...] = ()
+
+    def first_mean(self, start_m: Floats) -> Floats:
+        """Return the first mean for a start (3,): at rest, clock and shadowing 0."""
+        mean = np.zeros(self.layout.size)
+        mean[list(self.sampled)] = start_m
+        return mean
+
+    def loading(self, rows: int) -> Floats | None:
+        """Return how shadowing adds to a reading of ``rows`` values, (rows, n): to the last."""
+        if not self.shadowing:
+            return None
+        found = np.zeros((rows, self.layout.size))
+        first = rows - len(self.shadowing)
+        found[np.arange(first, rows), list(self.shadowing)] = 1.0
+        return found
+
+
+def assumed(motion: Motion, beta_db: float | None = None) -> Assumed:
+    """Return what a filter assumes, with shadowing of ``beta_db``; None without levels."""
+    flat, up, clock = START_HORIZONTAL_M**2, START_UP_M**2, FIRST_CLOCK_M**2
+    if motion == "velocity":
+        speed = SPEED_MPS**2 / 2
+        parts = [
+            constant_velocity(INTERVAL_S, ACCELERATION_MPS2, 2),
+            random_walk(INTERVAL_S, UP_M, dimensions=1),
+            random_walk(INTERVAL_S, CLOCK_M, dimensions=1),
+        ]
+        first = [flat, speed, flat, speed, up, clock]
+        own = len(first)
+        if beta_db is not None:
+            # A Gauss-Markov process of each station at the paper's speed.
+            stations, sigma_db = len(STATIONS_LEFT_M), max(beta_db, LEAST_SIGMA_DB)
+            rho = float(np.exp(-SPEED_MPS * INTERVAL_S / CORRELATION_M))
+            unit = np.eye(stations)
+            parts.append(LinearMotion(rho * unit, sigma_db**2 * (1 - rho**2) * unit))
+            first += [sigma_db**2] * stations
+        layout = StateLayout(len(first), 0, 2, 4, 5)
+        shadowing = tuple(range(own, len(first)))
+        return Assumed(layout, together(parts), np.diag(first), (0, 2, 4), shadowing)
+    noise = np.diag([STEP_M**2, STEP_M**2, UP_M**2, CLOCK_M**2])
+    if motion == "known-bearing":
+        ahead, left = ahead_and_left(BEARING_DEG)
+        noise[:2, :2] = STEP_M**2 * np.outer(ahead, ahead) + ACROSS_M**2 * np.outer(left, left)
+    first_covariance = np.diag([flat, flat, up, clock])
+    return Assumed(POSITION_CLOCK_3D, LinearMotion(np.eye(4), noise), first_covariance)
+
+
+def measurements(
+    scene: Scene, motion: Motion, beta_db: float | None
+) -> tuple[CompiledMeasurement, ...]:
+    """Return what is measured at each epoch: pseudoranges and, with β, levels."""
+    known = assumed(motion, beta_db)
+    received = []
+    if beta_db is not None:
+        sigma = RECEIVER_SIGMA_DB if known.shadowing else max(beta_db, LEAST_SIGMA_DB)
+        law: dict[str, Any] = {"loss_at_km_db": loss_at_km_db(), "exponent": 2.0}
+        received = [levels(known.layout, scene.stations_m, sigma, eirp_dbm=EIRP_DBM, **law)]
+    return tuple(
+        compiled(stack([pseudoranges(known.layout, place, sigma), *received]))
+        for place, sigma in zip(scene.satellites_m, scene.range_sigma_m, strict=True)
+    )
 
 
 class Run(NamedTuple):
@@ -41,16 +149,14 @@ class Run(NamedTuple):
 
 
 RUNS = (
-    Run(1, "identity"),
-    Run(1, "identity", BETA_DB),
-    Run(2, "velocity"),
-    *(Run(2, "velocity", beta) for beta in BETAS_DB),
-    Run(2, "identity"),
-    *(Run(2, "identity", beta) for beta in BETAS_DB),
-    Run(2, "known-bearing", BETA_DB),
-    Run(3, "velocity"),
-    Run(3, "velocity", BETA_DB),
-    Run(3, "identity", BETA_DB),
+    Run(1, IDENTITY),
+    Run(1, IDENTITY, BETA_DB),
+    *(Run(2, VELOCITY, beta) for beta in (None, *BETAS_DB)),
+    *(Run(2, IDENTITY, beta) for beta in (None, *BETAS_DB)),
+    Run(2, KNOWN_BEARING, BETA_DB),
+    Run(3, VELOCITY),
+    Run(3, VELOCITY, BETA_DB),
+    Run(3, IDENTITY, BETA_DB),
 )
 
 
@@ -60,8 +166,7 @@ def run_filter(
     models: Sequence[CompiledMeasurement],
     start_m: Floats,
     rng: np.random.Generator,
-    particles: int = PARTICLES,
-    options: SirOptions = SIR,
+    particles: int,
 ) -> Floats:
     """Run the filter over readings (K, m) from an assumed start (3,); return positions (K, 3)."""
     known = assumed(run.motion, run.beta_db)
@@ -69,11 +174,11 @@ def run_filter(
     belief = rao_blackwell.init(
         known.first_mean(start_m), known.first_covariance, known.sampled, particles, rng
     )
-    shadowing = loading(known, readings.shape[1])
+    loading = known.loading(readings.shape[1])
     found = np.empty((len(readings), 3))
     for k, (reading, model) in enumerate(zip(readings, models, strict=True)):
         belief = rao_blackwell.predict(belief, known.motion.transition, known.motion.noise, rng)
-        belief, _ = rao_blackwell.update(belief, model, reading, rng, options, shadowing)
+        belief, _ = rao_blackwell.update(belief, model, reading, rng, loading=loading)
         found[k] = belief.mean()[where]
     return found
 
@@ -104,30 +209,6 @@ class PaperRun(NamedTuple):
 
     scene: Scene
     errors_m: dict[Run, Floats]
-
-
-class Estimate(NamedTuple):
-    """A mean over trials, and its 95 % interval by Student's t."""
-
-    value: float
-    low: float
-    high: float
-
-
-def estimate(values: Floats, least: float = -np.inf, most: float = np.inf) -> Estimate:
-    """Return the mean over trials of (T,) values, its interval cut to what is possible.
-
-    Examples
-    --------
-    >>> found = estimate(np.array([1.0, 3.0]), least=0.0)
-    >>> found.value, found.low, round(found.high, 2)
-    (2.0, 0.0, 14.71)
-    """
-    mean, half = float(np.mean(values)), 0.0
-    if values.size > 1:
-        factor = float(stdtrit(values.size - 1, 0.975))
-        half = factor * float(np.std(values, ddof=1)) / float(np.sqrt(values.size))
-    return Estimate(mean, max(mean - half, least), min(mean + half, most))
 
 
 def run_paper(settings: PaperSettings) -> PaperRun:

@@ -4,50 +4,77 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import inf
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from scipy.special import stdtrit
 
-from mapfilter.experiments.papers.paper import Paper, Picture
+from mapfilter._types import Floats
+from mapfilter.experiments.papers.paper import Paper, Picture, interval_columns
 from mapfilter.experiments.papers.tesa import experiment as tesa
 from mapfilter.experiments.papers.tesa import scene
-from mapfilter.experiments.papers.tesa.models import IDENTITY, KNOWN_BEARING, VELOCITY, Motion
+from mapfilter.experiments.papers.tesa.experiment import IDENTITY, KNOWN_BEARING, VELOCITY, Motion
 from mapfilter.experiments.papers.tesa.scene import ASSUMPTIONS, BETA_DB
 from mapfilter.report.canvas import BLACK, BLUE, GREY, ORANGE, PURPLE, SKY, VERMILLION, Look
 from mapfilter.report.curves import Curve, Panel, plot_error_panels
 from mapfilter.simulation.drives import shadowing_db, straight_drive
 
+AVAILABLE_M = 100.0
+
 CLAIMS = (
     "Figs. 6 and 7: with powers of GSM the accuracy improves slightly",
     "Fig. 8: without satellites a position is still available, with a far larger error",
 )
-"""What the paper says; it prints no values."""
+"""The paper's claims; it prints no values."""
 
 _GNSS, _HYBRID = tesa.Run(1, IDENTITY), tesa.Run(1, IDENTITY, BETA_DB)
-_MEASURES = {
-    "mean_m": "mean_interval_m",
-    "outage_m": "outage_interval_m",
-    "below_100m": "below_interval",
-    "availability": "availability_interval",
-}
-"""Names of the measures and of their intervals."""
 
 
-def measures(run: tesa.PaperRun, key: tesa.Run) -> dict[str, tesa.Estimate]:
-    """Return means over trials by the names of :data:`_MEASURES`.
+class Estimate(NamedTuple):
+    """A mean over trials, and its 95 % interval by Student's t."""
+
+    value: float
+    low: float
+    high: float
+
+
+def estimate(values: Floats, least: float = -inf, most: float = inf) -> Estimate:
+    """Return the mean over trials of (T,) values, its interval cut to what is possible.
+
+    Examples
+    --------
+    >>> found = estimate(np.array([1.0, 3.0]), least=0.0)
+    >>> found.value, found.low, round(found.high, 2)
+    (2.0, 0.0, 14.71)
+    """
+    mean, half = float(np.mean(values)), 0.0
+    if values.size > 1:
+        factor = float(stdtrit(values.size - 1, 0.975))
+        half = factor * float(np.std(values, ddof=1)) / float(np.sqrt(values.size))
+    return Estimate(mean, max(mean - half, least), min(mean + half, most))
+
+
+def rows_of(run: tesa.PaperRun) -> dict[tesa.Run, dict[str, Any]]:
+    """Return every filter over every scenario: means over trials, and their 95 % intervals.
 
     The error over all epochs and over those of the outage; shares of the outage's epochs and of all
-    with less than 100 m.
+    with less than 100 m of error. ``beta_db`` is None without GSM.
     """
-    errors, outage = run.errors_m[key], run.scene.outage
-    near = errors < tesa.AVAILABLE_M
-    return {
-        "mean_m": tesa.estimate(errors.mean(axis=1), 0.0, inf),
-        "outage_m": tesa.estimate(errors[:, outage].mean(axis=1), 0.0, inf),
-        "below_100m": tesa.estimate(near[:, outage].mean(axis=1), 0.0, 1.0),
-        "availability": tesa.estimate(near.mean(axis=1), 0.0, 1.0),
-    }
+    found: dict[tesa.Run, dict[str, Any]] = {}
+    for key in tesa.RUNS:
+        errors, outage = run.errors_m[key], run.scene.outage
+        near = errors < AVAILABLE_M
+        found[key] = row = key._asdict()
+        for name, interval, values, most in (
+            ("mean_m", "mean_interval_m", errors, inf),
+            ("outage_m", "outage_interval_m", errors[:, outage], inf),
+            ("below_100m", "below_interval", near[:, outage], 1.0),
+            ("availability", "availability_interval", near, 1.0),
+        ):
+            row[name], *ends = estimate(values.mean(axis=1), 0.0, most)
+            row[interval] = tuple(ends)
+    return found
 
 
 def summary(run: tesa.PaperRun) -> dict[str, Any]:
@@ -59,31 +86,23 @@ def summary(run: tesa.PaperRun) -> dict[str, Any]:
     model, is the headline; only ``hybrid_known_bearing_outage_m`` uses the true bearing of the
     road. ``scenario3``: over the same outage where the vehicle halts in it, which is not in the
     paper: at constant speed a velocity model keeps its position even without levels.
-    ``hybrid_less_gnss_m``: of scenario 1, trial by trial; below 0 where GSM helps. ``rows``: every
-    filter over every scenario, ``beta_db`` None without GSM; intervals are of 95 % over trials.
+    ``hybrid_less_gnss_m``: of scenario 1, trial by trial; below 0 where GSM helps. ``rows``: see
+    :func:`rows_of`.
     """
-    found = {key: measures(run, key) for key in tesa.RUNS}
+    rows = rows_of(run)
 
-    def of(name: str, scenario: int, motion: Motion, beta: float | None = BETA_DB) -> float:
-        return found[tesa.Run(scenario, motion, beta)][name].value
+    def of(name: str, scenario: int, motion: Motion, beta: float | None = BETA_DB) -> Any:
+        return rows[tesa.Run(scenario, motion, beta)][name]
 
-    gain = tesa.estimate((run.errors_m[_HYBRID] - run.errors_m[_GNSS]).mean(axis=1))
-    outage = found[tesa.Run(2, VELOCITY, BETA_DB)]["outage_m"]
-    rows = []
-    for key, own in found.items():
-        row: dict[str, Any] = {"scenario": key.scenario, "motion": key.motion}
-        row["beta_db"] = key.beta_db
-        for name, one in own.items():
-            row |= {name: one.value, _MEASURES[name]: (one.low, one.high)}
-        rows.append(row)
+    gain = estimate((run.errors_m[_HYBRID] - run.errors_m[_GNSS]).mean(axis=1))
     return {
         "scenario1": {
             "gnss_m": of("mean_m", 1, IDENTITY, None),
             "hybrid_m": of("mean_m", 1, IDENTITY),
         },
         "scenario2": {
-            "hybrid_outage_m": outage.value,
-            "hybrid_outage_interval_m": (outage.low, outage.high),
+            "hybrid_outage_m": of("outage_m", 2, VELOCITY),
+            "hybrid_outage_interval_m": of("outage_interval_m", 2, VELOCITY),
             "gnss_velocity_outage_m": of("outage_m", 2, VELOCITY, None),
             "hybrid_identity_outage_m": of("outage_m", 2, IDENTITY),
             "gnss_outage_m": of("outage_m", 2, IDENTITY, None),
@@ -103,7 +122,7 @@ def summary(run: tesa.PaperRun) -> dict[str, Any]:
         },
         "hybrid_less_gnss_m": gain.value,
         "hybrid_less_gnss_interval_m": (gain.low, gain.high),
-        "rows": rows,
+        "rows": list(rows.values()),
         "claims": CLAIMS,
         "trials": len(run.errors_m[_GNSS]),
         "assumptions": ASSUMPTIONS,
@@ -112,14 +131,11 @@ def summary(run: tesa.PaperRun) -> dict[str, Any]:
 
 def tables(run: tesa.PaperRun) -> dict[str, pd.DataFrame]:
     """Return all filters over all scenarios."""
-    rows = []
-    for key in tesa.RUNS:
-        beta = None if key.beta_db is None else f"{key.beta_db:g}"
-        row: dict[str, Any] = {"scenario": key.scenario, "motion": key.motion, "beta_db": beta}
-        for name, one in measures(run, key).items():
-            row |= {name: one.value, f"{name}_low": one.low, f"{name}_high": one.high}
-        rows.append(row)
-    return {"scenarios": pd.DataFrame(rows, dtype=object)}
+    found = []
+    for row in rows_of(run).values():
+        beta = None if row["beta_db"] is None else f"{row['beta_db']:g}"
+        found.append(interval_columns(row | {"beta_db": beta}))
+    return {"scenarios": pd.DataFrame(found, dtype=object)}
 
 
 _COLOURS = {0.0: SKY, 1.0: BLUE, 4.0: PURPLE}
@@ -129,61 +145,56 @@ _SEED = 4
 
 def pictures(run: tesa.PaperRun) -> Iterator[Picture]:
     """Draw Figs. 4, 6, 7 and 8, and the outage by β, by model of motion, and with a halt."""
-    time = Look(across="time / s")
+    time, trials = Look(across="time / s"), f"{len(run.errors_m[_GNSS])} trials"
+
+    def mean(name: str, key: tesa.Run, colour: str) -> Curve:
+        return Curve(name, run.errors_m[key].mean(axis=0), colour)
+
+    def one_and_mean(name: str, key: tesa.Run, colour: str) -> list[Curve]:
+        one = Curve(f"{name}, one trial", run.errors_m[key][0], GREY)
+        return [one, mean(f"{name}, mean", key, colour)]
+
     panel = Panel("", "received power / dBm", _profiles(), bottom=None)
     title = "Fig. 4: power of a base station behind, 50 km/h"
     yield "figure-4", plot_error_panels([panel], title=title, **time)
 
-    trials = len(run.errors_m[_GNSS])
     top = 1.15 * max(float(run.errors_m[key][0].max()) for key in (_GNSS, _HYBRID))
     for figure, name, key in ((6, "GNSS", _GNSS), (7, "GNSS + GSM", _HYBRID)):
-        panel = Panel("", "error / m", _one_and_mean(run, key, name, BLUE), top=top)
-        title = f"Fig. {figure}: scenario 1, {name}, identity model, {trials} trials"
+        panel = Panel("", "error / m", one_and_mean(name, key, BLUE), top=top)
+        title = f"Fig. {figure}: scenario 1, {name}, identity model, {trials}"
         yield f"figure-{figure}", plot_error_panels([panel], title=title, **time)
 
-    alone, identity = tesa.Run(2, IDENTITY), tesa.Run(2, IDENTITY, BETA_DB)
-    velocity = tesa.Run(2, VELOCITY, BETA_DB)
     panels = [
-        Panel(name, "error / m", _one_and_mean(run, key, label, colour))
-        for name, key, label, colour in (
-            ("GNSS alone, identity model", alone, "GNSS", VERMILLION),
-            ("GNSS + GSM, identity model (the paper's)", identity, "identity", BLUE),
-            ("GNSS + GSM, velocity model", velocity, "velocity", ORANGE),
+        Panel(name, "error / m", one_and_mean(label, tesa.Run(2, motion, beta), colour))
+        for name, label, motion, beta, colour in (
+            ("GNSS alone, identity model", "GNSS", IDENTITY, None, VERMILLION),
+            ("GNSS + GSM, identity model (the paper's)", "identity", IDENTITY, BETA_DB, BLUE),
+            ("GNSS + GSM, velocity model", "velocity", VELOCITY, BETA_DB, ORANGE),
         )
     ]
-    title = f"Fig. 8: scenario 2, β = {BETA_DB:g} dB, {trials} trials"
+    title = f"Fig. 8: scenario 2, β = {BETA_DB:g} dB, {trials}"
     yield "figure-8", plot_error_panels(panels, title=title, columns=3, **time)
 
     panels = []
     for motion in (IDENTITY, VELOCITY):
-        by_beta = {beta: tesa.Run(2, motion, beta) for beta in scene.BETAS_DB}
         curves = [
-            Curve(f"β = {beta:g} dB", run.errors_m[key].mean(axis=0), _COLOURS[beta])
-            for beta, key in by_beta.items()
+            mean(f"β = {beta:g} dB", tesa.Run(2, motion, beta), _COLOURS[beta])
+            for beta in scene.BETAS_DB
         ]
         panels.append(Panel(f"{motion} model", "mean error / m", curves, logarithmic=True))
-    title = f"Scenario 2 by shadowing, GNSS + GSM, {trials} trials"
+    title = f"Scenario 2 by shadowing, GNSS + GSM, {trials}"
     yield "outage", plot_error_panels(panels, title=title, **time)
 
     panels = []
     for scenario, name in ((2, "scenario 2: constant speed"), (3, "scenario 3: halt")):
-        compared = (
-            ("GNSS alone, velocity model", tesa.Run(scenario, VELOCITY), VERMILLION),
-            ("GNSS + GSM, velocity model", tesa.Run(scenario, VELOCITY, BETA_DB), ORANGE),
-            ("GNSS + GSM, identity model", tesa.Run(scenario, IDENTITY, BETA_DB), BLUE),
-        )
         curves = [
-            Curve(label, run.errors_m[key].mean(axis=0), colour) for label, key, colour in compared
+            mean("GNSS alone, velocity model", tesa.Run(scenario, VELOCITY), VERMILLION),
+            mean("GNSS + GSM, velocity model", tesa.Run(scenario, VELOCITY, BETA_DB), ORANGE),
+            mean("GNSS + GSM, identity model", tesa.Run(scenario, IDENTITY, BETA_DB), BLUE),
         ]
         panels.append(Panel(name, "mean error / m", curves))
-    title = f"Outage with and without a halt, β = {BETA_DB:g} dB, {trials} trials"
+    title = f"Outage with and without a halt, β = {BETA_DB:g} dB, {trials}"
     yield "halt", plot_error_panels(panels, title=title, **time)
-
-
-def _one_and_mean(run: tesa.PaperRun, key: tesa.Run, name: str, colour: str) -> list[Curve]:
-    errors = run.errors_m[key]
-    one = Curve(f"{name}, one trial", errors[0], GREY)
-    return [one, Curve(f"{name}, mean", errors.mean(axis=0), colour)]
 
 
 def _profiles() -> list[Curve]:
