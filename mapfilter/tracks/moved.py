@@ -112,18 +112,40 @@ def rotation_matrices(quaternions: Floats) -> Floats:
 
 
 def motion_from_course(rows: pd.DataFrame, convergence_rad: float) -> pd.DataFrame:
-    """Integrate the speed of a receiver, in the direction of its course.
+    """Integrate the velocity of a receiver over each interval, by the mean of its ends.
 
-    Intervals of more than 5 s and of three usual ones have no step; without a course the heading
-    is unknown.
+    Intervals of more than 5 s and of three usual ones have no step; where neither end has a course
+    the heading is unknown.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        time_s, speed_mps and course_deg (clockwise from true north; NaN where unknown).
+    convergence_rad : float
+        Clockwise angle from true north to grid north.
+
+    Examples
+    --------
+    >>> turn = pd.DataFrame({"time_s": [0.0, 2.0], "speed_mps": 5.0, "course_deg": [0.0, 90.0]})
+    >>> motion_from_course(turn, 0.0).iloc[1].round(4).tolist()
+    [2.0, 7.0711, 0.7854, nan]
     """
     rows = rows.drop_duplicates("time_s")
     time = rows["time_s"].to_numpy(dtype=np.float64)
-    step = _integrated(time, rows["speed_mps"].to_numpy(dtype=np.float64))
-    between = np.diff(time)
-    longest_s = max(_LONGEST_S, 3 * float(np.median(between))) if between.size else _LONGEST_S
-    step[1:][between > longest_s] = np.nan
+    speed = rows["speed_mps"].to_numpy(dtype=np.float64)
     heading = heading_from_azimuth_rad(rows["course_deg"].to_numpy(), convergence_rad)
-    return pd.DataFrame(
-        {"time_s": time, "step_m": step, "heading_rad": heading, "turn_rad": np.nan}
-    )
+    # Where one end has no course, the other one's is taken.
+    first, last = heading[:-1], heading[1:]
+    first, last = np.where(np.isnan(first), last, first), np.where(np.isnan(last), first, last)
+    east = (speed[:-1] * np.cos(first) + speed[1:] * np.cos(last)) / 2
+    north = (speed[:-1] * np.sin(first) + speed[1:] * np.sin(last)) / 2
+    lasted_s = np.diff(time)
+    known = np.isfinite(east)
+    step = lasted_s * np.where(known, np.hypot(east, north), (speed[:-1] + speed[1:]) / 2)
+    longest_s = max(_LONGEST_S, 3 * float(np.median(lasted_s))) if lasted_s.size else _LONGEST_S
+    step[lasted_s > longest_s] = np.nan
+    moved = np.where(known & (step > 0), np.arctan2(north, east), np.nan)
+    columns = {"step_m": np.concatenate([[0.0], step]), "turn_rad": np.nan}
+    columns["heading_rad"] = np.concatenate([heading[:1], moved])
+    table = pd.DataFrame({"time_s": time, **columns})
+    return table[["time_s", "step_m", "heading_rad", "turn_rad"]]
