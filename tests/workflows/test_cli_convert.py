@@ -4,6 +4,7 @@ import pytest
 from command_line import mapfilter
 from made_recordings import COUNT, MADE, START_UTC_S
 
+from mapfilter.errors import InputError
 from mapfilter.tracks.store import read_log
 
 
@@ -57,6 +58,9 @@ def test_options_are_checked(walk):
     assert read_log(out).start_utc_s == START_UTC_S + 5
 
 
-def test_replay_says_how_to_use_a_recording(walk):
-    done = mapfilter("replay", "--db", walk, "--log", walk / "drive.csv")
+def test_info_and_replay_say_how_to_use_a_recording(walk):
+    done = mapfilter("info", walk / "walk.txt")
     assert done.code == 2
+    assert "a G-NetTrack log; mapfilter convert makes a log of it" in done.err
+    with pytest.raises(InputError, match=r"mapfilter convert drive\.csv --out LOG"):
+        read_log(walk / "drive.csv")

@@ -50,6 +50,8 @@ FORMATS: tuple[Format, ...] = (
 )
 """All formats, in the order in which a file is compared with them."""
 
+_PEEKED_BYTES = 1 << 18
+
 
 def format_named(name: str) -> Format:
     """Return a format by its name; ConfigError when there is none."""
@@ -63,6 +65,14 @@ def format_named(name: str) -> Format:
 def find_format(text: Text) -> Format | None:
     """Return the format that a file looks like, or None."""
     return next((known for known in FORMATS if known.matches(text)), None)
+
+
+def format_of(path: str | Path) -> Format | None:
+    """Return the format that a file looks like by its beginning; None for another file."""
+    try:
+        return find_format(read_text(Path(path), _PEEKED_BYTES))
+    except InputError:
+        return None
 
 
 def read_recording(

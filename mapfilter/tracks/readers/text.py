@@ -83,8 +83,10 @@ def parts_of(text: Text) -> Iterator[Text]:
         yield text
 
 
-def read_text(path: Path) -> Text:
+def read_text(path: Path, most_bytes: int = -1) -> Text:
     r"""Read a file as text: plain or gzip, UTF-8 or UTF-16, any line ends.
+
+    ``most_bytes`` are read at most, all of them where it is negative.
 
     Raises
     ------
@@ -101,9 +103,10 @@ def read_text(path: Path) -> Text:
     """
     try:
         size = path.stat().st_size
-        if size > _LARGEST_BYTES:
+        if size > _LARGEST_BYTES and most_bytes < 0:
             raise fail(InputError, str(path), "a recording of at most 2 GiB", f"{size} bytes")
-        data = path.read_bytes()
+        with path.open("rb") as stream:
+            data = stream.read(most_bytes)
     except OSError as error:
         raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
     notes: list[str] = []
