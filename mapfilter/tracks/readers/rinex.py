@@ -50,7 +50,7 @@ def fixed_number(text: str) -> float:
 def gps_seconds(words: Sequence[str]) -> float:
     """Return seconds since 6 January 1980 of year, month, day, hour, minute and second."""
     values = [fixed_number(word) for word in words]
-    if len(values) != 6 or not all(np.isfinite(values)):
+    if len(values) != 6 or not all(0 <= value < 10_000 for value in values):
         return float("nan")
     year, month, day, hour, minute, second = values
     if year < 100:

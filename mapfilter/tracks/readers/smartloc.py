@@ -86,7 +86,7 @@ def _satellites(system: Floats, number: Floats) -> np.ndarray:
     """Return names as in RINEX; slots of GLONASS count from 1, 65 or 301."""
     names = np.full(len(number), None, dtype=object)
     for kind, index in {*zip(system.tolist(), number.tolist(), strict=True)}:
-        letter = _LETTERS.get(int(kind)) if kind == kind else None
+        letter = _LETTERS.get(int(kind)) if 0 < kind < 100 else None
         slot = index - (300 if index > 300 else 64 if letter == "R" and index > 64 else 0)
         if letter == "S" and index > 100:
             slot = index - 100
