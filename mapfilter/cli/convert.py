@@ -15,7 +15,8 @@ from mapfilter.workflows.terminal import print_result
 
 def convert(
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="Recordings of one journey.")
+        list[Path],
+        typer.Argument(metavar="FILE...", help="Recordings of one journey, or their folder."),
     ],
     out: Annotated[
         Path, typer.Option("--out", metavar="LOG", help="The log's folder.", callback=given_path)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -79,14 +79,13 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         Clocks cannot be aligned, frames do not fit together, or the tables make no sense.
     """
     options = options or CombineOptions()
-    if not any(set(r.tables) - _NO_JOURNEY for r in recordings):
+    journey = [r for r in recordings if set(r.tables) - _NO_JOURNEY]
+    if not journey:
         names = ", ".join(r.path.name for r in recordings)
         expected = "a recording of a journey"
         got = "only lists of cells or orbits"
         raise fail(InputError, names, expected, got, "give a list as [cells] path")
-    timed = [r for r in recordings if any("time_s" in rows for rows in r.tables.values())]
-    alignment = align([r for r in timed if set(r.tables) - _NO_JOURNEY], options.offsets_s)
-    journey = [r for r in timed if set(r.tables) - _NO_JOURNEY]
+    alignment = align(journey, options.offsets_s)
     shifted = [
         _shifted(recording, offset)
         for recording, offset in zip(journey, alignment.offsets_s, strict=True)
@@ -115,16 +114,16 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
     }
     if "radio" in given:
         given["radio"] = _radio(given["radio"])
+    sensors = {
+        name: rows.assign(time_s=rows["time_s"] - start_s)
+        for name, rows in _sensors(shifted, frame, options.truth, notes).items()
+    }
     log = make_log(
         frame.crs,
         **given,
         start_utc_s=start_s if alignment.absolute else float("nan"),
         notes=notes,
     )
-    sensors = {
-        name: rows.assign(time_s=rows["time_s"] - start_s)
-        for name, rows in _sensors(shifted, frame, options.truth).items()
-    }
     if not given and not sensors:
         names = ", ".join(r.path.name for r in recordings)
         raise fail(InputError, names, "rows of a journey", "none")
@@ -138,14 +137,7 @@ def _shifted(recording: Recording, offset_s: float) -> Recording:
         name: rows.assign(time_s=rows["time_s"] + offset_s) if "time_s" in rows else rows
         for name, rows in recording.tables.items()
     }
-    return _with_tables(recording, tables)
-
-
-def _with_tables(recording: Recording, tables: Mapping[str, pd.DataFrame]) -> Recording:
-    return Recording(
-        recording.path, recording.format, recording.program, recording.clock, tables,
-        recording.rows, recording.unusable, recording.notes, recording.crs,
-    )  # fmt: skip
+    return replace(recording, tables=tables)
 
 
 def _joined(recordings: Sequence[Recording], table: str) -> pd.DataFrame | None:
@@ -260,15 +252,34 @@ def _satellites(
 
 
 def _sensors(
-    recordings: Sequence[Recording], frame: Frame, truth: Collection[Path]
+    recordings: Sequence[Recording], frame: Frame, truth: Collection[Path], notes: list[str]
 ) -> dict[str, pd.DataFrame]:
     found: dict[str, pd.DataFrame] = {}
     measured = [r for r in recordings if r.path not in truth]
     for name, columns in SENSOR_COLUMNS.items():
-        rows = _velocity(measured, frame) if name == "velocity" else _joined(recordings, name)
+        if name == "velocity":
+            rows = _velocity(measured, frame)
+        else:
+            rows = _joined(_apart(measured, name, notes), name)
         if rows is not None and len(rows):
             found[name] = rows[list(columns)]
     return found
+
+
+def _apart(recordings: Sequence[Recording], table: str, notes: list[str]) -> list[Recording]:
+    """Return the recordings of one sensor that do not overlap in time, calibrated ones first."""
+    having = [r for r in recordings if table in r.tables]
+    kept: list[Recording] = []
+    for recording in sorted(having, key=lambda r: "uncal" in r.path.name.lower()):
+        first, last = recording.tables[table]["time_s"].iloc[[0, -1]]
+        for other in kept:
+            begin, end = other.tables[table]["time_s"].iloc[[0, -1]]
+            if first < end and begin < last:
+                notes.append(f"{recording.path.name}: {table} not used, {other.path.name} has it")
+                break
+        else:
+            kept.append(recording)
+    return kept
 
 
 def _velocity(recordings: Sequence[Recording], frame: Frame) -> pd.DataFrame | None:

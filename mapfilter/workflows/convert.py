@@ -13,7 +13,7 @@ import pandas as pd
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, OutputError, fail
 from mapfilter.tracks.combine import CombineOptions, combine
 from mapfilter.tracks.readers.format import ReadOptions
-from mapfilter.tracks.readers.formats import read_recording
+from mapfilter.tracks.readers.formats import format_of, read_recording
 from mapfilter.tracks.readers.recording import Recording
 from mapfilter.tracks.readers.times import parse_zone
 from mapfilter.tracks.schema import TABLES
@@ -92,7 +92,7 @@ def run_convert(
     Parameters
     ----------
     files : sequence of Path
-        Recordings, as many as there are: cells from one, sensors from another.
+        Recordings, as many as there are: cells from one, sensors from another; or folders of them.
     out : Path
         The log's folder; must be absent, empty or a log that mapfilter wrote.
 
@@ -106,7 +106,8 @@ def run_convert(
     if options.zone:
         parse_zone(options.zone)
     truth = [path for path in options.combine.truth if path not in files]
-    every = [*dict.fromkeys(files), *dict.fromkeys(truth)]
+    inner, notes = _files_of(files)
+    every = [*dict.fromkeys(inner), *dict.fromkeys(truth)]
     _check_out(out, every)
     reading = ReadOptions(options.zone, options.columns)
     recordings, faults = [], Faults()
@@ -134,8 +135,27 @@ def run_convert(
         {name: count for name, count in rows.items() if count or name in TABLES},
         unused,
         found,
-        combined.log.notes,
+        (*notes, *combined.log.notes),
     )
+
+
+def _files_of(paths: Sequence[Path]) -> tuple[list[Path], list[str]]:
+    """Return files, and of folders the recordings in them; notes name the other files."""
+    found: list[Path] = []
+    notes = []
+    for path in paths:
+        if not path.is_dir():
+            found.append(path)
+            continue
+        inner = [p for p in sorted(path.iterdir()) if p.is_file() and not p.name.startswith(".")]
+        known = [p for p in inner if format_of(p) is not None]
+        if not known:
+            raise fail(InputError, str(path), "recordings in the folder", "none in a known format")
+        others = [p.name for p in inner if p not in known]
+        if others:
+            notes.append(f"{path.name}: {', '.join(others)[:200]} left out, no recordings")
+        found += known
+    return found, notes
 
 
 def _check_out(out: Path, inputs: Sequence[Path]) -> None:

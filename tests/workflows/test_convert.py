@@ -228,3 +228,30 @@ def test_truth_must_have_positions(made, tmp_path):
 def test_a_format_that_does_not_exist_is_refused(made, tmp_path):
     with pytest.raises(ConfigError, match="--format"):
         run_convert(made("gpx"), tmp_path / "log", ConvertOptions(format="kml"))
+
+
+def test_a_folder_is_all_recordings_in_it(made, tmp_path):
+    (tmp_path / "export").mkdir()
+    (path,) = made("sensorlogger")
+    text = path.read_text()
+    for name in ("TotalAcceleration", "AccelerometerUncalibrated", "Gyroscope", "Gravity"):
+        (tmp_path / "export" / f"{name}.csv").write_text(text)
+    (tmp_path / "export" / "Metadata.csv").write_text("version,device name\n3,phone\n")
+    (tmp_path / "export" / "Annotation.csv").write_text("time,seconds_elapsed,text\n1,2,a\n")
+    result = converted([tmp_path / "export"], tmp_path / "log")
+    assert set(read_sensors(tmp_path / "log")) == {"accelerometer", "gyroscope", "gravity"}
+    assert any("Annotation.csv, Metadata.csv left out" in note for note in result.notes)
+    assert any("AccelerometerUncalibrated.csv: accelerometer not used" in n for n in result.notes)
+    (tmp_path / "none").mkdir()
+    with pytest.raises(InputError, match="none in a known format"):
+        converted([tmp_path / "none"], tmp_path / "other")
+
+
+def test_parts_of_one_sensor_are_joined(made, tmp_path):
+    (path,) = made("sensorlogger")
+    head, *rows = path.read_text().splitlines()
+    for i, some in enumerate((rows[:10], rows[10:])):
+        (tmp_path / f"TotalAcceleration{i}.csv").write_text("\n".join([head, *some]))
+    paths = [tmp_path / f"TotalAcceleration{i}.csv" for i in (1, 0)]
+    converted(paths, tmp_path / "log")
+    assert len(read_sensors(tmp_path / "log")["accelerometer"]) == COUNT

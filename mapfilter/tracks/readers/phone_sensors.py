@@ -123,7 +123,8 @@ def _phyphox_time(seconds: Floats, reading: Reading) -> Floats:
 
 def _is_sensor_logger(text: Text) -> bool:
     names = set(_names(text))
-    return {"time", "seconds_elapsed"} <= names and len(names) > 2
+    held = {"x", "latitude", "pressure", "qx", "steps"}
+    return {"time", "seconds_elapsed"} <= names and bool(held & names)
 
 
 def _read_sensor_logger(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
