@@ -15,6 +15,9 @@ from mapfilter.tracks.readers.recording import Recording
 
 PLACE = ("x_m", "y_m", "z_m")
 _COLUMNS = ("time_s", "satellite", "pseudorange_m", "sigma_m", *PLACE)
+LOWEST_M, HIGHEST_M = 2.0e7, 5.5e7
+"""Distances of satellites from the earth's centre."""
+
 _FEW = 10
 _SAME_CLOCK_M = 3.0
 
@@ -43,6 +46,7 @@ def log_pseudoranges(
     kept = order.drop_duplicates(["time_s", "satellite"]).reset_index(drop=True)
     if len(kept) < len(rows):
         notes.append(f"pseudoranges: {len(rows) - len(kept)} of second signals left out")
+    kept = _sane_places(kept, notes)
     orbits = [r.tables["ephemerides"] for r in recordings if "ephemerides" in r.tables]
     missing = kept[list(PLACE)].isna().any(axis=1).to_numpy()
     if not orbits or not missing.any():
@@ -59,6 +63,17 @@ def log_pseudoranges(
     range_m[raw] -= _delays_m(placed[raw], here, recordings, notes)
     range_m -= _between_clocks_m(placed.assign(pseudorange_m=range_m), raw, here, notes)
     return placed.assign(pseudorange_m=range_m)[list(_COLUMNS)]
+
+
+def _sane_places(rows: pd.DataFrame, notes: list[str]) -> pd.DataFrame:
+    """Return rows without places at which no satellite can be."""
+    place = rows[list(PLACE)].to_numpy(dtype=np.float64)
+    away_m = np.linalg.norm(place, axis=1)
+    bad = np.isfinite(place).any(axis=1) & ~((away_m >= LOWEST_M) & (away_m <= HIGHEST_M))
+    if not bad.any():
+        return rows
+    notes.append(f"pseudoranges: {int(bad.sum())} places of satellites are none, left out")
+    return rows.assign(**{name: np.where(bad, np.nan, rows[name]) for name in PLACE})
 
 
 def _receiver(recordings: Sequence[Recording]) -> tuple[float, float, float] | None:

@@ -255,3 +255,12 @@ def test_parts_of_one_sensor_are_joined(made, tmp_path):
     paths = [tmp_path / f"TotalAcceleration{i}.csv" for i in (1, 0)]
     converted(paths, tmp_path / "log")
     assert len(read_sensors(tmp_path / "log")["accelerometer"]) == COUNT
+
+
+def test_places_where_no_satellite_can_be_are_left_out(made, tmp_path):
+    text = MADE["smartloc"][1].replace("14056711.07", "14056.71", 2)
+    text = "\n".join(line for line in text.splitlines() if not line.startswith("point3"))
+    (path,) = made("smartloc", smartloc=text.replace("4819715.57", "x", 1))
+    result = converted([path], tmp_path / "log")
+    assert "pseudoranges: 1 places of satellites are none, left out" in result.notes
+    assert read_log(tmp_path / "log").pseudoranges["x_m"].isna().sum() == 1
