@@ -54,7 +54,7 @@ Axis = Annotated[
 
 @with_options(CandidateFilter, optional=True)
 class ReadingSection(Section):
-    """``[[sweep.readings]]``: a named filter, with the keys that differ from ``[filter]``."""
+    """``[[sweep.readings]]``: a named filter, with the keys of the candidate filter that differ."""
 
     name: Annotated[str, Field(min_length=1)]
     filter: FilterName | None = None
@@ -89,7 +89,8 @@ class SweepSection(Section):
         Databases that are compared; by default that of ``[database]``.
     readings : list of section
         Filters that are compared, each as ``[[sweep.readings]]`` with a ``name`` and the keys of
-        ``[filter]`` that differ (the filter's name is called ``filter`` there).
+        ``[filter]`` that differ (the filter's name is called ``filter`` there). Options in sections
+        of their own, such as ``[filter.bayes]``, are the same for all.
     routes : int
         Routes that each point of the grid is run on.
     draws : int

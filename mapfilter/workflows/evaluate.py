@@ -28,7 +28,7 @@ from mapfilter.experiments.benchmarks.world import (
     write_buildings,
 )
 from mapfilter.experiments.sweep.world import SweepWorld, write_world
-from mapfilter.filters.gaussian import METHODS
+from mapfilter.positioning.locators import filter_options
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import predict
 from mapfilter.propagation.shadowing import named_rng
@@ -38,7 +38,7 @@ from mapfilter.roads.network import street_network
 from mapfilter.simulation.satellites import NlosModel, ReceptionModel
 from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.terminal import to_jsonable
-from mapfilter.workflows.world import World, filter_choice
+from mapfilter.workflows.world import World, filter_choice, option_sections
 
 NAMES = ("global-positioning", "audit", "ottawa")
 RUNS = 20
@@ -288,9 +288,9 @@ def _refused(key: str, config: Config) -> str:
     if not key.startswith("filter.") or key == "filter.name":
         return ""
     chosen = config.filter.name
-    *_, section, _ = key.split(".")
-    sections = {"candidate": "filter", "bayes": "bayes", "grid": "bayes"}
+    section, _, _ = key.rpartition(".")
     particles = chosen == "bayes" or key not in _OF_PARTICLES
-    if sections.get(chosen, "kalman" if chosen in METHODS else "") == section and particles:
+    options = None if ":" in chosen else filter_options(chosen)
+    if section in dict(option_sections(config.filter, options)) and particles:
         return ""
     return f"the filter {chosen} has no such option"

