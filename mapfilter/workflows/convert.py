@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, OutputError, fail
+from mapfilter.geodesy import short_crs
 from mapfilter.tracks.combine import CombineOptions, combine
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import format_of, read_recording
@@ -208,7 +209,9 @@ def report_lines(result: Converted) -> list[str]:
         lines += [f"  note: {text}" for text in file.notes]
     lines += [f"note: {note}" for note in result.notes]
     held = ", ".join(f"{name} {count}" for name, count in result.rows.items() if count)
-    lines.append(f"log: {result.log} ({result.crs[:20]}, {result.duration_s:.1f} s; {held})")
+    crs = short_crs(result.crs)
+    frame = "local frame" if crs == "unknown" else crs
+    lines.append(f"log: {result.log} ({frame}, {result.duration_s:.1f} s; {held})")
     return lines
 
 

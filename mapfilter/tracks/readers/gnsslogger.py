@@ -86,7 +86,8 @@ def _grouped(
         if line.startswith(b"#"):
             words = line.decode("utf-8", "replace").strip("# ").split(",")
             if words[0].startswith("Version"):
-                reading.program = f"GnssLogger {words[0].removeprefix('Version:').split()[0]}"
+                version = words[0].removeprefix("Version:").split()[:1]
+                reading.program = " ".join(["GnssLogger", *version])
             elif len(words) > 2:
                 names[words[0].strip()] = tuple(word.strip().lower() for word in words[1:])
             continue
