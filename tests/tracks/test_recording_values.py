@@ -120,3 +120,17 @@ def test_ephemerides_of_all_constellations_are_on_one_time(written):
     recording = read_recording(written("rinex-nav/3"))
     assert recording.tables["ionosphere"].iloc[0].tolist()[:2] == [4.657e-9, 1.49e-8]
     assert recording.notes == ("1 messages of GLONASS, SBAS or NavIC are not used",)
+
+
+def test_what_is_no_whole_number_is_missing(written):
+    text = MADE["opencellid"][1]
+    for i, word in enumerate(("1170250.0", "+1170250", "7.0.0", "1_0", "9" * 25)):
+        lines = text.splitlines()
+        lines[i + 1] = lines[i + 1].replace("1170250", word)
+        text = "\n".join(lines)
+    recording = read_recording(written("opencellid", text))
+    cells = recording.tables["radio"]["ci"].iloc[:6].tolist()
+    assert cells[:2] == [1170250.0, 1170250.0]
+    assert np.isnan(cells[2:5]).all()
+    assert cells[5] == 1170250.0
+    assert any("3 values are no numbers" in note for note in recording.notes)
