@@ -134,3 +134,13 @@ def test_what_is_no_whole_number_is_missing(written):
     assert np.isnan(cells[2:5]).all()
     assert cells[5] == 1170250.0
     assert any("3 values are no numbers" in note for note in recording.notes)
+
+
+def test_a_damaged_nanosecond_loses_only_its_row(written):
+    lines = MADE["gnsslogger"][1].splitlines()
+    at = next(i for i, line in enumerate(lines) if line.startswith("Raw,"))
+    lines[at] = lines[at].replace(",,,-", ",,,-x")
+    recording = read_recording(written("gnsslogger", "\n".join(lines)))
+    assert len(recording.tables["satellites"]) == 2 * COUNT - 1
+    assert recording.unusable[0].reason == "Raw: a time is missing"
+    assert recording.unusable[0].lines == (at + 1,)

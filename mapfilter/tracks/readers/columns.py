@@ -20,7 +20,7 @@ from mapfilter.tracks.readers.times import parse_times, unix_seconds
 SEPARATORS = ",;\t|"
 _LEAST_UNIX_S = 1e8
 _NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
-_WHOLE = r"^[-+]?\d{1,18}$"
+_WHOLE = r"^[-+]?(\d{1,18}|[0-8]\d{18})$"
 _MISSING = ("", "-", "nan", "NaN", "NA", "N/A", "null", "NULL", "None", "none", "#N/A")
 
 
