@@ -18,15 +18,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mapfilter.api import Bound as Bound
-    from mapfilter.api import Score as Score
-    from mapfilter.api import Sweep as Sweep
-    from mapfilter.api import Track as Track
-    from mapfilter.api import bound as bound
-    from mapfilter.api import locate as locate
-    from mapfilter.api import score as score
-    from mapfilter.api import simulate as simulate
-    from mapfilter.api import sweep as sweep
+    from mapfilter.api.located import Score as Score
+    from mapfilter.api.located import Track as Track
+    from mapfilter.api.located import locate as locate
+    from mapfilter.api.located import score as score
+    from mapfilter.api.studies import Bound as Bound
+    from mapfilter.api.studies import Sweep as Sweep
+    from mapfilter.api.studies import bound as bound
+    from mapfilter.api.studies import simulate as simulate
+    from mapfilter.api.studies import sweep as sweep
     from mapfilter.database.build import build as build
     from mapfilter.database.radioroutes import RadioRouteDatabase as RadioRouteDatabase
     from mapfilter.database.store import open_database as open_database
@@ -58,7 +58,8 @@ if TYPE_CHECKING:
     from mapfilter.tracks.store import write_log as write_log
 
 _NAMES = {
-    "api": "Bound Score Sweep Track bound locate score simulate sweep",
+    "api.located": "Score Track locate score",
+    "api.studies": "Bound Sweep bound simulate sweep",
     "database.build": "build",
     "database.radioroutes": "RadioRouteDatabase",
     "database.store": "open_database",

@@ -8,13 +8,13 @@ Run ``build_database.py`` first, with the same area; the settings are in ``repla
 import sys
 from pathlib import Path
 
-from mapfilter.workflows.replay import replay_facts, run_replay
+from mapfilter.workflows.replay import replay_figures, run_replay
 from mapfilter.workflows.simulate import run_simulate
 from mapfilter.workflows.terminal import Stage, run_pipeline
 
 if __name__ == "__main__":
     stages: dict[str, Stage] = {
         "simulate": run_simulate,
-        "replay": lambda config: replay_facts(run_replay(config, config.output.dir / "replay")),
+        "replay": lambda config: replay_figures(run_replay(config, config.output.dir / "replay")),
     }
     sys.exit(run_pipeline(stages, Path(__file__).with_suffix(".toml")))

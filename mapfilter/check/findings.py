@@ -1,4 +1,4 @@
-"""Findings of a check: what is wrong, where, by which numbers, and the remedy."""
+"""Findings of a check: fault, place, evidence and remedy."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ _BY_EXPECTED = {
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that is wrong with the inputs of a configuration, or looks so.
+    """A fault, or a suspected fault, of the inputs of a configuration.
 
     Parameters
     ----------

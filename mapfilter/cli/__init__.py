@@ -78,5 +78,5 @@ def _version(
 
 
 def main() -> None:
-    """Run the command line; a user's error is one clear message and exit code 2."""
+    """Run the command line; a user's error gives one message and exit code 2."""
     sys.exit(guarded(app))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_args
 
 import typer
 
@@ -28,6 +28,7 @@ from mapfilter.cli.options import (
     seeded,
     toml,
 )
+from mapfilter.tracks.schema import Without
 from mapfilter.workflows.terminal import print_message, print_result, progress_bar
 
 
@@ -215,7 +216,7 @@ def replay(
         typer.Option(
             "--without",
             metavar="KINDS",
-            help="What to leave out: gnss (fixes, pseudoranges), ta, tdoa, neighbours, radio.",
+            help=f"What to leave out, with commas between: {', '.join(get_args(Without))}.",
         ),
     ] = None,
     smooth: Annotated[
@@ -232,7 +233,7 @@ def replay(
 ) -> None:
     """Locate one log, or every log of a folder; exit code 3 if done in part."""
     from mapfilter.config.load import load_config
-    from mapfilter.workflows.replay import replay_facts, run_replay
+    from mapfilter.workflows.replay import replay_figures, run_replay
 
     given = seeded(settings, seed, "journeys.seed")
     for key, value in (("database.path", database), ("track.path", log)):
@@ -249,7 +250,7 @@ def replay(
     folder = (out or loaded.output.dir / "replay").absolute()
     with progress_bar("replay") as progress:
         result = run_replay(loaded, folder, progress=progress)
-    print_result(replay_facts(result), as_json)
+    print_result(replay_figures(result), as_json)
     for warning in result.warnings:
         print_message(warning)
     if result.partial:

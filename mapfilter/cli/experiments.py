@@ -44,7 +44,11 @@ def sweep(
     resume: ResumeOption = False,
     vary: Annotated[
         list[str] | None,
-        typer.Option("--vary", metavar="KEY=V1,V2,...", help="Values of any numeric option."),
+        typer.Option(
+            "--vary",
+            metavar="KEY=V1,V2,...",
+            help="Values of a numeric option that the sweep uses; repeatable.",
+        ),
     ] = None,
     dry_run: DryRunOption = False,
     as_json: JsonOption = False,
@@ -148,7 +152,7 @@ def evaluate(
         typer.Option(
             "--world",
             metavar="NAME",
-            help="The simulated world: plain (default), or easy, which flatters.",
+            help="Simulated world: plain (default), foreign, harsh, or easy (optimistic figures).",
         ),
     ] = None,
     data: Annotated[
@@ -178,9 +182,11 @@ def evaluate(
         RUNS,
         check_benchmark,
         load_benchmark,
+        main_table,
         run_global_positioning,
     )
-    from mapfilter.workflows.evaluate_audit import run_audit
+    from mapfilter.workflows.evaluate_audit import audit_table, run_audit
+    from mapfilter.workflows.evaluate_foreign import load_foreign, other_world, run_foreign
     from mapfilter.workflows.evaluate_ottawa import RUNS as OTTAWA_RUNS
     from mapfilter.workflows.evaluate_ottawa import run_ottawa
 
@@ -207,7 +213,10 @@ def evaluate(
     if name == "audit":
         refuse({"--world": world}, name)
         world = "easy"
-    loaded, fixed = load_benchmark(world or "plain", config, given)
+    foreign = other_world(world)
+    loaded, fixed = (
+        load_foreign(config, given) if foreign else load_benchmark(world or "plain", config, given)
+    )
     check_custom_filter(loaded)
     folder = (out or loaded.output.dir / name).absolute()
     common["runs"] = runs or RUNS
@@ -215,8 +224,12 @@ def evaluate(
         common["progress"] = progress
         if name == "audit":
             result = run_audit(config, given, folder, names=cases or (), **common)
+        elif foreign:
+            result = run_foreign(loaded, foreign, folder, cases=cases or (), fixed=fixed, **common)
         else:
             result = run_global_positioning(
                 loaded, folder, cases=cases or (), fixed=fixed, **common
             )
+    if not as_json:
+        result = audit_table(result) if name == "audit" else main_table(result)
     print_result(result, as_json)

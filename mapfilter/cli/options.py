@@ -47,7 +47,7 @@ ClusterOption = Annotated[
     str | None,
     typer.Option("--cluster", metavar="ADDRESS", help="A Dask scheduler, or local:N."),
 ]
-ResumeOption = Annotated[bool, typer.Option("--resume", help="Go on where it was cut short.")]
+ResumeOption = Annotated[bool, typer.Option("--resume", help="Continue an interrupted run.")]
 FilterOption = Annotated[
     str | None,
     typer.Option(

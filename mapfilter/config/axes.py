@@ -24,6 +24,15 @@ _NOT_USED = {
     "journeys.seed": "sweep.seed",
     "database.floor_dbm": "sweep.databases, each built with its own floor",
     "database.tile_px": "",
+    **dict.fromkeys(
+        (
+            *(f"filter.bayes.{name}" for name in ("timing_step_m", "timing_sd_m")),
+            *(f"filter.bayes.{name}" for name in ("satellite_sd_m", "antenna_height_m")),
+            "filter.bayes.antenna_height_sd_m",
+            *(f"filter.kalman.{name}" for name in ("timing_step_m", "timing_sd_m", "fix_sd_m")),
+        ),
+        "an option of replay, as sweeps simulate no such measurement",
+    ),
 }
 """Numeric options of these sections that change nothing in a sweep, and what does instead."""
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import fields
 from pathlib import Path
+from types import NoneType
 from typing import Annotated, Any, ClassVar, TypeVar
 
 from annotated_types import Ge, Le
@@ -20,7 +21,14 @@ from pydantic import (
 )
 
 from mapfilter._io import path_fault
-from mapfilter.options import Options, Positive, Words, annotations_of, describe_options
+from mapfilter.options import (
+    Options,
+    Positive,
+    Words,
+    annotations_of,
+    describe_options,
+    plain_types,
+)
 from mapfilter.positioning.locators import BUILT_IN
 
 EMBEDDED_MAP = "helsinki"
@@ -119,8 +127,8 @@ def with_options(
     """Return a class decorator that gives a section the fields of option dataclasses.
 
     Names, limits and defaults are those of the dataclasses (None if ``optional``), but for fields
-    that the section defines itself and for those in ``without``. :meth:`Section.of` returns the
-    dataclasses again.
+    that the section defines itself and for those in ``without``. A :class:`~pathlib.Path` is a
+    file's, relative to the configuration file. :meth:`Section.of` returns the dataclasses again.
     """
 
     def extended(section: type[SectionT]) -> type[SectionT]:
@@ -129,13 +137,21 @@ def with_options(
             annotations = annotations_of(kind)
             for info in describe_options(kind):
                 if info.name not in (*section.model_fields, *without):
-                    wanted = annotations[info.name]
+                    wanted = _of_file(annotations[info.name])
                     given[info.name] = (wanted | None, None) if optional else (wanted, info.default)
         made = _extended(section, given)
         made.kinds = kinds
         return made
 
     return extended
+
+
+def _of_file(annotation: Any) -> Any:
+    """Return the annotation of a key for that of an option: paths become files' paths."""
+    types = plain_types(annotation)
+    if Path not in types:
+        return annotation
+    return FilePath | None if NoneType in types else FilePath
 
 
 def with_columns(*names: str) -> Callable[[type[SectionT]], type[SectionT]]:

@@ -120,7 +120,7 @@ def _given(
 
 
 def _values(file: Path | None, settings: Sequence[str]) -> dict[str, Any]:
-    """Return what file and settings give, and nothing else."""
+    """Return the keys that file and settings give, without defaults."""
     values = _read_toml(file) if file is not None else {}
     faults = Faults()
     for setting in settings:
@@ -236,8 +236,8 @@ def _inside(annotation: Any, part: str | int) -> Any:
 def _field_at(detail: Mapping[str, Any]) -> tuple[tuple[str, ...], Any]:
     """Return keys and annotation of the field that one of pydantic's findings is of.
 
-    The place of a finding goes on with the members of a union, and ends with an element where a
-    list is too short.
+    The location of a finding also names the members of a union; of a list that is too short it
+    ends with an element.
     """
     place: tuple[str | int, ...] = detail["loc"]
     if detail["type"] == "missing" and isinstance(place[-1], int):
@@ -256,13 +256,13 @@ def _field_at(detail: Mapping[str, Any]) -> tuple[tuple[str, ...], Any]:
 
 
 def _fault(where: str, keys: Sequence[str], annotation: Any, detail: Mapping[str, Any]) -> Fault:
-    """Return the fault of a field; of an unknown key, with the one that was probably meant."""
+    """Return the fault of a field; of an unknown key, with the most similar known key."""
     kind, given = detail["type"], detail["input"]
     wanted = without_none(annotation)
     if kind == "extra_forbidden":
-        close = difflib.get_close_matches(keys[-1], list(wanted.model_fields), n=1)
+        close = difflib.get_close_matches(keys[-1], list(wanted.model_fields), n=2)
         what = "section" if len(keys) == 1 else "key"
-        return Fault(where, f"a known {what}", repr(keys[-1]), f"{close[0]!r}" if close else "")
+        return Fault(where, f"a known {what}", repr(keys[-1]), " or ".join(map(repr, close)))
     if kind == "value_error":
         got = ", ".join(given) if isinstance(given, Mapping) else shown(given)
         return Fault(where, str(detail["ctx"]["error"]), got)

@@ -80,7 +80,7 @@ def _toml(value: Any) -> str:
 
 
 def _entry(key: str, text: str) -> Iterator[str]:
-    """Yield the line of a key with its comment, which goes on below."""
+    """Yield the line of a key with its comment, continued on further lines."""
     lines = textwrap.wrap(text, _WIDTH - _COLUMN - 2, break_on_hyphens=False)
     if len(key) >= _COLUMN or not lines:
         yield key

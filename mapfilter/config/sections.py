@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from mapfilter.config.fields import Count, FilePath, FilterName, Section, with_options
 from mapfilter.config.inputs import (
@@ -25,11 +25,10 @@ from mapfilter.options import Below1, Degrees, NotNegative, Positive, Seed
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.kalman.filter import KalmanFilter
-from mapfilter.positioning.locators import BUILT_IN, filter_options
 from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
-from mapfilter.tracks.log import Without
+from mapfilter.tracks.schema import Without
 
 
 def _axis_values(value: Any) -> Any:
@@ -102,7 +101,7 @@ class SweepSection(Section):
     sigma_trans_m: Axis[NotNegative] | None = None
     sigma_orient_deg: Axis[Degrees] | None = None
     bias_sd_deg: Axis[Degrees] | None = None
-    drift_deg_per_sqrt_s: Axis[Degrees] | None = None
+    drift_deg_per_sqrt_s: Axis[NotNegative] | None = None
     scale: Axis[Below1] | None = None
     prediction_error_db: Axis[NotNegative] | None = None
     report_period_s: Axis[Positive] | None = None
@@ -193,14 +192,6 @@ class FilterSection(Section):
     smooth: bool = False
     bayes: BayesSection = BayesSection()
     kalman: KalmanSection = KalmanSection()
-
-    @model_validator(mode="after")
-    def _smooths(self) -> FilterSection:
-        smoothing = [name for name in BUILT_IN if hasattr(filter_options(name), "smooth")]
-        if self.smooth and self.name not in smoothing:
-            names = ", ".join(smoothing)
-            raise ValueError(f"no smooth (--smooth) with {self.name!r}; {names} can smooth")
-        return self
 
 
 class Output(Section):

@@ -1,1 +1,1 @@
-"""How good an estimate is, against the truth: accuracy, success, and how sure one can be of it."""
+"""Evaluation against ground truth: accuracy, success, their intervals, calibration and bounds."""

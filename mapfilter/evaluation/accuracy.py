@@ -30,7 +30,7 @@ _WINDOW_M = 100.0
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """Where the journey really went.
+    """True positions of a journey.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class Truth:
         return np.where(inside, east_m, np.nan), np.where(inside, north_m, np.nan)
 
     def distance_at(self, time_s: ArrayLike) -> Floats:
-        """Return metres really travelled since the start, at other times."""
+        """Return the true distance travelled since the start, interpolated to other times."""
         legs_m = np.hypot(np.diff(self.east_m), np.diff(self.north_m))
         travelled_m = np.concatenate([[0.0], np.cumsum(legs_m)])
         return np.asarray(np.interp(np.asarray(time_s, dtype=np.float64), self.time_s, travelled_m))
@@ -71,7 +71,7 @@ class Accuracy:
     Parameters
     ----------
     switched : bool
-        Whether the filter ever went over to tracking.
+        Whether the filter ever switched to tracking.
     success : bool
         It did, and was at most 50 m off then; never switching is a failure.
     switch_time_s, switch_distance_m, error_at_switch_m : float
@@ -145,7 +145,7 @@ class Outcome:
     final_status : str
         Status at the last epoch; empty without any epoch.
     switched : bool
-        Whether the filter ever went over to tracking.
+        Whether the filter ever switched to tracking.
     switch_time_s : float
         When, in seconds since the start of the log; NaN if it never did.
     epochs : int
@@ -159,7 +159,7 @@ class Outcome:
     unused : dict
         How many readings were not used, by reason.
     unknown_cells : dict
-        How many readings name each serving cell that is not in the database.
+        How many readings name each cell that is not in the database.
     """
 
     final_status: str

@@ -31,6 +31,7 @@ def expected_information(measurement: GaussianMeasurement, states: Floats) -> Fl
     Returns
     -------
     (K, n, n) array
+        Expected Fisher information of the state at each step.
     """
     trials, steps, n = states.shape
     factor = np.linalg.cholesky(measurement.covariance())
@@ -59,13 +60,14 @@ def posterior_bound(
     transition, process : (n, n) arrays
         Φ and the true Q.
     first_covariance : (n, n) array_like
-        Inverse of J(0), what is known before the first step.
+        Inverse of J(0), the covariance before the first step.
     information : iterable of (n, n) arrays
         Expected information of the readings of each step, 1 to K.
 
     Returns
     -------
     (K, n, n) array
+        Lower bound on the covariance of the estimate after each step, 1 to K.
 
     Raises
     ------

@@ -1,9 +1,9 @@
-"""How far one travels until it is clear where one is: an ideal filter, tried on drawn journeys.
+"""Distance to the first unambiguous fix: an ideal filter on simulated journeys.
 
 From each start a journey is drawn along the map: straight on where that is possible, now and then
 round a corner. Every place of the first serving cell is a hypothesis; the motion is known without
-error, so that all of them move alike, and those that leave the map are dropped. What is left is
-judged twice:
+error, so that all of them move alike, and those that leave the map are dropped. The rest is
+evaluated twice:
 
 - by cells: those stay at which the serving cell of the truth would serve, too, within the
   database's margin, as in Khalaf-Allah (2007). Serving cells are as predicted. This is exact for
@@ -50,7 +50,7 @@ _HOPELESS = 30.0
 
 @dataclass(frozen=True, slots=True)
 class FirstFixOptions(Options):
-    """Journeys of the ideal filter, and when its position counts as clear.
+    """Journeys of the ideal filter, and the criterion of an unambiguous position.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class FirstFix:
 def walk(rng, on_way, row, col, resolution_m, most_m):  # type: ignore[no-untyped-def]
     """Draw a journey over the points, two pixels a step in one of 16 directions.
 
-    The farther the map goes on in a direction and the straighter it is on, the likelier it is.
+    The probability of a direction grows with the length and straightness of the map along it.
 
     Returns
     -------
@@ -176,7 +176,7 @@ class Levels(NamedTuple):
 
 
 class Judgement(NamedTuple):
-    """Errors of levels, and when a journey counts as clear, for the kernels."""
+    """Errors of levels and the criterion of an unambiguous position, for the kernels."""
 
     deviation_db: float
     correlation_m: float

@@ -1,4 +1,4 @@
-"""Where a radio map will work, before anybody drives: all bounds together, by point and by way.
+"""Expected accuracy of a radio map without measurements: all bounds, by point and by way.
 
 Of two places that differ by levels d, one report with error covariance S decides which it is with
 a probability of error of at most half the Bhattacharyya coefficient, exp(-d' S⁻¹ d / 8) (Kailath
@@ -49,7 +49,7 @@ BANDS = (
     ("levels_to_fix_m", "m"),
     ("twin_error", ""),
 )
-"""What the raster holds, in the order of its bands, with units."""
+"""Bands of the raster in their order, with units."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,7 +116,7 @@ def _mean_overlap(  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class MapBound:
-    """What a radio map is good for."""
+    """Bounds of a radio map at its points and ways."""
 
     radio: RadioMap
     options: FirstFixOptions
@@ -191,7 +191,7 @@ class MapBound:
         return found.assign(starts=found["starts"].fillna(0).astype(np.int64))
 
     def twins(self) -> pd.DataFrame:
-        """Return the places that look alike, the worst first: one row for a start at most."""
+        """Return places with similar levels, the worst first; at most one row for each start."""
         fix, lattice = self.fix, self.radio.lattice
         journey = np.argmax(fix.twin_error, axis=1)
         each = np.arange(fix.start.size)
@@ -253,7 +253,7 @@ def map_bound(
     rng: np.random.Generator,
     progress: Progress | None = None,
 ) -> MapBound:
-    """Return all bounds of a radio map; for what they mean see the modules that make each."""
+    """Return all bounds of a radio map, as defined in the modules that compute them."""
     return MapBound(
         radio,
         options,

@@ -101,7 +101,7 @@ class RadioMap:
         return int(self.row.size)
 
     def points_by_cell(self) -> tuple[Ints, Ints]:
-        """Return the points where one can be when a cell serves, for all cells.
+        """Return the points at which each cell can serve.
 
         A point belongs to its strongest cell and to those at most the margin weaker.
 

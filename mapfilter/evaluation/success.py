@@ -39,7 +39,7 @@ def wilson_interval_of_routes(
 ) -> tuple[float, float]:
     """Return the Wilson interval of a share over all routes, from that of some routes.
 
-    Runs on one route are alike, so many runs on few routes say less than their number. The variance
+    Runs on one route are correlated: the effective sample size is below their number. The variance
     of the share is taken from the scatter of the routes (the ratio estimator of cluster sampling),
     and the interval is Wilson's for as many independent runs as have that variance (Korn and
     Graubard 1998). Where all routes succeed or all fail, each route counts as one run, and where

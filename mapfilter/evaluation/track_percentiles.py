@@ -1,7 +1,7 @@
-"""Percentiles of errors over several tracks, and how sure one can be of them.
+"""Percentiles of errors over several tracks, with confidence intervals.
 
-Errors of one track resemble each other, so that many epochs say less than they seem to: whole
-tracks are drawn anew (Davison & Hinkley, *Bootstrap Methods and their Application*, 1997, section
+Errors of one track are correlated, so that its epochs are not independent samples: whole tracks are
+resampled (Davison & Hinkley, *Bootstrap Methods and their Application*, 1997, section
 3.8).
 """
 

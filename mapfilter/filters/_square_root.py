@@ -28,7 +28,7 @@ kernel = njit(cache=True, nogil=True, error_model="numpy")
 
 
 class Problem(NamedTuple):
-    """Measurement, method and motion as kernels take them; alike in all lanes and steps.
+    """Measurement, method and motion for the kernels; equal in all lanes and steps.
 
     Parameters
     ----------

@@ -54,9 +54,9 @@ class CandidateOptions(Options):
     at_threshold : {"switch", "stall"}
         n = α is covered by neither branch of Table 2: the filter switches, or, as printed, stalls.
     switch_check : {"next_call", "same_call"}
-        As printed, Table 2 finds out at the next call that few are left and gives up that call's
-        motion, 22 m where a call is that long; "same_call" looks right after the update, which
-        alone gives errors as small as the paper's Table 4.
+        As printed, Table 2 checks the number of candidates at the next call and discards the motion
+        of that call, such as 22 m; "same_call" checks right after the update, which alone gives
+        errors as small as the paper's Table 4.
     when_empty : {"fail", "reinitialise"}
         With no candidate left the run has failed, or starts again from the serving cell's points.
     """

@@ -40,6 +40,7 @@ class Reason(StrEnum):
     NO_SERVING_CELL = "no_serving_cell"
     SECOND_SERVING_CELL = "second_serving_cell"
     UNKNOWN_CELL = "unknown_cell"
+    NO_CELL = "no_cell"
     NO_POINTS_IN_CELL = "no_points_in_cell"
     NO_CANDIDATES_LEFT = "no_candidates_left"
     NO_HEADING = "no_heading"

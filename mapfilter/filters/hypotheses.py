@@ -195,7 +195,7 @@ def _summarise(
 def _mean_near(
     east: Floats32, north: Floats32, weight: Floats32, x: float, y: float
 ) -> tuple[float, float]:
-    """Return the mean of what lies near a place, or the place where nothing does."""
+    """Return the mean of the hypotheses near a place, or the place itself without any."""
     cx, cy, reach = np.float32(x), np.float32(y), np.float32(NEAR_M**2)
     total, sx, sy = np.float32(0.0), np.float32(0.0), np.float32(0.0)
     for i in range(weight.size):

@@ -1,4 +1,4 @@
-"""Kalman-type filters step by step: predict, then update with whatever was measured; smoothing.
+"""Kalman-type filters step by step: prediction, update with the measurements present, smoothing.
 
 The arithmetic of a step is that of :mod:`mapfilter.filters.trials`, for one belief.
 """
@@ -60,7 +60,7 @@ def predict(
 def update(
     belief: Gaussian, measurement: CompiledMeasurement, reading: ArrayLike, method: Method
 ) -> tuple[Gaussian, Taken]:
-    """Return the belief after a reading (NaN where absent), and what became of the reading.
+    """Return the belief after a reading (NaN where absent), and the outcome of the update.
 
     Raises
     ------

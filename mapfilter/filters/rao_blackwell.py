@@ -167,7 +167,7 @@ def update(
     options: SirOptions = SIR,
     loading: Floats | None = None,
 ) -> tuple[MixedBelief, Taken]:
-    """Return the belief after a reading, and what became of the reading.
+    """Return the belief after a reading, and the outcome of the update.
 
     Parameters
     ----------
@@ -178,10 +178,11 @@ def update(
     reading : (m,) array_like
         NaN where absent.
     rng : numpy.random.Generator
+        Draws are made only where particles are resampled.
     options : SirOptions
         When to resample.
     loading : (m, n) array, optional
-        What else of the components that are not sampled adds to the reading, such as shadowing:
+        Linear contribution of components that are not sampled, such as shadowing, to the reading:
         ``y = h(x) + loading x + v``.
 
     Returns

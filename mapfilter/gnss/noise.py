@@ -55,11 +55,14 @@ def multipath_bias_m(
     Returns
     -------
     (K, S) array
+        Excess of the pseudorange of each of S satellites at each of K epochs, in metres.
     """
     travelled = np.asarray(travelled_m, dtype=np.float64)
     if not (mean_m >= 0 and correlation_m > 0 and (np.diff(travelled) >= 0).all()):
         got = f"{mean_m} m, {correlation_m} m"
-        raise fail(InputError, "multipath", "mean >= 0, length > 0, a way that goes on", got)
+        raise fail(
+            InputError, "multipath", "mean >= 0, length > 0, distances that never decrease", got
+        )
     drawn = correlated_along(travelled, satellites, correlation_m, rng)
     # The logarithm of the upper tail of a normal is that of a uniform number.
     return np.asarray(-mean_m * log_ndtr(-drawn))

@@ -343,6 +343,7 @@ def satellite_positions_m(
     Returns
     -------
     (S, 3) or (K, S, 3) array
+        Earth-centred x, y and z of S satellites in metres, for one time or for each of K.
 
     Raises
     ------

@@ -197,7 +197,7 @@ def independent(
     step: float = 0.0,
     patterns: Floats | None = None,
 ) -> GaussianTerms:
-    """Return a measurement of independent components, or raise what was found wrong with it."""
+    """Return a measurement of independent components, or raise its faults."""
     faults.raise_if_any(InputError)
     names = tuple(f"{name} {index}" for index in range(len(rows)))
     samples = np.zeros(1) if patterns is None else patterns

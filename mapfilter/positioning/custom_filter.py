@@ -250,11 +250,13 @@ class CustomEpochFilter(Filter[Any]):
 
     def smoother(self) -> Smoother | None:
         """Return the filter's smoother, where it has one."""
-        return self.filter.smoother() if hasattr(self.filter, "smoother") else None
+        with wrap_user_errors(self.name, self.filter):
+            return self.filter.smoother() if hasattr(self.filter, "smoother") else None
 
     def hypotheses(self, state: Any) -> Hypotheses | None:
         """Return the filter's hypotheses, where it shows them."""
-        return self.filter.hypotheses(state) if hasattr(self.filter, "hypotheses") else None
+        with wrap_user_errors(self.name, self.filter):
+            return self.filter.hypotheses(state) if hasattr(self.filter, "hypotheses") else None
 
     def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> Any:
         """Return the state before the first epoch."""

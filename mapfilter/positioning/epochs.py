@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from math import isfinite, nan
-from typing import TypeVar
+from math import isfinite, isnan, nan
+from typing import Any, NamedTuple
 
 import pandas as pd
 
 from mapfilter.filters.contract import MotionStep
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.schema import SCHEMA, SERVING
-
-RowT = TypeVar("RowT")
+from mapfilter.tracks.schema import SCHEMA, SERVING, TABLES
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,42 +116,47 @@ class Epoch:
 
     @property
     def measured(self) -> bool:
-        """Whether something besides motion was measured."""
-        return any(getattr(self, one.name) for one in fields(self)[2:])
+        """Whether something besides motion was measured; NaN, None and ``()`` are no reading."""
+        return any(_is_reading(getattr(self, one.name)) for one in fields(self)[2:])
+
+
+def _is_reading(value: Any) -> bool:
+    missing = value is None or value == () or (isinstance(value, float) and isnan(value))
+    return not missing
 
 
 def epochs(log: TrackLog) -> list[Epoch]:
     """Merge a log's tables by time."""
-    motion = _by_time(log, "motion", MotionStep)
-    radio = _by_time(log, "radio", _report_row)
-    fixes = _by_time(log, "gnss", GnssFix)
-    ranges = _by_time(log, "pseudoranges", _pseudorange)
-    differences = _by_time(log, "tdoa", Difference)
-    times = motion.keys() | radio.keys() | fixes.keys() | ranges.keys() | differences.keys()
+    found = {
+        name: _by_time(log, name, _FIELDS[name].row)
+        for name, table in TABLES.items()
+        if table.kinds
+    }
+    times = set[float]().union(*found.values())
     return [
         Epoch(
             time_s,
-            tuple(motion.get(time_s, ())),
-            tuple(radio.get(time_s, ())),
-            fixes[time_s][-1] if time_s in fixes else None,
-            tuple(ranges.get(time_s, ())),
-            tuple(differences.get(time_s, ())),
+            **{
+                _FIELDS[name].name: _FIELDS[name].of_rows(rows[time_s])
+                for name, rows in found.items()
+                if time_s in rows
+            },
         )
         for time_s in sorted(times)
     ]
 
 
-def _by_time(log: TrackLog, table: str, make: Callable[..., RowT]) -> dict[float, list[RowT]]:
-    """Return what ``make`` makes of the columns of each row, by time."""
+def _by_time(log: TrackLog, table: str, row: Callable[..., Any]) -> dict[float, list[Any]]:
+    """Return what ``row`` makes of the columns of each row, by time."""
     rows, columns = getattr(log, table), []
     for column in (rows[known.name] for known in SCHEMA[table][1:] if not known.optional):
         values = column.tolist()
         if str(column.dtype) in ("Int64", "Int8", "object", "str", "string"):
             values = [None if value is pd.NA or value != value else value for value in values]
         columns.append(values)
-    found: dict[float, list[RowT]] = {}
+    found: dict[float, list[Any]] = {}
     for time_s, *values in zip(rows["time_s"].tolist(), *columns, strict=True):
-        found.setdefault(time_s, []).append(make(*values))
+        found.setdefault(time_s, []).append(row(*values))
     return found
 
 
@@ -166,6 +169,28 @@ def _report_row(
 
 def _pseudorange(name: str, range_m: float, sigma_m: float, *place_m: float) -> Pseudorange:
     return Pseudorange(name, range_m, sigma_m, (place_m[0], place_m[1], place_m[2]))
+
+
+def _last(rows: list[Any]) -> Any:
+    return rows[-1]
+
+
+class _Field(NamedTuple):
+    """A field of an epoch: its name, a row by the columns of its table, and the rows of a time."""
+
+    name: str
+    row: Callable[..., Any]
+    of_rows: Callable[[list[Any]], Any] = tuple
+
+
+_FIELDS = {
+    "motion": _Field("motion", MotionStep),
+    "radio": _Field("radio", _report_row),
+    "gnss": _Field("fix", GnssFix, _last),
+    "pseudoranges": _Field("ranges", _pseudorange),
+    "tdoa": _Field("differences", Difference),
+}
+"""The field of each table of :data:`mapfilter.tracks.schema.TABLES` that holds measurements."""
 
 
 def headed(step: MotionStep, heading_rad: float) -> tuple[MotionStep, float]:

@@ -28,13 +28,13 @@ class Fix:
     east_m, north_m : float
         Position in the database's CRS; NaN while the filter gives none.
     covariance_m2 : (2, 2) array
-        East, north.
+        Covariance of east and north; NaN where the filter has none.
     radii_m : (3,) array
         Radii that hold 50, 67 and 95 % of the belief.
     status : Status
         SEARCHING, CONVERGED, TRACKING or LOST.
     hypotheses : int
-        Position hypotheses still held.
+        Number of hypotheses (candidates, particles or Gaussians).
     mass_50m : float
         Share of the belief within 50 m of the leading hypothesis.
     way_id : int
@@ -141,13 +141,27 @@ class TrackEstimate:
         Name of the filter.
     start_utc_s : float
         UTC seconds of ``time_s`` = 0; NaN when unknown.
-    time_s, east_m, north_m : (N,) arrays
-        See :class:`Fix`.
+    time_s : (N,) array
+        Seconds since the start of the log, in ascending order.
+    east_m, north_m : (N,) arrays
+        Position in ``crs``; NaN where the filter gives none.
     covariance_m2 : (N, 2, 2) array
+        Covariance of east and north; NaN where the filter has none.
     radii_m : (N, 3) array
-        For 50, 67 and 95 %.
-    hypotheses, way_id : (N,) integer arrays
-    mass_50m, way_probability : (N,) arrays
+        Radii about the position that contain 50, 67 and 95 % of the belief.
+    status : tuple of Status
+        SEARCHING, CONVERGED, TRACKING or LOST, for each epoch.
+    hypotheses : (N,) array of int64
+        Number of hypotheses (candidates, particles or Gaussians).
+    mass_50m : (N,) array
+        Share of the belief within 50 m of the leading hypothesis, 0 to 1; NaN where
+        the filter gives none.
+    way_id : (N,) array of int64
+        OpenStreetMap id of the matched way; 0 where none is matched.
+    way_probability : (N,) array
+        Probability of the matched way, 0 to 1; NaN where the filter gives none.
+    reason : tuple of Reason
+        Whether the reading of each epoch was used, or why not.
     unused : tuple of UnusedReading
         Every reading not used, and why.
     evidence : TrackEvidence or None

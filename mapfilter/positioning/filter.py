@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, nan
-from typing import Any, Generic, Protocol, TypeVar, get_args
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -29,13 +29,13 @@ from mapfilter.positioning.estimate import (
     TrackEstimate,
     UnusedReading,
 )
-from mapfilter.tracks.log import Kind as Kind
 from mapfilter.tracks.log import TrackLog, rows_by_kind
+from mapfilter.tracks.schema import ALL_KINDS as ALL_KINDS
+from mapfilter.tracks.schema import TABLES
+from mapfilter.tracks.schema import Kind as Kind
 
-ALL_KINDS: frozenset[Kind] = frozenset(get_args(Kind))
-_TABLE_OF = {"pseudorange": "pseudoranges"}
-_KEPT = {"motion", "serving", "neighbour"}
-"""Kinds whose rows stay, as they make the epochs."""
+_KEPT = ("motion", "radio")
+"""Tables whose rows stay, as they make the epochs."""
 _SNAPSHOT_EVERY_M = 20.0
 
 StateT = TypeVar("StateT")
@@ -201,7 +201,11 @@ def usable_part(log: TrackLog, filter_: Filter[Any]) -> tuple[TrackLog, list[Unu
         for kind, found in rows.items()
         if kind not in uses and len(found)
     ]
-    idle = [_TABLE_OF.get(kind, str(kind)) for kind in rows.keys() - uses - _KEPT]
+    idle = [
+        name
+        for name, table in TABLES.items()
+        if table.kinds and name not in _KEPT and uses.isdisjoint(table.kinds)
+    ]
     return replace(log, **{table: getattr(log, table).iloc[:0] for table in idle}), unused
 
 

@@ -114,7 +114,7 @@ class PredictionModel(Options):
     seed: Seed = 0
 
     def check(self, faults: Faults) -> None:
-        """See that the model has a probability of line of sight where one is asked for."""
+        """Check that the model defines a probability of line of sight where that is configured."""
         if self.line_of_sight == "probability" and not str(self.model).startswith("tr38901"):
             expected = "buildings, as only tr38901_uma and tr38901_umi have a probability"
             faults.add("prediction, line_of_sight", expected, "probability")

@@ -104,10 +104,10 @@ def simulate_ground_truth(
     *,
     antennas: Antennas | None = None,
 ) -> Iterator[tuple[str, Floats32]]:
-    """Simulate the ground truth: how the cells of a prediction are really received.
+    """Simulate the ground truth: true levels that differ from the prediction.
 
-    No filter is to be judged on its own prediction. EIRP, azimuth and path-loss slope of each cell
-    are off by uniformly drawn amounts; shadowing that is independent of the prediction's is added;
+    A filter must not be evaluated on its own prediction. EIRP, azimuth and path-loss slope of each
+    cell have uniformly drawn errors; shadowing that is independent of the prediction's is added;
     propagation model, street widths and roofs may differ. Every draw depends on the seed and on
     names only: adding a cell changes no other.
 

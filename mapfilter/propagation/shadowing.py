@@ -118,7 +118,7 @@ def site_shadowing(
 
 
 def named_rng(seed: int, *names: str) -> np.random.Generator:
-    """Return a generator that depends only on a seed and names, alike on every machine.
+    """Return a generator that depends only on a seed and names, equal on every machine.
 
     Examples
     --------

@@ -26,7 +26,7 @@ _LONGEST_SHOWN = 80
 
 @dataclass(slots=True)
 class Row:
-    """A line of the file: its number, its values by field of a cell, and whether any is wrong."""
+    """A line of the file: its number, its values by field of a cell, and whether any is invalid."""
 
     line: int
     values: dict[str, Any]

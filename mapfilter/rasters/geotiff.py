@@ -225,7 +225,7 @@ def _quantity(source: Any) -> Quantity | None:
 def _lattice(
     where: str, source: Any, declared: str | None, placed: bool, faults: Faults
 ) -> Lattice | None:
-    """Return where the pixels lie, or None; what is wrong with the file is added to ``faults``."""
+    """Return the lattice of the pixels, or None; faults of the file are added to ``faults``."""
     crs = None
     try:
         text = source.crs.to_wkt() if source.crs else declared
@@ -267,7 +267,7 @@ def _check_bands(where: str, names: tuple[str, ...], dtypes: Sequence[str], faul
 
 
 def _check_extent_of_file(path: Path, source: Any) -> None:
-    """Compare what the header of a TIFF promises with the bytes that are there."""
+    """Compare the size by the header of a TIFF with that of the file."""
     size_bytes = path.stat().st_size
     rows_px, cols_px = source.block_shapes[0]
     down, across = -(-source.height // rows_px), -(-source.width // cols_px)

@@ -62,7 +62,7 @@ _LONGEST_NUMBER = 64
 class GridHeader:
     """The header of the file ``where``: keys in capitals with their values, as texts.
 
-    What is wrong with the values that were asked for is noted in ``faults``.
+    Faults of the requested values are added to ``faults``.
     """
 
     where: str

@@ -58,7 +58,7 @@ class BaseMap:
     streets: tuple[Floats, ...] = ()
     """Lines, arrays (k, 2), as east, north."""
     points_m: Floats | None = None
-    """Places where one can be, (n, 2), as east, north, on a lattice; drawn as pale pixels."""
+    """Points of the map, (n, 2), as east, north, on a lattice; drawn as pale pixels."""
     attribution: str = ""
     """Owner of the map, such as "© OpenStreetMap contributors"; drawn small in a corner."""
     resolution_m: float = 5.0

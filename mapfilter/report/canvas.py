@@ -75,7 +75,7 @@ _STYLE: dict[Any, Any] = {
 }
 
 Drawn = Axes | Figure
-"""What a ``plot_*`` function returns."""
+"""Result of a ``plot_*`` function."""
 
 Look = dict[str, Any]
 """Keywords of artists: ``Look(color=BLUE, linewidth=1.5)``."""

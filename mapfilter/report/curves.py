@@ -258,7 +258,7 @@ def plot_scene(
 
 
 class SeenMap(NamedTuple):
-    """Counts of satellites on a grid, (rows, cols), from the north; NaN where nobody can be.
+    """Counts of satellites on a grid, (rows, cols), from the north; NaN inside buildings.
 
     ``extent_m`` is west, east, south, north.
     """

@@ -296,7 +296,7 @@ def _finish(axes: Axes, base: BaseMap, plan: CellPlan, title: str) -> None:
 def plot_landuse(
     landuse: LandUse, lattice: Lattice, base: BaseMap, *, title: str = "Land use"
 ) -> Figure:
-    """Draw the classes beside where one can walk, with each one's share of the area.
+    """Draw the classes beside the walkable places, with the share of each class in the area.
 
     Classes that are nowhere in the area are left out of the legend.
     """
@@ -369,7 +369,7 @@ def plot_twins(
     plan: CellPlan,
     base: BaseMap,
 ) -> Axes:
-    """Draw how alike each point's twin looks, and the worst pairs joined by lines.
+    """Draw the similarity of each point's twin, and the worst pairs joined by lines.
 
     The probability of an error is 0 to 0.5; ``pairs_m``, (n, 4), are east and north of both
     places, the worst first, of which some are drawn.

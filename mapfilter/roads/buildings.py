@@ -116,6 +116,7 @@ def rasterise_heights(buildings: Buildings, lattice: Lattice) -> Floats32:
     Returns
     -------
     numpy.ndarray of float32, shape (lattice.rows, lattice.cols)
+        Heights in metres; row 0 is in the north.
 
     Examples
     --------

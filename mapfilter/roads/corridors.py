@@ -189,7 +189,7 @@ def corridors(
     max_gap_m: float = MAX_GAP_M,
     min_sessions: int = 1,
 ) -> Corridors:
-    """Return the ways along which sessions went.
+    """Return the ways that the tracks of sessions follow.
 
     Parameters
     ----------

@@ -198,11 +198,11 @@ class RouteSource:
 
     def tile(self, window: Lattice) -> RouteLattice:
         """Return the route lattice of a window; the same points as on the whole lattice."""
-        on_square = _mask(self.squares, window)
+        on_square = inside_areas(self.squares, window)
         way, distance_m = self.ways.reaching(window)
-        allowed = ((way >= 0) | on_square) & ~_mask(self.buildings, window)
+        allowed = ((way >= 0) | on_square) & ~inside_areas(self.buildings, window)
         if self.water is not None and self.bridges is not None:
-            wet = _mask(self.water, window)
+            wet = inside_areas(self.water, window)
             if np.any(wet & allowed):
                 allowed &= ~wet | (self.bridges.reaching(window)[0] >= 0)
         return described(allowed, window, on_square, self.ways, (way, distance_m), SQUARE_CLASS)
@@ -266,7 +266,7 @@ def described(
     )
 
 
-def _mask(areas: STRtree | None, window: Lattice) -> Bools:
+def inside_areas(areas: STRtree | None, window: Lattice) -> Bools:
     """Return which pixel centres of a window lie in a polygon, shape (rows, cols)."""
     near = np.empty(0) if areas is None else areas_near(areas, window)
     return burn(((shape, 1) for shape in near), window, "uint8").astype(bool)

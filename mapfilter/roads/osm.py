@@ -129,11 +129,11 @@ def _is_area(found: GeoDataFrame) -> Bools:
 def _allowed(found: GeoDataFrame, profile: Profile) -> Bools:
     if profile == "walking":
         return _walkable(found) & np.asarray(found["highway"].isin(WALKING_CLASSES), np.bool_)
-    verdict = np.where(found["access"].isin(_FORBIDDING), -1, 0)
+    allowed = np.where(found["access"].isin(_FORBIDDING), -1, 0)
     for tag in ("vehicle", "motor_vehicle", "motorcar"):
-        verdict = np.where(found[tag].isin(_ALLOWING), 1, verdict)
-        verdict = np.where(found[tag].isin(_FORBIDDING), -1, verdict)
-    return np.asarray(found["highway"].isin(DRIVING_CLASSES) & (verdict >= 0), dtype=np.bool_)
+        allowed = np.where(found[tag].isin(_ALLOWING), 1, allowed)
+        allowed = np.where(found[tag].isin(_FORBIDDING), -1, allowed)
+    return np.asarray(found["highway"].isin(DRIVING_CLASSES) & (allowed >= 0), dtype=np.bool_)
 
 
 def _walkable(found: GeoDataFrame) -> Bools:

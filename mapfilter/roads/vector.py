@@ -154,7 +154,7 @@ def _features(
 
 
 def _check_file(path: Path) -> None:
-    """See that there is a file which holds its data itself, and not too much of it."""
+    """Check that a file exists, holds its data itself, and is not too large."""
     if not path.exists():
         hint = "a mistyped path, or one relative to another folder"
         raise fail(InputError, str(path), "a vector file", "no such file", hint)

@@ -265,7 +265,7 @@ def _about_half(uneven: float, rng: np.random.Generator) -> float:
 
 
 def bend(at: Floats, old_town_m: float, phases: Floats) -> Floats:
-    """Move places (N, 2) a little, most of all in the old town; what crosses goes on crossing.
+    """Displace points (N, 2) slightly, most in the old town; crossings are preserved.
 
     ``phases`` are those of the waves in radians, shape (2, 3).
     """

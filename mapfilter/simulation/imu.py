@@ -62,7 +62,7 @@ class ImuNoise(Options):
     sigma_trans_m: NotNegative = 0.2
     sigma_orient_deg: Degrees = 3.0
     bias_sd_deg: Degrees = 0.0
-    drift_deg_per_sqrt_s: Degrees = 0.0
+    drift_deg_per_sqrt_s: NotNegative = 0.0
     scale: Below1 = 0.0
     translation_noise: TranslationNoise = "zero_mean"
     heading_correlation_s: NotNegative = 0.0

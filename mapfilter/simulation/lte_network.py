@@ -1,4 +1,4 @@
-"""A hexagonal LTE network as it is received: sites of three sectors, levels, SINR, arrival times.
+"""Reception of a hexagonal LTE network: sites of three sectors, levels, SINR, arrival times.
 
 All sectors send at once and in the same band, so that each is received against all others. All
 times are distances (m), times of arrival times the speed of light.
@@ -97,7 +97,7 @@ def sites_along(
     shared: float,
     rng: np.random.Generator,
 ) -> Floats:
-    """Draw standard normal numbers for sites, part of which is common: what is near the receiver.
+    """Draw standard normal numbers for sites, with a part that all sites have in common.
 
     The correlation along the way, given as ``travelled_m`` of shape (K,), is
     ``exp(-d / correlation_m)``; ``shared`` is that of any two sites. The result is (K, sites).
@@ -137,6 +137,7 @@ def sector_levels_dbm(
     Returns
     -------
     (K, S, 3) array
+        Levels in dBm of the three sectors of each site at each place.
     """
     away = places_m[:, None] - sites_m
     distance = np.maximum(np.hypot(away[..., 0], away[..., 1]), _LEAST_DISTANCE_M)

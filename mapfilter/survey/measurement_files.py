@@ -384,7 +384,7 @@ def _iso(time: str) -> str:
 
 
 def _open_text(path: Path) -> TextIO:
-    """Open a file as text in which a wrong byte spoils only its own row."""
+    """Open a file as text in which an invalid byte invalidates only its own row."""
     try:
         with path.open("rb") as stream:
             head = stream.read(2)

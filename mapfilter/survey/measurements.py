@@ -1,4 +1,4 @@
-"""Measured levels with positions: drive tests and walks, from whatever logged them."""
+"""Measured levels with positions: drive tests and walks of any logging program."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from typing import Any, Literal
+from typing import Any, get_args
 
 import numpy as np
 import pandas as pd
@@ -21,12 +21,12 @@ from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import projected_crs, short_crs
 from mapfilter.gnss.orbits import Almanac
 from mapfilter.tracks.satellites import place_satellites
-from mapfilter.tracks.schema import NEIGHBOUR, PLACE, SERVING, TABLES, tidy_table
+from mapfilter.tracks.schema import NEIGHBOUR, PLACE, TABLES, Kind, Without
+from mapfilter.tracks.tables import tidy_table
 
-Kind = Literal["motion", "serving", "neighbour", "gnss", "pseudorange", "tdoa"]
-"""Kinds of measurements that a log may hold."""
-Without = Literal["gnss", "fixes", "pseudoranges", "ta", "tdoa", "neighbours", "radio"]
-"""What can be left out of a log."""
+_PART_OF: dict[Without, str] = {"fixes": "gnss", "ta": "radio", "neighbours": "radio"}
+"""Tables of those parts that are not left out by the name of their table."""
+
 
 # Tables may begin this long after another ends.
 _APART_S = 600.0
@@ -325,6 +325,8 @@ def make_log(
     >>> make_log("EPSG:32629", motion=pd.DataFrame({"time": seen, "step_m": [30.0, 33.0]}))
     TrackLog(EPSG:32629, 30.0 s from 2026-05-01 10:00:00 UTC; rows: motion 2)
     """
+    # Each table is an argument by its name: one without an argument is an error in every call.
+    arguments = locals()
     faults, called, numbers = Faults(), names or {}, row_numbers or {}
     whole = called.get("log", "log")
     try:
@@ -334,8 +336,7 @@ def make_log(
         crs = projected_crs(crs, f"{whole}, crs")
     except InputError as error:
         faults.found.extend(error.faults)
-    every = zip(TABLES, (motion, radio, gnss, pseudoranges, tdoa, truth), strict=True)
-    present = {table: rows for table, rows in every if rows is not None}
+    present = {table: rows for table in TABLES if (rows := arguments[table]) is not None}
     given, start_utc_s = _seconds(present, float(start_utc_s), called, faults)
     tables, every_note = dict[str, pd.DataFrame](), tuple(notes)
     for table in TABLES:
@@ -361,15 +362,12 @@ def make_log(
 
 def rows_by_kind(log: TrackLog) -> dict[Kind, pd.DataFrame]:
     """Return the rows of each kind of measurement."""
-    serving = log.radio["role"] == SERVING
-    return {
-        "motion": log.motion,
-        "serving": log.radio[serving],
-        "neighbour": log.radio[~serving],
-        "gnss": log.gnss,
-        "pseudorange": log.pseudoranges,
-        "tdoa": log.tdoa,
-    }
+    found: dict[Kind, pd.DataFrame] = {}
+    for name, table in TABLES.items():
+        rows = getattr(log, name)
+        for kind in table.kinds:
+            found[kind] = rows if len(table.kinds) == 1 else rows[rows["role"] == kind]
+    return found
 
 
 def leave_out(log: TrackLog, kinds: Collection[Without]) -> TrackLog:
@@ -378,8 +376,9 @@ def leave_out(log: TrackLog, kinds: Collection[Without]) -> TrackLog:
     Parameters
     ----------
     kinds : collection of str
-        ``gnss`` (``fixes`` and ``pseudoranges``), ``ta`` (timing advances; their reports stay),
-        ``tdoa``, ``neighbours`` (all cells but the serving one) and ``radio`` (all reports).
+        Tables by their names, such as ``tdoa`` and ``radio`` (all reports); ``gnss`` leaves out
+        ``fixes`` and ``pseudoranges``. Of the reports: ``ta`` (timing advances) and ``neighbours``
+        (all cells but the serving one).
 
     Examples
     --------
@@ -391,26 +390,24 @@ def leave_out(log: TrackLog, kinds: Collection[Without]) -> TrackLog:
     >>> print(*alone.notes, sep="; ")
     ta: 1 left out; neighbours: 1 left out
     """
-    radio, gnss, ranges, tdoa = log.radio, log.gnss, log.pseudoranges, log.tdoa
-    left: dict[str, int] = {}
-    if "gnss" in kinds or "fixes" in kinds:
-        left["gnss" if "gnss" in kinds else "fixes"] = len(gnss)
-        gnss = gnss.iloc[:0]
-    if "pseudoranges" in kinds or ("gnss" in kinds and len(ranges)):
-        left["pseudoranges"] = len(ranges)
-        ranges = ranges.iloc[:0]
-    if "ta" in kinds:
-        left["ta"] = int(radio["timing_advance"].notna().sum())
-        radio = radio.assign(timing_advance=pd.array([pd.NA] * len(radio), dtype="Int64"))
-    if "tdoa" in kinds:
-        left["tdoa"] = len(tdoa)
-        tdoa = tdoa.iloc[:0]
-    if "radio" in kinds:
-        left["radio"] = len(radio)
-        radio = radio.iloc[:0]
-    elif "neighbours" in kinds:
-        neighbour = radio["role"] == NEIGHBOUR
-        left["neighbours"] = int(neighbour.sum())
-        radio = radio[~neighbour].reset_index(drop=True)
-    notes = (*log.notes, *(f"{kind}: {count} left out" for kind, count in left.items()))
-    return replace(log, radio=radio, gnss=gnss, pseudoranges=ranges, tdoa=tdoa, notes=notes)
+    wanted, notes = set(kinds), list(log.notes)
+    if "gnss" in wanted:
+        wanted.discard("fixes")
+        if len(log.pseudoranges):
+            wanted.add("pseudoranges")
+    if "radio" in wanted:
+        wanted.discard("neighbours")
+    for kind in (one for one in get_args(Without) if one in wanted):
+        table = _PART_OF.get(kind, kind)
+        rows = getattr(log, table)
+        if kind == "ta":
+            count = int(rows["timing_advance"].notna().sum())
+            kept = rows.assign(timing_advance=pd.array([pd.NA] * len(rows), dtype="Int64"))
+        elif kind == "neighbours":
+            neighbour = rows["role"] == NEIGHBOUR
+            count, kept = int(neighbour.sum()), rows[~neighbour].reset_index(drop=True)
+        else:
+            count, kept = len(rows), rows.iloc[:0]
+        log = replace(log, **{table: kept})
+        notes.append(f"{kind}: {count} left out")
+    return replace(log, notes=tuple(notes))

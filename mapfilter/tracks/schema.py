@@ -1,30 +1,20 @@
-"""The tables of a track log: columns with units, ranges and likely mistakes, and their checks.
+"""The tables of a track log: columns with units, ranges and likely mistakes, and kinds of readings.
 
 Every table has ``time_s``, seconds after the log's start. Headings are radians counter-clockwise
-from grid east; positions are metres in the log's projected CRS.
+from grid east; positions are metres in the log's projected CRS. :mod:`mapfilter.tracks.tables`
+checks tables.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
-from typing import Any, Literal
+from math import inf, nextafter, pi
+from typing import Literal
 
-import numpy as np
-import pandas as pd
-from numpy.typing import ArrayLike
-
-from mapfilter._types import Bools, Floats, Ints
-from mapfilter.errors import Faults
-from mapfilter.geodesy import wrap_rad
-from mapfilter.tracks.technologies import LIMITS
-
-TABLES = ("motion", "radio", "gnss", "pseudoranges", "tdoa", "truth")
-"""The tables of a log, in the order in which they are stored."""
-
-OPTIONAL = ("pseudoranges", "tdoa")
-"""Tables that are stored only where they hold something."""
+Kind = Literal["motion", "serving", "neighbour", "gnss", "pseudorange", "tdoa"]
+"""Kinds of measurements that a log may hold, each in one table of :data:`TABLES`."""
+Without = Literal["gnss", "fixes", "pseudoranges", "ta", "tdoa", "neighbours", "radio"]
+"""What can be left out of a log: tables by their names, and parts of tables."""
 
 SATELLITE = r"[GRECJIS]\d{2}"
 """A satellite's name as in RINEX: the letter of its constellation and two digits."""
@@ -38,15 +28,9 @@ NEIGHBOUR = "neighbour"
 MISSING_SIGNS = (-9999.0, -99999.0, -999999.0)
 """Numbers by which other programs mean that a value is missing; here its field is empty."""
 
-_SHOWN_ROWS = 3
-_LOWEST_M, _HIGHEST_M = 2.0e7, 5.5e7
-_SELDOM_S = 10.0
-_SOMEWHERE_M = 25.0
-_SLOW_MPS = 0.04
-_MOVING = ("motion", "gnss", "truth")
-_TURN_RAD = 2 * np.pi + 1e-9
+_TURN_RAD = 2 * pi + 1e-9
 # 2.0**63 itself is one more than an int64 holds.
-_LARGEST_ID = float(np.nextafter(2.0**63, 0.0))
+_LARGEST_ID = nextafter(2.0**63, 0.0)
 _DEGREES, _SIGMA = "degrees given for radians", "metres in 0.001..100000"
 _NANOSECONDS = "nanoseconds given for metres"
 _RANGE_HINT = "kilometres or seconds for metres, or a leap second or week in the times"
@@ -62,12 +46,31 @@ class Column:
     """
 
     name: str
-    low: float = -np.inf
-    high: float = np.inf
+    low: float = -inf
+    high: float = inf
     expected: str = "a finite number"
     hint: str = ""
     kind: Literal["number", "integer", "text"] = "number"
     required: bool = False
+    optional: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """One table of a log.
+
+    Parameters
+    ----------
+    kinds : tuple of str
+        Kinds of measurements in its rows, by ``role`` where there are several; none for the truth.
+    columns : tuple of Column
+        In the order in which they are stored.
+    optional : bool
+        Whether it is stored only where it holds something.
+    """
+
+    kinds: tuple[Kind, ...]
+    columns: tuple[Column, ...]
     optional: bool = False
 
 
@@ -83,304 +86,94 @@ _TIME = Column("time_s", -1e11, 1e11, "seconds", "milliseconds for s", required=
 _EAST = Column("east_m", -1e8, 1e8, "metres east", required=True)
 _NORTH = Column("north_m", -1e8, 1e8, "metres north", required=True)
 
-SCHEMA: dict[str, tuple[Column, ...]] = {
-    "motion": (
-        _TIME,
-        Column("step_m", -1e6, 1e6, "metres"),
-        Column("heading_rad", -_TURN_RAD, _TURN_RAD, "radians in -2π..2π", _DEGREES),
-        Column("turn_rad", -_TURN_RAD, _TURN_RAD, "radians in -2π..2π", _DEGREES),
-    ),
-    "radio": (
-        _TIME,
-        _text("role", "serving or neighbour", required=True),
-        _text("cell", "a cell id"),
-        _integer("arfcn", 0, 3_279_165, "a carrier number"),
-        _integer("bsic", 0, 1007, "a BSIC or PCI"),
-        Column("level_dbm", -200, 0, "dBm in -200..0", "raw RXLEV given for dBm"),
-        _integer("censored", -1, 1, "-1, 0 or 1"),
-        _integer("timing_advance", 0, 3846, "steps >= 0"),
-        replace(_text("technology", "GSM, UMTS, LTE or NR"), optional=True),
-        *(
-            replace(_integer(name, 0, most, "a whole number >= 0"), optional=True)
-            for name, most in (("mcc", 999), ("mnc", 999), ("lac", 2**24 - 1), ("ci", 2**36 - 1))
+TABLES: dict[str, Table] = {
+    "motion": Table(
+        ("motion",),
+        (
+            _TIME,
+            Column("step_m", -1e6, 1e6, "metres"),
+            Column("heading_rad", -_TURN_RAD, _TURN_RAD, "radians in -2π..2π", _DEGREES),
+            Column("turn_rad", -_TURN_RAD, _TURN_RAD, "radians in -2π..2π", _DEGREES),
         ),
     ),
-    "gnss": (
-        _TIME,
-        _EAST,
-        _NORTH,
-        Column("var_east_m2", low=0, expected="square metres >= 0"),
-        Column("var_north_m2", low=0, expected="square metres >= 0"),
-        Column("cov_east_north_m2", expected="square metres"),
+    "radio": Table(
+        ("serving", "neighbour"),
+        (
+            _TIME,
+            _text("role", "serving or neighbour", required=True),
+            _text("cell", "a cell id"),
+            _integer("arfcn", 0, 3_279_165, "a carrier number"),
+            _integer("bsic", 0, 1007, "a BSIC or PCI"),
+            Column("level_dbm", -200, 0, "dBm in -200..0", "raw RXLEV given for dBm"),
+            _integer("censored", -1, 1, "-1, 0 or 1"),
+            _integer("timing_advance", 0, 3846, "steps >= 0"),
+            replace(_text("technology", "GSM, UMTS, LTE or NR"), optional=True),
+            *(
+                replace(_integer(name, 0, most, "a whole number >= 0"), optional=True)
+                for name, most in (
+                    ("mcc", 999),
+                    ("mnc", 999),
+                    ("lac", 2**24 - 1),
+                    ("ci", 2**36 - 1),
+                )
+            ),
+        ),
     ),
-    "pseudoranges": (
-        _TIME,
-        _text("satellite", "a name such as G07 or E19", required=True),
-        Column("pseudorange_m", 1.5e7, 6e7, "metres in 1.5e7..6e7", _RANGE_HINT),
-        Column("sigma_m", 1e-3, 1e5, _SIGMA),
-        *(Column(name, -6e7, 6e7, "metres from the earth's centre") for name in PLACE),
+    "gnss": Table(
+        ("gnss",),
+        (
+            _TIME,
+            _EAST,
+            _NORTH,
+            Column("var_east_m2", low=0, expected="square metres >= 0"),
+            Column("var_north_m2", low=0, expected="square metres >= 0"),
+            Column("cov_east_north_m2", expected="square metres"),
+        ),
     ),
-    "tdoa": (
-        _TIME,
-        _text("cell", "a cell id", required=True),
-        _text("reference", "a cell id", required=True),
-        Column("difference_m", -2e5, 2e5, "metres in -200000..200000", _NANOSECONDS),
-        Column("sigma_m", 1e-3, 1e5, _SIGMA),
-        Column("reference_sigma_m", 1e-3, 1e5, _SIGMA),
+    "pseudoranges": Table(
+        ("pseudorange",),
+        (
+            _TIME,
+            _text("satellite", "a name such as G07 or E19", required=True),
+            Column("pseudorange_m", 1.5e7, 6e7, "metres in 1.5e7..6e7", _RANGE_HINT),
+            Column("sigma_m", 1e-3, 1e5, _SIGMA),
+            *(Column(name, -6e7, 6e7, "metres from the earth's centre") for name in PLACE),
+        ),
+        optional=True,
     ),
-    "truth": (
-        _TIME,
-        _EAST,
-        _NORTH,
-        _integer("way_id", -_LARGEST_ID, _LARGEST_ID, "a way's number"),
+    "tdoa": Table(
+        ("tdoa",),
+        (
+            _TIME,
+            _text("cell", "a cell id", required=True),
+            _text("reference", "a cell id", required=True),
+            Column("difference_m", -2e5, 2e5, "metres in -200000..200000", _NANOSECONDS),
+            Column("sigma_m", 1e-3, 1e5, _SIGMA),
+            Column("reference_sigma_m", 1e-3, 1e5, _SIGMA),
+        ),
+        optional=True,
+    ),
+    "truth": Table(
+        (),
+        (
+            _TIME,
+            _EAST,
+            _NORTH,
+            _integer("way_id", -_LARGEST_ID, _LARGEST_ID, "a way's number"),
+        ),
     ),
 }
+"""The tables of a log, in the order in which they are stored.
+
+Each is also a field of :class:`mapfilter.tracks.log.TrackLog`, and an argument of
+:func:`mapfilter.tracks.log.make_log`.
+"""
+
+SCHEMA: dict[str, tuple[Column, ...]] = {name: table.columns for name, table in TABLES.items()}
 """The columns of each table, in the order in which they are stored."""
 
+OPTIONAL = tuple(name for name, table in TABLES.items() if table.optional)
+"""Tables that are stored only where they hold something."""
 
-@dataclass(frozen=True, eq=False, slots=True)
-class _Door:
-    """A table's name and its rows' numbers in messages, and the faults found in it."""
-
-    where: str
-    row_numbers: Ints
-    faults: Faults
-
-    def add(self, field: str, expected: str, got: object, hint: str = "") -> None:
-        self.faults.add(f"{self.where}{field}", expected, got, hint)
-
-    def add_rows(
-        self,
-        bad: Bools,
-        field: str,
-        expected: str,
-        got: Callable[[int], object],
-        hint: Callable[[int], str],
-    ) -> None:
-        """Note the first rows that are bad, and how many more there are."""
-        rows = np.flatnonzero(bad)
-        for row in rows[:_SHOWN_ROWS]:
-            self.add(f" row {self.row_numbers[row]}, {field}", expected, got(row), hint(row))
-        if len(rows) > _SHOWN_ROWS:
-            more = f"{len(rows) - _SHOWN_ROWS} more rows like these"
-            self.add(f", {field}", expected, more, hint(rows[-1]))
-
-
-def tidy_table(
-    table: str,
-    given: pd.DataFrame | None,
-    where: str,
-    faults: Faults,
-    row_numbers: ArrayLike | None = None,
-) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    """Return a table with the columns of the schema, sorted by time, without exact duplicates.
-
-    The notes returned with it are on what was ignored, sorted or dropped. A table with faults only
-    serves to find further ones.
-
-    Parameters
-    ----------
-    given : pandas.DataFrame or None
-        Table as read or made; None is an empty one. Values may be text, as from CSV.
-    where : str
-        Name of the file or table in messages.
-    row_numbers : (N,) array_like of int, optional
-        Number of each row in messages; 1 to N by default.
-    """
-    if given is None:
-        given = pd.DataFrame({c.name: [] for c in SCHEMA[table] if not c.optional})
-    given = given.reset_index(drop=True)
-    numbers = np.arange(1, len(given) + 1) if row_numbers is None else np.asarray(row_numbers)
-    door = _Door(where, numbers, faults)
-    notes = _check_columns(table, given, door)
-    columns = [c for c in SCHEMA[table] if c.name in given.columns or not c.optional]
-    tidy = pd.DataFrame({column.name: _column(column, given, door) for column in columns})
-    if table == "radio":
-        role = tidy["role"]
-        bad = role.notna().to_numpy() & ~role.isin([SERVING, NEIGHBOUR]).to_numpy()
-        _add_rows(door, bad, SCHEMA["radio"][1], role)
-        _check_technologies(tidy, door)
-        tidy["censored"] = tidy["censored"].fillna(0)
-    if table == "gnss":
-        _check_covariance(tidy, door)
-    if table == "pseudoranges":
-        _check_satellites(tidy, door)
-    if table == "motion":
-        tidy["heading_rad"] = wrap_rad(tidy["heading_rad"])
-    else:
-        _check_degrees(tidy, door)
-    _check_milliseconds(table, tidy, door)
-    return _sorted_unique(tidy, where, notes)
-
-
-def _check_columns(table: str, given: pd.DataFrame, door: _Door) -> tuple[str, ...]:
-    names = [column.name for column in SCHEMA[table]]
-    usual = [c.name for c in SCHEMA[table] if not c.optional and c.name not in given.columns]
-    notes = []
-    for name in (str(name) for name in given.columns if name not in names):
-        near = get_close_matches(name, usual, 1, 0.6)
-        if near:
-            door.add(f", column {name}", f"columns {', '.join(names)}", name, near[0])
-        else:
-            notes.append(f"{door.where}: column {name} is not used")
-    for column in SCHEMA[table]:
-        if column.required and column.name not in given.columns:
-            door.add("", f"a column {column.name}", "none")
-    return tuple(notes)
-
-
-def _column(column: Column, given: pd.DataFrame, door: _Door) -> Any:
-    values = given.get(column.name)
-    if values is None:
-        values = pd.Series([None] * len(given), dtype=object)
-    if column.kind == "text":
-        return _texts(column, values, door)
-    number, readable = _numbers(values)
-    missing = np.isnan(number)
-    bad = ~readable | np.isinf(number) | (number < column.low) | (number > column.high)
-    if column.kind == "integer":
-        bad |= ~missing & np.isfinite(number) & (number != np.round(number))
-    if column.required and column.name in given.columns:
-        bad |= missing
-    elif not column.required:
-        bad |= np.isin(number, MISSING_SIGNS)
-    _add_rows(door, bad, column, values)
-    if column.kind == "number":
-        return number
-    kept = np.where(bad | missing, 0.0, number).astype(np.int64)
-    if pd.api.types.is_integer_dtype(values.dtype):
-        kept = values.fillna(0).to_numpy(dtype=np.int64)
-    return pd.arrays.IntegerArray(kept, bad | missing)
-
-
-def _texts(column: Column, values: pd.Series, door: _Door) -> Any:
-    present = values.notna().to_numpy() & (values.astype(str) != "").to_numpy()
-    if column.required:
-        _add_rows(door, ~present, column, values)
-    texts = [str(v) if ok else None for v, ok in zip(values, present, strict=True)]
-    # Without the dtype pandas 3 makes these strings, and None becomes NaN.
-    return pd.Series(texts, dtype=object)
-
-
-def _numbers(values: pd.Series) -> tuple[Floats, Bools]:
-    """Return values as floats, and which of them could be read as a number or as missing."""
-    if pd.api.types.is_numeric_dtype(values.dtype):
-        number = values.to_numpy(dtype=np.float64, na_value=np.nan)
-        return number, np.ones(len(number), dtype=bool)
-    number = np.full(len(values), np.nan)
-    readable = np.ones(len(values), dtype=bool)
-    for row, value in enumerate(values):
-        if _is_empty(value):
-            continue
-        try:
-            number[row] = float(value)
-        except (TypeError, ValueError):
-            readable[row] = False
-    return number, readable
-
-
-def _add_rows(door: _Door, bad: Bools, column: Column, values: pd.Series) -> None:
-    def got(row: int) -> object:
-        return "nothing" if _is_empty(values.iloc[row]) else values.iloc[row]
-
-    def hint(row: int) -> str:
-        try:
-            number = float(values.iloc[row])
-        except (TypeError, ValueError):
-            return ""
-        if number in MISSING_SIGNS:
-            return "a sign for a missing value; leave the field empty"
-        return column.hint if np.isfinite(number) else ""
-
-    door.add_rows(bad, column.name, column.expected, got, hint)
-
-
-def _is_empty(value: Any) -> bool:
-    return value is None or value is pd.NA or (isinstance(value, str) and value == "")
-
-
-def _check_technologies(radio: pd.DataFrame, door: _Door) -> None:
-    """Note carriers, codes and timing advances that the row's technology does not have."""
-    if "technology" not in radio:
-        return
-    technology = radio["technology"]
-    for family, limits in LIMITS.items():
-        of = (technology == family).to_numpy()
-        for name, most in limits.items():
-            if of.any() and name in radio:
-                value = radio[name].to_numpy(dtype=np.float64, na_value=np.nan)
-                column = Column(name, 0, most, f"0..{most} in {family}")
-                _add_rows(door, of & (value > most), column, radio[name])
-
-
-def _check_covariance(gnss: pd.DataFrame, door: _Door) -> None:
-    product = gnss["var_east_m2"].to_numpy() * gnss["var_north_m2"].to_numpy()
-    bad = gnss["cov_east_north_m2"].to_numpy() ** 2 > product * (1 + 1e-9)
-    column = Column("cov_east_north_m2", expected="a covariance of at most √(var_east·var_north)")
-    _add_rows(door, bad, column, gnss["cov_east_north_m2"])
-
-
-def _check_satellites(rows: pd.DataFrame, door: _Door) -> None:
-    """Note satellites not named as in RINEX, or not as high as satellites are."""
-    name = rows["satellite"]
-    wrong = name.notna().to_numpy() & ~name.astype(str).str.fullmatch(SATELLITE).to_numpy(bool)
-    hint = "its constellation's letter (G, R, E, C, J, I, S) and two digits"
-    door.add_rows(
-        wrong, "satellite", "a name such as G07", lambda row: repr(name.iloc[row]), lambda _: hint
-    )
-    place, field = rows[list(PLACE)].to_numpy(dtype=np.float64), ", ".join(PLACE)
-    known = np.isfinite(place)
-    some = known.any(axis=1) & ~known.all(axis=1)
-    door.add_rows(some, field, "all three, or none", lambda _: "some of them", lambda _: "")
-    away_m = np.sqrt(np.sum(place**2, axis=1))
-    bad = known.all(axis=1) & ~((away_m >= _LOWEST_M) & (away_m <= _HIGHEST_M))
-    door.add_rows(
-        bad,
-        field,
-        "20 000 to 55 000 km from the earth's centre",
-        lambda row: f"{away_m[row] / 1000:.0f} km",
-        lambda _: "kilometres for metres, or a receiver's place",
-    )
-
-
-def _check_degrees(table: pd.DataFrame, door: _Door) -> None:
-    """Find positions that are longitudes and latitudes: near zero, and hardly moving for long."""
-    if "east_m" not in table or len(table) < 2:
-        return
-    east, north = table["east_m"].to_numpy(), table["north_m"].to_numpy()
-    small = bool(np.all(np.abs(east) <= 180) and np.all(np.abs(north) <= 180))
-    extent = max(np.ptp(east), np.ptp(north))
-    if small and 0 < extent < 0.5 and np.ptp(table["time_s"].to_numpy()) >= 10:
-        got = f"all within {extent:.4g} of ({east[0]:.6g}, {north[0]:.6g})"
-        door.add(", east_m and north_m", "metres", got, "degrees given for metres")
-
-
-def _check_milliseconds(table: str, rows: pd.DataFrame, door: _Door) -> None:
-    """Find times in milliseconds: rows seldom come, and what gets somewhere goes very slowly."""
-    time = np.unique(rows["time_s"].to_numpy())
-    if len(time) < 3 or table not in _MOVING or not np.isfinite(time).all():
-        return
-    between_s = float(np.median(np.diff(time)))
-    if table == "motion":
-        moved_m = float(np.nansum(np.abs(rows["step_m"].to_numpy())))
-    else:
-        # Not the path's length: the fixes of a parked car jitter.
-        moved_m = float(np.hypot(np.ptp(rows["east_m"]), np.ptp(rows["north_m"])))
-    speed_mps = moved_m / (time[-1] - time[0])
-    if between_s >= _SELDOM_S and moved_m >= _SOMEWHERE_M and speed_mps < _SLOW_MPS:
-        got = f"{between_s:g} between rows, hence {speed_mps:.2g} m/s"
-        door.add(", time_s", "seconds", got, "milliseconds for s")
-
-
-def _sorted_unique(
-    table: pd.DataFrame, where: str, notes: tuple[str, ...]
-) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    duplicate = table.duplicated().to_numpy()
-    if duplicate.any():
-        notes += (f"{where}: {int(duplicate.sum())} exact duplicate rows dropped",)
-        table = table[~duplicate]
-    backwards = int(np.sum(np.diff(table["time_s"].to_numpy()) < 0))
-    if backwards:
-        notes += (f"{where}: out of order in {backwards} places, sorted by time",)
-        table = table.sort_values("time_s", kind="stable")
-    return table.reset_index(drop=True), notes
+ALL_KINDS: frozenset[Kind] = frozenset(kind for table in TABLES.values() for kind in table.kinds)
+"""All kinds of measurements."""

@@ -1,4 +1,4 @@
-"""Track logs on disk: a folder with ``log.json`` and up to six tables, Parquet or CSV.
+"""Track logs on disk: a folder with ``log.json`` and tables, Parquet or CSV.
 
 ``log.json`` holds the format, its version, the CRS, the start and the checksums of the tables. A
 folder made by hand needs only ``{"crs": "EPSG:…"}`` in it; a table that is absent is empty. An

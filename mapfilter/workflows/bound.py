@@ -34,13 +34,13 @@ _FIX_TITLE = "Expected metres to convergence of an ideal filter"
 
 @dataclass(frozen=True)
 class BoundResult:
-    """What a database promises; medians and shares over points or journeys."""
+    """Bounds of a database; medians and shares over points or journeys."""
 
     points: int
     cells: int
     ways: int
     starts: int
-    """Where journeys begin."""
+    """Number of points at which journeys begin."""
     plane_bound_m: float
     """Median of the position-error bound of one report, of points that have one."""
     along_bound_m: float
@@ -65,7 +65,7 @@ class BoundResult:
     """Share of journeys with a twin."""
     seconds: float
     notes: tuple[str, ...]
-    """What is exact and what is approximate."""
+    """Which of the figures are exact and which are approximate."""
     outputs: tuple[Path, ...]
 
 

@@ -48,7 +48,7 @@ class BuildResult:
     seconds: float
     """Wall time, without that of the pictures."""
     notes: tuple[str, ...] = ()
-    """What was done to the inputs, such as rasters resampled, and what covers the area in part."""
+    """Changes of the inputs, such as resampling, and inputs that cover only a part of the area."""
     pictures: tuple[Path, ...] = ()
 
 

@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 from pathlib import Path
+from typing import Any
 
 from mapfilter._io import ensure_writable_folder, write_json
 from mapfilter._parallel import Progress, local_executor
@@ -44,6 +45,17 @@ NAMES = ("global-positioning", "audit", "ottawa")
 RUNS = 20
 TABLE = "table.json"
 _MISSING = 0.1
+_MAIN = (
+    "runs",
+    "success",
+    "wrong",
+    "switch_mean_m",
+    "error_mean_m",
+    "error_95_m",
+    "coverage_95",
+    "false_lost_per_km",
+    "seconds_per_track",
+)
 WORLDS = ("easy", "plain")
 
 _DRAWN = "is drawn for each run; use --seed"
@@ -67,6 +79,9 @@ REFUSED: Mapping[str, str] = {
     "filter.smooth": _CASES,
     "filter.bayes.timing_step_m": _NO_TIMING,
     "filter.bayes.timing_sd_m": _NO_TIMING,
+    "filter.kalman.timing_step_m": _NO_TIMING,
+    "filter.kalman.timing_sd_m": _NO_TIMING,
+    "filter.kalman.timing_memory_m": _NO_TIMING,
     "sweep": "there is no grid here; use mapfilter sweep",
     "output.pictures": _PICTURES,
 }
@@ -110,6 +125,16 @@ class EvaluateResult:
     cases: tuple[CaseResult, ...]
     seconds: float
     out: Path
+
+
+def main_figures(case: CaseResult) -> dict[str, Any]:
+    """Return the figures of a case that the table on the terminal shows."""
+    return {"case": case.name, **{name: getattr(case, name) for name in _MAIN}}
+
+
+def main_table(result: EvaluateResult) -> dict[str, Any]:
+    """Return a result with the main figures of each case only."""
+    return {**vars(result), "cases": [main_figures(case) for case in result.cases]}
 
 
 def check_benchmark(name: str, data: Path | None = None) -> None:
@@ -259,7 +284,8 @@ def load_benchmark(
         There is no such world, or a setting is wrong or has no meaning here.
     """
     if world not in WORLDS:
-        raise fail(ConfigError, "--world", " or ".join(WORLDS), repr(world))
+        expected = ", ".join((*WORLDS, "foreign or harsh"))
+        raise fail(ConfigError, "--world", expected, repr(world))
     with as_file(files("mapfilter.data")) as data:
         config = load_config(file, settings, out=out, base=data / f"world-{world}.toml")
     given = given_keys(file, settings)

@@ -6,11 +6,18 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from mapfilter._io import write_json
 from mapfilter._parallel import Progress, part_of
 from mapfilter.experiments.benchmarks.scores import CaseResult
-from mapfilter.workflows.evaluate import TABLE, check_names, load_benchmark, run_global_positioning
+from mapfilter.workflows.evaluate import (
+    TABLE,
+    check_names,
+    load_benchmark,
+    main_figures,
+    run_global_positioning,
+)
 from mapfilter.workflows.terminal import to_jsonable
 
 _GYRO = {
@@ -136,6 +143,14 @@ class AuditResult:
     rows: tuple[AuditRow, ...]
     seconds: float
     out: Path
+
+
+def audit_table(audit: AuditResult) -> dict[str, Any]:
+    """Return the result of an audit with the main figures of each row only."""
+    rows = [
+        {"name": row.name, "world": row.world, **main_figures(row.result)} for row in audit.rows
+    ]
+    return {**vars(audit), "rows": rows}
 
 
 def run_audit(

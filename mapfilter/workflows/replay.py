@@ -71,7 +71,7 @@ def check_logs(folders: Sequence[Path], lattice: Lattice) -> None:
 
 
 def lacking(log: TrackLog, estimate: TrackEstimate) -> str:
-    """Return what a log lacks so that nothing could be located in it, or an empty text."""
+    """Return the missing data of a log that cannot be located, or an empty text."""
     serving = (log.radio["role"] == SERVING) & log.radio["cell"].notna()
     moved = log.motion["step_m"].notna()
     lacks = []
@@ -226,7 +226,7 @@ def summary_figures(result: ReplayResult) -> dict[str, Any]:
     }
 
 
-def replay_facts(result: ReplayResult) -> dict[str, Any]:
+def replay_figures(result: ReplayResult) -> dict[str, Any]:
     """Return what a replay found, as JSON shows it.
 
     One log gives its own figures, several the sums of all.

@@ -59,7 +59,7 @@ class ServedPoints:
     """The points of a database, at most one for each pixel of a picture."""
 
     window: Window
-    """Where they lie on the database's lattice."""
+    """Their pixels on the database's lattice."""
     step: int
     """Pixels of that lattice along a side of a pixel of the picture."""
     best: BestServers

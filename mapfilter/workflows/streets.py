@@ -212,7 +212,7 @@ class Streets:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was left out, cut out, resampled or assumed."""
+        """Features left out or cut out, rasters resampled, and assumptions."""
         if self.landuse is not None:
             return self.landuse.notes
         roads, notes = self.config.roads, list(self._roads.notes)
@@ -253,7 +253,7 @@ class Streets:
 
     @property
     def attribution(self) -> str:
-        """Whose map this is, as its licence wants it shown."""
+        """Attribution of the map, as its licence requires."""
         return OSM_ATTRIBUTION if self._has_map else ""
 
     @property

@@ -184,7 +184,7 @@ def text_lines(found: Mapping[str, Any], indent: str = "") -> Iterator[str]:
 
 
 def _table(rows: list[Any]) -> list[str]:
-    """Return the lines of a table, numbers to the right; none where the rows are not alike."""
+    """Return the lines of a table, numbers to the right; none if the rows differ in keys."""
     if len(rows) < 2 or not all(
         isinstance(row, Mapping) and row.keys() == rows[0].keys() for row in rows
     ):

@@ -15,10 +15,10 @@ from mapfilter.config.fields import Section
 from mapfilter.config.inputs import Area, Rasters
 from mapfilter.config.sections import Config, FilterSection
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes, Routes
-from mapfilter.errors import InputError, fail
+from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import Lattice, unproject
 from mapfilter.positioning.filter import FilterOptions
-from mapfilter.positioning.locators import filter_options
+from mapfilter.positioning.locators import BUILT_IN, filter_options
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan, read_cell_plan
 from mapfilter.radio.msi import read_antennas
@@ -84,7 +84,7 @@ def open_by_section(path: Path, section: Rasters) -> RxLevRasters:
 
 
 def planned_cells(config: Config, crs: str, area: Lattice | None = None) -> CellPlan:
-    """Read the cell plan of a configuration; of a public list, only what is near the area.
+    """Read the cell plan of a configuration; of a public list, only the cells near the area.
 
     Raises
     ------
@@ -313,13 +313,16 @@ def filter_choice(section: FilterSection) -> FilterOptions:
     Raises
     ------
     ConfigError
-        A custom filter cannot be imported.
+        A custom filter cannot be imported, or the filter cannot smooth.
     """
     options: Any = filter_options(section.name)
     for _, part in option_sections(section, options):
         shared = {one.name for one in fields(options)} & set(type(part).model_fields)
         options = replace(options, **{name: getattr(part, name) for name in shared})
     if section.smooth:
+        if not hasattr(options, "smooth"):
+            able = ", ".join(name for name in BUILT_IN if hasattr(filter_options(name), "smooth"))
+            raise fail(ConfigError, "filter.smooth (--smooth)", able, section.name)
         options = replace(options, smooth=True)
     chosen: FilterOptions = options
     return chosen

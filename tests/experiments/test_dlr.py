@@ -196,7 +196,7 @@ def test_a_paper_run_and_its_table(monkeypatch):
     rows = dlr_table.rows(run)
     assert len(rows) == 4 * len(dlr.RUNS)
     static = next(row for row in rows if row["filter"] == "static" and row["epochs"] == "every")
-    assert static["told"] == pytest.approx(26 / 30)
+    assert static["located"] == pytest.approx(26 / 30)
     assert len(over_threshold(run, "edge")) == len(dlr.THRESHOLDS_DB)
     assert set(dlr.PUBLISHED) == set(found) - {"every_epoch"}
     for group, names in dlr.PUBLISHED.items():

@@ -1,7 +1,8 @@
 """The map filters keep the contract, live and in replay; hostile logs are told, never fatal."""
 
 import pickle
-from dataclasses import replace
+from dataclasses import fields, replace
+from functools import cached_property
 from math import nan, pi
 
 import numpy as np
@@ -13,10 +14,13 @@ from mapfilter.filters.contract import MotionStep, Reason, Status, UpdateInfo
 from mapfilter.filters.grid import GridFilter
 from mapfilter.filters.particle import ParticleFilter, ParticleOptions
 from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel, Start
 from mapfilter.positioning.bayes.options import BayesFilter, open_area
+from mapfilter.positioning.bayes.timing import TimingSource
 from mapfilter.positioning.epochs import epochs
+from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.filter import estimate_of, locate
 from mapfilter.testing import ContractError, check_belief_filter
 from mapfilter.tracks.log import make_log
@@ -50,6 +54,21 @@ def test_the_contract(area, name):
     motions = [MotionStep(5.0, 0.1 * i, nan) for i in range(12)]
     readings = [READING if i % 3 else None for i in range(12)]
     check_belief_filter(filters(area)[name], Start(READING), motions, readings)
+
+
+def test_measurements_that_no_source_uses_are_labelled(positioner):
+    class WithoutTiming(BayesPositioner):
+        @cached_property
+        def sources(self):
+            return tuple(one for one in super().sources if not isinstance(one, TimingSource))
+
+    rows = pd.DataFrame({"time_s": [3.0, 4.0], "cell": "W", "reference": "E", "difference_m": 0.0})
+    log = walk_log([(EAST, 50)], tdoa=rows)
+    given = {field.name: getattr(positioner, field.name) for field in fields(positioner)}
+    unused = locate(log, WithoutTiming(**given), np.random.default_rng(0)).estimate.unused
+    labelled = [one for one in unused if one.reason is Reason.NOT_USED_BY_FILTER]
+    assert labelled == [UnusedReading(3.0, "tdoa", "2 rows", Reason.NOT_USED_BY_FILTER)]
+    assert {"motion", "serving", "neighbour", "gnss", "pseudorange", "tdoa"} <= positioner.uses
 
 
 def test_a_filter_that_breaks_the_contract_is_found(area):

@@ -256,7 +256,7 @@ def test_which_rows_are_taken():
         ("neighbour", "ARFCN 700, BSIC 1", Reason.UNKNOWN_CELL),
         ("neighbour", "C", Reason.NOT_USED_BY_FILTER),
         ("neighbour", "Z", Reason.UNKNOWN_CELL),
-        ("neighbour", "", Reason.NOT_USED_BY_FILTER),
+        ("neighbour", "", Reason.NO_CELL),
     ]
     assert {one.time_s for one in found.unused} == {3.0}
 

@@ -1,6 +1,6 @@
 """Small parts of positioning by hand: fixes, radii, headings, ways, static fixes, the grid."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import cos, exp, hypot, inf, nan, pi, radians, sin, sqrt
 
 import numpy as np
@@ -20,7 +20,7 @@ from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel, Start
 from mapfilter.positioning.bayes.radio import name_of
 from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
-from mapfilter.positioning.epochs import GnssFix, ReportRow, headed
+from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow, headed
 from mapfilter.positioning.gnss.gate import FixTerm, widened
 from mapfilter.positioning.kalman.belief import gaussian_radii_m, share_within
 from mapfilter.positioning.kalman.static_fix import (
@@ -275,3 +275,22 @@ def test_where_a_grid_starts():
     np.testing.assert_allclose(free[0], free[35], rtol=1e-6)
     state = grid.states(np.array([0, 6]), np.array([2, 8]), np.array([0.1, -0.2], "f4"))
     np.testing.assert_allclose(state, [[25, 85], [65, 5], [0.1, -0.2], [0, 0], [0.05, 0.05]])
+
+
+@dataclass(frozen=True, slots=True)
+class PressureEpoch(Epoch):
+    pressure_hpa: float = nan
+
+
+@pytest.mark.parametrize(
+    ("measured", "epoch"),
+    [
+        (False, Epoch(0.0, (MotionStep(1.0, 0.0),))),
+        (False, PressureEpoch(0.0)),
+        (True, PressureEpoch(0.0, pressure_hpa=0.0)),
+        (True, Epoch(0.0, radio=(ReportRow("serving", "A", None, None, nan, 0),))),
+        (True, Epoch(0.0, fix=GnssFix(nan, nan))),
+    ],
+)
+def test_whether_an_epoch_holds_a_measurement(measured, epoch):
+    assert epoch.measured is measured

@@ -70,7 +70,10 @@ def test_neighbours_become_evidence_by_what_is_known_of_them():
     assert inside(reading) == {A: -70.0, D: -80.0, B: -75.0}
     # One code of two cells; without a code all cells of the carrier.
     assert others(reading) == [([B, C], -85.0, 0), ([B, C, D], -90.0, 0)]
-    assert unused == unknown_cells(unknown, elsewhere, nameless)
+    assert unused == [
+        *unknown_cells(unknown, elsewhere),
+        UnusedReading(0.0, "neighbour", "", Reason.NO_CELL),
+    ]
     assert history.level_dbm[[A, B, D]].tolist() == [-70.0, -75.0, -80.0]
     assert isnan(history.level_dbm[C])
     assert history.received_at_m.tolist() == [0.0, 0.0, -inf, 0.0]

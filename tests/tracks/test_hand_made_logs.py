@@ -6,6 +6,7 @@ import pytest
 
 from mapfilter.errors import InputError
 from mapfilter.tracks.log import make_log
+from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import list_logs, read_log, write_log
 
 CRS = "EPSG:32629"
@@ -77,9 +78,7 @@ def test_a_row_that_is_cut_off_is_told(folder):
 def test_a_name_near_that_of_a_missing_table_is_refused(name, folder):
     (folder / name).write_text("time_s,role\n1,serving\n")
     told = refusal_of(read_log, folder)
-    assert told.startswith(
-        f"{folder / name}: expected tables called motion, radio, gnss, pseudoranges, tdoa, truth"
-    )
+    assert told.startswith(f"{folder / name}: expected tables called {', '.join(TABLES)}")
     assert told.endswith(f"found {name} (likely: radio.csv)")
 
 

@@ -1,11 +1,15 @@
 """Logs from tables in memory: timestamps, and what is not a table of a log."""
 
+from dataclasses import fields
+from typing import get_args
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.tracks.log import make_log
+from mapfilter.tracks.log import TrackLog, make_log
+from mapfilter.tracks.schema import TABLES, Kind, Without
 
 CRS = "EPSG:32635"
 NOON_UTC_S = 1_767_268_800.0
@@ -82,3 +86,19 @@ def test_a_log_shows_itself_in_a_line():
     log = make_log(CRS, motion=pd.DataFrame({"time_s": [2.0, 1.0], **STEPS}))
     assert repr(log) == "TrackLog(EPSG:32635, 1.0 s; rows: motion 2; 1 notes)"
     assert repr(make_log(CRS)) == "TrackLog(EPSG:32635, 0.0 s; rows: none)"
+
+
+def test_every_kind_and_part_of_a_log_belongs_to_one_table():
+    kinds = [kind for table in TABLES.values() for kind in table.kinds]
+    assert sorted(kinds) == sorted(get_args(Kind))
+    assert set(TABLES) == {field.name for field in fields(TrackLog)} - {
+        "crs",
+        "start_utc_s",
+        "notes",
+    }
+
+
+def test_every_table_of_measurements_but_motion_can_be_left_out():
+    measured = {name for name, table in TABLES.items() if table.kinds}
+    assert measured - {"motion"} <= set(get_args(Without))
+    assert set(get_args(Without)) - measured == {"fixes", "ta", "neighbours"}

@@ -21,6 +21,9 @@ REFUSED = {
     "filter.smooth",
     "filter.bayes.timing_step_m",
     "filter.bayes.timing_sd_m",
+    "filter.kalman.timing_step_m",
+    "filter.kalman.timing_sd_m",
+    "filter.kalman.timing_memory_m",
     "output.pictures",
 }
 
@@ -36,7 +39,9 @@ OF_THE_CANDIDATE = {
     "when_empty": ("reinitialise", "when_empty"),
 }
 
-OF_KALMAN = tuple(field.name for field in fields(KalmanOptions))
+OF_KALMAN = tuple(
+    field.name for field in fields(KalmanOptions) if not field.name.startswith("timing")
+)
 
 # Name of the setting: its value, the option, and the option's value where it has another unit.
 OF_BAYES = {

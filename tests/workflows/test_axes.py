@@ -10,7 +10,7 @@ from mapfilter.options import fits
 from mapfilter.positioning import BUILT_IN
 from mapfilter.positioning.locators import filter_options
 from mapfilter.workflows.simulate import simulation_settings
-from mapfilter.workflows.sweep_plan import _varied
+from mapfilter.workflows.sweep_plan import _readings, _varied
 from mapfilter.workflows.world import filter_choice, option_sections
 
 
@@ -107,3 +107,11 @@ def test_what_is_not_varied_stays(tmp_path):
     assert (varied.imu.sigma_orient_deg, varied.filter.bayes.heading_sd_deg) == (10.0, 12.0)
     back = vary(varied, {"imu.sigma_orient_deg": 3.0, "filter.bayes.heading_sd_deg": 6.0})
     assert back == config
+
+
+def test_a_sweep_refuses_to_smooth_a_filter_that_cannot():
+    settings = ["area.map=manhattan", "filter.smooth=true", "filter.name=candidate"]
+    config = load_config(None, settings, out=None)
+    expected = r"filter\.smooth \(--smooth\): expected bayes, .*, found candidate"
+    with pytest.raises(ConfigError, match=expected):
+        _readings(config)

@@ -78,6 +78,17 @@ def test_a_log_with_neighbours_only(log, replay):
     assert outcome.err == "mapfilter: nothing is located in my-walk: no serving cell\n"
 
 
+def test_neighbours_that_name_neither_cell_nor_carrier_are_no_unknown_cells(log, replay):
+    table = pd.read_csv(log / "radio.csv")
+    neighbour = table["role"] == "neighbour"
+    table.loc[neighbour, ["cell", "arfcn", "bsic"]] = None
+    table.to_csv(log / "radio.csv", index=False)
+    outcome = replay(log, "--json", "--filter", "bayes")
+    assert (outcome.code, outcome.err) == (0, "")
+    assert outcome.json["unknown_cells"] == {}
+    assert 0 < outcome.json["unused"]["no_cell"] <= neighbour.sum()
+
+
 TOLD_WITHOUT_TRUTH = {
     "final_status", "switched", "switch_time_s", "epochs", "epochs_by_status", "last_lon_deg",
     "last_lat_deg", "last_time_s", "unused", "unknown_cells", "notes",

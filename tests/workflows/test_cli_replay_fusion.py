@@ -140,7 +140,7 @@ def test_strange_readings_are_labelled():
     assert np.isfinite(error[20:]).all()
     reasons = [str(reading.reason) for reading in found.unused]
     assert reasons.count("unknown_cell") == 60
-    assert reasons.count("not_used_by_filter") == 3
+    assert reasons.count("no_cell") == 3
 
 
 def test_fixes_with_a_broken_covariance_count_as_of_usual_quality():

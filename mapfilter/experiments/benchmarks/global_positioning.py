@@ -34,6 +34,7 @@ from mapfilter.experiments.benchmarks.scores import (
 from mapfilter.experiments.benchmarks.world import BenchmarkWorld
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.filter import FilterOptions, locate
+from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.simulation.reports import Levels
 
@@ -92,7 +93,7 @@ def informed(
 ) -> FilterOptions:
     """Return a filter with what the case's data sheet states, of options that are not fixed."""
     if not isinstance(choice, BayesFilter):
-        return choice
+        return replace(choice, smooth=case.smooth) if isinstance(choice, KalmanFilter) else choice
     stated = {**case.data_sheet, **(TOWN_HEIGHT if case.satellites is not None else {})}
     known: dict[str, Any] = {name: value for name, value in stated.items() if name not in fixed}
     return replace(choice, smooth=case.smooth, **known)

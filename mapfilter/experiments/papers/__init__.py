@@ -21,7 +21,7 @@ PAPERS = {
     "tesa": "tesa.paper",
     "dlr": "dlr.paper",
 }
-"""Where each paper is, by its name on the command line."""
+"""Modules of the papers, by their names on the command line."""
 
 
 def find_paper(name: str) -> Paper[Any]:

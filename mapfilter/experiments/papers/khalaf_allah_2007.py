@@ -32,7 +32,7 @@ ONE_SIGMA_TRANS_M = 0.2
 RESOLUTION_M = 5.0
 UPDATE_LENGTH_M = 22.0
 ROW_PERIOD_S = 16.0
-"""Walking at 1.4 m/s one is 22 m farther after 16 s: one row of dead reckoning for each update."""
+"""At a walking speed of 1.4 m/s, 16 s are 22 m: one row of dead reckoning for each update."""
 
 MAP_SETTINGS = (
     f"area.resolution_m={RESOLUTION_M}",

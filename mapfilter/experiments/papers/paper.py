@@ -1,4 +1,4 @@
-"""What all papers share: how one is run, and what its run gives."""
+"""Protocol of all papers: run, summary, tables and pictures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Detecting that a belief is wrong, and replacing it only by a better one.
+"""Detection of a wrong belief, and its replacement by a more probable alternative.
 
 Each reading has a log-likelihood under the belief, and an expected one if the belief is right. The
 shortfall, less a slack, feeds a CUSUM (Page, 1954). When that is large, an *alternative* starts
@@ -168,7 +168,7 @@ class Outcome(Enum):
 class Transition(NamedTuple):
     """Row of the table.
 
-    ``takes_over`` is the status with which the alternative goes on; None where the belief does.
+    ``takes_over`` is the status of the alternative where it replaces the belief, else None.
     ``reported`` is the status to report; None for that of the belief. ``cusum`` is kept, reset or
     the other's; ``keeps`` is whether the alternative stays beside the belief.
     """

@@ -12,6 +12,7 @@ from numba import njit
 from mapfilter._types import Bools, Floats32, Ints, Ints32
 from mapfilter.database.radioroutes import RadioField
 from mapfilter.geodesy import Lattice
+from mapfilter.models.fingerprint import RasterFrame
 from mapfilter.models.street_motion import map_log_likelihood
 from mapfilter.radio.cells import CellPlan
 
@@ -35,7 +36,9 @@ class AreaMap:
     distance_m : ndarray of float32, shape (rows, cols)
         To the nearest way.
     way_id : ndarray of int64, shape (rows, cols)
+        Id of the way of the nearest point; 0 where that belongs to no way.
     on_way : ndarray of bool, shape (rows, cols)
+        Whether the pixel is a point of the database.
     carriers : mapping
         Bands of the cells on each (ARFCN, BSIC); BSIC -1 for all on the carrier.
     floor_dbm : float
@@ -101,6 +104,12 @@ class AreaMap:
         return east - west, north - south
 
     @cached_property
+    def frame(self) -> RasterFrame:
+        """Where the lattice's pixels lie in the local frame."""
+        rows, cols, step = self.lattice.rows, self.lattice.cols, self.lattice.resolution_m
+        return RasterFrame(0.0, rows * step, 1 / step, rows, cols)
+
+    @cached_property
     def flat_level_dbm(self) -> Floats32:
         """Levels as one line of numbers, the bands of a pixel together."""
         return self.level_dbm.reshape(-1)
@@ -122,7 +131,7 @@ class AreaMap:
 
     @cached_property
     def points(self) -> Floats32:
-        """East and north in the local frame of all points where one can be, shape (2, P)."""
+        """East and north in the local frame of all points on ways, shape (2, P)."""
         row, col = np.nonzero(self.on_way)
         step = self.lattice.resolution_m
         return np.stack([(col + 0.5) * step, (self.lattice.rows - row - 0.5) * step]).astype(

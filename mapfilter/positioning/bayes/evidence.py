@@ -4,8 +4,8 @@ The map filter asks every source at every epoch and adds up what they return. A 
 state under its name in :attr:`~mapfilter.positioning.bayes.state.BayesState.sources`; what depends
 on a belief (a receiver's clock) is kept beside that belief, in
 :attr:`~mapfilter.positioning.bayes.alternative.AlternativeHypothesis.sources` for the alternative.
-A new kind of measurement is a class derived from :class:`EvidenceSource` and an entry in
-:attr:`~mapfilter.positioning.bayes.filter.BayesPositioner.sources`.
+A new kind of measurement is a class derived from :class:`EvidenceSource`; an instance in
+:attr:`~mapfilter.positioning.bayes.filter.BayesPositioner.more_sources` suffices.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBe
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import UnusedReading
+from mapfilter.tracks.schema import Kind
 
 
 class Term(Protocol):
@@ -76,7 +77,7 @@ class RadioReading:
 
 
 class Context(NamedTuple):
-    """Facts of an epoch that sources need besides the filter's state.
+    """Quantities of an epoch that sources need besides the filter's state.
 
     ``particle_spacing_m`` is how far the hypotheses nearest to the true position may lie from it;
     ``report_due`` whether the epoch's radio report is used.
@@ -109,9 +110,14 @@ class EvidenceUpdate(NamedTuple):
 
 
 class EvidenceSource(ABC):
-    """One kind of measurement."""
+    """One source of evidence.
+
+    ``kinds`` are the kinds of measurements of a log that it uses. Those that no source of a filter
+    uses are reported as not used.
+    """
 
     name: ClassVar[str]
+    kinds: ClassVar[frozenset[Kind]] = frozenset()
 
     def begin(self) -> Any:
         """Return the state before the first epoch."""
@@ -119,7 +125,10 @@ class EvidenceSource(ABC):
 
     @abstractmethod
     def first(self, epoch: Epoch) -> EvidenceUpdate:
-        """Return evidence for a belief that is still to be started, whatever came before."""
+        """Return evidence for a belief that is not started yet, without regard to past epochs.
+
+        Also called for an alternative, which starts from one epoch while the belief goes on.
+        """
 
     def start(self, belief: MapBelief, epoch: Epoch, travelled_m: float) -> tuple[MapBelief, Any]:  # noqa: ARG002
         """Adapt a belief just started; also return the state that depends on it, None if none."""

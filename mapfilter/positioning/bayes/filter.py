@@ -55,7 +55,7 @@ class BayesPositioner(Filter[BayesState]):
     """The map filter over an area.
 
     ``grid`` replaces particles by the exact filter on a grid; ``smooth`` smooths positions by the
-    whole log.
+    whole log. ``more_sources`` are sources of evidence besides the built-in ones.
     """
 
     model: BayesModel
@@ -81,6 +81,11 @@ class BayesPositioner(Filter[BayesState]):
     def name(self) -> str:
         """Name of the filter."""
         return "grid" if self.grid else "bayes"
+
+    @property
+    def uses(self) -> frozenset[Kind]:
+        """Motion, and what its sources use."""
+        return frozenset[Kind]({"motion"}).union(*(source.kinds for source in self.sources))
 
     @cached_property
     def sources(self) -> tuple[EvidenceSource, ...]:

@@ -19,7 +19,7 @@ from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.filters.resampling import systematic
 from mapfilter.models import fingerprint
-from mapfilter.models.fingerprint import LevelReading, RasterFrame
+from mapfilter.models.fingerprint import LevelReading
 from mapfilter.models.measured_map import ServingStatistics
 from mapfilter.models.street_motion import (
     BIAS,
@@ -216,9 +216,7 @@ class BayesModel:
 
     def _pixels(self, state: Floats32, back_east_m: float, back_north_m: float) -> Ints32:
         """Return the pixel of each hypothesis, moved back by a displacement of dead reckoning."""
-        lattice, step = self.area.lattice, self.area.lattice.resolution_m
-        frame = RasterFrame(0.0, lattice.rows * step, 1 / step, lattice.rows, lattice.cols)
-        return np.asarray(fingerprint.pixels(state, back_east_m, back_north_m, frame))
+        return np.asarray(fingerprint.pixels(state, back_east_m, back_north_m, self.area.frame))
 
 
 _MIN_VARIANCE = 0.25

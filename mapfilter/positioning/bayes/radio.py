@@ -28,7 +28,7 @@ from mapfilter.positioning.bayes.evidence import (
 from mapfilter.positioning.bayes.state import FIRST_SPACING_M, BayesState, DeadReckoning
 from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.estimate import UnusedReading
-from mapfilter.tracks.schema import SERVING
+from mapfilter.tracks.schema import SERVING, Kind
 
 _SERVING_NATS = 0.5
 _MAP_NATS_PER_M = 0.03
@@ -86,6 +86,7 @@ class RadioSource(EvidenceSource):
     area: AreaMap
     options: EvidenceOptions
     name: ClassVar[str] = "radio"
+    kinds: ClassVar[frozenset[Kind]] = frozenset({"serving", "neighbour"})
 
     def begin(self) -> RadioHistory:
         """Return the history before the first report."""
@@ -182,7 +183,7 @@ class RadioSource(EvidenceSource):
     def _placed(
         self, epoch: Epoch, serving: int
     ) -> tuple[dict[int, float], list[tuple[tuple[int, ...], ReportRow]], list[_Unplaced]]:
-        """Sort levels: of one cell and inside the scale, other ones, and those of unknown cells."""
+        """Sort levels: of one cell and inside the scale, other ones, and those without a band."""
         inside: dict[int, float] = {}
         others: list[tuple[tuple[int, ...], ReportRow]] = []
         unplaced: list[_Unplaced] = []
@@ -201,7 +202,8 @@ class RadioSource(EvidenceSource):
                 key = (row.arfcn, -1 if row.bsic is None else row.bsic)
                 bands = tuple(b for b in self.area.carriers.get(key, ()) if b != serving)
             else:
-                bands = ()
+                unplaced.append((row, Reason.NO_CELL))
+                continue
             if not bands:
                 unplaced.append((row, Reason.UNKNOWN_CELL))
             elif not isfinite(row.level_dbm):

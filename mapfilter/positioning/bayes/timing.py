@@ -23,6 +23,7 @@ from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Difference, Epoch
 from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.gnss.options import TimingOptions
+from mapfilter.tracks.schema import Kind
 
 
 class TimingState(NamedTuple):
@@ -41,6 +42,7 @@ class TimingTerm:
     model : GaussianTerms
         Of east and north in the frame of the hypotheses.
     reading_m : (m,) array
+        Measured distances, or differences of distances.
     weight : float
         Share of the reading that is new, 0 to 1.
     clip_sd : float
@@ -76,6 +78,7 @@ class TimingSource(EvidenceSource):
     options: TimingOptions
     advances: bool = True
     name: ClassVar[str] = "timing"
+    kinds: ClassVar[frozenset[Kind]] = frozenset({"serving", "neighbour", "tdoa"})
 
     def begin(self) -> TimingState:
         """Return the state before the first reading."""

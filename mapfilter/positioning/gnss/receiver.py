@@ -102,6 +102,7 @@ class Weighed:
     rows : (3, N) array
         Clock and height of the hypotheses afterwards.
     covariance : (3, 3) array
+        Of the clock error, its rate and the height afterwards, shared by all hypotheses.
     """
 
     gain: Floats
@@ -216,11 +217,11 @@ def weighed(
     loading[:, 4] = -np.sin(sky.elevation_rad)
     known_m = receiver.mean[0] + loading[:, 4] * receiver.mean[2]
     rng = np.random.default_rng(0)  # Nothing is drawn.
-    after, news = rao_blackwell.update(
+    after, info = rao_blackwell.update(
         before, compiled(model), sky.range_m - known_m, rng, _NO_RESAMPLING, loading
     )
     gain = after.log_weight - before.log_weight
-    best = -0.5 * news.nis if news.used else -np.inf
+    best = -0.5 * info.nis if info.used else -np.inf
     score = best - float(gain.max()) + 0.5 * max(len(sky.names) - free, 0)
     return Weighed(gain, score, after.state[2:], after.covariance[2:, 2:])
 

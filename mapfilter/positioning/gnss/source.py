@@ -31,6 +31,7 @@ from mapfilter.positioning.gnss.receiver import (
     sky_over,
     weighed,
 )
+from mapfilter.tracks.schema import Kind
 
 _FIRST_SPACING_M = 10.0
 _BLIND_START = 0.1
@@ -65,6 +66,7 @@ class FirstFix(EvidenceSource):
 
     origin_m: tuple[float, float]
     name: ClassVar[str] = "first fix"
+    kinds: ClassVar[frozenset[Kind]] = frozenset({"gnss"})
 
     def first(self, epoch: Epoch) -> EvidenceUpdate:
         """Return the fix as it is."""
@@ -86,6 +88,7 @@ class GnssSource(EvidenceSource):
     options: GnssOptions
     clock: bool = True
     name: ClassVar[str] = "gnss"
+    kinds: ClassVar[frozenset[Kind]] = frozenset({"gnss", "pseudorange"})
 
     @cached_property
     def gate(self) -> GnssGate:

@@ -96,7 +96,7 @@ class SumBelief:
     def update(
         self, measurement: CompiledMeasurement, reading: ArrayLike, method: Method
     ) -> tuple[SumBelief, Taken]:
-        """Return the belief after a reading (NaN where absent), and what became of the reading.
+        """Return the belief after a reading (NaN where absent), and the outcome of the update.
 
         Each part is updated by the method and weighed by its evidence; a part whose update fails
         loses its weight. Where all updates fail, nothing changes.

@@ -242,14 +242,14 @@ class _Step:
         return transition, noise, shift
 
     def _speed_mps(self) -> float:
-        """Return how fast one is believed to go, at least at a walk."""
+        """Return the estimated speed, at least that of a walk."""
         if self.belief is None:
             raise AssertionError("asked once started")
         mean = self.belief.moments.mean
         return max(float(np.hypot(*mean[list(self.layout.velocity)])), _WALK_MPS)
 
     def _step(self, epoch: Epoch, step: MotionStep) -> tuple[Floats, Floats]:
-        """Return where a step leads and how sure that is; without direction it is all spread."""
+        """Return a step's displacement and covariance; without a heading, zero and isotropic."""
         if not isfinite(step.step_m):
             self._label(epoch, (step,), Reason.NO_STEP)
             return np.zeros(2), np.zeros((2, 2))
@@ -318,8 +318,8 @@ class _Step:
     def _update_fix(self, fix: GnssFix) -> bool:
         cross_m2 = fix.cov_east_north_m2 if isfinite(fix.cov_east_north_m2) else 0.0
         noise = np.array([[fix.var_east_m2, cross_m2], [cross_m2, fix.var_north_m2]])
-        sure = np.isfinite(noise).all() and noise[0, 0] > 0 and np.linalg.det(noise) > 0
-        if not sure:
+        valid = np.isfinite(noise).all() and noise[0, 0] > 0 and np.linalg.det(noise) > 0
+        if not valid:
             noise = np.eye(2) * self.options.fix_sd_m**2
         return self._update(position_fix(self.layout, noise), [fix.east_m, fix.north_m])
 
@@ -327,10 +327,10 @@ class _Step:
         """Update with a measurement; return whether that could be done."""
         if self.belief is None:
             raise AssertionError("started before it measures")
-        self.belief, news = self.belief.update(compiled(model), reading, self.method)
-        if news.used:
-            self.recent_nis = [*self.recent_nis, news.nis / len(reading)][-_WINDOW:]
-        return news.used
+        self.belief, info = self.belief.update(compiled(model), reading, self.method)
+        if info.used:
+            self.recent_nis = [*self.recent_nis, info.nis / len(reading)][-_WINDOW:]
+        return info.used
 
     def _label(self, epoch: Epoch, steps: Sequence[MotionStep], reason: Reason) -> None:
         self.unused += [UnusedReading(epoch.time_s, "motion", "", reason) for _ in steps]

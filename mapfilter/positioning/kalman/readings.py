@@ -55,7 +55,7 @@ def _cell(sites: SiteModels, row: ReportRow, serving: str | None) -> tuple[str |
         known = row.cell in sites.cells
         return (row.cell, Reason.NOT_USED_BY_FILTER) if known else (None, Reason.UNKNOWN_CELL)
     if row.arfcn is None:
-        return None, Reason.NOT_USED_BY_FILTER
+        return None, Reason.NO_CELL
     found = sites.neighbours(serving, row.arfcn, row.bsic)
     if len(found) == 1:
         return found[0], Reason.NOT_USED_BY_FILTER

@@ -26,10 +26,10 @@ from mapfilter.positioning.kalman.models import compiled
 
 TOO_FEW = "not enough measurements"
 BAD_GEOMETRY = "bad geometry"
-UNSETTLED = "steps that do not converge"
+NOT_CONVERGED = "steps that do not converge"
 
 _ITERATIONS = 50
-_SETTLED_M = 1e-9
+_CONVERGED_M = 1e-9
 _LOWEST_RATIO = 1e-7
 
 
@@ -48,7 +48,7 @@ class StaticFix:
     iterations : int
         Gauss-Newton steps taken.
     problem : str
-        Why there is no fix: one of :data:`TOO_FEW`, :data:`BAD_GEOMETRY` and :data:`UNSETTLED`;
+        Why there is no fix: one of :data:`TOO_FEW`, :data:`BAD_GEOMETRY` and :data:`NOT_CONVERGED`;
         empty where there is one.
     """
 
@@ -131,12 +131,12 @@ def static_fix(
                 break
             length /= 2
         state, residual = tried, better
-        if np.abs(length * move).max() <= _SETTLED_M * (1 + np.abs(state[free]).max()):
+        if np.abs(length * move).max() <= _CONVERGED_M * (1 + np.abs(state[free]).max()):
             if largest_deviation is not None and values[-1] * largest_deviation < 1:
                 return failed(BAD_GEOMETRY, iteration)
             covariance = (right.T / values**2) @ right
             return StaticFix(state, covariance, True, iteration)
-    return failed(UNSETTLED, _ITERATIONS)
+    return failed(NOT_CONVERGED, _ITERATIONS)
 
 
 class PositionTrack(NamedTuple):

@@ -119,7 +119,7 @@ OVER_TIME = (EKF, AT_NEAR, AT_EDGE)
 
 
 class Epoch(NamedTuple):
-    """What a filter takes in at one moment; without a model nothing is measured."""
+    """Measurements of one epoch; the model is None where there are none."""
 
     model: GaussianTerms | None
     reading: Floats

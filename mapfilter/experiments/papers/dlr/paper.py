@@ -98,7 +98,7 @@ def rows(run: dlr.PaperRun) -> list[dict[str, Any]]:
     """Return every filter on every set of epochs that has any; errors in metres, east and north.
 
     ``where`` in the network time differences are taken (None without them) and ``above_db`` the
-    SINR below which stations are dropped (None for the three best ones); ``told``, the share of the
+    SINR below which stations are dropped (None for the three best ones); ``located``, the share of
     epochs at which there is a position: the others count as worse than any error; percentiles of
     the error, and ``interval_m``, 95 % over tracks, of the 90 % error.
     """
@@ -121,7 +121,7 @@ def rows(run: dlr.PaperRun) -> list[dict[str, Any]]:
                     "mobility": key.mobility,
                     "epochs": name,
                     "count": own.size,
-                    "told": float(np.isfinite(own).mean()),
+                    "located": float(np.isfinite(own).mean()),
                     **{one: value if np.isfinite(value) else np.nan for one, value in at.items()},
                     "interval_m": (interval.low, interval.high),
                 }
@@ -174,7 +174,7 @@ def tables(run: dlr.PaperRun) -> dict[str, pd.DataFrame]:
         picked = None if row["where"] is None else "three best"
         above = picked if row["above_db"] is None else f"{row['above_db']:g}"
         ends = {"error_90_low_m": low, "error_90_high_m": high}
-        found.append(row | {"above_db": above, "told": f"{row['told']:.4f}"} | ends)
+        found.append(row | {"above_db": above, "located": f"{row['located']:.4f}"} | ends)
     return {"errors": pd.DataFrame(found, dtype=object)}
 
 

@@ -77,7 +77,7 @@ ASSUMPTIONS = (
 
 
 class CombinationRun(NamedTuple):
-    """Root mean square errors by filter or bound and quantity, (K,), and how many went astray.
+    """Root mean square errors by filter or bound and quantity, (K,), and the share of divergence.
 
     ``astray`` is the share of trials more than 500 m off at the end.
     """

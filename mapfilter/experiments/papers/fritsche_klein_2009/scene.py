@@ -47,7 +47,7 @@ BIAS_HALF_M, DRIFT_HALF_MPS = 300e3, 10.0
 """The clock is initialised uniformly between minus and plus these."""
 
 MOTION_FACTOR, CLOCK_FACTOR = 100.0, 5.0
-"""How much more noise than there is the filters assume."""
+"""Ratios of the process noise that the filters assume to the true one."""
 
 SITES_EAST_M = (750.0, 957.0, 1523.0, 1730.0, 1164.0, 391.0, 184.0)
 SITES_NORTH_M = (1000.0, 1773.0, 1207.0, 1980.0, 2545.0, 2338.0, 1566.0)

@@ -1,0 +1,1 @@
+"""What notebooks call; every name is in :mod:`mapfilter` itself."""

@@ -1,0 +1,177 @@
+"""Locate a log, and score the track: what notebooks call first."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.errors import InputError, fail
+from mapfilter.evaluation.accuracy import Accuracy, Truth, accuracy, position_errors_m
+from mapfilter.positioning import filter as loop
+from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
+from mapfilter.positioning.locators import DEFAULT, as_filter
+from mapfilter.tracks.log import TrackLog
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Track:
+    """A located log: positions with their uncertainty, as tables and pictures.
+
+    Parameters
+    ----------
+    positioned : PositionedTrack
+        The filter's result: an estimate, snapshots of its hypotheses, and the processor time of
+        this process in seconds, without reading the database.
+    """
+
+    positioned: PositionedTrack
+    log: TrackLog
+    database: RadioRouteDatabase
+
+    @property
+    def estimate(self) -> TrackEstimate:
+        """All arrays of the estimate, and the reason for each measurement not used."""
+        return self.positioned.estimate
+
+    def __len__(self) -> int:
+        return len(self.estimate)
+
+    def __repr__(self) -> str:
+        found, status = self.estimate, "no epochs"
+        if len(found):
+            first = found.converged_at
+            when = "never converged" if first is None else f"converged at {found.time_s[first]:g} s"
+            status = f"{when}, {found.status[-1]} at the end"
+        return (
+            f"Track by {found.filter}: {len(found)} epochs, {status}, "
+            f"{self.positioned.filter_s:.2f} s of processor time"
+        )
+
+    def _repr_html_(self) -> str:
+        """Return the summary and the last epochs, as notebooks show them."""
+        return f"<p>{escape(repr(self))}</p>{self.to_dataframe().tail().to_html()}"
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return one row for each epoch: position (m), radii (m), status, reason and so on."""
+        return self.estimate.to_dataframe()
+
+    def to_geodataframe(self) -> gpd.GeoDataFrame:
+        """Return the same with points in the CRS of the database, without unlocated epochs."""
+        return self.estimate.to_geodataframe()
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the track over the streets of the database, with its 95 % radii.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Where to draw; a new figure when left out.
+        """
+        from mapfilter.report.track import plot_track
+        from mapfilter.workflows.served import served_points, street_map
+
+        base = street_map(self.database, served_points(self.database))
+        return plot_track(self.estimate, Truth.of_table(self.log.truth), base, ax=ax)
+
+
+def locate(
+    log: TrackLog,
+    database: RadioRouteDatabase,
+    filter: Any = DEFAULT,  # noqa: A002
+    *,
+    seed: int | np.random.Generator = 0,
+    ways: bool = True,
+    snapshots: bool = False,
+) -> Track:
+    """Locate a log from an unknown start.
+
+    Parameters
+    ----------
+    log : TrackLog
+        In the CRS of the database.
+    filter : options, str, Filter or class
+        Options such as ``BayesFilter(level_error_db=8.0)``, the name of a filter, or a custom
+        filter (see the page "Extending"). The Bayes map filter when left out.
+    seed : int or numpy.random.Generator
+        Equal logs, databases, options and seeds give equal bytes.
+    ways : bool
+        Whether positions are matched to ways.
+    snapshots : bool
+        Whether to keep the filter's hypotheses at some epochs, for pictures.
+
+    Raises
+    ------
+    InputError
+        The log is in another CRS than the database.
+    ConfigError
+        The filter is none, or a custom filter fails.
+    """
+    rng = np.random.default_rng(seed)
+    bound = as_filter(filter, database, ways=ways)
+    return Track(loop.locate(log, bound, rng, snapshots=snapshots), log, database)
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Score(Accuracy):
+    """Accuracy of one track against ground truth.
+
+    Besides the figures of :class:`mapfilter.evaluation.accuracy.Accuracy`, the error of each epoch.
+
+    Parameters
+    ----------
+    error_m : (N,) array
+        NaN where the track has no position, or the ground truth none.
+    """
+
+    error_m: Any = None
+
+    def __repr__(self) -> str:
+        if not self.switched:
+            return "Score: the filter never converged"
+        outcome = "right" if self.success else "wrong"
+        return (
+            f"Score: converged after {self.switch_distance_m:.0f} m, "
+            f"{self.error_at_switch_m:.1f} m off ({outcome}); "
+            f"then {self.error_mean_m:.1f} m on average, {self.error_95_m:.1f} m at 95 %"
+        )
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the figures as a table of one row."""
+        return pd.DataFrame([{k: v for k, v in asdict(self).items() if k != "error_m"}])
+
+
+def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
+    """Compare a track with ground truth.
+
+    Parameters
+    ----------
+    truth : DataFrame or Truth
+        Columns ``time_s``, ``east_m`` and ``north_m``, as the table ``truth`` of a log, in the CRS
+        of the track.
+
+    Raises
+    ------
+    InputError
+        The ground truth has fewer than two positions, or lacks a column.
+    """
+    estimate = track.estimate if isinstance(track, Track) else track
+    if not isinstance(truth, Truth):
+        lacking = {"time_s", "east_m", "north_m"} - set(truth.columns)
+        if lacking:
+            expected = "columns time_s, east_m and north_m"
+            raise fail(InputError, "truth", expected, ", ".join(map(str, truth.columns)))
+        known = Truth.of_table(truth)
+        if known is None:
+            raise fail(InputError, "truth", "two positions or more", len(truth))
+        truth = known
+    figures = asdict(accuracy(estimate, truth))
+    return Score(**figures, error_m=position_errors_m(estimate, truth))

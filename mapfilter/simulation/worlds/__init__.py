@@ -1,0 +1,1 @@
+"""Worlds that share no model with the filter: radio, walkers, phones, sensors, faulty inputs."""

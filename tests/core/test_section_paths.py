@@ -1,0 +1,50 @@
+"""Options that are files: keys of the configuration whose paths are relative to it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from pydantic import ValidationError
+
+from mapfilter.config.fields import Section, with_options
+from mapfilter.options import Options
+
+
+@dataclass(frozen=True, slots=True)
+class Terrain(Options):
+    """Terrain.
+
+    Parameters
+    ----------
+    heights : Path, optional
+        Raster of heights.
+    table : Path
+        Table of heights.
+    """
+
+    heights: Path | None = None
+    table: Path = Path("heights.csv")
+
+
+@with_options(Terrain)
+class TerrainSection(Section):
+    """``[terrain]``: heights."""
+
+
+@with_options(Terrain, optional=True)
+class OtherSection(Section):
+    """``[other]``: heights."""
+
+
+@pytest.mark.parametrize("section", [TerrainSection, OtherSection])
+def test_paths_are_relative_to_the_file(section, tmp_path):
+    values = {"heights": "dem.tif", "table": str(tmp_path / "table.csv")}
+    found = section.model_validate(values, context={"folder": tmp_path / "area"}).of(Terrain)
+    assert found == Terrain(tmp_path / "area" / "dem.tif", tmp_path / "table.csv")
+
+
+def test_without_a_path_there_is_the_default():
+    assert TerrainSection().of(Terrain) == Terrain()
+    assert OtherSection().table is None
+    with pytest.raises(ValidationError):
+        TerrainSection.model_validate({"heights": 5})
