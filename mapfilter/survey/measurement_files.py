@@ -23,8 +23,8 @@ import numpy as np
 from mapfilter._types import Floats
 from mapfilter.errors import Fault, Faults, InputError, fail
 from mapfilter.geodesy import degree_fault
-from mapfilter.radio.cell_layouts import number
 from mapfilter.radio.cell_rules import RANGES, id_fault
+from mapfilter.radio.tables import number
 
 _LONGEST_LINE = 1 << 16
 _FAULTS_KEPT = 20

@@ -10,6 +10,7 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
+from mapfilter.radio.identities import technology
 from mapfilter.tracks.readers.columns import (
     Columns,
     header_columns,
@@ -22,7 +23,6 @@ from mapfilter.tracks.readers.identities import (
     add_radio,
     available,
     parse_identities,
-    technology,
 )
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.text import Text
