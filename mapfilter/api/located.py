@@ -15,6 +15,7 @@ from mapfilter.evaluation.accuracy import Accuracy, Truth, accuracy, position_er
 from mapfilter.positioning import filter as loop
 from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
 from mapfilter.positioning.locators import DEFAULT, as_filter
+from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 
 if TYPE_CHECKING:
@@ -97,7 +98,8 @@ def locate(
     Parameters
     ----------
     log : TrackLog
-        In the CRS of the database.
+        In the CRS of the database. Cells that it names by identity (mcc, mnc, lac, ci) get the ids
+        of the database.
     filter : options, str, Filter or class
         Options such as ``BayesFilter(level_error_db=8.0)``, the name of a filter, or a custom
         filter (see the page "Extending"). The Bayes map filter when left out.
@@ -117,6 +119,7 @@ def locate(
     """
     rng = np.random.default_rng(seed)
     bound = as_filter(filter, database, ways=ways)
+    log = name_by_plan(log, database.plan)
     return Track(loop.locate(log, bound, rng, snapshots=snapshots), log, database)
 
 

@@ -70,11 +70,11 @@ def name_by_plan(log: TrackLog, plan: CellPlan) -> TrackLog:
         reported = _Reported(**values)
         named.append(table.name(reported))
         found.add(reported, named[-1], plan, count)
-    new = pd.Series([named[number] for number in numbers.tolist()], dtype=object)
-    if new.equals(pd.Series(cells.tolist(), dtype=object)):
-        return replace(log, notes=(*log.notes, *found.notes())) if found.lost else log
-    changed = radio.assign(cell=new.to_numpy(dtype=object))
-    return replace(log, radio=changed, notes=(*log.notes, *found.notes()))
+    if not any(found.named.values()) and not found.hidden:
+        return log
+    # Without the dtype pandas 3 makes these strings, and None becomes NaN.
+    new = pd.Series([named[i] for i in numbers.tolist()], index=radio.index, dtype=object)
+    return replace(log, radio=radio.assign(cell=new), notes=(*log.notes, *found.notes()))
 
 
 def _plain(value: Any) -> Any:
@@ -82,23 +82,25 @@ def _plain(value: Any) -> Any:
 
 
 class _Counts:
-    """Rows that got an id, and rows of identified cells that the plan does not have."""
+    """Rows that got an id, and rows of cells that the plan does not have."""
 
     def __init__(self) -> None:
         self.named: dict[str, int] = {}
         self.lost: dict[str, int] = {}
+        self.hidden = False
 
     def add(self, reported: _Reported, name: str | None, plan: CellPlan, rows: int) -> None:
         if name is not None and name in plan and name != reported.cell:
             self.named[name] = self.named.get(name, 0) + rows
         elif name is not None and name not in plan:
             self.lost[name] = self.lost.get(name, 0) + rows
+            self.hidden |= name != reported.cell
 
     def notes(self) -> Iterable[str]:
         if self.named:
             rows, cells = sum(self.named.values()), len(self.named)
             yield f"radio: {rows} rows of {cells} cells named by the plan's identities"
-        if self.lost and self.named:
+        if self.lost:
             rows, some = sum(self.lost.values()), listed(sorted(self.lost))
             yield f"radio: {rows} rows of {len(self.lost)} cells that the plan lacks ({some})"
 

@@ -116,9 +116,10 @@ def list_journeys(path: str | Path) -> list[Path]:
     try:
         return list_logs(path)
     except InputError:
-        if path.is_dir() and any(format_of(p) is not None for p in _files_in(path)):
-            return [path]
-        raise
+        inner = _files_in(path) if path.is_dir() else []
+        if any(_is_table(p) for p in inner) or all(format_of(p) is None for p in inner):
+            raise
+        return [path]
 
 
 def read_recordings(
