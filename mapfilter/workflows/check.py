@@ -20,6 +20,7 @@ from mapfilter.geodesy import Lattice
 from mapfilter.propagation.predict import off_frequency
 from mapfilter.radio.cell_rules import ANTENNAS
 from mapfilter.radio.cells import CellPlan
+from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.workflows.check_places import (
     check_pixels,
@@ -156,6 +157,7 @@ class _Checks:
 
     def check_rasters(self, rasters: RxLevRasters, plan: CellPlan | None) -> None:
         config, findings = self.config, self.findings
+        rasters = rasters if plan is None else named_by_plan(rasters, plan)
         check_pixels(rasters, findings)
         before = len(findings.found)
         samples = sampled(rasters, plan, findings)
