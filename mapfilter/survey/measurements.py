@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -28,6 +28,7 @@ Format = Literal["auto", "csv", "opencellid", "towercollector", "antennas"]
 SESSION_GAP_S = 1800.0
 """A longer silence begins a new session."""
 _SUFFIXES = (".csv", ".log", ".tsv")
+_RECORDED_SUFFIXES = (".txt", ".gz")
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +117,7 @@ def read_measurements(
     format: Format = "auto",  # noqa: A002
     columns: Mapping[str, str] | None = None,
     session_gap_s: float = SESSION_GAP_S,
+    recorded: Callable[[Path], Rows | None] | None = None,
 ) -> Measurements:
     """Read files of measurements; each file, session column and long silence begins a session.
 
@@ -133,6 +135,9 @@ def read_measurements(
         For "csv": which column holds which of :data:`~mapfilter.survey.measurement_files.FIELDS`.
     session_gap_s : float
         A longer silence begins a new session.
+    recorded : callable, optional
+        With "auto": reads files that are none of these formats; None for those that it does not
+        know.
 
     Raises
     ------
@@ -142,9 +147,9 @@ def read_measurements(
     """
     tables = []
     faults: list[Fault] = []
-    for path in _expanded(files):
+    for path in _expanded(files, recorded):
         try:
-            table = _read(path, format, columns)
+            table = _read(path, format, columns, recorded)
         except InputError as error:
             faults.extend(error.faults)
             continue
@@ -162,27 +167,49 @@ def read_measurements(
     return _joined(tables, projected_crs(crs), session_gap_s)
 
 
-def _read(path: Path, kind: Format, columns: Mapping[str, str] | None) -> Rows:
+def _read(
+    path: Path,
+    kind: Format,
+    columns: Mapping[str, str] | None,
+    recorded: Callable[[Path], Rows | None] | None,
+) -> Rows:
     if columns:
         return read_csv(path, mapped(columns))
     if kind == "auto":
-        header, kind = header_of(path), "csv"
-        if header[:1] == ["begin"]:
-            kind = "antennas"
-        elif {"cellid", "signal", "lat"} <= set(header):
-            kind = "opencellid"
-        elif {"cell_id", "dbm", "lat"} <= set(header):
-            kind = "towercollector"
+        own = _kind_of(path)
+        if own is None and recorded is not None and (rows := recorded(path)) is not None:
+            return rows
+        kind = own or "csv"
     return read_antennas_log(path) if kind == "antennas" else read_csv(path, DIALECTS[kind])
 
 
-def _expanded(files: Sequence[Path | str]) -> list[Path]:
+def _kind_of(path: Path) -> Format | None:
+    """Return the format of a file by its first line; None for none of the own ones."""
+    try:
+        header = header_of(path)
+    except InputError:
+        return None
+    if header[:1] == ["begin"]:
+        return "antennas"
+    names = set(header)
+    kinds: tuple[tuple[Format, set[str]], ...] = (
+        ("opencellid", {"cellid", "signal", "lat"}),
+        ("towercollector", {"cell_id", "dbm", "lat"}),
+        ("csv", {"level_dbm", "lat", "lon"}),
+    )
+    return next((kind for kind, needed in kinds if needed <= names), None)
+
+
+def _expanded(
+    files: Sequence[Path | str], recorded: Callable[[Path], Rows | None] | None
+) -> list[Path]:
+    suffixes = _SUFFIXES if recorded is None else (*_SUFFIXES, *_RECORDED_SUFFIXES)
     found: list[Path] = []
     for path in map(Path, files):
         if path.is_dir():
-            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in _SUFFIXES)
+            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in suffixes)
             if not inside:
-                raise fail(InputError, str(path), f"files {', '.join(_SUFFIXES)}", "none")
+                raise fail(InputError, str(path), f"files {', '.join(suffixes)}", "none")
             found += inside
         else:
             found.append(path)
