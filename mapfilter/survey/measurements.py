@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from mapfilter._types import Bools, Floats, Ints, Ints32
-from mapfilter.errors import Fault, InputError, fail
+from mapfilter.errors import Fault, InputError, fail, listed
 from mapfilter.geodesy import project, projected_crs, utm_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.survey.measurement_files import (
@@ -27,6 +28,7 @@ Format = Literal["auto", "csv", "opencellid", "towercollector", "antennas"]
 
 SESSION_GAP_S = 1800.0
 """A longer silence begins a new session."""
+_FILES_NAMED = 3
 _SUFFIXES = (".csv", ".log", ".tsv")
 _RECORDED_SUFFIXES = (".txt", ".gz")
 
@@ -245,7 +247,7 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
         north_m,
         level_dbm,
         accuracy_m,
-        tuple(note for table in tables for note in table.notes()),
+        _notes(tables),
     )
     placed = np.isfinite(east_m) & np.isfinite(north_m)
     if not placed.all():
@@ -256,6 +258,25 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
             raise fail(InputError, "measurements", f"places where {crs} is used", got, hint)
         joined = joined.where(placed, f"{count} rows left out: {crs} has no such places")
     return _once(joined)
+
+
+def _notes(tables: Sequence[Rows]) -> tuple[str, ...]:
+    """Return remarks by file; what more than three files share is summed up."""
+    files = Counter(what for table in tables for what in table.aside)
+    shared = [what for what, count in files.items() if count > _FILES_NAMED]
+    found = []
+    for what in shared:
+        of = [table for table in tables if what in table.aside]
+        total, names = sum(table.aside[what] for table in of), [table.path.name for table in of]
+        found.append(f"{total} {what} in {len(of)} files ({listed(names)})")
+        example = next((note for note in of[0].notes() if what in note), "")
+        if (at := example.find(", such as ")) >= 0:
+            found[-1] += example[at:]
+    kept = (
+        replace(t, aside=Counter({w: n for w, n in t.aside.items() if w not in shared}))
+        for t in tables
+    )
+    return (*found, *(note for table in kept for note in table.notes()))
 
 
 def _sessions(table: Rows, gap_s: float) -> Ints:
