@@ -7,6 +7,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from mapfilter._types import Floats
 
 LIMITS: dict[str, dict[str, int]] = {
     "GSM": {"arfcn": 1023, "bsic": 63, "lac": 65_535, "ci": 65_535, "timing_advance": 219},
@@ -23,6 +28,18 @@ LIMITS: dict[str, dict[str, int]] = {
 """Largest values of carriers ``arfcn`` (ARFCN, UARFCN, EARFCN, NR-ARFCN), codes ``bsic`` (BSIC,
 PSC, PCI), areas ``lac`` (LAC, TAC), identities ``ci`` (CI, ECI, NCI) and timing advances.
 """
+
+TIMING_STEP_M = {"GSM": 299_792_458 * 48 / 13e6 / 2, "LTE": 299_792_458 * 16 / 30.72e6 / 2}
+"""Distance of a step of timing advance: 553.5 m and 78.07 m; in NR it depends on the numerology."""
+
+BARS_DBM: dict[str, tuple[float, float, float, float]] = {
+    "GSM": (-107, -103, -97, -89),
+    "UMTS": (-115, -105, -95, -85),
+    "LTE": (-115, -105, -95, -85),
+    "NR": (-110, -90, -80, -65),
+}
+"""Least level (RSSI, RSCP, RSRP, SS-RSRP) of one to four bars on Android, unless the operator has
+set others."""
 
 _SPLIT = re.compile(r"[-_:;,/ .]+")
 _FAMILIES = {
@@ -72,3 +89,25 @@ def limit_fault(family: str | None, name: str, value: float | None) -> str:
     """Return what was expected of an identifier that a technology does not have, or ""."""
     most = LIMITS.get(family or "", {}).get(name)
     return f"0..{most} in {family}" if most is not None and (value or 0) > most else ""
+
+
+def levels_of_bars(bars: Sequence[float] | Floats, family: str) -> tuple[Floats, Floats, Floats]:
+    """Return the levels that bars mean: middle (dBm), width of the step (dB), and censoring.
+
+    No bar is any level below the first threshold (censored -1), four bars any level from the last
+    one on (censored 1), and both have no width. Other numbers give NaN.
+
+    Examples
+    --------
+    >>> [part.tolist() for part in levels_of_bars([0, 1, 3, 4], "LTE")]
+    [[-115.0, -110.0, -90.0, -85.0], [0.0, 10.0, 10.0, 0.0], [-1.0, 0.0, 0.0, 1.0]]
+    """
+    least = np.array(BARS_DBM[family], dtype=np.float64)
+    low = np.concatenate([least[:1], least])
+    high = np.concatenate([least, least[-1:]])
+    given = np.asarray(bars, dtype=np.float64)
+    known = np.isin(given, np.arange(5.0))
+    at = np.where(known, given, 0).astype(np.int64)
+    nothing = np.where(known, 0.0, np.nan)
+    censored = (at == 4).astype(np.float64) - (at == 0)
+    return (low + high)[at] / 2 + nothing, (high - low)[at] + nothing, censored + nothing

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, cast
@@ -27,6 +27,7 @@ from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.filter import Filter, FilterOptions, locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
+from mapfilter.positioning.log_options import fitted_to_log
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import CellPlan
 from mapfilter.report.canvas import save
@@ -308,16 +309,23 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
     def sites(crs: str) -> CellPlan:
         return planned_cells(config, crs) if database is None else database.plan
 
-    @cache
-    def over(crs: str) -> Filter[Any]:
-        if database is not None and not isinstance(options, KalmanFilter):
-            return options.over(database)
+    filters: dict[tuple[str, ...], Filter[Any]] = {}
+
+    def over(crs: str, fitted: FilterOptions, *notes: str) -> Filter[Any]:
+        key = (crs, *notes)
+        if key not in filters:
+            filters[key] = bound(crs, fitted)
+        return filters[key]
+
+    def bound(crs: str, fitted: FilterOptions) -> Filter[Any]:
+        if database is not None and not isinstance(fitted, KalmanFilter):
+            return fitted.over(database)
         plan = sites(crs)
-        return cast(KalmanFilter, options).over_sites(plan, plan_antennas(config, plan))
+        return cast(KalmanFilter, fitted).over_sites(plan, plan_antennas(config, plan))
 
     if database is not None:
         journeys.check(database.lattice)
-        over(database.lattice.crs)
+        over(database.lattice.crs, options)
     ensure_writable_folder(out)
     clear_results(out)
     logs: list[ReplayedLog] = []
@@ -325,8 +333,10 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
     for index, path in enumerate(journeys.paths):
         opened = journeys.open(path)
         name, crs = opened.name, opened.log.crs if database is None else database.lattice.crs
-        filter_ = over(crs)
         log = leave_out(name_by_plan(opened.log, sites(crs)), config.track.without)
+        fitted, notes = fitted_to_log(options, log)
+        filter_ = over(crs, fitted, *notes)
+        log = replace(log, notes=(*log.notes, *notes))
         rng = named_rng(config.journeys.seed, "replay", name)
         drawn = wanted == "all" or (wanted == "first" and not index)
         track = locate(log, filter_, rng, snapshots=drawn)
