@@ -63,7 +63,7 @@ def plot_error_over_distance(
         # Hundreds of metres while searching would press what follows flat.
         axes.set(yscale="log", ylim=(_LEAST_M, 2 * most_m))
         axes.yaxis.set_major_formatter("{x:g}")
-    _shade(axes, estimate, distance_m)
+    shade_statuses(axes, estimate, distance_m)
     near = Look(color=VERMILLION, linewidth=1.2, linestyle=(0, (5, 3)))
     axes.axhline(SUCCESS_RADIUS_M, label=f"{SUCCESS_RADIUS_M:.0f} m", **near)
     radii_m = estimate.radii_m.T
@@ -156,14 +156,16 @@ def plot_evidence(estimate: TrackEstimate, truth: Truth | None, *, title: str = 
     below.set(xlabel=across, ylabel="probability / %", ylim=(0.0, 104.0))
     below.set_xlim(float(along[0]), max(float(np.max(along)), float(along[0]) + 1.0))
     for axes in (above, below):
-        _shade(axes, estimate, along, named=axes is above)
+        shade_statuses(axes, estimate, along, named=axes is above)
         tidy(axes, grid=False)
     above.set_title(title or f"Filter: {estimate.filter}")
     bottom_legend(figure, 5)
     return figure
 
 
-def _shade(axes: Axes, estimate: TrackEstimate, along: Floats, *, named: bool = True) -> None:
+def shade_statuses(
+    axes: Axes, estimate: TrackEstimate, along: Floats, *, named: bool = True
+) -> None:
     """Shade the stretches of a track during which the filter was searching or lost."""
     for status, colour in _SHADES.items():
         has = np.array([s is status for s in estimate.status], dtype=bool)

@@ -20,6 +20,7 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
 from mapfilter.evaluation.accuracy import Accuracy, Outcome, Truth, accuracy, outcome
+from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.evaluation.success import SuccessSummary, summarise
 from mapfilter.filters.contract import Reason
 from mapfilter.geodesy import Lattice, same_crs
@@ -270,7 +271,8 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
     Parameters
     ----------
     config : Config
-        Its database (for Kalman-type filters its cells), track, filter and output sections count.
+        Its database (for Kalman-type filters its cells), track, filter, integrity and output
+        sections count.
     out : Path
         Folder of the results; one log writes straight into it, several into a folder each.
     progress : callable, optional
@@ -300,12 +302,13 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
     clear_results(out)
     logs: list[ReplayedLog] = []
     wanted = config.output.pictures
+    risk = config.integrity.of(IntegrityOptions).risk
     for index, folder in enumerate(folders):
         log = leave_out(read_log(folder), config.track.without)
         rng = named_rng(config.journeys.seed, "replay", folder.name)
         drawn = wanted == "all" or (wanted == "first" and not index)
         filter_ = over(log.crs if database is None else database.lattice.crs)
-        track = locate(log, filter_, rng, snapshots=drawn)
+        track = locate(log, filter_, rng, snapshots=drawn, risk=risk)
         into = out if len(folders) == 1 else out / folder.name
         if database is None:
             pictures = _draw_errors(log, track, into) if drawn else ()

@@ -7,7 +7,7 @@ import pytest
 from command_line import assert_done, assert_refused, mapfilter, settings
 
 from mapfilter.experiments.benchmarks.cases import CASES
-from mapfilter.experiments.benchmarks.scores import CaseResult
+from mapfilter.experiments.benchmarks.results import CaseResult
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.reports import ReportModel
