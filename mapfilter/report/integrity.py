@@ -23,7 +23,6 @@ from mapfilter.report.canvas import (
     ORANGE,
     VERMILLION,
     Look,
-    bottom_legend,
     figure_of,
     grouped,
     legend,
@@ -81,7 +80,8 @@ def plot_stanford(
         shown = np.ma.masked_equal(held, 0)
         norm = LogNorm(1, max(float(held.max()), 10.0))
         mesh = axes.pcolormesh(edges, edges, shown, norm=norm, cmap="viridis_r", zorder=3)
-        bar = figure_of(axes).colorbar(mesh, ax=axes, pad=0.02, shrink=0.85)
+        beside = axes.inset_axes((1.03, 0.0, 0.035, 1.0))
+        bar = figure_of(axes).colorbar(mesh, cax=beside, format="{x:g}")
         bar.set_label("epochs")
     axes.plot([0, end], [0, end], color=BLACK, linewidth=1.0, zorder=4)
     dashed = Look(color=GREY, linewidth=1.0, linestyle=(0, (5, 3)), zorder=4)
@@ -196,8 +196,6 @@ def plot_worst_run(
     distance_m = truth.distance_at(estimate.time_s)
     errors_m = position_errors_m(estimate, truth)
     shade_statuses(right, estimate, distance_m)
-    if last > first:
-        right.axvspan(distance_m[first], distance_m[last], color="#f6cdb8", alpha=0.6, linewidth=0)
     right.axhline(alert_limit_m, color=GREY, linewidth=1.0, linestyle=(0, (5, 3)))
     levels_m = np.where(np.isfinite(estimate.protection_m), estimate.protection_m, np.nan)
     for values, colour, name in (
@@ -213,14 +211,17 @@ def plot_worst_run(
     right.set(yscale="log", xlabel="distance travelled / m", ylabel="m")
     most_m = np.nanmax([*errors_m, *levels_m, 2 * SUCCESS_RADIUS_M])
     right.set_ylim(_LEAST_M, min(1.5 * most_m, max(_MOST_M, 1.2 * np.nanmax([*errors_m, 1.0]))))
+    if last > first:
+        ends = distance_m[first], distance_m[last]
+        name = f"claims > {SUCCESS_RADIUS_M:.0f} m off"
+        right.hlines(1.15 * _LEAST_M, *ends, color=BLACK, linewidth=4.0, label=name)
     right.set_xlim(0.0, max(float(truth.distance_at(truth.time_s[-1])), 1.0))
     right.yaxis.set_major_formatter("{x:g}")
     tidy(right, grid=False)
     figure.suptitle(title, fontweight="bold")
     right.set_title(f"alert limit {alert_limit_m:g} m (dashed)", fontsize=9, color=GREY)
-    figure.supxlabel(fill(reason, _WRAP), fontsize=9, x=0.01, ha="left")
-    handles, _ = right.get_legend_handles_labels()
-    bottom_legend(figure, 6, handles)
+    right.legend(loc="upper center", bbox_to_anchor=(0.45, -0.1), ncols=4, frameon=False)
+    figure.supxlabel(fill(reason, _WRAP), fontsize=10, x=0.01, ha="left")
     return figure
 
 

@@ -87,8 +87,9 @@ def explain(estimate: TrackEstimate, truth: Truth) -> WorstEpoch | None:
         while last + 1 < off.size and off[last + 1]:
             last += 1
         began = first == 0 or not claimed[first - 1]
+        before = f" after {estimate.status[first - 1]}" if first else ""
         what = (
-            f"a wrong place was claimed ({estimate.status[first]})"
+            f"a wrong place was claimed ({estimate.status[first]}{before})"
             if began
             else f"the position went astray while {estimate.status[first]}"
         )
