@@ -11,8 +11,8 @@ antenna height for microcellular system design*, IEEE Trans. Veh. Technol. 43(3)
 2.2 and 3.3 to 4.2 before and after the breakpoint; Zhang & Andrews 2015, *Downlink cellular network
 analysis with multi-slope path loss models*, IEEE Trans. Commun. 63(5)). Antennas below the roofs,
 such as those indoors, follow the site-general NLoS medians of street canyons (Rec. ITU-R P.1411,
-section 4.1.1, versions 10 to 12): α = 4.00, β = 10.2, γ = 2.36 among high buildings up to 200 m, and
-α = 5.06, as among low ones, beyond.
+section 4.1.1 of versions 10 to 12): α = 4.00, β = 10.2, γ = 2.36 among high buildings up to 200 m,
+and α = 5.06, as among low ones, beyond.
 """
 
 from __future__ import annotations
