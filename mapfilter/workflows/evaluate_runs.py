@@ -16,7 +16,6 @@ from mapfilter.evaluation.stanford import REGIONS, StanfordCounts
 from mapfilter.experiments.benchmarks.global_positioning import (
     Batch,
     BenchmarkCity,
-    LocatedRun,
     located_run,
     run_benchmark,
 )
@@ -24,6 +23,7 @@ from mapfilter.experiments.benchmarks.results import CaseResult, summarise
 from mapfilter.experiments.benchmarks.scores import Row
 from mapfilter.experiments.benchmarks.worst_run import explain, worst_row
 from mapfilter.experiments.sweep.world import SweepWorld
+from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import save
 from mapfilter.report.integrity import plot_coverage, plot_stanford, plot_worst_run
@@ -122,14 +122,13 @@ def draw_cases(
         replace(whole, cases=(name,), first=route, end=route + 1) for name, route in worst.items()
     ]
     found = ordered_results(executor or SerialExecutor(), run_again, tasks, in_flight=2)
-    for name, run in zip(names, found, strict=True):
-        truth = Truth.of_table(run.walked.truth)
-        story = explain(run.found.estimate, truth) if truth is not None else None
+    for name, (estimate, truth) in zip(names, found, strict=True):
+        story = explain(estimate, truth) if truth is not None else None
         if truth is None or story is None:
             continue
         made.append(folder / f"{name}-worst.png")
         drawn = plot_worst_run(
-            run.found.estimate,
+            estimate,
             truth,
             base,
             (story.index, story.first, story.last),
@@ -141,10 +140,11 @@ def draw_cases(
     return made
 
 
-def run_again(batch: Batch) -> LocatedRun:
-    """Repeat the one run of a batch."""
+def run_again(batch: Batch) -> tuple[TrackEstimate, Truth | None]:
+    """Repeat the one run of a batch; return its estimate and its truth."""
     runs = batch.city.on_route(batch.first, batch.fixed)
-    return located_run(batch, runs, batch.cases[0], batch.first)
+    run = located_run(batch, runs, batch.cases[0], batch.first)
+    return run.found.estimate, Truth.of_table(run.walked.truth)
 
 
 def _coverage(results: Sequence[CaseResult]) -> Any:

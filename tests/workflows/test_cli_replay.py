@@ -42,7 +42,8 @@ def test_some_cells_unknown(log, replay, tmp_path):
 def test_the_risk_of_protection_levels(log, replay, tmp_path):
     found = {}
     for risk in (None, "1e-3", "1e-6"):
-        assert_done(replay(log, "--json", *(() if risk is None else ("--protection", risk))))
+        given = () if risk is None else ("--protection", risk)
+        assert_done(replay(log, "--json", "--filter", "bayes", *given))
         found[risk] = read_estimate(tmp_path / "out" / "estimate.parquet")
     usual, rare = found["1e-3"].protection_m, found["1e-6"].protection_m
     assert np.array_equal(found[None].protection_m, usual, equal_nan=True)
