@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from textwrap import fill
 
@@ -38,6 +39,7 @@ _SIDE_IN = 6.4
 _RUN_IN = (13.0, 6.8)
 _WRAP, _LEAST_M, _MOST_M = 150, 0.5, 2000.0
 _AROUND_S, _LEAST_HALF_M = 60.0, 60.0
+_UNIT = re.compile(r"(\d) (m²|m|km|s|%)")
 _FILLS = {
     "available": "#e4f3ec",
     "misleading": "#fbe9c6",
@@ -191,7 +193,8 @@ def plot_worst_run(
     left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.15])
     near = truth if _reachable(truth, base) else None
     shown = _about(estimate, near, base, first, last)
-    plot_track(estimate, near, shown, left, title=" ", zoom=False)
+    place = " " if near is not None else "the truth is outside the map"
+    plot_track(estimate, near, shown, left, title=place, zoom=False)
     _mark_worst(left, local_frame(shown), estimate, near, worst)
     distance_m = truth.distance_at(estimate.time_s)
     errors_m = position_errors_m(estimate, truth)
@@ -221,7 +224,9 @@ def plot_worst_run(
     figure.suptitle(title, fontweight="bold")
     right.set_title(f"alert limit {alert_limit_m:g} m (dashed)", fontsize=9, color=GREY)
     right.legend(loc="upper center", bbox_to_anchor=(0.45, -0.1), ncols=4, frameon=False)
-    figure.supxlabel(fill(reason, _WRAP), fontsize=10, x=0.01, ha="left")
+    # No line ends between a number and its unit.
+    whole = _UNIT.sub("\\1\N{NO-BREAK SPACE}\\2", reason)
+    figure.supxlabel(fill(whole, _WRAP), fontsize=10, x=0.01, ha="left")
     return figure
 
 

@@ -82,3 +82,7 @@ def test_a_run_that_never_claimed_a_position():
 def test_epochs_outside_the_truth_are_no_run():
     table = line(3)
     assert explain(estimate(table, "CT", 5.0, time_s=[50.0, 51.0]), truth_of(table)) is None
+
+
+def test_another_city_is_kilometres_off():
+    assert "Worst at 1 s, after 10 m: TRACKING, 50 km off." in story("CT", [50_000, 50_100]).reason

@@ -84,7 +84,7 @@ def test_a_worst_run_marks_its_epoch(tmp_path, level_m):
     )  # fmt: skip
     left, right = drawn.axes
     assert drawn.get_suptitle() == "levels-6, run 3: astray"
-    assert drawn.get_supxlabel().startswith("Worst at 100 s")
+    assert drawn.get_supxlabel().startswith("Worst at 100\N{NO-BREAK SPACE}s")
     (star,) = (line for line in right.lines if line.get_marker() == "*")
     assert star.get_xydata()[0] == pytest.approx([140.0, 90.0])
     assert len(left.patches) == (2 if level_m == 20.0 else 1)
@@ -101,4 +101,5 @@ def test_the_log_of_another_city_is_drawn_without_its_truth():
     )
     left, _ = drawn.axes
     assert "truth" not in left.get_legend_handles_labels()[1]
+    assert left.get_title() == "the truth is outside the map"
     assert figure_of(left) is drawn

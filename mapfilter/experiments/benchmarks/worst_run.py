@@ -17,6 +17,7 @@ from mapfilter.evaluation.accuracy import (
 from mapfilter.positioning.estimate import TrackEstimate
 
 _BIN_M = 25.0
+_FAR_M = 10_000.0
 
 
 def worst_row(rows: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
@@ -100,7 +101,7 @@ def explain(estimate: TrackEstimate, truth: Truth) -> WorstEpoch | None:
         )
     worst = (
         f"Worst at {_place(estimate, truth, index)}: {estimate.status[index]}, "
-        f"{errors_m[index]:.0f} m off."
+        f"{_distance(float(errors_m[index]))} off."
     )
     return WorstEpoch(
         index, first, last, what, " ".join(filter(None, (stretch, worst, _stated(estimate, index))))
@@ -114,6 +115,11 @@ def _ending(estimate: TrackEstimate, claimed: Any, last: int) -> str:
     if not claimed[last + 1]:
         return f"then {estimate.status[last + 1]}"
     return "then within 50 m again"
+
+
+def _distance(metres: float) -> str:
+    """Return a distance in words; logs of another city are many kilometres off."""
+    return f"{metres:.0f} m" if metres < _FAR_M else f"{metres / 1000:.0f} km"
 
 
 def _place(estimate: TrackEstimate, truth: Truth, index: int) -> str:
@@ -148,7 +154,7 @@ def _searching(estimate: TrackEstimate, errors_m: Any, truth: Truth, index: int)
     """Return the state of a run that never claimed a position, at its end."""
     words = [f"At the end, {_place(estimate, truth, index)}: {estimate.status[index]}"]
     if np.isfinite(errors_m[index]):
-        words.append(f"leading hypothesis {errors_m[index]:.0f} m off")
+        words.append(f"leading hypothesis {_distance(float(errors_m[index]))} off")
     evidence = estimate.evidence
     if evidence is not None and np.isfinite(evidence.entropy_bits[index]):
         area_m2 = 2.0 ** float(evidence.entropy_bits[index]) * _BIN_M**2
