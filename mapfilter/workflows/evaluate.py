@@ -39,7 +39,7 @@ from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.satellites import NlosModel, ReceptionModel
-from mapfilter.workflows.evaluate_runs import run_cases
+from mapfilter.workflows.evaluate_runs import run_cases, street_base
 from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.terminal import to_jsonable
 from mapfilter.workflows.world import World, filter_choice, option_sections
@@ -217,16 +217,18 @@ def run_global_positioning(
     choice = filter_choice(config.filter)
     _check_lengths(wanted, fixed)
     ensure_writable_folder(out)
-    world, points = _world(World.of(config), out / "world", seed)
+    area = World.of(config)
+    world, points = _world(area, out / "world", seed)
     city = PlainCity(world, seed)
     integrity = config.integrity.of(IntegrityOptions)
+    drawn = pictures and config.output.pictures != "none"
     found = run_cases(
         Batch(city, choice, wanted, 0, runs, fixed, integrity),
         out,
         workers=workers,
         resume=resume,
         progress=progress,
-        streets=city.streets if pictures and config.output.pictures != "none" else None,
+        base=street_base(city.streets, area.streets.attribution) if drawn else None,
     )
     result = EvaluateResult(
         Path(config.area.map).name, seed, points, tuple(found), time.perf_counter() - began_s, out

@@ -46,7 +46,7 @@ from mapfilter.simulation.worlds.radio import planners_offsets_db
 from mapfilter.simulation.worlds.street_lines import StreetLines
 from mapfilter.tracks.store import write_log
 from mapfilter.workflows.evaluate import TABLE, EvaluateResult, load_benchmark
-from mapfilter.workflows.evaluate_runs import run_cases
+from mapfilter.workflows.evaluate_runs import run_cases, street_base
 from mapfilter.workflows.terminal import to_jsonable
 from mapfilter.workflows.world import World, filter_choice
 
@@ -132,17 +132,19 @@ def run_foreign(
     wanted = _check_cases(world, cases)
     choice = filter_choice(config.filter)
     ensure_writable_folder(out)
-    made, points = prepare(World.of(config), world, out / "world", seed, wanted, runs)
+    area = World.of(config)
+    made, points = prepare(area, world, out / "world", seed, wanted, runs)
     if "length_m" in fixed:
         made = replace(made, length_m=config.journeys.length_m)
     integrity = config.integrity.of(IntegrityOptions)
+    drawn = config.output.pictures != "none"
     found = run_cases(
         Batch(made, choice, wanted, 0, runs, fixed, integrity),
         out,
         workers=workers,
         resume=resume,
         progress=progress,
-        streets=made.streets if config.output.pictures != "none" else None,
+        base=street_base(made.streets, area.streets.attribution) if drawn else None,
     )
     name = Path(config.area.map).name
     seconds = time.perf_counter() - began_s

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from mapfilter.evaluation.accuracy import RADII, Truth
 from mapfilter.evaluation.stanford import REGIONS, StanfordCounts
 from mapfilter.experiments.benchmarks.global_positioning import (
     Batch,
-    BenchmarkCity,
     located_run,
     run_benchmark,
 )
@@ -31,14 +30,6 @@ from mapfilter.report.integrity import plot_coverage, plot_stanford, plot_worst_
 PICTURES = "pictures"
 
 
-class DrawnCity(BenchmarkCity, Protocol):
-    """A city of a benchmark whose streets can be drawn."""
-
-    @property
-    def streets(self) -> SweepWorld:
-        """Streets and cells."""
-
-
 def run_cases(
     whole: Batch,
     out: Path,
@@ -46,7 +37,7 @@ def run_cases(
     workers: int,
     resume: bool = False,
     progress: Progress | None = None,
-    streets: SweepWorld | None = None,
+    base: BaseMap | None = None,
 ) -> list[CaseResult]:
     """Do all runs of a benchmark and return one row of the table for each case.
 
@@ -55,14 +46,14 @@ def run_cases(
     whole : Batch
         All runs.
     out : Path
-        Gets finished batches, and pictures where there are ``streets`` to draw them on: a Stanford
-        diagram and the worst run of each case, and the coverage of all cases.
+        Gets finished batches, and pictures where there is a map to draw them on: a Stanford diagram
+        and the worst run of each case, and the coverage of all cases.
     workers : int
         Local processes.
     resume, progress
         As for :func:`mapfilter.experiments.benchmarks.global_positioning.run_benchmark`.
-    streets : SweepWorld, optional
-        Of the city.
+    base : BaseMap, optional
+        From :func:`street_base`; without it nothing is drawn.
     """
     with local_executor(workers) as executor:
         rows = run_benchmark(
@@ -78,17 +69,17 @@ def run_cases(
             summarise(whole.city.case(name), whole.choice.name, by_case[name])
             for name in whole.cases
         ]
-        if streets is not None:
-            draw_cases(whole, by_case, results, street_base(streets), out / PICTURES, executor)
+        if base is not None:
+            draw_cases(whole, by_case, results, base, out / PICTURES, executor)
     return results
 
 
-def street_base(streets: SweepWorld) -> BaseMap:
-    """Return the streets of a city as ground for maps."""
+def street_base(streets: SweepWorld, attribution: str) -> BaseMap:
+    """Return the streets of a city as ground for maps, with the attribution of their source."""
     network = streets.network
     ends = np.stack([network.east_m, network.north_m], axis=1)
     lines = np.stack([ends[network.node_a], ends[network.node_b]], axis=1)
-    return BaseMap(streets.lattice.bounds_m, tuple(lines))
+    return BaseMap(streets.lattice.bounds_m, tuple(lines), attribution=attribution)
 
 
 def draw_cases(

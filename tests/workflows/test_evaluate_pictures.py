@@ -6,8 +6,11 @@ import pytest
 from command_line import assert_refused, mapfilter
 
 from mapfilter.evaluation.stanford import REGIONS
+from mapfilter.experiments.sweep.world import open_world
+from mapfilter.workflows import evaluate_foreign
 from mapfilter.workflows.evaluate import load_benchmark, run_global_positioning
 from mapfilter.workflows.evaluate_foreign import load_foreign, run_foreign
+from mapfilter.workflows.evaluate_runs import street_base
 
 SMALL = [
     'area.map="manhattan"',
@@ -91,3 +94,36 @@ def test_the_plain_world_has_them_too(tmp_path):
     )
     assert drawn(tmp_path) == {"coverage.png", "cell-6-stanford.png", "cell-6-worst.png"}
     assert result.cases[0].runs == 1
+
+
+def test_maps_name_the_owner_of_their_streets(usual):
+    out, _ = usual
+    streets = open_world(out / "world" / "streets")
+    base = street_base(streets, "© somebody")
+    assert base.attribution == "© somebody"
+    assert base.bounds_m == streets.lattice.bounds_m
+    assert len(base.streets) == streets.network.node_a.size
+    first = base.streets[0]
+    ends = streets.network.node_a[0], streets.network.node_b[0]
+    assert [tuple(end) for end in first] == [
+        (streets.network.east_m[end], streets.network.north_m[end]) for end in ends
+    ]
+
+
+def test_the_map_of_a_run_is_that_of_its_area(tmp_path, monkeypatch):
+    given = []
+
+    def record(*_, base, **__):
+        given.append(base)
+        return []
+
+    monkeypatch.setattr(evaluate_foreign, "run_cases", record)
+    box = "area.bbox=24.9410,60.1650,24.9490,60.1700"
+    for settings in (["area.map=helsinki", box], SMALL[:5]):
+        config, fixed = load_foreign(None, settings)
+        run_foreign(
+            config, "foreign", tmp_path / str(len(given)), runs=1, seed=1, cases=CASES[:1],
+            workers=1, fixed=fixed,
+        )  # fmt: skip
+    assert "OpenStreetMap" in given[0].attribution
+    assert given[1].attribution == ""
