@@ -161,7 +161,7 @@ class GaussianTail:
     Examples
     --------
     >>> round_belief = GaussianTail(np.ones(1), np.zeros((1, 2)), 25.0 * np.eye(2)[np.newaxis])
-    >>> round(round_belief.protection_m(1e-3), 3), round(5 * (2 * np.log(1e3)) ** 0.5, 3)
+    >>> round(round_belief.protection_m(1e-3), 3), round(float(5 * (2 * np.log(1e3)) ** 0.5), 3)
     (18.585, 18.585)
     """
 
