@@ -49,9 +49,9 @@ if TYPE_CHECKING:
     from mapfilter.rasters.raster_set import open_rasters as open_rasters
     from mapfilter.roads.lattice import RouteLattice as RouteLattice
     from mapfilter.roads.routes import read_routes as read_routes
-    from mapfilter.simulation.imu import ImuNoise as ImuNoise
     from mapfilter.simulation.reports import ReportModel as ReportModel
     from mapfilter.simulation.walking import WalkerModel as WalkerModel
+    from mapfilter.tracks.imu_noise import ImuNoise as ImuNoise
     from mapfilter.tracks.log import TrackLog as TrackLog
     from mapfilter.tracks.log import make_log as make_log
     from mapfilter.tracks.store import read_log as read_log
@@ -76,7 +76,7 @@ _NAMES = {
     "rasters.raster_set": "RxLevRasters open_rasters",
     "roads.lattice": "RouteLattice",
     "roads.routes": "read_routes",
-    "simulation.imu": "ImuNoise",
+    "tracks.imu_noise": "ImuNoise",
     "simulation.reports": "ReportModel",
     "simulation.walking": "WalkerModel",
     "tracks.log": "TrackLog make_log",
