@@ -47,9 +47,12 @@ def test_soft_and_hard_steps_are_counted_within_five_percent(cadence_hz, rise_mp
     phone = Phone(cadence_hz=cadence_hz, rise_mps2=rise_mps2, seed=int(10 * cadence_hz))
     sensors, true_s, _ = walk_sensors(LEGS, phone)
     rows = stepped(reckoned(sensors))
-    # A weak first or last step of a leg may be missed.
-    assert abs(len(rows) - len(true_s)) <= 0.055 * len(true_s)
-    assert np.abs(rows["time_s"].to_numpy()[:, None] - true_s).min(axis=1).max() < 0.1
+    # At the ends of a leg a weak step may be missed, and a hard one may ring on once.
+    apart_s = np.abs(rows["time_s"].to_numpy()[:, None] - true_s)
+    missed, added = (apart_s.min(axis=0) > 0.1).sum(), (apart_s.min(axis=1) > 0.1).sum()
+    assert missed <= len(LEGS)
+    assert added <= len(LEGS)
+    assert missed + added <= 0.055 * len(true_s)
 
 
 @settings(max_examples=12)
