@@ -68,9 +68,9 @@ def convert(
         typer.Option("--pose", help="Walking direction: the phone's axis, by the steps, or auto."),
     ] = "auto",
     declination: Annotated[
-        float,
+        float | None,
         typer.Option("--declination", metavar="DEG", help="Magnetic declination, east positive."),
-    ] = 0.0,
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Convert recordings of other programs to a track log."""
@@ -107,7 +107,7 @@ def convert(
         sys.stdout.write("\n".join(report_lines(result)) + "\n")
 
 
-def _walk(pose: Literal["auto", "device", "any"], declination_deg: float) -> WalkOptions:
+def _walk(pose: Literal["auto", "device", "any"], declination_deg: float | None) -> WalkOptions:
     from mapfilter.tracks.pdr.walk import WalkOptions
 
     try:

@@ -20,7 +20,7 @@ _NEIGHBOURS, _LEAST_SHARE = 7, 0.35
 _AROUND_S = 0.4
 _STILL_MPS2, _STILL_S = 0.3, 1.0
 STEP_FACTOR = 0.405
-"""Weinberg's factor: metres by the fourth root of m/s²; of the walks in :doc:`howto/raw-imu`."""
+"""Weinberg's factor: metres by the fourth root of m/s²; of the walks in ``docs/howto/raw-imu``."""
 
 
 @dataclass(frozen=True, eq=False)

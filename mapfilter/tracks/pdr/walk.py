@@ -30,6 +30,7 @@ from mapfilter.tracks.pdr.walk_noise import walk_noise, walk_notes
 
 _AROUND_S = 0.75
 _QUIET_RADPS, _FASTEST_BIAS_RADPS = 0.02, 0.05
+_DECLINATION_SD_RAD = np.radians(8.0)
 _DRIVING_MPS, _SPEED_LASTS_S = 4.0, 3.0
 
 
@@ -43,8 +44,9 @@ class WalkOptions(Options):
         Direction of walking, seen from the phone: its top edge or, held upright, its back
         ("device"); the direction in which the steps accelerate it ("any", in a pocket or a bag);
         the first where both agree within 40 degrees, else the second ("auto").
-    declination_deg : float
-        Magnetic declination of the place: how far east of true north the compass points.
+    declination_deg : float or None
+        Magnetic declination of the place: how far east of true north the compass points. Where
+        it is None, magnetic north is taken for true north, with an error of 8 degrees.
     field_ut : float
         Size of the magnetic field of the place; 0 for the median of the recording.
     step_factor : float
@@ -52,7 +54,7 @@ class WalkOptions(Options):
     """
 
     pose: Pose = "auto"
-    declination_deg: Annotated[float, Ge(-180), Le(180)] = 0.0
+    declination_deg: Annotated[float, Ge(-180), Le(180)] | None = None
     field_ut: Annotated[float, Ge(0), Le(100)] = 0.0
     step_factor: Positive = STEP_FACTOR
 
@@ -125,7 +127,7 @@ def reckon_walk(
     counts = [int((part.rows["step_m"] > 0).sum()) for part in parts]
     if not sum(counts):
         return None, (*notes, *(["no steps found"] if parts else []))
-    north_rad = -np.radians(options.declination_deg) + convergence_rad
+    north_rad = convergence_rad - np.radians(options.declination_deg or 0.0)
     compass = any(np.isfinite(part.rows["heading_rad"]).any() for part in parts)
     rows = pd.concat([_begun(part.rows, k) for k, part in enumerate(parts)], ignore_index=True)
     rows["heading_rad"] = wrap_rad(rows["heading_rad"].to_numpy() + north_rad)
@@ -138,15 +140,18 @@ def reckon_walk(
     reckoning = rows[["time_s", "heading_sd_rad", "disturbed", "climb", "height_m"]]
     motion = rows[["time_s", "step_m", "heading_rad", "turn_rad"]]
     has_gyroscope = stretches[0].rate_radps is not None
+    north_sd_rad = _DECLINATION_SD_RAD if options.declination_deg is None else 0.0
     imu = walk_noise(
         rows,
         main.offset,
-        main.direction_sd_rad,
+        float(np.hypot(main.direction_sd_rad, north_sd_rad)),
         main.sway_rad,
         compass=compass,
         gyroscope=has_gyroscope,
     )
     words = (*notes, *walk_notes(rows, len(parts) - 1, found, compass=compass))
+    if compass and options.declination_deg is None:
+        words += ("no magnetic declination given: magnetic north taken for true north",)
     return Reckoned(motion, imu, reckoning, sum(counts), found, words), notes
 
 

@@ -26,7 +26,13 @@ def walk_noise(
     compass: bool,
     gyroscope: bool,
 ) -> ImuNoise:
-    """Return the errors of the motion, as far as the recording shows them."""
+    """Return the errors of the motion, as far as the recording shows them.
+
+    ``direction_sd_rad`` is that of the direction of walking, seen from the phone, and of the
+    magnetic declination; ``sway_rad`` the white noise of the course from step to step. The errors
+    of step lengths, 10 % each, 10 % from walker to walker and 6 % over 15 s, are those of the
+    literature and of the walks in ``docs/howto/raw-imu``.
+    """
     stepped = rows[rows["step_m"] > 0]
     between_s = np.diff(stepped["time_s"])
     period_s = float(np.median(between_s)) if between_s.size else 0.5
