@@ -18,8 +18,9 @@ import pandas as pd
 from mapfilter.geodesy import grid_convergence_rad, project, utm_crs
 from mapfilter.tracks.deadreckoning import dead_reckon
 from mapfilter.tracks.moved import motion_from_course, motion_from_odometry, rotation_matrices
+from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.pdr.vehicle import reckon_odometry
-from mapfilter.tracks.pdr.walk import WalkOptions, reckon_walk
+from mapfilter.tracks.pdr.walk import reckon_walk
 from mapfilter.tracks.readers.formats import read_recording
 
 FIRST_JUDGED_S = 1574659200.0

@@ -13,7 +13,7 @@ from mapfilter.errors import ConfigError, fail
 from mapfilter.workflows.terminal import print_result
 
 if TYPE_CHECKING:
-    from mapfilter.tracks.pdr.walk import WalkOptions
+    from mapfilter.tracks.pdr.options import WalkOptions
 
 
 def convert(
@@ -75,19 +75,15 @@ def convert(
 ) -> None:
     """Convert recordings of other programs to a track log."""
     from mapfilter.tracks.combine import CombineOptions
-    from mapfilter.workflows.convert import (
-        ConvertOptions,
-        parse_pairs,
-        report_lines,
-        run_convert,
-    )
+    from mapfilter.tracks.open_log import OpenOptions
+    from mapfilter.workflows.convert import parse_pairs, report_lines, run_convert
 
     given = [given_path(path) or path for path in files]
     true = [given_path(path) or path for path in truth or ()]
     place = numbers(origin, 2, "--origin")
     if place is not None and not (abs(place[0]) <= 90 and abs(place[1]) <= 180):
         raise fail(ConfigError, "--origin", "a latitude and a longitude in degrees", repr(origin))
-    options = ConvertOptions(
+    options = OpenOptions(
         format=form or "",
         zone=zone or "",
         columns=parse_pairs(column or (), "--column"),
@@ -108,7 +104,7 @@ def convert(
 
 
 def _walk(pose: Literal["auto", "device", "any"], declination_deg: float | None) -> WalkOptions:
-    from mapfilter.tracks.pdr.walk import WalkOptions
+    from mapfilter.tracks.pdr.options import WalkOptions
 
     try:
         return WalkOptions(pose=pose, declination_deg=declination_deg)

@@ -18,7 +18,7 @@ from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.journey_motion import journey_motion, measured_positions
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.moved import places_of_poses
-from mapfilter.tracks.pdr.walk import WalkOptions
+from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.raw_satellites import log_pseudoranges
 from mapfilter.tracks.readers.recording import Recording
 from mapfilter.tracks.sensors import SENSOR_COLUMNS
@@ -27,7 +27,7 @@ _RADIUS_68 = 1.515
 """Radius of 68 % of a two-dimensional normal distribution, in standard deviations."""
 
 _NO_JOURNEY = {"cells", "ephemerides", "ionosphere"}
-_CELL_COLUMNS = ("technology", "mcc", "mnc", "lac", "ci")
+_CELL_COLUMNS = ("technology", "mcc", "mnc", "lac", "ci", "level_step_db")
 
 
 @dataclass(frozen=True)

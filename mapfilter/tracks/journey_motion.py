@@ -11,9 +11,10 @@ from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.moved import motion_from_course, motion_from_poses
+from mapfilter.tracks.moved import by_compass, motion_from_course, motion_from_poses
+from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.pdr.vehicle import reckon_odometry, reckon_velocity
-from mapfilter.tracks.pdr.walk import WalkOptions, reckon_walk
+from mapfilter.tracks.pdr.walk import reckon_walk
 from mapfilter.tracks.readers.recording import Recording
 
 _PROVIDERS = ("gps", "fused", "flp", "network", "nlp")
@@ -78,7 +79,8 @@ def journey_motion(
             moved, imu, words = reckon_odometry(rows)
             notes += words
             return Moved(moved, imu)
-        moved = motion_from_poses(rows) if name == "poses" else rows
+        poses = name == "poses"
+        moved = motion_from_poses(rows) if poses else by_compass(rows, frame.convergence_rad)
         return Moved(moved.assign(heading_rad=wrap_rad(moved["heading_rad"])))
     if course_motion:
         return _course(recordings, sensors, frame, notes)

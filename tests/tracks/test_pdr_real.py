@@ -61,7 +61,8 @@ def test_drift_of_drives(bench, shared_data):
 
 def test_errors_stated_of_a_walk_cover_its_heading(bench, walks):
     """The lasting heading error of walks of 40 m, by their waypoints, is as large as stated."""
-    from mapfilter.tracks.pdr.walk import WalkOptions, reckon_walk
+    from mapfilter.tracks.pdr.options import WalkOptions
+    from mapfilter.tracks.pdr.walk import reckon_walk
 
     ratios = []
     for walk in walks:

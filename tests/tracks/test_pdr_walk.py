@@ -9,7 +9,8 @@ from made_phone import Leg, Phone, walk_sensors
 from scipy.spatial.transform import Rotation
 
 from mapfilter.tracks.log import make_log
-from mapfilter.tracks.pdr.walk import WalkOptions, reckon_walk
+from mapfilter.tracks.pdr.options import WalkOptions
+from mapfilter.tracks.pdr.walk import reckon_walk
 from mapfilter.tracks.store import read_log, write_log
 
 LEGS = (Leg(20, 0.3, 3), Leg(15, 1.8), Leg(30, -2.0), Leg(12, 3.0, 4))

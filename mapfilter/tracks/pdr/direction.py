@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from scipy.signal import butter, hilbert, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from mapfilter._types import Bools, Floats
 from mapfilter.geodesy import wrap_rad
+from mapfilter.tracks.pdr.options import Pose
 from mapfilter.tracks.pdr.signals import RATE_HZ
-
-Pose = Literal["auto", "device", "any"]
 
 DEVICE_SD_RAD = float(np.radians(8.0))
 ACCELERATION_SD_RAD = float(np.radians(20.0))

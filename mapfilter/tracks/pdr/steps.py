@@ -9,6 +9,7 @@ from scipy.ndimage import median_filter
 from scipy.signal import butter, find_peaks, sosfiltfilt
 
 from mapfilter._types import Bools, Floats, Ints
+from mapfilter.tracks.pdr.options import STEP_FACTOR
 from mapfilter.tracks.pdr.signals import RATE_HZ
 
 BAND_HZ = (0.5, 2.6)
@@ -19,8 +20,6 @@ _LEAST_STEPS = 3
 _NEIGHBOURS, _LEAST_SHARE = 7, 0.35
 _AROUND_S = 0.4
 _STILL_MPS2, _STILL_S = 0.3, 1.0
-STEP_FACTOR = 0.405
-"""Weinberg's factor: metres by the fourth root of m/s²; of the walks in ``docs/howto/raw-imu``."""
 
 
 @dataclass(frozen=True, eq=False)

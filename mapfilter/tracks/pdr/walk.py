@@ -4,59 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated
 
 import numpy as np
 import pandas as pd
-from annotated_types import Ge, Le
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.geodesy import wrap_rad
-from mapfilter.options import Options, Positive
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.pdr.attitude import Attitude, attitude
 from mapfilter.tracks.pdr.direction import (
-    Pose,
     direction_by_acceleration,
     direction_by_device,
     walking_direction,
 )
 from mapfilter.tracks.pdr.heading import YawOffset, compass_samples, yaw_offset
 from mapfilter.tracks.pdr.height import Climb, climbs
+from mapfilter.tracks.pdr.options import Pose, WalkOptions
 from mapfilter.tracks.pdr.rows import climbed_rows, course_over_strides, row_events
 from mapfilter.tracks.pdr.signals import RATE_HZ, Signals, inertial_signals
-from mapfilter.tracks.pdr.steps import STEP_FACTOR, find_steps, step_lengths, still
+from mapfilter.tracks.pdr.steps import find_steps, step_lengths, still
 from mapfilter.tracks.pdr.walk_noise import walk_noise, walk_notes
 
 _AROUND_S = 0.75
 _QUIET_RADPS, _FASTEST_BIAS_RADPS = 0.02, 0.05
 _DECLINATION_SD_RAD = np.radians(8.0)
 _DRIVING_MPS, _SPEED_LASTS_S = 4.0, 3.0
-
-
-@dataclass(frozen=True, slots=True)
-class WalkOptions(Options):
-    """How steps and headings are made of the sensors of a phone.
-
-    Parameters
-    ----------
-    pose : {"auto", "device", "any"}
-        Direction of walking, seen from the phone: its top edge or, held upright, its back
-        ("device"); the direction in which the steps accelerate it ("any", in a pocket or a bag);
-        the first where both agree within 40 degrees, else the second ("auto").
-    declination_deg : float or None
-        Magnetic declination of the place: how far east of true north the compass points. Where
-        it is None, magnetic north is taken for true north, with an error of 8 degrees.
-    field_ut : float
-        Size of the magnetic field of the place; 0 for the median of the recording.
-    step_factor : float
-        Length of a step by the fourth root of its vertical acceleration's range in m/s².
-    """
-
-    pose: Pose = "auto"
-    declination_deg: Annotated[float, Ge(-180), Le(180)] | None = None
-    field_ut: Annotated[float, Ge(0), Le(100)] = 0.0
-    step_factor: Positive = STEP_FACTOR
 
 
 @dataclass(frozen=True, eq=False)
