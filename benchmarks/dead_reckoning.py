@@ -37,6 +37,7 @@ HAND_COUNTS = {
 }
 """Steps counted by eye in plots of the acceleration: clear ones, and with half steps at stops."""
 LEAST_M = 20.0
+BEFORE_M = 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,8 +192,8 @@ def length_errors(walks: list[Walk], *, judged: bool) -> np.ndarray:
 def drive_drift(motion: pd.DataFrame, truth: pd.DataFrame, over_m: float) -> np.ndarray:
     """Return drift in metres per 100 m of stretches.
 
-    Without headings each stretch begins with the true direction of its first 10 m. Those with an
-    unknown step are left out.
+    Without headings each stretch begins with the true direction of the 30 m before it. Those with
+    an unknown step are left out.
     """
     time_s = motion["time_s"].to_numpy()
     true = np.stack([np.interp(time_s, truth["time_s"], truth[c]) for c in ("east", "north")])
@@ -205,12 +206,12 @@ def drive_drift(motion: pd.DataFrame, truth: pd.DataFrame, over_m: float) -> np.
     length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(true)))])
     drifts = []
     for i in range(0, len(time_s), 5):
-        j, k = np.searchsorted(length, [length[i] + 10.0, length[i] + over_m])
+        j, k = np.searchsorted(length, [length[i] - BEFORE_M, length[i] + over_m])
         if k >= len(time_s):
             break
-        if motion["step_m"].iloc[i + 1 : k + 1].isna().any():
+        if length[i] < BEFORE_M or motion["step_m"].iloc[j + 1 : k + 1].isna().any():
             continue
-        known, seen = (part[:, j] - part[:, i] for part in (true, found))
+        known, seen = (part[:, i] - part[:, j] for part in (true, found))
         turned = np.arctan2(known[1], known[0]) - np.arctan2(seen[1], seen[0])
         turned = turned if turns_only else 0.0
         rotation = np.array([[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]])
@@ -241,6 +242,13 @@ def drive_table(data: Path) -> pd.DataFrame:
     convergence_rad = grid_convergence_rad("EPSG:32610", -122.08, 37.4)
     course = motion_from_course(fixes["positions"], convergence_rad)
     drives.append(("Mountain View", "mapfilter, speed and course", course, truth))
+    folder = data / "kitti-osm"
+    true = pd.read_csv(folder / "truth/00.csv").rename(
+        columns={"east_m": "east", "north_m": "north"}
+    )
+    for name, file in (("ORB-SLAM", "orb-slam-00"), ("S-PTAM", "s-ptam-00")):
+        motion = read_recording(folder / f"odometry/{file}.csv").tables["motion"]
+        drives.append(("KITTI 00", f"{name}, as it is", motion, true))
     rows = []
     for name, method, motion, known in drives:
         for over_m in (100.0, 500.0):
