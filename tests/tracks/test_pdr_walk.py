@@ -302,3 +302,59 @@ def test_the_log_of_a_walk_is_read_as_it_was_written(tmp_path):
     back = read_log(tmp_path / "log")
     assert back.imu == found.imu
     pd.testing.assert_frame_equal(back.motion, log.motion)
+
+
+def test_a_phone_put_into_a_pocket_while_walking():
+    """From the hand to a pocket in 1 s, turned there by 110 degrees about an oblique axis."""
+    sensors, true_s, true_rad = walk_sensors((Leg(60, 0.5), Leg(60, -1.2, 0.0)))
+    moves_s = true_s[30]
+    time_s = sensors["gyroscope"]["time_s"].to_numpy()
+    share = np.clip(time_s - moves_s, 0, 1)
+    axis = np.array([0.2, 0.9, 0.4]) / np.linalg.norm([0.2, 0.9, 0.4])
+    pose = Rotation.from_rotvec(np.outer(share * np.radians(110), axis))
+    turning = (pose[:-1].inv() * pose[1:]).as_rotvec() * 100.0
+    for name, rows in sensors.items():
+        values = pose.inv().apply(rows.iloc[:, 1:].to_numpy(copy=True))
+        if name == "gyroscope":
+            values += np.concatenate([turning, [[0, 0, 0]]])
+        sensors[name] = pd.DataFrame(np.column_stack([time_s, values]), columns=rows.columns)
+    found = reckoned(sensors)
+    rows = stepped(found)
+    assert len(rows) == pytest.approx(120, abs=3)
+    settled = np.abs(rows["time_s"].to_numpy() - moves_s - 0.5) > 2
+    nearest = np.abs(rows["time_s"].to_numpy()[:, None] - true_s).argmin(axis=1)
+    apart = apart_deg(rows["heading_rad"], true_rad[nearest])
+    turned = np.abs(rows["time_s"].to_numpy() - true_s[60]) < 2
+    assert apart[settled & ~turned].max() < 15
+    before = found.reckoning["time_s"] < moves_s - 1
+    sds = found.reckoning["heading_sd_rad"]
+    assert sds[~before].mean() > sds[before].mean()
+
+
+def test_stairs_shorten_steps_and_lifts_have_none():
+    legs = (Leg(40, 0.0), Leg(40, 0.0, 0.0), Leg(40, 0.0), Leg(0, 0.0, 20.0), Leg(40, 0.0, 0.0))
+    sensors, true_s, _ = walk_sensors(legs)
+    time_s = sensors["accelerometer"]["time_s"].to_numpy()
+    ride_s = (true_s[119] + 3.0, true_s[119] + 19.0)
+    heights = [(0, 0), (true_s[40], 0), (true_s[79], 7), (ride_s[0], 7), (ride_s[1], 27), (1e4, 27)]
+    height = np.interp(time_s, *np.array(heights).T)
+    pressure = 1013.25 * (1 - height / 44330.77) ** (1 / 0.190263)
+    barometer = pd.DataFrame({"time_s": time_s, "pressure_hpa": pressure}).iloc[::10]
+    force = sensors["accelerometer"]
+    # The lift jolts at its start and its end, three times each.
+    for at_s in (ride_s[0] + 1, ride_s[1] - 3):
+        for k in range(3):
+            hit = force["time_s"].between(at_s + 0.6 * k, at_s + 0.6 * k + 0.25)
+            force.loc[hit, "z_mps2"] += 5.0
+    jolted = reckoned(sensors)
+    found = reckoned(sensors | {"barometer": barometer})
+    climb = found.reckoning["climb"].to_numpy()
+    rows = found.motion
+    assert [one.kind for one in found.climbs] == ["stairs", "lift"]
+    assert rows["step_m"][climb == 1].max() <= 0.3
+    assert (climb == 1).sum() > 30
+    assert rows["step_m"][climb == 2].sum() == 0
+    inside = jolted.motion["time_s"].between(*ride_s)
+    assert jolted.motion["step_m"][inside].sum() > 0.5
+    assert found.reckoning["height_m"].iloc[-1] == pytest.approx(27, abs=0.3)
+    assert any(note.startswith("stairs: +") for note in found.notes)
