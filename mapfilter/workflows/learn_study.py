@@ -20,7 +20,7 @@ from mapfilter.config.sections import Config
 from mapfilter.database.manifest import MANIFEST
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
-from mapfilter.errors import ConfigError, InputError, fail
+from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
 from mapfilter.learning.apply import apply_patch
 from mapfilter.learning.blank import blank_database, blank_log
 from mapfilter.learning.learn import (
@@ -36,9 +36,12 @@ from mapfilter.learning.phone import PhoneNoise, phone_noise
 from mapfilter.learning.tracks import JourneyTrack, placed
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.filter import Filter, FilterOptions, locate
+from mapfilter.positioning.log_options import fitted_to_log
 from mapfilter.propagation.shadowing import named_rng
-from mapfilter.tracks.store import list_logs, read_log
-from mapfilter.workflows.replay import check_logs
+from mapfilter.tracks.identify import name_by_plan
+from mapfilter.tracks.log import TrackLog
+from mapfilter.workflows.logs import journeys_of, open_journey
+from mapfilter.workflows.replay import check_log
 from mapfilter.workflows.world import filter_choice
 
 _LEAST_KNOWN = 0.3
@@ -51,7 +54,8 @@ _PASSES = 3
 class _Task:
     """One journey to locate."""
 
-    log: Path
+    name: str
+    log: TrackLog
     database: Path
     sha256: str
     choice: FilterOptions
@@ -111,9 +115,9 @@ def study_logs(
         config.journeys.seed,
     )
     database = open_database(path, verify="full")
-    folders = list_logs(config.track_path)
-    check_logs(folders, database.lattice)
-    key = _key(database, folders, choice, seed, use_truth)
+    paths = journeys_of(config)
+    names, logs = _opened(config, paths, database)
+    key = _key(database, (*paths, *config.track.recordings), choice, seed, use_truth)
     with (
         FinishedParts(out, lambda: key, keep=resume, name="journey") as finished,
         tempfile.TemporaryDirectory() as scratch,
@@ -121,7 +125,8 @@ def study_logs(
     ):
         lesson, tracks, notes = _Study(
             database,
-            folders,
+            names,
+            logs,
             choice,
             seed,
             use_truth,
@@ -131,7 +136,6 @@ def study_logs(
             2 * workers,
             progress,
         ).run()
-    logs = [read_log(folder) for folder in folders]
     trusted = lesson.trusted.tolist()
     good = [(log, track) for log, track, use in zip(logs, tracks, trusted, strict=True) if use]
     ways = missing_ways(database.field(), [pair[1] for pair in good], [pair[0] for pair in good])
@@ -141,10 +145,10 @@ def study_logs(
     journeys = [placed(log, track) for log, track in zip(logs, tracks, strict=True)]
     return Taught(
         database,
-        tuple(folder.name for folder in folders),
+        tuple(names),
         lesson,
         tuple(tracks),
-        Patch(database.lattice.crs, sha256_file(path / MANIFEST), len(folders), changes),
+        Patch(database.lattice.crs, sha256_file(path / MANIFEST), len(logs), changes),
         unlisted_cells(journeys, database.plan),
         phone_noise(good, lesson.learned.phone_db[lesson.trusted], lesson.learned.sd_db),
         notes,
@@ -156,7 +160,8 @@ class _Study:
     """The passes over all journeys."""
 
     database: RadioRouteDatabase
-    folders: Sequence[Path]
+    names: Sequence[str]
+    logs: Sequence[TrackLog]
     choice: FilterOptions
     seed: int
     use_truth: bool
@@ -180,7 +185,7 @@ class _Study:
             tracks = self._tracks(self.database, 1, is_blank=False)
         lesson = self._lesson(tracks)
         changes = changes_of(lesson.learned.network.findings, {})
-        patch = Patch(self.database.lattice.crs, "0" * 64, len(self.folders), changes)
+        patch = Patch(self.database.lattice.crs, "0" * 64, len(self.logs), changes)
         patched = apply_patch(self.database, patch, self.scratch / "patched")
         again = self._tracks(patched, 2, is_blank=False)
         second = self._lesson(again)
@@ -192,10 +197,7 @@ class _Study:
         return second, again, tuple(notes)
 
     def _lesson(self, tracks: Sequence[JourneyTrack]) -> Lesson:
-        journeys = [
-            placed(read_log(folder), track)
-            for folder, track in zip(self.folders, tracks, strict=True)
-        ]
+        journeys = [placed(log, track) for log, track in zip(self.logs, tracks, strict=True)]
         database = self.database
         lesson = lesson_of(journeys, database.plan, database.field(), database.floor_dbm)
         if not len(lesson.visits):
@@ -208,19 +210,18 @@ class _Study:
         self, database: RadioRouteDatabase, number: int, *, is_blank: bool
     ) -> list[JourneyTrack]:
         """Return the tracks of all journeys over a database; finished ones from disk."""
-        sha256, count = sha256_file(database.path / MANIFEST), len(self.folders)
+        sha256, count = sha256_file(database.path / MANIFEST), len(self.logs)
         found: dict[int, JourneyTrack] = {}
         tasks: dict[int, _Task] = {}
-        for i, folder in enumerate(self.folders):
+        for i, (name, log) in enumerate(zip(self.names, self.logs, strict=True)):
             part = number * count + i
             kept = self.finished.load(part) if self.finished.keep else None
-            log = read_log(folder)
             if self.use_truth and len(log.truth) > 1:
                 found[i] = JourneyTrack.of_truth(log)
             elif kept is not None:
                 found[i] = JourneyTrack.from_bytes(kept)
             else:
-                tasks[i] = _Task(folder, database.path, sha256, self.choice, self.seed, is_blank)
+                tasks[i] = _Task(name, log, database.path, sha256, self.choice, self.seed, is_blank)
         done = ordered_results(
             self.executor, _located, list(tasks.values()), in_flight=self.in_flight
         )
@@ -234,11 +235,10 @@ class _Study:
 
 def _located(task: _Task) -> bytes:
     """Locate one journey, on a worker."""
-    log = read_log(task.log)
-    if task.is_blank:
-        log = blank_log(log)
-    rng = named_rng(task.seed, "learn", task.log.name)
-    filter_ = _filter(task.database, task.choice, task.sha256)
+    log = blank_log(task.log) if task.is_blank else task.log
+    rng = named_rng(task.seed, "learn", task.name)
+    choice, _ = fitted_to_log(task.choice, log)
+    filter_ = _filter(task.database, choice, task.sha256)
     return JourneyTrack.of_estimate(locate(log, filter_, rng).estimate).to_bytes()
 
 
@@ -256,7 +256,7 @@ def _smoothing(choice: FilterOptions) -> FilterOptions:
 
 def _key(
     database: RadioRouteDatabase,
-    folders: Sequence[Path],
+    paths: Sequence[Path],
     choice: FilterOptions,
     seed: int,
     use_truth: bool,
@@ -264,11 +264,32 @@ def _key(
     """Return a checksum of everything that the tracks depend on."""
     parts = [VERSION, sha256_file(database.path / MANIFEST), repr(choice), seed, use_truth]
     digest = hashlib.sha256(repr(parts).encode())
-    for file in _files(folders):
+    for file in _files(paths):
         digest.update(f"{file.parent.name}/{file.name} {sha256_file(file)}".encode())
     return digest.hexdigest()
 
 
-def _files(folders: Sequence[Path]) -> Iterator[Path]:
-    for folder in folders:
-        yield from (file for file in sorted(folder.iterdir()) if file.is_file())
+def _files(paths: Sequence[Path]) -> Iterator[Path]:
+    for path in paths:
+        inner = sorted(path.iterdir()) if path.is_dir() else [path]
+        yield from (file for file in inner if file.is_file())
+
+
+def _opened(
+    config: Config, paths: Sequence[Path], database: RadioRouteDatabase
+) -> tuple[list[str], list[TrackLog]]:
+    """Return names and logs of all journeys; InputError with the faults of all of them."""
+    faults, names, logs = Faults(), list[str](), list[TrackLog]()
+    for path in paths:
+        try:
+            opened = open_journey(config, path, database.lattice.crs)
+        except ConfigError:
+            raise
+        except MapfilterError as error:
+            faults.found.extend(error.faults)
+            continue
+        check_log(path, opened.log, database.lattice, faults)
+        names.append(opened.name)
+        logs.append(name_by_plan(opened.log, database.plan))
+    faults.raise_if_any(InputError)
+    return names, logs

@@ -20,7 +20,7 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.log import leave_out, make_log
 from mapfilter.tracks.store import write_log
 from mapfilter.workflows import learn_study
-from mapfilter.workflows.check_logs import run_check_logs
+from mapfilter.workflows.check_suspects import run_check_suspects
 from mapfilter.workflows.learn import run_learn
 
 FEW = ["filter.bayes.max_particles=3000", "filter.bayes.min_search_particles=3000"]
@@ -120,10 +120,10 @@ def test_suspects_are_named_by_logs_alone(faulty, monkeypatch):
     # With truth in place of tracks, which are tested above, the check is quick.
     real = learn_study.study_logs
     monkeypatch.setattr(
-        "mapfilter.workflows.check_logs.study_logs",
+        "mapfilter.workflows.check_suspects.study_logs",
         lambda *args, **named: real(*args, **(named | {"use_truth": True})),
     )
-    result = run_check_logs(configured(*faulty))
+    result = run_check_suspects(configured(*faulty))
     assert result.ok
     told = {finding.where: finding.evidence for finding in result.findings}
     assert set(told) == {"cells S2B", "cells S1C"}
