@@ -31,6 +31,7 @@ _KNOWN_M = 25.0
 _ANCHOR_M = 20.0
 _LONGEST_M = 500.0
 _STEP_M = 5.0
+_SAMPLE_M, _GAP_M = 2.0, 12.0
 _TURN_RAD, _STRETCH = math.radians(20.0), 0.15
 _PRIOR = 0.01
 
@@ -72,17 +73,18 @@ def missing_ways(
         return ()
     proposed = []
     open_m2 = float(np.sum(away_m > _OFF_M)) * lattice.resolution_m**2
-    for line, number in zip(found.ways.geometry, found.sessions.tolist(), strict=True):
-        kept = _off_part(line, field, away_m)
-        if kept is None or number < LEAST_JOURNEYS:
+    parts = (part for line in found.ways.geometry for part in _off_parts(line, field, away_m))
+    for part in parts:
+        number = _passing(part, pieces)
+        if number < LEAST_JOURNEYS:
             continue
-        share = min(2 * _REACH_M * kept.length / max(open_m2, 1.0), 0.5)
+        share = min(2 * _REACH_M * part.length / max(open_m2, 1.0), 0.5)
         bayes = -(number - 1) * math.log(share)
         odds = bayes + math.log(_PRIOR)
         proposed.append(
             Change(
                 "way",
-                line_m=tuple(map(tuple, shapely.get_coordinates(kept.simplify(2.0)).tolist())),
+                line_m=tuple(map(tuple, shapely.get_coordinates(part.simplify(2.0)).tolist())),
                 half_width_m=_HALF_WIDTH_M,
                 log_bayes_factor=bayes,
                 probability=1 / (1 + math.exp(-min(odds, 700.0))),
@@ -156,19 +158,25 @@ def _joined(reckoned_m: Floats, start_m: Floats, end_m: Floats) -> Floats | None
     return np.asarray(start_m + np.column_stack([turned.real, turned.imag]))
 
 
-def _off_part(
+def _off_parts(
     line: shapely.LineString, field: RadioField, away_m: Floats
-) -> shapely.LineString | None:
-    """Return a line without ends that run along the map; None where little is left."""
-    at = np.arange(0.0, line.length + 0.1, 2.0)
+) -> Iterator[shapely.LineString]:
+    """Yield the parts of a line that run off the map, each a little longer at its ends."""
+    at = np.arange(0.0, line.length + 0.1, _SAMPLE_M)
     places = shapely.get_coordinates(shapely.line_interpolate_point(line, at))
     off = np.flatnonzero(_sampled(away_m, field, places) > _OFF_M - 3.0)
-    if off.size < 2 or 2.0 * off.size < _LEAST_M * 0.7:
-        return None
-    first, last = max(off[0] - 4, 0), min(off[-1] + 4, at.size - 1)
-    if off.size < 0.6 * (last - first):
-        return None
-    return shapely.LineString(places[first : last + 1])
+    runs = np.split(off, np.flatnonzero(np.diff(off) > _GAP_M / _SAMPLE_M) + 1)
+    more = round(_OFF_M / _SAMPLE_M)
+    for run in runs:
+        if run.size > 1 and _SAMPLE_M * run.size >= 0.7 * _LEAST_M:
+            yield shapely.LineString(places[max(run[0] - more, 0) : run[-1] + more + 1])
+
+
+def _passing(line: shapely.LineString, pieces: Sequence[tuple[int, Floats]]) -> int:
+    """Return how many journeys passed the middle of a line."""
+    middle = shapely.get_coordinates(line.interpolate(0.5, normalized=True))[0]
+    near = {n for n, place in pieces if np.hypot(*(place - middle).T).min() <= _REACH_M}
+    return len(near)
 
 
 def _sampled(values: Floats, field: RadioField, place_m: Floats) -> Floats:
