@@ -136,3 +136,13 @@ def test_time_outside_a_track_has_no_position():
     east, _, _ = track.at(np.array([0.0, 1.5, 3.0]))
     assert np.isnan(east).tolist() == [True, False, True]
     assert east[1] == 1.5
+
+
+def test_of_a_line_that_returns_to_the_map_only_the_stretch_beside_it_is_proposed():
+    rng = np.random.default_rng(7)
+    # Along a street, 60 m aside by an unmapped bay, and back to the street.
+    bay = np.array([[20, 102.5], [200, 102.5], [230, 140], [330, 140], [360, 102.5], [580, 102.5]])
+    (one,) = found([journey(rng, bay.astype(float)) for _ in range(4)])
+    line = np.array(one.line_m) - [EAST, NORTH]
+    assert 180.0 < line[:, 0].min() < line[:, 0].max() < 380.0
+    assert line[:, 1].max() == pytest.approx(140.0, abs=8.0)
