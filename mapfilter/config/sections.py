@@ -30,13 +30,15 @@ from mapfilter.config.inputs import (
     Rasters,
     Roads,
 )
+from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.options import Below1, Degrees, NotNegative, Positive, Seed
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.kalman.filter import KalmanFilter
-from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
+from mapfilter.tracks.imu_noise import ImuNoise
+from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.readers.formats import FORMATS
 from mapfilter.tracks.readers.plain_csv import FIELDS as RECORDED_FIELDS
 from mapfilter.tracks.schema import Without
@@ -186,6 +188,11 @@ class TrackColumns(Columns):
     """
 
 
+@with_options(WalkOptions)
+class TrackWalk(Section):
+    """``[track.walk]``: steps and headings made of the raw sensors of a walker's phone."""
+
+
 class Track(Section):
     """``[track]``: a log, a folder of logs, or recordings of other programs.
 
@@ -210,6 +217,8 @@ class Track(Section):
         Longitude and latitude at which a local frame of metres has its origin.
     course_motion : bool
         Make motion from the speed and course of positions where nothing else gives it.
+    steps : bool
+        Make steps and headings of the raw sensors of a phone where nothing else gives motion.
     """
 
     path: FilePath | None = None
@@ -220,6 +229,8 @@ class Track(Section):
     zone: str = ""
     origin: Pair | None = None
     course_motion: bool = False
+    steps: bool = True
+    walk: TrackWalk = TrackWalk()
     columns: TrackColumns = TrackColumns()
 
 
@@ -250,11 +261,17 @@ class Output(Section):
     dir : Path
         Folder of the results.
     pictures : {"none", "first", "all"}
-        Logs whose pictures are drawn; a database and a survey get theirs unless this is "none".
+        Logs whose pictures are drawn; a database, a survey and a benchmark get theirs unless this
+        is "none".
     """
 
     dir: FilePath = Path("out")
     pictures: Literal["none", "first", "all"] = "first"
+
+
+@with_options(IntegrityOptions)
+class IntegritySection(Section):
+    """``[integrity]``: protection levels of replays and benchmarks."""
 
 
 class Config(Section):
@@ -271,6 +288,7 @@ class Config(Section):
     imu: Imu = Imu()
     track: Track = Track()
     filter: FilterSection = FilterSection()
+    integrity: IntegritySection = IntegritySection()
     sweep: SweepSection = SweepSection()
     output: Output = Output()
 

@@ -31,7 +31,7 @@ from mapfilter.experiments.benchmarks.global_positioning import informed
 from mapfilter.geodesy import Lattice
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.candidate import CandidateFilter
-from mapfilter.simulation.imu import ImuNoise
+from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.workflows.evaluate import _refused, load_benchmark
 from mapfilter.workflows.evaluate import _world as prepare_world
 from mapfilter.workflows.world import World, filter_choice
@@ -147,7 +147,6 @@ def test_what_has_no_meaning_is_refused_by_name(key, world, tmp_path):
         ("filter.kalman.fix_sd_m=3", "bayes has no such option"),
         ("filter.bayes.timing_sd_m=100.0", "no timing advances"),
         ("sweep.scale=[0.1]", "mapfilter sweep"),
-        ('output.pictures="none"', "no pictures"),
         ('database.path="there"', "built here"),
         ("filter.threshold=3", "bayes has no such option"),
     ],
