@@ -14,6 +14,7 @@ from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.accuracy import Accuracy, Truth, accuracy, position_errors_m
 from mapfilter.positioning import filter as loop
 from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
+from mapfilter.positioning.integrity import DEFAULT_RISK
 from mapfilter.positioning.locators import DEFAULT, as_filter, filter_options
 from mapfilter.positioning.log_options import fitted_to_log
 from mapfilter.tracks.identify import name_by_plan
@@ -93,6 +94,7 @@ def locate(
     seed: int | np.random.Generator = 0,
     ways: bool = True,
     snapshots: bool = False,
+    risk: float = DEFAULT_RISK,
 ) -> Track:
     """Locate a log from an unknown start.
 
@@ -111,13 +113,15 @@ def locate(
         Whether positions are matched to ways.
     snapshots : bool
         Whether to keep the filter's hypotheses at some epochs, for pictures.
+    risk : float
+        Probability, at each epoch, that the error exceeds the protection level (``protection_m``).
 
     Raises
     ------
     InputError
         The log is in another CRS than the database.
     ConfigError
-        The filter is none, or a custom filter fails.
+        The filter is none, a custom filter fails, or the risk does not lie between 0 and 1.
     """
     rng = np.random.default_rng(seed)
     log = name_by_plan(log, database.plan)
@@ -126,7 +130,7 @@ def locate(
     )
     bound = as_filter(options, database, ways=ways)
     log = replace(log, notes=(*log.notes, *notes)) if notes else log
-    return Track(loop.locate(log, bound, rng, snapshots=snapshots), log, database)
+    return Track(loop.locate(log, bound, rng, snapshots=snapshots, risk=risk), log, database)
 
 
 @dataclass(frozen=True, repr=False, eq=False)

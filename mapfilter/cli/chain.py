@@ -243,6 +243,14 @@ def replay(
             "--smooth", help="Smooth the track by the whole log (forward filtering, backward pass)."
         ),
     ] = False,
+    protection: Annotated[
+        float | None,
+        typer.Option(
+            "--protection",
+            metavar="RISK",
+            help="Probability, at each epoch, that the error exceeds the protection level (1e-3).",
+        ),
+    ] = None,
     config: ConfigOption = None,
     settings: SetOption = None,
     out: OutOption = None,
@@ -269,6 +277,8 @@ def replay(
         given.append(f"track.without={toml([kind.strip() for kind in without.split(',')])}")
     if smooth:
         given.append("filter.smooth=true")
+    if protection is not None:
+        given.append(f"integrity.risk={protection!r}")
     loaded = load_config(config, given)
     check_custom_filter(loaded)
     folder = (out or loaded.output.dir / "replay").absolute()

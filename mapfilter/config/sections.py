@@ -30,6 +30,7 @@ from mapfilter.config.inputs import (
     Rasters,
     Roads,
 )
+from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.options import Below1, Degrees, NotNegative, Positive, Seed
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.candidate import CandidateFilter
@@ -260,11 +261,17 @@ class Output(Section):
     dir : Path
         Folder of the results.
     pictures : {"none", "first", "all"}
-        Logs whose pictures are drawn; a database and a survey get theirs unless this is "none".
+        Logs whose pictures are drawn; a database, a survey and a benchmark get theirs unless this
+        is "none".
     """
 
     dir: FilePath = Path("out")
     pictures: Literal["none", "first", "all"] = "first"
+
+
+@with_options(IntegrityOptions)
+class IntegritySection(Section):
+    """``[integrity]``: protection levels of replays and benchmarks."""
 
 
 class Config(Section):
@@ -281,6 +288,7 @@ class Config(Section):
     imu: Imu = Imu()
     track: Track = Track()
     filter: FilterSection = FilterSection()
+    integrity: IntegritySection = IntegritySection()
     sweep: SweepSection = SweepSection()
     output: Output = Output()
 

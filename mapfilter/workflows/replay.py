@@ -20,6 +20,7 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
 from mapfilter.evaluation.accuracy import Accuracy, Outcome, Truth, accuracy, outcome
+from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.evaluation.success import SuccessSummary, summarise
 from mapfilter.filters.contract import Reason
 from mapfilter.geodesy import Lattice, same_crs
@@ -289,7 +290,8 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
     Parameters
     ----------
     config : Config
-        Its database (for Kalman-type filters its cells), track, filter and output sections count.
+        Its database (for Kalman-type filters its cells), track, filter, integrity and output
+        sections count.
     out : Path
         Folder of the results; one log writes straight into it, several into a folder each.
     progress : callable, optional
@@ -330,6 +332,7 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
     clear_results(out)
     logs: list[ReplayedLog] = []
     wanted, count = config.output.pictures, len(journeys.paths)
+    risk = config.integrity.of(IntegrityOptions).risk
     for index, path in enumerate(journeys.paths):
         opened = journeys.open(path)
         name, crs = opened.name, opened.log.crs if database is None else database.lattice.crs
@@ -339,7 +342,7 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         log = replace(log, notes=(*log.notes, *notes))
         rng = named_rng(config.journeys.seed, "replay", name)
         drawn = wanted == "all" or (wanted == "first" and not index)
-        track = locate(log, filter_, rng, snapshots=drawn)
+        track = locate(log, filter_, rng, snapshots=drawn, risk=risk)
         into = out if count == 1 else out / name
         if database is None:
             pictures = _draw_errors(log, track, into) if drawn else ()
