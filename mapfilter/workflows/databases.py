@@ -19,6 +19,7 @@ from mapfilter.database.merge import merge
 from mapfilter.database.store import info, open_database
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.rasters.raster_set import is_raster_folder, open_rasters
+from mapfilter.tracks.readers.formats import format_of
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import is_log, read_log
 
@@ -95,6 +96,8 @@ def _no_raster(path: Path) -> str:
         return "best servers that mapfilter export wrote; QGIS and rasterio open it"
     if path.suffix == ".toml":
         return "a configuration; give it to a command with -c"
+    if (known := format_of(path)) is not None:
+        return f"{known.title}; mapfilter convert makes a log of it"
     if path.suffix == ".csv" and _INDEX_COLUMN not in _first_line(path):
         return "a cell plan; use it as cells.plan"
     return ""
