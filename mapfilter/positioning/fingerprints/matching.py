@@ -135,7 +135,7 @@ class Distances:
         for one, value in zip(cell.tolist(), own.tolist(), strict=True):
             where = self.by_cell.of_cell(one)
             known = self.value[where]
-            both = known * value if self.metric == "euclidean" else np.minimum(known, value)
+            both: Floats = known * value if self.metric == "euclidean" else np.minimum(known, value)
             shared[self.by_cell.report[where]] += both
         if self.metric == "euclidean":
             squared = self.total2 + float(np.sum(own**2)) - 2 * shared
