@@ -21,11 +21,14 @@ from mapfilter.positioning.fingerprints.options import (
     CANDIDATES,
     METHODS,
     Method,
+    Probabilistic,
+    SurveyMaps,
     method_name,
     method_options,
 )
 from mapfilter.positioning.fingerprints.regions import Errors, Regions, calibrate, coverage
 from mapfilter.positioning.fingerprints.reports import Reports
+from mapfilter.positioning.fingerprints.sources import simulated_reports
 
 MOST_FOLDS = 10
 MOST_VALIDATED = 2000
@@ -47,7 +50,7 @@ class Validation:
     Parameters
     ----------
     blocks : str
-        "logs", or "squares of N m".
+        What was left out: "logs", or "squares of N m"; or how reports were drawn.
     folds, reports : int
         Times that something was left out, and reports located.
     mean_m, median_m, error_95_m : float
@@ -151,9 +154,15 @@ class LocatedReports:
 
 
 def fit_locator(
-    database: Reports, method: Method | str = AUTO, progress: Progress | None = None
+    database: Reports,
+    method: Method | str = AUTO,
+    rng: np.random.Generator | None = None,
+    progress: Progress | None = None,
 ) -> ReportLocator:
     """Cross-validate a method on a database, calibrate its regions, and prepare it.
+
+    There is nothing to leave out of predicted levels: regions are calibrated with reports that are
+    drawn with the errors that are stated for them.
 
     Parameters
     ----------
@@ -162,6 +171,8 @@ def fit_locator(
     method : options, or name
         "auto" takes the one of :data:`~.options.CANDIDATES` with the lowest median error in
         cross-validation.
+    rng : numpy.random.Generator, optional
+        Draws reports from predicted levels; seeded with 0 when left out.
     progress : callable, optional
         Called with folds done and folds in all.
 
@@ -170,7 +181,7 @@ def fit_locator(
     InputError
         No report has a position and a level.
     ConfigError
-        There is no such method.
+        There is no such method, or no survey maps of predicted levels.
     """
     tried = [method] if not isinstance(method, str) else list(CANDIDATES)
     if isinstance(method, str) and method != AUTO:
@@ -179,17 +190,25 @@ def fit_locator(
         names = ", ".join((AUTO, *METHODS))
         raise fail(ConfigError, "method", f"{names}, or options of one", type(method).__name__)
     placed = database.placed()
-    fold, blocks = folds_of(placed)
+    if placed.predicted and any(isinstance(one, SurveyMaps) for one in tried):
+        hint = "levels of a radio-route database are maps already; use probabilistic"
+        raise fail(ConfigError, "method gp", "measured reports", "predicted levels", hint)
     found = []
-    count = len(np.unique(fold))
+    if placed.predicted:
+        blocks = "reports drawn with the stated errors"
+        drawn = rng if rng is not None else np.random.default_rng(0)
+        some = simulated_reports(placed, MOST_VALIDATED, Probabilistic().shared_db, drawn)
+        found = [(one, _simulated(placed, one, some)) for one in tried]
+    else:
+        fold, blocks = folds_of(placed)
+        count = len(np.unique(fold))
+        for number, one in enumerate(tried):
 
-    for number, one in enumerate(tried):
+            def report(done: int, _: int, begun: int = number * count) -> None:
+                if progress is not None:
+                    progress(begun + done, count * len(tried))
 
-        def report(done: int, _: int, begun: int = number * count) -> None:
-            if progress is not None:
-                progress(begun + done, count * len(tried))
-
-        found.append((one, cross_validate(placed, one, fold, report)))
+            found.append((one, cross_validate(placed, one, fold, report)))
     found.sort(key=lambda pair: float(np.median(pair[1].error_m)) if len(pair[1]) else np.inf)
     chosen, errors = found[0]
     enough = len(errors) >= _LEAST_VALIDATED
@@ -268,6 +287,15 @@ def cross_validate(
     empty = Errors(np.empty(0), np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
     every = [empty, *parts]
     return Errors(*(np.concatenate([getattr(part, name) for part in every]) for name in columns))
+
+
+def _simulated(database: Reports, method: Method, drawn: Reports) -> Errors:
+    """Return the errors of a method at drawn reports; every tenth is of one block."""
+    known, _ = drawn.named_as(database.cell_ids)
+    positions, located = _positions(locator(method, database), known, np.arange(len(drawn)))
+    off_m = positions[:, :2] - drawn.places[located]
+    block = np.arange(len(positions)) % MOST_FOLDS
+    return Errors(np.hypot(*off_m.T), positions[:, 2], positions[:, 3], block)
 
 
 def folds_of(database: Reports) -> tuple[Ints, str]:

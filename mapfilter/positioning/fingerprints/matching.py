@@ -7,7 +7,7 @@ Torres-Sospedra et al., Expert Systems with Applications 42 (2015), 9263-9278.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -140,7 +140,7 @@ class Distances:
         if self.metric == "euclidean":
             squared = self.total2 + float(np.sum(own**2)) - 2 * shared
             return np.asarray(np.sqrt(np.maximum(squared, 0.0)))
-        apart = np.maximum(self.total + own.sum() - 2 * shared, 0.0)
+        apart: Floats = np.maximum(self.total + own.sum() - 2 * shared, 0.0)
         if self.metric == "manhattan":
             return apart
         absent = 2 * self.scale.absent * (len(self.by_cell.first) - 1)
@@ -195,6 +195,7 @@ class Likelihoods:
     loss: Floats
     absence: Floats
     usual_dbm: Floats
+    predicted: bool = False
 
     @classmethod
     def at(cls, reports: Reports, errors: LevelErrors) -> Likelihoods:
@@ -205,7 +206,8 @@ class Likelihoods:
         cell = reports.cell[by_cell.order]
         loss = _absence(filled(level_dbm, cell, usual_dbm), errors)
         absence = _sums(by_cell, loss)
-        return cls(by_cell, errors, level_dbm, variance_db2, loss, absence, usual_dbm)
+        predicted = reports.predicted
+        return cls(by_cell, errors, level_dbm, variance_db2, loss, absence, usual_dbm, predicted)
 
     def of(self, cell: Ints32, level_dbm: Floats) -> tuple[Floats, Floats]:
         """Return log-likelihoods of one report: of which cells it has, and of their levels, (R,).
@@ -215,15 +217,21 @@ class Likelihoods:
         ``-(s2 - s1^2 / (s0 + 1/t)) / 2 - log(1 + t s0) / 2``, with ``s_k = sum d_i^k / v_i``, and a
         logarithm of each variance relative to that of a measured level.
         """
-        own = _absence(filled(level_dbm, cell, self.usual_dbm), self.errors)
-        count = self.by_cell.count
-        received = -self.absence - own.sum()
+        strength_dbm = filled(level_dbm, cell, self.usual_dbm)
+        own = _absence(strength_dbm, self.errors)
+        count, lost, absence = self.by_cell.count, self.loss, self.absence
+        if self.predicted:
+            # Phones report the strongest cells: the absence of weaker ones is no evidence.
+            least_dbm = max(float(strength_dbm.min()), self.errors.floor_dbm)
+            lost = _absence(self.level_dbm, replace(self.errors, floor_dbm=least_dbm))
+            absence = _sums(self.by_cell, lost)
+        received = -absence - own.sum()
         s0, s1, s2, logs = np.zeros((4, count))
         least_db2 = self.errors.level_db**2
         for one, dbm, own_loss in zip(cell.tolist(), level_dbm.tolist(), own.tolist(), strict=True):
             where = self.by_cell.of_cell(one)
             report = self.by_cell.report[where]
-            received[report] += self.loss[where] + own_loss
+            received[report] += lost[where] + own_loss
             if np.isnan(dbm):
                 continue
             apart_db, variance_db2 = dbm - self.level_dbm[where], self.variance_db2[where]

@@ -7,7 +7,7 @@ Cells, Wi-Fi access points, BLE beacons and LoRaWAN gateways are all transmitter
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -52,6 +52,8 @@ class Reports:
         Log or session; what is left out together in cross-validation. -1: by place.
     notes : tuple of str
         What was left out, and why.
+    predicted : bool
+        Whether the levels are those of a map, of all cells; phones report the strongest only.
     """
 
     crs: str
@@ -66,7 +68,8 @@ class Reports:
     east_m: Floats
     north_m: Floats
     block: Ints32
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = ()
+    predicted: bool = False
 
     def __len__(self) -> int:
         return len(self.first) - 1
@@ -114,6 +117,7 @@ class Reports:
             self.north_m[chosen],
             self.block[chosen],
             (*self.notes, *notes),
+            self.predicted,
         )
 
     def placed(self) -> Reports:
@@ -160,6 +164,7 @@ class Reports:
             self.north_m,
             self.block,
             self.notes,
+            self.predicted,
         )
         return found, unknown
 
