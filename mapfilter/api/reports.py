@@ -7,9 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.positioning.fingerprints.locating import LocatedReports, fit_locator, locate_by
+from mapfilter.positioning.fingerprints.locating import (
+    LocatedReports,
+    fit_locator,
+    locate_by,
+    usual_readings,
+)
 from mapfilter.positioning.fingerprints.options import AUTO, Method
-from mapfilter.positioning.fingerprints.reports import Reports, reports_of_log
+from mapfilter.positioning.fingerprints.reports import Reports
 from mapfilter.positioning.fingerprints.sources import reports_of_database, reports_of_logs
 from mapfilter.tracks.log import TrackLog
 
@@ -46,11 +51,14 @@ def locate_reports(
     ConfigError
         There is no such method.
     """
+    plan = None
     if isinstance(database, RadioRouteDatabase):
-        known = reports_of_database(database, level_error_db)
+        known, plan = reports_of_database(database, level_error_db), database.plan
     elif isinstance(database, Reports):
         known = database
     else:
         known = reports_of_logs([database] if isinstance(database, TrackLog) else database)
-    fitted = fit_locator(known, method, np.random.default_rng(seed))
-    return locate_by(fitted, reports_of_log(log) if isinstance(log, TrackLog) else log)
+    reports = reports_of_logs([log], plan) if isinstance(log, TrackLog) else log
+    rng = np.random.default_rng(seed)
+    fitted = fit_locator(known, method, rng, strongest=usual_readings(reports))
+    return locate_by(fitted, reports)

@@ -22,6 +22,7 @@ from mapfilter.positioning.fingerprints.locating import (
     figures_of,
     fit_locator,
     locate_by,
+    usual_readings,
 )
 from mapfilter.positioning.fingerprints.matches import locator
 from mapfilter.positioning.fingerprints.options import AUTO, Centroid, method_name
@@ -32,6 +33,7 @@ from mapfilter.positioning.fingerprints.sources import (
     reports_of_logs,
 )
 from mapfilter.positioning.fingerprints.tables import read_fingerprint_table
+from mapfilter.radio.cells import CellPlan
 from mapfilter.report.canvas import BLUE, GREY, save
 from mapfilter.report.curves import Distribution, plot_cumulative
 from mapfilter.tracks.log import TrackLog
@@ -110,7 +112,8 @@ def run_locate(
     began_s = time.perf_counter()
     known, (reports, names) = _inputs(database, log, crs, level_error_db)
     ensure_writable_folder(out)
-    fitted = fit_locator(known, method, np.random.default_rng(seed), progress)
+    rng, strongest = np.random.default_rng(seed), usual_readings(reports)
+    fitted = fit_locator(known, method, rng, strongest=strongest, progress=progress)
     located = locate_by(fitted, reports)
     baseline_m = _centroid_errors_m(fitted, reports)
     figures = figures_of(located)
@@ -138,16 +141,17 @@ def _inputs(
 ) -> tuple[Reports, tuple[Reports, Sequence[str]]]:
     """Read both inputs, and report the faults of both."""
     faults = Faults()
-    known, query = None, None
+    known, query, plan = None, None, None
     try:
         if (database / MANIFEST).is_file():
-            known = reports_of_database(open_database(database), level_error_db)
+            opened = open_database(database)
+            known, plan = reports_of_database(opened, level_error_db), opened.plan
         else:
             known = _reports(database, crs)[0]
     except MapfilterError as error:
         faults.found.extend(error.faults)
     try:
-        query = _reports(log, crs)
+        query = _reports(log, crs, plan)
     except MapfilterError as error:
         faults.found.extend(error.faults)
     if known is None or query is None:
@@ -155,7 +159,9 @@ def _inputs(
     return known, query
 
 
-def _reports(path: Path, crs: str | None) -> tuple[Reports, Sequence[str]]:
+def _reports(
+    path: Path, crs: str | None, plan: CellPlan | None = None
+) -> tuple[Reports, Sequence[str]]:
     """Return the reports of a log, logs or table, and the name of each block."""
     if is_table(path):
         return read_fingerprint_table(path, crs), ()
@@ -168,7 +174,7 @@ def _reports(path: Path, crs: str | None) -> tuple[Reports, Sequence[str]]:
         except MapfilterError as error:
             faults.found.extend(error.faults)
     faults.raise_if_any(InputError)
-    return reports_of_logs(logs), [folder.name for folder in folders]
+    return reports_of_logs(logs, plan), [folder.name for folder in folders]
 
 
 def _centroid_errors_m(fitted: ReportLocator, reports: Reports) -> Floats:

@@ -28,7 +28,7 @@ from mapfilter.positioning.fingerprints.options import (
 )
 from mapfilter.positioning.fingerprints.regions import Errors, Regions, calibrate, coverage
 from mapfilter.positioning.fingerprints.reports import Reports
-from mapfilter.positioning.fingerprints.sources import simulated_reports
+from mapfilter.positioning.fingerprints.sources import STRONGEST, simulated_reports
 
 MOST_FOLDS = 10
 MOST_VALIDATED = 2000
@@ -157,6 +157,8 @@ def fit_locator(
     database: Reports,
     method: Method | str = AUTO,
     rng: np.random.Generator | None = None,
+    *,
+    strongest: int = STRONGEST,
     progress: Progress | None = None,
 ) -> ReportLocator:
     """Cross-validate a method on a database, calibrate its regions, and prepare it.
@@ -173,6 +175,8 @@ def fit_locator(
         cross-validation.
     rng : numpy.random.Generator, optional
         Draws reports from predicted levels; seeded with 0 when left out.
+    strongest : int
+        Number of cells in such a report.
     progress : callable, optional
         Called with folds done and folds in all.
 
@@ -197,7 +201,9 @@ def fit_locator(
     if placed.predicted:
         blocks = "reports drawn with the stated errors"
         drawn = rng if rng is not None else np.random.default_rng(0)
-        some = simulated_reports(placed, MOST_VALIDATED, Probabilistic().shared_db, drawn)
+        some = simulated_reports(
+            placed, MOST_VALIDATED, strongest, Probabilistic().shared_db, drawn
+        )
         found = [(one, _simulated(placed, one, some)) for one in tried]
     else:
         fold, blocks = folds_of(placed)
@@ -217,6 +223,12 @@ def fit_locator(
     )
     regions = calibrate(errors) if enough else None
     return ReportLocator(chosen, placed, locator(chosen, placed), regions, validations)
+
+
+def usual_readings(reports: Reports) -> int:
+    """Return the median number of readings of the reports that have any; at least 1."""
+    counts = np.diff(reports.first)
+    return int(np.median(counts[counts > 0])) if (counts > 0).any() else 1
 
 
 def locate_by(fitted: ReportLocator, reports: Reports) -> LocatedReports:

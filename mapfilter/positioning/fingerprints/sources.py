@@ -8,6 +8,7 @@ from math import ceil, sqrt
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
@@ -17,18 +18,38 @@ from mapfilter.positioning.fingerprints.reports import (
     make_reports,
     reports_of_log,
 )
+from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.log import TrackLog
 
 MOST_POINTS = 20_000
 """A radio-route database is thinned to about so many places."""
 
-_STRONGEST = 7
-"""Cells in a simulated report: a serving cell and six neighbours."""
+STRONGEST = 7
+"""Cells in a report of a phone: a serving cell and six neighbours."""
 
 
-def reports_of_logs(logs: Sequence[TrackLog]) -> Reports:
-    """Return the reports of several logs, each a block of its own."""
-    return joined_reports([reports_of_log(log, number) for number, log in enumerate(logs)])
+def reports_of_logs(logs: Sequence[TrackLog], plan: CellPlan | None = None) -> Reports:
+    """Return the reports of several logs, each a block of its own.
+
+    Cells without id are named by carrier and BSIC where a plan has exactly one such cell.
+    """
+    named = logs if plan is None else [named_neighbours(log, plan) for log in logs]
+    return joined_reports([reports_of_log(log, number) for number, log in enumerate(named)])
+
+
+def named_neighbours(log: TrackLog, plan: CellPlan) -> TrackLog:
+    """Return a log whose cells without id have that of the only cell of their carrier and BSIC."""
+    known: dict[tuple[int, int], list[str]] = {}
+    for cell in plan.cells:
+        if cell.arfcn is not None and cell.bsic is not None:
+            known.setdefault((cell.arfcn, cell.bsic), []).append(cell.id)
+    radio = log.radio
+    rows = zip(radio["cell"], radio["arfcn"], radio["bsic"], strict=True)
+    found: list[str | None] = []
+    for cell, arfcn, bsic in rows:
+        ids = [] if arfcn is pd.NA or bsic is pd.NA else known.get((int(arfcn), int(bsic)), [])
+        found.append(ids[0] if pd.isna(cell) and len(ids) == 1 else cell)
+    return replace(log, radio=radio.assign(cell=pd.Series(found, index=radio.index, dtype=object)))
 
 
 def reports_of_database(database: RadioRouteDatabase, level_error_db: float = 6.0) -> Reports:
@@ -74,11 +95,11 @@ def reports_of_database(database: RadioRouteDatabase, level_error_db: float = 6.
 
 
 def simulated_reports(
-    database: Reports, count: int, shared_db: float, rng: np.random.Generator
+    database: Reports, count: int, strongest: int, shared_db: float, rng: np.random.Generator
 ) -> Reports:
     """Draw reports at places of predicted levels, with the errors that are stated for these.
 
-    Each is the strongest seven cells, with independent errors and one that all share.
+    Each has the strongest cells, with independent errors and one that all share.
     """
     drawn = database.some(rng.choice(len(database), min(count, len(database)), replace=False))
     report = drawn.report
@@ -87,7 +108,7 @@ def simulated_reports(
     level_dbm = level_dbm + drawn.sd_db * rng.standard_normal(len(level_dbm))
     order = np.lexsort((-level_dbm, report))
     rank = np.arange(len(order)) - drawn.first[report[order]]
-    kept = order[rank < _STRONGEST]
+    kept = order[rank < strongest]
     names = np.array(drawn.cell_ids, dtype=str)
     return make_reports(
         drawn.crs,
