@@ -123,7 +123,8 @@ def _centroid(database: Reports) -> Matcher:
         cell = received.serving
         if cell < 0 or by_cell.first[cell] == by_cell.first[cell + 1]:
             level_dbm = filled(received.level_dbm, received.cell, usual_dbm)
-            cell = int(received.cell[level_dbm.argmax()])
+            # Of equally strong ones the first of the database, whatever the order of readings.
+            cell = int(received.cell[level_dbm == level_dbm.max()].min())
         own = by_cell.report[by_cell.of_cell(cell)]
         return Match(own, np.full(len(own), 1 / len(own)), 0.0)
 

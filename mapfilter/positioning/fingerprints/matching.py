@@ -186,6 +186,12 @@ class Likelihoods:
         Of log-likelihood, if a cell is not received.
     absence : ndarray, shape (R,)
         Loss of each report if none of its cells is received.
+    usual_dbm : ndarray, shape (C,)
+        Stands for missing levels.
+    least_db2 : float
+        Least of the variances.
+    predicted : bool
+        Whether the absence of a cell weaker than all that were reported is no evidence.
     """
 
     by_cell: ByCell
@@ -195,7 +201,8 @@ class Likelihoods:
     loss: Floats
     absence: Floats
     usual_dbm: Floats
-    predicted: bool = False
+    least_db2: float
+    predicted: bool
 
     @classmethod
     def at(cls, reports: Reports, errors: LevelErrors) -> Likelihoods:
@@ -206,8 +213,18 @@ class Likelihoods:
         cell = reports.cell[by_cell.order]
         loss = _absence(filled(level_dbm, cell, usual_dbm), errors)
         absence = _sums(by_cell, loss)
-        predicted = reports.predicted
-        return cls(by_cell, errors, level_dbm, variance_db2, loss, absence, usual_dbm, predicted)
+        least_db2 = float(variance_db2.min()) if variance_db2.size else 1.0
+        return cls(
+            by_cell,
+            errors,
+            level_dbm,
+            variance_db2,
+            loss,
+            absence,
+            usual_dbm,
+            least_db2,
+            reports.predicted,
+        )
 
     def of(self, cell: Ints32, level_dbm: Floats) -> tuple[Floats, Floats]:
         """Return log-likelihoods of one report: of which cells it has, and of their levels, (R,).
@@ -215,7 +232,7 @@ class Likelihoods:
         The shared error is integrated out: levels d_i with variances v_i about a common offset of
         variance t have the log-likelihood
         ``-(s2 - s1^2 / (s0 + 1/t)) / 2 - log(1 + t s0) / 2``, with ``s_k = sum d_i^k / v_i``, and a
-        logarithm of each variance relative to that of a measured level.
+        logarithm of each variance relative to the least of the database.
         """
         strength_dbm = filled(level_dbm, cell, self.usual_dbm)
         own = _absence(strength_dbm, self.errors)
@@ -227,7 +244,7 @@ class Likelihoods:
             absence = _sums(self.by_cell, lost)
         received = -absence - own.sum()
         s0, s1, s2, logs = np.zeros((4, count))
-        least_db2 = self.errors.level_db**2
+        least_db2 = self.least_db2
         for one, dbm, own_loss in zip(cell.tolist(), level_dbm.tolist(), own.tolist(), strict=True):
             where = self.by_cell.of_cell(one)
             report = self.by_cell.report[where]

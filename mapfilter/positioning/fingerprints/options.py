@@ -92,7 +92,7 @@ class SurveyMaps(Options):
         As for "probabilistic".
     """
 
-    level_db: Positive = 1.0
+    level_db: Positive = 4.0
     shared_db: NotNegative = 3.0
     absence_per_db: Positive = 0.2
     effective_readings: Positive = 8.0
