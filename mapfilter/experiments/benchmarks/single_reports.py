@@ -122,8 +122,8 @@ def _wifi_reports(levels: Floats, places: Floats) -> Reports:
     )
 
 
-def session_reports(session: Session, crs: str, accuracy_m: float, block: int) -> Reports:
-    """Return the reports of a session whose position is at least so accurate."""
+def session_reports(session: Session, crs: str, accuracy_m: float) -> Reports:
+    """Return the reports of a session whose position is at least so accurate, as one block."""
     good = session.accuracy_m <= accuracy_m
     cell = np.array(session.cell, dtype=str)[good]
     count = int(good.sum())
@@ -135,7 +135,7 @@ def session_reports(session: Session, crs: str, accuracy_m: float, block: int) -
         count=count,
         places=session.places(crs)[good],
         time_s=session.time_s[good],
-        block=np.full(count, block),
+        block=np.zeros(count),
         serving=cell,
         timing_advance=session.timing_advance[good],
     )
@@ -148,13 +148,10 @@ def locate_wifi(training: Reports, test: Reports, method: str) -> tuple[LocatedR
 
 def locate_sessions(sessions: Sequence[Session], crs: str, method: str) -> Iterator[LocatedReports]:
     """Locate each session by the others."""
-    for left_out, session in enumerate(sessions):
-        others = [
-            session_reports(other, crs, MAP_M, block)
-            for block, other in enumerate(other for other in sessions if other is not session)
-        ]
+    for session in sessions:
+        others = [session_reports(other, crs, MAP_M) for other in sessions if other is not session]
         fitted = fit_locator(joined_reports(others), METHODS[method])
-        yield locate_by(fitted, session_reports(session, crs, GOOD_M, left_out))
+        yield locate_by(fitted, session_reports(session, crs, GOOD_M))
 
 
 def row_of(data: str, method: str, parts: Sequence[LocatedReports]) -> SingleReportsRow:

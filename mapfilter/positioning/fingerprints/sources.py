@@ -34,7 +34,7 @@ def reports_of_logs(logs: Sequence[TrackLog], plan: CellPlan | None = None) -> R
     Cells without id are named by carrier and BSIC where a plan has exactly one such cell.
     """
     named = logs if plan is None else [named_neighbours(log, plan) for log in logs]
-    return joined_reports([reports_of_log(log, number) for number, log in enumerate(named)])
+    return joined_reports([reports_of_log(log, 0) for log in named])
 
 
 def named_neighbours(log: TrackLog, plan: CellPlan) -> TrackLog:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import warnings
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -31,9 +32,9 @@ _OTHER = frozenset(
     )
 )
 _LEVEL_DBM = (-200.0, 0.0)
+_LONGEST = 40
 _MERCATOR = "EPSG:3857"
 _SEPARATORS = (",", ";", "\t")
-_LONGEST_HEADER = 1 << 22
 
 
 def read_fingerprint_table(path: Path | str, crs: str | None = None) -> Reports:
@@ -93,43 +94,57 @@ def read_fingerprint_table(path: Path | str, crs: str | None = None) -> Reports:
 def _read(path: Path) -> tuple[pd.DataFrame, list[str]]:
     expected = "a table with a header line"
     try:
-        with path.open(encoding="utf-8-sig", errors="replace") as stream:
-            header = stream.readline(_LONGEST_HEADER)
-        separator = max(_SEPARATORS, key=header.count)
-        named = [name.strip().lower() for name in next(csv.reader([header], delimiter=separator))]
-        if len(set(named)) < len(named):
-            twice = sorted({name for name in named if named.count(name) > 1})
-            raise fail(InputError, f"{path}, header", "each column once", listed(twice))
+        text = path.read_text(encoding="utf-8-sig", errors="replace")
+    except OSError as error:
+        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
+    lines = [line for line in text.splitlines() if line.strip()]
+    if not lines:
+        raise fail(InputError, str(path), expected, "an empty file", "cut off")
+    separator = max(_SEPARATORS, key=lines[0].count)
+    named = [name.strip().lower() for name in _fields(lines[0], separator)]
+    if len(set(named)) < len(named):
+        twice = sorted({name for name in named if named.count(name) > 1})
+        raise fail(InputError, f"{path}, header", "each column once", listed(twice))
+    # Rows that are too short end in empty fields; which field of one too long is which is unknown.
+    kept = [line for line in lines[1:] if len(_fields(line, separator)) <= len(named)]
+    notes = []
+    if len(kept) < len(lines) - 1:
+        count = len(lines) - 1 - len(kept)
+        notes = [f"{path.name}: {count} rows left out: too many fields"]
+    if not kept:
+        raise fail(InputError, str(path), f"{expected} and rows", "no rows", "cut off")
+    try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", pd.errors.DtypeWarning)
-            # Longer rows are skipped; shorter ones have empty fields at their end.
             table = pd.read_csv(
-                path,
+                StringIO("\n".join([lines[0], *kept])),
                 sep=separator,
-                encoding="utf-8-sig",
-                encoding_errors="replace",
-                on_bad_lines="skip",
                 index_col=False,
                 low_memory=False,
             )
-        with path.open("rb") as stream:
-            lines = sum(1 for line in stream if line.strip())
-    except OSError as error:
-        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
-    except (ValueError, StopIteration, csv.Error, pd.errors.ParserError) as error:
-        got = str(error).splitlines()[0] if str(error) else "an empty file"
+    except (ValueError, pd.errors.ParserError, pd.errors.ParserWarning) as error:
+        got = str(error).splitlines()[0]
         raise fail(InputError, str(path), expected, got, "cut off, or no text") from error
-    if table.empty:
-        raise fail(InputError, str(path), f"{expected} and rows", "no rows", "cut off")
-    missing = lines - 1 - len(table)
-    notes = [f"{path.name}: {missing} rows left out: too many fields"] if missing > 0 else []
     return table, notes
+
+
+def _fields(line: str, separator: str) -> list[str]:
+    if '"' not in line:
+        return line.split(separator)
+    try:
+        return next(csv.reader([line], delimiter=separator), [])
+    except csv.Error:
+        return line.split(separator)
 
 
 def _numbers(column: pd.Series) -> Floats:
     if pd.api.types.is_bool_dtype(column.dtype):
         return np.full(len(column), np.nan)
-    numbers = pd.to_numeric(column, errors="coerce")
+    try:
+        numbers = pd.to_numeric(column, errors="coerce")
+    except OverflowError:
+        # A whole number of hundreds of digits.
+        numbers = pd.to_numeric(column.astype(str).str.slice(0, _LONGEST), errors="coerce")
     return np.asarray(numbers.to_numpy(np.float64, na_value=np.nan))
 
 
