@@ -239,7 +239,7 @@ def locate(
     seed: SeedOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Locate each report by itself, without motion, with a region that holds as often as stated."""
+    """Locate each report of a log by itself, with a calibrated region."""
     from mapfilter.workflows.locate import run_locate
 
     if not 0 < level_error_db <= 60:
