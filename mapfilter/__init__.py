@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from mapfilter.api.located import Track as Track
     from mapfilter.api.located import locate as locate
     from mapfilter.api.located import score as score
+    from mapfilter.api.logs import read_log as read_log
     from mapfilter.api.reports import locate_reports as locate_reports
     from mapfilter.api.studies import Bound as Bound
     from mapfilter.api.studies import Sweep as Sweep
@@ -60,11 +61,11 @@ if TYPE_CHECKING:
     from mapfilter.simulation.walking import WalkerModel as WalkerModel
     from mapfilter.tracks.log import TrackLog as TrackLog
     from mapfilter.tracks.log import make_log as make_log
-    from mapfilter.tracks.store import read_log as read_log
     from mapfilter.tracks.store import write_log as write_log
 
 _NAMES = {
     "api.located": "Score Track locate score",
+    "api.logs": "read_log",
     "api.reports": "locate_reports",
     "api.studies": "Bound Sweep bound simulate sweep",
     "database.build": "build",
@@ -90,7 +91,7 @@ _NAMES = {
     "simulation.reports": "ReportModel",
     "simulation.walking": "WalkerModel",
     "tracks.log": "TrackLog make_log",
-    "tracks.store": "read_log write_log",
+    "tracks.store": "write_log",
 }
 """Names by the modules that define them."""
 

@@ -61,19 +61,15 @@ def convert(
 ) -> None:
     """Convert recordings of other programs to a track log."""
     from mapfilter.tracks.combine import CombineOptions
-    from mapfilter.workflows.convert import (
-        ConvertOptions,
-        parse_pairs,
-        report_lines,
-        run_convert,
-    )
+    from mapfilter.tracks.open_log import OpenOptions
+    from mapfilter.workflows.convert import parse_pairs, report_lines, run_convert
 
     given = [given_path(path) or path for path in files]
     true = [given_path(path) or path for path in truth or ()]
     place = numbers(origin, 2, "--origin")
     if place is not None and not (abs(place[0]) <= 90 and abs(place[1]) <= 180):
         raise fail(ConfigError, "--origin", "a latitude and a longitude in degrees", repr(origin))
-    options = ConvertOptions(
+    options = OpenOptions(
         format=form or "",
         zone=zone or "",
         columns=parse_pairs(column or (), "--column"),

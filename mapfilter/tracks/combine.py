@@ -18,6 +18,7 @@ from mapfilter.tracks.alignment import Alignment, align
 from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.moved import (
+    by_compass,
     motion_from_course,
     motion_from_odometry,
     motion_from_poses,
@@ -32,7 +33,7 @@ _RADIUS_68 = 1.515
 
 _NO_JOURNEY = {"cells", "ephemerides", "ionosphere"}
 _PROVIDERS = ("gps", "fused", "flp", "network", "nlp")
-_CELL_COLUMNS = ("technology", "mcc", "mnc", "lac", "ci")
+_CELL_COLUMNS = ("technology", "mcc", "mnc", "lac", "ci", "level_step_db")
 
 
 @dataclass(frozen=True)
@@ -216,7 +217,7 @@ def _motion(
 ) -> pd.DataFrame | None:
     """Return motion of the recording that tells it most directly; others stay sensors."""
     makers: tuple[tuple[str, Callable[[pd.DataFrame], pd.DataFrame]], ...] = (
-        ("motion", lambda rows: rows),
+        ("motion", lambda rows: by_compass(rows, frame.convergence_rad)),
         ("odometry", motion_from_odometry),
         ("poses", motion_from_poses),
     )

@@ -11,6 +11,31 @@ from mapfilter.geodesy import heading_from_azimuth_rad, wrap_rad
 _LONGEST_S = 5.0
 
 
+def by_compass(rows: pd.DataFrame, convergence_rad: float) -> pd.DataFrame:
+    """Return motion with headings of its compass where it has none.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        time_s, step_m, heading_rad, turn_rad and compass_deg, clockwise from true north.
+    convergence_rad : float
+        Clockwise angle from true north to grid north.
+
+    Examples
+    --------
+    >>> rows = pd.DataFrame({"time_s": [0.0, 1.0], "heading_rad": [0.5, np.nan],
+    ...     "compass_deg": [90.0, 0.0]})
+    >>> by_compass(rows, 0.0)["heading_rad"].round(3).tolist()
+    [0.5, 1.571]
+    """
+    if "compass_deg" not in rows:
+        return rows
+    heading = heading_from_azimuth_rad(rows["compass_deg"].to_numpy(), convergence_rad)
+    given = rows["heading_rad"].to_numpy(dtype=np.float64)
+    kept = rows.drop(columns="compass_deg")
+    return kept.assign(heading_rad=np.where(np.isnan(given), heading, given))
+
+
 def motion_from_odometry(rows: pd.DataFrame) -> pd.DataFrame:
     """Integrate speed and yaw rate over each interval, by the mean of its ends.
 

@@ -108,6 +108,7 @@ TABLES: dict[str, Table] = {
             _integer("censored", -1, 1, "-1, 0 or 1"),
             _integer("timing_advance", 0, 3846, "steps >= 0"),
             replace(_text("technology", "GSM, UMTS, LTE or NR"), optional=True),
+            Column("level_step_db", 0, 60, "dB in 0..60", optional=True),
             *(
                 replace(_integer(name, 0, most, "a whole number >= 0"), optional=True)
                 for name, most in (

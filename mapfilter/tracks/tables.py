@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults
 from mapfilter.geodesy import wrap_rad
+from mapfilter.radio.identities import LIMITS
 from mapfilter.tracks.schema import (
     MISSING_SIGNS,
     NEIGHBOUR,
@@ -23,7 +24,6 @@ from mapfilter.tracks.schema import (
     SERVING,
     Column,
 )
-from mapfilter.tracks.technologies import LIMITS
 
 _SHOWN_ROWS = 3
 _LOWEST_M, _HIGHEST_M = 2.0e7, 5.5e7

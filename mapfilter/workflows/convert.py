@@ -2,48 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, OutputError, fail
+from mapfilter.errors import ConfigError, OutputError, fail
 from mapfilter.geodesy import short_crs
-from mapfilter.tracks.combine import CombineOptions, combine
-from mapfilter.tracks.readers.format import ReadOptions
-from mapfilter.tracks.readers.formats import format_of, read_recording
+from mapfilter.tracks.combine import combine
+from mapfilter.tracks.open_log import OpenOptions, read_recordings
 from mapfilter.tracks.readers.recording import Recording
-from mapfilter.tracks.readers.times import parse_zone
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import check_log_replaceable, write_log
 
 _GAPS_SHOWN = 3
 _GAP_FACTOR = 5.0
 _LEAST_GAP_S = 2.0
-
-
-@dataclass(frozen=True)
-class ConvertOptions:
-    """How recordings are read and joined.
-
-    Parameters
-    ----------
-    format : str
-        Name of the format of all files; "" to find it by their content.
-    zone : str
-        Zone of local times that state none.
-    columns : mapping of str to str
-        For plain CSV: column of each field.
-    combine : CombineOptions
-    """
-
-    format: str = ""
-    zone: str = ""
-    columns: Mapping[str, str] = field(default_factory=dict)
-    combine: CombineOptions = field(default_factory=CombineOptions)
 
 
 @dataclass(frozen=True)
@@ -85,9 +62,7 @@ class Converted:
     notes: tuple[str, ...]
 
 
-def run_convert(
-    files: Sequence[Path], out: Path, options: ConvertOptions | None = None
-) -> Converted:
+def run_convert(files: Sequence[Path], out: Path, options: OpenOptions | None = None) -> Converted:
     """Write one track log from the recordings of one journey.
 
     Parameters
@@ -103,23 +78,10 @@ def run_convert(
         A recording cannot be read or holds nothing usable, or the recordings do not fit together;
         nothing is written then.
     """
-    options = options or ConvertOptions()
-    if options.zone:
-        parse_zone(options.zone)
+    options = options or OpenOptions()
     truth = [path for path in options.combine.truth if path not in files]
-    inner, notes = _files_of(files)
-    every = [*dict.fromkeys(inner), *dict.fromkeys(truth)]
-    _check_out(out, every)
-    reading = ReadOptions(options.zone, options.columns)
-    recordings, faults = [], Faults()
-    for path in every:
-        try:
-            recordings.append(read_recording(path, options.format, reading))
-        except ConfigError:
-            raise
-        except MapfilterError as error:
-            faults.found.extend(error.faults)
-    faults.raise_if_any(InputError)
+    _check_out(out, [*files, *truth])
+    recordings, notes = read_recordings([*files, *truth], options)
     combined = combine(recordings, options.combine)
     write_log(combined.log, out, sensors=combined.sensors)
     rows = {table: len(getattr(combined.log, table)) for table in TABLES}
@@ -138,25 +100,6 @@ def run_convert(
         found,
         (*notes, *combined.log.notes),
     )
-
-
-def _files_of(paths: Sequence[Path]) -> tuple[list[Path], list[str]]:
-    """Return files, and of folders the recordings in them; notes name the other files."""
-    found: list[Path] = []
-    notes = []
-    for path in paths:
-        if not path.is_dir():
-            found.append(path)
-            continue
-        inner = [p for p in sorted(path.iterdir()) if p.is_file() and not p.name.startswith(".")]
-        known = [p for p in inner if format_of(p) is not None]
-        if not known:
-            raise fail(InputError, str(path), "recordings in the folder", "none in a known format")
-        others = [p.name for p in inner if p not in known]
-        if others:
-            notes.append(f"{path.name}: {', '.join(others)[:200]} left out, no recordings")
-        found += known
-    return found, notes
 
 
 def _check_out(out: Path, inputs: Sequence[Path]) -> None:

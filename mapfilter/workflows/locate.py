@@ -13,8 +13,6 @@ import numpy as np
 from mapfilter._io import atomic_file, ensure_writable_folder, write_json
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats
-from mapfilter.database.manifest import MANIFEST
-from mapfilter.database.store import open_database
 from mapfilter.errors import Faults, InputError, MapfilterError
 from mapfilter.positioning.fingerprints.locating import (
     LocatedReports,
@@ -27,17 +25,9 @@ from mapfilter.positioning.fingerprints.locating import (
 from mapfilter.positioning.fingerprints.matches import locator
 from mapfilter.positioning.fingerprints.options import AUTO, Centroid, method_name
 from mapfilter.positioning.fingerprints.reports import Reports
-from mapfilter.positioning.fingerprints.sources import (
-    is_table,
-    reports_of_database,
-    reports_of_logs,
-)
-from mapfilter.positioning.fingerprints.tables import read_fingerprint_table
-from mapfilter.radio.cells import CellPlan
 from mapfilter.report.canvas import BLUE, GREY, save
 from mapfilter.report.curves import Distribution, plot_cumulative
-from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.store import list_logs, read_log
+from mapfilter.workflows.fingerprints import read_database, read_reports
 from mapfilter.workflows.terminal import to_jsonable
 
 POSITIONS, FIGURES, PICTURE = "positions.csv", "figures.json", "errors.png"
@@ -91,10 +81,10 @@ def run_locate(
     Parameters
     ----------
     database : Path
-        A radio-route database; or fingerprints: a log with ground truth, a folder of such logs, or
-        a table (CSV).
+        A radio-route database; or fingerprints: a log with ground truth, a folder of such logs,
+        recordings of other programs with positions, or a table (CSV).
     log : Path
-        A log, a folder of logs, or a table of fingerprints.
+        A log, a folder of logs, a recording, or a table of fingerprints.
     out : Path
         Gets ``positions.csv``, ``figures.json``, and ``errors.png`` where there is ground truth.
     crs : str, optional
@@ -143,38 +133,16 @@ def _inputs(
     faults = Faults()
     known, query, plan = None, None, None
     try:
-        if (database / MANIFEST).is_file():
-            opened = open_database(database)
-            known, plan = reports_of_database(opened, level_error_db), opened.plan
-        else:
-            known = _reports(database, crs)[0]
+        known, plan = read_database(database, crs, level_error_db)
     except MapfilterError as error:
         faults.found.extend(error.faults)
     try:
-        query = _reports(log, crs, plan)
+        query = read_reports(log, known.crs if known is not None else crs, plan)
     except MapfilterError as error:
         faults.found.extend(error.faults)
     if known is None or query is None:
         raise InputError(tuple(faults.found))
     return known, query
-
-
-def _reports(
-    path: Path, crs: str | None, plan: CellPlan | None = None
-) -> tuple[Reports, Sequence[str]]:
-    """Return the reports of a log, logs or table, and the name of each block."""
-    if is_table(path):
-        return read_fingerprint_table(path, crs), ()
-    folders = list_logs(path)
-    faults = Faults()
-    logs: list[TrackLog] = []
-    for folder in folders:
-        try:
-            logs.append(read_log(folder))
-        except MapfilterError as error:
-            faults.found.extend(error.faults)
-    faults.raise_if_any(InputError)
-    return reports_of_logs(logs, plan), [folder.name for folder in folders]
 
 
 def _centroid_errors_m(fitted: ReportLocator, reports: Reports) -> Floats:

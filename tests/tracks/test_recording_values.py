@@ -5,6 +5,7 @@ import pytest
 from made_recordings import COUNT, LEVEL_DBM, MADE, gnettrack
 from made_satellites import nmea, sentence
 
+from mapfilter.tracks.combine import combine
 from mapfilter.tracks.readers.formats import read_recording
 
 
@@ -144,3 +145,29 @@ def test_a_damaged_nanosecond_loses_only_its_row(written):
     assert len(recording.tables["satellites"]) == 2 * COUNT - 1
     assert recording.unusable[0].reason == "Raw: a time is missing"
     assert recording.unusable[0].lines == (at + 1,)
+
+
+def test_bars_are_levels_of_their_technology(tmp_path):
+    path = tmp_path / "bars.csv"
+    path.write_text(
+        "time,ci,technology,bars,rsrp\n"
+        "1777629600,7,LTE,0,\n1777629601,7,LTE,1,\n1777629602,7,LTE,4,\n"
+        "1777629603,7,GSM,2,\n1777629604,7,,3,\n1777629605,7,LTE,3,-91\n1777629606,7,NR,9,\n"
+    )
+    radio = read_recording(path).tables["radio"]
+    assert radio["level_dbm"].tolist()[:6] == [-115, -110, -85, -100, -90, -91]
+    assert np.isnan(radio["level_dbm"].iloc[6])
+    assert radio["level_step_db"].fillna(-1).tolist() == [0, 10, 0, 6, 10, -1, -1]
+    assert radio["censored"].fillna(0).tolist() == [-1, 0, 1, 0, 0, 0, 0]
+
+
+def test_compass_and_turn_degrees(tmp_path):
+    path = tmp_path / "walk.csv"
+    path.write_text(
+        "time,step_m,compass_deg,turn_deg\n1777629600,0.7,90,0\n1777629601,0.7,0,90\n"
+        "1777629602,0.7,400,-180\n"
+    )
+    motion = combine([read_recording(path)]).log.motion
+    assert motion["heading_rad"].tolist()[:2] == pytest.approx([0.0, np.pi / 2])
+    assert np.isnan(motion["heading_rad"].iloc[2])
+    assert motion["turn_rad"].tolist() == pytest.approx([0.0, np.pi / 2, -np.pi])

@@ -8,9 +8,10 @@ import pytest
 from mapfilter.geodesy import project, utm_crs
 from mapfilter.gnss.broadcast import place_by_broadcast
 from mapfilter.tracks.combine import CombineOptions
+from mapfilter.tracks.open_log import OpenOptions
 from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.store import read_log
-from mapfilter.workflows.convert import ConvertOptions, run_convert
+from mapfilter.workflows.convert import run_convert
 
 FOUND = {
     "cell-belgium-lte/walks/*.txt": ("gnettrack", {"positions", "radio"}),
@@ -81,7 +82,7 @@ def test_the_watch_tells_the_zone_of_the_phone(shared_data, tmp_path):
     folder = shared_data / "cell-belgium-lte"
     for name in ("lln_2", "waha_3", "ixelle_5"):
         watch = folder / "watch" / f"{name}.gpx.gz"
-        options = ConvertOptions(combine=CombineOptions(truth=[watch]))
+        options = OpenOptions(combine=CombineOptions(truth=[watch]))
         result = run_convert([folder / "walks" / f"{name}.txt"], tmp_path / name, options)
         assert any("UTC+01:00 (by positions" in note for note in result.notes)
 
@@ -89,7 +90,7 @@ def test_the_watch_tells_the_zone_of_the_phone(shared_data, tmp_path):
 def test_a_receiver_agrees_with_its_reference(shared_data, tmp_path):
     folder = shared_data / "gnss-android-vehicle"
     receiver, reference = next(folder.glob("*.nmea.gz")), next(folder.glob("*.gga.gz"))
-    options = ConvertOptions(combine=CombineOptions(truth=[reference]))
+    options = OpenOptions(combine=CombineOptions(truth=[reference]))
     result = run_convert([receiver], tmp_path / "log", options)
     assert any("agree within 0.5 m" in note for note in result.notes)
     log = read_log(tmp_path / "log")

@@ -58,9 +58,38 @@ def test_options_are_checked(walk):
     assert read_log(out).start_utc_s == START_UTC_S + 5
 
 
-def test_info_and_replay_say_how_to_use_a_recording(walk):
-    done = mapfilter("info", walk / "walk.txt")
-    assert done.code == 2
-    assert "a G-NetTrack log; mapfilter convert makes a log of it" in done.err
+def test_info_describes_a_recording(walk):
+    found = mapfilter("info", walk / "walk.txt", "--json").json
+    assert (found["kind"], found["format"]) == ("recording", "gnettrack")
+    assert found["rows"] == {"positions": COUNT, "radio": 2 * COUNT}
+    assert found["clock"] == "local time (zone unknown)"
     with pytest.raises(InputError, match=r"mapfilter convert drive\.csv --out LOG"):
         read_log(walk / "drive.csv")
+
+
+def test_formats_that_are_not_read_are_named(walk):
+    for name, told in (("drive.nmf", "Nemo"), ("drive.trp", "TEMS"), ("walk.kml", "KML")):
+        (walk / name).write_text('#FF,,,"2.19"\nsomething\n')
+        done = mapfilter("convert", walk / name, "--out", walk / "log")
+        assert done.code == 2
+        assert told in done.err
+
+
+def test_a_tab_delimited_export_with_a_map_of_columns(tmp_path):
+    head = ["Timestamp", "All-Latitude Decimal Degree", "All-Longitude Decimal Degree"]
+    head += ["All-Serving Cell RSRP (dBm)", "All-Serving Cell Identity"]
+    rows = [
+        ["2026-05-01 12:00:00.250", "60.17", "24.94", "-80.5", "9751830"],
+        ["2026-05-01 12:00:00.750", "", "", "-81.5", ""],
+        ["2026-05-01 12:00:01.250", "60.171", "24.94", "", "9751830"],
+    ]
+    path = tmp_path / "tems.txt"
+    path.write_text("\n".join("\t".join(row) for row in [head, *rows]))
+    names = zip(("time", "lat_deg", "lon_deg", "level_dbm", "ci"), head, strict=True)
+    columns = [f"--column={field}={name}" for field, name in names]
+    args = ("--format", "csv", "--zone", "+02:00", "--out", tmp_path / "log", "--json")
+    found = mapfilter("convert", path, *columns, *args).json
+    assert found["rows"]["gnss"] == 2
+    radio = read_log(tmp_path / "log").radio
+    assert radio["ci"].dropna().unique().tolist() == [9751830]
+    assert radio["level_dbm"].dropna().tolist() == [-80.5, -81.5]

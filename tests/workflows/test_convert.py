@@ -8,9 +8,10 @@ from made_recordings import COUNT, LAT_DEG, LON_DEG, MADE, START_UTC_S, STEP_S, 
 from mapfilter.errors import ConfigError, InputError, OutputError
 from mapfilter.geodesy import project
 from mapfilter.tracks.combine import CombineOptions
+from mapfilter.tracks.open_log import OpenOptions
 from mapfilter.tracks.sensors import read_sensors
 from mapfilter.tracks.store import read_log
-from mapfilter.workflows.convert import ConvertOptions, report_lines, run_convert
+from mapfilter.workflows.convert import report_lines, run_convert
 
 UTM = "EPSG:32635"
 
@@ -32,7 +33,7 @@ def made(tmp_path):
 
 
 def converted(paths, out, **combine):
-    options = ConvertOptions(combine=CombineOptions(**combine))
+    options = OpenOptions(combine=CombineOptions(**combine))
     return run_convert(paths, out, options)
 
 
@@ -227,7 +228,7 @@ def test_truth_must_have_positions(made, tmp_path):
 
 def test_a_format_that_does_not_exist_is_refused(made, tmp_path):
     with pytest.raises(ConfigError, match="--format"):
-        run_convert(made("gpx"), tmp_path / "log", ConvertOptions(format="kml"))
+        run_convert(made("gpx"), tmp_path / "log", OpenOptions(format="kml"))
 
 
 def test_a_folder_is_all_recordings_in_it(made, tmp_path):

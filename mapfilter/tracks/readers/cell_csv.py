@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapfilter._types import Floats
+from mapfilter.radio.identities import technology
 from mapfilter.tracks.readers.columns import (
     Columns,
     header_columns,
@@ -16,7 +17,7 @@ from mapfilter.tracks.readers.columns import (
     only,
 )
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.identities import add_radio, available, technology
+from mapfilter.tracks.readers.identities import add_radio, available
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.text import Text
 

@@ -51,6 +51,15 @@ FORMATS: tuple[Format, ...] = (
 """All formats, in the order in which a file is compared with them."""
 
 _PEEKED_BYTES = 1 << 18
+_NOT_READ = {
+    ".nmf": "a Nemo log; export measurements and positions as CSV, and map the columns",
+    ".trp": "a TEMS log; export it as tab-delimited text, and map the columns",
+    ".kml": "KML; export GPX, or a table as CSV",
+    ".kmz": "KML; export GPX, or a table as CSV",
+    ".geojson": "GeoJSON; export GPX, or a table as CSV",
+    ".fit": "a FIT file; export GPX",
+}
+"""Suffixes of formats that are not read, and what to do."""
 
 
 def format_named(name: str) -> Format:
@@ -96,7 +105,11 @@ def read_recording(
     path = Path(path)
     if path.is_dir():
         raise fail(InputError, str(path), "a file", "a folder", "name the files in it")
-    text = read_text(path)
+    try:
+        text = read_text(path)
+    except InputError as error:
+        hint = _NOT_READ.get(path.suffix.lower(), "")
+        raise InputError(tuple(replace(f, hint=hint or f.hint) for f in error.faults)) from error
     found = find_format(text)
     known = format_named(name) if name else found
     if known is None and options is not None and options.columns:
@@ -125,8 +138,8 @@ def _unknown(path: Path, text: Text) -> MapfilterError:
     """Return the error for a file of no known format."""
     names = set(header_names(text.first_line, likely_separator(text.first_line)))
     fields = {name for some in plain_csv.FIELDS.values() for name in some}
-    hint = ""
-    if len(names) > 1 and names & fields:
+    hint = _NOT_READ.get(path.suffix.lower(), "")
+    if not hint and len(names) > 1 and names & fields:
         hint = "a CSV without a column of times, or with other names: --column FIELD=COLUMN"
     expected = f"a recording in a known format ({', '.join(f.name for f in FORMATS)})"
     got = f"none of them; it begins with {text.first_line[:60]!r}"

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Bools, Floats, Ints
+from mapfilter.radio.identities import technology
 from mapfilter.tracks.readers.columns import (
     Columns,
     header_columns,
@@ -15,7 +16,7 @@ from mapfilter.tracks.readers.columns import (
     likely_separator,
 )
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.identities import add_radio, available, technology
+from mapfilter.tracks.readers.identities import add_radio, available
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.stale import repeated_readings
 from mapfilter.tracks.readers.text import Text

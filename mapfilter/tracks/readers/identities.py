@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,33 +11,10 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats, Ints
+from mapfilter.radio.identities import LIMITS, parse_cgi
 from mapfilter.tracks.readers.recording import Reading
-from mapfilter.tracks.technologies import LIMITS
 
-_SPLIT = re.compile(r"[-_:;,/ .]+")
 _UNAVAILABLE = (-1, 2**31 - 1, 2**63 - 1)
-_FAMILIES = {
-    "GSM": ("GSM", "GPRS", "EDGE", "2G"),
-    "UMTS": ("UMTS", "WCDMA", "HSPA", "HSPA+", "HSPAP", "HSDPA", "HSUPA", "DC-HSPA", "3G"),
-    "LTE": ("LTE", "LTE+", "LTE-A", "LTE_CA", "LTE CA", "4G", "4G+"),
-    "NR": ("NR", "5G", "5G SA", "5G NSA", "5G-SA", "5G-NSA", "NR SA", "NR NSA", "NRNSA", "ENDC"),
-    "CDMA": ("CDMA", "EVDO", "1XRTT", "EHRPD"),
-    "TDSCDMA": ("TDSCDMA", "TD-SCDMA", "TD_SCDMA"),
-    "WIFI": ("WIFI", "WLAN"),
-    "BLE": ("BLE", "BEACON"),
-}
-_FAMILY = {word: family for family, words in _FAMILIES.items() for word in words}
-
-
-def technology(word: str) -> str | None:
-    """Return GSM, UMTS, LTE, NR, … for a word of a recording; None where not known.
-
-    Examples
-    --------
-    >>> [technology(word) for word in ("LTE+", "hspa", "4G", "?")]
-    ['LTE', 'UMTS', 'LTE', None]
-    """
-    return _FAMILY.get(word.strip().upper())
 
 
 def available(values: Ints, there: Bools) -> Floats:
@@ -57,13 +34,9 @@ def parse_identities(texts: np.ndarray) -> dict[str, Floats]:
     """
     rows: dict[object, tuple[float, ...]] = {}
     for text in pd.unique(pd.Series(texts, dtype=object)):
-        words = [word for word in _SPLIT.split(str(text).strip()) if word]
-        whole = [float(word) for word in words if word.isascii() and word.isdigit()]
-        nan = float("nan")
-        if len(whole) == len(words) == 3:
-            rows[text] = (whole[0], whole[1], nan, whole[2])
-        else:
-            rows[text] = tuple(whole) if len(whole) == len(words) == 4 else (nan,) * 4
+        found = parse_cgi(str(text))
+        parts = (None,) * 4 if found is None else found
+        rows[text] = tuple(math.nan if part is None else float(part) for part in parts)
     table = np.array([rows[text] for text in texts], dtype=np.float64).reshape(-1, 4)
     return dict(zip(("mcc", "mnc", "lac", "ci"), table.T, strict=True))
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
+from mapfilter.radio.identities import BARS_DBM, levels_of_bars, technology
 from mapfilter.tracks.readers.columns import (
     Columns,
     header_columns,
@@ -22,7 +23,6 @@ from mapfilter.tracks.readers.identities import (
     add_radio,
     available,
     parse_identities,
-    technology,
 )
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.text import Text
@@ -43,6 +43,8 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
     "heading_rad": ("heading_rad",),
     "step_m": ("step_m",),
     "turn_rad": ("turn_rad",),
+    "compass_deg": ("compass_deg", "heading_deg", "azimuth_deg"),
+    "turn_deg": ("turn_deg",),
     "yaw_rate_radps": ("yaw_rate_radps", "yaw_rate"),
     "yaw_rate_degps": ("yaw_rate_degps",),
     "wheel_speed_mps": ("wheel_speed_mps", "wheel_speed"),
@@ -58,6 +60,8 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
     "arfcn": ("arfcn", "uarfcn", "earfcn", "nrarfcn", "nr_arfcn"),
     "bsic": ("bsic", "psc", "pci"),
     "level_dbm": ("level_dbm", "dbm", "rsrp", "rscp", "rssi", "signal_dbm"),
+    "bars": ("bars", "signal_bars"),
+    "level_step_db": ("level_step_db",),
     "timing_advance": ("timing_advance", "ta"),
     "pressure_hpa": ("pressure_hpa", "pressure"),
     "steps": ("steps", "step_count"),
@@ -71,10 +75,10 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
 
 _KMH = 1 / 3.6
 _CONTENT = (
-    ("lat_deg", "lon_deg"), ("east_m", "north_m"), ("step_m",), ("level_dbm",), ("acc_x",),
-    ("gyr_x",), ("mag_x",), ("pressure_hpa",), ("wheel_speed_mps",), ("wheel_speed_kmh",),
-    ("steps",),
-)  # fmt: skip
+    *(("lat_deg", "lon_deg"), ("east_m", "north_m"), ("step_m",), ("level_dbm",), ("bars",)),
+    *(("acc_x",), ("gyr_x",), ("mag_x",), ("pressure_hpa",), ("wheel_speed_mps",)),
+    *(("wheel_speed_kmh",), ("steps",)),
+)
 
 
 @dataclass(frozen=True)
@@ -128,7 +132,10 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
         columns = {name: mapped.number(name) for name in ("east_m", "north_m", "heading_rad")}
         _add(reading, "places", {"time_s": time_s, **columns}, rows, np.isfinite(columns["east_m"]))
     elif mapped.has("step_m"):
-        columns = {name: mapped.number(name) for name in ("step_m", "heading_rad", "turn_rad")}
+        moved = ("step_m", "heading_rad", "turn_rad", "compass_deg")
+        columns = {name: mapped.number(name) for name in moved}
+        if mapped.has("turn_deg"):
+            columns["turn_rad"] = np.radians(mapped.number("turn_deg"))
         there = np.isfinite(columns["step_m"])
         _add(reading, "motion", {"time_s": time_s, **columns}, rows, there)
     _add_odometry(mapped, reading, time_s)
@@ -211,7 +218,7 @@ def _add_sensors(mapped: _Mapped, reading: Reading, time_s: Floats) -> None:
 
 
 def _add_cells(mapped: _Mapped, reading: Reading, time_s: Floats) -> None:
-    if not mapped.has("level_dbm") and not mapped.has("ci") and not mapped.has("cell"):
+    if not any(map(mapped.has, ("level_dbm", "bars", "ci", "cell"))):
         return
     identity = {name: mapped.whole(name) for name in ("mcc", "mnc", "lac", "ci")}
     if mapped.has("cgi"):
@@ -223,21 +230,38 @@ def _add_cells(mapped: _Mapped, reading: Reading, time_s: Floats) -> None:
     columns = {
         **identity,
         "time_s": time_s,
-        "level_dbm": mapped.number("level_dbm"),
+        **{name: mapped.number(name) for name in ("level_dbm", "level_step_db")},
         **{name: mapped.whole(name) for name in ("arfcn", "bsic", "timing_advance")},
     }
+    if mapped.has("technology"):
+        columns["technology"] = mapped.rows.mapped(technology, *mapped.names("technology"))
+    if mapped.has("bars"):
+        _add_bars(mapped, columns)
     cell = mapped.texts("cell")
     identified = (cell != "") | ~np.isnan(identity["ci"])
     there = identified | ~np.isnan(columns["level_dbm"])
     if mapped.has("cell"):
         columns["cell"] = cell
-    if mapped.has("technology"):
-        columns["technology"] = mapped.rows.mapped(technology, *mapped.names("technology"))
     serving = mapped.rows.flags(*mapped.names("role"), true=("serving",))
     neighbour = mapped.rows.flags(*mapped.names("role"), true=("neighbour", "neighbor"))
     serving |= identified & ~neighbour
     columns["role"] = np.array(["neighbour", "serving"], dtype=object)[serving.astype(np.int64)]
     add_radio(reading, *only(columns, mapped.rows.line, there))
+
+
+def _add_bars(mapped: _Mapped, columns: dict[str, np.ndarray]) -> None:
+    """Give rows without a level that of their bars, as in LTE where the technology is unknown."""
+    bars = mapped.number("bars")
+    families = columns.get("technology", np.full(len(bars), None, dtype=object))
+    families = np.array([one if one in BARS_DBM else "LTE" for one in families], dtype=object)
+    names = ("level_dbm", "level_step_db", "censored")
+    found = {name: columns.get(name, np.zeros(len(bars))).copy() for name in names}
+    without = np.isnan(columns["level_dbm"])
+    for family in BARS_DBM:
+        of = without & (families == family)
+        for name, values in zip(names, levels_of_bars(bars[of], family), strict=True):
+            found[name][of] = values
+    columns |= found
 
 
 FORMAT = Format(

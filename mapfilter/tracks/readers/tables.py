@@ -120,12 +120,14 @@ RECORDED: dict[str, tuple[Field, ...]] = {
         Field("level_dbm", -200, 0, "dBm in -200..0"),
         Field("timing_advance", 0, 3846, "steps in 0..3846"),
         Field("censored", -1, 1, "-1, 0 or 1"),
+        Field("level_step_db", 0, 60, "dB in 0..60"),
     ),
     "motion": (
         _TIME,
         Field("step_m", -1e6, 1e6, _METRES),
         Field("heading_rad", -6.3, 6.3, "radians in -2π..2π"),
         Field("turn_rad", -6.3, 6.3, "radians in -2π..2π"),
+        Field("compass_deg", -180, 360, "degrees in -180..360"),
     ),
     "odometry": (
         _TIME,
