@@ -212,14 +212,14 @@ def locate(
         typer.Option(
             "--db",
             metavar="DB",
-            help="Database; or fingerprints: logs with truth, or a table (CSV).",
+            help="Database; or fingerprints: logs or recordings with positions, or a table.",
             callback=given_path,
         ),
     ],
     log: Annotated[
         Path,
         typer.Option(
-            "--log", metavar="LOG", help="A log, a folder of logs, or a table.", callback=given_path
+            "--log", metavar="LOG", help="A log, recording, table, or folder.", callback=given_path
         ),
     ],
     method: Annotated[

@@ -157,3 +157,42 @@ def test_faults_of_both_inputs_are_reported_together(tmp_path):
 def test_a_log_without_truth_is_no_database(folder):
     outcome = mapfilter("locate", "--db", folder / "blind", "--log", folder / "walk")
     assert_refused(outcome, "reports with positions")
+
+
+UPLOAD = "mcc,mnc,lac,cellid,lat,lon,signal,measured_at,rating,speed,direction,act,ta,psc,tac,pci"
+
+
+def test_recordings_are_database_and_log_as_they_are(tmp_path):
+    rng = np.random.default_rng(0)
+    for name in ("db/monday", "db/tuesday", "walk"):
+        place = np.abs(np.cumsum(rng.normal(0, 12, 200))) % 900
+        level = np.round(-65 - 0.03 * place + rng.normal(0, 2, 200))
+        rows = [
+            f"302,720,1,{1000 + (at > 450)},{45 + at / 111_200:.7f},-75.7,{dbm:.0f},"
+            f"{1_600_000_000_000 + 5000 * i},8,1,0,LTE,{int(at / 78)},,1,"
+            for i, (at, dbm) in enumerate(zip(place, level, strict=True))
+        ]
+        file = tmp_path / f"{name}.csv"
+        file.parent.mkdir(exist_ok=True)
+        file.write_text("\n".join([UPLOAD, *rows]) + "\n")
+    given = ["--db", tmp_path / "db", "--log", tmp_path / "walk.csv", "--out", tmp_path / "out"]
+    found = assert_done(mapfilter("locate", *given, "--method", "probabilistic", "--json")).json
+    assert found["located"] == 200
+    assert found["validations"][0]["folds"] == 2
+    # A step of the timing advance is 78 m of the street.
+    assert found["error_median_m"] < 40 < found["centroid_median_m"]
+    assert any("GNSS" in note for note in found["notes"])
+
+
+def test_a_table_with_times_is_no_recording(tmp_path):
+    rng = np.random.default_rng(0)
+    names = ["WAP001", "WAP002", "LONGITUDE", "LATITUDE", "FLOOR", "TIMESTAMP"]
+    for name in ("training", "validation"):
+        at = rng.uniform(0, 30, 60)
+        columns = [-60 - at, -90 + at, at - 7500, at + 4.86e6, 0 * at, 1.37e9 + at]
+        rows = pd.DataFrame(np.round(np.column_stack(columns), 2), columns=names)
+        rows.to_csv(tmp_path / f"{name}.csv", index=False)
+    given = ["--db", tmp_path / "training.csv", "--log", tmp_path / "validation.csv"]
+    found = assert_done(mapfilter("locate", *given, "--out", tmp_path / "out", "--json")).json
+    assert found["transmitters"] == 2
+    assert found["error_median_m"] < 3
