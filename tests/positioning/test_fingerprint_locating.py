@@ -151,3 +151,38 @@ def test_a_fitted_locator_is_used_again(floor):
     one, other = locate_by(fitted, floor[1]), locate_by(fitted, floor[1])
     np.testing.assert_array_equal(one.radii_m, other.radii_m)
     assert "level_db 4.0" in repr(one)
+
+
+@pytest.mark.parametrize("method", ["auto", *METHODS])
+def test_degenerate_databases_and_logs(method):
+    same = make_reports(
+        CRS,
+        np.arange(60),
+        ["a"] * 60,
+        [-60.0] * 60,
+        count=60,
+        places=np.tile([[1.0, 2.0]], (60, 1)),
+    )
+    single = make_reports(CRS, [0, 0], ["a", "b"], [-60.0, np.nan], count=1, places=[[1.0, 2.0]])
+    asked = make_reports(CRS, [0, 1], ["a", "c"], [np.nan, -50.0], count=3)
+    nothing = make_reports(CRS, [], [], [], count=0)
+    for known in (same, single):
+        found = mf.locate_reports(asked, known, method)
+        assert found.reason == ("", UNKNOWN, NOTHING)
+        assert (found.east_m[0], found.north_m[0]) == pytest.approx((1, 2))
+        assert len(mf.locate_reports(nothing, known, method)) == 0
+
+
+@pytest.mark.parametrize("method", ["auto", *METHODS])
+def test_serving_cells_without_levels_are_enough(method):
+    rng = np.random.default_rng(0)
+    east = rng.uniform(0, 100, 80)
+    cell = np.where(east < 50, "west", "east")
+    places = np.column_stack([east, rng.uniform(0, 10, 80)])
+    known = make_reports(
+        CRS, np.arange(80), cell, np.full(80, np.nan), count=80, places=places, serving=cell
+    )
+    asked = make_reports(CRS, [0, 1], ["west", "east"], [np.nan] * 2, count=2)
+    found = mf.locate_reports(asked, known, method)
+    west, east_m = found.east_m
+    assert west < 50 < east_m

@@ -183,7 +183,7 @@ def fit_locator(
     Raises
     ------
     InputError
-        No report has a position and a level.
+        No report has a position and a transmitter.
     ConfigError
         There is no such method, or no survey maps of predicted levels.
     """

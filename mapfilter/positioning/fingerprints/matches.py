@@ -29,6 +29,7 @@ from mapfilter.positioning.fingerprints.options import (
 from mapfilter.positioning.fingerprints.reports import Reports
 from mapfilter.positioning.fingerprints.survey_levels import surveyed_levels
 
+_NO_LEVEL_DBM = -30.0
 _NEGLIGIBLE = 1e-4
 _MOST = 4000
 _TINY = 1e-6
@@ -100,14 +101,16 @@ def locator(method: Method, database: Reports) -> Locator:
     Raises
     ------
     InputError
-        There are none; or no transmitter was received often enough for a survey map.
+        There are none.
     """
-    if not len(database) or not np.isfinite(database.level_dbm).any():
-        raise fail(InputError, "database", "reports with positions and levels", "none")
+    if not len(database):
+        raise fail(InputError, "database", "reports with positions and transmitters", "none")
     places = database.places
     if isinstance(method, Centroid):
         return Locator(places, _centroid(database), median=False)
-    floor_dbm = float(np.nanmin(database.level_dbm)) - 1.0
+    known = np.isfinite(database.level_dbm)
+    # Logs of serving cells alone have no levels; all cells then count alike.
+    floor_dbm = float(database.level_dbm[known].min()) - 1.0 if known.any() else _NO_LEVEL_DBM
     if isinstance(method, Neighbours):
         scale = Scale(method.representation, floor_dbm, method.exponent)
         return Locator(places, _neighbours(database, method, scale), median=False)
