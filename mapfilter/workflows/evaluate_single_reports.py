@@ -26,14 +26,15 @@ from mapfilter.experiments.benchmarks.single_reports import (
 )
 from mapfilter.geodesy import utm_crs
 from mapfilter.positioning.fingerprints.locating import LocatedReports
-from mapfilter.report.canvas import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, save
+from mapfilter.positioning.fingerprints.options import AUTO
+from mapfilter.report.canvas import BLACK, GREEN, GREY, ORANGE, PURPLE, SKY, save
 from mapfilter.report.curves import Distribution, plot_cumulative
 from mapfilter.workflows.evaluate_ottawa import session_files
 from mapfilter.workflows.terminal import to_jsonable
 
 TABLE = "table.json"
 SETS = (*WIFI, *PARTS)
-_COLOURS = dict(zip(METHODS, (BLUE, SKY, GREEN, ORANGE, GREY, PURPLE), strict=True))
+_COLOURS = dict(zip(METHODS, (BLACK, SKY, GREEN, ORANGE, GREY, PURPLE), strict=True))
 _SHARE = 0.95
 USUAL = tuple(name for name in METHODS if name != "gp")
 """Ten times Gaussian processes of each transmitter take minutes to an hour a set."""
@@ -92,10 +93,14 @@ def run_single_reports(
             rows.append(row_of(name, method, parts))
             error_m = np.concatenate([part.error_m for part in parts])
             label = f"{method}, median {rows[-1].median_m:.3g} m"
-            curves.append(Distribution(label, error_m[np.isfinite(error_m)], _COLOURS[method]))
+            known_m = error_m[np.isfinite(error_m)]
+            style = "--" if method == AUTO else "-"
+            curves.append(Distribution(label, known_m, _COLOURS[method], style))
             done += 1
             if progress is not None:
                 progress(done, count)
+        # What "auto" chose lies on that method's curve: dashed, above it.
+        curves.sort(key=lambda curve: curve.style == "--")
         most_m = max(float(np.quantile(curve.errors_m, 0.95)) for curve in curves)
         title = f"{name}: errors of single reports"
         drawn = plot_cumulative(curves, title=title, most_m=most_m, share=_SHARE)
