@@ -24,6 +24,7 @@ from mapfilter.cli.chain import (
 )
 from mapfilter.cli.convert import convert
 from mapfilter.cli.experiments import bench, evaluate, reproduce, sweep
+from mapfilter.cli.learning import learn
 from mapfilter.cli.options import DONE
 from mapfilter.workflows.terminal import guarded
 
@@ -55,6 +56,7 @@ _COMMANDS: tuple[tuple[Callable[..., None], str, str], ...] = (
         "--db area/database --log walk --filter bayes --out located",
         "howto/which-filter.rst",
     ),
+    (learn, "area/database --logs walks --out learned", "tutorial/learn.rst"),
     (sweep, "-c sweep.toml --out sweep --workers 4", "howto/sweep.rst"),
     (reproduce, "khalaf-allah-2007 --trials 20 --out paper", "explanation/success-statistics.rst"),
     (evaluate, "global-positioning --case levels-6 --runs 5", "explanation/simulated-worlds.rst"),

@@ -25,6 +25,7 @@ from mapfilter.cli.options import (
     WorkersOption,
     check_custom_filter,
     given_path,
+    refuse,
     seeded,
     toml,
 )
@@ -36,15 +37,35 @@ from mapfilter.workflows.terminal import print_message, print_result, progress_b
 def check(
     config: ConfigOption = None,
     settings: SetOption = None,
+    logs: Annotated[
+        Path | None,
+        typer.Option(
+            "--logs", metavar="LOGS", help="Journeys: names suspects of the database by them."
+        ),
+    ] = None,
+    database: Annotated[
+        Path | None,
+        typer.Option("--db", metavar="DB", help="With --logs: the database; then only it."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Check all inputs together before anything runs; exit code 2 if something is wrong."""
-    from mapfilter.check.findings import paragraphs
+    from mapfilter.check.findings import CheckResult, paragraphs
     from mapfilter.config.load import load_config
     from mapfilter.workflows.check import run_check
+    from mapfilter.workflows.check_suspects import checked_together, run_check_suspects
 
+    if logs is None:
+        refuse({"--db": database}, "check without --logs")
+    given = list(settings or ())
+    for key, value in (("database.path", database), ("track.path", logs)):
+        if value is not None:
+            given.append(f"{key}={toml(str(value))}")
+    loaded = load_config(config, given)
     with progress_bar("check") as progress:
-        result = run_check(load_config(config, settings or ()), progress)
+        result = CheckResult(True, ()) if database is not None else run_check(loaded, progress)
+        if logs is not None:
+            result = checked_together(result, run_check_suspects(loaded, progress))
     if as_json:
         print_result(result, as_json)
     else:
