@@ -19,7 +19,14 @@ from scipy.special import ndtr
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
 from mapfilter.filters.hypotheses import BeliefSummary, Bins, empty_summary, summarise
-from mapfilter.filters.particle import ParticleOptions, PriorT, ReadingT, WeighingModel, switched
+from mapfilter.filters.particle import (
+    Cloud,
+    ParticleOptions,
+    PriorT,
+    ReadingT,
+    WeighingModel,
+    switched,
+)
 
 _REACH_SD = 4.0
 _READ_INTO_PIXELS = 1 / 6
@@ -118,7 +125,9 @@ class GridModel(WeighingModel[ReadingT], Protocol[PriorT, ReadingT]):
     def start(self, prior: PriorT) -> tuple[Floats32, Floats32]:
         """Return the first mass on and off the map, shape (B, rows, cols) each."""
 
-    def states(self, row: NDArray[np.intp], col: NDArray[np.intp], bias_rad: Floats32) -> Floats32:
+    def states(
+        self, row: NDArray[np.intp], col: NDArray[np.intp], bias_rad: Floats32, off: Floats32
+    ) -> Floats32:
         """Return pixels as states of the particle model, shape (R, N)."""
 
     def transport(self, east_m: float, north_m: float, length_m: float) -> Transport:
@@ -133,6 +142,8 @@ class GridBelief:
     ----------
     on, off : ndarray of float32, shape (B, rows, cols)
         Mass of those on and off the map; together they sum to one after an update.
+    shared : object
+        What the model shares between all pixels after the last reading.
     waiting_m : (float, float, float)
         Displacement east and north, and its length, that mass has not been moved by yet.
     travelled_m, log_evidence, status, agreement_start_m
@@ -142,6 +153,7 @@ class GridBelief:
     on: Floats32
     off: Floats32
     model: GridModel[Any, Any]
+    shared: Any = None
     waiting_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     travelled_m: float = 0.0
     log_evidence: float = 0.0
@@ -184,8 +196,8 @@ class GridBelief:
         both = now.on + now.off
         bias, row, col = np.nonzero(both > _LEAST_MASS)
         mass = both[bias, row, col]
-        state = self.model.states(row, col, self.model.bias_rad[bias].astype(np.float32))
-        state[-1] = now.off[bias, row, col] / mass
+        off = now.off[bias, row, col] / mass
+        state = self.model.states(row, col, self.model.bias_rad[bias].astype(np.float32), off)
         return state, (mass / mass.sum()).astype(np.float32)
 
     @property
@@ -258,9 +270,11 @@ class GridFilter(Generic[PriorT, ReadingT]):
         before = belief.moved
         both = before.on + before.off
         bias, row, col = np.nonzero(both > _LEAST_MASS * float(both.max(initial=0.0)))
-        state = self.model.states(row, col, self.model.bias_rad[bias].astype(np.float32))
+        off = before.off[bias, row, col] / both[bias, row, col]
+        state = self.model.states(row, col, self.model.bias_rad[bias].astype(np.float32), off)
         log_weight = np.zeros(bias.size)
-        reason = self.model.weigh(state, log_weight, reading)
+        nothing = np.empty((bias.size, 0), dtype=np.float32)
+        cloud, reason = self.model.weigh(Cloud(state, nothing), log_weight, reading)
         if reason is not Reason.USED:
             return belief, UpdateInfo(reason, belief.status, int(bias.size))
         highest = float(log_weight.max(initial=-np.inf))
@@ -273,8 +287,9 @@ class GridFilter(Generic[PriorT, ReadingT]):
             return belief, UpdateInfo(Reason.NO_CANDIDATES_LEFT, belief.status, int(bias.size))
         weighed = replace(
             before,
-            on=on / np.float32(total),
-            off=off / np.float32(total),
+            on=(on / np.float32(total)).astype(np.float32),
+            off=(off / np.float32(total)).astype(np.float32),
+            shared=cloud.shared,
             log_evidence=before.log_evidence + highest + float(np.log(total)),
         )
         status, agreement_start_m = switched(
@@ -282,7 +297,7 @@ class GridFilter(Generic[PriorT, ReadingT]):
             belief.travelled_m,
             belief.agreement_start_m,
             agrees=weighed.summary.mass_50m >= self.options.switch_mass
-            and self.model.can_converge(weighed.summary),
+            and self.model.can_converge(weighed.summary, reading),
             hold_m=self.options.switch_hold_m,
         )
         now = replace(weighed, status=status, agreement_start_m=agreement_start_m)

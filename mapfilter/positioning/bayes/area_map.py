@@ -9,10 +9,11 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
-from mapfilter._types import Bools, Floats32, Ints, Ints32
+from mapfilter._types import Bools, Bytes, Floats32, Ints, Ints32
 from mapfilter.database.radioroutes import RadioField
 from mapfilter.geodesy import Lattice
 from mapfilter.models.fingerprint import RasterFrame
+from mapfilter.models.level_errors import roughness
 from mapfilter.models.street_motion import map_log_likelihood
 from mapfilter.radio.cells import CellPlan
 
@@ -34,7 +35,7 @@ class AreaMap:
     level_dbm : ndarray of float32, shape (rows, cols, C + 2)
         Levels, and the strongest and second strongest of each pixel.
     distance_m : ndarray of float32, shape (rows, cols)
-        To the nearest way.
+        To the edge of the nearest way, 0 on it.
     way_id : ndarray of int64, shape (rows, cols)
         Id of the way of the nearest point; 0 where that belongs to no way.
     on_way : ndarray of bool, shape (rows, cols)
@@ -83,7 +84,7 @@ class AreaMap:
             field.cell_ids,
             frozenset(plan.ids),
             level,
-            field.distance_to_way_m,
+            np.maximum(field.distance_to_way_m - field.half_width_m, 0),
             field.way_id,
             field.on_way,
             _carriers(plan, field.cell_ids),
@@ -113,6 +114,20 @@ class AreaMap:
     def flat_level_dbm(self) -> Floats32:
         """Levels as one line of numbers, the bands of a pixel together."""
         return self.level_dbm.reshape(-1)
+
+    @cached_property
+    def flat_rough_db(self) -> Bytes:
+        """Local standard deviation of the levels in tenths of a dB, in the same order."""
+        rough_db = roughness(self.level_dbm, self.lattice.resolution_m)
+        return np.minimum(np.rint(10 * rough_db), 255).astype(np.uint8).reshape(-1)
+
+    @cached_property
+    def site_of(self) -> Ints:
+        """Number of the site of each band; cells at one place are of one site."""
+        places = {cell: self.sites[cell][:2] for cell in self.cell_ids if cell in self.sites}
+        numbers: dict[object, int] = {}
+        found = [numbers.setdefault(places.get(c, c), len(numbers)) for c in self.cell_ids]
+        return np.array(found, dtype=np.int64)
 
     @cached_property
     def band_of(self) -> dict[str, int]:
