@@ -68,8 +68,8 @@ class ParticleOptions(Options):
     particles_per_bin: Positive = 60.0
     resample_below: Probability = 0.5
     mass_exponent: Annotated[float, Gt(0), Le(1)] = 0.5
-    jitter: tuple[NotNegative, ...] = (0.3, 0.3, 0.004, 0.002, 0.0, 0.004, 0.004)
-    searching_jitter: tuple[NotNegative, ...] = (1.5, 1.5, 0.01, 0.006, 0.0, 0.01, 0.01)
+    jitter: tuple[NotNegative, ...] = (0.3, 0.3, 0.004, 0.002, 0.0, 0.004, 0.004, 1e-4)
+    searching_jitter: tuple[NotNegative, ...] = (1.5, 1.5, 0.01, 0.006, 0.0, 0.01, 0.01, 1e-4)
     switch_mass: Probability = 0.99
     switch_hold_m: NotNegative = 14.0
     split_mass: Share = 0.5

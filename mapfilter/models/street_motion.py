@@ -4,7 +4,8 @@ A hypothesis holds its position, the errors of its headings and steps, and how p
 the map. One step of dead reckoning (Khalaf-Allah 2007, eqs. 3-10) moves it; the map then weighs it
 by the metre.
 
-Errors of headings have three parts: a *lasting* one of the journey, which drifts; a *deviation*,
+Errors of headings have three parts: a *lasting* one of the journey, which drifts, and with a biased
+gyroscope grows steadily; a *deviation*,
 which is correlated over tens of metres (magnetic disturbances, the way a phone is carried; an
 Ornstein-Uhlenbeck process), and now and then jumps to any value within tens of degrees; and white
 noise. The logarithm of the step scale has a lasting part and a deviation, too. White noise of
@@ -30,14 +31,15 @@ from mapfilter._kernels import cos_sin32, exp32, hashed, log32, normals, uniform
 from mapfilter._types import Floats, Floats32, Ints32
 from mapfilter.options import NotNegative, Options, Positive, Share
 
-EAST, NORTH, BIAS, LOG_SCALE, OFF, TURN, STRETCH = range(7)
+EAST, NORTH, BIAS, LOG_SCALE, OFF, TURN, STRETCH, RATE = range(8)
 """Rows of the state: metres from the frame's origin; lasting heading error (radians) and logarithm
-of the step scale; probability of being off the map; deviations of heading and log scale."""
-STATES = 7
+of the step scale; probability of being off the map; deviations of heading and log scale; growth of
+the lasting heading error (radians per metre)."""
+STATES = 8
 
 _F = np.float32
 _HEADING_SD_RAD, _BIAS_SD_RAD, _BIAS_DRIFT_RAD = radians(15.0), radians(10.0), radians(0.3)
-_DISTURBED_RAD = radians(40.0)
+_DISTURBED_RAD, _RATE_RAD = radians(40.0), radians(0.15)
 _MOST_SQUARES = 400
 _PARTS = 4
 _MOST_NATS = 14.0
@@ -66,6 +68,10 @@ class MotionErrors(Options):
         Standard deviation of the lasting heading error at the start.
     bias_drift_rad_per_sqrt_m : float
         Random walk of the lasting heading error.
+    rate_rad_per_m : float
+        Standard deviation of the steady growth of the lasting heading error, of biased gyroscopes.
+    rate_share : float
+        Share of journeys with such a gyroscope.
     scale_sd : float
         Standard deviation of the logarithm of the step scale at the start.
     scale_drift_per_sqrt_m : float
@@ -83,6 +89,8 @@ class MotionErrors(Options):
     disturbed_rad: NotNegative = _DISTURBED_RAD
     bias_sd_rad: NotNegative = _BIAS_SD_RAD
     bias_drift_rad_per_sqrt_m: NotNegative = _BIAS_DRIFT_RAD
+    rate_rad_per_m: NotNegative = _RATE_RAD
+    rate_share: Share = 0.5
     scale_sd: NotNegative = 0.03
     scale_drift_per_sqrt_m: NotNegative = 0.0
     stretch_sd: NotNegative = 0.08
@@ -160,7 +168,7 @@ def map_log_likelihood(distance_m: Floats32, sd_m: float) -> Floats32:
 def move(
     state: Floats32, step_m: float, heading_rad: float, errors: MotionErrors, key: np.uint64
 ) -> Floats32:
-    """Return all hypotheses (7 or more, N) after one measured step; further rows stay.
+    """Return all hypotheses (8 or more, N) after one measured step; further rows stay.
 
     The errors are added to the heading. A step of length 0 changes nothing. ``key`` is from
     :func:`mapfilter._kernels.draw_key`.
@@ -183,8 +191,9 @@ def move(
         _F(1 - exp(-errors.disturbances_per_m * length)),
         _F(errors.disturbed_rad),
     )
+    length_m = _F(length)
     long_m = _F(step_m * exp(0.5 * white_rad**2))
-    return np.asarray(_move(state, long_m, _F(heading_rad), noise, key))
+    return np.asarray(_move(state, long_m, length_m, _F(heading_rad), noise, key))
 
 
 class _Noise(NamedTuple):
@@ -206,6 +215,7 @@ class _Noise(NamedTuple):
 def _move(
     state: Floats32,
     step_m: np.float32,
+    length_m: np.float32,
     heading_rad: np.float32,
     noise: _Noise,
     key: np.uint64,
@@ -213,7 +223,7 @@ def _move(
     moved = np.empty_like(state)
     count = state.shape[1]
     east, north, bias, scale = state[0], state[1], state[2], state[3]
-    turn, stretch = state[5], state[6]
+    turn, stretch, rate = state[5], state[6], state[7]
     to_east, to_north, to_bias, to_scale = moved[0], moved[1], moved[2], moved[3]
     to_turn, to_stretch = moved[5], moved[6]
     moved[4] = state[4]
@@ -222,7 +232,7 @@ def _move(
         c, d = normals(hashed(key, np.uint64(4 * i + 1)))
         e, f = normals(hashed(key, np.uint64(4 * i + 2)))
         u, _ = uniforms(hashed(key, np.uint64(4 * i + 3)))
-        lasting = wrap32(bias[i] + noise.bias_rad * c)
+        lasting = wrap32(bias[i] + rate[i] * length_m + noise.bias_rad * c)
         steady = scale[i] + noise.scale * d
         beside = noise.turn_keep * turn[i] + noise.turn_rad * e
         beside = noise.jump_rad * e if _F(u) < noise.jump else beside

@@ -37,7 +37,7 @@ from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.simulate import run_simulate
 
 _LEVELS, _PER_ROW = 7, 20
-_JITTER = (0.5, 0.5, 0.005, 0.003, 0.0, 0.004, 0.004)
+_JITTER = (0.5, 0.5, 0.005, 0.003, 0.0, 0.004, 0.004, 1e-4)
 _TRACKS, _LENGTH_M, _CUT_M = 5, 1940.0, 300.0
 
 

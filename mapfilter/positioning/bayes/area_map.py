@@ -18,7 +18,7 @@ from mapfilter.models.street_motion import map_log_likelihood
 from mapfilter.radio.cells import CellPlan
 
 _BELOW_FLOOR_DB = 6.0
-_EDGE_M = 60.0
+_EDGE_M, _EDGE_SHARE = 60.0, 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +157,7 @@ class AreaMap:
     def at_edge(self, place_m: Floats) -> bool:
         """Return whether a place in the local frame is near the edge of the area, or beyond."""
         inside = [min(place_m[i], self.size_m[i] - place_m[i]) for i in range(2)]
-        return bool(min(inside) < _EDGE_M)
+        return bool(min(inside) < min(_EDGE_M, _EDGE_SHARE * min(self.size_m)))
 
     def log_map(self, sd_m: float) -> Floats32:
         """Return the map's log-likelihood at every pixel."""

@@ -276,7 +276,8 @@ class BayesPositioner(Filter[BayesState]):
         if reading is None:
             return state, Reason.USED
         update, rules = self.filters[state.compass].update, self.rules
-        reading = replace(reading, doubted=doubted(rules, before, state.null, state.alternative))
+        doubt = doubted(rules, before, state.null, state.alternative)
+        reading = replace(reading, doubted=doubt or self.area.at_edge(before.summary.mean))
         belief, info = update(before, reading, rng)
         if info.reason is not Reason.USED:
             return replace(state, belief=belief), info.reason

@@ -34,6 +34,7 @@ from mapfilter.models.street_motion import (
     LOG_SCALE,
     NORTH,
     OFF,
+    RATE,
     STATES,
     STRETCH,
     TURN,
@@ -134,6 +135,8 @@ class BayesModel:
         state[LOG_SCALE] = self.motion.scale_sd * rng.standard_normal(most)
         state[TURN] = self.motion.turn_sd_rad * rng.standard_normal(most)
         state[STRETCH] = self.motion.stretch_sd * rng.standard_normal(most)
+        biased = rng.random(most) < self.motion.rate_share
+        state[RATE] = self.motion.rate_rad_per_m * rng.standard_normal(most) * biased
         cloud = _new(state)
         if prior.reading is not None:
             # Hypotheses that were drawn by this evidence keep what it says of the levels' errors.
