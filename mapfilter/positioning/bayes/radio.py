@@ -110,7 +110,7 @@ class RadioSource(EvidenceSource):
         The hypotheses nearest to the true position lie up to ``particle_spacing_m`` from it.
         """
         options = self.options
-        serving, reason, rows = self._serving(epoch)
+        served, serving, reason, rows = self._serving(epoch)
         if not self.due(used, reckoning.travelled_m) or not epoch.radio:
             if epoch.radio and reason is Reason.USED:
                 reason = Reason.NOT_MOVED_ENOUGH
@@ -120,7 +120,7 @@ class RadioSource(EvidenceSource):
         levels: LevelReport | None = None
         bounds: tuple[BoundReading, ...] = ()
         if options.use_levels:
-            inside, others, unknown = self._placed(epoch, serving)
+            inside, others, unknown = self._placed(epoch, served, serving)
             rows += unknown
             bounds = tuple(self._bound(bands, row, counted_m) for bands, row in others)
             if inside:
@@ -134,37 +134,38 @@ class RadioSource(EvidenceSource):
             levels,
             bounds,
             length_m=length_m,
-            timing_advance=_timing_advance(epoch) if serving >= 0 else nan,
+            timing_advance=served.timing_advance if served is not None else nan,
         )
         return EvidenceUpdate(reckoning, unused=unused, radio=reading, reason=reason)
 
-    def _serving(self, epoch: Epoch) -> tuple[int, Reason, list[_Unplaced]]:
-        """Return the band of the serving cell, or -1 and the reason; and further serving rows."""
+    def _serving(self, epoch: Epoch) -> tuple[ReportRow | None, int, Reason, list[_Unplaced]]:
+        """Return the row of the serving cell and its band, or None, -1 and the reason.
+
+        Also return further serving rows.
+        """
         named = [row for row in epoch.radio if row.role == SERVING and row.cell is not None]
         if not named:
-            return -1, Reason.NO_SERVING_CELL if epoch.radio else Reason.NO_READING, []
+            return None, -1, Reason.NO_SERVING_CELL if epoch.radio else Reason.NO_READING, []
         more = [(row, Reason.SECOND_SERVING_CELL) for row in named[1:]]
         cell = str(named[0].cell)
         if cell in self.area.band_of:
-            return self.area.band_of[cell], Reason.USED, more
+            return named[0], self.area.band_of[cell], Reason.USED, more
         known = cell in self.area.known_ids
-        return -1, Reason.NO_POINTS_IN_CELL if known else Reason.UNKNOWN_CELL, more
+        return None, -1, Reason.NO_POINTS_IN_CELL if known else Reason.UNKNOWN_CELL, more
 
     def _placed(
-        self, epoch: Epoch, serving: int
+        self, epoch: Epoch, served: ReportRow | None, serving: int
     ) -> tuple[dict[int, float], list[tuple[tuple[int, ...], ReportRow]], list[_Unplaced]]:
         """Sort levels: of one cell and inside the scale, other ones, and those without a band."""
         inside: dict[int, float] = {}
         others: list[tuple[tuple[int, ...], ReportRow]] = []
         unplaced: list[_Unplaced] = []
-        served = False
         for row in epoch.radio:
             if row.role == SERVING:
-                # A second or unknown serving cell has its reason already.
-                bands: tuple[int, ...] = () if served or serving < 0 else (serving,)
-                served = True
-                if not bands:
+                # A second, unknown or nameless serving cell has its reason already.
+                if row is not served:
                     continue
+                bands: tuple[int, ...] = (serving,)
             elif row.cell is not None:
                 band = self.area.band_of.get(row.cell)
                 bands = (band,) if band is not None else ()
@@ -226,10 +227,6 @@ _Unplaced = tuple[ReportRow, Reason]
 
 def _carrier(row: ReportRow) -> tuple[int, int]:
     return -1 if row.arfcn is None else row.arfcn, -1 if row.bsic is None else row.bsic
-
-
-def _timing_advance(epoch: Epoch) -> float:
-    return next((row.timing_advance for row in epoch.radio if row.role == SERVING), nan)
 
 
 def _unused(epoch: Epoch, rows: list[_Unplaced]) -> list[UnusedReading]:
