@@ -42,10 +42,10 @@ class Tiny:
     def start(self, prior):  # noqa: ARG002
         return PRIOR[0].astype(np.float32), PRIOR[1].astype(np.float32)
 
-    def states(self, row, col, bias_rad):
-        state = np.zeros((5, row.size), dtype=np.float32)
+    def states(self, row, col, bias_rad, off):
+        state = np.zeros((6, row.size), dtype=np.float32)
         state[0], state[1] = (col + 0.5) * PIXEL_M, (ROWS - row - 0.5) * PIXEL_M
-        state[2] = bias_rad
+        state[2], state[3] = bias_rad, off
         return state
 
     def transport(self, east_m, north_m, length_m):
@@ -64,16 +64,16 @@ class Tiny:
             COME_BACK,
         )
 
-    def weigh(self, state, log_weight, reading):
+    def weigh(self, cloud, log_weight, reading):
         if reading is None:
-            return Reason.NO_READING
-        for i, (east_m, north_m, bias_rad) in enumerate(state[:3].T):
+            return cloud, Reason.NO_READING
+        for i, (east_m, north_m, bias_rad) in enumerate(cloud.state[:3].T):
             row, col = oracle.pixel_of(float(east_m), float(north_m), PIXEL_M, ROWS, COLS)
             b = int(np.argmin(np.abs(BIAS_RAD - bias_rad)))
             log_weight[i] += log(LIKELIHOOD[reading][b, row, col])
-        return Reason.USED
+        return cloud._replace(shared=reading), Reason.USED
 
-    def can_converge(self, summary):  # noqa: ARG002
+    def can_converge(self, summary, reading):  # noqa: ARG002
         return True
 
 
@@ -135,11 +135,35 @@ def test_the_hypotheses_are_the_pixels_with_their_probability_of_being_off():
         place = (round((col + 0.5) * PIXEL_M), round((ROWS - row - 0.5) * PIXEL_M), b)
         expected[place] = (on + off, off / (on + off))
     assert belief.weight.size == len(expected)
-    for (east_m, north_m, bias_rad, _, off), weight in zip(
+    for (east_m, north_m, bias_rad, off, *_), weight in zip(
         belief.state.T, belief.weight, strict=True
     ):
         b = int(np.argmin(np.abs(BIAS_RAD - bias_rad)))
         assert (weight, off) == pytest.approx(expected[round(east_m), round(north_m), b], rel=1e-5)
+
+
+def test_the_model_weighs_pixels_with_their_probability_of_being_off_and_shares_its_memory():
+    given = []
+
+    class Curious(Tiny):
+        def weigh(self, cloud, log_weight, reading):
+            given.append(cloud)
+            return super().weigh(cloud, log_weight, reading)
+
+        def can_converge(self, summary, reading):
+            given.append(reading)
+            return super().can_converge(summary, reading)
+
+    filter_, rng = GridFilter(Curious()), np.random.default_rng(0)
+    belief, _ = filter_.update(filter_.init(None, rng), 1, rng)
+    cloud = given[0]
+    on, off = PRIOR.reshape(2, -1)
+    np.testing.assert_allclose(cloud.state[3], off / (on + off), rtol=1e-5)
+    assert (cloud.kept.shape, cloud.shared) == ((3 * ROWS * COLS, 0), None)
+    assert belief.shared == 1
+    assert filter_.predict(belief, MotionStep(1.0, 0.0), rng)[0].shared == 1
+    # The switch rule may depend on the reading; it is asked where the mass agrees only.
+    assert given[1:] in ([], [1])
 
 
 def test_steps_wait_for_a_reading_and_are_summed():
