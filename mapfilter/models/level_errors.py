@@ -396,12 +396,12 @@ def weigh_by_levels(
     means = terms.gain.shape[1]
     slots = (means - 1) // 2
     cell, slot, gain = terms.cell, terms.slot, terms.gain
-    share, half, one = _F(0.01 * roughness_share), _F(0.5), _F(1.0)
+    share, half, one, zero = _F(0.01 * roughness_share), _F(0.5), _F(1.0), _F(0.0)
     most, cap = _F(_LOG_ODDS), _F(_MOST_LOG_ODDS)
     width = np.int64(bands)
     for i in range(pixel.size):
         at = np.int64(pixel[i]) * width
-        total = _F(0.0)
+        total = zero
         for k in range(cell.size):
             s = slot[k]
             error = kept[i, s] + kept[i, slots + s] + kept[i, means - 1]
@@ -411,11 +411,13 @@ def weigh_by_levels(
             variance = own + share * rough * rough
             right = -half * (v * v / variance + log32(variance))
             before = kept[i, means + s]
-            odds = before + terms.other[k] - right
-            odds = odds if odds < most else most
+            whole = before + terms.other[k] - right
+            odds = whole if whole < most else most
             odds = odds if odds > -most else -most
             fine = one / (one + exp32(odds))
-            total += right - log32(fine * (one + exp32(before)))
+            # Beyond the bound the logarithm of one plus the odds is that of the odds.
+            beyond = whole - odds if whole > odds else zero
+            total += right + beyond - log32(fine * (one + exp32(before)))
             after = odds if odds < cap else cap
             kept[i, means + s] = after if after > -cap else -cap
             step = fine * v * own / variance
@@ -464,11 +466,13 @@ def weigh_by_absence(
             place = place if place < last else last
             right = table[np.int32(place)]
             before = kept[i, means + s]
-            odds = before + terms.other[k] - right
-            odds = odds if odds < most else most
+            whole = before + terms.other[k] - right
+            odds = whole if whole < most else most
             odds = odds if odds > -most else -most
             fine = one / (one + exp32(odds))
-            total += right - log32(fine * (one + exp32(before)))
+            # Beyond the bound the logarithm of one plus the odds is that of the odds.
+            beyond = whole - odds if whole > odds else zero
+            total += right + beyond - log32(fine * (one + exp32(before)))
             after = odds if odds < cap else cap
             kept[i, means + s] = after if after > -cap else -cap
             if z < _F(6.0):
