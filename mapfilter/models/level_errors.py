@@ -33,6 +33,7 @@ from scipy.ndimage import uniform_filter
 
 from mapfilter._kernels import exp32, log32
 from mapfilter._types import Bytes, Floats, Floats32, Ints, Ints32
+from mapfilter.errors import Faults
 from mapfilter.options import NotNegative, Options, Positive, Probability, Share
 
 SLOTS = 24
@@ -88,6 +89,13 @@ class LevelErrors(Options):
     fault_m: Positive = 300.0
     absent_db: NotNegative = 3.0
     weight: Share = 0.35
+
+    def check(self, faults: Faults) -> None:
+        """Add shares that leave no error of a cell's own."""
+        if self.site_share + self.common_share >= 1:
+            where = "LevelErrors, site_share and common_share"
+            found = f"{self.site_share} and {self.common_share}"
+            faults.add(where, "site_share + common_share < 1", found)
 
     @property
     def total_db(self) -> float:

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import norm, truncnorm
 
+from mapfilter.errors import ConfigError
 from mapfilter.models.fingerprint import bound_table
 from mapfilter.models.level_errors import (
     SLOTS,
@@ -245,6 +246,13 @@ def test_the_memory_before_the_first_report():
     assert LevelErrors(fault_probability=0.2).fault_log_odds == pytest.approx(log(0.25))
     total = LevelErrors(slow_db=3.0, fast_db=4.0, white_db=12.0).total_db
     assert total == pytest.approx(13.0)
+
+
+def test_shares_of_errors_leave_one_of_the_cells_own():
+    assert LevelErrors(site_share=0.7, common_share=0.29).site_share == 0.7
+    for shares in ((0.6, 0.4), (1.0, 0.0), (0.0, 1.0), (0.9, 0.8)):
+        with pytest.raises(ConfigError, match=r"expected site_share \+ common_share < 1, found"):
+            LevelErrors(site_share=shares[0], common_share=shares[1])
 
 
 @given(st.lists(st.tuples(st.floats(0, 300), st.sets(st.integers(0, 5), min_size=1)), max_size=8),
