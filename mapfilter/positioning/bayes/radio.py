@@ -124,7 +124,7 @@ class RadioSource(EvidenceSource):
             rows += unknown
             bounds = tuple(self._bound(bands, row, counted_m) for bands, row in others)
             if inside:
-                levels = self._levels(inside, others, epoch, serving, particle_spacing_m)
+                levels = self._levels(inside, epoch, particle_spacing_m)
         unused = _unused(epoch, rows)
         if serving < 0 and levels is None and not bounds:
             return EvidenceUpdate(used, unused=unused, reason=reason)
@@ -185,34 +185,37 @@ class RadioSource(EvidenceSource):
         return inside, others, unplaced
 
     def _levels(
-        self,
-        inside: dict[int, float],
-        others: list[tuple[tuple[int, ...], ReportRow]],
-        epoch: Epoch,
-        serving: int,
-        particle_spacing_m: float,
+        self, inside: dict[int, float], epoch: Epoch, particle_spacing_m: float
     ) -> LevelReport:
         """Return levels, and the cells that are absent though a report has room for them."""
         options, count = self.options, len(inside)
-        absent = np.zeros(0, dtype=np.int32)
+        absent: list[int] = []
         limit_dbm = self.area.floor_dbm
         neighbours = sum(row.role != SERVING for row in epoch.radio)
         if neighbours >= _NEIGHBOURS_FOR_ABSENCE:
             if neighbours >= options.full_list:
                 limit_dbm = min(row.level_dbm for row in epoch.radio if isfinite(row.level_dbm))
-            present = {serving, *inside}.union(*(bands for bands, _ in others))
-            for row in epoch.radio:
-                if row.cell is None and row.arfcn is not None:
-                    present.update(self.area.carriers.get(_carrier(row), ()))
-            bands = range(len(self.area.cell_ids))
-            absent = np.array([band for band in bands if band not in present], dtype=np.int32)
+            present = self._present(epoch)
+            absent = [band for band in range(len(self.area.cell_ids)) if band not in present]
         return LevelReport(
             np.fromiter(inside, np.int32, count),
             np.fromiter(inside.values(), np.float32, count),
-            absent,
+            np.array(absent, dtype=np.int32),
             limit_dbm,
             options.offset_db(particle_spacing_m),
         )
+
+    def _present(self, epoch: Epoch) -> set[int]:
+        """Return the bands that rows of a report are of, or may be of, with and without levels."""
+        area, present = self.area, set[int]()
+        for row in epoch.radio:
+            if row.cell is not None:
+                present.update({area.band_of[row.cell]} if row.cell in area.band_of else ())
+            elif row.arfcn is not None:
+                present.update(area.carriers.get(_carrier(row), ()))
+            else:
+                return set(range(len(area.cell_ids)))
+        return present
 
     def _bound(self, bands: tuple[int, ...], row: ReportRow, counted_m: float) -> BoundReading:
         weight = self.options.bound_weight * (1.0 - exp(-2.0 * counted_m / _BOUND_M))
