@@ -58,7 +58,7 @@ def test_other_pixels_hold_what_a_nearest_point_holds(database, field):
         assert (same & np.isclose(expected, field.distance_to_way_m[row, col])).any()
 
 
-def test_the_width_is_that_of_the_nearest_ways_class(database, field):
+def test_the_width_is_that_of_the_nearest_ways_class(field):
     """7 m to each side of a residential street; squares have no width of their own."""
     assert set(np.unique(field.way_id)) == {0, 77}
     np.testing.assert_array_equal(field.half_width_m[field.way_id == 77], 7.0)

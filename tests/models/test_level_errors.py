@@ -403,7 +403,8 @@ def test_a_cell_that_is_off_by_itself_stops_counting_while_others_go_on():
             memory, kept, gained = weighed(memory, kept, pixel, table, report(levels))
             total += float(gained[0])
         error_db = {
-            band: float(kept[0, [slot, 6 + slot, 12]].sum()) for band, slot in memory.slot_of.items()
+            band: float(kept[0, [slot, 6 + slot, 12]].sum())
+            for band, slot in memory.slot_of.items()
         }
         odds = {band: float(kept[0, 13 + slot]) for band, slot in memory.slot_of.items()}
         found[probability] = total, error_db, odds
