@@ -300,6 +300,8 @@ class GridFilter(Generic[PriorT, ReadingT]):
             and self.model.can_converge(weighed.summary, reading),
             hold_m=self.options.switch_hold_m,
         )
+        if status is not Status.SEARCHING and weighed.summary.mass_50m < self.options.split_mass:
+            status, agreement_start_m = Status.SEARCHING, nan
         now = replace(weighed, status=status, agreement_start_m=agreement_start_m)
         return now, UpdateInfo(Reason.USED, status, int(bias.size))
 

@@ -22,7 +22,7 @@ from mapfilter.errors import Faults
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
 from mapfilter.filters.hypotheses import BeliefSummary, Bins, empty_summary, flattened, summarise
 from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
-from mapfilter.options import NotNegative, Options, Positive, Probability
+from mapfilter.options import NotNegative, Options, Positive, Probability, Share
 
 _Count = Annotated[int, Ge(1)]
 PriorT = TypeVar("PriorT", contravariant=True)
@@ -58,6 +58,8 @@ class ParticleOptions(Options):
         hypothesis,
     switch_hold_m : float
         and has done so for so many metres travelled.
+    split_mass : float
+        It searches again when less than this lies there.
     """
 
     max_particles: _Count = 20_000
@@ -70,6 +72,7 @@ class ParticleOptions(Options):
     searching_jitter: tuple[NotNegative, ...] = (1.5, 1.5, 0.01, 0.006, 0.0, 0.01, 0.01)
     switch_mass: Probability = 0.99
     switch_hold_m: NotNegative = 14.0
+    split_mass: Share = 0.5
 
     def check(self, faults: Faults) -> None:
         """Add a lower limit above the upper one."""
@@ -259,6 +262,8 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             and self.model.can_converge(summary, reading),
             hold_m=options.switch_hold_m,
         )
+        if status is not Status.SEARCHING and summary.mass_50m < options.split_mass:
+            status, agreement_start_m = Status.SEARCHING, nan
         searching = status is Status.SEARCHING
         if searching and options.mass_exponent < 1:
             weight = flattened(state, weight, belief.bins, options.mass_exponent)

@@ -28,8 +28,10 @@ won              found      other, TRACKING   TRACKING   other's  took over
 ===============  =========  ================  =========  =======  ===========
 
 Then, by the status reported before: ``LOST`` stays while the belief searches and becomes
-``TRACKING`` when it converges; ``CONVERGED`` lasts for one epoch. A belief that had converged is
-``LOST`` while the null hypothesis is more probable, too. A belief does not converge while the null
+``TRACKING`` when it converges; ``CONVERGED`` lasts for one epoch. A belief that had converged and
+splits is ``LOST``. While the null hypothesis is more probable than the belief, one that had
+converged is ``LOST``, too, and ``OUTSIDE`` where it lies at the edge of the area; one that searches
+is ``OUTSIDE``. A belief does not converge while the null
 hypothesis is not improbable or the alternative close behind, as the true position may have died out
 of it.
 """
@@ -58,8 +60,10 @@ _PRIOR_LOG_ODDS = log(0.01 / 0.99)
 _SERVING_NATS = 0.7
 _MAP_NATS_PER_M = 0.03
 _TERMS_FACTOR = 1.5
+_UNKNOWN_NATS = 0.5
 """Log-likelihood, below 0, under the null hypothesis: of a serving cell at full weight, of the map
-per metre, and of other terms as a multiple of what is expected of them."""
+per metre, and of other terms as a multiple of what is expected of them; and the gain from a serving
+cell that the map does not have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +130,8 @@ class NullHypothesis:
         """
         expected = other_log_likelihood + _TERMS_FACTOR * reading.expected
         expected -= _MAP_NATS_PER_M * reading.length_m
-        expected -= _SERVING_NATS * reading.serving_weight * (reading.serving >= 0)
+        known = reading.serving >= 0
+        expected += (-_SERVING_NATS if known else _UNKNOWN_NATS) * reading.serving_weight
         log_odds = self.log_odds + expected - gained
         return NullHypothesis(min(max(log_odds, _LEAST_LOG_ODDS), _MOST_LOG_ODDS))
 
@@ -193,7 +198,7 @@ class Transition(NamedTuple):
 
 
 _SEARCHING, _CONVERGED = Status.SEARCHING, Status.CONVERGED
-_TRACKING, _LOST = Status.TRACKING, Status.LOST
+_TRACKING, _LOST, _OUTSIDE = Status.TRACKING, Status.LOST, Status.OUTSIDE
 
 TRANSITIONS: Mapping[tuple[Outcome, bool], Transition] = {
     # Outcome, and whether the belief is still searching.
@@ -214,6 +219,8 @@ TRANSITIONS: Mapping[tuple[Outcome, bool], Transition] = {
 REPORTED: Mapping[tuple[Status, Status], Status] = {
     # Status reported before, and found now; others are reported as found.
     (_LOST, _SEARCHING): _LOST,
+    (_TRACKING, _SEARCHING): _LOST,
+    (_CONVERGED, _SEARCHING): _LOST,
     (_LOST, _CONVERGED): _TRACKING,
     (_CONVERGED, _CONVERGED): _TRACKING,
 }
@@ -236,10 +243,13 @@ def resolve_alternative(
     null: NullHypothesis,
     alternative: AlternativeHypothesis | None,
     travelled_m: float,
+    *,
+    at_edge: bool,
 ) -> Resolution:
     """Apply the table after a belief and its alternative were weighed by the same reading.
 
-    ``before`` is the status reported at the last epoch.
+    ``before`` is the status reported at the last epoch; ``at_edge`` whether the belief lies at the
+    edge of the area.
     """
     if main.status is _CONVERGED and doubted(rules, main, null, alternative):
         main = replace(main, status=_SEARCHING)
@@ -258,10 +268,20 @@ def resolve_alternative(
             null = alternative.null
     found = row.reported or belief.status
     belief, status = report(before, belief, found)
-    sure = rules.converge_log_odds if before is _LOST else 0.0
-    if status is _TRACKING and null.log_odds > sure:
-        status = _LOST
+    status = under_null(rules, before, status, null, at_edge=at_edge)
     return Resolution(belief, status, null, alternative if row.keeps else None, taken_over)
+
+
+def under_null(
+    rules: AlternativeRules, before: Status, found: Status, null: NullHypothesis, *, at_edge: bool
+) -> Status:
+    """Return the status to report where the null hypothesis may be more probable."""
+    was = before in (_LOST, _OUTSIDE)
+    if null.log_odds <= (rules.converge_log_odds if was else 0.0):
+        return found
+    if found is _SEARCHING or before is _OUTSIDE or at_edge:
+        return _OUTSIDE
+    return _LOST
 
 
 def doubted(

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
-from mapfilter._types import Bools, Bytes, Floats32, Ints, Ints32
+from mapfilter._types import Bools, Bytes, Floats, Floats32, Ints, Ints32
 from mapfilter.database.radioroutes import RadioField
 from mapfilter.geodesy import Lattice
 from mapfilter.models.fingerprint import RasterFrame
@@ -18,6 +18,7 @@ from mapfilter.models.street_motion import map_log_likelihood
 from mapfilter.radio.cells import CellPlan
 
 _BELOW_FLOOR_DB = 6.0
+_EDGE_M = 60.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +153,11 @@ class AreaMap:
         return np.stack([(col + 0.5) * step, (self.lattice.rows - row - 0.5) * step]).astype(
             np.float32
         )
+
+    def at_edge(self, place_m: Floats) -> bool:
+        """Return whether a place in the local frame is near the edge of the area, or beyond."""
+        inside = [min(place_m[i], self.size_m[i] - place_m[i]) for i in range(2)]
+        return bool(min(inside) < _EDGE_M)
 
     def log_map(self, sd_m: float) -> Floats32:
         """Return the map's log-likelihood at every pixel."""

@@ -54,7 +54,8 @@ class RadioReading:
     serving : int
         Band of the serving cell; -1 where none is used.
     serving_weight : float
-        Power of the serving cell's likelihood.
+        Power of the serving cell's likelihood; with a band of -1 that of a cell that the map does
+        not have, 0 where none serves.
     levels : LevelReport or None
         Levels inside the scale, and cells that are absent.
     bounds : tuple of BoundReading

@@ -289,7 +289,10 @@ class BayesPositioner(Filter[BayesState]):
             own = _challenged(alternative.null, terms, alternative.belief, other)
             alternative = replace(alternative, belief=other, null=own)
         travelled_m = state.reckoning.travelled_m
-        now = resolve_alternative(rules, state.status, belief, null, alternative, travelled_m)
+        at_edge = self.area.at_edge(belief.summary.mean)
+        now = resolve_alternative(
+            rules, state.status, belief, null, alternative, travelled_m, at_edge=at_edge
+        )
         if now.taken_over and alternative is not None:
             sources = {**sources, **alternative.sources}
         alternative = now.alternative

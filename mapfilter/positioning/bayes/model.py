@@ -216,7 +216,8 @@ class BayesModel:
         self, cloud: Cloud, log_weight: Floats, reading: RadioReading
     ) -> tuple[Cloud, Reason]:
         """Add the log-likelihood of a report, then of each further term, in place."""
-        used = False
+        # A serving cell that the map lacks weighs all hypotheses alike.
+        used = reading.serving_weight > 0
         if reading.serving >= 0 or reading.levels is not None or reading.bounds:
             pixel = self._pixels(cloud.state)
             used = True

@@ -115,8 +115,8 @@ class BayesFilter(Options):
     max_particles: Annotated[int, Ge(100), Le(10_000_000)] = 20_000
     min_search_particles: Particles = 12_000
     min_particles: Particles = 3000
-    switch_mass: Probability = 0.99
-    switch_hold_m: NotNegative = 14.0
+    switch_mass: Probability = 0.998
+    switch_hold_m: NotNegative = 30.0
     smooth: bool = False
     satellite_sd_m: Positive = 2.0
     antenna_height_m: Annotated[float, Ge(-1e4), Le(1e4)] = 100.0

@@ -48,6 +48,9 @@ class EvidenceOptions(Options):
         Distance that the first report counts for, and the most that any report does.
     use_levels : bool
         Use levels, too, not serving cells only.
+    serving_with_levels : float
+        Share of a serving cell's weight where levels are reported, too: given these, it depends on
+        the position no more.
     full_list : int
         With so many neighbours or more a report may have left out others, weaker than these; with
         fewer, all cells above the floor are in it.
@@ -62,6 +65,7 @@ class EvidenceOptions(Options):
     spacing_m: NotNegative = 5.0
     first_m: NotNegative = 25.0
     use_levels: bool = True
+    serving_with_levels: Share = 1.0
     full_list: Annotated[int, Ge(0)] = 6
     bound_weight: Share = 0.5
     beside_db: NotNegative = 6.0
@@ -120,17 +124,19 @@ class RadioSource(EvidenceSource):
         levels: LevelReport | None = None
         bounds: tuple[BoundReading, ...] = ()
         if options.use_levels:
-            inside, others, unknown = self._placed(epoch, served, serving)
-            rows += unknown
+            inside, others, unplaced = self._placed(epoch, served, serving)
+            rows += unplaced
             bounds = tuple(self._bound(bands, row, counted_m) for bands, row in others)
             if inside:
                 levels = self._levels(inside, epoch, particle_spacing_m)
         unused = _unused(epoch, rows)
-        if serving < 0 and levels is None and not bounds:
+        unknown = reason in (Reason.UNKNOWN_CELL, Reason.NO_POINTS_IN_CELL)
+        if serving < 0 and levels is None and not bounds and (used is None or not unknown):
             return EvidenceUpdate(used, unused=unused, reason=reason)
+        share = 1.0 if levels is None else options.serving_with_levels
         reading = RadioReading(
             serving,
-            counted_m * options.serving.weight_per_m,
+            counted_m * options.serving.weight_per_m * share * (serving >= 0 or unknown),
             levels,
             bounds,
             length_m=length_m,

@@ -98,7 +98,7 @@ def step_output(
 ) -> StepOutput:
     """Summarise the belief; ``reason`` is whether the epoch's report was used."""
     belief, (west, south) = state.belief, area.origin_m
-    if belief is None:
+    if belief is None or state.status is Status.OUTSIDE:
         summary, count, way = empty_summary(STATES), 0, (0, nan)
     else:
         summary, count = belief.summary, belief.log_weight.size
