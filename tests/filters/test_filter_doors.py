@@ -46,6 +46,7 @@ def test_the_usual_options():
         "searching_jitter": (1.5, 1.5, 0.01, 0.006, 0.0, 0.01, 0.01),
         "switch_mass": 0.99,
         "switch_hold_m": 14.0,
+        "split_mass": 0.5,
     }
     assert asdict(CandidateOptions()) == {
         "update_length_m": 22.0,

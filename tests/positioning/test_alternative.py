@@ -28,7 +28,7 @@ RULES = AlternativeRules(
 CALM = -11.0
 """Log odds of a null hypothesis that is next to impossible."""
 SEARCHING, CONVERGED = Status.SEARCHING, Status.CONVERGED
-TRACKING, LOST = Status.TRACKING, Status.LOST
+TRACKING, LOST, OUTSIDE = Status.TRACKING, Status.LOST, Status.OUTSIDE
 
 
 def at(east_m, mass_50m):
@@ -51,10 +51,11 @@ def rival(lead, *, status=SEARCHING, mass=0.5, east_m=500.0, null=CALM):
     return AlternativeHypothesis(belief, 100.0, 0.0, null=NullHypothesis(null))
 
 
-def after(main, other=None, *, before=None, null=CALM, travelled_m=200.0):
+def after(main, other=None, *, before=None, null=CALM, travelled_m=200.0, at_edge=False):
     usual = SEARCHING if main.status is CONVERGED else main.status
     reported = usual if before is None else before
-    return resolve_alternative(RULES, reported, main, NullHypothesis(null), other, travelled_m)
+    null = NullHypothesis(null)
+    return resolve_alternative(RULES, reported, main, null, other, travelled_m, at_edge=at_edge)
 
 
 def test_a_belief_alone_keeps_its_status():
@@ -94,8 +95,34 @@ def test_a_found_belief_is_lost_while_the_null_hypothesis_is_more_probable():
     # It comes back when the null hypothesis is as improbable as it must be to converge.
     assert after(Belief(TRACKING), before=LOST, null=-4.9).status is LOST
     assert after(Belief(TRACKING), before=LOST, null=-5.0).status is TRACKING
-    # A search is not lost: it has claimed nothing.
-    assert after(Belief(SEARCHING), null=9.0).status is SEARCHING
+
+
+def test_a_found_belief_at_the_edge_is_outside_where_the_null_hypothesis_is_more_probable():
+    assert after(Belief(TRACKING), null=0.0, at_edge=True).status is TRACKING
+    out = after(Belief(TRACKING), null=0.1, at_edge=True)
+    assert (out.status, out.belief.status) == (OUTSIDE, TRACKING)
+    # Once outside it stays there, wherever it believes itself, until that is improbable.
+    for status in (TRACKING, SEARCHING):
+        assert after(Belief(status), before=OUTSIDE, null=-4.9).status is OUTSIDE
+        assert after(Belief(status), before=OUTSIDE, null=-5.0).status is status
+    assert after(Belief(TRACKING), before=LOST, null=-4.9, at_edge=True).status is OUTSIDE
+    back = after(Belief(CONVERGED), before=OUTSIDE, null=-5.0)
+    assert (back.status, back.belief.status) == (CONVERGED, CONVERGED)
+    assert after(Belief(CONVERGED), before=OUTSIDE, null=-4.9).status is OUTSIDE
+
+
+def test_a_search_is_outside_where_the_null_hypothesis_is_more_probable():
+    assert after(Belief(SEARCHING), null=0.0).status is SEARCHING
+    out = after(Belief(SEARCHING), null=0.1)
+    assert (out.status, out.belief.status, out.null.log_odds) == (OUTSIDE, SEARCHING, 0.1)
+    # One that had been found is lost: where it was is known.
+    assert after(Belief(SEARCHING), before=LOST, null=0.1).status is LOST
+
+
+@pytest.mark.parametrize("before", [CONVERGED, TRACKING])
+def test_a_found_belief_that_splits_is_lost(before):
+    now = after(Belief(SEARCHING), before=before)
+    assert (now.status, now.belief.status) == (LOST, SEARCHING)
 
 
 def test_a_lost_belief_that_catches_up_is_tracking_again():
@@ -200,7 +227,9 @@ def test_the_table_of_the_documentation_is_what_happens():
             assert now.belief.status is status, line
             assert now.belief.summary is (other.belief if took_over else main).summary
             if told != "its own":
-                assert now.status is Status[told], line
+                # A search is OUTSIDE where the null hypothesis is the more probable one.
+                beyond = told == "SEARCHING" and name == "ahead, suspect"
+                assert now.status is (OUTSIDE if beyond else Status[told]), line
             expected = {"kept": -6.0, "reset": -6.0, "other's": other.null.log_odds}[null]
             assert now.null.log_odds == expected, line
             outcome = judge(RULES, main, other, 200.0)
@@ -241,8 +270,12 @@ def test_a_reading_adds_the_difference_of_its_log_likelihoods():
     # A serving cell is one of two; half a weight costs half of 0.7.
     served = RadioReading(2, 0.5)
     assert null.after(served, 0.0, -0.1).log_odds == pytest.approx(-3.0 - 0.35 + 0.1)
-    # Without one its weight is nothing.
-    assert null.after(replace(served, serving=-1), 0.0, 0.0).log_odds == pytest.approx(-3.0)
+    # One that the map does not have is the more probable the less the map holds.
+    unknown = replace(served, serving=-1)
+    assert null.after(unknown, 0.0, 0.0).log_odds == pytest.approx(-3.0 + 0.25)
+    # Without any its weight is nothing.
+    none = replace(unknown, serving_weight=0.0)
+    assert null.after(none, 0.0, 0.0).log_odds == pytest.approx(-3.0)
     # The map costs 0.03 a metre since the last report.
     moved = RadioReading(levels=LEVELS, length_m=20.0)
     assert null.after(moved, -6.0, -6.6).log_odds == pytest.approx(-3.0)

@@ -61,7 +61,7 @@ def test_the_usual_options():
     assert (evidence.spacing_m, evidence.first_m, evidence.use_levels) == (5.0, 25.0, True)
     assert (evidence.serving, evidence.levels) == (ServingWeights(), LevelErrors())
     weights = evidence.full_list, evidence.bound_weight, evidence.beside_db, evidence.beside_m
-    assert weights == (6, 0.5, 6.0, 50.0)
+    assert (*weights, evidence.serving_with_levels) == (6, 0.5, 6.0, 50.0, 1.0)
     bound = BayesFilter(bias_sd_deg=1.5).over_area(small_area.make_area())
     model = bound.model
     narrow = MotionErrors(bias_sd_rad=radians(1.5))
@@ -76,7 +76,8 @@ def test_the_usual_options():
     rest = {name: getattr(usual, name) for name in ("slow_db", "fast_db", "white_db")}
     assert replace(levels, **rest) == usual
     assert replace(model.evidence, levels=usual) == evidence
-    assert (bound.options, bound.rules) == (ParticleOptions(), AlternativeRules())
+    particles = ParticleOptions(switch_mass=0.998, switch_hold_m=30.0)
+    assert (bound.options, bound.rules) == (particles, AlternativeRules())
     # The step of timing advance is rounded to decimetres in the options.
     assert (bound.satellites, bound.timing) == (GnssOptions(), TimingOptions(step_m=553.5))
     assert (bound.smooth, bound.grid) == (False, False)
@@ -255,13 +256,14 @@ def resolved(main, lead, null=-9.0, own=-9.0, before=None):
     )
     reported = before or (S if main is C else main)
     rules = AlternativeRules()
-    return resolve_alternative(rules, reported, belief(main), NullHypothesis(null), other, 200.0)
+    null = NullHypothesis(null)
+    return resolve_alternative(rules, reported, belief(main), null, other, 200.0, at_edge=False)
 
 
 def test_resolutions_at_their_thresholds():
     # No belief converges beside a null hypothesis, nor with an alternative close behind.
     alone = resolve_alternative(
-        AlternativeRules(), S, belief(C), NullHypothesis(-5.0), None, 0.0
+        AlternativeRules(), S, belief(C), NullHypothesis(-5.0), None, 0.0, at_edge=True
     )
     assert (alone.status, alone.alternative, alone.taken_over) == (C, None, False)
     assert resolved(C, -2.0).status is C
@@ -298,6 +300,7 @@ def test_converged_lasts_for_one_epoch_and_lost_until_convergence():
     for before in Status:
         for found in (S, T, L):
             _, status = report(before, belief(found), found)
-            assert status is (L if (before, found) == (L, S) else found)
+            # One that was found and searches is lost.
+            assert status is (L if found is S and before in (C, T, L) else found)
         now, status = report(before, belief(C), C)
-        assert now.status is status is (C if before in (S, T) else T)
+        assert now.status is status is (T if before in (C, L) else C)

@@ -188,9 +188,41 @@ def test_a_report_too_soon_leaves_the_last_one():
 def test_a_report_without_anything_known_is_not_the_last_one():
     used, _, _, _ = read(serving("A", -70.0))
     moved = START.moved(MotionStep(9.0, 0.0))
-    for rows in ((), (serving("X", -60.0),), (carrier(None, None, -60.0),)):
+    for rows in ((), (carrier(None, None, -60.0),), (ReportRow("serving", *[None] * 3, -50.0, 0),)):
         after, reading, _, _ = read(*rows, used=used, moved=moved)
         assert (after, reading) == (used, None)
+
+
+@pytest.mark.parametrize("cell", ["E", "X"])
+def test_a_serving_cell_that_the_map_lacks_weighs_all_hypotheses_alike(cell):
+    """It starts no belief, but tells a belief that its map may be another network's."""
+    assert read(serving(cell, -60.0))[1] is None
+    used, _, _, _ = read(serving("A", -70.0))
+    moved = START.moved(MotionStep(9.0, 0.0))
+    after, reading, _, _ = read(serving(cell, -60.0), used=used, moved=moved)
+    assert after is moved
+    assert (reading.serving, reading.levels, reading.bounds) == (-1, None, ())
+    assert reading.serving_weight == pytest.approx(9.0 * 0.04)
+    log_weight, cloud = np.full(50, -2.0), Cloud(hypotheses(50), np.empty((50, 0), "f4"))
+    assert BayesModel(AREA, evidence=OPTIONS).weigh(cloud, log_weight, reading) == (
+        cloud, Reason.USED,
+    )  # fmt: skip
+    np.testing.assert_array_equal(log_weight, -2.0)
+    # Beside levels of known cells it counts, too; without any serving cell nothing does.
+    _, reading, _, _ = read(serving(cell, -60.0), named("C", -80.0), used=used, moved=moved)
+    assert (reading.serving, inside(reading)) == (-1, {C: -80.0})
+    assert reading.serving_weight == pytest.approx(9.0 * 0.04)
+    _, reading, _, _ = read(named("C", -80.0), used=used, moved=moved)
+    assert (reading.serving, reading.serving_weight) == (-1, 0.0)
+
+
+def test_a_serving_cell_may_count_less_beside_levels():
+    given = replace(OPTIONS, serving_with_levels=0.25)
+    for options, share in ((OPTIONS, 1.0), (given, 0.25)):
+        _, reading, _, _ = read(serving("A", -70.0), options=options)
+        assert reading.serving_weight == pytest.approx(0.8 * share)
+        _, reading, _, _ = read(serving("A"), options=options)
+        assert reading.serving_weight == pytest.approx(0.8)
 
 
 # Absent cells
