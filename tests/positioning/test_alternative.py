@@ -217,7 +217,7 @@ def test_the_table_of_the_documentation_is_what_happens():
     seen = set()
     for line in lines:
         name, which, goes_on, told, null, alternative = (one.strip() for one in line if one.strip())
-        for searching in ((True, False) if which == "any" else (which == "searching",)):
+        for searching in (True, False) if which == "any" else (which == "searching",):
             main, other = Belief(SEARCHING if searching else TRACKING, 0.0), CASES[name]
             now = after(main, other, null=-6.0)
             took_over = goes_on != "belief"

@@ -251,9 +251,7 @@ def test_outcomes_at_their_thresholds():
 
 
 def resolved(main, lead, null=-9.0, own=-9.0, before=None):
-    other = AlternativeHypothesis(
-        belief(S, lead, 500.0, 0.5), 100.0, 0.0, null=NullHypothesis(own)
-    )
+    other = AlternativeHypothesis(belief(S, lead, 500.0, 0.5), 100.0, 0.0, null=NullHypothesis(own))
     reported = before or (S if main is C else main)
     rules = AlternativeRules()
     null = NullHypothesis(null)
