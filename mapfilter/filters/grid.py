@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import isfinite, nan
+from math import cos, isfinite, nan, sin
 from typing import Any, Generic, Protocol
 
 import numpy as np
@@ -31,6 +31,7 @@ from mapfilter.filters.particle import (
 _REACH_SD = 4.0
 _READ_INTO_PIXELS = 1 / 6
 _LEAST_MASS = 1e-9
+_NOTHING = (0.0, 0.0, 0.0, 0.0)
 
 
 def taps(shift_px: float, sd_px: float) -> tuple[int, Floats32]:
@@ -130,8 +131,13 @@ class GridModel(WeighingModel[ReadingT], Protocol[PriorT, ReadingT]):
     ) -> Floats32:
         """Return pixels as states of the particle model, shape (R, N)."""
 
-    def transport(self, east_m: float, north_m: float, length_m: float) -> Transport:
-        """Return the effect of a displacement by dead reckoning, of some length."""
+    def transport(
+        self, east_m: float, north_m: float, length_m: float, spread_m2: float
+    ) -> Transport:
+        """Return the effect of a displacement by dead reckoning, of some length.
+
+        ``spread_m2`` is a further variance along each axis.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,8 +150,9 @@ class GridBelief:
         Mass of those on and off the map; together they sum to one after an update.
     shared : object
         What the model shares between all pixels after the last reading.
-    waiting_m : (float, float, float)
-        Displacement east and north, and its length, that mass has not been moved by yet.
+    waiting : (float, float, float, float)
+        Displacement east and north (m), its length (m) and the variance of steps without a heading
+        (m², along each axis) that mass has not been moved by yet.
     travelled_m, log_evidence, status, agreement_start_m
         As of :class:`mapfilter.filters.particle.ParticleBelief`.
     """
@@ -154,7 +161,7 @@ class GridBelief:
     off: Floats32
     model: GridModel[Any, Any]
     shared: Any = None
-    waiting_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    waiting: tuple[float, float, float, float] = _NOTHING
     travelled_m: float = 0.0
     log_evidence: float = 0.0
     status: Status = Status.SEARCHING
@@ -168,10 +175,10 @@ class GridBelief:
     @cached_property
     def moved(self) -> GridBelief:
         """The belief with all mass moved by the displacement that waits, and weighed by the map."""
-        if self.waiting_m[2] == 0:
+        if self.waiting[2] == 0:
             return self
         model = self.model
-        step = model.transport(*self.waiting_m)
+        step = model.transport(*self.waiting)
         on, off = np.empty_like(self.on), np.empty_like(self.off)
         for b in range(on.shape[0]):
             right = taps(step.right_px[b], step.sd_right_px[b])
@@ -184,10 +191,8 @@ class GridBelief:
         leave, come_back = np.float32(step.leave), np.float32(step.come_back)
         stayed = on * (1 - leave) + off * come_back
         away = on * leave + off * (1 - come_back)
-        waiting = (0.0, 0.0, 0.0)
-        return replace(
-            self, on=stayed * step.on, off=away * np.float32(step.off), waiting_m=waiting
-        )
+        off_cost = np.float32(step.off)
+        return replace(self, on=stayed * step.on, off=away * off_cost, waiting=_NOTHING)
 
     @cached_property
     def _cloud(self) -> tuple[Floats32, Floats32]:
@@ -244,21 +249,24 @@ class GridFilter(Generic[PriorT, ReadingT]):
         motion: MotionStep,
         rng: np.random.Generator,  # noqa: ARG002
     ) -> tuple[GridBelief, Reason]:
-        """Add a step to the displacement that waits for the next reading."""
+        """Add a step to the displacement that waits for the next reading.
+
+        Without a heading mass spreads to all sides, as far as the step is long.
+        """
         if not isfinite(motion.step_m):
             return belief, Reason.NO_STEP
-        if not isfinite(motion.heading_rad):
-            return belief, Reason.NO_HEADING
+        reason = Reason.USED if isfinite(motion.heading_rad) else Reason.NO_HEADING
         if motion.step_m == 0:
-            return belief, Reason.USED
-        east_m, north_m, length_m = belief.waiting_m
-        waiting_m = (
-            east_m + motion.step_m * np.cos(motion.heading_rad),
-            north_m + motion.step_m * np.sin(motion.heading_rad),
-            length_m + abs(motion.step_m),
-        )
+            return belief, reason
+        east_m, north_m, length_m, spread_m2 = belief.waiting
+        if reason is Reason.USED:
+            east_m += motion.step_m * cos(motion.heading_rad)
+            north_m += motion.step_m * sin(motion.heading_rad)
+        else:
+            spread_m2 += motion.step_m**2 / 2
+        waiting = (east_m, north_m, length_m + abs(motion.step_m), spread_m2)
         travelled_m = belief.travelled_m + abs(motion.step_m)
-        return replace(belief, waiting_m=waiting_m, travelled_m=travelled_m), Reason.USED
+        return replace(belief, waiting=waiting, travelled_m=travelled_m), reason
 
     def update(
         self,

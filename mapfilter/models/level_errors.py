@@ -162,8 +162,8 @@ class LevelMemory:
         Number of each band's site.
     band : ndarray of int32, shape (S,)
         Band of each slot; -1 for none yet.
-    covariance_db2 : ndarray, shape (2S + 1, 2S + 1)
-        Of the errors, given the levels so far.
+    prior_db2, covariance_db2 : ndarray, shape (2S + 1, 2S + 1)
+        Covariance of the errors before any level, and given the levels so far.
     other_dbm, other_db2 : ndarray, shape (S,)
         Mean and variance of the next level of a cell that the prediction is wrong about.
     used : ndarray of int, shape (S,)
@@ -177,6 +177,7 @@ class LevelMemory:
     errors: LevelErrors
     site: Ints
     band: Ints32
+    prior_db2: Floats
     covariance_db2: Floats
     other_dbm: Floats
     other_db2: Floats
@@ -194,6 +195,7 @@ class LevelMemory:
             errors,
             site,
             np.full(slots, -1, dtype=np.int32),
+            covariance,
             covariance,
             np.full(slots, _OTHER_DBM),
             np.full(slots, _OTHER_SD_DB**2),
@@ -259,6 +261,12 @@ class LevelMemory:
             turn[part + at] = 0.0
             turn[np.ix_(part + at, part + rest)] = by
             noise[np.ix_(part + at, part + at)] = sd_db**2 * left
+        prior = np.zeros_like(self.prior_db2)
+        held_now = np.flatnonzero(band >= 0)
+        correlation = self.correlation(band[held_now], band[held_now])
+        prior[np.ix_(held_now, held_now)] = self.errors.slow_db**2 * correlation
+        prior[np.ix_(slots + held_now, slots + held_now)] = self.errors.fast_db**2 * correlation
+        prior[-1, -1] = self.errors.device_db**2
         kept = kept.copy()
         for part in (0, slots):
             kept[:, part + at] = kept[:, part + rest] @ by.T.astype(np.float32)
@@ -268,6 +276,7 @@ class LevelMemory:
         return replace(
             self,
             band=band,
+            prior_db2=prior,
             covariance_db2=turn @ self.covariance_db2 @ turn.T + noise,
             other_dbm=other_dbm,
             other_db2=other_db2,
@@ -282,17 +291,11 @@ class LevelMemory:
             exp(-length_m / errors.slow_m),
             exp(-length_m / errors.fast_m),
         )
-        prior = np.zeros_like(self.covariance_db2)
-        held = np.flatnonzero(self.band >= 0)
-        correlation = self.correlation(self.band[held], self.band[held])
-        prior[np.ix_(held, held)] = errors.slow_db**2 * correlation
-        prior[np.ix_(slots + held, slots + held)] = errors.fast_db**2 * correlation
-        prior[-1, -1] = errors.device_db**2
         both = np.outer(decay, decay)
         keep = exp(-length_m / _OTHER_M)
         return replace(
             self,
-            covariance_db2=self.covariance_db2 * both + prior * (1 - both),
+            covariance_db2=self.covariance_db2 * both + self.prior_db2 * (1 - both),
             other_dbm=_OTHER_DBM + (self.other_dbm - _OTHER_DBM) * keep,
             other_db2=_OTHER_SD_DB**2 + (self.other_db2 - _OTHER_SD_DB**2) * keep**2,
         ), decay.astype(np.float32)

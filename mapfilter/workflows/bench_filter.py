@@ -205,7 +205,7 @@ def _step(model: BayesModel, log: TrackLog, count: int, runs: int) -> StepBench:
 def whole_step(
     given: StepInputs, belief: ParticleBelief, jitter: Floats32, rng: np.random.Generator
 ) -> Floats32:
-    """Return the particles after a step that always resamples, with what they keep, (R + W, N)."""
+    """Return the particles after a step that always resamples: state and what they keep."""
     model, count = given.model, belief.log_weight.size
     state, log_weight = model.move(belief.state, belief.log_weight, given.motion, draw_key(rng))
     cloud, _ = model.weigh(Cloud(state, belief.kept, belief.shared), log_weight, given.reading)

@@ -48,7 +48,7 @@ class Tiny:
         state[2], state[3] = bias_rad, off
         return state
 
-    def transport(self, east_m, north_m, length_m):
+    def transport(self, east_m, north_m, length_m, spread_m2):
         self.asked.append((east_m, north_m, length_m))
         way = [displaced(b, east_m, north_m) for b in range(3)]
         right, down = np.array(way).T
@@ -177,7 +177,7 @@ def test_steps_wait_for_a_reading_and_are_summed():
     assert info.reason is Reason.NO_READING
     weighed, _ = filter_.update(belief, 1, rng)
     assert model.asked[-1] == pytest.approx((2.0, 4.0, 8.0))
-    assert weighed.waiting_m == (0.0, 0.0, 0.0)
+    assert weighed.waiting == (0.0, 0.0, 0.0, 0.0)
     assert weighed.travelled_m == belief.travelled_m == 8.0
     one = oracle.forward(PRIOR.ravel(), [(transition(2.0, 4.0, circular=False), likelihood(1))])
     np.testing.assert_allclose(np.stack([weighed.on, weighed.off]).ravel(), one[0][0], rtol=2e-4)

@@ -221,7 +221,7 @@ def test_a_step_without_a_heading_spreads_to_all_sides():
 def test_the_grid_moves_mass_as_the_oracle_moves_hypotheses(step_m, heading_rad):
     """Over three typical steps the noise adds up; the scale's error is one of the whole way."""
     grid, steps = StreetGrid(MODEL, bin_rad=0.15), step_m / ERRORS.typical_step_m
-    way = grid.transport(step_m * np.cos(heading_rad), step_m * np.sin(heading_rad), step_m)
+    way = grid.transport(step_m * np.cos(heading_rad), step_m * np.sin(heading_rad), step_m, 0.0)
     assert grid.bias_rad.tolist() == pytest.approx(list(np.arange(-6, 7) * 0.15))
     for b, bias_rad in enumerate(grid.bias_rad):
         mean, covariance = oracle.step_moments(bias_rad, 0.0, 4.0, heading_rad, ERRORS)

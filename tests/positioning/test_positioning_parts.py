@@ -227,7 +227,7 @@ def test_what_a_stretch_of_dead_reckoning_does_on_the_grid(compass):
         assert grid.bias_rad.size == 72
         np.testing.assert_allclose(np.diff(np.unwrap(grid.bias_rad)), radians(5))
     east_m, north_m, length_m = 12.0, -5.0, 16.0
-    step = grid.transport(east_m, north_m, length_m)
+    step = grid.transport(east_m, north_m, length_m, 0.0)
     stretch, way = exp(0.02), hypot(east_m, north_m)
     for b, bias in enumerate(grid.bias_rad):
         angle = np.arctan2(north_m, east_m) + bias

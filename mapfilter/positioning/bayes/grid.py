@@ -89,7 +89,9 @@ class StreetGrid:
         state[OFF] = off
         return state
 
-    def transport(self, east_m: float, north_m: float, length_m: float) -> Transport:
+    def transport(
+        self, east_m: float, north_m: float, length_m: float, spread_m2: float
+    ) -> Transport:
         """Return the transport of the mass of each bin by a displacement of dead reckoning."""
         motion, over = self.model.motion, self.model.weights.over(length_m)
         pixel_m = self.model.area.lattice.resolution_m
@@ -104,8 +106,8 @@ class StreetGrid:
         along_var += 2 * motion.stretch_m * length_m * motion.stretch_sd**2
         across_var += 2 * motion.heading_m * length_m * motion.turn_sd_rad**2
         heading = np.arctan2(up, right)
-        east_var = along_var * np.cos(heading) ** 2 + across_var * np.sin(heading) ** 2
-        north_var = along_var * np.sin(heading) ** 2 + across_var * np.cos(heading) ** 2
+        east_var = along_var * np.cos(heading) ** 2 + across_var * np.sin(heading) ** 2 + spread_m2
+        north_var = along_var * np.sin(heading) ** 2 + across_var * np.cos(heading) ** 2 + spread_m2
         width_rad = 2 * pi / _CIRCLE_BINS if self.circular else self.bin_rad
         return Transport(
             right,

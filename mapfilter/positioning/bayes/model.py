@@ -277,8 +277,8 @@ class BayesModel:
             kept = decayed(cloud.kept, decay, keep, errors.fault_log_odds)
         cells = np.concatenate([report.cell, self._expected(pixel, memory, report)])
         memory, kept = memory.with_cells(cells[: memory.slots], kept)
-        slotted = np.isin(report.cell, memory.band)
-        if not slotted.all():
+        if report.cell.size > memory.slots:
+            slotted = np.isin(report.cell, memory.band)
             report = report._replace(cell=report.cell[slotted], level_dbm=report.level_dbm[slotted])
         memory, terms = memory.updated(report)
         absent = memory.absence(report)
