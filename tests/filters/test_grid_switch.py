@@ -143,7 +143,7 @@ def test_motion_of_a_grid_that_is_absent_or_nothing():
     start = filter_.init(ONE, rng)
     for motion, why in (
         (MotionStep(nan, 0.0), Reason.NO_STEP),
-        (MotionStep(1.0, nan), Reason.NO_HEADING),
+        (MotionStep(0.0, nan), Reason.NO_HEADING),
         (MotionStep(0.0, 1.0), Reason.USED),
     ):
         assert filter_.predict(start, motion, rng) == (start, why)

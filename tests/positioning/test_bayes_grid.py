@@ -1,5 +1,7 @@
 """The particle filter against the exact one on a grid: the same model, two ways to sum."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -86,7 +88,16 @@ def variation(a, b):
     return 0.5 * np.abs(a - b).sum()
 
 
-def test_particles_agree_with_the_grid(area, log):
+def without_headings(log):
+    """Three steps of 5 m, of which it is not known where to."""
+    motion = log.motion.copy()
+    motion.loc[11:13, ["heading_rad", "turn_rad"]] = np.nan
+    return replace(log, motion=motion)
+
+
+@pytest.mark.parametrize("change", [lambda log: log, without_headings])
+def test_particles_agree_with_the_grid(area, log, change):
+    log = change(log)
     exact = beliefs(positioner(area, grid=True), log, COARSE_M)
     for sampled, summed in zip(
         beliefs(positioner(area, grid=False), log, COARSE_M), exact, strict=True

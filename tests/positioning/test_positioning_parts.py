@@ -227,7 +227,7 @@ def test_what_a_stretch_of_dead_reckoning_does_on_the_grid(compass):
         assert grid.bias_rad.size == 72
         np.testing.assert_allclose(np.diff(np.unwrap(grid.bias_rad)), radians(5))
     east_m, north_m, length_m = 12.0, -5.0, 16.0
-    step = grid.transport(east_m, north_m, length_m, 0.0)
+    step = grid.transport(east_m, north_m, length_m, 7.0)
     stretch, way = exp(0.02), hypot(east_m, north_m)
     for b, bias in enumerate(grid.bias_rad):
         angle = np.arctan2(north_m, east_m) + bias
@@ -241,7 +241,7 @@ def test_what_a_stretch_of_dead_reckoning_does_on_the_grid(compass):
         side = np.array([-axis[1], axis[0]])
         spread = along * np.outer(axis, axis) + across * np.outer(side, side)
         found = (10 * step.sd_right_px[b]) ** 2, (10 * step.sd_down_px[b]) ** 2
-        assert found == pytest.approx(np.diagonal(spread), rel=1e-9)
+        assert found == pytest.approx(np.diagonal(spread) + 7.0, rel=1e-9)
     width = 0.04 if compass else radians(5)
     assert step.turned_bins == pytest.approx(0.03 * 4 / width)
     told = [[exp(0.05 * 16 * oracle.map_log_likelihood(float(d), 6.0)) for d in row]
