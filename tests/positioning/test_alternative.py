@@ -261,41 +261,57 @@ def test_the_null_hypothesis_is_one_in_a_hundred_at_first():
     assert NullHypothesis(log(3.0)).probability == pytest.approx(0.75)
 
 
-def test_a_reading_adds_the_difference_of_its_log_likelihoods():
-    null = NullHypothesis(-3.0)
+def odds_after(null, reading, other, gained, length_m=0.0):
+    found = null.after(reading, other, gained, null.travelled_m + length_m)
+    assert found.travelled_m == null.travelled_m + length_m
+    return found.log_odds
+
+
+@pytest.mark.parametrize("travelled_m", [0.0, 730.0])
+def test_a_reading_adds_the_difference_of_its_log_likelihoods(travelled_m):
+    null = NullHypothesis(-3.0, travelled_m)
     # Levels: -6 if no prediction is right, -9 under the belief.
     reading = RadioReading(levels=LEVELS)
-    assert null.after(reading, -6.0, -9.0).log_odds == pytest.approx(0.0)
-    assert null.after(reading, -6.0, -4.0).log_odds == pytest.approx(-5.0)
+    assert odds_after(null, reading, -6.0, -9.0) == pytest.approx(0.0)
+    assert odds_after(null, reading, -6.0, -4.0) == pytest.approx(-5.0)
     # A serving cell is one of two; half a weight costs half of 0.7.
     served = RadioReading(2, 0.5)
-    assert null.after(served, 0.0, -0.1).log_odds == pytest.approx(-3.0 - 0.35 + 0.1)
+    assert odds_after(null, served, 0.0, -0.1) == pytest.approx(-3.0 - 0.35 + 0.1)
     # One that the map does not have is the more probable the less the map holds.
     unknown = replace(served, serving=-1)
-    assert null.after(unknown, 0.0, 0.0).log_odds == pytest.approx(-3.0 + 0.25)
+    assert odds_after(null, unknown, 0.0, 0.0) == pytest.approx(-3.0 + 0.25)
     # Without any its weight is nothing.
     none = replace(unknown, serving_weight=0.0)
-    assert null.after(none, 0.0, 0.0).log_odds == pytest.approx(-3.0)
-    # The map costs 0.03 a metre since the last report.
-    moved = RadioReading(levels=LEVELS, length_m=20.0)
-    assert null.after(moved, -6.0, -6.6).log_odds == pytest.approx(-3.0)
+    assert odds_after(null, none, 0.0, 0.0) == pytest.approx(-3.0)
     # Other terms are half as bad again as is expected of them.
     timed = RadioReading(expected=-2.0)
-    assert null.after(timed, 0.0, -3.0).log_odds == pytest.approx(-3.0)
-    both = RadioReading(2, 0.5, LEVELS, expected=-2.0, length_m=20.0)
-    assert null.after(both, -6.0, -12.0).log_odds == pytest.approx(
+    assert odds_after(null, timed, 0.0, -3.0) == pytest.approx(-3.0)
+    both = RadioReading(2, 0.5, LEVELS, expected=-2.0)
+    assert odds_after(null, both, -6.0, -12.0, 20.0) == pytest.approx(
         -3.0 + (-6.0 - 0.35 - 0.6 - 3.0) + 12.0
     )
 
 
+@pytest.mark.parametrize("reading", [RadioReading(), RadioReading(levels=LEVELS, length_m=20.0)])
+def test_the_map_counts_by_the_metres_between_readings_of_any_kind(reading):
+    """Satellites alone, too, tell that one follows the ways."""
+    null = NullHypothesis(-3.0, 55.0)
+    # The map costs 0.03 a metre since the last reading, and 0.2 under the belief.
+    now = null.after(reading, 0.0, -0.2, 75.0)
+    assert now.log_odds == pytest.approx(-3.0 - 0.6 + 0.2)
+    again = now.after(reading, 0.0, 0.0, 85.0)
+    assert again.log_odds == pytest.approx(now.log_odds - 0.3)
+    assert again.reset().travelled_m == 85.0
+
+
 def test_the_log_odds_are_bounded_so_that_a_change_is_seen_in_time():
     reading = RadioReading(levels=LEVELS)
-    low = NullHypothesis(-11.5).after(reading, -30.0, -4.0)
-    high = NullHypothesis(5.0).after(reading, -6.0, -400.0)
+    low = NullHypothesis(-11.5).after(reading, -30.0, -4.0, 0.0)
+    high = NullHypothesis(5.0).after(reading, -6.0, -400.0, 0.0)
     assert (low.log_odds, high.log_odds) == (-12.0, 12.0)
     # However long all was well, the same evidence turns it round.
-    assert low.after(reading, -6.0, -18.0).log_odds == 0.0
-    assert high.after(reading, -18.0, -6.0).log_odds == 0.0
+    assert odds_after(low, reading, -6.0, -18.0) == 0.0
+    assert odds_after(high, reading, -18.0, -6.0) == 0.0
     assert exp(-12.0) > 5e-6
 
 
