@@ -289,7 +289,8 @@ class RadioRouteDatabase:
             raise fail(InputError, where, "points of the database", "none", "another area or CRS")
         order = np.lexsort((points["col"], points["row"]))
         code, classes = _codes(points.pop("way_class"))
-        half_width_m = np.array([half_width_of(name) for name in classes], dtype=np.float32)[code]
+        by_class_m = np.array([half_width_of(name) for name in classes], dtype=np.float32)[code]
+        half_width_m = np.where(points["way_id"] == 0, np.float32(0), by_class_m)
         points = {name: values[order] for name, values in points.items()}
         received: list[tuple[str, Rows, Rows, Floats32]] = []
         for cell_id in self.cell_ids:

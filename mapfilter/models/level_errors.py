@@ -33,6 +33,7 @@ from scipy.ndimage import uniform_filter
 
 from mapfilter._kernels import exp32, log32
 from mapfilter._types import Bytes, Floats, Floats32, Ints, Ints32
+from mapfilter.errors import Faults
 from mapfilter.options import NotNegative, Options, Positive, Probability, Share
 
 SLOTS = 24
@@ -88,6 +89,13 @@ class LevelErrors(Options):
     fault_m: Positive = 300.0
     absent_db: NotNegative = 3.0
     weight: Share = 0.35
+
+    def check(self, faults: Faults) -> None:
+        """Add shares that leave no error of a cell's own."""
+        if self.site_share + self.common_share >= 1:
+            where = "LevelErrors, site_share and common_share"
+            found = f"{self.site_share} and {self.common_share}"
+            faults.add(where, "site_share + common_share < 1", found)
 
     @property
     def total_db(self) -> float:
@@ -399,12 +407,12 @@ def weigh_by_levels(
     means = terms.gain.shape[1]
     slots = (means - 1) // 2
     cell, slot, gain = terms.cell, terms.slot, terms.gain
-    share, half, one = _F(0.01 * roughness_share), _F(0.5), _F(1.0)
+    share, half, one, zero = _F(0.01 * roughness_share), _F(0.5), _F(1.0), _F(0.0)
     most, cap = _F(_LOG_ODDS), _F(_MOST_LOG_ODDS)
     width = np.int64(bands)
     for i in range(pixel.size):
         at = np.int64(pixel[i]) * width
-        total = _F(0.0)
+        total = zero
         for k in range(cell.size):
             s = slot[k]
             error = kept[i, s] + kept[i, slots + s] + kept[i, means - 1]
@@ -414,11 +422,13 @@ def weigh_by_levels(
             variance = own + share * rough * rough
             right = -half * (v * v / variance + log32(variance))
             before = kept[i, means + s]
-            odds = before + terms.other[k] - right
-            odds = odds if odds < most else most
+            whole = before + terms.other[k] - right
+            odds = whole if whole < most else most
             odds = odds if odds > -most else -most
             fine = one / (one + exp32(odds))
-            total += right - log32(fine * (one + exp32(before)))
+            # Beyond the bound the logarithm of one plus the odds is that of the odds.
+            beyond = whole - odds if whole > odds else zero
+            total += right + beyond - log32(fine * (one + exp32(before)))
             after = odds if odds < cap else cap
             kept[i, means + s] = after if after > -cap else -cap
             step = fine * v * own / variance
@@ -467,11 +477,13 @@ def weigh_by_absence(
             place = place if place < last else last
             right = table[np.int32(place)]
             before = kept[i, means + s]
-            odds = before + terms.other[k] - right
-            odds = odds if odds < most else most
+            whole = before + terms.other[k] - right
+            odds = whole if whole < most else most
             odds = odds if odds > -most else -most
             fine = one / (one + exp32(odds))
-            total += right - log32(fine * (one + exp32(before)))
+            # Beyond the bound the logarithm of one plus the odds is that of the odds.
+            beyond = whole - odds if whole > odds else zero
+            total += right + beyond - log32(fine * (one + exp32(before)))
             after = odds if odds < cap else cap
             kept[i, means + s] = after if after > -cap else -cap
             if z < _F(6.0):

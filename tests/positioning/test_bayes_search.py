@@ -52,8 +52,8 @@ def test_a_search_without_the_true_place_is_taken_over(area, seed):
     assert switches[0] < 20
 
 
-def test_a_belief_with_a_large_cusum_does_not_converge(area):
-    never = AlternativeRules(start_cusum=1e9, start_cusum_cells=1e9, converge_cusum=-1.0)
+def test_a_belief_does_not_converge_beside_a_null_hypothesis(area):
+    never = AlternativeRules(start_log_odds=1e9, converge_log_odds=-12.1)
     positioner = replace(FEW.over_area(area), rules=never)
     estimate = locate(walk_log(), positioner, np.random.default_rng(0)).estimate
     assert set(estimate.status) == {Status.SEARCHING}

@@ -107,9 +107,13 @@ class AlternativeRules(Options):
 
 @dataclass(frozen=True, slots=True)
 class NullHypothesis:
-    """Log odds that a belief describes none of what is measured."""
+    """Log odds that a belief describes none of what is measured.
+
+    ``travelled_m`` is the distance that the belief had travelled at the last reading.
+    """
 
     log_odds: float = _PRIOR_LOG_ODDS
+    travelled_m: float = 0.0
 
     @property
     def probability(self) -> float:
@@ -117,7 +121,11 @@ class NullHypothesis:
         return 1 / (1 + exp(-self.log_odds))
 
     def after(
-        self, reading: RadioReading, other_log_likelihood: float, gained: float
+        self,
+        reading: RadioReading,
+        other_log_likelihood: float,
+        gained: float,
+        travelled_m: float,
     ) -> NullHypothesis:
         """Add a reading.
 
@@ -127,17 +135,19 @@ class NullHypothesis:
             Of its levels, if the prediction is wrong about all cells.
         gained : float
             Log-likelihood of the reading, and of the map since the last one, under the belief.
+        travelled_m : float
+            By the belief.
         """
         expected = other_log_likelihood + _TERMS_FACTOR * reading.expected
-        expected -= _MAP_NATS_PER_M * reading.length_m
+        expected -= _MAP_NATS_PER_M * (travelled_m - self.travelled_m)
         known = reading.serving >= 0
         expected += (-_SERVING_NATS if known else _UNKNOWN_NATS) * reading.serving_weight
         log_odds = self.log_odds + expected - gained
-        return NullHypothesis(min(max(log_odds, _LEAST_LOG_ODDS), _MOST_LOG_ODDS))
+        return NullHypothesis(min(max(log_odds, _LEAST_LOG_ODDS), _MOST_LOG_ODDS), travelled_m)
 
     def reset(self) -> NullHypothesis:
         """Return it as at the start, unless it is less probable."""
-        return NullHypothesis(min(self.log_odds, _PRIOR_LOG_ODDS))
+        return replace(self, log_odds=min(self.log_odds, _PRIOR_LOG_ODDS))
 
 
 @dataclass(frozen=True, eq=False)

@@ -355,7 +355,8 @@ def _challenged(
     other = 0.0
     if reading.levels is not None and after.shared is not None:
         other = after.shared.other_log_likelihood
-    return null.after(reading, other, after.log_evidence - before.log_evidence)
+    gained = after.log_evidence - before.log_evidence
+    return null.after(reading, other, gained, after.travelled_m)
 
 
 def _every_kind() -> RadioReading:

@@ -114,7 +114,7 @@ class RadioSource(EvidenceSource):
         The hypotheses nearest to the true position lie up to ``particle_spacing_m`` from it.
         """
         options = self.options
-        serving, reason, rows = self._serving(epoch)
+        served, serving, reason, rows = self._serving(epoch)
         if not self.due(used, reckoning.travelled_m) or not epoch.radio:
             if epoch.radio and reason is Reason.USED:
                 reason = Reason.NOT_MOVED_ENOUGH
@@ -124,11 +124,11 @@ class RadioSource(EvidenceSource):
         levels: LevelReport | None = None
         bounds: tuple[BoundReading, ...] = ()
         if options.use_levels:
-            inside, others, unplaced = self._placed(epoch, serving)
+            inside, others, unplaced = self._placed(epoch, served, serving)
             rows += unplaced
             bounds = tuple(self._bound(bands, row, counted_m) for bands, row in others)
             if inside:
-                levels = self._levels(inside, others, epoch, serving, particle_spacing_m)
+                levels = self._levels(inside, epoch, particle_spacing_m)
         unused = _unused(epoch, rows)
         unknown = reason in (Reason.UNKNOWN_CELL, Reason.NO_POINTS_IN_CELL)
         if serving < 0 and levels is None and not bounds and (used is None or not unknown):
@@ -140,37 +140,38 @@ class RadioSource(EvidenceSource):
             levels,
             bounds,
             length_m=length_m,
-            timing_advance=_timing_advance(epoch) if serving >= 0 else nan,
+            timing_advance=served.timing_advance if served is not None else nan,
         )
         return EvidenceUpdate(reckoning, unused=unused, radio=reading, reason=reason)
 
-    def _serving(self, epoch: Epoch) -> tuple[int, Reason, list[_Unplaced]]:
-        """Return the band of the serving cell, or -1 and the reason; and further serving rows."""
+    def _serving(self, epoch: Epoch) -> tuple[ReportRow | None, int, Reason, list[_Unplaced]]:
+        """Return the row of the serving cell and its band, or None, -1 and the reason.
+
+        Also return further serving rows.
+        """
         named = [row for row in epoch.radio if row.role == SERVING and row.cell is not None]
         if not named:
-            return -1, Reason.NO_SERVING_CELL if epoch.radio else Reason.NO_READING, []
+            return None, -1, Reason.NO_SERVING_CELL if epoch.radio else Reason.NO_READING, []
         more = [(row, Reason.SECOND_SERVING_CELL) for row in named[1:]]
         cell = str(named[0].cell)
         if cell in self.area.band_of:
-            return self.area.band_of[cell], Reason.USED, more
+            return named[0], self.area.band_of[cell], Reason.USED, more
         known = cell in self.area.known_ids
-        return -1, Reason.NO_POINTS_IN_CELL if known else Reason.UNKNOWN_CELL, more
+        return None, -1, Reason.NO_POINTS_IN_CELL if known else Reason.UNKNOWN_CELL, more
 
     def _placed(
-        self, epoch: Epoch, serving: int
+        self, epoch: Epoch, served: ReportRow | None, serving: int
     ) -> tuple[dict[int, float], list[tuple[tuple[int, ...], ReportRow]], list[_Unplaced]]:
         """Sort levels: of one cell and inside the scale, other ones, and those without a band."""
         inside: dict[int, float] = {}
         others: list[tuple[tuple[int, ...], ReportRow]] = []
         unplaced: list[_Unplaced] = []
-        served = False
         for row in epoch.radio:
             if row.role == SERVING:
-                # A second or unknown serving cell has its reason already.
-                bands: tuple[int, ...] = () if served or serving < 0 else (serving,)
-                served = True
-                if not bands:
+                # A second, unknown or nameless serving cell has its reason already.
+                if row is not served:
                     continue
+                bands: tuple[int, ...] = (serving,)
             elif row.cell is not None:
                 band = self.area.band_of.get(row.cell)
                 bands = (band,) if band is not None else ()
@@ -190,34 +191,37 @@ class RadioSource(EvidenceSource):
         return inside, others, unplaced
 
     def _levels(
-        self,
-        inside: dict[int, float],
-        others: list[tuple[tuple[int, ...], ReportRow]],
-        epoch: Epoch,
-        serving: int,
-        particle_spacing_m: float,
+        self, inside: dict[int, float], epoch: Epoch, particle_spacing_m: float
     ) -> LevelReport:
         """Return levels, and the cells that are absent though a report has room for them."""
         options, count = self.options, len(inside)
-        absent = np.zeros(0, dtype=np.int32)
+        absent: list[int] = []
         limit_dbm = self.area.floor_dbm
         neighbours = sum(row.role != SERVING for row in epoch.radio)
         if neighbours >= _NEIGHBOURS_FOR_ABSENCE:
             if neighbours >= options.full_list:
                 limit_dbm = min(row.level_dbm for row in epoch.radio if isfinite(row.level_dbm))
-            present = {serving, *inside}.union(*(bands for bands, _ in others))
-            for row in epoch.radio:
-                if row.cell is None and row.arfcn is not None:
-                    present.update(self.area.carriers.get(_carrier(row), ()))
-            bands = range(len(self.area.cell_ids))
-            absent = np.array([band for band in bands if band not in present], dtype=np.int32)
+            present = self._present(epoch)
+            absent = [band for band in range(len(self.area.cell_ids)) if band not in present]
         return LevelReport(
             np.fromiter(inside, np.int32, count),
             np.fromiter(inside.values(), np.float32, count),
-            absent,
+            np.array(absent, dtype=np.int32),
             limit_dbm,
             options.offset_db(particle_spacing_m),
         )
+
+    def _present(self, epoch: Epoch) -> set[int]:
+        """Return the bands that rows of a report are of, or may be of, with and without levels."""
+        area, present = self.area, set[int]()
+        for row in epoch.radio:
+            if row.cell is not None:
+                present.update({area.band_of[row.cell]} if row.cell in area.band_of else ())
+            elif row.arfcn is not None:
+                present.update(area.carriers.get(_carrier(row), ()))
+            else:
+                return set(range(len(area.cell_ids)))
+        return present
 
     def _bound(self, bands: tuple[int, ...], row: ReportRow, counted_m: float) -> BoundReading:
         weight = self.options.bound_weight * (1.0 - exp(-2.0 * counted_m / _BOUND_M))
@@ -232,10 +236,6 @@ _Unplaced = tuple[ReportRow, Reason]
 
 def _carrier(row: ReportRow) -> tuple[int, int]:
     return -1 if row.arfcn is None else row.arfcn, -1 if row.bsic is None else row.bsic
-
-
-def _timing_advance(epoch: Epoch) -> float:
-    return next((row.timing_advance for row in epoch.radio if row.role == SERVING), nan)
 
 
 def _unused(epoch: Epoch, rows: list[_Unplaced]) -> list[UnusedReading]:
