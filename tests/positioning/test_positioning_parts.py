@@ -278,7 +278,7 @@ def test_where_a_grid_starts():
     np.testing.assert_allclose(free[0], free[35], rtol=1e-6)
     place = np.array([0, 6]), np.array([2, 8])
     state = grid.states(*place, np.array([0.1, -0.2], "f4"), np.array([0.05, 0.7], "f4"))
-    rows = [[25, 85], [65, 5], [0.1, -0.2], [0, 0], [0.05, 0.7], [0, 0], [0, 0]]
+    rows = [[25, 85], [65, 5], [0.1, -0.2], [0, 0], [0.05, 0.7], *[[0, 0]] * 3]
     np.testing.assert_allclose(state, rows, rtol=1e-6)
 
 
