@@ -195,6 +195,13 @@ def test_deviations_jump_now_and_then_to_any_value_within_tens_of_degrees():
     assert (np.abs(parts[TURN]) > 0.01).mean() == pytest.approx(expected, abs=1.5 * spread)
     calm = move(still, 5.0, 0.0, replace(errors, disturbances_per_m=0.0), KEY)
     assert np.abs(calm[TURN]).max() < 0.01
+    # Where to is drawn for itself.
+    always = replace(errors, disturbances_per_m=1e9, step_sd_m=1.0, bias_drift_rad_per_sqrt_m=0.1)
+    drawn = move(still, 5.0, 0.0, always, KEY)
+    new = drawn[STRETCH] - exp(-5.0 / 35.0) * still[STRETCH]
+    both = np.array([drawn[TURN], new, drawn[BIAS]], dtype=float)
+    assert drawn[TURN].std(dtype=float) == pytest.approx(0.9, rel=SPREAD)
+    assert np.abs(np.corrcoef(both) - np.eye(3)).max() < SPREAD
     # The rest of the state is the same with and without jumps.
     np.testing.assert_array_equal(calm[[BIAS, LOG_SCALE, STRETCH]],
                                   after[[BIAS, LOG_SCALE, STRETCH]])  # fmt: skip
