@@ -3,6 +3,7 @@
 from importlib.metadata import version as installed_version
 from importlib.util import find_spec
 from pathlib import Path
+from runpy import run_path
 from shutil import rmtree
 
 project = "mapfilter"
@@ -19,6 +20,11 @@ extensions = [
 ]
 templates_path = ["_templates"]
 exclude_patterns = ["_build", "_templates"]
+
+# Pictures of pages that are drawn from made cases.
+run_path(str(Path(__file__).with_name("diagrams.py")))["draw"](
+    Path(__file__).parent / "_static" / "drawn"
+)
 
 # Pages of modules that are gone would stay and fail the next build.
 rmtree(Path(__file__).parent / "api", ignore_errors=True)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from mapfilter.api.located import Track as Track
     from mapfilter.api.located import locate as locate
     from mapfilter.api.located import score as score
+    from mapfilter.api.logs import read_log as read_log
     from mapfilter.api.studies import Bound as Bound
     from mapfilter.api.studies import Sweep as Sweep
     from mapfilter.api.studies import bound as bound
@@ -54,11 +55,11 @@ if TYPE_CHECKING:
     from mapfilter.simulation.walking import WalkerModel as WalkerModel
     from mapfilter.tracks.log import TrackLog as TrackLog
     from mapfilter.tracks.log import make_log as make_log
-    from mapfilter.tracks.store import read_log as read_log
     from mapfilter.tracks.store import write_log as write_log
 
 _NAMES = {
     "api.located": "Score Track locate score",
+    "api.logs": "read_log",
     "api.studies": "Bound Sweep bound simulate sweep",
     "database.build": "build",
     "database.radioroutes": "RadioRouteDatabase",
@@ -80,7 +81,7 @@ _NAMES = {
     "simulation.reports": "ReportModel",
     "simulation.walking": "WalkerModel",
     "tracks.log": "TrackLog make_log",
-    "tracks.store": "read_log write_log",
+    "tracks.store": "write_log",
 }
 """Names by the modules that define them."""
 

@@ -33,6 +33,7 @@ from mapfilter.positioning.filter import Filter, estimate_of, kinds_of, locate, 
 from mapfilter.positioning.locators import as_filter
 from mapfilter.tracks.log import TrackLog
 
+_PLACE = ("east_m", "north_m", "covariance_m2")
 _ORDER = {
     Status.SEARCHING: set(Status) - {Status.TRACKING},
     Status.CONVERGED: {Status.TRACKING, Status.LOST, Status.OUTSIDE},
@@ -104,7 +105,7 @@ def check_filter(
     live = estimate_of(bound, outputs, start_utc_s=log.start_utc_s)
     _require(len(live) == len(replayed), "one epoch at a time gives a fix for every epoch")
     if bound.smoother() is None:
-        for name in ("east_m", "north_m", "covariance_m2", "radii_m", "status", "reason"):
+        for name in (*_PLACE, "radii_m", "radius_99_m", "protection_m", "status", "reason"):
             same_values = same(getattr(live, name), getattr(replayed, name))
             _require(same_values, f"one epoch at a time gives the {name} of the whole log")
 
@@ -139,6 +140,9 @@ def _check_output(output: StepOutput, epoch: Epoch, last: Status) -> None:
         _require(bool(known.all()), "a filter that has converged gives a position")
     radii = fix.radii_m[np.isfinite(fix.radii_m)]
     _require(bool(np.all(np.diff(radii) >= 0)), "radii for 50, 67 and 95 % do not shrink")
+    wide = not fix.radius_99_m < radii.max(initial=0.0)
+    _require(wide, "the radius for 99 % is not below that for 95 %")
+    _require(not fix.protection_m < 0, "a protection level is not negative")
     for reading in output.unused:
         _require(reading.reason is not Reason.USED, "unused readings have a reason")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,10 @@ from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.accuracy import Accuracy, Truth, accuracy, position_errors_m
 from mapfilter.positioning import filter as loop
 from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
-from mapfilter.positioning.locators import DEFAULT, as_filter
+from mapfilter.positioning.integrity import DEFAULT_RISK
+from mapfilter.positioning.locators import DEFAULT, as_filter, filter_options
+from mapfilter.positioning.log_options import fitted_to_log
+from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 
 if TYPE_CHECKING:
@@ -91,33 +94,43 @@ def locate(
     seed: int | np.random.Generator = 0,
     ways: bool = True,
     snapshots: bool = False,
+    risk: float = DEFAULT_RISK,
 ) -> Track:
     """Locate a log from an unknown start.
 
     Parameters
     ----------
     log : TrackLog
-        In the CRS of the database.
+        In the CRS of the database. Cells that it names by identity (mcc, mnc, lac, ci) get the ids
+        of the database.
     filter : options, str, Filter or class
         Options such as ``BayesFilter(level_error_db=8.0)``, the name of a filter, or a custom
-        filter (see the page "Extending"). The Bayes map filter when left out.
+        filter (see the page "Extending"). The Bayes map filter when left out. What the log states
+        takes the place of defaults: the step of timing advance by technology, and of levels.
     seed : int or numpy.random.Generator
         Equal logs, databases, options and seeds give equal bytes.
     ways : bool
         Whether positions are matched to ways.
     snapshots : bool
         Whether to keep the filter's hypotheses at some epochs, for pictures.
+    risk : float
+        Probability, at each epoch, that the error exceeds the protection level (``protection_m``).
 
     Raises
     ------
     InputError
         The log is in another CRS than the database.
     ConfigError
-        The filter is none, or a custom filter fails.
+        The filter is none, a custom filter fails, or the risk does not lie between 0 and 1.
     """
     rng = np.random.default_rng(seed)
-    bound = as_filter(filter, database, ways=ways)
-    return Track(loop.locate(log, bound, rng, snapshots=snapshots), log, database)
+    log = name_by_plan(log, database.plan)
+    options, notes = fitted_to_log(
+        filter_options(filter) if isinstance(filter, str) else filter, log
+    )
+    bound = as_filter(options, database, ways=ways)
+    log = replace(log, notes=(*log.notes, *notes)) if notes else log
+    return Track(loop.locate(log, bound, rng, snapshots=snapshots, risk=risk), log, database)
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -46,10 +46,19 @@ REMEDIES = {
     "landuse-outside": "Take the land-use raster of this area.",
     "level-as-loss": 'Set rasters.quantity = "level".',
     "levels-above-eirp": "Check the EIRP, or what the rasters hold.",
+    "log-cells-unknown": "Take the plan of the network that was received, with mcc, mnc, lac and "
+    "ci, or name the cells in the log by the plan's ids.",
+    "log-invalid": "Correct the log or recording, or its settings in [track].",
+    "log-outside-area": "Take a log of this area, or the area of this log.",
+    "log-rows-unused": "Look at the lines named; mapfilter convert lists all reasons.",
+    "log-without-motion": "Add a recording of steps, odometry or a fused track (track.recordings), "
+    "or set track.course_motion; without motion only GNSS locates.",
     "lon-lat-swapped": "Exchange longitude and latitude.",
     "loss-as-level": 'Set rasters.quantity = "loss"; levels are then taken from the EIRP.',
     "map-invalid": "Correct area.map.",
     "measurements-invalid": "Correct the files of prediction.survey, or their settings.",
+    "measurements-without-times": "Write times in ISO 8601 or as Unix seconds; without them "
+    "sessions are not told apart, and tracks have no order.",
     "metres-for-degrees": "Name columns of metres east and north, or give degrees.",
     "nodata-as-level": "Set rasters.nodata, or write the raster with its nodata value.",
     "plan-invalid": "Correct the field.",

@@ -21,6 +21,7 @@ from mapfilter.cli.chain import (
     replay,
     simulate,
 )
+from mapfilter.cli.convert import convert
 from mapfilter.cli.experiments import bench, evaluate, reproduce, sweep
 from mapfilter.cli.options import DONE
 from mapfilter.workflows.terminal import guarded
@@ -45,6 +46,7 @@ _COMMANDS: tuple[tuple[Callable[..., None], str, str], ...] = (
     (export, "area/database --to area.gpkg", "cli.rst"),
     (info, "area/database", "cli.rst"),
     (bound, "area/database --out bound", "howto/where-will-it-work.rst"),
+    (convert, "walk.txt --truth watch.gpx --out walk", "howto/recordings.rst"),
     (simulate, "-c area.toml --out area", "explanation/simulated-worlds.rst"),
     (
         replay,

@@ -208,8 +208,26 @@ def simulate(
 def replay(
     database: Annotated[Path | None, typer.Option("--db", metavar="DB", help="Database.")] = None,
     log: Annotated[
-        Path | None, typer.Option("--log", metavar="LOG", help="A log, or a folder of logs.")
+        list[Path] | None,
+        typer.Option(
+            "--log",
+            metavar="LOG",
+            help="A log, or a folder of logs; or recordings of one journey, repeatable.",
+        ),
     ] = None,
+    truth: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--truth", metavar="FILE", help="Recording whose positions are the truth; repeatable."
+        ),
+    ] = None,
+    zone: Annotated[
+        str | None, typer.Option("--zone", help="Zone of local times in recordings.")
+    ] = None,
+    course_motion: Annotated[
+        bool,
+        typer.Option("--course-motion", help="Make motion from speed and course of positions."),
+    ] = False,
     filter_name: FilterOption = None,
     without: Annotated[
         str | None,
@@ -225,6 +243,14 @@ def replay(
             "--smooth", help="Smooth the track by the whole log (forward filtering, backward pass)."
         ),
     ] = False,
+    protection: Annotated[
+        float | None,
+        typer.Option(
+            "--protection",
+            metavar="RISK",
+            help="Probability, at each epoch, that the error exceeds the protection level (1e-3).",
+        ),
+    ] = None,
     config: ConfigOption = None,
     settings: SetOption = None,
     out: OutOption = None,
@@ -236,15 +262,23 @@ def replay(
     from mapfilter.workflows.replay import replay_figures, run_replay
 
     given = seeded(settings, seed, "journeys.seed")
-    for key, value in (("database.path", database), ("track.path", log)):
+    paths = {"database.path": database, "track.path": log[0] if log else None}
+    for key, value in (paths | {"track.zone": zone}).items():
         if value is not None:
             given.append(f"{key}={toml(str(value))}")
+    for key, files in (("track.recordings", (log or [])[1:]), ("track.truth", truth or [])):
+        if files:
+            given.append(f"{key}={toml([str(file) for file in files])}")
+    if course_motion:
+        given.append("track.course_motion=true")
     if filter_name is not None:
         given.append(f"filter.name={toml(filter_name)}")
     if without is not None:
         given.append(f"track.without={toml([kind.strip() for kind in without.split(',')])}")
     if smooth:
         given.append("filter.smooth=true")
+    if protection is not None:
+        given.append(f"integrity.risk={protection!r}")
     loaded = load_config(config, given)
     check_custom_filter(loaded)
     folder = (out or loaded.output.dir / "replay").absolute()

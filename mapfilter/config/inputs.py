@@ -178,7 +178,8 @@ class SurveySection(Section):
     files : list of Path
         Files of measurements, or folders of them.
     format : {"auto", "csv", "opencellid", "towercollector", "antennas"}
-        Format of the files; "auto" detects it from the first line of each.
+        Format of the files; "auto" detects it from each, and reads recordings of other programs
+        with cells and positions, too.
     session_gap_s : float
         A longer silence begins a new session.
     max_accuracy_m : float

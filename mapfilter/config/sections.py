@@ -10,7 +10,16 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from mapfilter.config.fields import Count, FilePath, FilterName, Section, with_options
+from mapfilter.config.fields import (
+    Columns,
+    Count,
+    FilePath,
+    FilterName,
+    Pair,
+    Section,
+    with_columns,
+    with_options,
+)
 from mapfilter.config.inputs import (
     Area,
     BuildingsSection,
@@ -21,6 +30,7 @@ from mapfilter.config.inputs import (
     Rasters,
     Roads,
 )
+from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.options import Below1, Degrees, NotNegative, Positive, Seed
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.candidate import CandidateFilter
@@ -28,6 +38,8 @@ from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
+from mapfilter.tracks.readers.formats import FORMATS
+from mapfilter.tracks.readers.plain_csv import FIELDS as RECORDED_FIELDS
 from mapfilter.tracks.schema import Without
 
 
@@ -40,6 +52,13 @@ def _each_once(values: tuple[float, ...]) -> tuple[float, ...]:
     if len(set(values)) < len(values):
         raise ValueError("every value once")
     return values
+
+
+def _format_name(value: str) -> str:
+    """Check the name of a format of recordings; "" is none."""
+    if value and value not in (names := [known.name for known in FORMATS]):
+        raise ValueError(f"one of {', '.join(names)}")
+    return value
 
 
 _T = TypeVar("_T")
@@ -160,19 +179,49 @@ class Imu(Section):
     """``[imu]``: errors of simulated dead reckoning."""
 
 
+@with_columns(*RECORDED_FIELDS)
+class TrackColumns(Columns):
+    """``[track.columns]``: names of the columns of a plain CSV recording.
+
+    Each key is a field; its value is the name of its column in the file.
+    """
+
+
 class Track(Section):
-    """``[track]``: a log, or a folder of logs, and what is left out of them.
+    """``[track]``: a log, a folder of logs, or recordings of other programs.
+
+    All keys but ``path`` and ``without`` are for recordings.
 
     Parameters
     ----------
     path : Path, optional
-        The log, or a folder of logs; by default ``journeys`` in the output folder.
+        The log, a folder of logs, a recording, or a folder of recordings of one journey; by default
+        ``journeys`` in the output folder.
     without : list of str
         What the filter does not receive.
+    recordings : list of Path
+        Further recordings of the same journey.
+    truth : list of Path
+        Recordings whose positions are the truth, and no measurements.
+    format : str
+        Format of the recordings, as for ``mapfilter convert``; found by their content otherwise.
+    zone : str
+        Zone of local times that state none, such as "Europe/Brussels" or "+01:00".
+    origin : (float, float), optional
+        Longitude and latitude at which a local frame of metres has its origin.
+    course_motion : bool
+        Make motion from the speed and course of positions where nothing else gives it.
     """
 
     path: FilePath | None = None
     without: Annotated[tuple[Without, ...], Field(strict=False)] = ()
+    recordings: Files = ()
+    truth: Files = ()
+    format: Annotated[str, AfterValidator(_format_name)] = ""
+    zone: str = ""
+    origin: Pair | None = None
+    course_motion: bool = False
+    columns: TrackColumns = TrackColumns()
 
 
 @with_options(CandidateFilter)
@@ -202,11 +251,17 @@ class Output(Section):
     dir : Path
         Folder of the results.
     pictures : {"none", "first", "all"}
-        Logs whose pictures are drawn; a database and a survey get theirs unless this is "none".
+        Logs whose pictures are drawn; a database, a survey and a benchmark get theirs unless this
+        is "none".
     """
 
     dir: FilePath = Path("out")
     pictures: Literal["none", "first", "all"] = "first"
+
+
+@with_options(IntegrityOptions)
+class IntegritySection(Section):
+    """``[integrity]``: protection levels of replays and benchmarks."""
 
 
 class Config(Section):
@@ -223,6 +278,7 @@ class Config(Section):
     imu: Imu = Imu()
     track: Track = Track()
     filter: FilterSection = FilterSection()
+    integrity: IntegritySection = IntegritySection()
     sweep: SweepSection = SweepSection()
     output: Output = Output()
 

@@ -29,6 +29,7 @@ from mapfilter.database.tiles import TileRows, TileTask, read_tiles, tile_window
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
+from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters, check_against_plan
 from mapfilter.roads.lattice import RouteLattice
 
@@ -181,6 +182,7 @@ class BuildJob:
     ) -> BuildJob:
         """Check that the inputs fit each other, and cut them; errors as of :func:`build`."""
         source = LatticeRoutes(routes) if isinstance(routes, RouteLattice) else routes
+        rasters = named_by_plan(rasters, plan)
         check_against_plan(rasters, plan)
         check_aligned(rasters.lattice, source.lattice, f"{rasters.path} and roads")
         lattice, windows = rasters.lattice, []

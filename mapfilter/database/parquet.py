@@ -52,11 +52,16 @@ def open_writer(schema: pa.Schema, where: Path | pa.NativeFile) -> pq.ParquetWri
     )
 
 
-def read_columns(path: Path, columns: Sequence[str]) -> pa.Table:
-    """Read some columns of a part and compare their checksums; StoreError where damaged."""
+def read_columns(path: Path, columns: Sequence[str], optional: Sequence[str] = ()) -> pa.Table:
+    """Read some columns of a part and compare their checksums; StoreError where damaged.
+
+    Columns that are ``optional`` may be absent.
+    """
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as source:
-            table = source.read(list(columns))
+            there = source.schema_arrow.names
+            columns = [name for name in columns if name in there or name not in optional]
+            table = source.read(columns)
         table.validate(full=True)
     except DAMAGE as error:
         raise damaged(path, error) from error

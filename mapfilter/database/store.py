@@ -24,12 +24,15 @@ from mapfilter.radio.cells import Cell, CellPlan
 
 _ARROW_TYPES = {
     "str": pa.string(),
+    "str | None": pa.string(),
     "Antenna": pa.string(),
     "float": pa.float64(),
     "float | None": pa.float64(),
     "int | None": pa.int64(),
     "bool": pa.bool_(),
 }
+_OPTIONAL = ("technology",)
+"""Columns that older databases, and those whose plan does not state them, lack."""
 
 
 def write_cells(plan: CellPlan, path: Path) -> None:
@@ -38,15 +41,18 @@ def write_cells(plan: CellPlan, path: Path) -> None:
 
 
 def cells_table(plan: CellPlan) -> pa.Table:
-    """Return the cell table."""
-    schema = pa.schema([(field.name, _ARROW_TYPES[str(field.type)]) for field in fields(Cell)])
+    """Return the cell table; without technologies where no cell states one."""
+    stated = any(cell.technology for cell in plan.cells)
+    columns = [one for one in fields(Cell) if stated or one.name not in _OPTIONAL]
+    schema = pa.schema([(one.name, _ARROW_TYPES[str(one.type)]) for one in columns])
     rows = [asdict(cell) for cell in plan.cells]
     return pa.Table.from_pylist(rows, schema)
 
 
 def read_cells(path: Path, crs: str) -> CellPlan:
     """Read a cell table; raise StoreError where it is damaged."""
-    rows = read_columns(path, [field.name for field in fields(Cell)]).to_pylist()
+    names = [one.name for one in fields(Cell)]
+    rows = read_columns(path, names, optional=_OPTIONAL).to_pylist()
     try:
         return CellPlan(crs, tuple(Cell(**row) for row in rows))
     except (TypeError, MapfilterError) as error:

@@ -21,7 +21,7 @@ from mapfilter.positioning.estimate import TrackEstimate
 SUCCESS_RADIUS_M = 50.0
 """An error of at most this at the switch counts as success (section 6.2)."""
 
-RADII = (50, 67, 95)
+RADII = (50, 67, 95, 99)
 """Per cent of the belief that the radii of an estimate hold."""
 
 _CLAIMS = (Status.CONVERGED, Status.TRACKING)
@@ -210,7 +210,10 @@ class Claims:
     within_50m : int
         Claimed epochs that were at most 50 m off.
     covered : tuple of int
-        Claimed epochs whose radius held the truth, for 50, 67 and 95 %.
+        Claimed epochs whose radius held the truth, for 50, 67, 95 and 99 %.
+    converged, wrong_converged : int
+        How often CONVERGED was reported, the first time and after LOST, and how often of these more
+        than 50 m off.
     false_starts : int
         How often a claim began more than 50 m off.
     lost : int
@@ -227,6 +230,8 @@ class Claims:
     claimed: int
     within_50m: int
     covered: tuple[int, ...]
+    converged: int
+    wrong_converged: int
     false_starts: int
     lost: int
     false_lost: int
@@ -244,10 +249,12 @@ def score_claims(estimate: TrackEstimate, truth: Truth, *, until_s: float = inf)
     errors_m = position_errors_m(estimate, truth)
     inside = (estimate.time_s >= truth.time_s[0]) & (estimate.time_s <= truth.time_s[-1])
     counted = inside & (estimate.time_s <= until_s)
-    claimed = counted & np.array([status in _CLAIMS for status in estimate.status], dtype=bool)
+    claimed = counted & claims_of(estimate)
+    converged = counted & np.array([s is Status.CONVERGED for s in estimate.status], dtype=bool)
     lost = counted & np.array([status is Status.LOST for status in estimate.status], dtype=bool)
     near = errors_m <= SUCCESS_RADIUS_M
-    held = errors_m[:, np.newaxis] <= estimate.radii_m
+    radii_m = np.column_stack([estimate.radii_m, estimate.radius_99_m])
+    held = errors_m[:, np.newaxis] <= radii_m
     followed = counted & np.logical_or.accumulate(claimed) & np.isfinite(errors_m)
     began_claim, began_lost = claimed & ~_before(claimed), lost & ~_before(lost)
     return Claims(
@@ -256,11 +263,18 @@ def score_claims(estimate: TrackEstimate, truth: Truth, *, until_s: float = inf)
         claimed=int(claimed.sum()),
         within_50m=int((claimed & near).sum()),
         covered=tuple(int(count) for count in held[claimed].sum(axis=0)),
+        converged=int(converged.sum()),
+        wrong_converged=int((converged & ~near).sum()),
         false_starts=int((began_claim & ~near).sum()),
         lost=int(began_lost.sum()),
         false_lost=int((began_lost & _before(claimed & near)).sum()),
         worst_100m_m=_worst_100m(errors_m[followed], truth.distance_at(estimate.time_s[followed])),
     )
+
+
+def claims_of(estimate: TrackEstimate) -> Bools:
+    """Return at which epochs a position is claimed: CONVERGED or TRACKING, shape (N,)."""
+    return np.array([status in _CLAIMS for status in estimate.status], dtype=bool)
 
 
 def _before(happened: Bools) -> Bools:

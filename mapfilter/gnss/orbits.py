@@ -77,8 +77,7 @@ OLDEST_DAYS = 180.0
 """Farther from its time of applicability an almanac is too inaccurate."""
 
 _GPS_EPOCH_S = datetime(1980, 1, 6, tzinfo=UTC).timestamp()
-# UTC dates from which on GPS time is ahead by one second more.
-_LEAPS = tuple(
+LEAPS_UTC_S = tuple(
     datetime(year, month, 1, tzinfo=UTC).timestamp()
     for month, years in (
         (1, (1988, 1990, 1991, 1996, 1999, 2006, 2009, 2017)),
@@ -86,6 +85,7 @@ _LEAPS = tuple(
     )
     for year in years
 )
+"""UTC dates from which on GPS time is ahead by one second more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,7 +316,7 @@ def gps_time(utc_s: float) -> tuple[int, float]:
     if not (np.isfinite(utc_s) and utc_s >= _GPS_EPOCH_S):
         hint = "seconds since another start than 1970" if np.isfinite(utc_s) else ""
         raise fail(InputError, "utc_s", "Unix time from 6 January 1980 on", utc_s, hint)
-    elapsed = utc_s - _GPS_EPOCH_S + sum(utc_s >= leap for leap in _LEAPS)
+    elapsed = utc_s - _GPS_EPOCH_S + sum(utc_s >= leap for leap in LEAPS_UTC_S)
     week = int(elapsed // WEEK_S)
     return week, elapsed - week * WEEK_S
 

@@ -43,7 +43,7 @@ _F = np.float32
 _ROUGHNESS_M = 35.0
 _LOG_ODDS, _MOST_LOG_ODDS = 20.0, 8.0
 _ABSENT_BY_FAULT = log(0.7)
-_OTHER_DBM, _OTHER_SD_DB, _OTHER_M, _OTHER_WHITE_DB = -90.0, 15.0, 100.0, 4.5
+_OTHER_DBM, _OTHER_SD_DB, _OTHER_M, _OTHER_WHITE_DB = -90.0, 15.0, 200.0, 4.0
 _NEGLIGIBLE = 1e-3
 _STEPS_PER_SD, _REACH_SD = 32, 8
 
@@ -85,7 +85,7 @@ class LevelErrors(Options):
     site_share: Share = 0.6
     common_share: Share = 0.2
     roughness: NotNegative = 1.0
-    fault_probability: Probability = 0.03
+    fault_probability: Probability = 0.1
     fault_m: Positive = 300.0
     absent_db: NotNegative = 3.0
     weight: Share = 0.35

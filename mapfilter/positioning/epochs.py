@@ -149,7 +149,7 @@ def epochs(log: TrackLog) -> list[Epoch]:
 def _by_time(log: TrackLog, table: str, row: Callable[..., Any]) -> dict[float, list[Any]]:
     """Return what ``row`` makes of the columns of each row, by time."""
     rows, columns = getattr(log, table), []
-    for column in (rows[column.name] for column in SCHEMA[table][1:]):
+    for column in (rows[known.name] for known in SCHEMA[table][1:] if not known.optional):
         values = column.tolist()
         if str(column.dtype) in ("Int64", "Int8", "object", "str", "string"):
             values = [None if value is pd.NA or value != value else value for value in values]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from math import nan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import pandas as pd
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.filters.contract import Reason, Status
+from mapfilter.positioning.integrity import DEFAULT_RISK, RadialTail
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -43,6 +45,11 @@ class Fix:
         Probability of that way.
     reason : Reason
         Whether the epoch's serving-cell reading was used, or why not.
+    radius_99_m : float
+        Radius that holds 99 % of the belief; NaN where the filter has none.
+    protection_m : float
+        Protection level: the error exceeds it with at most a stated risk, by default 1e-3. Infinite
+        where there is none for this risk (unavailable), NaN of filters without one.
     """
 
     time_s: float
@@ -56,6 +63,8 @@ class Fix:
     way_id: int
     way_probability: float
     reason: Reason
+    radius_99_m: float = nan
+    protection_m: float = nan
 
     @classmethod
     def nowhere(cls, time_s: float, status: Status, reason: Reason) -> Fix:
@@ -99,11 +108,30 @@ class StepOutput:
         probabilities.
     unused : tuple of UnusedReading
         Measurements of the epoch that were not used, and why.
+    tail : RadialTail, optional
+        How likely the position is farther off, for protection levels of any risk; of filters that
+        hold probabilities.
     """
 
     fix: Fix
     evidence: tuple[float, float, float, float, float] | None = None
     unused: tuple[UnusedReading, ...] = ()
+    tail: RadialTail | None = None
+
+    def protected(self, tail: RadialTail | None, risk: float = DEFAULT_RISK) -> StepOutput:
+        """Return the output with a tail, and what follows from it for the fix.
+
+        Parameters
+        ----------
+        risk : float
+            Of the protection level, between 0 and 1.
+        """
+        if tail is None:
+            return self
+        wide_m = max(tail.radius_m(0.99), float(self.fix.radii_m[-1]))
+        level_m = tail.protection_m(risk)
+        fix = replace(self.fix, radius_99_m=wide_m, protection_m=level_m)
+        return replace(self, fix=fix, tail=tail)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -162,6 +190,10 @@ class TrackEstimate:
         Probability of the matched way, 0 to 1; NaN where the filter gives none.
     reason : tuple of Reason
         Whether the reading of each epoch was used, or why not.
+    radius_99_m : (N,) array
+        Radii that hold 99 % of the belief; NaN where the filter has none.
+    protection_m : (N,) array
+        Protection levels; infinite where there is none for the risk, NaN of filters without any.
     unused : tuple of UnusedReading
         Every reading not used, and why.
     evidence : TrackEvidence or None
@@ -182,6 +214,8 @@ class TrackEstimate:
     way_id: Ints
     way_probability: Floats
     reason: tuple[Reason, ...]
+    radius_99_m: Floats
+    protection_m: Floats
     unused: tuple[UnusedReading, ...] = ()
     evidence: TrackEvidence | None = None
 
@@ -215,6 +249,8 @@ class TrackEstimate:
             int(self.way_id[index]),
             float(self.way_probability[index]),
             self.reason[index],
+            float(self.radius_99_m[index]),
+            float(self.protection_m[index]),
         )
 
     @property
@@ -234,6 +270,8 @@ class TrackEstimate:
             "radius_50_m": self.radii_m[:, 0],
             "radius_67_m": self.radii_m[:, 1],
             "radius_95_m": self.radii_m[:, 2],
+            "radius_99_m": self.radius_99_m,
+            "protection_m": self.protection_m,
             "status": list(map(str, self.status)),
             "hypotheses": self.hypotheses,
             "mass_50m": self.mass_50m,

@@ -20,11 +20,13 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import unproject
 from mapfilter.positioning.estimate import TrackEstimate, TrackEvidence, UnusedReading
 
-VERSION = 1
+VERSION = 2
 _META = b"mapfilter"
 _GPX = "http://www.topografix.com/GPX/1/1"
 _COLUMNS = tuple(TrackEstimate.of_fixes("", "", ()).to_dataframe())
 _EVIDENCE = tuple(TrackEvidence.__dataclass_fields__)
+_SINCE_2 = ("radius_99_m", "protection_m")
+"""Columns that files of version 1 lack; they are then NaN."""
 
 
 def write_estimate(estimate: TrackEstimate, path: str | Path) -> None:
@@ -84,11 +86,13 @@ def _estimate(table: Any, meta: dict[str, Any], path: Path) -> TrackEstimate:
     faults = Faults()
     if meta["version"] > VERSION:
         faults.add(str(path), f"version <= {VERSION}", meta["version"], "a newer mapfilter")
+    old = _SINCE_2 if meta["version"] < VERSION else ()
     for name in _COLUMNS:
-        if name not in table.column_names:
+        if name not in table.column_names and name not in old:
             faults.add(f"{path}, {name}", "a column of that name", "none")
     faults.raise_if_any(StoreError)
-    column = {name: table[name].to_numpy() for name in _COLUMNS}
+    column = {name: table[name].to_numpy() for name in _COLUMNS if name not in old}
+    column |= {name: np.full(table.num_rows, np.nan) for name in old}
     east, cross, north = (
         column[name] for name in ("var_east_m2", "cov_east_north_m2", "var_north_m2")
     )
@@ -112,6 +116,8 @@ def _estimate(table: Any, meta: dict[str, Any], path: Path) -> TrackEstimate:
         column["way_id"],
         column["way_probability"],
         tuple(Reason(r) for r in column["reason"]),
+        column["radius_99_m"],
+        column["protection_m"],
         tuple(UnusedReading(t, kind, what, Reason(r)) for t, kind, what, r in meta["unused"]),
         evidence,
     )
@@ -144,11 +150,12 @@ def write_geojson(estimate: TrackEstimate, path: str | Path) -> None:
     if len(positions) > 1:
         features.append(_feature("LineString", positions, {"filter": estimate.filter}))
     for index, position in zip(located.tolist(), positions, strict=True):
-        radius_m = float(estimate.radii_m[index, 2])
+        radius_m, level_m = float(estimate.radii_m[index, 2]), float(estimate.protection_m[index])
         properties = {
             "time_s": round(float(estimate.time_s[index]), 3),
             "status": str(estimate.status[index]),
             "radius_95_m": round(radius_m, 2) if np.isfinite(radius_m) else None,
+            "protection_m": round(level_m, 2) if np.isfinite(level_m) else None,
         }
         features.append(_feature("Point", position, properties))
     with atomic_file(Path(path)) as temporary:

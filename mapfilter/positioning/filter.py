@@ -29,6 +29,7 @@ from mapfilter.positioning.estimate import (
     TrackEstimate,
     UnusedReading,
 )
+from mapfilter.positioning.integrity import DEFAULT_RISK, check_risk
 from mapfilter.tracks.log import TrackLog, rows_by_kind
 from mapfilter.tracks.schema import ALL_KINDS as ALL_KINDS
 from mapfilter.tracks.schema import TABLES
@@ -140,7 +141,12 @@ class FilterOptions(Protocol):
 
 
 def locate(
-    log: TrackLog, filter_: Filter[Any], rng: np.random.Generator, *, snapshots: bool = False
+    log: TrackLog,
+    filter_: Filter[Any],
+    rng: np.random.Generator,
+    *,
+    snapshots: bool = False,
+    risk: float = DEFAULT_RISK,
 ) -> PositionedTrack:
     """Locate a log: the one loop over epochs.
 
@@ -152,12 +158,18 @@ def locate(
         In the filter's CRS.
     snapshots : bool
         Whether to keep the hypotheses at some epochs until the filter first tracks, for figures.
+    risk : float
+        Probability, at each epoch, that the error exceeds the protection level. Positions that are
+        smoothed have a level only where the smoother gives one.
 
     Raises
     ------
+    ConfigError
+        The risk does not lie between 0 and 1.
     InputError
         The log is in another CRS than the filter.
     """
+    check_risk(risk)
     if not same_crs(log.crs, filter_.crs):
         hint = "log of another area or zone"
         raise fail(InputError, "log, crs", filter_.crs, log.crs, hint)
@@ -172,13 +184,18 @@ def locate(
     for epoch in merged:
         before = state
         state, output = filter_.step(before, epoch, rng)
-        outputs.append(output)
+        if risk != DEFAULT_RISK:
+            output = output.protected(output.tail, risk)
+        # A tail is as large as a belief.
+        outputs.append(replace(output, tail=None))
         if smoother is not None:
             smoother.add(before, state)
         if snapshots:
             album.add(state, epoch, output)
     estimate = estimate_of(filter_, outputs, unused, log.start_utc_s)
     if smoother is not None:
+        unknown = np.full(len(estimate), nan)
+        estimate = replace(estimate, radius_99_m=unknown, protection_m=unknown)
         estimate = smoother.smoothed(estimate, rng)
     return PositionedTrack(estimate, tuple(album.taken), time.process_time() - began_s)
 

@@ -1,107 +1,18 @@
-"""Tables of cells: reading them, and the columns of other layouts that are fields of a plan."""
+"""Lists of cells in other layouts: which of their columns are fields of a plan."""
 
 from __future__ import annotations
 
-import csv
 import difflib
-import io
-import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Literal
 
-from mapfilter._io import read_input
-from mapfilter.errors import Faults, InputError, fail
+from mapfilter.errors import Faults, InputError
+from mapfilter.radio.identities import parse_cgi
+from mapfilter.radio.tables import Table
 
-_LARGEST_BYTES = 1 << 26
-_MOST_FIELDS = 5_000_000
-_SEPARATORS = (",", ";", "\t")
-
-
-@dataclass(frozen=True, slots=True)
-class Table:
-    """The header and the rows of a file, each row with its line; blank lines are left out."""
-
-    path: Path
-    separator: str
-    header: tuple[str, ...]
-    rows: tuple[tuple[int, list[str]], ...]
-
-    def number(self, text: str) -> float | None:
-        """Return a finite number or None; decimal commas are read where they separate nothing."""
-        return number(text, decimal_comma=self.separator != ",")
-
-    def whole_rows(self, columns: int, faults: Faults) -> Iterator[tuple[int, list[str]]]:
-        """Yield the rows that have so many fields; the others are faults."""
-        for line, texts in self.rows:
-            if len(texts) == columns:
-                yield line, texts
-                continue
-            hint = "a decimal comma, or an unquoted separator"
-            if len(texts) < columns:
-                hint = "the line is cut off"
-            faults.add(f"{self.path} row {line}, fields", f"{columns}", f"{len(texts)}", hint)
-
-
-def number(text: str, *, decimal_comma: bool = False) -> float | None:
-    """Return a text as a finite number, or None.
-
-    Examples
-    --------
-    >>> number("60.5"), number("60,5"), number("60,5", decimal_comma=True), number("1_0")
-    (60.5, None, 60.5, None)
-    """
-    if decimal_comma and text.count(",") == 1 and "." not in text:
-        text = text.replace(",", ".")
-    try:
-        value = float("?" if "_" in text else text)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None
-
-
-def read_table(path: Path, what: str) -> Table:
-    """Read a table in UTF-8 whose first line names its columns; commas, semicolons or tabs.
-
-    Parameters
-    ----------
-    what : str
-        For messages, such as ``"a cell plan"``.
-
-    Raises
-    ------
-    InputError
-        The file is missing, empty, too large or no such text.
-    """
-    try:
-        text = read_input(path, _LARGEST_BYTES, what).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        got = f"other bytes at offset {error.start}"
-        hint = "saved in a Windows code page, or no text file"
-        raise fail(InputError, str(path), "text in UTF-8", got, hint) from error
-    if "\0" in text:
-        raise fail(InputError, str(path), "text in UTF-8", "NUL characters", "no text file")
-    head = next((line for line in text.splitlines() if line.strip()), "")
-    separator = max(_SEPARATORS, key=head.count)
-    reader = csv.reader(io.StringIO(text, newline=None), delimiter=separator)
-    lines: list[tuple[int, list[str]]] = []
-    fields = 0
-    try:
-        for row in reader:
-            if any(field.strip() for field in row):
-                lines.append((reader.line_num, row))
-                fields += len(row)
-                if fields > _MOST_FIELDS:
-                    got = f"more in the first {reader.line_num} lines"
-                    raise fail(InputError, str(path), f"{what} of at most 5e6 fields", got)
-    except csv.Error as error:
-        raise fail(InputError, f"{path} row {reader.line_num}", "CSV", error) from error
-    if not lines:
-        raise fail(InputError, str(path), "a header line and rows", "nothing", "an empty file")
-    header = tuple(name.strip() for name in lines[0][1])
-    return Table(path, separator, header, tuple(lines[1:]))
+_LONGEST_SHOWN = 200
 
 
 Layout = Literal["plan", "atoll", "opencellid"]
@@ -114,6 +25,7 @@ COLUMNS = (
     *("mechanical_downtilt_deg", "antenna", "beamwidth_deg", "max_attenuation_db"),
     *("vertical_beamwidth_deg", "side_lobe_db", "eirp_dbm", "frequency_mhz", "indoor"),
     *("penetration_loss_db", "mcc", "mnc", "lac", "ci", "arfcn", "bsic"),
+    "technology",
 )
 """Columns of a file that mapfilter writes, in order."""
 ATOLL: Columns = {
@@ -135,7 +47,8 @@ ATOLL: Columns = {
     "lac": ("LAC",),
     "ci": ("CELL_IDENTITY", "CI"),
     "arfcn": ("CONTROL_CHANNEL", "BCCH"),
-    "bsic": ("BSIC",),
+    "bsic": ("BSIC", "PHY_CELL_ID", "PSC"),
+    "technology": ("TECHNOLOGY",),
 }
 OPENCELLID: Columns = {
     "lat": ("lat",),
@@ -150,7 +63,19 @@ OPENCELLID_HEADER = (
     *("changeable", "created", "updated", "averageSignal"),
 )
 """Of the downloads of OpenCellID and of the Mozilla Location Service; the former leave it out."""
-_OWN: Columns = {name: (name,) for name in (*COLUMNS, "east", "north", "crs")}
+ALIASES: Columns = {
+    "lac": ("tac",),
+    "ci": ("eci", "nci"),
+    "arfcn": ("uarfcn", "earfcn", "nr_arfcn", "nrarfcn"),
+    "bsic": ("psc", "pci"),
+    "cgi": ("cgi", "ecgi", "ncgi"),
+}
+"""Names by technology; a plan may have several of a field, each filled in some rows. A ``cgi`` is
+mcc, mnc, lac and ci in one text."""
+_IMPLIED = {"uarfcn": "UMTS", "psc": "UMTS", "earfcn": "LTE", "nr_arfcn": "NR", "nrarfcn": "NR"}
+_OWN: Columns = {name: (name,) for name in (*COLUMNS, "east", "north", "crs")} | {
+    name: (*((name,) if name in COLUMNS else ()), *more) for name, more in ALIASES.items()
+}
 LAYOUTS: Mapping[Layout, Columns] = {
     "plan": _OWN,
     "atoll": {name: (*ATOLL.get(name, ()), name) for name in _OWN},
@@ -202,47 +127,82 @@ def arrange(
         header = OPENCELLID_HEADER
     picked = _pick(table, header, layout, columns)
     fields = [*picked, *(name for name in defaults if name not in picked)]
-    composed = "cell" not in picked and all(name in picked for name in _IDENTITY)
+    fields += [name for name in _IDENTITY if "cgi" in picked and name not in fields]
+    fields = [name for name in fields if name != "cgi"]
+    composed = "cell" not in fields and all(name in fields for name in _IDENTITY)
+    implied = any(header[i].casefold() in _IMPLIED for at in picked.values() for i in at)
+    if implied and "technology" not in fields:
+        fields.append("technology")
+    names = (*fields, "cell") if composed else tuple(fields)
     filled: Counter[str] = Counter()
     found = []
     for line, texts in table.whole_rows(len(header), faults):
-        values = {name: texts[at].strip() for name, at in picked.items()}
+        values = {name: _first(texts, at) for name, at in picked.items()}
+        _by_technology(
+            values, [header[i] for at in picked.values() for i in at if texts[i].strip()]
+        )
         for name, default in defaults.items():
             if not values.get(name):
                 values[name] = repr(default)
                 filled[name] += 1
         if composed:
-            values["cell"] = "-".join(values[name] for name in _IDENTITY)
-        found.append((line, list(values.values())))
-    notes = tuple(
+            parts = (values[name] for name in _IDENTITY)
+            values["cell"] = "-".join(part for part in parts if part)
+        found.append((line, [values.get(name, "") for name in names]))
+    notes = table.notes + tuple(
         f"{name} = {defaults[name]:g} for {count} of {len(found)} cells without one"
         for name, count in sorted(filled.items())
     )
-    shown = {name: f"{header[at]} ({name})" for name, at in picked.items() if header[at] != name}
-    names = (*fields, "cell") if composed else tuple(fields)
+    shown = {
+        name: f"{header[at[0]]} ({name})" for name, at in picked.items() if header[at[0]] != name
+    }
     return Arranged(names, tuple(found), shown, notes, table.separator != ",")
+
+
+def none_of(header: Sequence[str]) -> str:
+    """Return what was found in place of a column: the columns that there are."""
+    shown = ", ".join(header)
+    shown = f"{shown[:_LONGEST_SHOWN]}, …" if len(shown) > _LONGEST_SHOWN else shown
+    return f"none (columns: {shown})"
+
+
+def _first(texts: list[str], places: tuple[int, ...]) -> str:
+    """Return the first text that is not blank."""
+    return next((text for at in places if (text := texts[at].strip())), "")
+
+
+def _by_technology(values: dict[str, str], filled: list[str]) -> None:
+    """Fill in the parts of a CGI, and the technology of the columns in which a row has values."""
+    identity = parse_cgi(values.pop("cgi", ""))
+    if identity is not None:
+        for name, part in zip(_IDENTITY, identity, strict=True):
+            values[name] = values.get(name) or ("" if part is None else str(part))
+    if not values.get("technology"):
+        named = (_IMPLIED.get(name.casefold()) for name in filled)
+        values["technology"] = next((name for name in named if name), "")
 
 
 def _pick(
     table: Table, header: tuple[str, ...], layout: Layout, columns: Mapping[str, str]
-) -> dict[str, int]:
-    """Return the place of each field's column."""
+) -> dict[str, tuple[int, ...]]:
+    """Return the places of each field's column, or columns."""
     faults = Faults()
     places = {name: at for at, name in reversed(list(enumerate(header)))}
     folded = {name.casefold(): at for name, at in places.items()}
-    picked = {}
+    picked: dict[str, tuple[int, ...]] = {}
     for field, name in columns.items():
         if name in places:
-            picked[field] = places[name]
+            picked[field] = (places[name],)
         else:
             near = difflib.get_close_matches(name, places, n=1, cutoff=0.5)
             hint = f"{near[0]} meant" if near else ""
-            faults.add(f"{table.path} header", f"a column {name} ({field})", "none", hint)
+            got = none_of(header)
+            faults.add(f"{table.path} header", f"a column {name} ({field})", got, hint)
     faults.raise_if_any(InputError)
     for field, names in LAYOUTS[layout].items():
-        at = next((folded[name.casefold()] for name in names if name.casefold() in folded), None)
-        if at is not None:
-            picked.setdefault(field, at)
+        at = [folded[name.casefold()] for name in names if name.casefold() in folded]
+        if at:
+            picked.setdefault(field, tuple(at if field in ALIASES else at[:1]))
     if {"lat", "lon", "east", "north"} <= picked.keys():
         surplus = ("lat", "lon") if {"east", "north"} & columns.keys() else ("east", "north")
         picked = {field: at for field, at in picked.items() if field not in surplus}

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
+from mapfilter.radio.identities import LIMITS, limit_fault
 
 POINTED = ("sector", "3gpp")
 """Antennas that need an azimuth."""
@@ -33,7 +36,8 @@ class Range:
         kind = "a whole number" if self.whole else f"{self.unit or 'a number'}"
         if self.above_low:
             return f"{kind} > {self.low:g} and ≤ {self.high:g}"
-        return f"{kind} in {self.low:g}..{self.high:g}"
+        high = f"{self.high:.12g}" if self.whole else f"{self.high:g}"
+        return f"{kind} in {self.low:g}..{high}"
 
     def hint(self, value: float) -> str:
         """Return the likely mistake behind a value that is not in the range, if one is known."""
@@ -73,8 +77,8 @@ RANGES: dict[str, Range] = {
     "mnc": Range(0, 999, whole=True),
     "lac": Range(0, 2**24 - 1, whole=True),
     "ci": Range(0, 2**36 - 1, whole=True),
-    "arfcn": Range(0, 1023, whole=True, mistakes=((1023, np.inf, "EARFCN given for ARFCN"),)),
-    "bsic": Range(0, 63, whole=True),
+    "arfcn": Range(0, 3_279_165, whole=True, mistakes=((1e8, np.inf, "Hz given for a carrier"),)),
+    "bsic": Range(0, 1007, whole=True),
 }
 """The range of each numeric field of a cell."""
 
@@ -82,6 +86,9 @@ OPTIONAL = frozenset(
     {"azimuth_deg", "vertical_beamwidth_deg", "mcc", "mnc", "lac", "ci", "arfcn", "bsic"}
 )
 """Numeric fields that may be None."""
+TECHNOLOGIES = tuple(LIMITS)
+"""Technologies of a cell that can be stated; they limit its identity, carrier and code."""
+_LIMITED = ("arfcn", "bsic", "lac", "ci")
 
 
 def id_fault(value: Any) -> tuple[str, str] | None:
@@ -112,6 +119,16 @@ def antenna_fault(value: Any) -> tuple[str, str] | None:
     if wrong is None:
         return None
     return f"{', '.join(ANTENNAS)}, or the name of a pattern file in one folder", wrong[1]
+
+
+def technology_faults(technology: Any, value: Callable[[str], Any]) -> list[tuple[str, str, Any]]:
+    """Return (field, expected, found) of an unknown technology, or of what a known one lacks."""
+    if technology is None:
+        return []
+    if technology not in TECHNOLOGIES:
+        return [("technology", f"one of {', '.join(TECHNOLOGIES)}, or nothing", repr(technology))]
+    limited = ((name, limit_fault(technology, name, value(name))) for name in _LIMITED)
+    return [(name, expected, value(name)) for name, expected in limited if expected]
 
 
 def looks_like_radians(azimuths: list[float]) -> bool:

@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,19 @@ from pyproj import CRS
 
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import degree_fault, project, projected_crs, unproject
-from mapfilter.radio.cell_layouts import COLUMNS, Arranged, Layout, arrange, number, read_table
-from mapfilter.radio.cell_rules import ANTENNAS, OPTIONAL, RANGES, antenna_fault, id_fault
+from mapfilter.radio.cell_layouts import ALIASES, COLUMNS, Arranged, Layout, arrange, none_of
+from mapfilter.radio.cell_rules import (
+    ANTENNAS,
+    OPTIONAL,
+    RANGES,
+    TECHNOLOGIES,
+    antenna_fault,
+    id_fault,
+)
+from mapfilter.radio.identities import technology
+from mapfilter.radio.tables import number, read_table
 
-_ALLOWED = {*COLUMNS, "east", "north", "crs"}
+_ALLOWED = {*COLUMNS, "east", "north", "crs", *chain.from_iterable(ALIASES.values())}
 _REQUIRED = ("cell", "height_m", "eirp_dbm", "frequency_mhz")
 _TRUE, _FALSE = {"1", "true", "yes", "y"}, {"0", "false", "no", "n"}
 _NEAR_DEG = 3.0
@@ -51,11 +61,13 @@ def read_plan(
         The file cannot be read as a table, or its header is wrong.
     """
     table = read_table(path, "a cell plan")
+    where, wrong = f"{path} header", Faults()
     if layout == "plan" and not columns:
-        _check_header(path, table.header, known_only=True)
+        _check_own_header(where, table.header, wrong)
         defaults = None
     arranged = arrange(table, layout, columns or {}, defaults or {}, faults)
-    _check_header(path, arranged.header, known_only=False)
+    _check_fields(where, arranged.header, table.header, wrong)
+    wrong.raise_if_any(InputError)
     if not arranged.rows and not faults.found:
         raise fail(InputError, str(path), "at least one cell", "a header without rows")
     rows = []
@@ -69,23 +81,28 @@ def read_plan(
     return rows, arranged.notes
 
 
-def _check_header(path: Path, header: tuple[str, ...], *, known_only: bool) -> None:
-    faults = Faults()
-    where = f"{path} header"
+def _check_own_header(where: str, header: tuple[str, ...], faults: Faults) -> None:
+    """Check the columns of mapfilter's own layout, in which none has another meaning."""
     for name in header:
-        if name not in _ALLOWED and known_only:
+        if name not in _ALLOWED:
             near = difflib.get_close_matches(name.lower(), sorted(_ALLOWED), n=1, cutoff=0.5)
             faults.add(where, "known columns only", repr(name), f"{near[0]} meant" if near else "")
     for name in sorted({name for name in header if header.count(name) > 1}):
         faults.add(where, "each column once", f"{name} {header.count(name)} times")
-    wanted = list(_REQUIRED)
-    wanted += ["east", "north"] if {"east", "north"} & set(header) else ["lat", "lon"]
-    for name in wanted:
-        if name not in header:
-            faults.add(where, f"a column {name}", "none", "left out or misspelt")
     if {"lat", "lon"} & set(header) and {"east", "north"} & set(header):
         faults.add(where, "lat and lon, or east and north", "both")
-    faults.raise_if_any(InputError)
+
+
+def _check_fields(
+    where: str, fields: tuple[str, ...], header: tuple[str, ...], faults: Faults
+) -> None:
+    """Check that every field is there without which there is no cell."""
+    wanted = list(_REQUIRED)
+    wanted += ["east", "north"] if {"east", "north"} & set(fields) else ["lat", "lon"]
+    for name in wanted:
+        if name not in fields:
+            hint = f"left out or misspelt; cells.columns.{name} names a column called otherwise"
+            faults.add(where, f"a column {name}", none_of(header), hint)
 
 
 def _row(where: str, line: int, given: Mapping[str, str], table: Arranged, faults: Faults) -> Row:
@@ -135,6 +152,11 @@ def _row(where: str, line: int, given: Mapping[str, str], table: Arranged, fault
     values["antenna"] = antenna.lower() if antenna.lower() in ANTENNAS else antenna
     if wrong := antenna_fault(values["antenna"]):
         refuse("antenna", *wrong)
+    stated = given.get("technology", "")
+    values["technology"] = technology(stated) if stated else None
+    if stated and values["technology"] not in TECHNOLOGIES:
+        values["technology"] = None
+        refuse("technology", f"one of {', '.join(TECHNOLOGIES)}, or nothing", repr(stated))
     if given.get("crs"):
         try:
             values["crs"] = projected_crs(given["crs"], f"{where}, crs")

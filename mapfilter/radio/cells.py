@@ -20,6 +20,7 @@ from mapfilter.radio.cell_rules import (
     antenna_fault,
     id_fault,
     looks_like_radians,
+    technology_faults,
 )
 from mapfilter.radio.cell_table import read_plan
 
@@ -60,9 +61,12 @@ class Cell:
     penetration_loss_db : float
         Loss of an indoor cell's signal on its way out.
     mcc, mnc, lac, ci : int or None
-        Global identity.
+        Global identity: LAC or TAC; CI, ECI or NCI.
     arfcn, bsic : int or None
-        BCCH carrier and base station identity code: all that identifies a reported neighbour.
+        Carrier (ARFCN, UARFCN, EARFCN, NR-ARFCN) and code (BSIC, PSC, PCI): all that identifies a
+        reported neighbour.
+    technology : str or None
+        "GSM", "UMTS", "LTE" or "NR"; it limits identity, carrier and code. None where unknown.
     """
 
     id: str
@@ -88,6 +92,7 @@ class Cell:
     ci: int | None = None
     arfcn: int | None = None
     bsic: int | None = None
+    technology: str | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -134,7 +139,7 @@ class CellPlan:
 
     @cached_property
     def ids_by_carrier(self) -> Mapping[tuple[int, int], tuple[str, ...]]:
-        """Ids of the cells on each (ARFCN, BSIC), in the plan's order."""
+        """Ids of the cells on each carrier and code (``arfcn``, ``bsic``), in the plan's order."""
         found: dict[tuple[int, int], tuple[str, ...]] = {}
         for cell in self.cells:
             if cell.arfcn is not None and cell.bsic is not None:
@@ -186,6 +191,8 @@ def _check_cells(
     for i, cell in enumerate(cells):
         if ranges:
             _check_fields(cell, partial(where, i), faults)
+        for name, expected, got in technology_faults(cell.technology, partial(getattr, cell)):
+            faults.add(where(i, name), expected, got, "another technology")
         if cell.antenna in POINTED and cell.azimuth_deg is None:
             expected = "an azimuth, as the antenna is a sector"
             hint = "azimuth left out, or the antenna is omni"
@@ -295,10 +302,12 @@ def write_cell_plan(plan: CellPlan, path: Path | str) -> None:
     )
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    stated = any(cell.technology for cell in plan.cells)
+    columns = COLUMNS if stated else [name for name in COLUMNS if name != "technology"]
+    writer.writerow(columns)
     for cell, lon, lat in zip(plan.cells, lon_deg.tolist(), lat_deg.tolist(), strict=True):
         named = {"cell": cell.id, "lat": f"{lat:.9f}", "lon": f"{lon:.9f}"}
         named["indoor"] = str(int(cell.indoor))
-        writer.writerow(named.get(column) or getattr(cell, column) for column in COLUMNS)
+        writer.writerow(named.get(column) or getattr(cell, column) for column in columns)
     with atomic_file(Path(path)) as temporary:
         temporary.write_text(text.getvalue(), encoding="utf-8")

@@ -17,8 +17,8 @@ import numpy as np
 
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
-from mapfilter.radio.cell_layouts import Table, read_table
 from mapfilter.radio.cell_rules import id_fault
+from mapfilter.radio.tables import Table, read_table
 
 INDEX_COLUMNS = ("TX_NAME", "FILE_NAME")
 """Columns that make a table an index of rasters."""

@@ -32,7 +32,7 @@ from mapfilter._io import read_input
 from mapfilter._types import Floats32, Ints
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
-from mapfilter.radio.cell_layouts import number
+from mapfilter.radio.tables import number
 from mapfilter.rasters.files import Declared, RasterFile, Window, without_nodata
 
 _LARGEST_HEADER_BYTES = 1 << 16

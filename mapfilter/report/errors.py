@@ -47,9 +47,10 @@ def plot_error_over_distance(
     """Draw the position error over the true distance travelled.
 
     The error's axis is logarithmic where hundreds of metres become few; the filter's own radii are
-    a band; epochs without a position leave a gap. Marks the switch from searching to tracking, the
-    50 m that count as success there, the mean and the 67 and 95 % errors after it, and where the
-    filter was searching or lost. Without a title it is the filter's name.
+    a band, its protection levels dotted; epochs without a position leave a gap. Marks the switch
+    from searching to tracking, the 50 m that count as success there, the mean and the 67 and 95 %
+    errors after it, and where the filter was searching or lost. Without a title it is the filter's
+    name.
     """
     distance_m = truth.distance_at(estimate.time_s)
     errors_m = position_errors_m(estimate, truth)
@@ -63,7 +64,7 @@ def plot_error_over_distance(
         # Hundreds of metres while searching would press what follows flat.
         axes.set(yscale="log", ylim=(_LEAST_M, 2 * most_m))
         axes.yaxis.set_major_formatter("{x:g}")
-    _shade(axes, estimate, distance_m)
+    shade_statuses(axes, estimate, distance_m)
     near = Look(color=VERMILLION, linewidth=1.2, linestyle=(0, (5, 3)))
     axes.axhline(SUCCESS_RADIUS_M, label=f"{SUCCESS_RADIUS_M:.0f} m", **near)
     radii_m = estimate.radii_m.T
@@ -72,6 +73,10 @@ def plot_error_over_distance(
             axes.fill_between(distance_m, radius_m, color=ORANGE, alpha=0.16, linewidth=0)
         band = Look(color=ORANGE, linewidth=1.1, label="50, 67, 95 % radius by the filter")
         axes.plot(distance_m, radii_m[2], **band)
+    levels_m = np.where(np.isfinite(estimate.protection_m), estimate.protection_m, np.nan)
+    if np.isfinite(levels_m).any():
+        dotted = Look(color=PURPLE, linewidth=1.1, linestyle=(0, (1, 1.5)))
+        axes.plot(distance_m, levels_m, label="protection level", **dotted)
     axes.plot(distance_m, errors_m, color=BLUE, linewidth=1.5, label="error")
     if score.switched:
         at_m, error_m = score.switch_distance_m, score.error_at_switch_m
@@ -156,14 +161,16 @@ def plot_evidence(estimate: TrackEstimate, truth: Truth | None, *, title: str = 
     below.set(xlabel=across, ylabel="probability / %", ylim=(0.0, 104.0))
     below.set_xlim(float(along[0]), max(float(np.max(along)), float(along[0]) + 1.0))
     for axes in (above, below):
-        _shade(axes, estimate, along, named=axes is above)
+        shade_statuses(axes, estimate, along, named=axes is above)
         tidy(axes, grid=False)
     above.set_title(title or f"Filter: {estimate.filter}")
     bottom_legend(figure, 5)
     return figure
 
 
-def _shade(axes: Axes, estimate: TrackEstimate, along: Floats, *, named: bool = True) -> None:
+def shade_statuses(
+    axes: Axes, estimate: TrackEstimate, along: Floats, *, named: bool = True
+) -> None:
     """Shade the stretches of a track during which the filter was searching or lost."""
     for status, colour in _SHADES.items():
         has = np.array([s is status for s in estimate.status], dtype=bool)

@@ -229,7 +229,8 @@ def corridors(
         aside += left_out
     notes = [f"ways are corridors of {half_width_m:g} m to either side of tracks"]
     if aside:
-        why = f"alone, or less accurate than {max_accuracy_m:g} m"
+        why = f"less accurate than max_accuracy_m = {max_accuracy_m:g} m, or more than "
+        why += f"max_gap_m = {max_gap_m:g} m from the positions before and after"
         notes.append(f"{aside} positions left out: {why}")
     if not pieces:
         hint = "tracks with gaps: raise max_gap_m"

@@ -23,8 +23,8 @@ import numpy as np
 from mapfilter._types import Floats
 from mapfilter.errors import Fault, Faults, InputError, fail
 from mapfilter.geodesy import degree_fault
-from mapfilter.radio.cell_layouts import number
 from mapfilter.radio.cell_rules import RANGES, id_fault
+from mapfilter.radio.tables import number
 
 _LONGEST_LINE = 1 << 16
 _FAULTS_KEPT = 20
@@ -40,6 +40,9 @@ _REQUIRED = ("lat", "lon", "level_dbm")
 FIELDS = ("cell", *_IDENTITY, *_REQUIRED, "time", "accuracy_m", "session")
 """Fields that a column map may name."""
 
+NO_TIME = "times not understood (levels kept)"
+_TIMES = "expected ISO 8601 (2026-05-01T10:00:00+02:00) or Unix s, ms or µs"
+
 Identity = tuple[int, int, int, int]
 """mcc, mnc, lac (tac in LTE) and ci."""
 
@@ -49,7 +52,7 @@ class Rows:
     """Good rows as columns, the faults of bad ones, and counts of what is set aside.
 
     ``cell`` and ``session`` are numbers given in ``cells`` and ``sessions``; ``identified`` is the
-    cell of identities that were looked at before.
+    cell of identities that were looked at before, ``odd_time`` the first time not understood.
     """
 
     path: Path
@@ -64,6 +67,7 @@ class Rows:
     refused: int = 0
     faults: list[Fault] = field(default_factory=list)
     aside: Counter[str] = field(default_factory=Counter)
+    odd_time: str = ""
 
     @property
     def columns(self) -> Floats:
@@ -136,7 +140,8 @@ class Rows:
             return
         time_s, accuracy_m = unix_seconds(given["time"]), number(given["accuracy_m"]) or math.nan
         if given["time"] and math.isnan(time_s):
-            self.aside["times not understood (levels kept)"] += 1
+            self.aside[NO_TIME] += 1
+            self.odd_time = self.odd_time or f"{given['time'][:40]!r} in line {line}"
         if not 0 < accuracy_m < _UNAVAILABLE:
             accuracy_m = math.nan
         self.cell.append(self.cells.setdefault(cell, len(self.cells)))
@@ -145,12 +150,15 @@ class Rows:
 
     def notes(self) -> list[str]:
         """Return remarks on how many rows were refused or set aside, and where the first are."""
-        found = [f"{count} {what}" for what, count in self.aside.items()]
+        found = [f"{count} {what}{self._example(what)}" for what, count in self.aside.items()]
         if self.refused:
             some = "; ".join(str(fault) for fault in self.faults[:_FAULTS_SHOWN])
             more = "; …" if self.refused > _FAULTS_SHOWN else ""
             found.insert(0, f"{self.refused} of {self.read} rows left out: {some}{more}")
         return [f"{self.path.name}: {note}" for note in found]
+
+    def _example(self, what: str) -> str:
+        return f", such as {self.odd_time}; {_TIMES}" if what == NO_TIME and self.odd_time else ""
 
 
 def unix_seconds(text: str) -> float:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -10,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from mapfilter._types import Bools, Floats, Ints, Ints32
-from mapfilter.errors import Fault, InputError, fail
+from mapfilter.errors import Fault, InputError, fail, listed
 from mapfilter.geodesy import project, projected_crs, utm_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.survey.measurement_files import (
@@ -27,7 +28,9 @@ Format = Literal["auto", "csv", "opencellid", "towercollector", "antennas"]
 
 SESSION_GAP_S = 1800.0
 """A longer silence begins a new session."""
+_FILES_NAMED = 3
 _SUFFIXES = (".csv", ".log", ".tsv")
+_RECORDED_SUFFIXES = (".txt", ".gz")
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +119,7 @@ def read_measurements(
     format: Format = "auto",  # noqa: A002
     columns: Mapping[str, str] | None = None,
     session_gap_s: float = SESSION_GAP_S,
+    recorded: Callable[[Path], Rows | None] | None = None,
 ) -> Measurements:
     """Read files of measurements; each file, session column and long silence begins a session.
 
@@ -133,6 +137,9 @@ def read_measurements(
         For "csv": which column holds which of :data:`~mapfilter.survey.measurement_files.FIELDS`.
     session_gap_s : float
         A longer silence begins a new session.
+    recorded : callable, optional
+        With "auto": reads files that are none of these formats; None for those that it does not
+        know.
 
     Raises
     ------
@@ -142,9 +149,9 @@ def read_measurements(
     """
     tables = []
     faults: list[Fault] = []
-    for path in _expanded(files):
+    for path in _expanded(files, recorded):
         try:
-            table = _read(path, format, columns)
+            table = _read(path, format, columns, recorded)
         except InputError as error:
             faults.extend(error.faults)
             continue
@@ -162,27 +169,49 @@ def read_measurements(
     return _joined(tables, projected_crs(crs), session_gap_s)
 
 
-def _read(path: Path, kind: Format, columns: Mapping[str, str] | None) -> Rows:
+def _read(
+    path: Path,
+    kind: Format,
+    columns: Mapping[str, str] | None,
+    recorded: Callable[[Path], Rows | None] | None,
+) -> Rows:
     if columns:
         return read_csv(path, mapped(columns))
     if kind == "auto":
-        header, kind = header_of(path), "csv"
-        if header[:1] == ["begin"]:
-            kind = "antennas"
-        elif {"cellid", "signal", "lat"} <= set(header):
-            kind = "opencellid"
-        elif {"cell_id", "dbm", "lat"} <= set(header):
-            kind = "towercollector"
+        own = _kind_of(path)
+        if own is None and recorded is not None and (rows := recorded(path)) is not None:
+            return rows
+        kind = own or "csv"
     return read_antennas_log(path) if kind == "antennas" else read_csv(path, DIALECTS[kind])
 
 
-def _expanded(files: Sequence[Path | str]) -> list[Path]:
+def _kind_of(path: Path) -> Format | None:
+    """Return the format of a file by its first line; None for none of the own ones."""
+    try:
+        header = header_of(path)
+    except InputError:
+        return None
+    if header[:1] == ["begin"]:
+        return "antennas"
+    names = set(header)
+    kinds: tuple[tuple[Format, set[str]], ...] = (
+        ("opencellid", {"cellid", "signal", "lat"}),
+        ("towercollector", {"cell_id", "dbm", "lat"}),
+        ("csv", {"level_dbm", "lat", "lon"}),
+    )
+    return next((kind for kind, needed in kinds if needed <= names), None)
+
+
+def _expanded(
+    files: Sequence[Path | str], recorded: Callable[[Path], Rows | None] | None
+) -> list[Path]:
+    suffixes = _SUFFIXES if recorded is None else (*_SUFFIXES, *_RECORDED_SUFFIXES)
     found: list[Path] = []
     for path in map(Path, files):
         if path.is_dir():
-            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in _SUFFIXES)
+            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in suffixes)
             if not inside:
-                raise fail(InputError, str(path), f"files {', '.join(_SUFFIXES)}", "none")
+                raise fail(InputError, str(path), f"files {', '.join(suffixes)}", "none")
             found += inside
         else:
             found.append(path)
@@ -218,7 +247,7 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
         north_m,
         level_dbm,
         accuracy_m,
-        tuple(note for table in tables for note in table.notes()),
+        _notes(tables),
     )
     placed = np.isfinite(east_m) & np.isfinite(north_m)
     if not placed.all():
@@ -229,6 +258,25 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
             raise fail(InputError, "measurements", f"places where {crs} is used", got, hint)
         joined = joined.where(placed, f"{count} rows left out: {crs} has no such places")
     return _once(joined)
+
+
+def _notes(tables: Sequence[Rows]) -> tuple[str, ...]:
+    """Return remarks by file; what more than three files share is summed up."""
+    files = Counter(what for table in tables for what in table.aside)
+    shared = [what for what, count in files.items() if count > _FILES_NAMED]
+    found = []
+    for what in shared:
+        of = [table for table in tables if what in table.aside]
+        total, names = sum(table.aside[what] for table in of), [table.path.name for table in of]
+        found.append(f"{total} {what} in {len(of)} files ({listed(names)})")
+        example = next((note for note in of[0].notes() if what in note), "")
+        if (at := example.find(", such as ")) >= 0:
+            found[-1] += example[at:]
+    kept = (
+        replace(t, aside=Counter({w: n for w, n in t.aside.items() if w not in shared}))
+        for t in tables
+    )
+    return (*found, *(note for table in kept for note in table.notes()))
 
 
 def _sessions(table: Rows, gap_s: float) -> Ints:

@@ -7,7 +7,7 @@ checks tables.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, nextafter, pi
 from typing import Literal
 
@@ -41,7 +41,8 @@ class Column:
     """One column of a table: its inclusive range, and ``expected`` and ``hint`` of messages.
 
     Numbers are float64 (missing: NaN), integers nullable Int64, and text is None where missing.
-    Columns that are ``required`` hold a value in every row.
+    Columns that are ``required`` hold a value in every row; ``optional`` ones are only in tables
+    in which they were given.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Column:
     hint: str = ""
     kind: Literal["number", "integer", "text"] = "number"
     required: bool = False
+    optional: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +107,17 @@ TABLES: dict[str, Table] = {
             Column("level_dbm", -200, 0, "dBm in -200..0", "raw RXLEV given for dBm"),
             _integer("censored", -1, 1, "-1, 0 or 1"),
             _integer("timing_advance", 0, 3846, "steps >= 0"),
+            replace(_text("technology", "GSM, UMTS, LTE or NR"), optional=True),
+            Column("level_step_db", 0, 60, "dB in 0..60", optional=True),
+            *(
+                replace(_integer(name, 0, most, "a whole number >= 0"), optional=True)
+                for name, most in (
+                    ("mcc", 999),
+                    ("mnc", 999),
+                    ("lac", 2**24 - 1),
+                    ("ci", 2**36 - 1),
+                )
+            ),
         ),
     ),
     "gnss": Table(

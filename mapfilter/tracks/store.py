@@ -8,7 +8,7 @@ almanac beside it (``almanac.txt``, YUMA) gives the places of satellites whose r
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from difflib import get_close_matches
 from math import inf, isnan, nan
 from pathlib import Path
@@ -33,6 +33,7 @@ from mapfilter.errors import Faults, InputError, MapfilterError, StoreError, fai
 from mapfilter.gnss.orbits import read_yuma
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.schema import OPTIONAL, SCHEMA, TABLES
+from mapfilter.tracks.sensors import FOLDER, write_sensors
 
 HEAD = "log.json"
 ALMANAC = "almanac.txt"
@@ -54,6 +55,8 @@ def _checked_parts(folder: Path, head: dict[str, Any]) -> dict[str, Path]:
     allowed = {f"{table}{suffix}": table for table in TABLES for suffix in _SUFFIXES}
     listed = head["parts"] if isinstance(head["parts"], list) else [head["parts"]]
     for part in listed:
+        if isinstance(part, dict) and str(part.get("path")).startswith(f"{FOLDER}/"):
+            continue
         if not isinstance(part, dict) or part.get("path") not in allowed:
             faults.add(f"{folder / HEAD}, parts", "tables of a log", repr(part))
             continue
@@ -180,6 +183,7 @@ def write_log(
     log: TrackLog,
     folder: str | Path,
     format: Literal["parquet", "csv"] = "parquet",  # noqa: A002
+    sensors: Mapping[str, pd.DataFrame] | None = None,
 ) -> None:
     """Write a log as a folder, in one step; equal logs give equal bytes.
 
@@ -189,6 +193,8 @@ def write_log(
         Replaced when it is there; must be absent, empty or a log that mapfilter wrote.
     format : {"parquet", "csv"}
         Of the tables.
+    sensors : mapping of str to pandas.DataFrame, optional
+        Tables of raw sensors, see :data:`mapfilter.tracks.sensors.SENSOR_COLUMNS`.
 
     Raises
     ------
@@ -207,11 +213,13 @@ def write_log(
             if format == "csv":
                 rows.to_csv(path, index=False, lineterminator="\n")
             else:
-                schema = pa.schema([(column.name, _ARROW[column.kind]) for column in SCHEMA[table]])
+                columns = [column for column in SCHEMA[table] if column.name in rows]
+                schema = pa.schema([(column.name, _ARROW[column.kind]) for column in columns])
                 plain = pa.Table.from_pandas(rows, schema, preserve_index=False)
                 pq.write_table(plain.replace_schema_metadata(None), path, compression="zstd")
             part = {"path": path.name, "sha256": sha256_file(path)}
             parts.append(part | {"bytes": path.stat().st_size, "rows": len(rows)})
+        parts += write_sensors(new, sensors or {}, format)
         head: dict[str, Any] = {
             "format": FORMAT,
             "version": VERSION,
@@ -291,7 +299,10 @@ def _no_log(path: Path, expected: str) -> MapfilterError:
         expected = f'{HEAD} with the CRS, such as {{"crs": "EPSG:32635"}}'
         return fail(InputError, str(path), expected, got, "left out when the log was made by hand")
     if path.is_file():
-        return fail(InputError, str(path), expected, "a file", "name the folder that it lies in")
+        hint = "name the folder that it lies in"
+        if path.stem not in TABLES and path.name != HEAD:
+            hint = f"convert it first: mapfilter convert {path.name} --out LOG"
+        return fail(InputError, str(path), expected, "a file", hint)
     got = "a folder without any" if path.is_dir() else "no such folder"
     return fail(InputError, str(path), expected, got)
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults
 from mapfilter.geodesy import wrap_rad
+from mapfilter.radio.identities import LIMITS
 from mapfilter.tracks.schema import (
     MISSING_SIGNS,
     NEIGHBOUR,
@@ -82,16 +83,18 @@ def tidy_table(
         Number of each row in messages; 1 to N by default.
     """
     if given is None:
-        given = pd.DataFrame({column.name: [] for column in SCHEMA[table]})
+        given = pd.DataFrame({c.name: [] for c in SCHEMA[table] if not c.optional})
     given = given.reset_index(drop=True)
     numbers = np.arange(1, len(given) + 1) if row_numbers is None else np.asarray(row_numbers)
     door = _Door(where, numbers, faults)
     notes = _check_columns(table, given, door)
-    tidy = pd.DataFrame({column.name: _column(column, given, door) for column in SCHEMA[table]})
+    columns = [c for c in SCHEMA[table] if c.name in given.columns or not c.optional]
+    tidy = pd.DataFrame({column.name: _column(column, given, door) for column in columns})
     if table == "radio":
         role = tidy["role"]
         bad = role.notna().to_numpy() & ~role.isin([SERVING, NEIGHBOUR]).to_numpy()
         _add_rows(door, bad, SCHEMA["radio"][1], role)
+        _check_technologies(tidy, door)
         tidy["censored"] = tidy["censored"].fillna(0)
     if table == "gnss":
         _check_covariance(tidy, door)
@@ -107,9 +110,10 @@ def tidy_table(
 
 def _check_columns(table: str, given: pd.DataFrame, door: _Door) -> tuple[str, ...]:
     names = [column.name for column in SCHEMA[table]]
+    usual = [c.name for c in SCHEMA[table] if not c.optional and c.name not in given.columns]
     notes = []
     for name in (str(name) for name in given.columns if name not in names):
-        near = get_close_matches(name, [n for n in names if n not in given.columns], 1, 0.6)
+        near = get_close_matches(name, usual, 1, 0.6)
         if near:
             door.add(f", column {name}", f"columns {', '.join(names)}", name, near[0])
         else:
@@ -188,6 +192,20 @@ def _add_rows(door: _Door, bad: Bools, column: Column, values: pd.Series) -> Non
 
 def _is_empty(value: Any) -> bool:
     return value is None or value is pd.NA or (isinstance(value, str) and value == "")
+
+
+def _check_technologies(radio: pd.DataFrame, door: _Door) -> None:
+    """Note carriers, codes and timing advances that the row's technology does not have."""
+    if "technology" not in radio:
+        return
+    technology = radio["technology"]
+    for family, limits in LIMITS.items():
+        of = (technology == family).to_numpy()
+        for name, most in limits.items():
+            if of.any() and name in radio:
+                value = radio[name].to_numpy(dtype=np.float64, na_value=np.nan)
+                column = Column(name, 0, most, f"0..{most} in {family}")
+                _add_rows(door, of & (value > most), column, radio[name])
 
 
 def _check_covariance(gnss: pd.DataFrame, door: _Door) -> None:

@@ -15,8 +15,8 @@ from mapfilter.database.estimate import BuildEstimate, dry_run
 from mapfilter.database.manifest import InputFile
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import projected_crs, same_crs
 from mapfilter.radio.cells import CellPlan
+from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.workflows.pictures import NETWORK_PICTURES, clear_pictures, draw_network
 from mapfilter.workflows.streets import pixels_on
@@ -24,6 +24,7 @@ from mapfilter.workflows.world import (
     World,
     area_lattice,
     check_cells_near,
+    check_crs_of_area,
     check_scale,
     map_cover,
     planned_rasters,
@@ -133,13 +134,10 @@ def _raster_world(config: Config) -> tuple[RxLevRasters, CellPlan, World]:
     """
     rasters = planned_rasters(config)
     lattice, area = rasters.lattice, config.area
-    if area.crs is not None:
-        area_crs = projected_crs(area.crs, "area.crs")
-        if not same_crs(area_crs, lattice.crs):
-            expected = f"{area_crs}, the CRS of the area"
-            raise fail(InputError, f"{rasters.path}, CRS", expected, lattice.crs, "another zone")
+    check_crs_of_area(area, rasters)
     check_scale(lattice.crs, lattice.bounds_m, f"{rasters.path}, CRS")
     whole = world = World(config, lattice)
+    rasters = named_by_plan(rasters, whole.plan)
     if area.has_box:
         wanted = area_lattice(area.model_copy(update={"crs": lattice.crs}))
         found = pixels_on(lattice, wanted.bounds_m)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+import numpy as np
 import rasterio
 from rasterio.errors import RasterioError
 
@@ -20,7 +21,11 @@ from mapfilter.geodesy import Lattice
 from mapfilter.propagation.predict import off_frequency
 from mapfilter.radio.cell_rules import ANTENNAS
 from mapfilter.radio.cells import CellPlan
+from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
+from mapfilter.survey.measurement_files import NO_TIME
+from mapfilter.survey.measurements import Measurements
+from mapfilter.workflows.check_logs import check_logs
 from mapfilter.workflows.check_places import (
     check_pixels,
     check_rasters_place,
@@ -76,6 +81,7 @@ def run_check(config: Config, progress: Progress | None = None) -> CheckResult:
     done(4)
     if area is not None and placed:
         check.check_roads(area, rasters)
+    check_logs(config, lattice, plan, findings)
     done(5)
     return findings.result()
 
@@ -127,7 +133,9 @@ class _Checks:
         about = rasters.lattice if rasters is not None else None
         if config.surveyed_plan is not None:
             try:
-                about = survey_inputs(config).lattice
+                inputs = survey_inputs(config)
+                about = inputs.lattice
+                self._check_times(inputs.measurements)
             except MapfilterError as error:
                 self.findings.add_faults(error, "measurements-invalid")
                 if not config.area.has_extent:
@@ -144,6 +152,18 @@ class _Checks:
             self.findings.add_faults(error, "map-invalid" if of_map else "area-invalid")
             return None
 
+    def _check_times(self, measurements: Measurements) -> None:
+        """Report sessions without times that can be read."""
+        unknown = np.bincount(measurements.session, np.isnan(measurements.time_s))
+        lost = np.flatnonzero(unknown == np.bincount(measurements.session))
+        if lost.size:
+            names = listed([measurements.sessions[i] for i in lost.tolist()])
+            evidence = f"No time can be read in {lost.size} of {len(unknown)} sessions ({names})"
+            examples = [note for note in measurements.notes if NO_TIME in note]
+            evidence += f": {examples[0]}." if examples else "."
+            where = ", ".join(map(str, self.config.prediction.survey.files))
+            self.findings.add("measurements-without-times", where, evidence, "warning")
+
     def overlaps(self, rasters: RxLevRasters) -> bool:
         return not self._is_placed or check_rasters_place(rasters, self.config, self.findings)
 
@@ -156,6 +176,7 @@ class _Checks:
 
     def check_rasters(self, rasters: RxLevRasters, plan: CellPlan | None) -> None:
         config, findings = self.config, self.findings
+        rasters = rasters if plan is None else named_by_plan(rasters, plan)
         check_pixels(rasters, findings)
         before = len(findings.found)
         samples = sampled(rasters, plan, findings)

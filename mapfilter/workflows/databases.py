@@ -18,7 +18,9 @@ from mapfilter.database.manifest import MANIFEST
 from mapfilter.database.merge import merge
 from mapfilter.database.store import info, open_database
 from mapfilter.errors import ConfigError, InputError, fail
+from mapfilter.evaluation.map_bound import BANDS as BOUND_BANDS
 from mapfilter.rasters.raster_set import is_raster_folder, open_rasters
+from mapfilter.tracks.readers.formats import format_of, read_recording
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import is_log, read_log
 
@@ -66,7 +68,9 @@ def run_info(path: Path) -> dict[str, Any]:
     if not path.exists():
         raise fail(InputError, str(path), "a database, raster file or log", "nothing there")
     if path.is_file():
-        if hint := _no_raster(path):
+        if (hint := _no_raster(path)) is None:
+            return _recording_info(path)
+        if hint:
             raise fail(InputError, str(path), "a database, raster or log folder", "a file", hint)
         return _raster_info(path)
     if (path / MANIFEST).exists():
@@ -82,8 +86,8 @@ def run_info(path: Path) -> dict[str, Any]:
     raise fail(InputError, str(path), f"{MANIFEST}, a log, or logs", "none", hint)
 
 
-def _no_raster(path: Path) -> str:
-    """Return the use of a file that is not a raster, or an empty text."""
+def _no_raster(path: Path) -> str | None:
+    """Return the use of a file that is not a raster, else an empty text; None for a recording."""
     name = path.name.lower()
     if name.endswith(_MAPS):
         return "a map; use it as area.map"
@@ -93,23 +97,36 @@ def _no_raster(path: Path) -> str:
         return "an exported database, or a layer of roads; QGIS and geopandas open it"
     if path.suffix.lower() in (".tif", ".tiff") and _is_export(path):
         return "best servers that mapfilter export wrote; QGIS and rasterio open it"
+    if path.suffix.lower() in (".tif", ".tiff") and _is_bound(path):
+        return "the bound of a database that mapfilter bound wrote; QGIS and rasterio open it"
     if path.suffix == ".toml":
         return "a configuration; give it to a command with -c"
+    if format_of(path) is not None:
+        return None
     if path.suffix == ".csv" and _INDEX_COLUMN not in _first_line(path):
         return "a cell plan; use it as cells.plan"
     return ""
 
 
-def _is_export(path: Path) -> bool:
+def _described(path: Path) -> tuple[tuple[str | None, ...], bool]:
+    """Return the descriptions of a raster's bands, and whether a tag lists cells."""
     try:
         with warnings.catch_warnings():
             # A file that is cut off may have lost its place; its own reader reports that.
             warnings.simplefilter("ignore", NotGeoreferencedWarning)
             source = rasterio.open(path)
         with source:
-            return CELLS_TAG in source.tags() and source.descriptions == tuple(dict(BANDS))
+            return source.descriptions, CELLS_TAG in source.tags()
     except RasterioError:
-        return False
+        return (), False
+
+
+def _is_export(path: Path) -> bool:
+    return _described(path) == (tuple(dict(BANDS)), True)
+
+
+def _is_bound(path: Path) -> bool:
+    return _described(path)[0] == tuple(dict(BOUND_BANDS))
 
 
 def _first_line(path: Path) -> bytes:
@@ -135,6 +152,20 @@ def _raster_info(path: Path) -> dict[str, Any]:
         "cols": lattice.cols,
         "bytes": sum(part.stat().st_size for part in rasters.parts),
         "notes": list(rasters.notes),
+    }
+
+
+def _recording_info(path: Path) -> dict[str, Any]:
+    recording = read_recording(path)
+    return {
+        "kind": "recording",
+        "format": recording.format,
+        "program": recording.program,
+        "clock": str(recording.clock),
+        "rows": {name: len(rows) for name, rows in recording.tables.items()},
+        "unused": {found.reason: found.count for found in recording.unusable},
+        "notes": list(recording.notes),
+        "use": "mapfilter replay --log, or mapfilter convert",
     }
 
 

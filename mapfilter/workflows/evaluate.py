@@ -10,15 +10,17 @@ from pathlib import Path
 from typing import Any
 
 from mapfilter._io import ensure_writable_folder, write_json
-from mapfilter._parallel import Progress, local_executor
+from mapfilter._parallel import Progress
 from mapfilter.config.load import given_keys, load_config
 from mapfilter.config.sections import Config
 from mapfilter.database.build import build
 from mapfilter.database.sources import LatticeRoutes
 from mapfilter.errors import ConfigError, Faults, fail
+from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
-from mapfilter.experiments.benchmarks.global_positioning import benchmark
-from mapfilter.experiments.benchmarks.scores import CaseResult
+from mapfilter.experiments.benchmarks.global_positioning import Batch
+from mapfilter.experiments.benchmarks.plain_runs import PlainCity
+from mapfilter.experiments.benchmarks.results import CaseResult
 from mapfilter.experiments.benchmarks.world import (
     BUILDINGS,
     FULL,
@@ -37,6 +39,7 @@ from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.satellites import NlosModel, ReceptionModel
+from mapfilter.workflows.evaluate_runs import run_cases, street_base
 from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.terminal import to_jsonable
 from mapfilter.workflows.world import World, filter_choice, option_sections
@@ -53,6 +56,9 @@ _MAIN = (
     "error_mean_m",
     "error_95_m",
     "coverage_95",
+    "off_50m",
+    "hazardous",
+    "exceeded",
     "false_lost_per_km",
     "seconds_per_track",
 )
@@ -64,7 +70,6 @@ _PREDICTS = "levels are predicted here, and the ground truth is drawn"
 _NO_JOURNEYS = "journeys are simulated here"
 _RUNS = "use --runs"
 _NO_TIMING = "no timing advances are simulated"
-_PICTURES = "no pictures are drawn here"
 REFUSED: Mapping[str, str] = {
     "prediction.ground_truth.write": _PREDICTS,
     "prediction.ground_truth.seed": _DRAWN,
@@ -83,7 +88,6 @@ REFUSED: Mapping[str, str] = {
     "filter.kalman.timing_sd_m": _NO_TIMING,
     "filter.kalman.timing_memory_m": _NO_TIMING,
     "sweep": "there is no grid here; use mapfilter sweep",
-    "output.pictures": _PICTURES,
 }
 """Settings, or sections of them, that have no meaning here, and why."""
 
@@ -180,6 +184,7 @@ def run_global_positioning(
     resume: bool = False,
     progress: Progress | None = None,
     fixed: frozenset[str] = frozenset(),
+    pictures: bool = True,
 ) -> EvaluateResult:
     """Predict, build, and run the cases of the benchmark on a map.
 
@@ -188,7 +193,7 @@ def run_global_positioning(
     config, fixed
         From :func:`mapfilter.workflows.evaluate.load_benchmark`.
     out : Path
-        Gets the world, the finished batches and ``table.json``.
+        Gets the world, the finished batches, ``table.json`` and ``pictures``.
     runs, seed : int
         Routes for each case; seed of routes, ground truth and noise.
     cases : sequence of str
@@ -199,6 +204,8 @@ def run_global_positioning(
         Keep what the same benchmark has finished.
     progress : callable, optional
         Called with batches done and batches in all.
+    pictures : bool
+        Whether to draw them, unless ``output.pictures`` is "none".
 
     Raises
     ------
@@ -210,21 +217,19 @@ def run_global_positioning(
     choice = filter_choice(config.filter)
     _check_lengths(wanted, fixed)
     ensure_writable_folder(out)
-    world, points = _world(World.of(config), out / "world", seed)
-    with local_executor(workers) as executor:
-        found = benchmark(
-            world,
-            choice,
-            wanted,
-            runs,
-            seed,
-            out,
-            executor=executor,
-            in_flight=2 * workers,
-            resume=resume,
-            progress=progress,
-            fixed=fixed,
-        )
+    area = World.of(config)
+    world, points = _world(area, out / "world", seed)
+    city = PlainCity(world, seed)
+    integrity = config.integrity.of(IntegrityOptions)
+    drawn = pictures and config.output.pictures != "none"
+    found = run_cases(
+        Batch(city, choice, wanted, 0, runs, fixed, integrity),
+        out,
+        workers=workers,
+        resume=resume,
+        progress=progress,
+        base=street_base(city.streets, area.streets.attribution) if drawn else None,
+    )
     result = EvaluateResult(
         Path(config.area.map).name, seed, points, tuple(found), time.perf_counter() - began_s, out
     )

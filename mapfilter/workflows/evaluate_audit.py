@@ -10,7 +10,7 @@ from typing import Any
 
 from mapfilter._io import write_json
 from mapfilter._parallel import Progress, part_of
-from mapfilter.experiments.benchmarks.scores import CaseResult
+from mapfilter.experiments.benchmarks.results import CaseResult
 from mapfilter.workflows.evaluate import (
     TABLE,
     check_names,
@@ -202,6 +202,7 @@ def run_audit(
             resume=resume,
             progress=part_of(progress, number, len(wanted)),
             fixed=fixed,
+            pictures=False,
         )
         map_name = result.map
         rows.append(AuditRow(**vars(change), result=result.cases[0]))

@@ -11,13 +11,14 @@ from typing import get_args
 import numpy as np
 
 from mapfilter._io import atomic_dir, ensure_writable_folder, write_json
-from mapfilter._parallel import Progress, local_executor
+from mapfilter._parallel import Progress
 from mapfilter._types import Floats
 from mapfilter.config.load import given_keys
 from mapfilter.config.sections import Config
 from mapfilter.database.build import build
 from mapfilter.database.sources import LatticeRoutes
 from mapfilter.errors import ConfigError, Faults
+from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.experiments.benchmarks.foreign import (
     GROUND,
     STREETS,
@@ -27,7 +28,7 @@ from mapfilter.experiments.benchmarks.foreign import (
     database_name,
     write_ground,
 )
-from mapfilter.experiments.benchmarks.foreign_runs import foreign_benchmark
+from mapfilter.experiments.benchmarks.global_positioning import Batch
 from mapfilter.experiments.benchmarks.world import without_ways
 from mapfilter.experiments.benchmarks.world_cases import CASES_OF, OtherWorld
 from mapfilter.experiments.sweep.world import SweepWorld, write_world
@@ -45,6 +46,7 @@ from mapfilter.simulation.worlds.radio import planners_offsets_db
 from mapfilter.simulation.worlds.street_lines import StreetLines
 from mapfilter.tracks.store import write_log
 from mapfilter.workflows.evaluate import TABLE, EvaluateResult, load_benchmark
+from mapfilter.workflows.evaluate_runs import run_cases, street_base
 from mapfilter.workflows.terminal import to_jsonable
 from mapfilter.workflows.world import World, filter_choice
 
@@ -130,22 +132,20 @@ def run_foreign(
     wanted = _check_cases(world, cases)
     choice = filter_choice(config.filter)
     ensure_writable_folder(out)
-    made, points = prepare(World.of(config), world, out / "world", seed, wanted, runs)
+    area = World.of(config)
+    made, points = prepare(area, world, out / "world", seed, wanted, runs)
     if "length_m" in fixed:
         made = replace(made, length_m=config.journeys.length_m)
-    with local_executor(workers) as executor:
-        found = foreign_benchmark(
-            made,
-            choice,
-            wanted,
-            runs,
-            out,
-            executor=executor,
-            in_flight=2 * workers,
-            resume=resume,
-            progress=progress,
-            fixed=fixed,
-        )
+    integrity = config.integrity.of(IntegrityOptions)
+    drawn = config.output.pictures != "none"
+    found = run_cases(
+        Batch(made, choice, wanted, 0, runs, fixed, integrity),
+        out,
+        workers=workers,
+        resume=resume,
+        progress=progress,
+        base=street_base(made.streets, area.streets.attribution) if drawn else None,
+    )
     name = Path(config.area.map).name
     seconds = time.perf_counter() - began_s
     result = EvaluateResult(name, seed, points, tuple(found), seconds, out)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, cast
@@ -20,6 +20,7 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
 from mapfilter.evaluation.accuracy import Accuracy, Outcome, Truth, accuracy, outcome
+from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.evaluation.success import SuccessSummary, summarise
 from mapfilter.filters.contract import Reason
 from mapfilter.geodesy import Lattice, same_crs
@@ -27,12 +28,16 @@ from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.filter import Filter, FilterOptions, locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
+from mapfilter.positioning.log_options import fitted_to_log
 from mapfilter.propagation.shadowing import named_rng
+from mapfilter.radio.cells import CellPlan
 from mapfilter.report.canvas import save
 from mapfilter.report.errors import plot_error_over_distance
+from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog, leave_out
+from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.schema import SERVING
-from mapfilter.tracks.store import list_logs, read_log
+from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.pictures import ESTIMATES, FIGURES, SUMMARY, clear_results, draw_track
 from mapfilter.workflows.terminal import to_jsonable
 from mapfilter.workflows.world import filter_choice, outside_m, plan_antennas, planned_cells
@@ -40,34 +45,49 @@ from mapfilter.workflows.world import filter_choice, outside_m, plan_antennas, p
 _AWAY_M = 5000.0
 
 
-def check_logs(folders: Sequence[Path], lattice: Lattice) -> None:
-    """Read every log once before any is located, so that all faults are reported before any result.
+def check_log(path: Path, log: TrackLog, lattice: Lattice, faults: Faults) -> None:
+    """Note a log in another CRS than the database, or far outside its lattice.
 
-    Raises
-    ------
-    InputError
-        Logs cannot be read, are in another CRS than the database, or their truth or GNSS fixes all
-        lie more than 5 km outside its lattice.
+    Its truth, or its GNSS fixes, may not all lie more than 5 km outside.
     """
-    faults = Faults()
-    for folder in folders:
-        if wrong := path_fault(folder):
-            faults.add("logs", wrong, shown(str(folder)))
-            continue
-        try:
-            log = read_log(folder)
-        except MapfilterError as error:
-            faults.found.extend(error.faults)
-            continue
-        if not same_crs(log.crs, lattice.crs):
-            expected = f"{lattice.crs}, the database's"
-            faults.add(f"{folder}, crs", expected, log.crs, "log of another area or zone")
-            continue
-        for table in ("truth", "gnss"):
-            places = getattr(log, table)
-            east_m, north_m = places["east_m"].to_numpy(), places["north_m"].to_numpy()
-            _check_near(f"{folder}, {table}", east_m, north_m, lattice, faults)
-    faults.raise_if_any(InputError)
+    if not same_crs(log.crs, lattice.crs):
+        expected = f"{lattice.crs}, the database's"
+        faults.add(f"{path}, crs", expected, log.crs, "log of another area or zone")
+        return
+    for table in ("truth", "gnss"):
+        places = getattr(log, table)
+        east_m, north_m = places["east_m"].to_numpy(), places["north_m"].to_numpy()
+        _check_near(f"{path}, {table}", east_m, north_m, lattice, faults)
+
+
+class _Logs:
+    """The logs of a configuration; recordings are kept, as reading them may take long."""
+
+    def __init__(self, config: Config, database: RadioRouteDatabase | None) -> None:
+        self.config, self.paths = config, journeys_of(config)
+        self._crs = "" if database is None else database.lattice.crs
+        self._kept: dict[Path, OpenedLog] = {}
+
+    def open(self, path: Path) -> OpenedLog:
+        opened = self._kept.get(path) or open_journey(self.config, path, self._crs)
+        if opened.recordings:
+            self._kept[path] = opened
+        return opened
+
+    def check(self, lattice: Lattice) -> None:
+        """Read every log before any is located, so that all faults come before any result."""
+        faults = Faults()
+        for path in self.paths:
+            if wrong := path_fault(path):
+                faults.add("logs", wrong, shown(str(path)))
+                continue
+            try:
+                check_log(path, self.open(path).log, lattice, faults)
+            except ConfigError:
+                raise
+            except MapfilterError as error:
+                faults.found.extend(error.faults)
+        faults.raise_if_any(InputError)
 
 
 def lacking(log: TrackLog, estimate: TrackEstimate) -> str:
@@ -270,7 +290,8 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
     Parameters
     ----------
     config : Config
-        Its database (for Kalman-type filters its cells), track, filter and output sections count.
+        Its database (for Kalman-type filters its cells), track, filter, integrity and output
+        sections count.
     out : Path
         Folder of the results; one log writes straight into it, several into a folder each.
     progress : callable, optional
@@ -284,29 +305,45 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
     """
     options = filter_choice(config.filter)
     database = _database(config, options)
-    folders = list_logs(config.track_path)
+    journeys = _Logs(config, database)
 
     @cache
-    def over(crs: str) -> Filter[Any]:
-        if database is not None and not isinstance(options, KalmanFilter):
-            return options.over(database)
-        plan = planned_cells(config, crs) if database is None else database.plan
-        return cast(KalmanFilter, options).over_sites(plan, plan_antennas(config, plan))
+    def sites(crs: str) -> CellPlan:
+        return planned_cells(config, crs) if database is None else database.plan
+
+    filters: dict[tuple[str, ...], Filter[Any]] = {}
+
+    def over(crs: str, fitted: FilterOptions, *notes: str) -> Filter[Any]:
+        key = (crs, *notes)
+        if key not in filters:
+            filters[key] = bound(crs, fitted)
+        return filters[key]
+
+    def bound(crs: str, fitted: FilterOptions) -> Filter[Any]:
+        if database is not None and not isinstance(fitted, KalmanFilter):
+            return fitted.over(database)
+        plan = sites(crs)
+        return cast(KalmanFilter, fitted).over_sites(plan, plan_antennas(config, plan))
 
     if database is not None:
-        check_logs(folders, database.lattice)
-        over(database.lattice.crs)
+        journeys.check(database.lattice)
+        over(database.lattice.crs, options)
     ensure_writable_folder(out)
     clear_results(out)
     logs: list[ReplayedLog] = []
-    wanted = config.output.pictures
-    for index, folder in enumerate(folders):
-        log = leave_out(read_log(folder), config.track.without)
-        rng = named_rng(config.journeys.seed, "replay", folder.name)
+    wanted, count = config.output.pictures, len(journeys.paths)
+    risk = config.integrity.of(IntegrityOptions).risk
+    for index, path in enumerate(journeys.paths):
+        opened = journeys.open(path)
+        name, crs = opened.name, opened.log.crs if database is None else database.lattice.crs
+        log = leave_out(name_by_plan(opened.log, sites(crs)), config.track.without)
+        fitted, notes = fitted_to_log(options, log)
+        filter_ = over(crs, fitted, *notes)
+        log = replace(log, notes=(*log.notes, *notes))
+        rng = named_rng(config.journeys.seed, "replay", name)
         drawn = wanted == "all" or (wanted == "first" and not index)
-        filter_ = over(log.crs if database is None else database.lattice.crs)
-        track = locate(log, filter_, rng, snapshots=drawn)
-        into = out if len(folders) == 1 else out / folder.name
+        track = locate(log, filter_, rng, snapshots=drawn, risk=risk)
+        into = out if count == 1 else out / name
         if database is None:
             pictures = _draw_errors(log, track, into) if drawn else ()
         else:
@@ -314,11 +351,13 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         lack = lacking(log, track.estimate)
         if isinstance(options, KalmanFilter):
             lack = "" if track.estimate.converged_at is not None else "too little was measured"
-        logs.append(_write(folder.name, log, track, into, pictures, lack))
+        if "no motion" in lack and "velocity" in opened.sensors:
+            lack += " (track.course_motion makes it from speed and course)"
+        logs.append(_write(name, log, track, into, pictures, lack))
         if progress is not None:
-            progress(index + 1, len(folders))
+            progress(index + 1, count)
     result = ReplayResult(config.filter.name, tuple(logs), summary_of(logs), out)
-    if len(folders) > 1:
+    if count > 1:
         write_json(out / SUMMARY, to_jsonable(summary_figures(result)))
     return result
 

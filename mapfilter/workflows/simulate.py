@@ -8,8 +8,8 @@ from pathlib import Path
 from mapfilter._io import atomic_dir
 from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
-from mapfilter.errors import InputError, OutputError, fail
-from mapfilter.geodesy import same_crs
+from mapfilter.errors import OutputError, fail, listed
+from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import check_against_plan
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.imu import ImuNoise
@@ -19,7 +19,7 @@ from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
 from mapfilter.simulation.walking import WalkerModel, inside_buildings
 from mapfilter.tracks.store import check_log_replaceable, is_log, write_log
 from mapfilter.workflows.predict import open_ground_truth
-from mapfilter.workflows.world import World, check_cells_near, planned_rasters
+from mapfilter.workflows.world import World, check_cells_near, lattice_on, planned_rasters
 
 
 @dataclass(frozen=True)
@@ -32,24 +32,23 @@ class SimulateResult:
     """True length of each journey."""
     path: Path
     """Folder that holds one log folder for each."""
+    notes: tuple[str, ...] = ()
+    """Which journeys receive nothing, and how rasters were read."""
 
 
 def run_simulate(config: Config, progress: Progress | None = None) -> SimulateResult:
     """Simulate journeys and write their logs; a folder of older logs is replaced as a whole."""
-    world = World.of(config)
     settings = simulation_settings(config)
     as_predicted = settings.reports.radio == "as_predicted"
     rasters = planned_rasters(config) if as_predicted else open_ground_truth(config)
+    world = World(config, lattice_on(config.area, rasters))
+    rasters = named_by_plan(rasters, world.plan)
     check_against_plan(rasters, world.plan)
     check_cells_near(world.plan, world.lattice, str(config.cells.plan or "cells"))
-    if not same_crs(rasters.lattice.crs, world.lattice.crs):
-        expected = f"{world.lattice.crs}, the CRS of the area"
-        where = f"{rasters.path}, CRS"
-        raise fail(InputError, where, expected, rasters.lattice.crs, "another zone: set area.crs")
     _check_replaceable(config.track_path)
     network = street_network(world.ways, world.routes)
     levels = level_sampler(rasters, world.plan.ids, world.lattice.bounds_m, plan=world.plan)
-    total = settings.journeys * settings.draws
+    total, silent = settings.journeys * settings.draws, []
     with atomic_dir(config.track_path) as folder:
         track_m = 0.0
         centred = settings.journey.walker.beside == "centre"
@@ -59,9 +58,14 @@ def run_simulate(config: Config, progress: Progress | None = None) -> SimulateRe
         for done, (name, log) in enumerate(journeys, start=1):
             write_log(log, folder / name)
             track_m = log.truth_length_m
+            if log.radio.empty:
+                silent.append(name)
             if progress is not None:
                 progress(done, total)
-    return SimulateResult(total, track_m, config.track_path)
+    notes = list(rasters.notes)
+    if silent:
+        notes.append(f"no cell is received in {len(silent)} of {total} journeys ({listed(silent)})")
+    return SimulateResult(total, track_m, config.track_path, tuple(notes))
 
 
 def _check_replaceable(folder: Path) -> None:

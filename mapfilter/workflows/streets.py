@@ -26,6 +26,7 @@ from mapfilter.roads.routes import Roads, gaps, read_roads, unused_classes, with
 from mapfilter.roads.ways import Bounds, Buildings, Water, Ways, clip_ways
 from mapfilter.simulation.synthetic_city import SyntheticCity, manhattan, synthetic_city
 from mapfilter.survey.measurements import Measurements, read_measurements
+from mapfilter.workflows.measured import recorded_rows
 
 LARGEST_AREA_PX = 400_000_000
 EARTH_RADIUS_M = 6_371_000.0
@@ -327,8 +328,14 @@ def _parts(path: Path) -> list[Path]:
 def measurements_of(config: Config, files: Sequence[Path], crs: str | None) -> Measurements:
     """Read measurements as the section of the survey describes them."""
     survey = config.prediction.survey
-    columns, gap_s = survey.columns.given or None, survey.session_gap_s
-    return read_measurements(files, crs, format=survey.format, columns=columns, session_gap_s=gap_s)
+    return read_measurements(
+        files,
+        crs,
+        format=survey.format,
+        columns=survey.columns.given or None,
+        session_gap_s=survey.session_gap_s,
+        recorded=recorded_rows,
+    )
 
 
 def _corridors(config: Config, crs: str, bounds_m: Bounds) -> Roads:

@@ -27,10 +27,11 @@ from mapfilter.experiments.sweep.plan import (
 )
 from mapfilter.experiments.sweep.world import SweepWorld, all_levels_dbm
 from mapfilter.filters.candidate import CandidateOptions
-from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.geodesy import Lattice
 from mapfilter.propagation.models import GroundTruthErrors
 from mapfilter.propagation.shadowing import site_shadowing
 from mapfilter.radio.cells import CellPlan
+from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import check_against_plan
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.network import street_network
@@ -38,7 +39,13 @@ from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
 from mapfilter.workflows.predict import open_ground_truth
 from mapfilter.workflows.simulate import simulation_settings
-from mapfilter.workflows.world import World, check_cells_near, filter_choice, planned_rasters
+from mapfilter.workflows.world import (
+    World,
+    check_cells_near,
+    filter_choice,
+    lattice_on,
+    planned_rasters,
+)
 
 GROUND_TRUTH = "ground truth"
 
@@ -188,17 +195,14 @@ def sweep_world(config: Config, radios: Sequence[Radio]) -> SweepWorld:
         The area, map, plan or rasters are wrong, or the ground truth is not predicted yet.
     """
     names = {radio.name for radio in radios}
-    world = World.of(config)
     opened = {
         real: open_ground_truth(config) if real else planned_rasters(config)
         for real in sorted({name == GROUND_TRUTH for name in names})
     }
-    for rasters in opened.values():
+    world = World(config, lattice_on(config.area, next(iter(opened.values()))))
+    for real in opened:
+        rasters = opened[real] = named_by_plan(opened[real], world.plan)
         check_against_plan(rasters, world.plan)
-        if not same_crs(rasters.lattice.crs, world.lattice.crs):
-            expected = f"{world.lattice.crs}, the CRS of the area"
-            where, found = f"{rasters.path}, CRS", rasters.lattice.crs
-            raise fail(InputError, where, expected, found, "another zone: set area.crs")
     lattices = [rasters.lattice for rasters in opened.values()]
     if len(set(lattices)) > 1:
         expected = "ground truth rasters on the lattice of the predicted ones"

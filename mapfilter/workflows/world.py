@@ -16,7 +16,7 @@ from mapfilter.config.inputs import Area, Rasters
 from mapfilter.config.sections import Config, FilterSection
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes, Routes
 from mapfilter.errors import ConfigError, InputError, fail
-from mapfilter.geodesy import Lattice, unproject
+from mapfilter.geodesy import Lattice, projected_crs, same_crs, short_crs, unproject
 from mapfilter.positioning.filter import FilterOptions
 from mapfilter.positioning.locators import BUILT_IN, filter_options
 from mapfilter.radio.antenna import MeasuredAntenna
@@ -81,6 +81,34 @@ def open_by_section(path: Path, section: Rasters) -> RxLevRasters:
         resolution_m=section.resolution_m,
         resampling=section.resampling,
     )
+
+
+def check_crs_of_area(area: Area, rasters: RxLevRasters) -> None:
+    """Check that rasters are in the CRS that the area states, if any."""
+    if area.crs is None:
+        return
+    wanted, found = projected_crs(area.crs, "area.crs"), rasters.lattice.crs
+    if not same_crs(wanted, found):
+        expected = f"{wanted}, the CRS of the area"
+        hint = f'another zone or datum: set area.crs = "{short_crs(found)}"'
+        raise fail(InputError, f"{rasters.path}, CRS", expected, found, hint)
+
+
+def lattice_on(area: Area, rasters: RxLevRasters) -> Lattice:
+    """Return the lattice of the area's box, in the CRS of the rasters; else that of the rasters.
+
+    Journeys beyond the rasters would receive nothing.
+
+    Raises
+    ------
+    InputError
+        The area states another CRS than the rasters.
+    """
+    lattice = rasters.lattice
+    check_crs_of_area(area, rasters)
+    if not area.has_box:
+        return lattice
+    return area_lattice(area.model_copy(update={"crs": lattice.crs}))
 
 
 def planned_cells(config: Config, crs: str, area: Lattice | None = None) -> CellPlan:

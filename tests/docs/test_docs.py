@@ -24,7 +24,9 @@ from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate_store import _COLUMNS as ESTIMATE_COLUMNS
 from mapfilter.radio.cell_layouts import COLUMNS as PLAN_COLUMNS
+from mapfilter.tracks.readers.formats import FORMATS
 from mapfilter.tracks.schema import SCHEMA
+from mapfilter.tracks.sensors import SENSOR_COLUMNS
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 CITATION = DOCS.parent / "CITATION.cff"
@@ -180,4 +182,22 @@ def test_quickstart_shows_only_commands_that_exist():
     commands = set(typer.main.get_command(app).commands)
     shown = set(re.findall(r"^   \$ mapfilter (\w+)", page("quickstart.rst"), flags=re.MULTILINE))
     assert shown <= commands
-    assert commands - shown <= {"merge", "bench", "bound", "evaluate", "sweep", "reproduce"}
+    assert commands - shown <= {
+        "merge",
+        "convert",
+        "bench",
+        "bound",
+        "evaluate",
+        "sweep",
+        "reproduce",
+    }
+
+
+def test_recordings_page_lists_every_format_with_an_example():
+    text = page("howto/recordings.rst")
+    rows = re.findall(r"^   \* - ``([\w-]+)``\n     - (.+)", text, flags=re.MULTILINE)
+    assert {name for name, _ in rows} - {"--format"} == {known.name for known in FORMATS}
+    assert len(re.findall(r"^     - ``convert .+--out \w+``$", text, re.MULTILINE)) == len(FORMATS)
+    listed = named(page("file-formats.rst"))
+    assert {column for columns in SENSOR_COLUMNS.values() for column in columns} <= listed
+    assert set(SENSOR_COLUMNS) <= listed

@@ -15,16 +15,18 @@ def truth(seconds):
     return Truth(time_s, 10.0 * time_s, np.zeros_like(time_s))
 
 
-def claims(statuses, errors_m, radii_m=(10.0, 20.0, 30.0), *, seconds=None, time_s=None, **more):
+def claims(
+    statuses, errors_m, radii_m=(10.0, 20.0, 30.0, 40.0), *, seconds=None, time_s=None, **more
+):
     """Score epochs a second apart that are off to the north."""
     count = len(statuses)
     times = np.arange(float(count)) if time_s is None else np.asarray(time_s, dtype=float)
     errors = np.broadcast_to(np.asarray(errors_m, dtype=float), (count,))
-    radii = np.broadcast_to(np.asarray(radii_m, dtype=float), (count, 3))
+    radii = np.broadcast_to(np.asarray(radii_m, dtype=float), (count, 4))
     fixes = [
         Fix(
-            times[i], 10.0 * times[i], errors[i], np.eye(2), radii[i], STATUS[statuses[i]],
-            1, 1.0, 0, 0.0, Reason.USED,
+            times[i], 10.0 * times[i], errors[i], np.eye(2), radii[i, :3], STATUS[statuses[i]],
+            1, 1.0, 0, 0.0, Reason.USED, radii[i, 3],
         )
         for i in range(count)
     ]  # fmt: skip
@@ -41,14 +43,15 @@ def test_every_claimed_epoch_counts_and_no_other():
 @pytest.mark.parametrize(
     ("error_m", "radii_m", "covered"),
     [
-        (10.0, (10.0, 20.0, 30.0), (3, 3, 3)),
-        (10.01, (10.0, 20.0, 30.0), (0, 3, 3)),
-        (20.5, (10.0, 20.0, 30.0), (0, 0, 3)),
+        (10.0, (10.0, 20.0, 30.0, 40.0), (3, 3, 3, 3)),
+        (10.01, (10.0, 20.0, 30.0, 40.0), (0, 3, 3, 3)),
+        (20.5, (10.0, 20.0, 30.0, 40.0), (0, 0, 3, 3)),
         # Half as far again as the radius, and less than that, is outside.
-        (30.5, (10.0, 20.0, 30.0), (0, 0, 0)),
-        (38.9, (10.0, 20.0, 30.0), (0, 0, 0)),
-        (10.0, (8.0, 9.0, 9.5), (0, 0, 0)),
-        (0.0, (0.0, 0.0, 0.0), (3, 3, 3)),
+        (30.5, (10.0, 20.0, 30.0, 30.4), (0, 0, 0, 0)),
+        (38.9, (10.0, 20.0, 30.0, 40.0), (0, 0, 0, 3)),
+        (10.0, (8.0, 9.0, 9.5, 9.9), (0, 0, 0, 0)),
+        (0.0, (0.0, 0.0, 0.0, 0.0), (3, 3, 3, 3)),
+        (5.0, (10.0, 20.0, 30.0, np.nan), (3, 3, 3, 0)),
     ],
 )
 def test_coverage_is_counted_against_the_radius_itself(error_m, radii_m, covered):
@@ -56,8 +59,14 @@ def test_coverage_is_counted_against_the_radius_itself(error_m, radii_m, covered
 
 
 def test_coverage_takes_each_epochs_own_radius():
-    radii = [(1, 1, 1), (1, 2, 3), (4, 5, 6), (7, 8, 9)]
-    assert claims("SCTT", [0, 2, 5.5, 6], radii).covered == (1, 2, 3)
+    radii = [(1, 1, 1, 1), (1, 2, 3, 4), (4, 5, 6, 7), (7, 8, 9, 10)]
+    assert claims("SCTT", [0, 2, 5.5, 6], radii).covered == (1, 2, 3, 3)
+
+
+def test_every_converged_counts_also_after_lost():
+    found = claims("SCTTLLCTLC", [900, 60, 5, 5, 5, 5, 49, 80, 5, 51])
+    assert (found.converged, found.wrong_converged) == (3, 2)
+    assert claims("SSCTC", [5, 5, 60, 5, 60], until_s=3.0).converged == 1
 
 
 def test_the_limit_of_50_m_belongs_to_what_is_near():
@@ -86,20 +95,20 @@ def test_nothing_counts_after_a_given_time():
     assert (whole.claimed, whole.lost, whole.false_starts) == (5, 1, 1)
     until = claims("SCTTLTT", errors, until_s=3.0)
     assert (until.epochs, until.claimed, until.within_50m) == (4, 3, 3)
-    assert (until.lost, until.false_starts, until.covered) == (0, 0, (3, 3, 3))
+    assert (until.lost, until.false_starts, until.covered) == (0, 0, (3, 3, 3, 3))
     assert until.km == pytest.approx(0.03)
     assert until.worst_100m_m == 0.0
 
 
 def test_epochs_without_truth_do_not_count():
     found = claims("CTTT", 5.0, seconds=2, time_s=[-1.0, 0.0, 2.0, 3.0])
-    assert (found.epochs, found.claimed, found.covered) == (2, 2, (2, 2, 2))
+    assert (found.epochs, found.claimed, found.covered) == (2, 2, (2, 2, 2, 2))
     assert found.km == pytest.approx(0.02)
 
 
 def test_a_track_without_a_claim():
     found = claims("SSLS", 5.0)
-    assert (found.claimed, found.within_50m, found.covered) == (0, 0, (0, 0, 0))
+    assert (found.claimed, found.within_50m, found.covered) == (0, 0, (0, 0, 0, 0))
     assert np.isnan(found.worst_100m_m)
 
 

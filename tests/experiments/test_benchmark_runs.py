@@ -9,6 +9,7 @@ from grid_town import CRS, levels, streets
 from mapfilter.experiments.benchmarks import global_positioning
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.global_positioning import Batch, informed, run_batch
+from mapfilter.experiments.benchmarks.plain_runs import PlainCity
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate import Fix, PositionedTrack, TrackEstimate
@@ -63,7 +64,8 @@ class RecordedWorld:
 
 @pytest.fixture(autouse=True)
 def located_by_the_world(monkeypatch):
-    def locate(log, perfect, rng):
+    def locate(log, perfect, rng, *, risk):
+        assert risk == 1e-3
         return perfect(log, rng)
 
     monkeypatch.setattr(global_positioning, "locate", locate)
@@ -71,7 +73,7 @@ def located_by_the_world(monkeypatch):
 
 def run(*cases, world=None, first=0, end=1, choice=CHOICE, seed=3, fixed=frozenset()):
     world = world or RecordedWorld()
-    rows = run_batch(Batch(world, choice, cases, seed, first, end, fixed))
+    rows = run_batch(Batch(PlainCity(world, seed), choice, cases, first, end, fixed))
     return world, rows
 
 

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from walked_line import estimate, line, located, walked
 
+from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.scores import score, score_window
 
@@ -192,3 +193,42 @@ def test_the_end_of_a_window_is_not_in_it():
     errors = np.where(np.arange(401) < 160, 10.0, 30.0)
     found = located(estimate(table, "C" + 400 * "T", errors))
     assert score_window(walked(table), found, 100.0) == {"window_median_m": 20.0}
+
+
+def test_claimed_epochs_are_counted_in_the_regions_of_the_stanford_diagram():
+    # Available, misleading, hazardous, unavailable, both; searching epochs do not count.
+    errors_m = [900, 5, 30, 60, 5, 90, 5]
+    levels_m = [10, 20, 20, 20, 80, 80, np.inf]
+    scored = row("SCTTTTT", errors_m, levels_m=levels_m)
+    names = ("available", "misleading", "hazardous", "unavailable", "unavailable_misleading")
+    assert [scored[name] for name in names] == [1, 1, 1, 2, 1]
+    assert scored["protection_m"] == 50.0
+    assert sum(epochs for _, _, epochs in scored["stanford"]) == 6
+    # With another alert limit the same levels are of use, or not.
+    wide = score(
+        USUAL,
+        walked(line(6)),
+        located(estimate(line(6), "SCTTTTT", errors_m, levels_m=levels_m)),
+        IntegrityOptions(alert_limit_m=85.0),
+    )
+    assert [wide[name] for name in names] == [2, 2, 1, 1, 0]
+
+
+def test_after_a_displacement_levels_do_not_count():
+    table = line(9)
+    found = estimate(table, "CTTTTTTTTT", 5.0, levels_m=20.0)
+    scored = score(RECOVERY, walked(table, 4.0), located(found))
+    assert scored["available"] == 5
+
+
+def test_filters_without_levels_have_no_regions():
+    scored = row("SCTT", [900, 5, 5, 5])
+    assert (scored["available"], scored["protection_m"], scored["covered_99"]) == (None, None, None)
+    assert scored["stanford"] == []
+    assert row("SCTT", 5.0, wide_m=[1, 9, 4, 9])["covered_99"] == 2
+
+
+def test_levels_that_are_mostly_infinite_have_no_median():
+    scored = row("CTTT", 5.0, levels_m=[np.inf, np.inf, np.inf, 20.0])
+    assert scored["protection_m"] is None
+    assert (scored["available"], scored["unavailable"]) == (1, 3)

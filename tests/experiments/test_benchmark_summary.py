@@ -5,9 +5,11 @@ from math import isnan, sqrt
 
 import numpy as np
 import pytest
+from scipy import stats
 
+from mapfilter.evaluation.stanford import REGIONS
 from mapfilter.experiments.benchmarks.cases import CASES
-from mapfilter.experiments.benchmarks.scores import CaseResult, summarise
+from mapfilter.experiments.benchmarks.results import CaseResult, summarise
 
 CASE = CASES["levels-6"]
 Z = 1.959963984540054
@@ -30,6 +32,15 @@ def run(**changed):
         "covered_50": 40,
         "covered_67": 60,
         "covered_95": 76,
+        "covered_99": 79,
+        "converged": 2,
+        "wrong_converged": 0,
+        "available": 70,
+        "misleading": 1,
+        "hazardous": 0,
+        "unavailable": 8,
+        "unavailable_misleading": 1,
+        "protection_m": 21.0,
         "false_converged": 0,
         "false_lost": 0,
         "lost": 0,
@@ -40,6 +51,17 @@ def wilson(share, runs):
     centre = (share + Z * Z / (2 * runs)) / (1 + Z * Z / runs)
     half = Z / (1 + Z * Z / runs) * sqrt(share * (1 - share) / runs + (Z / (2 * runs)) ** 2)
     return centre - half, centre + half
+
+
+def drawn_again(parts, wholes):
+    """The percentile bootstrap of scipy, over runs."""
+    found = stats.bootstrap(
+        (np.array(parts, dtype=float), np.array(wholes, dtype=float)),
+        lambda a, b, axis: a.sum(axis=axis) / b.sum(axis=axis),
+        paired=True, vectorized=True, n_resamples=4000, method="percentile",
+        rng=np.random.default_rng(8),
+    )  # fmt: skip
+    return found.confidence_interval.low, found.confidence_interval.high
 
 
 def clustered(parts, wholes):
@@ -142,7 +164,8 @@ def test_seconds_are_the_median_and_windows_the_mean():
 
 
 def test_runs_that_claim_nothing():
-    nothing = dict.fromkeys(("claimed", "within_50m", "covered_50", "covered_67", "covered_95"), 0)
+    names = ("claimed", "within_50m", "covered_50", "covered_67", "covered_95", "converged")
+    nothing = dict.fromkeys(names, 0) | dict.fromkeys((*REGIONS, "covered_99", "protection_m"))
     lost = dict.fromkeys(("switch_m", "error_mean_m", "error_67_m", "error_95_m", "worst_100m_m"))
     found = summarise(CASE, "bayes", [run(success=False, **nothing, **lost) for _ in range(5)])
     assert (found.success, found.wrong, found.claimed) == (0.0, 0.0, 0.0)
@@ -151,6 +174,61 @@ def test_runs_that_claim_nothing():
     assert (found.coverage_95_low, found.coverage_95_high) == (0.0, 1.0)
     assert isnan(found.worst_100m_mean_m)
     assert isnan(found.error_mean_m)
+    assert isnan(found.coverage_99)
+    assert isnan(found.protection_m)
+    assert (found.epochs_available, found.converged) == (0, 0)
+    assert (found.hazardous_low, found.hazardous_high) == (0.0, 1.0)
+
+
+def test_intervals_of_shares_draw_runs_again():
+    rng = np.random.default_rng(6)
+    claimed = rng.integers(20, 400, 30)
+    held = rng.binomial(claimed, rng.beta(8, 2, 30))
+    rows = [
+        run(claimed=int(c), covered_50=int(h), covered_99=int(h), within_50m=int(h))
+        for c, h in zip(claimed, held, strict=True)
+    ]
+    found = summarise(CASE, "bayes", rows)
+    low, high = drawn_again(held, claimed)
+    for name in ("coverage_50", "coverage_99", "within_50m"):
+        assert getattr(found, f"{name}_low") == pytest.approx(low, abs=0.006)
+        assert getattr(found, f"{name}_high") == pytest.approx(high, abs=0.006)
+    assert found.off_50m == pytest.approx(1 - found.within_50m)
+    assert found.off_50m_low == pytest.approx(1 - found.within_50m_high)
+
+
+def test_a_run_without_a_99_percent_radius_does_not_count_for_it():
+    rows = [run(claimed=80, covered_99=76), run(claimed=900, covered_99=None)]
+    assert summarise(CASE, "bayes", rows).coverage_99 == pytest.approx(76 / 80)
+
+
+def test_wrong_converged_is_a_share_of_all_converged():
+    rows = [run(converged=3, wrong_converged=1), run(converged=1), run(converged=0)]
+    found = summarise(CASE, "bayes", rows)
+    assert (found.converged, found.wrong_converged) == (4, 0.25)
+    none = summarise(CASE, "bayes", [run(converged=1) for _ in range(40)])
+    assert none.wrong_converged_high == pytest.approx(Z * Z / (40 + Z * Z))
+
+
+def test_regions_are_counted_over_the_runs_with_levels():
+    without = dict.fromkeys((*REGIONS, "protection_m"))
+    rows = [
+        run(), run(available=10, misleading=0, hazardous=5, unavailable=5), run(**without),
+    ]  # fmt: skip
+    found = summarise(CASE, "bayes", rows)
+    counted = {name: getattr(found, f"epochs_{name}") for name in REGIONS}
+    assert list(counted.values()) == [80, 1, 5, 13, 2]
+    assert found.hazardous == pytest.approx(5 / 101)
+    assert found.misleading == pytest.approx(1 / 101)
+    assert found.available == pytest.approx(80 / 101)
+    # An error above the level is one, whether the position was available or not.
+    assert found.exceeded == pytest.approx(8 / 101)
+    assert found.protection_m == 21.0
+
+
+def test_a_median_level_counts_infinite_ones():
+    rows = [run(protection_m=level) for level in (9.0, None, None)]
+    assert summarise(CASE, "bayes", rows).protection_m == float("inf")
 
 
 def test_every_figure_of_a_case_depends_on_its_rows():
@@ -165,12 +243,18 @@ def test_every_figure_of_a_case_depends_on_its_rows():
                 for name, value in run().items()
                 if isinstance(value, float)
             }
-            counts = np.sort(rng.integers(1 + seed_shift, 40 + seed_shift, 6))
-            names = ("covered_50", "covered_67", "covered_95", "within_50m", "claimed", "epochs")
+            counts = np.sort(rng.integers(1 + seed_shift, 40 + seed_shift, 7))
+            names = (
+                "covered_50", "covered_67", "covered_95", "covered_99", "within_50m", "claimed",
+                "epochs",
+            )  # fmt: skip
             change |= {name: int(count) for name, count in zip(names, counts, strict=True)}
             change |= {
                 name: int(rng.integers(1, 9)) for name in ("lost", "false_lost", "false_converged")
             }
+            change |= {name: int(rng.integers(1, 90)) for name in REGIONS}
+            change["converged"] = int(rng.integers(9, 90))
+            change["wrong_converged"] = int(rng.integers(1, 9))
             change |= {"success": i % (2 + seed_shift) == 0, "wrong": i % (3 + seed_shift) == 1}
             made.append(run(**change, window_median_m=float(rng.uniform(1, 9))))
         return made

@@ -27,12 +27,16 @@ def truth_of(table):
     return Truth(*(table[name].to_numpy() for name in ("time_s", "east_m", "north_m")))
 
 
-def estimate(table, statuses, errors_m, radii_m=(10.0, 20.0, 30.0), time_s=None):
+def estimate(
+    table, statuses, errors_m, radii_m=(10.0, 20.0, 30.0), time_s=None, levels_m=None, wide_m=None
+):
     """One epoch a second from the first row on, off to the north."""
     truth = truth_of(table)
     times = np.arange(float(len(statuses))) if time_s is None else np.asarray(time_s, dtype=float)
     errors = np.broadcast_to(np.asarray(errors_m, dtype=float), times.shape)
     radii = np.broadcast_to(np.asarray(radii_m, dtype=float), (times.size, 3))
+    levels = np.broadcast_to(np.nan if levels_m is None else levels_m, times.shape)
+    wide = np.broadcast_to(np.nan if wide_m is None else wide_m, times.shape)
     east = np.interp(times, truth.time_s, truth.east_m)
     north = np.interp(times, truth.time_s, truth.north_m)
     fixes = [
@@ -48,6 +52,8 @@ def estimate(table, statuses, errors_m, radii_m=(10.0, 20.0, 30.0), time_s=None)
             0,
             0.0,
             Reason.USED,
+            wide[i],
+            levels[i],
         )
         for i in range(times.size)
     ]

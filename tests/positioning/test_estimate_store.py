@@ -3,7 +3,7 @@
 import json
 from dataclasses import fields, replace
 from datetime import UTC, datetime
-from math import nan
+from math import inf, nan
 from xml.etree import ElementTree
 
 import geopandas
@@ -34,8 +34,32 @@ def make_estimate(crs=CRS, places=PLACES):
     known = np.array([[4.0, -1.5], [-1.5, 9.0]]), np.array([3.0, 4.5, 9.25])
     fixes = [
         Fix(0.0, nan, nan, *UNKNOWN, Status.SEARCHING, 92, nan, 0, nan, Reason.NO_READING),
-        Fix(0.48, *places[0], *known, Status.CONVERGED, 1, 0.75, 1 << 45, 0.5, Reason.USED),
-        Fix(0.48, *places[1], *UNKNOWN, Status.TRACKING, 1, 1.0, -7, nan, Reason.NOT_MOVED_ENOUGH),
+        Fix(
+            0.48,
+            *places[0],
+            *known,
+            Status.CONVERGED,
+            1,
+            0.75,
+            1 << 45,
+            0.5,
+            Reason.USED,
+            12.5,
+            21.25,
+        ),
+        Fix(
+            0.48,
+            *places[1],
+            *UNKNOWN,
+            Status.TRACKING,
+            1,
+            1.0,
+            -7,
+            nan,
+            Reason.NOT_MOVED_ENOUGH,
+            14.5,
+            inf,
+        ),
         Fix(0.96, nan, nan, *UNKNOWN, Status.LOST, 0, nan, 0, nan, Reason.NO_CANDIDATES_LEFT),
     ]
     unused = [
@@ -177,7 +201,7 @@ def test_other_files_are_refused(written):
 
 def test_a_newer_version_is_refused_with_what_to_do(written):
     with_meta(written, version=estimate_store.VERSION + 1)
-    assert refused(written, "version <= 1, found 2").faults[0].hint == "a newer mapfilter"
+    assert refused(written, "version <= 2, found 3").faults[0].hint == "a newer mapfilter"
 
 
 def test_missing_columns_are_all_named(written):
@@ -268,8 +292,8 @@ def test_geojson_holds_a_line_and_the_located_epochs(tmp_path, crs, lon, lat):
     places = [point["geometry"]["coordinates"] for point in points]
     assert places == line["geometry"]["coordinates"]
     assert [point["properties"] for point in points] == [
-        {"time_s": 0.48, "status": "CONVERGED", "radius_95_m": 9.25},
-        {"time_s": 0.48, "status": "TRACKING", "radius_95_m": None},
+        {"time_s": 0.48, "status": "CONVERGED", "radius_95_m": 9.25, "protection_m": 21.25},
+        {"time_s": 0.48, "status": "TRACKING", "radius_95_m": None, "protection_m": None},
     ]
     frame = geopandas.read_file(path)
     assert frame.crs.to_epsg() == 4326
@@ -283,3 +307,29 @@ def test_nothing_located_gives_files_without_points(tmp_path, estimate):
         "type": "FeatureCollection", "features": [],
     }  # fmt: skip
     assert b"trkpt" not in (tmp_path / "track.gpx").read_bytes()
+
+
+def test_files_of_the_first_version_have_no_levels(tmp_path):
+    path = tmp_path / "estimate.parquet"
+    write_estimate(make_estimate(), path)
+    table = pq.read_table(path)
+    meta = json.loads(table.schema.metadata[b"mapfilter"])
+    assert meta["version"] == 2
+    old = table.drop_columns(["radius_99_m", "protection_m"]).replace_schema_metadata(
+        {**table.schema.metadata, b"mapfilter": json.dumps({**meta, "version": 1}).encode()}
+    )
+    pq.write_table(old, path)
+    found = read_estimate(path)
+    assert np.isnan(found.protection_m).all()
+    assert np.isnan(found.radius_99_m).all()
+    assert np.array_equal(found.east_m, make_estimate().east_m, equal_nan=True)
+    # A file of the present version without them is damaged.
+    pq.write_table(old.replace_schema_metadata(table.schema.metadata), path)
+    refused(path, "protection_m")
+
+
+def test_geojson_has_the_level_or_none(tmp_path):
+    write_geojson(make_estimate(), tmp_path / "e.geojson")
+    features = json.loads((tmp_path / "e.geojson").read_text())["features"]
+    points = [f["properties"] for f in features if f["geometry"]["type"] == "Point"]
+    assert [point["protection_m"] for point in points] == [21.25, None]

@@ -104,6 +104,18 @@ class Shrinking(Steady):
         return state, fix_at(epoch, Status.SEARCHING, radii_m=(3.0, 2.0, 1.0))
 
 
+class Narrow(Steady):
+    def step(self, state, epoch, rng):
+        output = fix_at(epoch, Status.SEARCHING)
+        return state, replace(output, fix=replace(output.fix, radius_99_m=2.0))
+
+
+class Negative(Steady):
+    def step(self, state, epoch, rng):
+        output = fix_at(epoch, Status.SEARCHING)
+        return state, replace(output, fix=replace(output.fix, protection_m=-1.0))
+
+
 class Late(Steady):
     def step(self, state, epoch, rng):
         return state, fix_at(epoch, Status.SEARCHING, time_s=epoch.time_s + 1e-3)
@@ -122,6 +134,8 @@ class Drifting(Steady):
     [
         (InPlace, "states are never changed in place"),
         (Jumping, "SEARCHING is not followed by TRACKING"),
+        (Narrow, "99 % is not below that for 95 %"),
+        (Negative, "a protection level is not negative"),
         (OwnDice, "the generator alone decides the result"),
         (Shrinking, "do not shrink"),
         (Late, "time of its epoch"),

@@ -278,3 +278,25 @@ def test_a_phone_on_a_site_stays_finite():
     found = located(on_it)
     assert np.isfinite(found.east_m).all()
     assert np.isfinite(found.covariance_m2).all()
+
+
+def test_protection_levels_are_beyond_the_radii_and_hold():
+    rare, exceeded, epochs = [], 0, 0
+    for seed in range(4):
+        log, truth = drive(seed, steps=120)
+        found = located(log)
+        known = np.isfinite(found.radii_m[:, 2])
+        assert (found.radius_99_m[known] >= found.radii_m[known, 2]).all()
+        assert (found.protection_m[known] > found.radius_99_m[known]).all()
+        rare.append(found.protection_m[known][-1])
+        exceeded += int((errors_m(found, truth)[known] > found.protection_m[known]).sum())
+        epochs += int(known.sum())
+    assert epochs > 400
+    assert exceeded <= 0.02 * epochs
+    wide = locate(
+        drive(3, steps=120)[0],
+        KalmanFilter().over_sites(PLAN),
+        np.random.default_rng(0),
+        risk=1e-7,
+    ).estimate
+    assert wide.protection_m[-1] > 1.3 * rare[-1]

@@ -86,7 +86,8 @@ def test_a_map_of_columns(tmp_path: Path) -> None:
     plan = _read(tmp_path, text, columns=columns)
     assert (plan["A"].height_m, plan["A"].eirp_dbm, plan.notes) == (30.0, 50.0, ())
     said = _complaint(tmp_path, text, columns={**columns, "height_m": "AGI"})
-    assert "expected a column AGI (height_m), found none (likely: AGL meant)" in said
+    assert "expected a column AGI (height_m), found none (columns: Name, E, N, AGL, " in said
+    assert "(likely: AGL meant)" in said
     said = _complaint(tmp_path, text, columns={**columns, "cell": "E", "east": "Name"})
     assert "row 2, Name (east): expected a number, found 'A'" in said
 

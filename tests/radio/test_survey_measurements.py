@@ -164,7 +164,11 @@ def test_a_bad_time_or_accuracy_costs_only_itself(tmp_path):
     assert len(found) == 22
     assert np.isnan(found.time_s[-2:]).all()
     assert math.isnan(found.accuracy_m[-1])
-    assert found.notes == ("drive.csv: 2 times not understood (levels kept)",)
+    (note,) = found.notes
+    assert note.startswith(
+        "drive.csv: 2 times not understood (levels kept), such as 'yesterday' in"
+    )
+    assert "expected ISO 8601" in note
 
 
 def test_repetitions_are_left_out_and_told(tmp_path):

@@ -24,7 +24,6 @@ REFUSED = {
     "filter.kalman.timing_step_m",
     "filter.kalman.timing_sd_m",
     "filter.kalman.timing_memory_m",
-    "output.pictures",
 }
 
 OF_THE_CANDIDATE = {
@@ -185,7 +184,10 @@ READ_AS_FOR_A_BUILD = (
 
 OTHERWISE = {
     "filter.name",
+    "integrity.risk",
+    "integrity.alert_limit_m",
     "output.dir",
+    "output.pictures",
     "journeys.nlos_satellites",
     "prediction.default_roof_height_m",
     "prediction.ground_truth.default_roof_height_m",

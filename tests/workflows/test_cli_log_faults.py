@@ -98,7 +98,8 @@ def test_no_log(replay, tmp_path, world):
     assert_refused(replay(tmp_path / "none"), "none: expected a track log, or a folder of logs")
     (tmp_path / "empty").mkdir()
     assert_refused(replay(tmp_path / "empty"), "empty: expected", "found a folder without any")
-    assert_refused(replay(world.rasters), "rxlev.tif: expected a track log")
+    told = "rxlev.tif: expected a recording as text, found a TIFF raster"
+    assert_refused(replay(world.rasters), told)
     assert not (tmp_path / "out").exists()
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from command_line import ONE, assert_done, change, contents, mapfilter, put
+from command_line import ONE, assert_done, assert_refused, change, contents, mapfilter, put
 
 from mapfilter.config.load import load_config
 from mapfilter.filters.contract import Reason
@@ -37,6 +37,29 @@ def test_some_cells_unknown(log, replay, tmp_path):
     motion = pd.read_csv(log / "motion.csv")
     assert len(estimate) >= len(motion)
     assert np.isfinite(estimate.east_m[-1])
+
+
+def test_the_risk_of_protection_levels(log, replay, tmp_path):
+    found = {}
+    for risk in (None, "1e-3", "1e-6"):
+        given = () if risk is None else ("--protection", risk)
+        assert_done(replay(log, "--json", "--filter", "bayes", *given))
+        found[risk] = read_estimate(tmp_path / "out" / "estimate.parquet")
+    usual, rare = found["1e-3"].protection_m, found["1e-6"].protection_m
+    assert np.array_equal(found[None].protection_m, usual, equal_nan=True)
+    known = np.isfinite(usual)
+    assert known.sum() > 50
+    assert (rare[known] > usual[known]).all()
+    points = json.loads((tmp_path / "out" / "estimate.geojson").read_text())["features"][1:]
+    levels = [point["properties"]["protection_m"] for point in points]
+    assert levels[-1] == pytest.approx(rare[-1], abs=0.01)
+
+
+@pytest.mark.parametrize("risk", ["0", "1", "-0.1", "nan"])
+def test_a_risk_that_is_no_probability_is_refused(log, replay, tmp_path, risk):
+    outcome = replay(log, "--protection", risk)
+    assert_refused(outcome, "integrity.risk")
+    assert not (tmp_path / "out").exists()
 
 
 def test_all_cells_unknown_with_pictures(log, replay, tmp_path):

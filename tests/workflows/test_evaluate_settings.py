@@ -147,7 +147,6 @@ def test_what_has_no_meaning_is_refused_by_name(key, world, tmp_path):
         ("filter.kalman.fix_sd_m=3", "bayes has no such option"),
         ("filter.bayes.timing_sd_m=100.0", "no timing advances"),
         ("sweep.scale=[0.1]", "mapfilter sweep"),
-        ('output.pictures="none"', "no pictures"),
         ('database.path="there"', "built here"),
         ("filter.threshold=3", "bayes has no such option"),
     ],

@@ -3,7 +3,7 @@
 from dataclasses import fields
 from pathlib import Path
 
-from mapfilter.experiments.benchmarks.scores import CaseResult
+from mapfilter.experiments.benchmarks.results import CaseResult
 from mapfilter.workflows.evaluate import EvaluateResult, main_table
 from mapfilter.workflows.terminal import text_lines
 

@@ -87,6 +87,19 @@ class ForeignWorld:
         streets, ground = self.folder / STREETS, self.folder / GROUND
         return _city(streets, ground, sha256_file(streets / "world.json") + sha256_file(ground))
 
+    @property
+    def streets(self) -> SweepWorld:
+        """Streets and cells."""
+        return self.city.streets
+
+    def case(self, name: str) -> WorldCase:
+        """Return a case of the world by its name."""
+        return CASES_OF[self.name][name]
+
+    def on_route(self, route: int, fixed: frozenset[str] = frozenset()) -> RouteRuns:  # noqa: ARG002
+        """Return the runs of all cases on a route; the world takes no settings of errors."""
+        return RouteRuns(self, route)
+
     def given(self, case: WorldCase, route: int) -> GivenInputs:
         """Return what the filter is given in a run of a case."""
         city = self.city.streets
@@ -168,6 +181,13 @@ class RouteRuns:
         if case.other_city:
             truth = truth.assign(east_m=truth["east_m"] + AWAY_M)
         return Walk(truth), replace(log, truth=truth)
+
+    def filter(self, choice: FilterOptions, case: WorldCase) -> Filter[Any]:
+        """Return the filter over the database that a case is given."""
+        return self.world.filter(choice, case, self.route)
+
+    def window_from_s(self, case: WorldCase, walked: Walk) -> None:
+        """Return None: no satellites are received here."""
 
     def _walk_of(self, case: WorldCase) -> _Received:
         key = case.pedestrian, case.other_city

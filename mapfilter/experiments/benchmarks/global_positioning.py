@@ -1,4 +1,4 @@
-"""Global positioning from an unknown start, on any map: routes and radio are drawn anew.
+"""Global positioning from an unknown start, on any map and in any world.
 
 Runs go in batches of a few routes, each with a ground truth of its own; all cases run over the same
 journeys. Finished batches lie on disk, so that what was stopped can go on.
@@ -6,86 +6,122 @@ journeys. Finished batches lie on disk, so that what was stopped can go on.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from mapfilter._io import read_json, write_json
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter._resume import start_or_resume
-from mapfilter.experiments.benchmarks.cases import CASES, Case
-from mapfilter.experiments.benchmarks.journeys import (
-    TOWN_HEIGHT,
-    displaced_walk,
-    log_of,
-    spoofer_of,
-    walk,
-    with_satellites,
-)
-from mapfilter.experiments.benchmarks.scores import (
-    CaseResult,
-    Row,
-    score,
-    score_window,
-    summarise,
-)
-from mapfilter.experiments.benchmarks.world import BenchmarkWorld
+from mapfilter.evaluation.stanford import IntegrityOptions
+from mapfilter.experiments.benchmarks.cases import Case
+from mapfilter.experiments.benchmarks.journeys import TOWN_HEIGHT, Walk
+from mapfilter.experiments.benchmarks.scores import Row, score, score_window
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.filter import FilterOptions, locate
+from mapfilter.positioning.estimate import PositionedTrack
+from mapfilter.positioning.filter import Filter, FilterOptions, locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.propagation.shadowing import named_rng
-from mapfilter.simulation.reports import Levels
+from mapfilter.tracks.log import TrackLog
 
 ROUTES_PER_BATCH = 2
 HEAD, BATCHES = "benchmark.json", "batches"
-_VERSION = 2
+_VERSION = 3
+
+
+class RunsOfRoute(Protocol):
+    """The runs of all cases on one route and in one ground truth."""
+
+    def run(self, case: Any) -> tuple[Walk, TrackLog]:
+        """Return truth and log of a case."""
+
+    def filter(self, choice: FilterOptions, case: Any) -> Filter[Any]:
+        """Return the filter over the database that a case is given."""
+
+    def window_from_s(self, case: Any, walked: Walk) -> float | None:
+        """Return from when on the errors of two minutes are looked at; None for no window."""
+
+
+class BenchmarkCity(Protocol):
+    """A simulated city on disk, with everything that its runs are drawn from."""
+
+    @property
+    def seed(self) -> int:
+        """Of routes, ground truths and noise."""
+
+    @property
+    def sha256(self) -> str:
+        """Of all that its runs depend on, but the seed."""
+
+    def case(self, name: str) -> Case:
+        """Return a case by its name."""
+
+    def on_route(self, route: int, fixed: frozenset[str] = frozenset()) -> RunsOfRoute:
+        """Return the runs on a route; ``fixed`` are errors that were set for all cases."""
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Runs of all cases over the routes from ``first`` to before ``end``."""
+    """Runs of some cases over the routes from ``first`` to before ``end``.
 
-    world: BenchmarkWorld
+    Parameters
+    ----------
+    fixed : frozenset of str
+        Options of the filter and errors of dead reckoning that were set for all cases.
+    integrity : IntegrityOptions
+        Risk and alert limit of the protection levels.
+    """
+
+    city: BenchmarkCity
     choice: FilterOptions
     cases: tuple[str, ...]
-    seed: int
     first: int
     end: int
     fixed: frozenset[str] = frozenset()
+    integrity: IntegrityOptions = field(default_factory=IntegrityOptions)
+
+
+@dataclass(frozen=True, eq=False)
+class LocatedRun:
+    """One run of a case: truth, log and estimate."""
+
+    case: Case
+    walked: Walk
+    log: TrackLog
+    found: PositionedTrack
 
 
 def run_batch(batch: Batch) -> list[Row]:
     """Do the runs of a batch and return their rows."""
-    return [row for route in range(batch.first, batch.end) for row in _run_route(batch, route)]
-
-
-def _run_route(batch: Batch, route: int) -> list[Row]:
-    """Run all cases on one route and in one ground truth."""
-    world, streets, settings = batch.world, batch.world.streets, batch.world.settings
-    truth_seed = int(named_rng(batch.seed, "ground truth", str(route)).integers(2**62))
     rows: list[Row] = []
-    truths: dict[float | None, Levels] = {}
-    for name in batch.cases:
-        case = CASES[name]
-        error_db = None if "level_error_db" in batch.fixed else case.level_error_db
-        if error_db not in truths:
-            truths[error_db] = world.ground_truth(truth_seed, error_db)
-        levels = truths[error_db]
-        make = displaced_walk if case.recovery_within_m > 0 else walk
-        walked = make(streets, settings.journey, batch.seed, route)
-        log = log_of(case, walked, levels, streets, settings, batch.seed, route, batch.fixed)
-        skyline = world.skyline(case)
-        log = with_satellites(case, log, walked, skyline, batch.seed, route, world.reception)
-        choice = informed(batch.choice, case, batch.fixed)
-        filter_ = world.filter(choice, thinned=case.missing_ways > 0)
-        found = locate(log, filter_, named_rng(batch.seed, "filter", name, str(route)))
-        row = {**score(case, walked, found), "route": route}
-        if case.satellites is not None:
-            row |= score_window(walked, found, spoofer_of(walked, batch.seed, route).from_s)
-        rows.append(row)
+    for route in range(batch.first, batch.end):
+        runs = batch.city.on_route(route, batch.fixed)
+        for name in batch.cases:
+            one = located_run(batch, runs, name, route)
+            row = {**score(one.case, one.walked, one.found, batch.integrity), "route": route}
+            from_s = runs.window_from_s(one.case, one.walked)
+            if from_s is not None:
+                row |= score_window(one.walked, one.found, from_s)
+            rows.append(row)
     return rows
+
+
+def located_run(batch: Batch, runs: RunsOfRoute, name: str, route: int) -> LocatedRun:
+    """Return one run of a batch's case, to be scored or drawn.
+
+    Parameters
+    ----------
+    runs : RunsOfRoute
+        Of the route.
+    name : str
+        Of the case.
+    """
+    case = batch.city.case(name)
+    walked, log = runs.run(case)
+    filter_ = runs.filter(informed(batch.choice, case, batch.fixed), case)
+    rng = named_rng(batch.city.seed, "filter", name, str(route))
+    return LocatedRun(case, walked, log, locate(log, filter_, rng, risk=batch.integrity.risk))
 
 
 def informed(
@@ -99,56 +135,62 @@ def informed(
     return replace(choice, smooth=case.smooth, **known)
 
 
-def benchmark(
-    world: BenchmarkWorld,
-    choice: FilterOptions,
-    cases: Sequence[str],
-    runs: int,
-    seed: int,
+def run_benchmark(
+    whole: Batch,
     out: Path,
     *,
     executor: Executor | None = None,
     in_flight: int = 4,
     resume: bool = False,
     progress: Progress | None = None,
-    fixed: frozenset[str] = frozenset(),
-) -> list[CaseResult]:
-    """Run the cases, on so many routes each, and return one row of the table for each.
+) -> list[Row]:
+    """Do all runs in batches, and return their rows in the order of the routes.
 
-    Finished batches are kept in ``out``; to resume another benchmark is a ConfigError. ``progress``
-    counts batches; ``fixed`` are options of the filter and errors of dead reckoning that hold in
-    all cases.
+    Parameters
+    ----------
+    whole : Batch
+        All runs as one batch.
+    out : Path
+        Keeps finished batches; those of the same benchmark are not done again where ``resume``.
+    in_flight : int
+        Batches that are handed to the executor at a time.
+    progress : callable, optional
+        Called with batches done and batches in all.
+
+    Raises
+    ------
+    ConfigError
+        There is something else to resume.
     """
     head = {
         "version": _VERSION,
-        "filter": repr(choice),
-        "cases": list(cases),
-        "seed": seed,
-        "fixed": sorted(fixed),
-        "world": world.sha256,
+        "filter": repr(whole.choice),
+        "cases": list(whole.cases),
+        "seed": whole.city.seed,
+        "fixed": sorted(whole.fixed),
+        "integrity": repr(whole.integrity),
+        "world": whole.city.sha256,
     }
-    (out / BATCHES).mkdir(parents=True, exist_ok=True)
-    start_or_resume(out / HEAD, head, (out / BATCHES).glob("*.json"), resume=resume)
+    folder = out / BATCHES
+    folder.mkdir(parents=True, exist_ok=True)
+    start_or_resume(out / HEAD, head, folder.glob("*.json"), resume=resume)
     parts, tasks = [], []
-    for first in range(0, runs, ROUTES_PER_BATCH):
-        end = min(first + ROUTES_PER_BATCH, runs)
-        parts.append(out / BATCHES / f"{first:06d}.json")
-        if not (resume and len(_rows(parts[-1])) == (end - first) * len(cases)):
-            tasks.append((parts[-1], Batch(world, choice, tuple(cases), seed, first, end, fixed)))
+    for first in range(whole.first, whole.end, ROUTES_PER_BATCH):
+        batch = replace(whole, first=first, end=min(first + ROUTES_PER_BATCH, whole.end))
+        parts.append(folder / f"{first:06d}.json")
+        count = (batch.end - batch.first) * len(batch.cases)
+        if not (resume and len(_rows(parts[-1])) == count):
+            tasks.append((parts[-1], batch))
     results = ordered_results(
         executor or SerialExecutor(),
         run_batch,
-        [task for _, task in tasks],
+        [batch for _, batch in tasks],
         in_flight=in_flight,
         progress=progress,
     )
     for (part, _), rows in zip(tasks, results, strict=True):
         write_json(part, {"rows": rows})
-    every = [row for part in parts for row in _rows(part)]
-    return [
-        summarise(CASES[name], choice.name, [row for row in every if row["case"] == name])
-        for name in cases
-    ]
+    return [row for part in parts for row in _rows(part)]
 
 
 def _rows(part: Path) -> list[Any]:

@@ -13,6 +13,7 @@ from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief, NullHypothesis
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
+from mapfilter.positioning.integrity import sample_tail
 
 FIRST_SPACING_M = 5.0
 """Assumed distance between hypotheses before there are any."""
@@ -121,4 +122,8 @@ def step_output(
         east_m, north_m, mass = summary.runners_up[0].tolist()
     log_evidence = belief.log_evidence if belief else nan
     evidence = (east_m + west, north_m + south, mass, summary.entropy_bits, log_evidence)
-    return StepOutput(fix, evidence, unused)
+    output = StepOutput(fix, evidence, unused)
+    if belief is None or not count:
+        return output
+    places = belief.state[0], belief.state[1], belief.weight
+    return output.protected(sample_tail(*places, summary.mean, p_none=0.0))

@@ -25,6 +25,7 @@ from mapfilter.models.state import MOVING, POSITION, StateLayout
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.estimate import Fix, StepOutput, TrackEstimate, UnusedReading
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind
+from mapfilter.positioning.integrity import GaussianTail
 from mapfilter.positioning.kalman.belief import (
     FusionHistory,
     SumBelief,
@@ -143,8 +144,8 @@ class KalmanTracker(Filter[KalmanState]):
     ) -> tuple[KalmanState, StepOutput]:
         """Take one epoch: first move, then measure."""
         work = _Step(self.sites, self.method, state)
-        fix = work.take(epoch)
-        return work.state, StepOutput(fix, unused=tuple(work.unused))
+        output = StepOutput(work.take(epoch), unused=tuple(work.unused))
+        return work.state, output.protected(work.tail)
 
     def smoother(self) -> KalmanSmoother | None:
         """Return a new smoother where positions shall be smoothed."""
@@ -210,6 +211,11 @@ class _Step:
             tuple(self.recent_nis),
             self.motion,
         )
+
+    @property
+    def tail(self) -> GaussianTail | None:
+        """The belief's tail about its mean."""
+        return None if self.belief is None else belief_tail(self.belief, self.where)
 
     def take(self, epoch: Epoch) -> Fix:
         """Move, then measure; return the epoch's fix."""
@@ -354,6 +360,12 @@ class _Step:
                 self.status = Status.CONVERGED
         else:
             self.status = Status.LOST if lost else Status.TRACKING
+
+
+def belief_tail(belief: SumBelief, where: list[int]) -> GaussianTail:
+    """Return the tail of a Gaussian sum about its mean; ``where`` are east and north."""
+    offsets_m = belief.means[:, where] - belief.moments.mean[where]
+    return GaussianTail(belief.weights, offsets_m, belief.covariances[:, where][:, :, where])
 
 
 def _place(belief: Gaussian, where: list[int]) -> dict[str, Any]:

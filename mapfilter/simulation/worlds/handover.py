@@ -1,11 +1,10 @@
 """Which cell serves: layer-3 filtering, event A3 with hysteresis and time to trigger, load offsets.
 
 After 3GPP TS 36.331: measurements are filtered by ``F = (1 - a) F' + a M`` with ``a = 1 / 2^(k/4)``
-every 200 ms (section 5.5.3.2). A neighbour is handed over to once event A3 has held for the time to
-trigger without a break: its filtered level and its offset exceed those of the serving cell by more
-than the hysteresis (section 5.5.4.4). Cell individual offsets balance load; networks set them anew
-as load changes (TR 36.902, section 4.6). A handover back within a few seconds is a ping-pong (TR
-36.839, section 5.2.1.1.3 counts those within 1 s), here also for load.
+every 200 ms. A neighbour is handed over to once event A3 has held for the time to trigger without a
+break: its filtered level and its offset exceed those of the serving cell by more than the
+hysteresis. Cell individual offsets balance load; networks set them anew as load changes (TR
+36.902). A handover back within a few seconds is a ping-pong (TR 36.839), here also for load.
 """
 
 from __future__ import annotations

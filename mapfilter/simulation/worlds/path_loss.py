@@ -1,18 +1,18 @@
 """Path loss of several slopes with diffraction over roofs, and sector antennas with side lobes.
 
 With line of sight the loss is that of free space up to the breakpoint ``4 h_b h_m / λ`` and falls
-with the fourth power of distance beyond it (Rec. ITU-R P.1411, section 4.1.2, lower bound). Where
-buildings reach into the path, the loss of a single knife edge is added (Rec. ITU-R P.526, section
-4.1), up to the loss over the roofs. The latter has slopes of 3.0, 3.8 and 4.4, which change at
-150 m and 500 m, and passes the site-general NLoS median above roof-tops at 500 m (Rec. ITU-R
-P.1411, section 4.2.1: α = 4.39, β = -6.27, γ = 2.30). That a slope grows with distance is the rule
+with the fourth power of distance beyond it (the lower bound of Rec. ITU-R P.1411). Where
+buildings reach into the path, the loss of a single knife edge is added (Rec. ITU-R P.526), up to
+the loss over the roofs. The latter has slopes of 3.0, 3.8 and 4.4, which change at 150 m and 500 m,
+and passes a median of the site-general form at 500 m (Rec. ITU-R P.1411, section 4.2.1, with
+α = 4.39, β = -6.27, γ = 2.30). That a slope grows with distance is the rule
 in measurements (Feuerstein et al. 1994, *Path loss, delay spread, and outage models as functions of
 antenna height for microcellular system design*, IEEE Trans. Veh. Technol. 43(3): exponents 2.1 to
 2.2 and 3.3 to 4.2 before and after the breakpoint; Zhang & Andrews 2015, *Downlink cellular network
 analysis with multi-slope path loss models*, IEEE Trans. Commun. 63(5)). Antennas below the roofs,
 such as those indoors, follow the site-general NLoS medians of street canyons (Rec. ITU-R P.1411,
-section 4.1.1): α = 4.00, β = 10.2, γ = 2.36 among high buildings up to 200 m, and α = 5.06, as
-among low ones, beyond.
+section 4.1.1 of versions 10 to 12): α = 4.00, β = 10.2, γ = 2.36 among high buildings up to 200 m,
+and α = 5.06, as among low ones, beyond.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ class PhoneModel(Options):
         Weaker cells are not received.
     offset_sd_db : float
         All levels of a journey are off by one number of this standard deviation: absolute accuracy
-        of 4 to 6 dB (3GPP TS 45.008, section 8.1.2).
+        of 4 to 6 dB (3GPP TS 45.008).
     measurement_sd_db : float
         Standard deviation of each measurement of layer 1 without fading (relative accuracy of 2 to
         4 dB, the same).
@@ -53,7 +53,7 @@ class PhoneModel(Options):
     diversity : float
         Independent fades in a measurement at rest: receive antennas, bandwidth.
     carried : {"hand", "car"}
-        A car takes off N(9 dB, 5 dB) for the journey (3GPP TR 38.901, section 7.4.3.2).
+        A car takes off N(9 dB, 5 dB) for the journey (3GPP TR 38.901).
 
     Raises
     ------

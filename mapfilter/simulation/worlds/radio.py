@@ -4,9 +4,9 @@ A level is EIRP + antenna gain - path loss + guiding by the street + shadowing, 
 plane. Shadowing has three independent parts:
 
 *area*
-    of blocks and terrain, the same for all sectors of a site, and in part for all sites. 3GPP TR
-    36.942 (section 4.5) and TS 36.814 (table A.2.1.1.2-3) put the correlation between sites at 0.5
-    and that between the sectors of a site at 1.
+    of blocks and terrain, the same for all sectors of a site, and in part for all sites. Studies
+    of LTE put the correlation between sites at 0.5 and that between the sectors of a site at 1
+    (SEAMCAT handbook, section 9.11, after 3GPP TR 36.942).
 *street*
     of the street's own facades: one field for each street and site, read at the foot on the centre
     line, so that it changes along a street, not across it, and from street to street. Where streets

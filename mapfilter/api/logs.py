@@ -1,0 +1,51 @@
+"""Read a log, or recordings of other programs, in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from mapfilter.tracks.combine import CombineOptions
+from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.open_log import OpenOptions, open_log
+
+
+def read_log(
+    paths: str | Path | Sequence[str | Path],
+    *,
+    crs: str = "",
+    truth: Sequence[str | Path] = (),
+    zone: str = "",
+    columns: Mapping[str, str] | None = None,
+    course_motion: bool = False,
+) -> TrackLog:
+    """Read a track log, or recordings of one journey by other programs.
+
+    Parameters
+    ----------
+    paths : path, or sequence of paths
+        A log's folder; or recordings (the page "Recordings of other programs" lists the formats),
+        or a folder of them.
+    crs : str
+        Projected CRS for recordings, such as ``database.lattice.crs``; else the UTM zone of their
+        positions.
+    truth : sequence of paths
+        Recordings whose positions are the truth, and no measurements.
+    zone : str
+        Zone of local times that state none, such as ``Europe/Brussels``.
+    columns : mapping of str to str, optional
+        For plain CSV: column of each field, such as ``{"time": "Zeit"}``.
+    course_motion : bool
+        Make motion from the speed and course of positions where nothing else gives it.
+
+    Raises
+    ------
+    InputError
+        There is neither a log nor a recording, or what there is makes no sense; with every fault.
+    StoreError
+        A file of a log is missing, cut off or changed since it was written.
+    """
+    true = [Path(path) for path in truth]
+    combine = CombineOptions(truth=true, course_motion=course_motion)
+    options = OpenOptions(zone=zone, columns=columns or {}, combine=combine)
+    return open_log(paths, crs=crs, options=options).log

@@ -1,0 +1,101 @@
+"""The command that reads recordings of other programs."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mapfilter.cli.options import JsonOption, given_path, numbers
+from mapfilter.errors import ConfigError, fail
+from mapfilter.workflows.terminal import print_result
+
+
+def convert(
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="FILE...", help="Recordings of one journey, or their folder."),
+    ],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="LOG", help="The log's folder.", callback=given_path)
+    ],
+    form: Annotated[
+        str | None,
+        typer.Option("--format", metavar="NAME", help="Format; found by the content otherwise."),
+    ] = None,
+    truth: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--truth", metavar="FILE", help="Recording whose positions are the truth; repeatable."
+        ),
+    ] = None,
+    crs: Annotated[
+        str | None,
+        typer.Option("--crs", metavar="EPSG", help="Projected CRS; else the UTM zone."),
+    ] = None,
+    origin: Annotated[
+        str | None,
+        typer.Option("--origin", metavar="LAT,LON", help="Origin of a local frame of metres."),
+    ] = None,
+    zone: Annotated[
+        str | None,
+        typer.Option("--zone", help="Zone of local times, such as Europe/Brussels or +01:00."),
+    ] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option("--column", metavar="FIELD=COLUMN", help="Column of a plain CSV; repeatable."),
+    ] = None,
+    offset: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--offset", metavar="FILE=S", help="Seconds to add to the times of a file; repeatable."
+        ),
+    ] = None,
+    course_motion: Annotated[
+        bool,
+        typer.Option("--course-motion", help="Make motion from speed and course of positions."),
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Convert recordings of other programs to a track log."""
+    from mapfilter.tracks.combine import CombineOptions
+    from mapfilter.tracks.open_log import OpenOptions
+    from mapfilter.workflows.convert import parse_pairs, report_lines, run_convert
+
+    given = [given_path(path) or path for path in files]
+    true = [given_path(path) or path for path in truth or ()]
+    place = numbers(origin, 2, "--origin")
+    if place is not None and not (abs(place[0]) <= 90 and abs(place[1]) <= 180):
+        raise fail(ConfigError, "--origin", "a latitude and a longitude in degrees", repr(origin))
+    options = OpenOptions(
+        format=form or "",
+        zone=zone or "",
+        columns=parse_pairs(column or (), "--column"),
+        combine=CombineOptions(
+            crs=crs or "",
+            origin_deg=None if place is None else (place[0], place[1]),
+            truth=true,
+            offsets_s=_offsets(parse_pairs(offset or (), "--offset"), [*given, *true]),
+            course_motion=course_motion,
+        ),
+    )
+    result = run_convert(given, out, options)
+    if as_json:
+        print_result(result, as_json)
+    else:
+        sys.stdout.write("\n".join(report_lines(result)) + "\n")
+
+
+def _offsets(pairs: dict[str, str], files: list[Path]) -> dict[Path, float]:
+    """Return the offset of each file, named by its path or its name alone."""
+    found: dict[Path, float] = {}
+    for name, text in pairs.items():
+        named = [path for path in files if str(path) == name or path.name == name]
+        seconds = (numbers(text, 1, "--offset") or [0.0])[0]
+        if not named or not abs(seconds) <= 1e10:
+            got = repr(f"{name}={text}")
+            raise fail(ConfigError, "--offset", "FILE=SECONDS of one of the recordings", got)
+        found.update(dict.fromkeys(named, seconds))
+    return found

@@ -1,0 +1,306 @@
+"""Protection levels: radii that are exceeded with at most a stated probability, the risk.
+
+The risk that a position is more than ``R`` off is ``p_none + (1 - p_none) T(R)``: the probability
+that no hypothesis is true, and the belief's own tail. The protection level is the smallest ``R`` at
+which that is at most the risk; it is infinite where ``p_none`` alone exceeds it. So do receivers of
+satellite navigation state theirs (Walter & Enge 1995, *Weighted RAIM for precision approach*, ION
+GPS-95), with the mixture of hypotheses in place of a list of faults (Gupta & Gao, *Reliable GNSS
+localization against multiple faults using a particle filter framework*, arXiv:2101.06380).
+
+Of Gaussian mixtures the tail is integrated. A cloud of ``n`` samples says nothing of probabilities
+far below ``1 / n``; three things are done about it:
+
+* each sample is a kernel whose tail is exponential, so that the tail goes on beyond the last
+  sample; its width is Silverman's for the distances;
+* ``n`` is the effective number ``1 / Σ w²`` (Kish 1965);
+* the tail's own sampling error counts: ``T + 1.645 sqrt(T / n)``, a one-sided bound of 95 %, must
+  keep the risk.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, erfc, exp, inf, isfinite, log, pi, sin, sqrt
+from typing import Protocol
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from mapfilter._types import Floats, Floats32
+from mapfilter.errors import ConfigError, fail
+
+DEFAULT_RISK = 1e-3
+"""Probability, at each epoch, that the error exceeds the protection level."""
+
+_Z_95 = 1.6448536269514722
+_RINGS_PER_SQRT_M = 30.0
+_RINGS = 4096
+_SILVERMAN = 1.06
+_HALF_PER_SD = 0.75
+"""Half of the samples lie within 0.67 deviations on a line, and 1.18 in the plane."""
+_REACH = 45.0
+_STEPS = 36
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(40)
+
+
+class RadialTail(Protocol):
+    """How likely the true position is beyond a distance from the reported one."""
+
+    def outside(self, radius_m: float) -> float:
+        """Return the share of the belief beyond a radius, without any correction."""
+
+    def radius_m(self, share: float) -> float:
+        """Return the radius that holds a share of the belief, without any correction."""
+
+    def protection_m(self, risk: float) -> float:
+        """Return the protection level for a risk; infinite where there is none."""
+
+
+def check_risk(risk: float, where: str = "risk") -> None:
+    """Check that a risk is a probability between 0 and 1; ConfigError if not."""
+    if not 0 < risk < 1:
+        raise fail(ConfigError, where, "a probability between 0 and 1, such as 1e-3", risk)
+
+
+def usable_risk(risk: float, p_none: float) -> float:
+    """Return the risk that is left for a belief's tail; at most 0 where none is.
+
+    Examples
+    --------
+    >>> round(usable_risk(1e-3, 2e-4), 7), usable_risk(1e-3, 0.01) < 0
+    (0.0008002, True)
+    """
+    check_risk(risk)
+    if not 0 <= p_none <= 1:
+        raise ValueError(f"a probability lies in 0..1, got {p_none}")
+    return (risk - p_none) / (1 - p_none) if p_none < 1 else -1.0
+
+
+@dataclass(frozen=True, eq=False)
+class SampleTail:
+    """The tail of a cloud of weighted positions, by distance from the reported position.
+
+    Parameters
+    ----------
+    distance_m, mass : (k,) arrays
+        Ascending distances, and the shares of the belief at each; shares sum to one.
+    scale_m : float
+        Of the kernels, whose tail is that of the logistic distribution.
+    effective : float
+        Effective number of samples.
+    p_none : float
+        Probability that no hypothesis is true.
+    """
+
+    distance_m: Floats
+    mass: Floats
+    scale_m: float
+    effective: float
+    p_none: float = 0.0
+
+    def outside(self, radius_m: float) -> float:
+        """Return the share of the samples beyond a radius."""
+        return float(self.mass[self.distance_m > radius_m].sum())
+
+    def radius_m(self, share: float) -> float:
+        """Return the smallest distance within which a share of the samples lies."""
+        if not self.mass.size:
+            return float("nan")
+        held = np.cumsum(self.mass)
+        at = int(np.searchsorted(held, share * held[-1] * (1 - 1e-9)))
+        return float(self.distance_m[min(at, held.size - 1)])
+
+    def protection_m(self, risk: float) -> float:
+        """Return the protection level for a risk; infinite where there is none, NaN if empty."""
+        usable = usable_risk(risk, self.p_none)
+        if not self.mass.size:
+            return float("nan")
+        if usable <= 0:
+            return inf
+        error = _Z_95 / sqrt(self.effective)
+        share = ((sqrt(error * error + 4 * usable) - error) / 2) ** 2
+        return float(_kernel_radius(self.distance_m, self.mass, self.scale_m, share))
+
+
+def sample_tail(
+    east_m: Floats32, north_m: Floats32, weight: Floats32, at: ArrayLike, p_none: float
+) -> SampleTail:
+    """Return the tail of weighted positions about a reported one.
+
+    Parameters
+    ----------
+    east_m, north_m, weight : (n,) arrays
+        Hypotheses; weights sum to one.
+    at : array_like
+        East and north of the reported position, in the same frame; more is left alone.
+    p_none : float
+        Probability that no hypothesis is true, 0 to 1.
+    """
+    east_at, north_at = np.asarray(at, dtype=np.float64)[:2]
+    distance_m, mass, effective, half_m = _rings(east_m, north_m, weight, east_at, north_at)
+    deviation_m = _SILVERMAN * half_m / _HALF_PER_SD * max(effective, 1.0) ** -0.2
+    return SampleTail(distance_m, mass, deviation_m * sqrt(3) / pi, effective, p_none)
+
+
+@dataclass(frozen=True, eq=False)
+class GaussianTail:
+    """The tail of a Gaussian mixture about a reported position.
+
+    Parameters
+    ----------
+    weights : (c,) array
+        Of the parts; they sum to one.
+    offsets_m : (c, 2) array
+        East and north of the parts' means from the reported position.
+    covariances_m2 : (c, 2, 2) array
+        Of east and north.
+    p_none : float
+        Probability that no part is true.
+
+    Examples
+    --------
+    >>> round_belief = GaussianTail(np.ones(1), np.zeros((1, 2)), 25.0 * np.eye(2)[np.newaxis])
+    >>> round(round_belief.protection_m(1e-3), 3), round(float(5 * (2 * np.log(1e3)) ** 0.5), 3)
+    (18.585, 18.585)
+    """
+
+    weights: Floats
+    offsets_m: Floats
+    covariances_m2: Floats
+    p_none: float = 0.0
+
+    def outside(self, radius_m: float) -> float:
+        """Return the share of the mixture beyond a radius."""
+        return float(_mixture_outside(radius_m, *self._parts))
+
+    def radius_m(self, share: float) -> float:
+        """Return the radius that holds a share of the mixture."""
+        return float(_mixture_radius(1 - share, *self._parts))
+
+    def protection_m(self, risk: float) -> float:
+        """Return the protection level for a risk; infinite where there is none."""
+        usable = usable_risk(risk, self.p_none)
+        return float(_mixture_radius(usable, *self._parts)) if usable > 0 else inf
+
+    @property
+    def _parts(self) -> tuple[Floats, Floats, Floats]:
+        """Weights, and means and deviations along the parts' own axes, the longer one first."""
+        values, axes = np.linalg.eigh(self.covariances_m2)
+        long_m = np.sqrt(np.maximum(values[:, 1], 1e-6))
+        # A part that is thinner than this is a line for any radius.
+        short_m = np.maximum(np.sqrt(np.maximum(values[:, 0], 0.0)), 0.01 * long_m)
+        turned = np.einsum("ci,cij->cj", self.offsets_m, axes)[:, ::-1]
+        return self.weights, np.abs(turned), np.stack([long_m, short_m], axis=1)
+
+
+@njit(error_model="numpy", cache=True)
+def _rings(
+    east: Floats32, north: Floats32, weight: Floats32, x: float, y: float
+) -> tuple[Floats, Floats, float, float]:
+    """Return outer edges and shares of rings that hold anything, 1 / Σ w², and the median."""
+    of_ring = np.zeros(_RINGS + 1)
+    squares, total = 0.0, 0.0
+    cx, cy = np.float32(x), np.float32(y)
+    for i in range(weight.size):
+        dx, dy = east[i] - cx, north[i] - cy
+        ring = int(_RINGS_PER_SQRT_M * np.sqrt(np.sqrt(dx * dx + dy * dy)))
+        w = float(weight[i])
+        of_ring[min(ring, _RINGS)] += w
+        squares += w * w
+        total += w
+    if not total > 0:
+        return np.empty(0), np.empty(0), 0.0, 0.0
+    count = 0
+    for k in range(of_ring.size):
+        count += of_ring[k] > 0
+    edge, mass, at, held, half = np.empty(count), np.empty(count), 0, 0.0, 0.0
+    for k in range(of_ring.size):
+        if of_ring[k] > 0:
+            edge[at], mass[at] = ((k + 1) / _RINGS_PER_SQRT_M) ** 2, of_ring[k] / total
+            if held < 0.5:
+                half = edge[at]
+            held += mass[at]
+            at += 1
+    return edge, mass, total * total / squares, half
+
+
+@njit(error_model="numpy", cache=True)
+def _kernel_radius(distance: Floats, mass: Floats, scale: float, share: float) -> float:
+    """Return the radius beyond which the kernels have a share; one grid for all shares."""
+    low, high = 0.0, float(distance[-1] + _REACH * scale)
+    for _ in range(_STEPS):
+        middle, beyond = 0.5 * (low + high), 0.0
+        for k in range(mass.size - 1, -1, -1):
+            away = (middle - distance[k]) / scale
+            if away > _REACH:
+                break
+            beyond += mass[k] / (1.0 + exp(away)) if away > -_REACH else mass[k]
+        if beyond > share:
+            low = middle
+        else:
+            high = middle
+        if high - low < 1e-3 * high:
+            break
+    return high
+
+
+@njit(error_model="numpy", cache=True)
+def _upper(z: float) -> float:
+    """Return the share of a standard normal above z."""
+    return 0.5 * erfc(z / sqrt(2.0))
+
+
+@njit(error_model="numpy", cache=True)
+def _outside(radius: float, along: float, across: float, long: float, short: float) -> float:
+    """Return the share of a Gaussian beyond a radius, its mean and deviations on its axes."""
+    beyond: float = _upper((radius - along) / long) + _upper((radius + along) / long)
+    # Where the circle is as far from the axis as the mean, the inner integral is a step.
+    step = sqrt(max(radius * radius - across * across, 0.0))
+    edges = (-radius, -step, step, radius)
+    for panel in range(3):
+        low = max(edges[panel], along - 9.0 * long, -radius)
+        high = min(edges[panel + 1], along + 9.0 * long, radius)
+        if not high > low:
+            continue
+        from_, to = np.arcsin(low / radius), np.arcsin(high / radius)
+        half, middle = 0.5 * (to - from_), 0.5 * (to + from_)
+        for k in range(_NODES.size):
+            angle = middle + half * _NODES[k]
+            away, up = radius * sin(angle), radius * cos(angle)
+            z = (away - along) / long
+            density = exp(-0.5 * z * z) / (long * sqrt(2.0 * pi)) * up
+            tail = _upper((up - across) / short) + _upper((up + across) / short)
+            beyond += half * _WEIGHTS[k] * density * tail
+    return beyond
+
+
+@njit(error_model="numpy", cache=True)
+def _mixture_outside(radius: float, weight: Floats, mean: Floats, deviation: Floats) -> float:
+    if radius <= 0:
+        return 1.0
+    beyond = 0.0
+    for c in range(weight.size):
+        place = mean[c, 0], mean[c, 1], deviation[c, 0], deviation[c, 1]
+        beyond += weight[c] * _outside(radius, *place)
+    return beyond
+
+
+@njit(error_model="numpy", cache=True)
+def _mixture_radius(share: float, weight: Floats, mean: Floats, deviation: Floats) -> float:
+    """Return the radius beyond which the mixture has a share."""
+    if not isfinite(weight.sum() + mean.sum() + deviation.sum()):
+        return np.nan
+    reach = sqrt(2.0 * log(2.0 * weight.size / share)) + 1.0
+    low, high = 0.0, 0.0
+    for c in range(weight.size):
+        high = max(high, sqrt(mean[c, 0] ** 2 + mean[c, 1] ** 2) + reach * deviation[c, 0])
+    for _ in range(_STEPS):
+        middle = 0.5 * (low + high)
+        if _mixture_outside(middle, weight, mean, deviation) > share:
+            low = middle
+        else:
+            high = middle
+        if high - low < 1e-5 * high:
+            break
+    return high

@@ -1,0 +1,168 @@
+"""Tables in files: CSV in the usual encodings, and workbooks of Excel or LibreOffice."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from python_calamine import CalamineError, CalamineWorkbook
+
+from mapfilter._io import read_input
+from mapfilter.errors import Faults, InputError, MapfilterError, fail
+
+_LARGEST_BYTES = 1 << 26
+_LARGEST_UNPACKED_BYTES = 1 << 29
+_MOST_FIELDS = 5_000_000
+_SEPARATORS = (",", ";", "\t")
+_MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
+_WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
+"""First bytes of .xlsx and .ods, and of .xls."""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """The header and the rows of a file, each row with its line; blank lines are left out.
+
+    ``notes`` say what was assumed to read it; workbooks have no separator.
+    """
+
+    path: Path
+    separator: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[int, list[str]], ...]
+    notes: tuple[str, ...] = ()
+
+    def number(self, text: str) -> float | None:
+        """Return a finite number or None; decimal commas are read where they separate nothing."""
+        return number(text, decimal_comma=self.separator != ",")
+
+    def whole_rows(self, columns: int, faults: Faults) -> Iterator[tuple[int, list[str]]]:
+        """Yield the rows that have so many fields; the others are faults."""
+        for line, texts in self.rows:
+            if len(texts) == columns:
+                yield line, texts
+                continue
+            hint = "a decimal comma, or an unquoted separator"
+            if len(texts) < columns:
+                hint = "the line is cut off"
+            faults.add(f"{self.path} row {line}, fields", f"{columns}", f"{len(texts)}", hint)
+
+
+def number(text: str, *, decimal_comma: bool = False) -> float | None:
+    """Return a text as a finite number, or None.
+
+    Examples
+    --------
+    >>> number("60.5"), number("60,5"), number("60,5", decimal_comma=True), number("1_0")
+    (60.5, None, 60.5, None)
+    """
+    if decimal_comma and text.count(",") == 1 and "." not in text:
+        text = text.replace(",", ".")
+    try:
+        value = float("?" if "_" in text else text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def read_table(path: Path, what: str) -> Table:
+    """Read a table whose first line names its columns.
+
+    Text has commas, semicolons or tabs, and is UTF-8, UTF-16 with a byte order mark, or else
+    Windows-1252 (with a note). Of a workbook (.xlsx, .xls, .ods) the first sheet is read.
+
+    Parameters
+    ----------
+    what : str
+        For messages, such as ``"a cell plan"``.
+
+    Raises
+    ------
+    InputError
+        The file is missing, empty, too large or no such table.
+    """
+    data = read_input(path, _LARGEST_BYTES, what)
+    if data.startswith(_WORKBOOKS):
+        return _read_workbook(path, data, what)
+    text, notes = _decoded(path, data)
+    head = next((line for line in text.splitlines() if line.strip()), "")
+    separator = max(_SEPARATORS, key=head.count)
+    reader = csv.reader(io.StringIO(text, newline=None), delimiter=separator)
+    lines: list[tuple[int, list[str]]] = []
+    fields = 0
+    try:
+        for row in reader:
+            if any(field.strip() for field in row):
+                lines.append((reader.line_num, row))
+                fields += len(row)
+                if fields > _MOST_FIELDS:
+                    raise _too_large(path, what, reader.line_num)
+    except csv.Error as error:
+        raise fail(InputError, f"{path} row {reader.line_num}", "CSV", error) from error
+    if not lines:
+        raise fail(InputError, str(path), "a header line and rows", "nothing", "an empty file")
+    header = tuple(name.strip() for name in lines[0][1])
+    return Table(path, separator, header, tuple(lines[1:]), notes)
+
+
+def _too_large(path: Path, what: str, lines: int) -> MapfilterError:
+    got = f"more in the first {lines} lines"
+    return fail(InputError, str(path), f"{what} of at most 5e6 fields", got)
+
+
+def _decoded(path: Path, data: bytes) -> tuple[str, tuple[str, ...]]:
+    """Return a file's text, and a note where its encoding was assumed."""
+    notes: tuple[str, ...] = ()
+    encoding = next((name for mark, name in _MARKS.items() if data.startswith(mark)), "utf-8")
+    try:
+        text = data.decode(encoding)
+    except UnicodeDecodeError as error:
+        expected, got = "text in UTF-8, UTF-16 or Windows-1252", f"other bytes at {error.start}"
+        if encoding == "utf-16":
+            raise fail(InputError, str(path), expected, got, "cut off, or no text file") from error
+        try:
+            text = data.decode("cp1252")
+        except UnicodeDecodeError:
+            raise fail(InputError, str(path), expected, got, "no text file") from error
+        notes = (f"{path.name}: no UTF-8 (byte {error.start}); read as Windows-1252",)
+    if "\0" in text:
+        raise fail(InputError, str(path), "text in UTF-8", "NUL characters", "no text file")
+    return text, notes
+
+
+def _read_workbook(path: Path, data: bytes, what: str) -> Table:
+    expected, hint = "a workbook that can be read", "cut off, protected by a password, or no table"
+    try:
+        if data.startswith(b"PK"):
+            with zipfile.ZipFile(io.BytesIO(data)) as archive:
+                unpacked = sum(member.file_size for member in archive.infolist())
+            if unpacked > _LARGEST_UNPACKED_BYTES:
+                raise fail(InputError, str(path), expected, f"{unpacked / 2**20:.0f} MB unpacked")
+        book = CalamineWorkbook.from_filelike(io.BytesIO(data))
+        sheets = book.sheet_names
+        cells = book.get_sheet_by_index(0).to_python(skip_empty_area=False) if sheets else []
+    except (CalamineError, zipfile.BadZipFile, ValueError, OSError) as error:
+        got = (str(error).splitlines() or [type(error).__name__])[0]
+        raise fail(InputError, str(path), expected, got, hint) from error
+    texts = ((line, [_text(value) for value in row]) for line, row in enumerate(cells, start=1))
+    lines = [(line, row) for line, row in texts if any(row)]
+    if not lines:
+        raise fail(InputError, str(path), "a header line and rows", "an empty sheet")
+    if sum(len(row) for _, row in lines) > _MOST_FIELDS:
+        raise _too_large(path, what, len(lines))
+    others = f"; {len(sheets) - 1} more not read" if len(sheets) > 1 else ""
+    note = f"{path.name}: sheet {sheets[0]!r} of a workbook{others}"
+    return Table(path, "", tuple(lines[0][1]), tuple(lines[1:]), (note,))
+
+
+def _text(value: Any) -> str:
+    """Return the value of a cell as a CSV file would have it."""
+    if isinstance(value, float) and math.isfinite(value) and value == int(value):
+        return str(int(value))
+    return str(value).strip()

@@ -1,0 +1,277 @@
+"""Clocks of several recordings of one journey: offsets by stamps, positions or speeds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from mapfilter._types import Floats
+from mapfilter.errors import InputError, fail
+from mapfilter.geodesy import unproject
+from mapfilter.tracks.readers.recording import Recording
+
+_QUARTER_S = 900.0
+_MOST_ZONE_S = 14 * 3600.0
+_MOST_POINTS = 400
+_MOST_SHIFTS = 4000
+_COMMON_SHARE = 0.5
+_NEAR_M = 100.0
+_MOVED_M = 50.0
+_FINE_S = 0.1
+_SEARCH_S = 30.0
+_RATE_HZ = 5.0
+_LEAST_CORRELATION = 0.5
+_METRES_PER_DEGREE = 111_195.0
+_REMARKABLE_S = 1.5
+
+_Track = tuple[Floats, Floats, Floats]
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """Seconds to add to the times of each recording, and how they were found.
+
+    ``absolute`` tells whether the common time is UTC.
+    """
+
+    offsets_s: tuple[float, ...]
+    absolute: bool
+    notes: tuple[str, ...] = ()
+
+
+def align(recordings: Sequence[Recording], given_s: Mapping[Path, float]) -> Alignment:
+    """Bring recordings to one clock.
+
+    Clocks of UTC and GPS need no offset; local times without a zone take the quarter of an hour
+    by which positions, or the times themselves, agree; clocks from an unknown start are aligned by
+    positions or by speeds in common. Offsets that were given are taken as they are.
+
+    Raises
+    ------
+    InputError
+        A clock cannot be aligned.
+    """
+    reference = _reference(recordings)
+    first = recordings[reference]
+    offsets, notes = [], []
+    for recording in recordings:
+        if recording.path in given_s:
+            offsets.append(given_s[recording.path])
+            notes.append(f"{recording.path.name}: {given_s[recording.path]:+g} s, as given")
+            continue
+        offset_s, note = (0.0, "") if recording is first else _offset(recording, first)
+        offsets.append(offset_s + given_s.get(first.path, 0.0))
+        if note:
+            notes.append(f"{recording.path.name}: {note}")
+    return Alignment(tuple(offsets), first.clock.absolute, tuple(notes))
+
+
+def _reference(recordings: Sequence[Recording]) -> int:
+    """Return the recording whose clock is the common one."""
+
+    def rank(recording: Recording) -> int:
+        clock = recording.clock
+        kind = 0 if clock.absolute else 4 if clock.kind == "local" else 8
+        has = 0 if "positions" in recording.tables else 1 if "truth" in recording.tables else 2
+        return kind + has
+
+    return min(range(len(recordings)), key=lambda i: rank(recordings[i]))
+
+
+def _offset(recording: Recording, first: Recording) -> tuple[float, str]:
+    """Return the seconds to add to a recording's times, and a note."""
+    one, other = _track(first), _track(recording)
+    clock = recording.clock
+    same = clock.kind == first.clock.kind and clock.kind != "utc"
+    if clock.absolute or (same and clock.kind == "local"):
+        return 0.0, _disagreement(one, other)
+    if clock.kind == "local":
+        return _zone(recording, first, one, other)
+    if same and _common(recording, first) >= _COMMON_SHARE:
+        return 0.0, ""
+    if one is not None and other is not None:
+        low, high = one[0][0] - other[0][-1], one[0][-1] - other[0][0]
+        step_s = max(1.0, (high - low) / _MOST_SHIFTS)
+        shift_s, apart_m = _best_shift(one, other, np.arange(low, high + step_s, step_s))
+        if apart_m < _NEAR_M:
+            return shift_s, f"{shift_s:+.1f} s, by positions (median {apart_m:.1f} m apart)"
+    shift, correlation = _by_speed(_speed(first), _speed(recording))
+    if correlation >= _LEAST_CORRELATION:
+        return shift, f"{shift:+.1f} s, by speeds (correlation {correlation:.2f})"
+    expected = f"positions or speeds in common with {first.path.name}"
+    got = f"times in {clock}, and none"
+    hint = f"give --offset {recording.path.name}=SECONDS"
+    raise fail(InputError, str(recording.path), expected, got, hint)
+
+
+def _span(recording: Recording) -> tuple[float, float]:
+    times = [rows["time_s"] for rows in recording.tables.values() if "time_s" in rows]
+    return min(float(t.iloc[0]) for t in times), max(float(t.iloc[-1]) for t in times)
+
+
+def _common(recording: Recording, first: Recording, shift_s: float = 0.0) -> float:
+    """Return the share of the shorter recording that lies within the other one."""
+    (a, b), (c, d) = _span(first), _span(recording)
+    overlap = min(b, d + shift_s) - max(a, c + shift_s)
+    return overlap / max(min(b - a, d - c), 1e-9)
+
+
+def _zone(
+    recording: Recording, first: Recording, one: _Track | None, other: _Track | None
+) -> tuple[float, str]:
+    """Return the shift of local times by whole quarters of an hour."""
+    shifts = np.arange(-_MOST_ZONE_S, _MOST_ZONE_S + 1, _QUARTER_S)
+    if one is not None and other is not None:
+        apart = np.array([_apart_m(one, other, shift, 0.1) for shift in shifts])
+        if np.isfinite(apart).any():
+            shift_s = float(shifts[np.nanargmin(apart)])
+            near = float(np.nanmin(apart))
+            note = f"local time is UTC{_clock(-shift_s)} (by positions, median {near:.1f} m apart)"
+            fine = _disagreement(one, (other[0] + shift_s, *other[1:]))
+            return shift_s, f"{note}; {fine}" if fine else note
+    common = np.array([_common(recording, first, shift) for shift in shifts])
+    if common.max() <= 0:
+        expected = f"local times that overlap those of {first.path.name} in some zone"
+        hint = "recordings of two journeys, or a wrong date; else give --zone or --offset"
+        raise fail(InputError, str(recording.path), expected, "none", hint)
+    good = shifts[common >= common.max() - 1e-6]
+    shift_s = float(good[np.argmin(np.abs(good))])
+    return shift_s, f"local time is UTC{_clock(-shift_s)} (by the overlap of times)"
+
+
+def _clock(shift_s: float) -> str:
+    sign = "-" if shift_s < 0 else "+"
+    return f"{sign}{int(abs(shift_s)) // 3600:02d}:{int(abs(shift_s)) % 3600 // 60:02d}"
+
+
+def _disagreement(one: _Track | None, other: _Track | None) -> str:
+    """Return a note where positions of two clocks agree better some seconds apart."""
+    if one is None or other is None or not (_moved(one) and _moved(other)):
+        return ""
+    now_m = _apart_m(one, other, 0.0, 0.1)
+    if not np.isfinite(now_m):
+        return ""
+    shifts = np.arange(-_SEARCH_S, _SEARCH_S + 0.5, 0.5)
+    shift_s, apart_m = _best_shift(one, other, shifts)
+    if abs(shift_s) < _REMARKABLE_S or apart_m > 0.8 * now_m:
+        return f"positions agree within {now_m:.1f} m (median)"
+    return (
+        f"positions agree best {shift_s:+.1f} s shifted ({apart_m:.1f} m, not {now_m:.1f} m); "
+        "not applied, see --offset"
+    )
+
+
+def _moved(track: _Track) -> bool:
+    return float(np.hypot(np.ptp(track[1]), np.ptp(track[2]))) > _MOVED_M
+
+
+def _track(recording: Recording) -> _Track | None:
+    """Return times and positions (degrees scaled to metres), or None where there are few."""
+    for name in ("positions", "truth"):
+        if name in recording.tables and len(recording.tables[name]) >= 3:
+            rows = recording.tables[name]
+            return _degrees(rows["time_s"], rows["lon_deg"], rows["lat_deg"])
+    for name in ("places", "true_places"):
+        if recording.crs and name in recording.tables and len(recording.tables[name]) >= 3:
+            rows = recording.tables[name]
+            lon, lat = unproject(recording.crs, rows["east_m"], rows["north_m"])
+            return _degrees(rows["time_s"], lon, lat)
+    return None
+
+
+def _degrees(time_s: pd.Series, lon_deg: object, lat_deg: object) -> _Track:
+    time, first = np.unique(time_s.to_numpy(dtype=np.float64), return_index=True)
+    lon = np.asarray(lon_deg, dtype=np.float64)[first]
+    lat = np.asarray(lat_deg, dtype=np.float64)[first]
+    # One scale for both tracks: whole degrees of latitude give the same one nearly everywhere.
+    wide = np.cos(np.radians(np.round(np.median(lat))))
+    return time, _METRES_PER_DEGREE * wide * lon, _METRES_PER_DEGREE * lat
+
+
+def _apart_m(one: _Track, other: _Track, shift_s: float, least: float) -> float:
+    """Return the median distance of a shifted track; NaN where little of it is in common."""
+    step = max(1, len(other[0]) // _MOST_POINTS)
+    time = other[0][::step] + shift_s
+    inside = (time >= one[0][0]) & (time <= one[0][-1])
+    if inside.sum() < 3 or inside.mean() < least:
+        return float("nan")
+    east = np.interp(time[inside], one[0], one[1]) - other[1][::step][inside]
+    north = np.interp(time[inside], one[0], one[2]) - other[2][::step][inside]
+    return float(np.median(np.hypot(east, north)))
+
+
+def _best_shift(one: _Track, other: _Track, shifts: Floats) -> tuple[float, float]:
+    """Return the shift of the least median distance, and that distance."""
+    least = min(_COMMON_SHARE, 0.9 * np.ptp(one[0]) / max(np.ptp(other[0]), 1e-9) * _COMMON_SHARE)
+    apart = np.array([_apart_m(one, other, shift, least) for shift in shifts])
+    if not np.isfinite(apart).any():
+        return 0.0, float("inf")
+    best, step = float(shifts[np.nanargmin(apart)]), float(shifts[1] - shifts[0])
+    fine = best + np.arange(-step, step + _FINE_S, _FINE_S)
+    apart = np.array([_apart_m(one, other, shift, least) for shift in fine])
+    if not np.isfinite(apart).any():
+        return best, float("inf")
+    return float(fine[np.nanargmin(apart)]), float(np.nanmin(apart))
+
+
+def _speed(recording: Recording) -> tuple[Floats, Floats] | None:
+    """Return times and speeds of the first table that has or gives them."""
+    tables = recording.tables
+    for name in ("odometry", "positions"):
+        if name in tables and tables[name]["speed_mps"].notna().sum() >= 10:
+            rows = tables[name].dropna(subset="speed_mps")
+            return rows["time_s"].to_numpy(), rows["speed_mps"].abs().to_numpy()
+    if "motion" in tables and tables["motion"]["step_m"].notna().sum() >= 10:
+        rows = tables["motion"].dropna(subset="step_m")
+        return _rate(rows["time_s"].to_numpy(), rows["step_m"].abs().to_numpy()[1:])
+    if "poses" in tables and len(tables["poses"]) >= 10:
+        rows = tables["poses"]
+        step = np.sqrt((rows[["x_m", "y_m", "z_m"]].diff().to_numpy()[1:] ** 2).sum(axis=1))
+        return _rate(rows["time_s"].to_numpy(), step)
+    track = _track(recording)
+    if track is None or len(track[0]) < 10:
+        return None
+    return _rate(track[0], np.hypot(np.diff(track[1]), np.diff(track[2])))
+
+
+def _rate(time_s: Floats, step_m: Floats) -> tuple[Floats, Floats]:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        speed = step_m / np.diff(time_s)
+    good = np.isfinite(speed)
+    return time_s[1:][good], speed[good]
+
+
+def _by_speed(
+    one: tuple[Floats, Floats] | None, other: tuple[Floats, Floats] | None
+) -> tuple[float, float]:
+    """Return the shift of the greatest correlation of two speeds, and that correlation."""
+    if one is None or other is None or len(one[0]) < 10 or len(other[0]) < 10:
+        return 0.0, 0.0
+    lengths = [min(float(np.ptp(time)), 6 * 3600.0) for time, _ in (one, other)]
+    grids = [np.arange(0.0, length, 1 / _RATE_HZ) for length in lengths]
+    a, b = (
+        np.interp(grid + track[0][0], *track)
+        for grid, track in zip(grids, (one, other), strict=True)
+    )
+    size = 1 << int(np.ceil(np.log2(len(a) + len(b))))
+
+    def lagged(x: Floats, y: Floats) -> Floats:
+        product = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
+        return np.concatenate([product[-(len(y) - 1) :], product[: len(x)]])
+
+    ones_a, ones_b = np.ones(len(a)), np.ones(len(b))
+    count = np.round(lagged(ones_a, ones_b))
+    sum_a, sum_b = lagged(a, ones_b), lagged(ones_a, b)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shared = lagged(a, b) - sum_a * sum_b / count
+        spread_a = lagged(a**2, ones_b) - sum_a**2 / count
+        spread_b = lagged(ones_a, b**2) - sum_b**2 / count
+        correlation = shared / np.sqrt(np.maximum(spread_a * spread_b, 1e-12))
+    correlation[count < max(10, _COMMON_SHARE * min(len(a), len(b)))] = -1.0
+    best = int(np.nanargmax(correlation))
+    shift_s = (best - (len(b) - 1)) / _RATE_HZ + one[0][0] - other[0][0]
+    return float(shift_s), float(min(correlation[best], 1.0))

@@ -1,0 +1,296 @@
+"""Several recordings of one journey as one track log, with raw sensors beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from mapfilter.errors import Faults, InputError, fail
+from mapfilter.geodesy import (
+    heading_from_azimuth_rad,
+    wrap_rad,
+)
+from mapfilter.tracks.alignment import Alignment, align
+from mapfilter.tracks.frame import Frame
+from mapfilter.tracks.log import TrackLog, make_log
+from mapfilter.tracks.moved import (
+    by_compass,
+    motion_from_course,
+    motion_from_odometry,
+    motion_from_poses,
+    places_of_poses,
+)
+from mapfilter.tracks.raw_satellites import log_pseudoranges
+from mapfilter.tracks.readers.recording import Recording
+from mapfilter.tracks.sensors import SENSOR_COLUMNS
+
+_RADIUS_68 = 1.515
+"""Radius of 68 % of a two-dimensional normal distribution, in standard deviations."""
+
+_NO_JOURNEY = {"cells", "ephemerides", "ionosphere"}
+_PROVIDERS = ("gps", "fused", "flp", "network", "nlp")
+_CELL_COLUMNS = ("technology", "mcc", "mnc", "lac", "ci", "level_step_db")
+
+
+@dataclass(frozen=True)
+class CombineOptions:
+    """How recordings become a log.
+
+    Parameters
+    ----------
+    crs : str
+        Projected CRS of the log; "" for the UTM zone of its positions.
+    origin_deg : (float, float) or None
+        Latitude and longitude at which a local frame of metres has its origin.
+    truth : collection of Path
+        Recordings whose positions are the truth, and no measurements.
+    offsets_s : mapping of Path to float
+        Seconds to add to the times of a recording.
+    course_motion : bool
+        Whether steps are made from the speed and course of positions where nothing else gives them.
+    """
+
+    crs: str = ""
+    origin_deg: tuple[float, float] | None = None
+    truth: Collection[Path] = ()
+    offsets_s: Mapping[Path, float] = field(default_factory=dict)
+    course_motion: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Combined:
+    """A log made of recordings, its sensor tables, and how the clocks were aligned."""
+
+    log: TrackLog
+    sensors: Mapping[str, pd.DataFrame]
+    alignment: Alignment
+    notes: tuple[str, ...]
+
+
+def combine(recordings: Sequence[Recording], options: CombineOptions | None = None) -> Combined:
+    """Make one log of the recordings of one journey.
+
+    Raises
+    ------
+    InputError
+        Clocks cannot be aligned, frames do not fit together, or the tables make no sense.
+    """
+    options = options or CombineOptions()
+    journey = [r for r in recordings if set(r.tables) - _NO_JOURNEY]
+    if not journey:
+        names = ", ".join(r.path.name for r in recordings)
+        expected = "a recording of a journey"
+        got = "only lists of cells or orbits"
+        raise fail(InputError, names, expected, got, "give a list as [cells] path")
+    alignment = align(journey, options.offsets_s)
+    shifted = [
+        _shifted(recording, offset)
+        for recording, offset in zip(journey, alignment.offsets_s, strict=True)
+    ]
+    frame = Frame(shifted, options.crs, options.origin_deg)
+    notes = [*alignment.notes, *frame.notes]
+    for recording in recordings:
+        if "cells" in recording.tables:
+            count = len(recording.tables["cells"])
+            notes.append(f"{recording.path.name}: a list of {count} cells; give it as [cells] path")
+    tables = {
+        "motion": _motion(shifted, frame, options, notes),
+        "radio": _joined(shifted, "radio"),
+        "gnss": _fixes(shifted, frame, options, notes),
+        "truth": _truth(shifted, frame, options),
+        "pseudoranges": _satellites(recordings, shifted, notes),
+    }
+    start_s = min(
+        float(rows["time_s"].min()) for r in shifted for rows in r.tables.values() if len(rows)
+    )
+    start_s = float(np.floor(start_s))
+    given = {
+        name: rows.assign(time_s=rows["time_s"] - start_s)
+        for name, rows in tables.items()
+        if rows is not None and len(rows)
+    }
+    if "radio" in given:
+        given["radio"] = _radio(given["radio"])
+    sensors = {
+        name: rows.assign(time_s=rows["time_s"] - start_s)
+        for name, rows in _sensors(shifted, frame, options.truth, notes).items()
+    }
+    log = make_log(
+        frame.crs,
+        **given,
+        start_utc_s=start_s if alignment.absolute else float("nan"),
+        notes=notes,
+    )
+    if not given and not sensors:
+        names = ", ".join(r.path.name for r in recordings)
+        raise fail(InputError, names, "rows of a journey", "none")
+    return Combined(log, sensors, alignment, tuple(notes))
+
+
+def _shifted(recording: Recording, offset_s: float) -> Recording:
+    if offset_s == 0.0:
+        return recording
+    tables = {
+        name: rows.assign(time_s=rows["time_s"] + offset_s) if "time_s" in rows else rows
+        for name, rows in recording.tables.items()
+    }
+    return replace(recording, tables=tables)
+
+
+def _joined(recordings: Sequence[Recording], table: str) -> pd.DataFrame | None:
+    parts = [r.tables[table] for r in recordings if table in r.tables]
+    if not parts:
+        return None
+    rows = pd.concat(parts, ignore_index=True)
+    return rows.sort_values("time_s", kind="stable", ignore_index=True)
+
+
+def _radio(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return reports with the columns of a log; empty columns of identities are left out."""
+    whole = ("mcc", "mnc", "lac", "ci", "arfcn", "bsic", "timing_advance", "censored")
+    rows = rows.assign(**{name: rows[name].round().astype("Int64") for name in whole})
+    empty = [name for name in _CELL_COLUMNS if rows[name].isna().all()]
+    return rows.drop(columns=empty)
+
+
+def _positions(recording: Recording) -> tuple[pd.DataFrame | None, str]:
+    """Return measured positions of the best provider, and a note on those of others."""
+    rows = recording.tables.get("positions", recording.tables.get("places"))
+    if rows is None or "provider" not in rows or rows["provider"].isna().all():
+        return rows, ""
+    named = rows["provider"].fillna("").str.lower()
+    found = [name for name in _PROVIDERS if (named == name).any()]
+    if not found or (named == found[0]).all():
+        return rows, ""
+    left = int((named != found[0]).sum())
+    kept = rows[named == found[0]].reset_index(drop=True)
+    return kept, f"{recording.path.name}: {left} fixes of other providers than {found[0]} left out"
+
+
+def _fixes(
+    recordings: Sequence[Recording], frame: Frame, options: CombineOptions, notes: list[str]
+) -> pd.DataFrame | None:
+    parts = []
+    for recording in recordings:
+        rows, note = _positions(recording)
+        if rows is None or recording.path in options.truth:
+            continue
+        if note:
+            notes.append(note)
+        east, north = frame.east_north(rows, recording.crs)
+        variance = np.full(len(rows), np.nan)
+        if "accuracy_m" in rows:
+            radius = rows["accuracy_m"].to_numpy()
+            variance = np.where(radius > 0, (radius / _RADIUS_68) ** 2, np.nan)
+        columns = {"time_s": rows["time_s"], "east_m": east, "north_m": north}
+        columns |= {"var_east_m2": variance, "var_north_m2": variance}
+        parts.append(pd.DataFrame({**columns, "cov_east_north_m2": 0.0 * variance}))
+    return pd.concat(parts, ignore_index=True).sort_values("time_s") if parts else None
+
+
+def _truth(
+    recordings: Sequence[Recording], frame: Frame, options: CombineOptions
+) -> pd.DataFrame | None:
+    parts = []
+    for recording in recordings:
+        rows = recording.tables.get("truth", recording.tables.get("true_places"))
+        if rows is None and recording.path in options.truth:
+            rows, _ = _positions(recording)
+            if rows is None and "poses" in recording.tables:
+                rows = places_of_poses(recording.tables["poses"])
+            if rows is None:
+                got = f"a recording of {', '.join(recording.tables)}"
+                raise fail(InputError, str(recording.path), "positions, as the truth", got)
+        if rows is not None:
+            east, north = frame.east_north(rows, recording.crs)
+            place = {"time_s": rows["time_s"], "east_m": east, "north_m": north}
+            parts.append(pd.DataFrame(place))
+    return pd.concat(parts, ignore_index=True).sort_values("time_s") if parts else None
+
+
+def _motion(
+    recordings: Sequence[Recording], frame: Frame, options: CombineOptions, notes: list[str]
+) -> pd.DataFrame | None:
+    """Return motion of the recording that tells it most directly; others stay sensors."""
+    makers: tuple[tuple[str, Callable[[pd.DataFrame], pd.DataFrame]], ...] = (
+        ("motion", lambda rows: by_compass(rows, frame.convergence_rad)),
+        ("odometry", motion_from_odometry),
+        ("poses", motion_from_poses),
+    )
+    for name, make in makers:
+        having = [r for r in recordings if name in r.tables and r.path not in options.truth]
+        if not having:
+            continue
+        for other in having[1:]:
+            notes.append(f"{other.path.name}: {name} not used, {having[0].path.name} has it, too")
+        moved = make(having[0].tables[name])
+        return moved.assign(heading_rad=wrap_rad(moved["heading_rad"]))
+    if options.course_motion:
+        for recording in recordings:
+            rows, _ = _positions(recording)
+            if rows is not None and "course_deg" in rows and rows["course_deg"].notna().any():
+                notes.append(f"{recording.path.name}: motion from speed and course of its fixes")
+                return motion_from_course(rows, frame.convergence_rad)
+        faults = Faults()
+        names = ", ".join(r.path.name for r in recordings)
+        faults.add(names, "positions with speed and course", "none", "leave out --course-motion")
+        faults.raise_if_any(InputError)
+    return None
+
+
+def _satellites(
+    recordings: Sequence[Recording], shifted: Sequence[Recording], notes: list[str]
+) -> pd.DataFrame | None:
+    rows = _joined(shifted, "satellites")
+    if rows is None:
+        return None
+    lists = [r for r in recordings if not set(r.tables) - _NO_JOURNEY]
+    return log_pseudoranges([*shifted, *lists], rows, notes)
+
+
+def _sensors(
+    recordings: Sequence[Recording], frame: Frame, truth: Collection[Path], notes: list[str]
+) -> dict[str, pd.DataFrame]:
+    found: dict[str, pd.DataFrame] = {}
+    measured = [r for r in recordings if r.path not in truth]
+    for name, columns in SENSOR_COLUMNS.items():
+        if name == "velocity":
+            rows = _velocity(measured, frame)
+        else:
+            rows = _joined(_apart(measured, name, notes), name)
+        if rows is not None and len(rows):
+            found[name] = rows[list(columns)]
+    return found
+
+
+def _apart(recordings: Sequence[Recording], table: str, notes: list[str]) -> list[Recording]:
+    """Return the recordings of one sensor that do not overlap in time, calibrated ones first."""
+    having = [r for r in recordings if table in r.tables]
+    kept: list[Recording] = []
+    for recording in sorted(having, key=lambda r: "uncal" in r.path.name.lower()):
+        first, last = recording.tables[table]["time_s"].iloc[[0, -1]]
+        for other in kept:
+            begin, end = other.tables[table]["time_s"].iloc[[0, -1]]
+            if first < end and begin < last:
+                notes.append(f"{recording.path.name}: {table} not used, {other.path.name} has it")
+                break
+        else:
+            kept.append(recording)
+    return kept
+
+
+def _velocity(recordings: Sequence[Recording], frame: Frame) -> pd.DataFrame | None:
+    parts = []
+    for recording in recordings:
+        rows, _ = _positions(recording)
+        if rows is None or "speed_mps" not in rows:
+            continue
+        rows = rows[rows["speed_mps"].notna()]
+        heading = heading_from_azimuth_rad(rows["course_deg"], frame.convergence_rad)
+        columns = {"time_s": rows["time_s"], "speed_mps": rows["speed_mps"]}
+        parts.append(pd.DataFrame({**columns, "heading_rad": heading}))
+    return pd.concat(parts, ignore_index=True).sort_values("time_s") if parts else None

@@ -1,0 +1,183 @@
+"""Cells of a log by the ids of a plan: identities, and carriers with codes, by technology."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from mapfilter.errors import listed
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.radio.identities import parse_cgi
+from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.schema import SERVING
+
+_IDENTITY = ("mcc", "mnc", "lac", "ci")
+_KEYS = ("technology", *_IDENTITY, "arfcn", "bsic")
+_UNIQUE_IN_NETWORK = ("LTE", "NR")
+"""Technologies whose cell identity is unique in a network, whatever the tracking area."""
+_SHORT_CI = 1 << 16
+
+
+@dataclass(frozen=True, slots=True)
+class _Reported:
+    """One combination of a cell's id, identity, carrier and code, as reports give it."""
+
+    role: str
+    cell: str | None
+    technology: str | None
+    mcc: int | None
+    mnc: int | None
+    lac: int | None
+    ci: int | None
+    arfcn: int | None
+    bsic: int | None
+
+
+def name_by_plan(log: TrackLog, plan: CellPlan) -> TrackLog:
+    """Return a log whose reported cells have the ids of a plan, where the plan has them.
+
+    A cell whose id the plan does not know is looked up by its identity: the columns ``mcc``,
+    ``mnc``, ``lac`` and ``ci``, or an id that is a CGI, ECGI or NCGI. Parts that either side does
+    not state are not compared, and a single cell must fit; the tracking area does not count in LTE
+    and NR, and the RNC is dropped in UMTS where the plan has 16-bit identities. A serving cell
+    without any identity is looked up by carrier and code. Neighbours without an identity are left
+    to the filter, unless the plan has their carrier and code in several technologies.
+
+    Returns
+    -------
+    TrackLog
+        The same object where nothing changes; what was named is in its notes.
+    """
+    radio = log.radio
+    cells = radio["cell"]
+    if radio.empty or bool(cells.isin(plan.ids).all()):
+        return log
+    keys = radio[["role", "cell"]].copy()
+    for name in _KEYS:
+        keys[name] = radio.get(name)
+    keys = keys.astype(object).where(keys.notna(), None)
+    numbers = pd.MultiIndex.from_frame(keys.fillna("")).factorize()[0]
+    _, first = np.unique(numbers, return_index=True)
+    table = _Table(plan)
+    named: list[str | None] = []
+    found = _Counts()
+    for at, count in zip(first.tolist(), np.bincount(numbers).tolist(), strict=True):
+        values = {k: _plain(v) for k, v in keys.iloc[at].items()}
+        reported = _Reported(**values)
+        named.append(table.name(reported))
+        found.add(reported, named[-1], plan, count)
+    if not any(found.named.values()) and not found.hidden:
+        return log
+    # Without the dtype pandas 3 makes these strings, and None becomes NaN.
+    new = pd.Series([named[i] for i in numbers.tolist()], index=radio.index, dtype=object)
+    return replace(log, radio=radio.assign(cell=new), notes=(*log.notes, *found.notes()))
+
+
+def _plain(value: Any) -> Any:
+    return int(value) if isinstance(value, int | float | np.number) else value
+
+
+class _Counts:
+    """Rows that got an id, and rows of cells that the plan does not have."""
+
+    def __init__(self) -> None:
+        self.named: dict[str, int] = {}
+        self.lost: dict[str, int] = {}
+        self.hidden = False
+
+    def add(self, reported: _Reported, name: str | None, plan: CellPlan, rows: int) -> None:
+        if name is not None and name in plan and name != reported.cell:
+            self.named[name] = self.named.get(name, 0) + rows
+        elif name is not None and name not in plan:
+            self.lost[name] = self.lost.get(name, 0) + rows
+            self.hidden |= name != reported.cell
+
+    def notes(self) -> Iterable[str]:
+        if self.named:
+            rows, cells = sum(self.named.values()), len(self.named)
+            yield f"radio: {rows} rows of {cells} cells named by the plan's identities"
+        if self.lost:
+            rows, some = sum(self.lost.values()), listed(sorted(self.lost))
+            yield f"radio: {rows} rows of {len(self.lost)} cells that the plan lacks ({some})"
+
+
+class _Table:
+    """The identities, carriers and codes of a plan."""
+
+    def __init__(self, plan: CellPlan) -> None:
+        self.plan = plan
+        self.by_ci: dict[int, list[Cell]] = {}
+        for cell in plan.cells:
+            if cell.ci is None and (found := parse_cgi(cell.id)) is not None:
+                mcc, mnc, lac, ci = found
+                cell = replace(cell, mcc=mcc, mnc=mnc, lac=lac, ci=ci)
+            if cell.ci is not None:
+                self.by_ci.setdefault(cell.ci, []).append(cell)
+
+    def name(self, reported: _Reported) -> str | None:
+        """Return the plan's id of a reported cell, or what was reported."""
+        if reported.cell is not None and reported.cell in self.plan:
+            return reported.cell
+        if reported.ci is None and reported.cell is not None:
+            reported = _with_identity(reported)
+        if reported.ci is not None:
+            return self._by_identity(reported) or reported.cell or _shown(reported)
+        if reported.cell is not None or reported.arfcn is None or reported.bsic is None:
+            return reported.cell
+        return self._by_carrier(reported.arfcn, reported.bsic, reported)
+
+    def _by_identity(self, reported: _Reported) -> str | None:
+        assert reported.ci is not None
+        found = [c for c in self.by_ci.get(reported.ci, ()) if _fits(c, reported)]
+        if not found and reported.ci >= _SHORT_CI and reported.technology in ("UMTS", None):
+            short = self.by_ci.get(reported.ci % _SHORT_CI, ())
+            # The short identity is unique in a location area only.
+            found = [c for c in short if c.lac is not None and c.lac == reported.lac]
+            found = [c for c in found if _fits(c, reported)]
+        return found[0].id if len(found) == 1 else None
+
+    def _by_carrier(self, arfcn: int, bsic: int, reported: _Reported) -> str | None:
+        ids = self.plan.ids_by_carrier.get((arfcn, bsic), ())
+        cells = [self.plan[one] for one in ids]
+        same = [c.id for c in cells if _same_technology(c.technology, reported.technology)]
+        if reported.role == SERVING:
+            return same[0] if len(same) == 1 else None
+        if len(same) == len(ids):
+            return None
+        # A filter resolves by carrier and code alone, and would take a cell of another technology.
+        unknown = f"{reported.technology} carrier {arfcn}, code {bsic}"
+        return same[0] if len(same) == 1 else unknown if not same else None
+
+
+def _with_identity(reported: _Reported) -> _Reported:
+    """Return a reported cell with the identity that its id states, if any."""
+    found = parse_cgi(reported.cell or "")
+    if found is None:
+        return reported
+    mcc, mnc, lac, ci = found
+    return replace(reported, mcc=mcc, mnc=mnc, lac=lac, ci=ci)
+
+
+def _same_technology(one: str | None, other: str | None) -> bool:
+    return one is None or other is None or one == other
+
+
+def _fits(cell: Cell, reported: _Reported) -> bool:
+    """Return whether no part of an identity that both sides state differs."""
+    if not _same_technology(cell.technology, reported.technology):
+        return False
+    names = ["mcc", "mnc", "lac"]
+    by_network = cell.mnc is not None and reported.mnc is not None
+    if by_network and (reported.technology or cell.technology) in _UNIQUE_IN_NETWORK:
+        names.remove("lac")
+    pairs = [(getattr(cell, name), getattr(reported, name)) for name in names]
+    return all(one is None or other is None or one == other for one, other in pairs)
+
+
+def _shown(reported: _Reported) -> str:
+    parts = (reported.mcc, reported.mnc, reported.lac, reported.ci)
+    return "-".join(str(part) for part in parts if part is not None)

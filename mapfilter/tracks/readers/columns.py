@@ -1,0 +1,232 @@
+"""Columns of separated values, read fast; a bad line loses nothing but itself."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from mapfilter._types import Bools, Floats, Ints
+from mapfilter.tracks.readers.lines import LONGEST_LINE, blocks, good_lines, parsed
+from mapfilter.tracks.readers.recording import Reading
+from mapfilter.tracks.readers.times import parse_times, unix_seconds
+
+SEPARATORS = ",;\t|"
+_LEAST_UNIX_S = 1e8
+_NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
+_WHOLE = r"^[-+]?(\d{1,18}|[0-8]\d{18})$"
+_MISSING = ("", "-", "nan", "NaN", "NA", "N/A", "null", "NULL", "None", "none", "#N/A")
+
+
+@dataclass(eq=False)
+class Columns:
+    """Lines of separated values.
+
+    Parameters
+    ----------
+    reading : Reading
+        Takes notes.
+    names : tuple of str
+        Lower case, without blanks around.
+    line : (N,) array of int
+        The file's line of each row.
+    decimal_comma : bool
+        Whether numbers may have a comma for the point.
+    """
+
+    reading: Reading
+    names: tuple[str, ...]
+    line: Ints
+    decimal_comma: bool = False
+    _columns: dict[int, pa.ChunkedArray] = field(default_factory=dict, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+    def has(self, *names: str) -> bool:
+        """Return whether all these columns are there."""
+        return all(name in self.names for name in names)
+
+    def find(self, *names: str) -> str | None:
+        """Return the first of these names that is a column."""
+        return next((name for name in names if name in self.names), None)
+
+    def _raw(self, *names: str) -> pa.ChunkedArray | None:
+        name = self.find(*names)
+        return None if name is None else self._columns.get(self.names.index(name))
+
+    def texts(self, *names: str) -> np.ndarray:
+        """Return the first of these columns that is there as texts, "" where missing."""
+        column = self._raw(*names)
+        if column is None:
+            return np.full(len(self), "", dtype=object)
+        trimmed = pc.utf8_trim_whitespace(column).dictionary_encode().combine_chunks()
+        words = np.array(trimmed.dictionary.to_pylist(), dtype=object)
+        index = trimmed.indices.to_numpy(zero_copy_only=False)
+        return words[index] if len(words) else np.full(len(self), "", dtype=object)
+
+    def mapped(self, meaning: Callable[[str], Any], *names: str) -> np.ndarray:
+        """Return what each word of a column means; a function of words that are few."""
+        column = self._raw(*names)
+        if column is None:
+            return np.full(len(self), meaning(""), dtype=object)
+        trimmed = pc.utf8_trim_whitespace(column).dictionary_encode().combine_chunks()
+        words = [meaning(word) for word in trimmed.dictionary.to_pylist()]
+        index = trimmed.indices.to_numpy(zero_copy_only=False)
+        found = np.empty(len(words), dtype=object)
+        found[:] = words
+        return found[index] if len(words) else np.full(len(self), meaning(""), dtype=object)
+
+    def flags(self, *names: str, true: Collection[str]) -> Bools:
+        """Return in which rows a column has one of some words."""
+        column = self._raw(*names)
+        if column is None:
+            return np.zeros(len(self), dtype=bool)
+        found = pc.is_in(pc.utf8_trim_whitespace(column), pa.array(list(true)))
+        return np.asarray(found.to_numpy(), dtype=bool)
+
+    def times(self, *names: str, zone: str = "", layout: str = "ISO8601") -> tuple[Floats, bool]:
+        """Return UTC seconds of a column of times, see :func:`parse_times`."""
+        column = self._raw(*names)
+        if column is not None and layout == "ISO8601":
+            try:
+                number = np.asarray(pc.cast(column, pa.float64()).to_numpy(), dtype=np.float64)
+            except pa.ArrowInvalid:
+                pass
+            else:
+                return unix_seconds(np.where(np.abs(number) > _LEAST_UNIX_S, number, np.nan)), True
+        return parse_times(self.texts(*names), zone, layout)
+
+    def number(self, *names: str) -> Floats:
+        """Return the first of these columns that is there as numbers, NaN where missing.
+
+        What is no number is noted and taken for missing.
+        """
+        column = self._raw(*names)
+        if column is None:
+            return np.full(len(self), np.nan)
+        if self.decimal_comma:
+            column = pc.replace_substring(column, ",", ".")
+        numbers = self._cast(column, pa.float64(), _NUMBER, names)
+        return np.asarray(numbers.to_numpy(), dtype=np.float64)
+
+    def whole(self, *names: str) -> tuple[Ints, Bools]:
+        """Return whole numbers exactly (0 where missing), and which of them are there."""
+        column = self._raw(*names)
+        if column is None:
+            return np.zeros(len(self), dtype=np.int64), np.zeros(len(self), dtype=bool)
+        column = pc.replace_substring_regex(pc.utf8_trim_whitespace(column), r"\.0*$", "")
+        numbers = self._cast(column, pa.int64(), _WHOLE, names)
+        there = np.asarray(pc.is_valid(numbers).to_numpy(), dtype=bool)
+        return np.asarray(pc.fill_null(numbers, 0).to_numpy(), dtype=np.int64), there
+
+    def _cast(
+        self, column: pa.ChunkedArray, kind: pa.DataType, pattern: str, names: Sequence[str]
+    ) -> pa.ChunkedArray:
+        try:
+            return pc.cast(column, kind)
+        except pa.ArrowInvalid:
+            pass
+        column = pc.utf8_trim_whitespace(column)
+        missing = pc.is_in(column, pa.array(_MISSING))
+        good = pc.match_substring_regex(column, pattern)
+        if bad := pc.sum(pc.and_not(pc.invert(good), missing)).as_py():
+            self.reading.note(f"{self.find(*names)}: {bad} values are no numbers, taken as missing")
+        column = pc.replace_substring_regex(column, r"^\+", "")
+        return pc.cast(pc.if_else(good, column, None), kind)
+
+
+def header_columns(
+    data: bytes, reading: Reading, first_line: int = 1, *, ragged: int = 0
+) -> Columns:
+    """Read lines of which the first that is not blank names the columns.
+
+    ``ragged`` is the least number of fields of a line whose last fields may be absent; 0 where
+    every line has all fields.
+    """
+    start = 0
+    while start < len(data):
+        end = data.find(b"\n", start)
+        end = len(data) if end < 0 else end
+        header = data[start:end].decode("utf-8", "replace").strip("\n")
+        start, first_line = end + 1, first_line + 1
+        if header.strip():
+            separator = likely_separator(header)
+            names = header_names(header, separator)
+            return value_columns(
+                memoryview(data)[start:], reading, names, separator, first_line, ragged=ragged
+            )
+    return Columns(reading, (), np.zeros(0, dtype=np.int64))
+
+
+def only(columns: Mapping[str, Any], lines: Ints, rows: Bools) -> tuple[dict[str, Any], Ints]:
+    """Return some rows of arrays, and their lines; the arrays themselves where all are kept."""
+    if rows.all():
+        return dict(columns), lines
+    kept = {name: v[rows] if np.ndim(v) else v for name, v in columns.items()}
+    return kept, lines[rows]
+
+
+def likely_separator(header: str) -> str:
+    """Return the separator that a header line has most often."""
+    return max(SEPARATORS, key=header.count)
+
+
+def header_names(header: str, separator: str) -> tuple[str, ...]:
+    """Return the names in a header line, in lower case."""
+    fields = next(csv.reader([header[:LONGEST_LINE]], delimiter=separator), [])
+    return tuple(name.strip().lower() for name in fields)
+
+
+def line_columns(
+    lines: Sequence[bytes],
+    numbers: Sequence[int],
+    reading: Reading,
+    names: Sequence[str],
+    separator: str,
+    *,
+    ragged: int = 0,
+) -> Columns:
+    """Read lines picked from a file; ``numbers`` are theirs there."""
+    data = b"\n".join(lines)
+    columns = value_columns(memoryview(data), reading, names, separator, 1, ragged=ragged)
+    places = np.asarray(numbers, dtype=np.int64)
+    columns.line = places[columns.line - 1] if len(places) else columns.line
+    return columns
+
+
+def value_columns(
+    data: memoryview,
+    reading: Reading,
+    names: Sequence[str],
+    separator: str,
+    first_line: int = 1,
+    *,
+    ragged: int = 0,
+) -> Columns:
+    """Read lines of values under known names."""
+    named = tuple(names)
+    lines: list[Ints] = []
+    tables: list[pa.Table] = []
+    for block, line in blocks(data, first_line):
+        good, rows = good_lines(block, line, len(named), separator, reading, ragged or len(named))
+        if rows.size:
+            tables.append(parsed(good, len(named), separator))
+            lines.append(rows)
+    found = Columns(reading, named, np.concatenate(lines) if lines else np.zeros(0, dtype=np.int64))
+    found.decimal_comma = separator != ","
+    if tables:
+        table = pa.concat_tables(tables)
+        found._columns.update(enumerate(table.columns))
+    return found
+
+
+def split_blanks(data: bytes) -> bytes:
+    """Return a text in which runs of blanks and tabs are one blank, none at a line's ends."""
+    return re.sub(rb"^ | $", b"", re.sub(rb"[ \t]+", b" ", data), flags=re.MULTILINE)

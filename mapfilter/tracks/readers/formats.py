@@ -1,0 +1,146 @@
+"""The table of formats, finding the format of a file, and reading it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from mapfilter.errors import ConfigError, InputError, MapfilterError, fail
+from mapfilter.tracks.readers import (
+    antennas,
+    cell_csv,
+    gnettrack,
+    gnsslogger,
+    gpx,
+    indoor,
+    nmea,
+    phone_sensors,
+    plain_csv,
+    poses,
+    rinex,
+    rinex_navigation,
+    smartloc,
+)
+from mapfilter.tracks.readers.columns import header_names, likely_separator
+from mapfilter.tracks.readers.format import Format, ReadOptions
+from mapfilter.tracks.readers.recording import Reading, Recording
+from mapfilter.tracks.readers.text import Text, parts_of, read_text
+
+FORMATS: tuple[Format, ...] = (
+    gnettrack.FORMAT,
+    cell_csv.TOWER_COLLECTOR,
+    cell_csv.UPLOAD,
+    cell_csv.CELL_LIST,
+    gpx.FORMAT,
+    nmea.FORMAT,
+    gnsslogger.FORMAT,
+    rinex.FORMAT,
+    rinex_navigation.FORMAT,
+    smartloc.FORMAT,
+    smartloc.RAW,
+    indoor.FORMAT,
+    phone_sensors.PHYPHOX,
+    phone_sensors.SENSOR_LOGGER,
+    antennas.FORMAT,
+    poses.KITTI,
+    poses.TUM,
+    plain_csv.FORMAT,
+)
+"""All formats, in the order in which a file is compared with them."""
+
+_PEEKED_BYTES = 1 << 18
+_NOT_READ = {
+    ".nmf": "a Nemo log; export measurements and positions as CSV, and map the columns",
+    ".trp": "a TEMS log; export it as tab-delimited text, and map the columns",
+    ".kml": "KML; export GPX, or a table as CSV",
+    ".kmz": "KML; export GPX, or a table as CSV",
+    ".geojson": "GeoJSON; export GPX, or a table as CSV",
+    ".fit": "a FIT file; export GPX",
+}
+"""Suffixes of formats that are not read, and what to do."""
+
+
+def format_named(name: str) -> Format:
+    """Return a format by its name; ConfigError when there is none."""
+    for known in FORMATS:
+        if known.name == name:
+            return known
+    names = ", ".join(known.name for known in FORMATS)
+    raise fail(ConfigError, "--format", f"one of {names}", repr(name))
+
+
+def find_format(text: Text) -> Format | None:
+    """Return the format that a file looks like, or None."""
+    return next((known for known in FORMATS if known.matches(text)), None)
+
+
+def format_of(path: str | Path) -> Format | None:
+    """Return the format that a file looks like by its beginning; None for another file."""
+    try:
+        return find_format(read_text(Path(path), _PEEKED_BYTES))
+    except InputError:
+        return None
+
+
+def read_recording(
+    path: str | Path, name: str = "", options: ReadOptions | None = None
+) -> Recording:
+    """Read a recording of another program.
+
+    Parameters
+    ----------
+    path : str or Path
+        Plain or gzip.
+    name : str
+        Of a format; "" to find it by the file's content.
+    options : ReadOptions, optional
+
+    Raises
+    ------
+    InputError
+        The file is missing, damaged, of no known format, or holds no usable row.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise fail(InputError, str(path), "a file", "a folder", "name the files in it")
+    try:
+        text = read_text(path)
+    except InputError as error:
+        hint = _NOT_READ.get(path.suffix.lower(), "")
+        raise InputError(tuple(replace(f, hint=hint or f.hint) for f in error.faults)) from error
+    found = find_format(text)
+    known = format_named(name) if name else found
+    if known is None and options is not None and options.columns:
+        known = plain_csv.FORMAT
+    if known is None:
+        raise _unknown(path, text)
+    reading = Reading(path, notes=list(text.notes))
+    options = options or ReadOptions()
+    try:
+        # Numbers of any size occur in damaged files; what comes of them is checked in the end.
+        with np.errstate(all="ignore"):
+            for part in parts_of(text) if known.by_rows else (text,):
+                known.read(part, reading, options)
+        return reading.done(known.name)
+    except InputError as error:
+        if found is None or found is known:
+            raise
+        named = tuple(
+            replace(fault, hint=f"this is {found.title}; use --format {found.name}, or none")
+            for fault in error.faults
+        )
+        raise InputError(named) from error
+
+
+def _unknown(path: Path, text: Text) -> MapfilterError:
+    """Return the error for a file of no known format."""
+    names = set(header_names(text.first_line, likely_separator(text.first_line)))
+    fields = {name for some in plain_csv.FIELDS.values() for name in some}
+    hint = _NOT_READ.get(path.suffix.lower(), "")
+    if not hint and len(names) > 1 and names & fields:
+        hint = "a CSV without a column of times, or with other names: --column FIELD=COLUMN"
+    expected = f"a recording in a known format ({', '.join(f.name for f in FORMATS)})"
+    got = f"none of them; it begins with {text.first_line[:60]!r}"
+    return fail(InputError, str(path), expected, got, hint)

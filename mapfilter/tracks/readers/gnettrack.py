@@ -1,0 +1,175 @@
+"""Logs of G-NetTrack: text with tabs, and CSV of several versions."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pandas as pd
+
+from mapfilter._types import Bools, Floats, Ints
+from mapfilter.radio.identities import technology
+from mapfilter.tracks.readers.columns import (
+    Columns,
+    header_columns,
+    header_names,
+    likely_separator,
+)
+from mapfilter.tracks.readers.format import Format, ReadOptions
+from mapfilter.tracks.readers.identities import add_radio, available
+from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.stale import repeated_readings
+from mapfilter.tracks.readers.text import Text
+
+_NEEDED = {"timestamp", "longitude", "latitude", "rawcellid", "networkmode"}
+_KMH = 1 / 3.6
+_LEAST_FIELDS = 20
+_MOST_NEIGHBOURS = 18
+_LAYOUT = "%Y.%m.%d_%H.%M.%S"
+
+
+def _matches(text: Text) -> bool:
+    line = text.first_line
+    return set(header_names(line, likely_separator(line))) >= _NEEDED
+
+
+def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
+    reading.program = "G-NetTrack"
+    rows = header_columns(text.data, reading, ragged=_LEAST_FIELDS)
+    version = [word for word in rows.texts("version_name")[:1] if word]
+    reading.program += f" {version[0]}" if version else ""
+    time_s, zoned = rows.times("timestamp", zone=options.zone, layout=_LAYOUT)
+    reading.clock = Clock("local", options.zone if zoned else "")
+    lat, lon = rows.number("latitude"), rows.number("longitude")
+    _add_positions(rows, reading, time_s, lat, lon)
+    serving = _serving(rows, reading)
+    state = _state(rows, serving)
+    repeated = repeated_readings(state, time_s, lat, lon)
+    reading.refuse(rows.line[repeated], "radio not renewed: repeats a reading for over 30 s, 50 m")
+    _add_serving(rows, reading, time_s, serving, ~repeated)
+    _add_neighbours(rows, reading, time_s, ~repeated)
+
+
+def _add_positions(
+    rows: Columns, reading: Reading, time_s: Floats, lat: Floats, lon: Floats
+) -> None:
+    """Add the positions that differ from the row before: others are not renewed."""
+    new = np.ones(len(rows), dtype=bool)
+    new[1:] = (np.diff(lat) != 0) | (np.diff(lon) != 0)
+    if (repeats := int((~new).sum())) > 0:
+        reading.note(f"positions: {repeats} rows repeat the position before, left out")
+    columns = {
+        "time_s": time_s,
+        "lat_deg": lat,
+        "lon_deg": lon,
+        "altitude_m": rows.number("altitude"),
+        "accuracy_m": rows.number("accuracy"),
+        "speed_mps": _KMH * rows.number("speed"),
+    }
+    kept = {name: values[new] for name, values in columns.items()}
+    reading.add("positions", kept, rows.line[new])
+
+
+def _serving(rows: Columns, reading: Reading) -> dict[str, Floats]:
+    """Return the identity of the serving cell; a network code that varies is the commonest one."""
+    operator = rows.texts("operator")
+    lac = available(*rows.whole("lac"))
+    if not rows.has("lac"):
+        lac = _hexadecimal(rows.texts("lachex"))
+    ci = available(*rows.whole("rawcellid"))
+    mcc, mnc = (np.full(len(rows), np.nan) for _ in range(2))
+    for word in pd.unique(operator):
+        if re.fullmatch(r"\d{5,6}", str(word)):
+            of = operator == word
+            mcc[of], mnc[of] = float(word[:3]), float(word[3:])
+    networks = pd.Series(list(zip(mcc, mnc, strict=True)))[~np.isnan(mcc)]
+    if networks.nunique() > 1:
+        commonest = networks.groupby([lac[~np.isnan(mcc)], ci[~np.isnan(mcc)]]).agg(
+            lambda codes: codes.mode().iloc[0]
+        )
+        varied = networks.groupby([lac[~np.isnan(mcc)], ci[~np.isnan(mcc)]]).nunique()
+        for (one_lac, one_ci), count in varied.items():
+            if count > 1:
+                of = (lac == one_lac) & (ci == one_ci)
+                mcc[of], mnc[of] = commonest[one_lac, one_ci]
+                reading.note(
+                    f"radio: cell {one_ci:.0f} with {count} network codes, "
+                    f"{mcc[of][0]:.0f}-{mnc[of][0]:.0f} taken"
+                )
+    return {"mcc": mcc, "mnc": mnc, "lac": lac, "ci": ci}
+
+
+def _hexadecimal(texts: np.ndarray) -> Floats:
+    known = {
+        word: float(int(word, 16)) if re.fullmatch(r"[0-9A-Fa-f]{1,7}", word) else np.nan
+        for word in set(texts.tolist())
+    }
+    return np.array([known[word] for word in texts], dtype=np.float64)
+
+
+def _state(rows: Columns, serving: dict[str, Floats]) -> Ints:
+    """Return equal numbers for rows in which everything that was measured is equal."""
+    names = ["level", "rsrp", "qual", "rsrq", "psc", "arfcn", "ta"]
+    for i in range(1, _MOST_NEIGHBOURS + 1):
+        names += [f"ncell{i}", f"nrxlev{i}"]
+    columns = {name: rows.texts(name) for name in names if rows.has(name)}
+    table = pd.DataFrame({"ci": serving["ci"], **columns})
+    groups = table.groupby(list(table.columns), sort=False, dropna=False)
+    return np.asarray(groups.ngroup(), dtype=np.int64)
+
+
+def _add_serving(
+    rows: Columns, reading: Reading, time_s: Floats, serving: dict[str, Floats], good: Bools
+) -> None:
+    families = rows.mapped(technology, "networkmode", "networktech")
+    columns = {
+        **serving,
+        "time_s": time_s,
+        "technology": families,
+        "arfcn": available(*rows.whole("arfcn")),
+        "bsic": available(*rows.whole("psc")),
+        "level_dbm": rows.number("level", "rsrp"),
+        "timing_advance": available(*rows.whole("ta")),
+    }
+    kept = {name: values[good] for name, values in columns.items()}
+    add_radio(reading, {**kept, "role": "serving"}, rows.line[good])
+
+
+def _add_neighbours(rows: Columns, reading: Reading, time_s: Floats, good: Bools) -> None:
+    false = 0
+    for i in range(1, _MOST_NEIGHBOURS + 1):
+        words = rows.texts(f"ntech{i}")
+        there = good & (words != "")
+        if not there.any():
+            continue
+        names = rows.texts(f"ncell{i}")
+        # Some versions list GSM neighbours that are no cells, with a dump of an object as name.
+        dump = there & np.array(["=null" in name or "=" in name for name in names], dtype=bool)
+        false += int(dump.sum())
+        there &= ~dump
+        columns = {
+            "time_s": time_s,
+            "technology": rows.mapped(technology, f"ntech{i}"),
+            "arfcn": available(*rows.whole(f"narfcn{i}")),
+            "bsic": _codes(names),
+            "level_dbm": rows.number(f"nrxlev{i}"),
+        }
+        kept = {name: values[there] for name, values in columns.items()}
+        add_radio(reading, {**kept, "role": "neighbour"}, rows.line[there])
+    if false:
+        reading.note(f"radio: {false} neighbours are no cells (a dump for a code), left out")
+
+
+def _codes(texts: np.ndarray) -> Floats:
+    known = {word: float(word) if word.isdigit() else np.nan for word in set(texts.tolist())}
+    return np.array([known[word] for word in texts], dtype=np.float64)
+
+
+FORMAT = Format(
+    "gnettrack",
+    "a G-NetTrack log",
+    "G-NetTrack, G-NetTrack Pro (text or CSV)",
+    "serving cell, neighbours by carrier and PCI, levels, timing advance, positions",
+    _matches,
+    _read,
+)

@@ -1,0 +1,232 @@
+"""NMEA 0183: positions, speed and course, accuracy, date and time."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from mapfilter._types import Floats
+from mapfilter.tracks.readers.columns import Columns, line_columns
+from mapfilter.tracks.readers.format import Format, ReadOptions
+from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.text import Text
+
+_SENTENCE = re.compile(rb"[$!]([A-Z]{2}|P)([A-Z]{3})[,\d]")
+_KINDS = {
+    b"GGA": ("time", "lat", "ns", "lon", "ew", "quality", "used", "hdop", "altitude"),
+    b"RMC": ("time", "status", "lat", "ns", "lon", "ew", "knots", "course", "date"),
+    b"GST": ("time", "rms", "major", "minor", "axis", "lat_sd", "lon_sd"),
+    b"ZDA": ("time", "day", "month", "year"),
+}
+_FIELDS = 20
+_KNOT_MPS = 1852.0 / 3600.0
+_UERE_M = 4.0
+_RADIUS_68 = 1.515
+_DAY_S = 86_400.0
+_MANY, _NEARLY_ALL = 10, 0.95
+
+
+def _matches(text: Text) -> bool:
+    lines = [line.strip() for line in text.head[:200] if line.strip()]
+    found = sum(_SENTENCE.match(line.encode()) is not None for line in lines)
+    return found >= 1 and found >= 0.5 * len(lines)
+
+
+def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
+    reading.program, reading.clock = "NMEA 0183 receiver", Clock("utc")
+    kinds = _sentences(text.data, reading)
+    tables = {kind: _table(kind, *kinds[kind], reading) for kind in _KINDS}
+    dates = _dates(tables)
+    if dates.empty:
+        reading.note("no date in the file (neither RMC nor ZDA): times count from a midnight")
+        reading.clock = Clock("monotonic")
+    known = tables[b"GGA"], tables[b"RMC"]
+    rows = pd.concat([_gga(known[0], dates), _rmc(known[1], dates)], ignore_index=True)
+    rows = rows[rows["valid"]].sort_values("line", kind="stable")
+    if rows.empty:
+        return
+    first = rows.groupby("time_s", sort=True).first().reset_index()
+    accuracy = _accuracy(tables[b"GST"], dates, first)
+    columns = {name: first[name].to_numpy() for name in first.columns}
+    columns["accuracy_m"] = np.where(np.isnan(accuracy), columns["accuracy_m"], accuracy)
+    reading.add("positions", columns, columns["line"])
+
+
+def _sentences(data: bytes, reading: Reading) -> dict[bytes, tuple[list[bytes], list[int]]]:
+    """Return the sentences of each kind that is read, with right checksums, and their lines.
+
+    Some programs write wrong checksums throughout: a kind of which nearly none is right is taken.
+    """
+    found: dict[bytes, tuple[list[bytes], list[int]]] = {kind: ([], []) for kind in _KINDS}
+    wrong: dict[bytes, tuple[list[bytes], list[int]]] = {kind: ([], []) for kind in _KINDS}
+    for number, line in enumerate(data.split(b"\n"), start=1):
+        start = line.find(b"$")
+        kind = line[start + 3 : start + 6]
+        if start < 0 or kind not in _KINDS:
+            if line.strip():
+                reading.rows += 1
+                if start < 0 and b"!" not in line:
+                    reading.refuse(number, "no NMEA sentence")
+            continue
+        reading.rows += 1
+        body, star, given = line[start + 1 :].strip().rpartition(b"*")
+        lines, numbers = (wrong if star and not _checks(body, given) else found)[kind]
+        lines.append(body if star else given)
+        numbers.append(number)
+    for kind, (lines, numbers) in wrong.items():
+        if len(lines) >= _MANY and len(lines) > _NEARLY_ALL * (len(lines) + len(found[kind][0])):
+            reading.note(f"{kind.decode()}: nearly all {len(lines)} checksums are wrong; taken")
+            found[kind] = (lines, numbers)
+        else:
+            reading.refuse(np.array(numbers, dtype=np.int64), "checksum is wrong")
+    return found
+
+
+def _checks(body: bytes, given: bytes) -> bool:
+    total = 0
+    for byte in body:
+        total ^= byte
+    try:
+        return total == int(given[:2], 16)
+    except ValueError:
+        return False
+
+
+def _table(kind: bytes, lines: list[bytes], numbers: list[int], reading: Reading) -> Columns:
+    names = ["talker", *_KINDS[kind]]
+    names += [f"field{i}" for i in range(len(names), _FIELDS)]
+    rows = reading.rows
+    table = line_columns(lines, numbers, reading, names, ",", ragged=len(_KINDS[kind]) + 1)
+    reading.rows = rows
+    return table
+
+
+def _dates(tables: dict[bytes, Columns]) -> pd.DataFrame:
+    """Return the UTC midnight of each sentence with a date, by line, with its time of day."""
+    parts = []
+    rmc, zda = tables[b"RMC"], tables[b"ZDA"]
+    if len(rmc):
+        words = rmc.texts("date")
+        years = np.array([_year(word) for word in words])
+        good = np.isfinite(years)
+        parts.append(
+            _days(rmc, [word[2:4] for word in words], [word[:2] for word in words], years, good)
+        )
+    if len(zda):
+        years = zda.number("year")
+        parts.append(
+            _days(
+                zda,
+                zda.texts("month").tolist(),
+                zda.texts("day").tolist(),
+                years,
+                np.isfinite(years),
+            )
+        )
+    rows = (
+        pd.concat(parts) if parts else pd.DataFrame({"line": [], "midnight_s": [], "of_day_s": []})
+    )
+    return rows.dropna().sort_values("line", kind="stable").reset_index(drop=True)
+
+
+def _year(word: str) -> float:
+    if not (len(word) == 6 and word.isdigit()):
+        return float("nan")
+    year = int(word[4:])
+    return 2000.0 + year if year < 80 else 1900.0 + year
+
+
+def _days(
+    rows: Columns, months: Sequence[str], days: Sequence[str], years: Floats, good: np.ndarray
+) -> pd.DataFrame:
+    texts = [
+        f"{year:.0f}-{month:0>2}-{day:0>2}" if ok else ""
+        for year, month, day, ok in zip(years, months, days, good, strict=True)
+    ]
+    moments = pd.to_datetime(pd.Series(texts), format="%Y-%m-%d", errors="coerce", utc=True)
+    midnight = (moments - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy()
+    columns = {"line": rows.line, "midnight_s": midnight, "of_day_s": _of_day(rows.texts("time"))}
+    return pd.DataFrame(columns)
+
+
+def _of_day(texts: np.ndarray) -> Floats:
+    """Return seconds of the day of ``hhmmss.ss``; second 60 is a leap second."""
+    number = pd.to_numeric(pd.Series(texts, dtype=object), errors="coerce").to_numpy(np.float64)
+    hours, rest = np.divmod(number, 10_000.0)
+    minutes, seconds = np.divmod(rest, 100.0)
+    good = (hours < 24) & (minutes < 60) & (seconds < 61) & (number >= 0)
+    return np.where(good, 3600 * hours + 60 * minutes + seconds, np.nan)
+
+
+def _utc(rows: Columns, dates: pd.DataFrame) -> Floats:
+    """Return UTC seconds by the date of the nearest line that has one."""
+    of_day = _of_day(rows.texts("time"))
+    if dates.empty:
+        turns = np.cumsum(np.diff(np.nan_to_num(of_day), prepend=0.0) < -_DAY_S / 2)
+        return np.asarray(of_day + _DAY_S * turns)
+    lines = dates["line"].to_numpy()
+    at = np.clip(np.searchsorted(lines, rows.line), 1, max(len(lines) - 1, 1))
+    before = np.clip(at - 1, 0, len(lines) - 1)
+    at = np.clip(at, 0, len(lines) - 1)
+    nearer = np.abs(lines[at] - rows.line) < np.abs(lines[before] - rows.line)
+    index = np.where(nearer, at, before)
+    midnight, dated = dates["midnight_s"].to_numpy()[index], dates["of_day_s"].to_numpy()[index]
+    # A sentence just before or after midnight may have its date from the other side.
+    turn = np.round((dated - of_day) / _DAY_S)
+    return np.asarray(midnight + of_day + _DAY_S * np.nan_to_num(turn))
+
+
+def _degrees(rows: Columns, name: str, sign: str, negative: str) -> Floats:
+    value = rows.number(name)
+    degrees, minutes = np.divmod(value, 100.0)
+    result = np.where(minutes < 60, degrees + minutes / 60, np.nan)
+    return np.asarray(np.where(rows.texts(sign) == negative, -result, result))
+
+
+def _gga(rows: Columns, dates: pd.DataFrame) -> pd.DataFrame:
+    quality = rows.texts("quality")
+    columns = {
+        "line": rows.line,
+        "time_s": _utc(rows, dates),
+        "lat_deg": _degrees(rows, "lat", "ns", "S"),
+        "lon_deg": _degrees(rows, "lon", "ew", "W"),
+        "altitude_m": rows.number("altitude"),
+        "accuracy_m": _UERE_M * rows.number("hdop"),
+        "valid": ~np.isin(quality, ("", "0", "6", "7", "8")),
+    }
+    return pd.DataFrame(columns)
+
+
+def _rmc(rows: Columns, dates: pd.DataFrame) -> pd.DataFrame:
+    columns = {
+        "line": rows.line,
+        "time_s": _utc(rows, dates),
+        "lat_deg": _degrees(rows, "lat", "ns", "S"),
+        "lon_deg": _degrees(rows, "lon", "ew", "W"),
+        "speed_mps": _KNOT_MPS * rows.number("knots"),
+        "course_deg": rows.number("course"),
+        "valid": rows.texts("status") == "A",
+    }
+    return pd.DataFrame(columns)
+
+
+def _accuracy(rows: Columns, dates: pd.DataFrame, first: pd.DataFrame) -> Floats:
+    """Return the 68 % radius of GST sentences at the times of positions, NaN without."""
+    if not len(rows):
+        return np.full(len(first), np.nan)
+    radius = _RADIUS_68 * np.sqrt((rows.number("lat_sd") ** 2 + rows.number("lon_sd") ** 2) / 2)
+    known = pd.Series(radius, index=_utc(rows, dates)).groupby(level=0).first()
+    return np.asarray(known.reindex(first["time_s"]), dtype=np.float64)
+
+
+FORMAT = Format(
+    "nmea",
+    "NMEA 0183",
+    "GNSS receivers, u-center, NMEA loggers",
+    "GGA, RMC, GST and ZDA: positions, speed, course, accuracy",
+    _matches,
+    _read,
+)

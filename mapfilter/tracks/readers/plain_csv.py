@@ -1,0 +1,275 @@
+"""Plain CSV: columns by their usual names, or by a map from fields to columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+import numpy as np
+
+from mapfilter._types import Floats
+from mapfilter.errors import Faults, InputError
+from mapfilter.radio.identities import BARS_DBM, levels_of_bars, technology
+from mapfilter.tracks.readers.columns import (
+    Columns,
+    header_columns,
+    header_names,
+    likely_separator,
+    only,
+)
+from mapfilter.tracks.readers.format import Format, ReadOptions
+from mapfilter.tracks.readers.identities import (
+    add_radio,
+    available,
+    parse_identities,
+)
+from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.text import Text
+
+_UNIX_S = 1e8
+
+FIELDS: Mapping[str, tuple[str, ...]] = {
+    "time": ("time", "time_s", "timestamp", "datetime", "utc", "unix_time", "date_time", "t"),
+    "lat_deg": ("lat_deg", "lat", "latitude"),
+    "lon_deg": ("lon_deg", "lon", "lng", "long", "longitude"),
+    "altitude_m": ("altitude_m", "altitude", "ele", "height_m"),
+    "accuracy_m": ("accuracy_m", "accuracy"),
+    "speed_mps": ("speed_mps",),
+    "speed_kmh": ("speed_kmh",),
+    "course_deg": ("course_deg", "bearing", "course"),
+    "east_m": ("east_m", "easting"),
+    "north_m": ("north_m", "northing"),
+    "heading_rad": ("heading_rad",),
+    "step_m": ("step_m",),
+    "turn_rad": ("turn_rad",),
+    "compass_deg": ("compass_deg", "heading_deg", "azimuth_deg"),
+    "turn_deg": ("turn_deg",),
+    "yaw_rate_radps": ("yaw_rate_radps", "yaw_rate"),
+    "yaw_rate_degps": ("yaw_rate_degps",),
+    "wheel_speed_mps": ("wheel_speed_mps", "wheel_speed"),
+    "wheel_speed_kmh": ("wheel_speed_kmh",),
+    "role": ("role",),
+    "technology": ("technology", "radio", "rat", "network_type"),
+    "cell": ("cell",),
+    "cgi": ("cgi", "ecgi", "ncgi"),
+    "mcc": ("mcc",),
+    "mnc": ("mnc", "net"),
+    "lac": ("lac", "tac", "area"),
+    "ci": ("ci", "cid", "eci", "nci", "cellid", "cell_id"),
+    "arfcn": ("arfcn", "uarfcn", "earfcn", "nrarfcn", "nr_arfcn"),
+    "bsic": ("bsic", "psc", "pci"),
+    "level_dbm": ("level_dbm", "dbm", "rsrp", "rscp", "rssi", "signal_dbm"),
+    "bars": ("bars", "signal_bars"),
+    "level_step_db": ("level_step_db",),
+    "timing_advance": ("timing_advance", "ta"),
+    "pressure_hpa": ("pressure_hpa", "pressure"),
+    "steps": ("steps", "step_count"),
+    **{
+        f"{sensor}_{axis}": (f"{sensor}_{axis}", f"{sensor}{axis}")
+        for sensor in ("acc", "gyr", "mag")
+        for axis in "xyz"
+    },
+}
+"""Fields that a column map may name, and the names of columns that are known without one."""
+
+_KMH = 1 / 3.6
+_CONTENT = (
+    *(("lat_deg", "lon_deg"), ("east_m", "north_m"), ("step_m",), ("level_dbm",), ("bars",)),
+    *(("acc_x",), ("gyr_x",), ("mag_x",), ("pressure_hpa",), ("wheel_speed_mps",)),
+    *(("wheel_speed_kmh",), ("steps",)),
+)
+
+
+@dataclass(frozen=True)
+class _Mapped:
+    """Columns by field."""
+
+    rows: Columns
+    own: Mapping[str, str]
+
+    def names(self, field: str) -> tuple[str, ...]:
+        return (self.own[field].lower(),) if field in self.own else FIELDS[field]
+
+    def has(self, *fields: str) -> bool:
+        return all(self.rows.find(*self.names(field)) is not None for field in fields)
+
+    def number(self, field: str) -> Floats:
+        return self.rows.number(*self.names(field))
+
+    def whole(self, field: str) -> Floats:
+        return available(*self.rows.whole(*self.names(field)))
+
+    def texts(self, field: str) -> np.ndarray:
+        return self.rows.texts(*self.names(field))
+
+
+def _matches(text: Text) -> bool:
+    names = set(header_names(text.first_line, likely_separator(text.first_line)))
+
+    def has(field: str) -> bool:
+        return bool(names & set(FIELDS[field]))
+
+    return has("time") and any(all(map(has, fields)) for fields in _CONTENT)
+
+
+def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
+    reading.program = "CSV"
+    rows = header_columns(text.data, reading, text.line)
+    _check_map(rows, reading, options.columns)
+    mapped = _Mapped(rows, options.columns)
+    time_s = _times(mapped, reading, options)
+    if mapped.has("lat_deg", "lon_deg"):
+        speed = mapped.number("speed_mps")
+        if mapped.has("speed_kmh"):
+            speed = _KMH * mapped.number("speed_kmh")
+        names = ("lat_deg", "lon_deg", "altitude_m", "accuracy_m", "course_deg")
+        columns = {name: mapped.number(name) for name in names}
+        there = np.isfinite(columns["lat_deg"]) | np.isfinite(columns["lon_deg"])
+        columns |= {"time_s": time_s, "speed_mps": speed}
+        _add(reading, "positions", columns, rows, there)
+    if mapped.has("east_m", "north_m"):
+        columns = {name: mapped.number(name) for name in ("east_m", "north_m", "heading_rad")}
+        _add(reading, "places", {"time_s": time_s, **columns}, rows, np.isfinite(columns["east_m"]))
+    elif mapped.has("step_m"):
+        moved = ("step_m", "heading_rad", "turn_rad", "compass_deg")
+        columns = {name: mapped.number(name) for name in moved}
+        if mapped.has("turn_deg"):
+            columns["turn_rad"] = np.radians(mapped.number("turn_deg"))
+        there = np.isfinite(columns["step_m"])
+        _add(reading, "motion", {"time_s": time_s, **columns}, rows, there)
+    _add_odometry(mapped, reading, time_s)
+    _add_sensors(mapped, reading, time_s)
+    _add_cells(mapped, reading, time_s)
+
+
+def _add(
+    reading: Reading,
+    table: str,
+    columns: Mapping[str, np.ndarray],
+    rows: Columns,
+    there: np.ndarray,
+) -> None:
+    """Add the rows of a table that hold something of it."""
+    if there.any():
+        reading.add(table, *only(columns, rows.line, there))
+
+
+def _check_map(rows: Columns, reading: Reading, own: Mapping[str, str]) -> None:
+    """Raise InputError with every fault of a column map, and where times are missing."""
+    faults = Faults()
+    present = f"{', '.join(rows.names)[:300]}"
+    for field, column in own.items():
+        if field not in FIELDS:
+            near = get_close_matches(field, FIELDS, 1)
+            hint = near[0] if near else ""
+            faults.add(f"--column {field}", f"one of {', '.join(FIELDS)}", field, hint)
+        elif column.lower() not in rows.names:
+            faults.add(f"{reading.path} header", f"a column {column} for {field}", present)
+        elif rows.names.count(column.lower()) > 1:
+            faults.add(f"{reading.path} header", f"one column {column}", "several")
+    if "time" not in own and rows.find(*FIELDS["time"]) is None:
+        hint = "--column time=COLUMN"
+        faults.add(f"{reading.path} header", "a column of times", present, hint)
+    faults.raise_if_any(InputError)
+
+
+def _times(mapped: _Mapped, reading: Reading, options: ReadOptions) -> Floats:
+    """Return UTC seconds, or seconds from an unknown start where they are small numbers."""
+    number = mapped.number("time") if len(mapped.rows) else np.zeros(0)
+    known = number[np.isfinite(number)]
+    if known.size >= 0.5 * len(number) and known.size and abs(float(np.median(known))) < _UNIX_S:
+        reading.clock = Clock("monotonic")
+        return number
+    reading.notes[:] = [note for note in reading.notes if not note.endswith("taken as missing")]
+    time_s, zoned = mapped.rows.times(*mapped.names("time"), zone=options.zone)
+    reading.clock = Clock("utc") if zoned else Clock("local", options.zone)
+    return time_s
+
+
+def _add_odometry(mapped: _Mapped, reading: Reading, time_s: Floats) -> None:
+    if not (mapped.has("wheel_speed_mps") or mapped.has("wheel_speed_kmh")):
+        return
+    speed = mapped.number("wheel_speed_mps")
+    if mapped.has("wheel_speed_kmh"):
+        speed = _KMH * mapped.number("wheel_speed_kmh")
+    yaw = mapped.number("yaw_rate_radps")
+    if mapped.has("yaw_rate_degps"):
+        yaw = np.radians(mapped.number("yaw_rate_degps"))
+    columns = {"time_s": time_s, "speed_mps": speed, "yaw_rate_radps": yaw}
+    _add(reading, "odometry", columns, mapped.rows, np.isfinite(speed))
+
+
+def _add_sensors(mapped: _Mapped, reading: Reading, time_s: Floats) -> None:
+    sensors = (("acc", "accelerometer", "mps2"), ("gyr", "gyroscope", "radps"))
+    for short, sensor, unit in (*sensors, ("mag", "magnetometer", "ut")):
+        if mapped.has(*(f"{short}_{axis}" for axis in "xyz")):
+            columns = {f"{axis}_{unit}": mapped.number(f"{short}_{axis}") for axis in "xyz"}
+            there = np.isfinite(columns[f"x_{unit}"])
+            _add(reading, sensor, {"time_s": time_s, **columns}, mapped.rows, there)
+    for field, table, column in (
+        ("pressure_hpa", "barometer", "pressure_hpa"),
+        ("steps", "steps", "count"),
+    ):
+        if mapped.has(field):
+            value = mapped.number(field)
+            columns = {"time_s": time_s, column: value}
+            _add(reading, table, columns, mapped.rows, np.isfinite(value))
+
+
+def _add_cells(mapped: _Mapped, reading: Reading, time_s: Floats) -> None:
+    if not any(map(mapped.has, ("level_dbm", "bars", "ci", "cell"))):
+        return
+    identity = {name: mapped.whole(name) for name in ("mcc", "mnc", "lac", "ci")}
+    if mapped.has("cgi"):
+        given = parse_identities(mapped.texts("cgi"))
+        identity = {
+            name: np.where(np.isnan(values), given[name], values)
+            for name, values in identity.items()
+        }
+    columns = {
+        **identity,
+        "time_s": time_s,
+        **{name: mapped.number(name) for name in ("level_dbm", "level_step_db")},
+        **{name: mapped.whole(name) for name in ("arfcn", "bsic", "timing_advance")},
+    }
+    if mapped.has("technology"):
+        columns["technology"] = mapped.rows.mapped(technology, *mapped.names("technology"))
+    if mapped.has("bars"):
+        _add_bars(mapped, columns)
+    cell = mapped.texts("cell")
+    identified = (cell != "") | ~np.isnan(identity["ci"])
+    there = identified | ~np.isnan(columns["level_dbm"])
+    if mapped.has("cell"):
+        columns["cell"] = cell
+    serving = mapped.rows.flags(*mapped.names("role"), true=("serving",))
+    neighbour = mapped.rows.flags(*mapped.names("role"), true=("neighbour", "neighbor"))
+    serving |= identified & ~neighbour
+    columns["role"] = np.array(["neighbour", "serving"], dtype=object)[serving.astype(np.int64)]
+    add_radio(reading, *only(columns, mapped.rows.line, there))
+
+
+def _add_bars(mapped: _Mapped, columns: dict[str, np.ndarray]) -> None:
+    """Give rows without a level that of their bars, as in LTE where the technology is unknown."""
+    bars = mapped.number("bars")
+    families = columns.get("technology", np.full(len(bars), None, dtype=object))
+    families = np.array([one if one in BARS_DBM else "LTE" for one in families], dtype=object)
+    names = ("level_dbm", "level_step_db", "censored")
+    found = {name: columns.get(name, np.zeros(len(bars))).copy() for name in names}
+    without = np.isnan(columns["level_dbm"])
+    for family in BARS_DBM:
+        of = without & (families == family)
+        for name, values in zip(names, levels_of_bars(bars[of], family), strict=True):
+            found[name][of] = values
+    columns |= found
+
+
+FORMAT = Format(
+    "csv",
+    "a plain CSV",
+    "any program; columns by their usual names, or ``--column FIELD=COLUMN``",
+    "positions, places, motion, wheel speed and yaw rate, cells, inertial sensors, pressure",
+    _matches,
+    _read,
+    by_rows=True,
+)

@@ -1,0 +1,275 @@
+"""What one file recorded: checked tables, its clock, and the rows that cannot be used."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from mapfilter._types import Bools, Floats, Ints
+from mapfilter.errors import InputError, MapfilterError, fail
+from mapfilter.tracks.readers.recorded_values import checked_values, joined_parts
+from mapfilter.tracks.readers.tables import RECORDED, Field
+
+ClockKind = Literal["utc", "gps", "local", "monotonic"]
+
+_LINES_KEPT = 3
+_EARLIEST_UTC_S, _LATEST_UTC_S = 315_964_800.0, 4_102_444_800.0
+_JUMP_S = 86_400.0
+_STRAY_SHARE = 0.1
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The clock by which a file counts time.
+
+    Parameters
+    ----------
+    kind : {"utc", "gps", "local", "monotonic"}
+        Times of ``utc`` and ``gps`` are in the tables as UTC seconds (Unix time). Those of
+        ``local`` without a zone are seconds as if the zone were UTC; ``monotonic`` ones count from
+        an unknown start.
+    zone : str
+        Zone by which local times were turned into UTC; "" where unknown.
+    """
+
+    kind: ClockKind
+    zone: str = ""
+
+    @property
+    def absolute(self) -> bool:
+        """Whether times in the tables are UTC seconds."""
+        return self.kind in ("utc", "gps") or (self.kind == "local" and bool(self.zone))
+
+    def __str__(self) -> str:
+        if self.kind == "local":
+            return f"local time ({self.zone or 'zone unknown'})"
+        return {"utc": "UTC", "gps": "GPS time"}.get(self.kind, "seconds from an unknown start")
+
+
+@dataclass(frozen=True)
+class Unusable:
+    """Rows of a file that cannot be used, for one reason; ``lines`` are the first of them."""
+
+    reason: str
+    count: int
+    lines: tuple[int, ...]
+
+    def __str__(self) -> str:
+        more = ", …" if self.count > len(self.lines) else ""
+        plural = "line" if self.count == 1 else "lines"
+        return (
+            f"{self.count} rows: {self.reason} ({plural} {', '.join(map(str, self.lines))}{more})"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """The content of one recording of another program.
+
+    Parameters
+    ----------
+    path : Path
+    format : str
+        Name in the table of formats.
+    program : str
+        The program that wrote it, with its version where the file has it.
+    clock : Clock
+    tables : mapping of str to pandas.DataFrame
+        Those of :data:`mapfilter.tracks.readers.tables.RECORDED` that hold something, sorted by
+        ``time_s``.
+    rows : int
+        Rows read, usable or not.
+    unusable : tuple of Unusable
+        Rows left out, by reason.
+    notes : tuple of str
+        What was ignored, changed or is remarkable.
+    crs : str
+        Projected CRS of positions in metres; "" for a frame of the file's own.
+    """
+
+    path: Path
+    format: str
+    program: str
+    clock: Clock
+    tables: Mapping[str, pd.DataFrame]
+    rows: int
+    unusable: tuple[Unusable, ...] = ()
+    notes: tuple[str, ...] = ()
+    crs: str = ""
+
+    @property
+    def unusable_rows(self) -> int:
+        """Number of rows left out."""
+        return sum(found.count for found in self.unusable)
+
+
+@dataclass(slots=True)
+class Reading:
+    """Collects the tables, bad rows and notes of one file while it is read.
+
+    ``absolute`` tells whether times are seconds of UTC (or of local time as if it were UTC), so
+    that they can be checked against the calendar.
+    """
+
+    path: Path
+    rows: int = 0
+    clock: Clock = field(default_factory=lambda: Clock("utc"))
+    program: str = ""
+    crs: str = ""
+    tables: dict[str, list[pd.DataFrame]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    _refused: dict[str, list[Ints]] = field(default_factory=dict)
+
+    def refuse(self, lines: ArrayLike, reason: str) -> None:
+        """Count lines with bad rows, each once for a reason."""
+        found = np.atleast_1d(np.asarray(lines, dtype=np.int64))
+        if found.size:
+            self._refused.setdefault(reason, []).append(found)
+
+    def note(self, text: str) -> None:
+        """Add a remark, once."""
+        if text not in self.notes:
+            self.notes.append(text)
+
+    def add(self, table: str, columns: Mapping[str, Any], lines: ArrayLike) -> None:
+        """Check rows of a table, and keep the usable ones.
+
+        Parameters
+        ----------
+        table : str
+            One of :data:`RECORDED`.
+        columns : mapping of str to array_like
+            ``time_s`` and columns of the table; absent ones are missing in every row. NaN and None
+            are missing values.
+        lines : (N,) array_like of int
+            The line of each row.
+        """
+        line = np.asarray(lines, dtype=np.int64)
+        checked = {
+            f.name: checked_values(f, columns.get(f.name), len(line)) for f in RECORDED[table]
+        }
+        good = np.ones(len(line), dtype=bool)
+        for known in RECORDED[table]:
+            good &= self._check(table, known, checked, line, good)
+        if table == "positions":
+            nowhere = good & (checked["lat_deg"] == 0) & (checked["lon_deg"] == 0)
+            self.refuse(line[nowhere], "latitude and longitude are 0 (no fix yet)")
+            good &= ~nowhere
+        if "time_s" in checked:
+            good &= self._in_era(checked["time_s"], line, good)
+        if not good.any():
+            return
+        if not good.all():
+            checked = {name: values[good] for name, values in checked.items()}
+        rows = pd.DataFrame(checked, copy=False)
+        if "time_s" in rows and (back := int(np.sum(np.diff(rows["time_s"].to_numpy()) < 0))):
+            self.note(f"{table}: times go backwards in {back} places; sorted")
+        self.tables.setdefault(table, []).append(rows)
+
+    def _check(
+        self, table: str, known: Field, checked: dict[str, Any], line: Ints, good: Bools
+    ) -> Bools:
+        """Refuse rows without a needed value; ignore other values out of range."""
+        values = checked[known.name]
+        if known.text:
+            missing = np.asarray(values.codes < 0)
+            outside = np.zeros(len(values), dtype=bool)
+        else:
+            missing = np.isnan(values)
+            outside = ~missing & ~((values >= known.low) & (values <= known.high))
+        label = f"{table}, {known.name}"
+        if known.required:
+            self.refuse(line[good & missing], f"{known.name}: missing, or no {known.kind}")
+            for hint, of in known.mistakes(values, good & outside):
+                self.refuse(line[of], f"{known.name}: not {known.expected}{hint}")
+            return ~missing & ~outside
+        if (ignored := good & outside).any():
+            first = line[ignored][0]
+            self.note(
+                f"{label}: {int(ignored.sum())} values are not {known.expected}, ignored "
+                f"(first in line {first})"
+            )
+            checked[known.name] = np.where(outside, np.nan, values)
+        return np.ones(len(line), dtype=bool)
+
+    def _in_era(self, time_s: Floats, line: Ints, good: Bools) -> Bools:
+        """Refuse times that are no dates, and few rows that lie days away from all others."""
+        kept = np.ones(len(line), dtype=bool)
+        if self.clock.kind != "monotonic":
+            kept = (time_s >= _EARLIEST_UTC_S) & (time_s <= _LATEST_UTC_S)
+            self.refuse(line[good & ~kept], "time: not between 1980 and 2100")
+        index = np.flatnonzero(good & kept)
+        if index.size < 3:
+            return kept
+        order = index[np.argsort(time_s[index], kind="stable")]
+        group = np.concatenate([[0], np.cumsum(np.diff(time_s[order]) > _JUMP_S)])
+        sizes = np.bincount(group)
+        stray = order[sizes[group] < max(2, _STRAY_SHARE * sizes.max())]
+        if len(sizes) > 1 and stray.size < index.size:
+            self.refuse(np.sort(line[stray]), "time: more than a day away from all other rows")
+            kept[stray] = False
+        return kept
+
+    def done(self, name: str, rows_word: str = "row") -> Recording:
+        """Sort the tables, drop exact duplicates, and return the recording.
+
+        Raises
+        ------
+        InputError
+            No row can be used.
+        """
+        found = {reason: np.unique(np.concatenate(some)) for reason, some in self._refused.items()}
+        refused = tuple(
+            Unusable(reason, len(lines), tuple(lines[:_LINES_KEPT].tolist()))
+            for reason, lines in sorted(found.items(), key=lambda one: -len(one[1]))
+        )
+        if not self.tables:
+            raise nothing_usable(self.path, name, self.rows, refused, rows_word)
+        kept = {
+            table: self._tidy(table, joined_parts(self.tables.pop(table)))
+            for table in RECORDED
+            if table in self.tables
+        }
+        return Recording(
+            self.path,
+            name,
+            self.program,
+            self.clock,
+            kept,
+            self.rows,
+            refused,
+            tuple(self.notes),
+            self.crs,
+        )
+
+    def _tidy(self, table: str, rows: pd.DataFrame) -> pd.DataFrame:
+        if "time_s" not in rows:
+            return rows
+        time = rows["time_s"].to_numpy()
+        if (np.diff(time) < 0).any():
+            rows = rows.sort_values("time_s", kind="stable", ignore_index=True)
+            time = rows["time_s"].to_numpy()
+        equal = np.flatnonzero(np.diff(time) == 0)
+        if equal.size:
+            among = np.union1d(equal, equal + 1)
+            duplicate = np.zeros(len(rows), dtype=bool)
+            duplicate[among] = rows.iloc[among].duplicated().to_numpy()
+            if duplicate.any():
+                self.note(f"{table}: {int(duplicate.sum())} exact duplicate rows dropped")
+                rows = rows[~duplicate].reset_index(drop=True)
+        return rows
+
+
+def nothing_usable(
+    path: Path, name: str, rows: int, refused: Iterable[Unusable], rows_word: str = "row"
+) -> MapfilterError:
+    """Return the error for a file of which no row can be used, with the main reasons."""
+    reasons = "; ".join(str(found) for found in list(refused)[:3])
+    got = f"none in {rows} rows" + (f": {reasons}" if reasons else "")
+    return fail(InputError, str(path), f"a usable {rows_word} of {name}", got)

@@ -1,0 +1,41 @@
+"""Readings that a program repeats without measuring again."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from mapfilter._types import Bools, Floats, Ints
+
+_LONG_S = 30.0
+_FAR_M = 50.0
+_METRES_PER_DEGREE = 111_195.0
+
+
+def repeated_readings(state: Ints, time_s: Floats, lat_deg: Floats, lon_deg: Floats) -> Bools:
+    """Return the rows that repeat a reading for long while the position moves on.
+
+    A run of equal readings of more than 30 s, over more than 50 m, counts; its first row is a
+    reading, the others are repetitions.
+
+    Parameters
+    ----------
+    state : (N,) array of int
+        Equal numbers where all that was measured is equal.
+    """
+    repeated = np.zeros(len(state), dtype=bool)
+    if not len(state):
+        return repeated
+    edges = [0, *(np.flatnonzero(np.diff(state)) + 1).tolist(), len(state)]
+    for first, last in pairwise(edges):
+        rows = slice(first, last)
+        lat, lon = lat_deg[rows], lon_deg[rows]
+        known = np.isfinite(lat) & np.isfinite(lon)
+        if last - first < 3 or not known.any() or np.ptp(time_s[rows]) <= _LONG_S:
+            continue
+        wide = np.cos(np.radians(np.mean(lat[known])))
+        extent_m = _METRES_PER_DEGREE * np.hypot(np.ptp(lat[known]), np.ptp(lon[known]) * wide)
+        if extent_m > _FAR_M:
+            repeated[first + 1 : last] = True
+    return repeated

@@ -1,0 +1,208 @@
+"""The tables of a recording: their columns, units and ranges.
+
+Times are seconds; positions degrees (WGS 84) or metres; the axes of sensors are those of the
+device, right-handed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapfilter._types import Bools, Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One column of a recorded table.
+
+    Parameters
+    ----------
+    name : str
+        With its unit.
+    low, high : float
+        Inclusive range.
+    expected : str
+        The range, in messages.
+    required : bool
+        Whether a row without a value is unusable; other values out of range become missing.
+    text : bool
+        Whether values are texts.
+    hints : tuple of (float, float, str)
+        Likely mistakes behind values within these intervals.
+    """
+
+    name: str
+    low: float = -np.inf
+    high: float = np.inf
+    expected: str = "a finite number"
+    required: bool = False
+    text: bool = False
+    hints: tuple[tuple[float, float, str], ...] = ()
+
+    @property
+    def kind(self) -> str:
+        """What a value is, in messages."""
+        return "text" if self.text else "number"
+
+    def mistakes(self, values: Floats, bad: Bools) -> Iterator[tuple[str, Bools]]:
+        """Yield the likely mistake behind bad values, and which of them are its."""
+        for low, high, hint in self.hints:
+            of = bad & (np.abs(values) >= low) & (np.abs(values) <= high)
+            if of.any():
+                yield f" (likely: {hint})", of
+                bad = bad & ~of
+        if bad.any():
+            yield "", bad
+
+
+def _axes(unit: str, most: float, expected: str) -> tuple[Field, ...]:
+    return tuple(
+        Field(f"{axis}_{unit}", -most, most, expected, required=True) for axis in ("x", "y", "z")
+    )
+
+
+def _text(name: str, *, required: bool = False) -> Field:
+    return Field(name, required=required, text=True)
+
+
+_TIME = Field("time_s", -1e11, 1e11, "seconds", required=True)
+_SWAPPED = ((90.0, 180.0, "latitude and longitude swapped"), (180.0, np.inf, "metres for degrees"))
+_METRES = "metres"
+
+RECORDED: dict[str, tuple[Field, ...]] = {
+    "positions": (
+        _TIME,
+        Field("lat_deg", -90, 90, "degrees in -90..90", required=True, hints=_SWAPPED),
+        Field(
+            *("lon_deg", -180, 180, "degrees in -180..180"),
+            required=True,
+            hints=((180.0, np.inf, "metres for degrees"),),
+        ),
+        Field("altitude_m", -500, 20_000, "metres in -500..20000"),
+        Field("accuracy_m", 0, 1e5, "metres >= 0"),
+        Field("speed_mps", 0, 350, "m/s in 0..350"),
+        Field("course_deg", 0, 360, "degrees in 0..360"),
+        _text("provider"),
+    ),
+    "places": (
+        _TIME,
+        Field("east_m", -1e8, 1e8, _METRES, required=True),
+        Field("north_m", -1e8, 1e8, _METRES, required=True),
+        Field("up_m", -1e5, 1e5, _METRES),
+        Field("heading_rad", -6.3, 6.3, "radians"),
+    ),
+    "truth": (
+        _TIME,
+        Field("lat_deg", -90, 90, "degrees in -90..90", required=True, hints=_SWAPPED),
+        Field("lon_deg", -180, 180, "degrees in -180..180", required=True),
+        Field("altitude_m", -500, 20_000, "metres in -500..20000"),
+    ),
+    "true_places": (
+        _TIME,
+        Field("east_m", -1e8, 1e8, _METRES, required=True),
+        Field("north_m", -1e8, 1e8, _METRES, required=True),
+        Field("heading_rad", -6.3, 6.3, "radians"),
+    ),
+    "radio": (
+        _TIME,
+        _text("role", required=True),
+        _text("technology"),
+        Field("mcc", 0, 999, "0..999"),
+        Field("mnc", 0, 999, "0..999"),
+        Field("lac", 0, 2**24 - 1, "0..16777215"),
+        Field("ci", 0, 2**36 - 1, "0..68719476735"),
+        _text("cell"),
+        Field("arfcn", 0, 3_279_165, "a carrier number"),
+        Field("bsic", 0, 1007, "0..1007"),
+        Field("level_dbm", -200, 0, "dBm in -200..0"),
+        Field("timing_advance", 0, 3846, "steps in 0..3846"),
+        Field("censored", -1, 1, "-1, 0 or 1"),
+        Field("level_step_db", 0, 60, "dB in 0..60"),
+    ),
+    "motion": (
+        _TIME,
+        Field("step_m", -1e6, 1e6, _METRES),
+        Field("heading_rad", -6.3, 6.3, "radians in -2π..2π"),
+        Field("turn_rad", -6.3, 6.3, "radians in -2π..2π"),
+        Field("compass_deg", -180, 360, "degrees in -180..360"),
+    ),
+    "odometry": (
+        _TIME,
+        Field("speed_mps", -150, 350, "m/s in -150..350", required=True),
+        Field("yaw_rate_radps", -20, 20, "rad/s in -20..20"),
+        Field("speed_sd_mps", 0, 100, "m/s >= 0"),
+        Field("yaw_rate_sd_radps", 0, 10, "rad/s >= 0"),
+    ),
+    "poses": (
+        _TIME,
+        Field("x_m", -1e8, 1e8, _METRES, required=True),
+        Field("y_m", -1e8, 1e8, _METRES, required=True),
+        Field("z_m", -1e8, 1e8, _METRES, required=True),
+        *(Field(f"q{axis}", -1.01, 1.01, "-1..1", required=True) for axis in "xyzw"),
+    ),
+    "satellites": (
+        _TIME,
+        _text("satellite", required=True),
+        _text("signal"),
+        Field("pseudorange_m", 1.5e7, 6e7, "metres in 1.5e7..6e7", required=True),
+        Field("sigma_m", 1e-3, 1e5, "metres in 0.001..100000"),
+        Field("rate_mps", -2e4, 2e4, "m/s"),
+        Field("cn0_dbhz", 0, 100, "dB-Hz in 0..100"),
+        *(Field(f"{axis}_m", -6e7, 6e7, _METRES) for axis in ("x", "y", "z")),
+    ),
+    "accelerometer": (_TIME, *_axes("mps2", 2000, "m/s² in -2000..2000")),
+    "linear_acceleration": (_TIME, *_axes("mps2", 2000, "m/s² in -2000..2000")),
+    "gravity": (_TIME, *_axes("mps2", 20, "m/s² in -20..20")),
+    "gyroscope": (_TIME, *_axes("radps", 200, "rad/s in -200..200")),
+    "magnetometer": (_TIME, *_axes("ut", 10_000, "µT in -10000..10000")),
+    "orientation": (
+        _TIME,
+        *(Field(f"q{axis}", -1.01, 1.01, "-1..1", required=True) for axis in "xyzw"),
+    ),
+    "barometer": (
+        _TIME,
+        Field(
+            *("pressure_hpa", 300, 1100, "hPa in 300..1100"),
+            required=True,
+            hints=((30_000.0, 110_000.0, "pascal for hPa"),),
+        ),
+    ),
+    "steps": (_TIME, Field("count", 0, 1e9, "steps >= 0", required=True)),
+    "ephemerides": (
+        _TIME,
+        _text("satellite", required=True),
+        *(
+            Field(name, required=True)
+            for name in (
+                *("toc_s", "af0", "af1", "af2", "crs", "delta_n", "m0", "cuc", "eccentricity"),
+                *("cus", "sqrt_a", "toe_s", "cic", "omega0", "cis", "i0", "crc", "omega"),
+                *("omega_dot", "idot", "tgd"),
+            )
+        ),
+        Field("health"),
+    ),
+    "ionosphere": tuple(
+        Field(f"{name}{i}", required=True) for name in ("alpha", "beta") for i in range(4)
+    ),
+    "cells": (
+        _text("technology"),
+        Field("mcc", 0, 999, "0..999", required=True),
+        Field("mnc", 0, 999, "0..999", required=True),
+        Field("lac", 0, 2**24 - 1, "0..16777215", required=True),
+        Field("ci", 0, 2**36 - 1, "0..68719476735", required=True),
+        Field("lat_deg", -90, 90, "degrees in -90..90", required=True, hints=_SWAPPED),
+        Field("lon_deg", -180, 180, "degrees in -180..180", required=True),
+        Field("range_m", 0, 1e6, "metres >= 0"),
+        Field("samples", 0, 1e12, ">= 0"),
+    ),
+}
+"""The columns of each table of a recording; ``cells`` and ``ionosphere`` have no times."""
+
+SENSORS = (
+    *("accelerometer", "linear_acceleration", "gravity", "gyroscope", "magnetometer"),
+    *("orientation", "barometer", "steps", "odometry", "velocity"),
+)
+"""Tables of raw sensors, which a log keeps in its folder ``sensors``."""

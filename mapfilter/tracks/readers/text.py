@@ -1,0 +1,187 @@
+"""Text of a recording in one form: UTF-8, lines that end with a line feed, unpacked."""
+
+from __future__ import annotations
+
+import re
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+from mapfilter.errors import InputError, fail
+
+_LARGEST_BYTES = 1 << 31
+_LARGEST_UNPACKED_BYTES = 1 << 30
+_HEAD_BYTES = 1 << 16
+_PART_BYTES = 1 << 24
+_MOST_ZERO_SHARE = 0.05
+_MOST_STRANGE_SHARE = 0.1
+_ARCHIVES = {
+    b"PK\x03\x04": "a ZIP archive (or an Excel file)",
+    b"\xfd7zXZ": "an XZ archive",
+    b"BZh": "a bzip2 archive",
+    b"7z\xbc\xaf": "a 7z archive",
+    b"PAR1": "a Parquet file",
+    b"\x89PNG": "a PNG picture",
+    b"\xff\xd8\xff": "a JPEG picture",
+    b"%PDF": "a PDF file",
+    b"SQLite": "an SQLite database",
+    b"II*\x00": "a TIFF raster",
+    b"MM\x00*": "a TIFF raster",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Text:
+    """A file's content.
+
+    Parameters
+    ----------
+    path : Path
+    data : bytes
+        UTF-8 without a byte order mark; lines end with a line feed.
+    notes : tuple of str
+        What was changed to make it so.
+    line : int
+        Number of the first line; for a part of a file, one less than that of its first row.
+    """
+
+    path: Path
+    data: bytes = field(repr=False)
+    notes: tuple[str, ...] = ()
+    line: int = 1
+
+    @cached_property
+    def head(self) -> tuple[str, ...]:
+        """The first lines, up to 64 KiB of them."""
+        return tuple(self.data[:_HEAD_BYTES].decode("utf-8", "replace").split("\n"))
+
+    @cached_property
+    def first_line(self) -> str:
+        """The first line that is not blank."""
+        return next((line.strip() for line in self.head if line.strip()), "")
+
+
+def parts_of(text: Text) -> Iterator[Text]:
+    """Cut a large text into parts, each below the first line that is not blank."""
+    if len(text.data) <= _PART_BYTES:
+        yield text
+        return
+    begin = len(text.data) - len(text.data.lstrip(b"\n \t"))
+    end = text.data.find(b"\n", begin)
+    header, at = text.data[begin : end + 1], end + 1
+    line = 1 + text.data[:begin].count(b"\n")
+    while end >= 0 and at < len(text.data):
+        cut = text.data.find(b"\n", at + _PART_BYTES)
+        stop = cut + 1 if cut >= 0 else len(text.data)
+        part = text.data[at:stop]
+        yield Text(text.path, header + part, text.notes, line)
+        line += part.count(b"\n")
+        at = stop
+    if end < 0:
+        yield text
+
+
+def read_text(path: Path, most_bytes: int = -1) -> Text:
+    r"""Read a file as text: plain or gzip, UTF-8 or UTF-16, any line ends.
+
+    ``most_bytes`` are read at most, all of them where it is negative.
+
+    Raises
+    ------
+    InputError
+        The file is missing, empty, too large, or no text.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.NamedTemporaryFile() as file:
+    ...     _ = Path(file.name).write_bytes("a,b\r\n1,2".encode("utf-16"))
+    ...     read_text(Path(file.name)).data
+    b'a,b\n1,2'
+    """
+    try:
+        size = path.stat().st_size
+        if size > _LARGEST_BYTES and most_bytes < 0:
+            raise fail(InputError, str(path), "a recording of at most 2 GiB", f"{size} bytes")
+        with path.open("rb") as stream:
+            data = stream.read(most_bytes)
+    except OSError as error:
+        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
+    notes: list[str] = []
+    if data.startswith(b"\x1f\x8b"):
+        data = _unpacked(path, data, notes)
+    for start, what in _ARCHIVES.items():
+        if data.startswith(start):
+            hint = "unpack it first" if "archive" in what else ""
+            raise fail(InputError, str(path), "a recording as text", what, hint)
+    data = _as_utf8(path, data, notes)
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    if not data.strip():
+        raise fail(InputError, str(path), "a recording", "an empty file")
+    return Text(path, data, tuple(notes))
+
+
+def _unpacked(path: Path, data: bytes, notes: list[str]) -> bytes:
+    """Unpack gzip as far as it is whole."""
+    parts: list[bytes] = []
+    left = _LARGEST_UNPACKED_BYTES
+    try:
+        while data.startswith(b"\x1f\x8b"):
+            stream = zlib.decompressobj(wbits=31)
+            parts.append(stream.decompress(data, left))
+            left -= len(parts[-1])
+            if left <= 0:
+                got = "more than 1 GiB, unpacked"
+                raise fail(InputError, str(path), "a recording of at most 1 GiB", got)
+            if not stream.eof:
+                notes.append("the gzip file is cut off; what could be unpacked was read")
+                break
+            data = stream.unused_data
+    except zlib.error as error:
+        if not any(parts):
+            raise fail(InputError, str(path), "a gzip file", str(error), "damaged") from error
+        notes.append("the gzip file is damaged; what could be unpacked was read")
+    return b"".join(parts)
+
+
+def _as_utf8(path: Path, data: bytes, notes: list[str]) -> bytes:
+    if data.startswith(b"\xef\xbb\xbf"):
+        data = data[3:]
+    elif (wide := _utf16(data)) is not None:
+        notes.append("UTF-16 text")
+        # A file cut off may end within a character.
+        data = data[: len(data) // 2 * 2].decode(wide, "replace").lstrip("\ufeff").encode()
+    zeros = data.count(b"\0")
+    if zeros > _MOST_ZERO_SHARE * len(data):
+        raise fail(InputError, str(path), "a recording as text", "a binary file")
+    if zeros:
+        notes.append(f"{zeros} zero bytes left out")
+        data = data.replace(b"\0", b"")
+    if not data.isascii():
+        try:
+            data.decode("utf-8")
+        except UnicodeDecodeError:
+            notes.append("some bytes are not UTF-8")
+            strange = data[:_HEAD_BYTES].decode("utf-8", "replace").count("\ufffd")
+            if strange > _MOST_STRANGE_SHARE * min(len(data), _HEAD_BYTES):
+                got = "a binary file"
+                raise fail(InputError, str(path), "a recording as text", got) from None
+            data = data.decode("utf-8", "replace").encode()
+    return data
+
+
+def _utf16(data: bytes) -> str | None:
+    """Return the codec of UTF-16 text, with or without a mark, else None."""
+    if data.startswith(b"\xff\xfe"):
+        return "utf-16-le"
+    if data.startswith(b"\xfe\xff"):
+        return "utf-16-be"
+    head = data[:512]
+    if len(head) >= 8 and re.fullmatch(rb"(?:[\t\n\r -~]\0)+.?", head, re.DOTALL):
+        return "utf-16-le"
+    if len(head) >= 8 and re.fullmatch(rb"(?:\0[\t\n\r -~])+.?", head, re.DOTALL):
+        return "utf-16-be"
+    return None

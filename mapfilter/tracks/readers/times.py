@@ -1,0 +1,146 @@
+"""Times as recordings write them, in UTC seconds."""
+
+from __future__ import annotations
+
+import re
+from datetime import UTC, datetime, timedelta, timezone, tzinfo
+from zoneinfo import ZoneInfo
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from mapfilter._types import Floats
+from mapfilter.errors import ConfigError, fail
+from mapfilter.gnss.orbits import LEAPS_UTC_S, WEEK_S
+
+GPS_EPOCH_S = datetime(1980, 1, 6, tzinfo=UTC).timestamp()
+_UNITS = ((1e17, 1e9), (1e14, 1e6), (1e11, 1e3))
+_OFFSET = re.compile(r"(?:UTC|GMT)?([+-])(\d{1,2})(?::?([0-5]\d))?")
+
+
+def utc_from_gps_s(gps_s: ArrayLike) -> Floats:
+    """Turn seconds since 6 January 1980 in GPS time into UTC seconds (Unix time).
+
+    Leap seconds are those announced until 2026.
+
+    Examples
+    --------
+    >>> float(utc_from_gps_s(1930 * WEEK_S + 18.0)) - datetime(2017, 1, 1, tzinfo=UTC).timestamp()
+    0.0
+    """
+    elapsed = np.asarray(gps_s, dtype=np.float64)
+    leaps = np.sort(np.asarray(LEAPS_UTC_S))
+    # From the date of leap second k on, GPS time is k seconds ahead.
+    starts = leaps - GPS_EPOCH_S + np.arange(1, len(leaps) + 1)
+    return np.asarray(GPS_EPOCH_S + elapsed - np.searchsorted(starts, elapsed, side="right"))
+
+
+def utc_from_week_s(week: ArrayLike, tow_s: ArrayLike) -> Floats:
+    """Turn GPS weeks, counted on, and seconds of the week into UTC seconds."""
+    return utc_from_gps_s(np.asarray(week) * WEEK_S + np.asarray(tow_s))
+
+
+def unix_seconds(values: ArrayLike) -> Floats:
+    """Turn Unix times in s, ms, µs or ns, each told by its size, into seconds.
+
+    Examples
+    --------
+    >>> unix_seconds([1599319703, 1599319703000, 1599319703000000000]).tolist()
+    [1599319703.0, 1599319703.0, 1599319703.0]
+    """
+    number = np.array(values, dtype=np.float64)
+    for least, scale in _UNITS:
+        large = np.abs(number) > least
+        number[large] /= scale
+    return number
+
+
+def parse_times(texts: np.ndarray, zone: str = "", layout: str = "ISO8601") -> tuple[Floats, bool]:
+    """Read dates and times.
+
+    Parameters
+    ----------
+    texts : (N,) array of str
+        A leap second (``:60``) is the first second of the next minute.
+    zone : str
+        Zone of times that state none.
+    layout : str
+        Format as of ``strptime``, or "ISO8601"; numbers are Unix times then.
+
+    Returns
+    -------
+    time_s : (N,) array
+        UTC seconds, NaN where not understood. Without a zone, as if the zone were UTC.
+    zoned : bool
+        Whether the times are UTC: by their own zone or by ``zone``.
+    """
+    given = pd.Series(texts, dtype=object).astype(str)
+    time_s = np.full(len(given), np.nan)
+    if layout == "ISO8601":
+        number = pd.to_numeric(given, errors="coerce").to_numpy(dtype=np.float64)
+        is_number = np.isfinite(number) & (np.abs(number) > 1e8)
+        time_s[is_number] = unix_seconds(number[is_number])
+    else:
+        is_number = np.zeros(len(given), dtype=bool)
+    rest = given[~is_number]
+    if rest.empty:
+        return time_s, True
+    leap = rest.str.contains(r":60(?:\D|$)|_\d\d\.\d\d\.60$", regex=True).to_numpy()
+    plain = rest.str.replace(r"([:.])60(?=\D|$)", r"\g<1>59", regex=True) if leap.any() else rest
+    aware = plain.str.contains(r"(?:Z|z|[+-]\d\d:?\d\d)\s*$", regex=True).to_numpy()
+    # Other years are beyond the range of timestamps, or no dates.
+    if layout == "ISO8601":
+        plain = plain.str.replace(",", ".", regex=False)
+    plain = plain.where(plain.str.match(r"\s*(?:19|20)\d\d"), "")
+    moments = pd.to_datetime(plain, format=layout, utc=True, errors="coerce")
+    seconds = (moments - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy(dtype=np.float64)
+    seconds = seconds + leap
+    if zone and not aware.all():
+        seconds = np.where(aware, seconds, utc_from_local_s(seconds, zone))
+    time_s[~is_number] = seconds
+    understood = np.isfinite(seconds)
+    zoned = bool(zone) or bool(aware[understood].all() if understood.any() else False)
+    return time_s, zoned
+
+
+def utc_from_local_s(local_s: ArrayLike, zone: str) -> Floats:
+    """Turn local times, in seconds as if their zone were UTC, into UTC seconds.
+
+    Of an hour that a clock set back passes twice the first is taken.
+    """
+    rules = parse_zone(zone)
+    local = np.asarray(local_s, dtype=np.float64)
+    shift = np.zeros(local.shape)
+    # The shift is constant within an hour's quarter in every zone.
+    quarter = np.floor(np.where(np.isfinite(local), local, 0.0) / 900.0)
+    for value in np.unique(quarter):
+        moment = datetime(1970, 1, 1) + timedelta(seconds=float(value) * 900.0)
+        offset = moment.replace(tzinfo=rules).utcoffset() or timedelta(0)
+        shift[quarter == value] = offset.total_seconds()
+    return np.asarray(local - shift)
+
+
+def parse_zone(zone: str) -> tzinfo:
+    """Return the time zone of a name (``Europe/Brussels``, ``UTC``) or an offset (``+01:00``).
+
+    Raises
+    ------
+    ConfigError
+        There is no such zone.
+
+    Examples
+    --------
+    >>> parse_zone("+05:30")
+    datetime.timezone(datetime.timedelta(seconds=19800))
+    """
+    if found := _OFFSET.fullmatch(zone.strip()):
+        sign = -1 if found[1] == "-" else 1
+        shift = sign * timedelta(hours=int(found[2]), minutes=int(found[3] or 0))
+        if abs(shift) <= timedelta(hours=15):
+            return timezone(shift)
+    try:
+        return ZoneInfo(zone.strip())
+    except (ValueError, OSError, LookupError) as error:
+        expected = "a zone such as Europe/Brussels or +01:00"
+        raise fail(ConfigError, "--zone", expected, repr(zone)) from error

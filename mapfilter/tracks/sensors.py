@@ -1,0 +1,97 @@
+"""Tables of raw sensors beside a log: the folder ``sensors`` in its folder, one table each.
+
+Times are those of the log. Axes are those of the device, right-handed; odometry is of the vehicle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from mapfilter._io import read_json, sha256_file
+from mapfilter.errors import Faults, InputError, StoreError, fail
+
+FOLDER = "sensors"
+
+SENSOR_COLUMNS: dict[str, tuple[str, ...]] = {
+    "accelerometer": ("time_s", "x_mps2", "y_mps2", "z_mps2"),
+    "linear_acceleration": ("time_s", "x_mps2", "y_mps2", "z_mps2"),
+    "gravity": ("time_s", "x_mps2", "y_mps2", "z_mps2"),
+    "gyroscope": ("time_s", "x_radps", "y_radps", "z_radps"),
+    "magnetometer": ("time_s", "x_ut", "y_ut", "z_ut"),
+    "orientation": ("time_s", "qx", "qy", "qz", "qw"),
+    "barometer": ("time_s", "pressure_hpa"),
+    "steps": ("time_s", "count"),
+    "odometry": ("time_s", "speed_mps", "yaw_rate_radps", "speed_sd_mps", "yaw_rate_sd_radps"),
+    "velocity": ("time_s", "speed_mps", "heading_rad"),
+}
+"""Sensors of a log and the columns of each.
+
+``accelerometer`` includes gravity, ``linear_acceleration`` does not; ``orientation`` is the
+rotation from the device to east, north and up; ``steps`` counts since some start; ``velocity`` is
+that of a GNSS receiver, with headings counter-clockwise from grid east.
+"""
+
+
+def write_sensors(
+    folder: Path, sensors: Mapping[str, pd.DataFrame], form: Literal["parquet", "csv"]
+) -> list[dict[str, Any]]:
+    """Write sensor tables into a log's new folder, and return their parts for its head."""
+    parts: list[dict[str, Any]] = []
+    for name, columns in SENSOR_COLUMNS.items():
+        rows = sensors.get(name)
+        if rows is None or rows.empty:
+            continue
+        path = folder / FOLDER / f"{name}.{form}"
+        path.parent.mkdir(exist_ok=True)
+        rows = rows[list(columns)].astype("float64")
+        if form == "csv":
+            rows.to_csv(path, index=False, lineterminator="\n")
+        else:
+            table = pa.Table.from_pandas(rows, preserve_index=False).replace_schema_metadata(None)
+            pq.write_table(table, path, compression="zstd")
+        part = {"path": f"{FOLDER}/{path.name}", "sha256": sha256_file(path)}
+        parts.append(part | {"bytes": path.stat().st_size, "rows": len(rows)})
+    return parts
+
+
+def read_sensors(log: str | Path) -> dict[str, pd.DataFrame]:
+    """Read the sensor tables of a log, by name; none where it has no folder ``sensors``.
+
+    Raises
+    ------
+    InputError
+        A table is damaged, or lacks a column.
+    StoreError
+        A table was cut off or changed since ``mapfilter convert`` wrote it.
+    """
+    folder = Path(log)
+    paths = {
+        name: path
+        for name in SENSOR_COLUMNS
+        for path in (folder / FOLDER / f"{name}.parquet", folder / FOLDER / f"{name}.csv")
+        if path.is_file()
+    }
+    head = folder / "log.json"
+    listed = read_json(head).get("parts", []) if head.is_file() else []
+    sums = {part.get("path"): part.get("sha256") for part in listed if isinstance(part, dict)}
+    faults, tables = Faults(), {}
+    for name, path in paths.items():
+        known = sums.get(f"{FOLDER}/{path.name}")
+        if known is not None and known != sha256_file(path):
+            raise fail(StoreError, str(path), f"SHA-256 {known}", "another", "changed or cut off")
+        try:
+            rows = pd.read_csv(path) if path.suffix == ".csv" else pq.read_table(path).to_pandas()
+        except (pa.ArrowException, ValueError, OSError) as error:
+            got = (str(error).splitlines() or ["nothing"])[0]
+            raise fail(InputError, str(path), "a readable table", got, "cut off") from error
+        if lacking := [column for column in SENSOR_COLUMNS[name] if column not in rows]:
+            faults.add(str(path), f"columns {', '.join(SENSOR_COLUMNS[name])}", f"no {lacking[0]}")
+        tables[name] = rows
+    faults.raise_if_any(InputError)
+    return tables

@@ -1,0 +1,93 @@
+"""Checks of the logs or recordings that a configuration names, against plan and area."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from mapfilter.check.findings import Findings, Severity
+from mapfilter.config.sections import Config
+from mapfilter.errors import MapfilterError, listed
+from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.radio.cells import CellPlan
+from mapfilter.tracks.identify import name_by_plan
+from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.open_log import OpenedLog
+from mapfilter.tracks.schema import SERVING
+from mapfilter.workflows.logs import journeys_of, open_journey
+from mapfilter.workflows.world import outside_m
+
+_AWAY_M = 5000.0
+_MANY = 0.2
+
+
+def check_logs(
+    config: Config, lattice: Lattice | None, plan: CellPlan | None, findings: Findings
+) -> None:
+    """Check every log or recording of ``[track]``, if it names any."""
+    if config.track.path is None:
+        return
+    try:
+        paths = journeys_of(config)
+    except MapfilterError as error:
+        findings.add_faults(error, "log-invalid")
+        return
+    for path in paths:
+        try:
+            opened = open_journey(config, path, "" if lattice is None else lattice.crs)
+        except MapfilterError as error:
+            findings.add_faults(error, "log-invalid")
+            continue
+        _check_recordings(opened, findings)
+        if lattice is not None and _is_near(path, opened.log, lattice, findings) and plan:
+            _check_cells(path, name_by_plan(opened.log, plan), plan, findings)
+
+
+def _check_recordings(opened: OpenedLog, findings: Findings) -> None:
+    """Report recordings of which many rows cannot be used, and those without motion."""
+    for recording in opened.recordings:
+        lost = recording.unusable_rows
+        if lost > _MANY * recording.rows:
+            reasons = "; ".join(str(found) for found in recording.unusable[:2])
+            evidence = f"{lost} of {recording.rows} rows cannot be used: {reasons}."
+            findings.add("log-rows-unused", str(recording.path), evidence, "warning")
+    if opened.log.motion.empty:
+        held = [name for name in ("radio", "gnss") if len(getattr(opened.log, name))]
+        evidence = (
+            f"There is no motion (rows of {', '.join([*held, *opened.sensors]) or 'nothing'})."
+        )
+        findings.add("log-without-motion", opened.name, evidence, "warning")
+
+
+def _is_near(path: Path, log: TrackLog, lattice: Lattice, findings: Findings) -> bool:
+    if not same_crs(log.crs, lattice.crs):
+        evidence = f"The log is in {log.crs}, the area in {lattice.crs}."
+        findings.add("crs-mixed", str(path), evidence)
+        return False
+    for table in ("truth", "gnss"):
+        places = getattr(log, table)
+        if places.empty:
+            continue
+        away_m = outside_m(places["east_m"].to_numpy(), places["north_m"].to_numpy(), lattice)
+        if away_m.min() > _AWAY_M:
+            evidence = f"All positions ({table}) lie {away_m.min() / 1000:.0f} km or more outside."
+            findings.add("log-outside-area", str(path), evidence)
+            return False
+    return True
+
+
+def _check_cells(path: Path, log: TrackLog, plan: CellPlan, findings: Findings) -> None:
+    """Report serving cells that the plan lacks, and logs without serving cells."""
+    serving = log.radio["cell"][(log.radio["role"] == SERVING).to_numpy()].dropna()
+    if serving.empty:
+        evidence = f"No serving cell is named in {len(log.radio)} rows of reports."
+        findings.add("log-cells-unknown", str(path), evidence, "warning")
+        return
+    unknown = ~serving.isin(plan.ids).to_numpy()
+    if unknown.any():
+        ids = np.unique(serving.to_numpy(dtype=str)[unknown]).tolist()
+        evidence = f"{int(unknown.sum())} of {len(serving)} reports are of {len(ids)} serving "
+        evidence += f"cells that the plan lacks: {listed(ids)}."
+        severity: Severity = "error" if unknown.all() else "warning"
+        findings.add("log-cells-unknown", str(path), evidence, severity)

@@ -1,0 +1,49 @@
+"""The logs of a configuration: track logs, or recordings of other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mapfilter.config.sections import Config, Track
+from mapfilter.geodesy import projected_crs
+from mapfilter.radio.cells import CellPlan
+from mapfilter.tracks.combine import CombineOptions
+from mapfilter.tracks.open_log import OpenedLog, OpenOptions, list_journeys, open_log
+
+
+def open_options(track: Track) -> OpenOptions:
+    """Return how the section reads recordings."""
+    origin_deg = None if track.origin is None else (track.origin[1], track.origin[0])
+    return OpenOptions(
+        format=track.format,
+        zone=track.zone,
+        columns=track.columns.given,
+        combine=CombineOptions(
+            origin_deg=origin_deg, truth=track.truth, course_motion=track.course_motion
+        ),
+    )
+
+
+def journeys_of(config: Config) -> list[Path]:
+    """Return what holds one journey each: logs, or the first recording of one."""
+    if config.track.recordings:
+        return [config.track_path]
+    return list_journeys(config.track_path)
+
+
+def open_journey(
+    config: Config, path: Path, crs: str = "", plan: CellPlan | None = None
+) -> OpenedLog:
+    """Open a journey, with the recordings that the section adds to it.
+
+    Parameters
+    ----------
+    crs : str
+        Of the database, for recordings; else that of the area, else the UTM zone of positions.
+    plan : CellPlan, optional
+        Gives reported cells its ids.
+    """
+    if not crs and config.area.crs is not None:
+        crs = projected_crs(config.area.crs, "area.crs")
+    paths = [path, *config.track.recordings]
+    return open_log(paths, crs=crs, plan=plan, options=open_options(config.track))

@@ -1,0 +1,99 @@
+"""Filters take the step of timing advance, and of levels, from the log that states them."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.candidate import CandidateFilter
+from mapfilter.positioning.filter import locate
+from mapfilter.positioning.kalman.filter import KalmanFilter
+from mapfilter.positioning.log_options import fitted_to_log
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.tracks.log import make_log
+
+CRS = "EPSG:32635"
+LTE_M = 299_792_458 / 30.72e6 * 8
+
+
+def log(**columns):
+    rows = {"time_s": np.arange(4.0), "role": "serving", "cell": "A", "level_dbm": -80.0}
+    rows |= {"timing_advance": 3} | columns
+    return make_log(CRS, radio=pd.DataFrame(rows))
+
+
+@pytest.mark.parametrize("options", [BayesFilter(), KalmanFilter(), KalmanFilter(method="ukf")])
+def test_steps_of_timing_advance_by_technology(options):
+    fitted, notes = fitted_to_log(options, log(technology="LTE"))
+    assert fitted.timing_step_m == pytest.approx(LTE_M)
+    assert notes == ("timing advance: steps of 78.07 m, by technology",)
+    assert fitted_to_log(options, log(technology="GSM")) == (options, ())
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        {},
+        {"technology": "NR"},
+        {"technology": ["LTE", "LTE", "GSM", "LTE"]},
+        {"technology": ["LTE", "LTE", None, "LTE"]},
+        {"technology": "LTE", "timing_advance": None},
+    ],
+)
+def test_nothing_is_assumed_where_the_step_is_not_known(columns):
+    options = BayesFilter()
+    assert fitted_to_log(options, log(**columns)) == (options, ())
+
+
+def test_what_the_user_set_stays():
+    options = BayesFilter(timing_step_m=100.0, level_error_db=6.0)
+    given = log(technology="LTE", level_step_db=10.0)
+    assert fitted_to_log(options, given) == (options, ())
+    custom = object()
+    assert fitted_to_log(custom, given) == (custom, ())
+    assert fitted_to_log(CandidateFilter(), given)[0] == CandidateFilter()
+
+
+def test_steps_of_levels_add_their_rounding_error():
+    fitted, notes = fitted_to_log(BayesFilter(), log(level_step_db=12.0))
+    assert fitted.level_error_db == pytest.approx((10.0**2 + 12.0**2 / 12) ** 0.5)
+    assert "levels in steps of 12 dB" in notes[0]
+    assert fitted_to_log(BayesFilter(), log(level_step_db=0.0))[1] == ()
+    assert fitted_to_log(BayesFilter(), log(level_step_db=10.0, censored=1))[1] == ()
+
+
+def test_a_vehicle_is_located_by_timing_advances_of_lte():
+    """Circles of 78 m steps about three sites meet at the place, those of 553 m nowhere."""
+    sites = {"A": (385_000.0, 6_672_000.0), "B": (388_000.0, 6_672_000.0)}
+    sites["C"] = (385_500.0, 6_676_000.0)
+    plan = CellPlan(
+        CRS,
+        tuple(
+            Cell(name, name, *place, 30.0, None, 50.0, 1800.0, "omni", technology="LTE")
+            for name, place in sites.items()
+        ),
+    )
+    here = np.array([386_200.0, 6_673_600.0])
+    rows = []
+    for second in range(60):
+        for name, place in sites.items():
+            steps = int(np.hypot(*(here - place)) / LTE_M)
+            rows.append(
+                {
+                    "time_s": float(second),
+                    "role": "serving",
+                    "cell": name,
+                    "timing_advance": steps,
+                    "technology": "LTE",
+                }
+            )
+    motion = pd.DataFrame({"time_s": np.arange(60.0), "step_m": 0.0, "heading_rad": 0.0})
+    given = make_log(CRS, radio=pd.DataFrame(rows), motion=motion)
+    fitted, _ = fitted_to_log(KalmanFilter(), given)
+    errors = []
+    for options in (fitted, KalmanFilter()):
+        track = locate(given, options.over_sites(plan), np.random.default_rng(0))
+        place = np.array([track.estimate.east_m[-1], track.estimate.north_m[-1]])
+        errors.append(np.hypot(*(place - here)))
+    assert errors[0] < 200
+    assert errors[1] > 500

@@ -1,0 +1,150 @@
+"""Cells of a log get the ids of a plan: by identity, by carrier and code, by technology."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.tracks.identify import name_by_plan
+from mapfilter.tracks.log import make_log
+
+CRS = "EPSG:32635"
+
+
+def cell(name, **values):
+    return Cell(name, name, 385_000.0, 6_672_000.0, 30.0, None, 50.0, 1800.0, "omni", **values)
+
+
+PLAN = CellPlan(
+    CRS,
+    (
+        cell("gsm", technology="GSM", mcc=244, mnc=91, lac=3021, ci=117, arfcn=100, bsic=7),
+        cell("lte", technology="LTE", mcc=244, mnc=91, lac=500, ci=9751830, arfcn=100, bsic=7),
+        cell("umts", technology="UMTS", lac=3021, ci=4464, arfcn=10737, bsic=101),
+        cell("nr", technology="NR", mcc=244, mnc=91, ci=68_719_476_735, arfcn=640_000, bsic=800),
+        cell("244-91-77-12345"),
+        cell("twin1", mcc=244, mnc=91, ci=99, arfcn=5, bsic=5),
+        cell("twin2", mcc=244, mnc=91, ci=99, arfcn=5, bsic=5),
+        cell("alone", arfcn=6, bsic=5),
+    ),
+)
+
+
+def named(**row):
+    """Return the cell and the notes of a log of one row."""
+    rows = pd.DataFrame([{"time_s": 0.0, "role": "serving", "level_dbm": -80.0, **row}])
+    log = name_by_plan(make_log(CRS, radio=rows), PLAN)
+    value = log.radio["cell"].iloc[0]
+    return (None if pd.isna(value) else value), log.notes
+
+
+@pytest.mark.parametrize(
+    ("row", "expected"),
+    [
+        ({"mcc": 244, "mnc": 91, "lac": 3021, "ci": 117, "technology": "GSM"}, "gsm"),
+        ({"cell": "244-91-3021-117"}, "gsm"),
+        ({"cell": "244/91/3021/117"}, "gsm"),
+        # The area is part of the identity in GSM, and none of it in LTE.
+        ({"mcc": 244, "mnc": 91, "lac": 3022, "ci": 117, "technology": "GSM"}, "244-91-3022-117"),
+        ({"mcc": 244, "mnc": 91, "lac": 501, "ci": 9751830, "technology": "LTE"}, "lte"),
+        ({"cell": "244-91-9751830"}, "lte"),
+        ({"mcc": 244, "mnc": 5, "ci": 9751830}, "244-5-9751830"),
+        ({"ci": 9751830}, "lte"),
+        # RNC 57, 16-bit identity 4464; only within its location area.
+        ({"mcc": 244, "mnc": 91, "lac": 3021, "ci": (57 << 16) + 4464}, "umts"),
+        ({"lac": 3020, "ci": (57 << 16) + 4464}, f"3020-{(57 << 16) + 4464}"),
+        ({"cell": "244-91-68719476735"}, "nr"),
+        ({"cell": "244-91-12345"}, "244-91-77-12345"),
+        ({"ci": 99}, "99"),
+        ({"arfcn": 6, "bsic": 5}, "alone"),
+        ({"arfcn": 5, "bsic": 5}, None),
+        ({"arfcn": 100, "bsic": 7, "technology": "LTE"}, "lte"),
+        ({"arfcn": 100, "bsic": 7, "technology": "GSM"}, "gsm"),
+        ({"arfcn": 100, "bsic": 7}, None),
+        ({"cell": "../new"}, "../new"),
+        ({"cell": "alone"}, "alone"),
+    ],
+)
+def test_serving_cells(row, expected):
+    assert named(**row)[0] == expected
+
+
+@pytest.mark.parametrize(
+    ("row", "expected"),
+    [
+        # A neighbour of one candidate is the filter's business, unless another technology has it.
+        ({"arfcn": 6, "bsic": 5}, None),
+        ({"arfcn": 6, "bsic": 5, "technology": "LTE"}, None),
+        ({"arfcn": 100, "bsic": 7, "technology": "LTE"}, "lte"),
+        ({"arfcn": 10737, "bsic": 101, "technology": "LTE"}, "LTE carrier 10737, code 101"),
+        ({"arfcn": 1, "bsic": 1, "technology": "LTE"}, None),
+    ],
+)
+def test_neighbours(row, expected):
+    assert named(role="neighbour", **row)[0] == expected
+
+
+def test_notes_count_what_was_named_and_what_the_plan_lacks():
+    rows = pd.DataFrame(
+        {
+            "time_s": np.arange(5.0),
+            "role": "serving",
+            "cell": ["244-91-3021-117", "gsm", "244-91-9751830", "244-91-9751830", "244-91-1-2"],
+        }
+    )
+    log = make_log(CRS, radio=rows)
+    again = name_by_plan(log, PLAN)
+    assert again.radio["cell"].tolist() == ["gsm", "gsm", "lte", "lte", "244-91-1-2"]
+    assert again.notes[-2:] == (
+        "radio: 3 rows of 2 cells named by the plan's identities",
+        "radio: 1 rows of 1 cells that the plan lacks (244-91-1-2)",
+    )
+    assert log.radio["cell"].iloc[0] == "244-91-3021-117"
+
+
+def test_a_log_with_ids_stays_the_same_object():
+    rows = pd.DataFrame({"time_s": [0.0, 1.0], "role": "serving", "cell": ["gsm", "lte"]})
+    log = make_log(CRS, radio=rows)
+    assert name_by_plan(log, PLAN) is log
+    unknown = make_log(CRS, radio=rows.assign(cell=["gsm", "elsewhere"]))
+    assert name_by_plan(unknown, PLAN) is unknown
+    empty = make_log(CRS)
+    assert name_by_plan(empty, PLAN) is empty
+
+
+numbers = st.none() | st.integers(0, 300)
+
+
+@settings(max_examples=25)
+@given(
+    rows=st.lists(
+        st.fixed_dictionaries(
+            {
+                "cell": st.none() | st.sampled_from(["gsm", "244-91-3021-117", "x"]),
+                "lac": numbers,
+                "ci": numbers | st.just(117),
+                "arfcn": numbers | st.just(100),
+                "bsic": st.none() | st.integers(0, 8),
+                "technology": st.none() | st.sampled_from(["GSM", "LTE"]),
+                "role": st.sampled_from(["serving", "neighbour"]),
+            }
+        ),
+        min_size=1,
+        max_size=6,
+    )
+)
+def test_naming_is_row_by_row_and_naming_again_changes_nothing(rows):
+    table = pd.DataFrame([{"time_s": float(i), **row} for i, row in enumerate(rows)])
+    for name in ("lac", "ci", "arfcn", "bsic"):
+        table[name] = table[name].astype("Int64")
+    log = make_log(CRS, radio=table)
+    once = name_by_plan(log, PLAN)
+    again = name_by_plan(once, PLAN)
+    assert again.radio["cell"].equals(once.radio["cell"])
+    assert once.radio.drop(columns="cell").equals(log.radio.drop(columns="cell"))
+    for i in range(len(rows)):
+        alone = make_log(CRS, radio=table.iloc[[i]])
+        one = name_by_plan(alone, PLAN).radio["cell"].tolist()
+        assert one == once.radio["cell"].iloc[[i]].tolist()

@@ -1,0 +1,99 @@
+"""Raw sensors beside a log, and reports by technology."""
+
+import pandas as pd
+import pytest
+
+from mapfilter.errors import InputError, OutputError, StoreError
+from mapfilter.tracks.log import make_log
+from mapfilter.tracks.sensors import SENSOR_COLUMNS, read_sensors
+from mapfilter.tracks.store import read_log, write_log
+
+UTM = "EPSG:32635"
+
+
+@pytest.fixture
+def log():
+    return make_log(UTM, motion=pd.DataFrame({"time_s": [0.0, 1.0], "step_m": [1.0, 1.2]}))
+
+
+@pytest.fixture
+def sensors():
+    return {
+        name: pd.DataFrame({column: [0.5 * i, 0.5 * i + 1] for i, column in enumerate(columns)})
+        for name, columns in SENSOR_COLUMNS.items()
+    }
+
+
+@pytest.mark.parametrize("form", ["parquet", "csv"])
+def test_sensors_are_read_as_they_were_written(form, log, sensors, tmp_path):
+    folder = tmp_path / "log"
+    write_log(log, folder, form, sensors)
+    found = read_sensors(folder)
+    assert set(found) == set(sensors)
+    for name, rows in sensors.items():
+        pd.testing.assert_frame_equal(found[name], rows)
+    assert read_log(folder).notes == ()
+    write_log(log, folder, form, {})
+    assert read_sensors(folder) == {}
+    assert not (folder / "sensors").exists()
+
+
+def test_a_log_without_sensors_has_none(log, tmp_path):
+    write_log(log, tmp_path / "log")
+    assert read_sensors(tmp_path / "log") == {}
+    assert read_sensors(tmp_path / "absent") == {}
+
+
+def test_sensors_that_were_changed_are_refused(log, sensors, tmp_path):
+    write_log(log, tmp_path / "log", sensors=sensors)
+    path = tmp_path / "log" / "sensors" / "gyroscope.parquet"
+    path.write_bytes(path.read_bytes()[:-10])
+    with pytest.raises(StoreError, match="changed or cut off"):
+        read_sensors(tmp_path / "log")
+
+
+def test_sensors_made_by_hand_need_their_columns(log, tmp_path):
+    folder = tmp_path / "log"
+    (folder / "sensors").mkdir(parents=True)
+    (folder / "log.json").write_text('{"crs": "EPSG:32635"}')
+    path = folder / "sensors" / "barometer.csv"
+    path.write_text("time_s,pressure\n0,1013\n")
+    with pytest.raises(InputError, match="no pressure_hpa"):
+        read_sensors(folder)
+    path.write_text("time_s,pressure_hpa\n0,1013\n")
+    assert read_sensors(folder)["barometer"]["pressure_hpa"].tolist() == [1013]
+    path.rename(path.with_suffix(".parquet"))
+    with pytest.raises(InputError, match="a readable table"):
+        read_sensors(folder)
+    with pytest.raises(OutputError, match="other files"):
+        write_log(log, folder)
+
+
+def report(**columns):
+    return pd.DataFrame({"time_s": [0.0], "role": ["neighbour"], "level_dbm": [-90.0], **columns})
+
+
+def test_carriers_and_codes_are_checked_by_technology():
+    lte = make_log(UTM, radio=report(technology="LTE", arfcn=66_486, bsic=503))
+    assert lte.radio["arfcn"].tolist() == [66_486]
+    nr = make_log(UTM, radio=report(technology="NR", arfcn=636_666, bsic=1007, ci=2**36 - 1))
+    assert nr.radio["ci"].tolist() == [2**36 - 1]
+    for technology, column, value, expected in (
+        ("GSM", "arfcn", 1024, "0..1023 in GSM"),
+        ("GSM", "bsic", 64, "0..63 in GSM"),
+        ("UMTS", "bsic", 512, "0..511 in UMTS"),
+        ("LTE", "bsic", 504, "0..503 in LTE"),
+        ("LTE", "timing_advance", 1283, "0..1282 in LTE"),
+    ):
+        with pytest.raises(InputError, match=rf"{column}: expected {expected}, found {value}"):
+            make_log(UTM, radio=report(technology=technology, **{column: value}))
+    make_log(UTM, radio=report(arfcn=66_486, bsic=503))
+
+
+def test_columns_of_identity_are_only_where_they_were_given(tmp_path):
+    assert "technology" not in make_log(UTM, radio=report()).radio
+    log = make_log(UTM, radio=report(technology="LTE", mcc=244, mnc=91, lac=3021, ci=1170250))
+    for form in ("parquet", "csv"):
+        write_log(log, tmp_path / form, form)
+        again = read_log(tmp_path / form)
+        pd.testing.assert_frame_equal(again.radio, log.radio)

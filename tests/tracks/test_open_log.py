@@ -1,0 +1,138 @@
+"""Logs and recordings are opened alike: files, several of them, folders."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_recordings import COUNT, LAT_DEG, LON_DEG, MADE, START_UTC_S
+
+import mapfilter as mf
+from mapfilter.errors import ConfigError, InputError
+from mapfilter.geodesy import project
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.tracks.combine import CombineOptions
+from mapfilter.tracks.open_log import OpenOptions, list_journeys, open_log
+from mapfilter.tracks.sensors import read_sensors
+from mapfilter.tracks.store import read_log, write_log
+
+UTM = "EPSG:32635"
+
+
+@pytest.fixture
+def made(tmp_path):
+    def write(*names):
+        paths = [tmp_path / MADE[name][0] for name in names]
+        for path, name in zip(paths, names, strict=True):
+            path.write_text(MADE[name][1])
+        return paths
+
+    return write
+
+
+def test_a_recording_is_a_log_in_the_crs_asked_for(made):
+    (path,) = made("towercollector")
+    opened = open_log(path, crs="EPSG:3067")
+    assert (opened.name, opened.log.crs) == ("towers", "EPSG:3067")
+    assert len(opened.recordings) == 1
+    east, _ = project("EPSG:3067", LON_DEG, LAT_DEG)
+    assert opened.log.gnss["east_m"].to_numpy() == pytest.approx(east, abs=0.1)
+    assert open_log(str(path)).log.crs == UTM
+
+
+def test_several_recordings_and_their_folder_are_one_journey(made, tmp_path):
+    paths = made("towercollector", "sensorlogger", "gpx")
+    options = OpenOptions(combine=CombineOptions(truth=[paths[2]]))
+    one = open_log(paths, options=options)
+    folder = open_log(tmp_path, options=options)
+    assert len(one.log.truth) == COUNT
+    assert set(one.sensors) == set(folder.sensors) >= {"accelerometer"}
+    for table in ("radio", "gnss", "truth"):
+        assert getattr(one.log, table).equals(getattr(folder.log, table)), table
+    # A truth that is named only there is read, too.
+    apart = open_log(paths[:2], options=options)
+    assert len(apart.log.truth) == COUNT
+
+
+def test_a_track_log_is_opened_as_it_is(made, tmp_path):
+    opened = open_log(made("towercollector", "sensorlogger"))
+    write_log(opened.log, tmp_path / "log", sensors=opened.sensors)
+    again = open_log(tmp_path / "log", crs="EPSG:3067")
+    assert (again.name, again.log.crs, again.recordings) == ("log", UTM, ())
+    assert again.log.radio.equals(read_log(tmp_path / "log").radio)
+    assert again.sensors.keys() == read_sensors(tmp_path / "log").keys()
+    with pytest.raises(InputError, match="name it alone"):
+        open_log([tmp_path / "log", tmp_path / "towers.csv"])
+
+
+def test_a_plan_names_the_cells(made):
+    (path,) = made("towercollector")
+    cells = tuple(
+        Cell(f"C{i}", "S", 385_000.0, 6_672_000.0, 30.0, None, 50.0, 1800.0, "omni")
+        for i in range(2)
+    )
+    log = open_log(path).log
+    ci = sorted(log.radio["ci"].dropna().unique())
+    named = [
+        Cell(**{**{f: getattr(c, f) for f in c.__slots__}, "mcc": 244, "mnc": 91, "ci": int(one)})
+        for c, one in zip(cells, ci, strict=False)
+    ]
+    radio = open_log(path, plan=CellPlan(UTM, tuple(named))).log.radio
+    for cell in named:
+        rows = radio[radio["ci"] == cell.ci]
+        assert len(rows)
+        assert (rows["cell"] == cell.id).all()
+
+
+def test_faults_of_all_files_come_together(made, tmp_path):
+    (path,) = made("towercollector")
+    (tmp_path / "a.bin").write_bytes(b"\0\1\2" * 99)
+    (tmp_path / "b.csv").write_text("x,y\n1,2\n")
+    with pytest.raises(InputError) as caught:
+        open_log([path, tmp_path / "a.bin", tmp_path / "b.csv", tmp_path / "none.csv"])
+    wheres = [fault.where for fault in caught.value.faults]
+    assert [any(name in where for where in wheres) for name in ("a.bin", "b.csv", "none.csv")] == [
+        True
+    ] * 3
+    with pytest.raises(ConfigError, match="Mars"):
+        open_log(path, options=OpenOptions(zone="Mars"))
+
+
+def test_journeys_of_a_path(made, tmp_path):
+    (path,) = made("towercollector")
+    assert list_journeys(path) == [path]
+    assert list_journeys(tmp_path) == [tmp_path]
+    log = open_log(path).log
+    for name in ("b", "a"):
+        write_log(log, tmp_path / "logs" / name)
+    assert list_journeys(tmp_path / "logs") == [tmp_path / "logs" / "a", tmp_path / "logs" / "b"]
+    assert list_journeys(tmp_path / "logs" / "a") == [tmp_path / "logs" / "a"]
+    for wrong in ("none", "logs/a/radio.parquet", "logs/a/log.json"):
+        with pytest.raises(InputError):
+            list_journeys(tmp_path / wrong)
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="a folder without any"):
+        list_journeys(tmp_path / "empty")
+    hand = tmp_path / "hand"
+    hand.mkdir()
+    (hand / "motion.csv").write_text("time_s,step_m\n0,1\n")
+    with pytest.raises(InputError, match=r"without a log\.json"):
+        list_journeys(hand)
+    with pytest.raises(InputError, match=r"log\.json"):
+        open_log(hand)
+    # Outside such a folder a file of that name is a recording.
+    (tmp_path / "truth.csv").write_text("time_s,lat,lon\n0,60.17,24.94\n1,60.171,24.94\n")
+    assert len(open_log(tmp_path / "truth.csv").log.gnss) == 2
+
+
+def test_read_log_of_the_front_door(made, tmp_path):
+    tower, gpx = made("towercollector", "gpx")
+    log = mf.read_log([tower], truth=[gpx])
+    assert log.start_utc_s == START_UTC_S
+    assert len(log.truth) == COUNT
+    mf.write_log(log, tmp_path / "log")
+    assert len(mf.read_log(tmp_path / "log").truth) == COUNT
+    table = pd.DataFrame({"Zeit": np.arange(3.0), "Breite": 60.17, "Laenge": 24.94})
+    table.to_csv(tmp_path / "zeit.csv", index=False)
+    names = {"time": "Zeit", "lat_deg": "Breite", "lon_deg": "Laenge"}
+    assert len(mf.read_log(tmp_path / "zeit.csv", columns=names).gnss) == 3
+    with pytest.raises(InputError, match="known format"):
+        mf.read_log(tmp_path / "zeit.csv")

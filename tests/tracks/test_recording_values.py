@@ -1,0 +1,173 @@
+"""Values of recordings: units, codes, identities, and what programs get wrong."""
+
+import numpy as np
+import pytest
+from made_recordings import COUNT, LEVEL_DBM, MADE, gnettrack
+from made_satellites import nmea, sentence
+
+from mapfilter.tracks.combine import combine
+from mapfilter.tracks.readers.formats import read_recording
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(name, data=None):
+        file, text = MADE[name]
+        path = tmp_path / file
+        content = text if data is None else data
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+        return path
+
+    return write
+
+
+def test_cells_of_lte_keep_their_carriers_codes_and_identities(written):
+    rows = read_recording(written("gnettrack")).tables["radio"]
+    serving, neighbour = (rows[rows["role"] == role] for role in ("serving", "neighbour"))
+    assert serving["cell"].unique().tolist() == ["244-91-2124-102764173"]
+    assert serving["technology"].unique().tolist() == ["LTE"]
+    assert serving["bsic"].unique().tolist() == [435.0]
+    assert serving["level_dbm"].to_numpy() == pytest.approx(LEVEL_DBM)
+    assert neighbour["arfcn"].unique().tolist() == [2850.0]
+    assert neighbour["cell"].isna().all()
+
+
+def test_levels_given_as_asu_become_dbm(written):
+    recording = read_recording(written("opencellid/mls"))
+    assert recording.tables["radio"]["level_dbm"].unique().tolist() == [-83.0]
+    assert any("ASU" in note for note in recording.notes)
+
+
+def test_a_bound_of_a_level_is_censored(written):
+    rows = read_recording(written("antennas")).tables["radio"]
+    assert rows[rows["role"] == "serving"]["censored"].unique().tolist() == [1.0]
+    assert rows[rows["role"] == "neighbour"]["censored"].unique().tolist() == [0.0]
+
+
+def test_pseudoranges_are_light_times(written):
+    rows = read_recording(written("gnsslogger")).tables["satellites"]
+    way_s = rows[rows["satellite"] == "G07"]["pseudorange_m"] / 299_792_458.0
+    assert way_s.to_numpy() == pytest.approx(0.071, abs=1e-12)
+    assert rows["sigma_m"].to_numpy() == pytest.approx(20e-9 * 299_792_458.0)
+
+
+def test_bias_is_taken_off_sensors_that_are_not_calibrated(written):
+    rows = read_recording(written("gnsslogger")).tables["accelerometer"]
+    assert rows[["x_mps2", "y_mps2", "z_mps2"]].iloc[0].tolist() == pytest.approx([0.1, 0.2, 9.8])
+
+
+def test_sensor_logger_axes_are_not_in_the_order_of_the_columns(written):
+    rows = read_recording(written("sensorlogger")).tables["accelerometer"]
+    assert rows[["x_mps2", "y_mps2", "z_mps2"]].iloc[0].tolist() == [0.2, 0.1, 9.7]
+
+
+def test_accuracy_of_nmea_comes_from_gst(written):
+    rows = read_recording(written("nmea")).tables["positions"]
+    assert rows["accuracy_m"].to_numpy() == pytest.approx(1.515 * np.sqrt((9 + 16) / 2))
+    assert rows["speed_mps"].to_numpy() == pytest.approx(2.2, abs=1e-3)
+
+
+def test_nmea_passes_midnight_and_a_leap_second(written):
+    place = "6010.20000,N,02456.40000,E"
+    rows = [
+        f"GPRMC,{clock},A,{place},4.2,30.0,{day},,,A"
+        for clock, day in (
+            ("235958.00", "311216"),
+            ("235959.00", "311216"),
+            ("235960.00", "311216"),
+            ("000000.00", "010117"),
+            ("000001.00", "010117"),
+        )
+    ]
+    rows.insert(2, f"GPGGA,235959.50,{place},1,12,0.8,12.5,M,17.0,M,,")
+    rows.insert(4, f"GPGGA,000000.50,{place},1,12,0.8,12.5,M,17.0,M,,")
+    found = read_recording(written("nmea", "\r\n".join(map(sentence, rows)))).tables["positions"]
+    new_year = 1_483_228_800.0
+    assert (found["time_s"] - new_year).tolist() == [-2.0, -1.0, -0.5, 0.0, 0.5, 1.0]
+
+
+def test_wrong_checksums_are_left_out_unless_all_are(written):
+    lines = nmea().split("\r\n")
+    lines[4] = lines[4][:-2] + "00"
+    recording = read_recording(written("nmea", "\r\n".join(lines)))
+    assert [(u.reason, u.count, u.lines) for u in recording.unusable] == [
+        ("checksum is wrong", 1, (5,))
+    ]
+    every = "\r\n".join(line[:-2] + "00" if "RMC" in line else line for line in lines)
+    recording = read_recording(written("nmea", every))
+    assert len(recording.tables["positions"]) == COUNT
+    assert any("checksums are wrong; taken" in note for note in recording.notes)
+
+
+def test_readings_that_a_program_repeats_are_left_out(written):
+    head, *rows = gnettrack().splitlines()
+    first = rows[0].split("\t")
+    frozen = []
+    for row in rows:
+        fields = row.split("\t")
+        frozen.append("\t".join([*fields[:3], *first[3:]]))
+    recording = read_recording(written("gnettrack", "\n".join([head, *frozen])))
+    assert len(recording.tables["positions"]) == COUNT
+    assert len(recording.tables["radio"]) == 2
+    assert recording.unusable[0].count == COUNT - 1
+    assert "not renewed" in recording.unusable[0].reason
+
+
+def test_ephemerides_of_all_constellations_are_on_one_time(written):
+    rows = read_recording(written("rinex-nav/3")).tables["ephemerides"]
+    assert rows["satellite"].tolist() == ["G07", "E12", "C20"]
+    assert rows["toe_s"].tolist() == [2416 * 604_800 + 468_000.0] * 3
+    assert rows["toc_s"].tolist() == [2416 * 604_800 + 468_000.0] * 3
+    recording = read_recording(written("rinex-nav/3"))
+    assert recording.tables["ionosphere"].iloc[0].tolist()[:2] == [4.657e-9, 1.49e-8]
+    assert recording.notes == ("1 messages of GLONASS, SBAS or NavIC are not used",)
+
+
+def test_what_is_no_whole_number_is_missing(written):
+    text = MADE["opencellid"][1]
+    for i, word in enumerate(("1170250.0", "+1170250", "7.0.0", "1_0", "9" * 25)):
+        lines = text.splitlines()
+        lines[i + 1] = lines[i + 1].replace("1170250", word)
+        text = "\n".join(lines)
+    recording = read_recording(written("opencellid", text))
+    cells = recording.tables["radio"]["ci"].iloc[:6].tolist()
+    assert cells[:2] == [1170250.0, 1170250.0]
+    assert np.isnan(cells[2:5]).all()
+    assert cells[5] == 1170250.0
+    assert any("3 values are no numbers" in note for note in recording.notes)
+
+
+def test_a_damaged_nanosecond_loses_only_its_row(written):
+    lines = MADE["gnsslogger"][1].splitlines()
+    at = next(i for i, line in enumerate(lines) if line.startswith("Raw,"))
+    lines[at] = lines[at].replace(",,,-", ",,,-x")
+    recording = read_recording(written("gnsslogger", "\n".join(lines)))
+    assert len(recording.tables["satellites"]) == 2 * COUNT - 1
+    assert recording.unusable[0].reason == "Raw: a time is missing"
+    assert recording.unusable[0].lines == (at + 1,)
+
+
+def test_bars_are_levels_of_their_technology(tmp_path):
+    path = tmp_path / "bars.csv"
+    path.write_text(
+        "time,ci,technology,bars,rsrp\n"
+        "1777629600,7,LTE,0,\n1777629601,7,LTE,1,\n1777629602,7,LTE,4,\n"
+        "1777629603,7,GSM,2,\n1777629604,7,,3,\n1777629605,7,LTE,3,-91\n1777629606,7,NR,9,\n"
+    )
+    radio = read_recording(path).tables["radio"]
+    assert radio["level_dbm"].tolist()[:6] == [-115, -110, -85, -100, -90, -91]
+    assert np.isnan(radio["level_dbm"].iloc[6])
+    assert radio["level_step_db"].fillna(-1).tolist() == [0, 10, 0, 6, 10, -1, -1]
+    assert radio["censored"].fillna(0).tolist() == [-1, 0, 1, 0, 0, 0, 0]
+
+
+def test_compass_and_turn_degrees(tmp_path):
+    path = tmp_path / "walk.csv"
+    path.write_text(
+        "time,step_m,compass_deg,turn_deg\n1777629600,0.7,90,0\n1777629601,0.7,0,90\n"
+        "1777629602,0.7,400,-180\n"
+    )
+    motion = combine([read_recording(path)]).log.motion
+    assert motion["heading_rad"].tolist()[:2] == pytest.approx([0.0, np.pi / 2])
+    assert np.isnan(motion["heading_rad"].iloc[2])
+    assert motion["turn_rad"].tolist() == pytest.approx([0.0, np.pi / 2, -np.pi])

@@ -1,0 +1,179 @@
+"""Damaged recordings: every reader reads what is whole, or refuses with a message; none crashes."""
+
+import numpy as np
+import pytest
+from fuzz import MUTATIONS, fuzz
+from made_recordings import COUNT, MADE
+
+from mapfilter.errors import InputError, MapfilterError
+from mapfilter.tracks.readers import text as texts
+from mapfilter.tracks.readers.formats import read_recording
+from mapfilter.tracks.readers.recording import Recording
+from mapfilter.tracks.readers.tables import RECORDED
+
+
+def check(recording: Recording) -> None:
+    """Check what every recording promises, whatever it was read from."""
+    assert recording.tables
+    for table, rows in recording.tables.items():
+        assert len(rows), table
+        if "time_s" in rows:
+            time_s = rows["time_s"].to_numpy()
+            assert np.isfinite(time_s).all()
+            assert (np.diff(time_s) >= 0).all()
+        for known in RECORDED[table]:
+            values = rows[known.name]
+            if known.text:
+                assert not known.required or values.notna().all()
+                continue
+            numbers = values.to_numpy(dtype=float)
+            assert not known.required or np.isfinite(numbers).all(), known.name
+            inside = (numbers >= known.low) & (numbers <= known.high)
+            assert (inside | np.isnan(numbers)).all(), (table, known.name)
+    for found in recording.unusable:
+        assert found.count >= len(found.lines) > 0
+        assert found.reason
+
+
+def some(count):
+    """Return a fifth of the usual number of copies, for so many formats, else what is asked for."""
+    return count if count > MUTATIONS else count // 5
+
+
+@pytest.fixture
+def read(tmp_path):
+    def of(name, data):
+        path = tmp_path / MADE[name][0]
+        path.write_bytes(data)
+        recording = read_recording(path)
+        check(recording)
+        return recording
+
+    return of
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_mutations_are_read_or_refused(name, read, mutation_count):
+    sample = MADE[name][1].encode()
+    tally = fuzz(sample, lambda data: read(name, data), some(mutation_count))
+    assert tally.read > 0
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_mutations_are_read_or_refused_as_the_named_format(name, tmp_path, mutation_count):
+    path = tmp_path / MADE[name][0]
+
+    def read_as(data):
+        path.write_bytes(data)
+        check(read_recording(path, name.partition("/")[0]))
+
+    fuzz(MADE[name][1].encode(), read_as, some(mutation_count), seed=1)
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_a_file_cut_off_anywhere_keeps_its_whole_rows(name, read):
+    data = MADE[name][1].encode()
+    whole = sum(len(rows) for rows in read(name, data).tables.values())
+    counts = []
+    for end in range(0, len(data), max(1, len(data) // 97)):
+        try:
+            counts.append(sum(len(rows) for rows in read(name, data[:end]).tables.values()))
+        except InputError:
+            counts.append(0)
+    assert max(counts) <= whole
+    # Half a file keeps about half of its rows; there are two ephemerides only.
+    if not name.startswith("rinex-nav"):
+        assert counts[len(counts) * 3 // 4] >= 0.4 * whole
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_every_format_refuses_every_other_file(name, tmp_path):
+    for other, (file, text) in MADE.items():
+        if other.partition("/")[0] == name.partition("/")[0]:
+            continue
+        path = tmp_path / file
+        path.write_text(text)
+        said = ""
+        try:
+            check(read_recording(path, name.partition("/")[0]))
+        except MapfilterError as error:
+            said = str(error)
+        assert f"use --format {other.partition('/')[0]}" in said or not said or other == "csv"
+
+
+COMMA = ["towercollector", "opencellid", "opencellid/mls", "opencellid-cells", "sensorlogger"]
+
+
+@pytest.mark.parametrize("name", COMMA)
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_other_separators_and_decimal_commas_change_nothing(name, separator, read):
+    text = MADE[name][1]
+    plain = read(name, text.encode())
+    other = text.replace(",", separator)
+    tables = read(name, other.encode()).tables
+    for table, rows in plain.tables.items():
+        assert tables[table].equals(rows), table
+    commas = read(name, other.replace(".", ",").encode()).tables
+    for table in set(plain.tables) & {"positions", "cells"}:
+        assert commas[table]["lat_deg"].equals(plain.tables[table]["lat_deg"])
+
+
+@pytest.mark.parametrize("name", COMMA)
+def test_swapped_columns_change_nothing(name, read):
+    text = MADE[name][1]
+    plain = read(name, text.encode())
+    rows = [line.split(",") for line in text.splitlines()]
+    turned = "\n".join(",".join(reversed(row)) for row in rows)
+    for table, expected in plain.tables.items():
+        assert read(name, turned.encode()).tables[table].equals(expected), table
+
+
+def test_latitude_and_longitude_swapped_in_the_file_are_told(read):
+    text = MADE["opencellid"][1]
+    far = text.replace(",24.94", ",124.94")
+    swapped = "\n".join(
+        ",".join([*row[:4], row[5], row[4], *row[6:]]) if i else ",".join(row)
+        for i, row in enumerate(line.split(",") for line in far.splitlines())
+    )
+    recording = read("opencellid", swapped.encode())
+    assert "positions" not in recording.tables
+    assert "latitude and longitude swapped" in recording.unusable[0].reason
+
+
+def test_a_quote_that_is_never_closed_ends_with_its_line(read):
+    lines = MADE["towercollector"][1].splitlines()
+    lines[5] = lines[5].replace('"P"', '"P')
+    lines[7] = lines[7].replace(",LTE", ',"LTE')
+    recording = read("towercollector", "\n".join(lines).encode())
+    assert len(recording.tables["radio"]) == 2 * COUNT
+
+
+def test_a_long_line_is_refused_alone(read):
+    lines = MADE["opencellid"][1].splitlines()
+    lines[5] += "x" * 100_000
+    recording = read("opencellid", "\n".join(lines).encode())
+    assert len(recording.tables["radio"]) == COUNT - 1
+
+
+def test_a_gpx_with_entities_is_not_expanded(read):
+    bomb = '<!DOCTYPE x [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;&a;">]>'
+    data = MADE["gpx"][1].replace("<gpx ", bomb + "<gpx ").encode()
+    with pytest.raises(InputError):
+        read("gpx", data)
+
+
+BY_PARTS = ["towercollector", "opencellid", "opencellid-cells", "phyphox", "sensorlogger", "csv"]
+
+
+@pytest.mark.parametrize("name", BY_PARTS)
+def test_a_large_file_is_read_part_by_part(name, read, monkeypatch):
+    lines = MADE[name][1].splitlines()
+    lines[20] = "bad"
+    data = "\n".join(["", *lines]).encode()
+    whole = read(name, data)
+    monkeypatch.setattr(texts, "_PART_BYTES", 300)
+    parts = read(name, data)
+    assert parts.unusable == whole.unusable
+    assert parts.rows == whole.rows
+    for table, rows in whole.tables.items():
+        assert parts.tables[table].equals(rows), table

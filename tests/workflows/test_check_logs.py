@@ -1,0 +1,101 @@
+"""``check`` looks at the log or recordings that a configuration names, and at a survey's times."""
+
+import pandas as pd
+import pytest
+from command_line import ONE, change, mapfilter, settings
+from made_recordings import MADE
+
+from mapfilter.geodesy import unproject
+from mapfilter.tracks.store import read_log
+
+
+@pytest.fixture
+def check(world):
+    def found(path, *more):
+        args = (*settings(track__path=f'"{path}"'), *more, "--json")
+        done = mapfilter("check", "-c", world.toml, *args)
+        findings = {f["code"]: f for f in done.json["findings"]}
+        assert done.code == (2 if any(f["severity"] == "error" for f in findings.values()) else 0)
+        return findings
+
+    return found
+
+
+def test_good_logs_have_no_findings(check, world, log):
+    assert check(world.journeys) == {}
+    assert check(log) == {}
+
+
+def test_cells_that_the_plan_lacks(check, log):
+    change(log / "radio.csv", cell=lambda c: c.where(c != "A", "X"))
+    found = check(log)["log-cells-unknown"]
+    assert found["severity"] == "warning"
+    assert "1 serving cells that the plan lacks: X." in found["evidence"]
+    change(log / "radio.csv", cell=lambda c: c.where(c.isna(), "X"))
+    assert check(log)["log-cells-unknown"]["severity"] == "error"
+    change(log / "radio.csv", cell=lambda c: c.where(c.isna()), arfcn=lambda n: n.where(n.isna()))
+    assert "No serving cell is named" in check(log)["log-cells-unknown"]["evidence"]
+
+
+def test_logs_of_another_place_or_system(check, log):
+    change(log / "truth.csv", east_m=lambda e: e + 50_000)
+    assert "All positions (truth) lie 50 km or more outside." in str(check(log))
+    (log / "log.json").write_text('{"crs": "EPSG:32634"}')
+    assert "The log is in EPSG:32634" in check(log)["crs-mixed"]["evidence"]
+
+
+def test_damaged_and_missing_logs(check, log, tmp_path):
+    (log / "motion.csv").write_text("time_s,step_m\n0,a\n")
+    found = check(log)["log-invalid"]
+    assert "motion.csv row 2, step_m" in found["where"]
+    assert "a track log" in check(tmp_path / "none")["log-invalid"]["evidence"]
+
+
+def test_recordings(check, tmp_path, world):
+    log = read_log(world.journeys / ONE)
+    lon, lat = unproject(log.crs, log.truth["east_m"], log.truth["north_m"])
+    rows = pd.DataFrame({"time": 1_777_629_600 + log.truth["time_s"], "lat": lat, "lon": lon})
+    rows.loc[rows.index[: len(rows) // 3], "lat"] = 99.0
+    rows.to_csv(tmp_path / "drive.csv", index=False)
+    found = check(tmp_path / "drive.csv")
+    assert set(found) == {"log-rows-unused", "log-without-motion", "log-cells-unknown"}
+    assert "lat_deg: not degrees in -90..90" in found["log-rows-unused"]["evidence"]
+    rows.assign(time="yesterday").to_csv(tmp_path / "drive.csv", index=False)
+    found = check(tmp_path / "drive.csv")
+    assert set(found) == {"log-invalid"}
+    assert "time" in found["log-invalid"]["evidence"]
+
+
+def test_a_survey_without_times(tmp_path):
+    text = MADE["opencellid"][1]
+    head, *rows = text.splitlines()
+    lines = [",".join([*r.split(",")[:7], "24.09.2014", *r.split(",")[8:]]) for r in rows]
+    (tmp_path / "upload.csv").write_text("\n".join([head, *lines]))
+    config = tmp_path / "survey.toml"
+    config.write_text(
+        '[area]\nmap = "none"\n[prediction]\nmodel = "survey"\n'
+        '[prediction.survey]\nfiles = ["upload.csv"]\n[output]\ndir = "out"\n'
+    )
+    found = {f["code"]: f for f in mapfilter("check", "-c", config, "--json").json["findings"]}
+    evidence = found["measurements-without-times"]["evidence"]
+    assert "No time can be read in 1 of 1 sessions (upload)" in evidence
+    assert "30 times not understood (levels kept), such as '24.09.2014' in line 2" in evidence
+    assert "ISO 8601" in evidence
+
+
+def test_notes_that_many_files_share_are_summed_up(tmp_path):
+    head, *rows = MADE["opencellid"][1].splitlines()
+    (tmp_path / "drives").mkdir()
+    for i in range(5):
+        lines = [",".join([*r.split(",")[:7], "soon", *r.split(",")[8:]]) for r in rows[: 20 + i]]
+        (tmp_path / "drives" / f"d{i}.csv").write_text("\n".join([head, *lines]))
+    config = tmp_path / "survey.toml"
+    config.write_text(
+        '[area]\nmap = "none"\n[prediction]\nmodel = "survey"\n[prediction.survey]\n'
+        'files = ["drives"]\ncross_validate = false\n[output]\ndir = "out"\npictures = "none"\n'
+    )
+    notes = mapfilter("predict", "-c", config, "--json").json["notes"]
+    of_times = [note for note in notes if "times not understood" in note]
+    assert len(of_times) == 1
+    assert of_times[0].startswith("110 times not understood (levels kept) in 5 files (")
+    assert "such as 'soon' in line 2" in of_times[0]

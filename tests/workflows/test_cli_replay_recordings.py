@@ -1,0 +1,147 @@
+"""``replay`` takes recordings of other programs: cells by identity, motion, truth."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from command_line import ONE, assert_done, assert_refused, mapfilter, settings
+from conftest import PLAN, TOML
+
+from mapfilter.geodesy import unproject
+from mapfilter.positioning.estimate_store import read_estimate
+from mapfilter.tracks.store import read_log, write_log
+
+IDENTITIES = {"A": (3021, 117001), "B": (3021, 117002), "C": (3022, 117003)}
+START_UTC_S = 1_777_629_600
+
+
+@pytest.fixture(scope="module")
+def database(tmp_path_factory):
+    """The small world's database, of a plan with identities."""
+    folder = tmp_path_factory.mktemp("identified")
+    head, *rows = PLAN.splitlines()
+    lines = [f"{head},technology,mcc,mnc,lac,ci"]
+    lines += [f"{row},LTE,244,91,{','.join(map(str, IDENTITIES[row[0]]))}" for row in rows]
+    (folder / "cells.csv").write_text("\n".join(lines) + "\n")
+    (folder / "world.toml").write_text(TOML)
+    for command in ("predict", "build"):
+        assert_done(mapfilter(command, "-c", folder / "world.toml"))
+    return folder / "out" / "database"
+
+
+@pytest.fixture
+def recordings(world, tmp_path):
+    """A journey of the small world as two recordings and a truth, in UTC and WGS 84."""
+    log = read_log(world.journeys / ONE)
+    folder = tmp_path / "drive"
+    folder.mkdir()
+    radio = log.radio[log.radio["role"] == "serving"]
+    lac, ci = zip(*(IDENTITIES[cell] for cell in radio["cell"]), strict=True)
+    cells = pd.DataFrame({"time": START_UTC_S + radio["time_s"], "technology": "LTE"})
+    cells = cells.assign(mcc=244, mnc=91, lac=lac, ci=ci, rsrp=radio["level_dbm"])
+    cells.to_csv(folder / "cells.csv", index=False)
+    motion = log.motion[["time_s", "step_m", "heading_rad"]]
+    motion = motion.assign(time=START_UTC_S + motion.pop("time_s"))
+    motion.to_csv(folder / "steps.csv", index=False)
+    lon, lat = unproject(log.crs, log.truth["east_m"], log.truth["north_m"])
+    truth = pd.DataFrame({"time": START_UTC_S + log.truth["time_s"], "lat": lat, "lon": lon})
+    truth.to_csv(tmp_path / "truth.csv", index=False)
+    return folder
+
+
+def replayed(database, out, *args):
+    given = settings(output__pictures="none", filter__margin_db=0.0, filter__update_length_m=10.0)
+    given += ["--filter", "candidate"]
+    return mapfilter("replay", "--db", database, "--out", out, *given, *args, "--json")
+
+
+def test_recordings_of_a_journey_are_located(database, recordings, tmp_path, world):
+    truth = ("--truth", tmp_path / "truth.csv")
+    files = ("--log", recordings / "steps.csv", "--log", recordings / "cells.csv")
+    done = replayed(database, tmp_path / "out", *files, *truth)
+    assert done.code == 0, done.err
+    found = done.json
+    assert found["unknown_cells"] == {}
+    assert any("named by the plan's identities" in note for note in found["notes"])
+    original = read_log(world.journeys / ONE)
+    serving = original.radio[original.radio["role"] == "serving"]
+    write_log(replace(original, radio=serving), tmp_path / "plain")
+    plain = replayed(database, tmp_path / "of", "--log", tmp_path / "plain").json
+    assert found["switched"]
+    assert found["error_mean_m"] == pytest.approx(plain["error_mean_m"], abs=1)
+    # A folder is the same journey, and so is the log that convert makes of it.
+    folder = replayed(database, tmp_path / "folder", "--log", recordings, *truth).json
+    log = tmp_path / "log"
+    assert_done(mapfilter("convert", recordings, *truth, "--out", log, "--crs", "EPSG:32635"))
+    written = replayed(database, tmp_path / "again", "--log", log).json
+    for other in (folder, written):
+        assert other["epochs"] == found["epochs"]
+        assert other["error_mean_m"] == pytest.approx(found["error_mean_m"], abs=1)
+    estimate = read_estimate(tmp_path / "out" / "estimate.parquet")
+    motion_s = original.motion["time_s"].to_numpy()
+    assert np.isin(np.round(motion_s, 3), np.round(estimate.time_s, 3)).mean() > 0.95
+
+
+def test_the_section_names_recordings(database, recordings, tmp_path):
+    table = pd.read_csv(recordings / "steps.csv").rename(columns={"time": "Zeit"})
+    table.to_csv(recordings / "steps.csv", index=False)
+    config = tmp_path / "drive.toml"
+    config.write_text(
+        '[track]\npath = "drive/steps.csv"\nrecordings = ["drive/cells.csv"]\n'
+        'truth = "truth.csv"\nformat = "csv"\n[track.columns]\ntime = "Zeit"\n'
+    )
+    done = replayed(database, tmp_path / "out", "-c", config)
+    assert_refused(
+        mapfilter("replay", "--db", database, "--out", tmp_path / "out", "-c", config),
+        "cells.csv",
+        "a column Zeit for time",
+    )
+    assert done.code == 2
+    for path in (recordings / "cells.csv", tmp_path / "truth.csv"):
+        path.write_text(path.read_text().replace("time,", "Zeit,", 1))
+    done = replayed(database, tmp_path / "out", "-c", config)
+    assert done.code == 0, done.err
+    assert done.json["error_mean_m"] is not None
+
+
+def test_a_drive_test_alone_says_what_it_lacks(database, recordings, tmp_path):
+    cells = recordings / "cells.csv"
+    done = replayed(database, tmp_path / "out", "--log", cells)
+    assert done.code == 3
+    assert "nothing is located in cells: no motion" in done.err
+
+
+def test_speed_and_course_become_motion_on_request(database, recordings, tmp_path):
+    truth = pd.read_csv(tmp_path / "truth.csv")
+    cells = pd.read_csv(recordings / "cells.csv")
+    places = {name: np.interp(cells["time"], truth["time"], truth[name]) for name in ("lat", "lon")}
+    drive = cells.assign(**places, speed_mps=1.4, bearing=90.0)
+    drive.to_csv(tmp_path / "drive.csv", index=False)
+    path = tmp_path / "drive.csv"
+    done = replayed(database, tmp_path / "out", "--log", path, "--without", "gnss")
+    assert done.code == 3
+    assert "no motion (track.course_motion makes it from speed and course)" in done.err
+    given = ("--log", path, "--course-motion", "--without", "gnss")
+    done = replayed(database, tmp_path / "out", *given)
+    assert done.code == 0, done.err
+
+
+def test_refusals(database, recordings, tmp_path):
+    (tmp_path / "far.csv").write_text("time,lat,lon\n1777629600,48.1,11.5\n1777629601,48.1,11.6\n")
+    out = tmp_path / "out"
+    assert_refused(
+        mapfilter("replay", "--db", database, "--out", out, "--log", tmp_path / "far.csv"),
+        "far.csv, gnss: expected positions near the database's",
+    )
+    for more, told in (
+        (["--log", tmp_path / "none.csv"], "none.csv: expected a track log"),
+        (["--log", recordings, "--zone", "Mars"], "Europe/Brussels"),
+        (["--log", recordings, "--set", 'track.format="kml"'], "one of gnettrack"),
+        (["--log", recordings, "--truth", tmp_path / "none.gpx"], "none.gpx"),
+        (["--log", recordings / "cells.csv", "--log", database], "database: expected"),
+    ):
+        assert_refused(mapfilter("replay", "--db", database, "--out", out, *more), told)
+        assert not out.exists()
+    assert json.loads((database / "manifest.json").read_text())

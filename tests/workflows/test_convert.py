@@ -1,0 +1,267 @@
+"""Recordings become one log: clocks, frames, motion, sensors, and the command."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_recordings import COUNT, LAT_DEG, LON_DEG, MADE, START_UTC_S, STEP_S, TIMES_S
+
+from mapfilter.errors import ConfigError, InputError, OutputError
+from mapfilter.geodesy import project
+from mapfilter.tracks.combine import CombineOptions
+from mapfilter.tracks.open_log import OpenOptions
+from mapfilter.tracks.sensors import read_sensors
+from mapfilter.tracks.store import read_log
+from mapfilter.workflows.convert import report_lines, run_convert
+
+UTM = "EPSG:32635"
+
+
+@pytest.fixture
+def made(tmp_path):
+    """Write made recordings, by format, and return their paths."""
+
+    def write(*names, **changed):
+        paths = []
+        for name in names:
+            file, text = MADE[name]
+            path = tmp_path / file
+            path.write_text(changed.get(name, text))
+            paths.append(path)
+        return paths
+
+    return write
+
+
+def converted(paths, out, **combine):
+    options = OpenOptions(combine=CombineOptions(**combine))
+    return run_convert(paths, out, options)
+
+
+LISTS = ("opencellid-cells", "rinex-nav", "rinex-nav/3")
+
+
+@pytest.mark.parametrize("name", [name for name in MADE if name not in (*LISTS, "smartloc")])
+def test_every_recording_makes_a_log_that_is_read_back(name, made, tmp_path):
+    result = converted(made(name), tmp_path / "log")
+    log, sensors = read_log(tmp_path / "log"), read_sensors(tmp_path / "log")
+    tables = ("motion", "radio", "gnss", "pseudoranges", "tdoa", "truth")
+    rows = {table: len(getattr(log, table)) for table in tables}
+    rows |= {f"sensors/{sensor}": len(table) for sensor, table in sensors.items()}
+    assert {k: v for k, v in rows.items() if v} == {k: v for k, v in result.rows.items() if v}
+    assert not set(log.notes) - set(result.notes) - {n for n in log.notes if "no use" in n}
+    again = converted(made(name), tmp_path / "again")
+    assert again.rows == result.rows
+    for one in sorted((tmp_path / "log").rglob("*.parquet")):
+        other = tmp_path / "again" / one.relative_to(tmp_path / "log")
+        assert one.read_bytes() == other.read_bytes()
+
+
+def test_cells_from_one_sensors_from_another_truth_from_a_third(made, tmp_path):
+    paths = made("towercollector", "sensorlogger", "gpx")
+    result = converted(paths, tmp_path / "log", truth=[paths[2]])
+    log = read_log(tmp_path / "log")
+    assert log.crs == UTM
+    assert log.start_utc_s == START_UTC_S
+    assert len(log.radio) == 2 * COUNT
+    assert len(log.truth) == len(log.gnss) == COUNT
+    east, north = project(UTM, LON_DEG, LAT_DEG)
+    assert log.truth["east_m"].to_numpy() == pytest.approx(east, abs=0.1)
+    assert log.truth["north_m"].to_numpy() == pytest.approx(north, abs=0.1)
+    assert log.gnss["var_east_m2"].to_numpy() == pytest.approx((6.4 / 1.515) ** 2)
+    acceleration = read_sensors(tmp_path / "log")["accelerometer"]
+    assert acceleration["time_s"].tolist() == (TIMES_S - START_UTC_S).tolist()
+    assert result.unused == {}
+    text = "\n".join(report_lines(result))
+    assert "TotalAcceleration.csv: Sensor Logger, UTC" in text
+    assert "accelerometer: 30 rows, every 2 s" in text
+
+
+def test_radio_keeps_identities_by_technology(made, tmp_path):
+    converted(made("gnettrack"), tmp_path / "log")
+    radio = read_log(tmp_path / "log").radio
+    serving = radio[radio["role"] == "serving"]
+    assert serving["ci"].unique().tolist() == [102764173]
+    assert serving["technology"].unique().tolist() == ["LTE"]
+    assert radio[radio["role"] == "neighbour"]["arfcn"].unique().tolist() == [2850]
+
+
+def test_a_local_clock_is_aligned_by_positions(made, tmp_path):
+    paths = made("gnettrack", "gpx")
+    result = converted(paths, tmp_path / "log", truth=[paths[1]])
+    log = read_log(tmp_path / "log")
+    assert any("UTC+03:00 (by positions" in note for note in result.notes)
+    assert log.gnss["time_s"].tolist() == log.truth["time_s"].tolist()
+
+
+def test_a_clock_without_a_start_is_aligned_by_positions(made, tmp_path):
+    east = "\n".join(f"{STEP_S * i},{LAT_DEG[i]},{LON_DEG[i]},1013" for i in range(5, COUNT))
+    (own,) = made("csv", csv="time,lat,lon,pressure\n" + east)
+    (truth,) = made("gpx")
+    result = converted([own], tmp_path / "log", truth=[truth])
+    assert any("by positions" in note for note in result.notes)
+    log = read_log(tmp_path / "log")
+    assert log.gnss["time_s"].to_numpy() == pytest.approx(STEP_S * np.arange(5, COUNT), abs=0.11)
+
+
+def test_a_clock_without_a_start_is_aligned_by_speeds(tmp_path):
+    time_s = np.arange(0.0, 300.0, 0.5)
+    speed = 8 + 5 * np.sin(time_s / 17) + 3 * np.sin(time_s / 5.3)
+    moved = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) / 2)])
+    lat = 60.17 + moved / 111_195
+    truth = pd.DataFrame({"time": START_UTC_S + time_s, "lat": lat, "lon": 24.94})
+    wheels = pd.DataFrame({"time": time_s[:400] + 7.0, "wheel_speed": speed[100:500]})
+    truth.to_csv(tmp_path / "truth.csv", index=False)
+    wheels.assign(yaw_rate=0.0).to_csv(tmp_path / "wheels.csv", index=False)
+    paths = [tmp_path / "wheels.csv", tmp_path / "truth.csv"]
+    result = converted(paths, tmp_path / "log", truth=[paths[1]])
+    log = read_log(tmp_path / "log")
+    assert any("by speeds" in note for note in result.notes)
+    assert log.motion["time_s"].iloc[0] == pytest.approx(50.0, abs=0.3)
+    assert log.motion["step_m"].sum() == pytest.approx(moved[499] - moved[100], rel=1e-3)
+
+
+def test_a_clock_that_cannot_be_aligned_needs_an_offset(made, tmp_path):
+    paths = made("phyphox", "gpx")
+    with pytest.raises(InputError, match=r"--offset Accelerometer\.csv=SECONDS"):
+        converted(paths, tmp_path / "log")
+    assert not (tmp_path / "log").exists()
+    converted(paths, tmp_path / "log", offsets_s={paths[0]: START_UTC_S + 1.0})
+    assert read_sensors(tmp_path / "log")["accelerometer"]["time_s"].iloc[0] == 1.0
+
+
+def test_clocks_that_disagree_are_told(made, tmp_path):
+    late = MADE["gpx"][1].replace("T10:00", "T10:01").replace("T10:00", "T10:01")
+    late = MADE["gpx"][1]
+    for second in range(0, 60, 2):
+        late = late.replace(f"T10:00:{second:02d}Z", f"T1x:00:{second:02d}Z")
+    for second in range(0, 60, 2):
+        at = second + 8
+        late = late.replace(f"T1x:00:{second:02d}Z", f"T10:{at // 60:02d}:{at % 60:02d}Z")
+    paths = made("opencellid", "gpx", gpx=late)
+    result = converted(paths, tmp_path / "log", truth=[paths[1]])
+    assert any("agree best -8.0 s shifted" in note for note in result.notes)
+
+
+def test_metres_of_a_frame_of_their_own(made, tmp_path):
+    result = converted(made("indoor"), tmp_path / "log")
+    assert any("frame of its own" in note for note in result.notes)
+    result = converted(made("indoor"), tmp_path / "log", origin_deg=(30.29, 120.07))
+    log = read_log(tmp_path / "log")
+    assert not any("frame of its own" in note for note in result.notes)
+    assert log.truth["east_m"].iloc[0] == pytest.approx(100.0)
+    with pytest.raises(InputError, match="--origin LAT,LON"):
+        converted(made("indoor", "gpx"), tmp_path / "other")
+
+
+def test_satellites_are_placed_by_ephemerides(made, tmp_path):
+    result = converted(made("rinex-obs/2", "rinex-nav"), tmp_path / "log")
+    rows = read_log(tmp_path / "log").pseudoranges
+    assert any("60 placed by broadcast ephemerides" in note for note in result.notes)
+    away_m = np.sqrt((rows[["x_m", "y_m", "z_m"]] ** 2).sum(axis=1))
+    assert away_m.between(2.63e7, 2.69e7).all()
+    # The satellite's clock is 10 µs ahead, and some relativity.
+    first = rows[rows["satellite"] == "G07"]["pseudorange_m"].iloc[0]
+    assert first == pytest.approx(21_300_000.5 + 299_792_458.0 * 1e-5, abs=8.0)
+
+
+def test_course_and_speed_make_motion_on_request(made, tmp_path):
+    assert converted(made("nmea"), tmp_path / "log").rows["motion"] == 0
+    result = converted(made("nmea"), tmp_path / "moved", course_motion=True)
+    log = read_log(tmp_path / "moved")
+    assert result.rows["motion"] == COUNT
+    assert log.motion["step_m"].iloc[1:].to_numpy() == pytest.approx(4.4, abs=0.01)
+    # 30.1 degrees clockwise from north, and the convergence of the grid.
+    assert np.degrees(log.motion["heading_rad"]).to_numpy() == pytest.approx(59.9 - 1.78, abs=0.2)
+    with pytest.raises(InputError, match="speed and course"):
+        converted(made("gpx"), tmp_path / "none", course_motion=True)
+
+
+@pytest.mark.parametrize("name", ["kitti", "tum"])
+def test_poses_make_steps_and_turns(name, made, tmp_path):
+    converted(made(name), tmp_path / "log")
+    motion = read_log(tmp_path / "log").motion
+    assert motion["step_m"].iloc[1:].to_numpy() == pytest.approx(2.202, abs=0.05)
+    expected = -0.02 if name == "kitti" else 0.02
+    assert motion["turn_rad"].iloc[1:].to_numpy() == pytest.approx(expected, abs=1e-5)
+
+
+def test_odometry_makes_steps_and_turns(made, tmp_path):
+    text = MADE["smartloc"][1]
+    text = "\n".join(line for line in text.splitlines() if not line.startswith("point3"))
+    converted(made("smartloc", smartloc=text), tmp_path / "log")
+    motion = read_log(tmp_path / "log").motion
+    assert motion["step_m"].iloc[1:].to_numpy() == pytest.approx(4.4)
+    assert motion["turn_rad"].iloc[1:].to_numpy() == pytest.approx(0.02)
+
+
+def test_lists_alone_are_no_journey(made, tmp_path):
+    with pytest.raises(InputError, match="give a list as"):
+        converted(made("opencellid-cells"), tmp_path / "log")
+    result = converted(made("opencellid-cells", "opencellid"), tmp_path / "log")
+    assert any("a list of 30 cells" in note for note in result.notes)
+
+
+def test_every_file_that_cannot_be_read_is_told_at_once(made, tmp_path):
+    paths = made("gpx", "nmea", gpx="hello\nworld", nmea="")
+    with pytest.raises(InputError) as caught:
+        converted(paths, tmp_path / "log")
+    assert len(caught.value.faults) == 2
+    assert not (tmp_path / "log").exists()
+
+
+def test_inputs_are_never_written_to(made, tmp_path):
+    (path,) = made("gpx")
+    before = path.read_bytes()
+    with pytest.raises(OutputError):
+        converted([path], path)
+    with pytest.raises(OutputError, match=r"other files \(watch.gpx\)"):
+        converted([path], tmp_path)
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
+def test_truth_must_have_positions(made, tmp_path):
+    paths = made("gpx", "phyphox")
+    with pytest.raises(InputError, match="positions, as the truth"):
+        converted(paths, tmp_path / "log", truth=[paths[1]], offsets_s={paths[1]: START_UTC_S})
+
+
+def test_a_format_that_does_not_exist_is_refused(made, tmp_path):
+    with pytest.raises(ConfigError, match="--format"):
+        run_convert(made("gpx"), tmp_path / "log", OpenOptions(format="kml"))
+
+
+def test_a_folder_is_all_recordings_in_it(made, tmp_path):
+    (tmp_path / "export").mkdir()
+    (path,) = made("sensorlogger")
+    text = path.read_text()
+    for name in ("TotalAcceleration", "AccelerometerUncalibrated", "Gyroscope", "Gravity"):
+        (tmp_path / "export" / f"{name}.csv").write_text(text)
+    (tmp_path / "export" / "Metadata.csv").write_text("version,device name\n3,phone\n")
+    (tmp_path / "export" / "Annotation.csv").write_text("time,seconds_elapsed,text\n1,2,a\n")
+    result = converted([tmp_path / "export"], tmp_path / "log")
+    assert set(read_sensors(tmp_path / "log")) == {"accelerometer", "gyroscope", "gravity"}
+    assert any("Annotation.csv, Metadata.csv left out" in note for note in result.notes)
+    assert any("AccelerometerUncalibrated.csv: accelerometer not used" in n for n in result.notes)
+    (tmp_path / "none").mkdir()
+    with pytest.raises(InputError, match="none in a known format"):
+        converted([tmp_path / "none"], tmp_path / "other")
+
+
+def test_parts_of_one_sensor_are_joined(made, tmp_path):
+    (path,) = made("sensorlogger")
+    head, *rows = path.read_text().splitlines()
+    for i, some in enumerate((rows[:10], rows[10:])):
+        (tmp_path / f"TotalAcceleration{i}.csv").write_text("\n".join([head, *some]))
+    paths = [tmp_path / f"TotalAcceleration{i}.csv" for i in (1, 0)]
+    converted(paths, tmp_path / "log")
+    assert len(read_sensors(tmp_path / "log")["accelerometer"]) == COUNT
+
+
+def test_places_where_no_satellite_can_be_are_left_out(made, tmp_path):
+    text = MADE["smartloc"][1].replace("14056711.07", "14056.71", 2)
+    text = "\n".join(line for line in text.splitlines() if not line.startswith("point3"))
+    (path,) = made("smartloc", smartloc=text.replace("4819715.57", "x", 1))
+    result = converted([path], tmp_path / "log")
+    assert "pseudoranges: 1 places of satellites are none, left out" in result.notes
+    assert read_log(tmp_path / "log").pseudoranges["x_m"].isna().sum() == 1
