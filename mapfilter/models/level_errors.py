@@ -85,7 +85,7 @@ class LevelErrors(Options):
     site_share: Share = 0.6
     common_share: Share = 0.2
     roughness: NotNegative = 1.0
-    fault_probability: Probability = 0.1
+    fault_probability: Probability = 0.06
     fault_m: Positive = 300.0
     absent_db: NotNegative = 3.0
     weight: Share = 0.35

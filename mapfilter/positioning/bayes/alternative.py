@@ -31,7 +31,7 @@ Then, by the status reported before: ``LOST`` stays while the belief searches an
 ``TRACKING`` when it converges; ``CONVERGED`` lasts for one epoch. A belief that had converged and
 splits is ``LOST``. While the null hypothesis is more probable than the belief, one that had
 converged is ``LOST``, too, and ``OUTSIDE`` where it lies at the edge of the area; one that searches
-is ``OUTSIDE``. A belief does not converge while the null
+is ``OUTSIDE``, and so is one that has left the area. A belief does not converge while the null
 hypothesis is not improbable or the alternative close behind, as the true position may have died out
 of it.
 """
@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 MapBelief = ParticleBelief | GridBelief
 
 _LEAST_LOG_ODDS, _MOST_LOG_ODDS = -12.0, 12.0
-_PRIOR_LOG_ODDS = log(0.01 / 0.99)
+_PRIOR_LOG_ODDS = log(0.05 / 0.95)
 _SERVING_NATS = 0.7
 _MAP_NATS_PER_M = 0.03
 _TERMS_FACTOR = 1.5
@@ -255,11 +255,12 @@ def resolve_alternative(
     travelled_m: float,
     *,
     at_edge: bool,
+    gone: bool = False,
 ) -> Resolution:
     """Apply the table after a belief and its alternative were weighed by the same reading.
 
     ``before`` is the status reported at the last epoch; ``at_edge`` whether the belief lies at the
-    edge of the area.
+    edge of the area, ``gone`` whether most of it lies beyond.
     """
     if main.status is _CONVERGED and doubted(rules, main, null, alternative):
         main = replace(main, status=_SEARCHING)
@@ -278,7 +279,7 @@ def resolve_alternative(
             null = alternative.null
     found = row.reported or belief.status
     belief, status = report(before, belief, found)
-    status = under_null(rules, before, status, null, at_edge=at_edge)
+    status = _OUTSIDE if gone else under_null(rules, before, status, null, at_edge=at_edge)
     return Resolution(belief, status, null, alternative if row.keeps else None, taken_over)
 
 

@@ -291,8 +291,16 @@ class BayesPositioner(Filter[BayesState]):
             alternative = replace(alternative, belief=other, null=own)
         travelled_m = state.reckoning.travelled_m
         at_edge = self.area.at_edge(belief.summary.mean)
+        gone = not self.area.holds(belief.state[0], belief.state[1], belief.weight)
         now = resolve_alternative(
-            rules, state.status, belief, null, alternative, travelled_m, at_edge=at_edge
+            rules,
+            state.status,
+            belief,
+            null,
+            alternative,
+            travelled_m,
+            at_edge=at_edge,
+            gone=gone,
         )
         if now.taken_over and alternative is not None:
             sources = {**sources, **alternative.sources}

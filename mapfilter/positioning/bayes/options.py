@@ -109,7 +109,7 @@ class BayesFilter(Options):
     level_error_db: Positive = 8.7
     level_correlation_m: Positive = 200.0
     device_error_db: NotNegative = 5.0
-    fault_probability: Probability = 0.1
+    fault_probability: Probability = 0.06
     level_weight: Annotated[float, Gt(0), Le(1)] = 0.35
     report_spacing_m: NotNegative = 5.0
     max_particles: Annotated[int, Ge(100), Le(10_000_000)] = 20_000

@@ -126,4 +126,4 @@ def step_output(
     if belief is None or not count:
         return output
     places = belief.state[0], belief.state[1], belief.weight
-    return output.protected(sample_tail(*places, summary.mean, p_none=0.0))
+    return output.protected(sample_tail(*places, summary.mean, p_none=state.null.probability))
