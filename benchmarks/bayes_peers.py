@@ -31,6 +31,7 @@ from mapfilter.models.street_motion import (
     LOG_SCALE,
     NORTH,
     OFF,
+    RATE,
     STATES,
     STRETCH,
     TURN,
@@ -40,14 +41,14 @@ from mapfilter.tracks.store import read_log
 from mapfilter.workflows.bench_filter import StepInputs, make_world, step_inputs, whole_step
 
 Step = Callable[[Floats], Floats]
-"""From equally weighted particles, shape (8, N), to those after a whole step."""
+"""From equally weighted particles, shape (9, N), to those after a whole step."""
 
 MAP = STATES
 """Row of a step's log-likelihood of the map, after the rows of the model's own state."""
 
 _MOST_ODDS, _KEPT_ODDS = 20.0, 8.0
 _RUNS, _PACKAGE_STEPS = 5, 10
-_JITTER = (0.5, 0.5, 0.005, 0.003, 0.0, 0.004, 0.004)
+_JITTER = (0.5, 0.5, 0.005, 0.003, 0.0, 0.004, 0.004, 1e-4)
 _TABLE_DB, _PER_DB = 64, 4
 _TABLE_SD, _PER_SD = 8, 32
 
@@ -79,7 +80,9 @@ class NumpyModel:
         length_m = abs(self.motion.step_m)
         a, b, c, d, e, f = rng.standard_normal((6, count))
         moved = np.empty_like(state)
-        bias = state[BIAS] + errors.bias_drift_rad_per_sqrt_m * length_m**0.5 * c
+        moved[RATE] = state[RATE]
+        bias = state[BIAS] + length_m * state[RATE]
+        bias += errors.bias_drift_rad_per_sqrt_m * length_m**0.5 * c
         moved[BIAS] = (bias + np.pi) % (2 * np.pi) - np.pi
         moved[LOG_SCALE] = state[LOG_SCALE] + errors.scale_drift_per_sqrt_m * length_m**0.5 * d
         turned, stretched = (exp(-length_m / x) for x in (errors.heading_m, errors.stretch_m))

@@ -22,6 +22,7 @@ from mapfilter.models.street_motion import (
     LOG_SCALE,
     NORTH,
     OFF,
+    RATE,
     STATES,
     STRETCH,
     TURN,
@@ -54,7 +55,7 @@ def test_the_usual_options():
         "site_share": 0.6,
         "common_share": 0.2,
         "roughness": 1.0,
-        "fault_probability": 0.03,
+        "fault_probability": 0.1,
         "fault_m": 300.0,
         "absent_db": 3.0,
         "weight": 0.35,
@@ -69,6 +70,8 @@ def test_the_usual_options():
         "disturbed_rad": radians(40),
         "bias_sd_rad": radians(10),
         "bias_drift_rad_per_sqrt_m": radians(0.3),
+        "rate_rad_per_m": radians(0.15),
+        "rate_share": 0.5,
         "scale_sd": 0.03,
         "scale_drift_per_sqrt_m": 0.0,
         "stretch_sd": 0.08,
@@ -81,8 +84,8 @@ def test_the_usual_options():
         "leave_per_m": 0.001,
         "return_per_m": 0.01,
     }
-    rows = EAST, NORTH, BIAS, LOG_SCALE, OFF, TURN, STRETCH, STATES
-    assert rows == tuple(range(8))
+    rows = EAST, NORTH, BIAS, LOG_SCALE, OFF, TURN, STRETCH, RATE, STATES
+    assert rows == tuple(range(9))
 
 
 def test_the_table_of_margins_goes_from_minus_64_to_64_db_in_quarters():
@@ -206,7 +209,7 @@ def test_no_two_numbers_of_a_step_are_drawn_alike():
 
 
 def test_a_step_of_nothing_changes_nothing():
-    state = np.array([[1.0], [2.0], [0.3], [0.1], [0.4], [-0.2], [0.05], [9.0]], dtype=np.float32)
+    state = np.array([[1.0, 2.0, 0.3, 0.1, 0.4, -0.2, 0.05, 0.01, 9.0]], dtype=np.float32).T
     np.testing.assert_array_equal(move(state, 0.0, 1.0, MotionErrors(), np.uint64(1)), state)
 
 

@@ -285,17 +285,6 @@ def test_the_covariance_forgets_by_the_metre_and_stays_one(ways, one_m, more_m):
 # Faults
 
 FAULTY = replace(SOUND, fault_probability=0.1, fault_m=300.0)
-OTHER_DBM, OTHER_DB2, OTHER_M, OTHER_WHITE_DB2 = -90.0, 15.0**2, 100.0, 4.5**2
-"""The levels of a cell that the prediction is wrong about: a Gauss-Markov process, white noise."""
-
-
-def other_log_density(levels):
-    """Log density of levels (metres, dBm) of such a cell, but for ½ log 2π each."""
-    at_m, level = np.array(levels).T
-    covariance = OTHER_DB2 * np.exp(-np.abs(at_m[:, None] - at_m) / OTHER_M)
-    covariance += OTHER_WHITE_DB2 * np.eye(at_m.size)
-    off = level - OTHER_DBM
-    return -0.5 * (off @ np.linalg.solve(covariance, off) + np.linalg.slogdet(covariance)[1])
 
 
 def test_levels_of_a_faulty_cell_are_a_process_of_their_own():
@@ -308,7 +297,7 @@ def test_levels_of_a_faulty_cell_are_a_process_of_their_own():
         at_m += length_m
         levels.append((at_m, level))
         total += float(terms.other[1])
-        assert total == pytest.approx(other_log_density(levels), rel=1e-6)
+        assert total == pytest.approx(oracle.other_log_density(levels), rel=1e-6)
 
 
 @pytest.mark.parametrize("probability", [0.01, 0.1, 0.6])
@@ -322,7 +311,7 @@ def test_one_level_is_the_mixture_over_a_fault(probability):
     for i in range(PIXELS):
         off = level - float(table[i, 3])
         right = (1 - probability) * norm.pdf(off, 0, sqrt(total_db2))
-        wrong = probability * norm.pdf(level, OTHER_DBM, sqrt(OTHER_DB2 + OTHER_WHITE_DB2))
+        wrong = probability * exp(oracle.other_log_density([(0.0, level)])) / sqrt(2 * np.pi)
         assert found[i] == pytest.approx(log(right + wrong) + 0.5 * log(2 * np.pi), abs=2e-4)
         odds = float(np.clip(log(wrong / right), -8, 8))
         assert kept[i, 13 + slot] == pytest.approx(odds, abs=2e-3)
@@ -384,8 +373,9 @@ def test_however_far_a_level_is_off_it_costs_no_more_than_that_of_a_faulty_cell(
     found = weighed(memory, memory.start(1), np.zeros(1, int), table, report({2: -90.0}))[2]
     lasting = FAULTY.slow_db**2 + FAULTY.fast_db**2 + FAULTY.device_db**2
     right = norm.logpdf(off_db, 0, sqrt(lasting + FAULTY.white_db**2))
-    wrong = norm.logpdf(0, 0, sqrt(OTHER_DB2 + OTHER_WHITE_DB2))
-    expected = np.logaddexp(log(0.9) + right, log(0.1) + wrong) + 0.5 * log(2 * np.pi)
+    right += 0.5 * log(2 * np.pi)
+    wrong = oracle.other_log_density([(0.0, -90.0)])
+    expected = np.logaddexp(log(0.9) + right, log(0.1) + wrong)
     assert found[0] == pytest.approx(expected, abs=2e-4)
 
 

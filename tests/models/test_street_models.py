@@ -13,6 +13,7 @@ from mapfilter.models.street_motion import (
     LOG_SCALE,
     NORTH,
     OFF,
+    RATE,
     STATES,
     STRETCH,
     TURN,
@@ -194,6 +195,13 @@ def test_deviations_jump_now_and_then_to_any_value_within_tens_of_degrees():
     assert (np.abs(parts[TURN]) > 0.01).mean() == pytest.approx(expected, abs=1.5 * spread)
     calm = move(still, 5.0, 0.0, replace(errors, disturbances_per_m=0.0), KEY)
     assert np.abs(calm[TURN]).max() < 0.01
+    # Where to is drawn for itself.
+    always = replace(errors, disturbances_per_m=1e9, step_sd_m=1.0, bias_drift_rad_per_sqrt_m=0.1)
+    drawn = move(still, 5.0, 0.0, always, KEY)
+    new = drawn[STRETCH] - exp(-5.0 / 35.0) * still[STRETCH]
+    both = np.array([drawn[TURN], new, drawn[BIAS]], dtype=float)
+    assert drawn[TURN].std(dtype=float) == pytest.approx(0.9, rel=SPREAD)
+    assert np.abs(np.corrcoef(both) - np.eye(3)).max() < SPREAD
     # The rest of the state is the same with and without jumps.
     np.testing.assert_array_equal(calm[[BIAS, LOG_SCALE, STRETCH]],
                                   after[[BIAS, LOG_SCALE, STRETCH]])  # fmt: skip
@@ -219,9 +227,33 @@ def test_the_variance_of_a_heading_is_shared_by_white_noise_and_deviation():
 def test_further_rows_of_the_state_stay():
     before = np.vstack([deviating(OU, 5), np.arange(10.0, dtype="f4").reshape(2, 5)])
     after = move(before, 3.0, 0.2, OU, KEY)
-    np.testing.assert_array_equal(after[7:], before[7:])
+    np.testing.assert_array_equal(after[8:], before[8:])
     np.testing.assert_array_equal(after[OFF], before[OFF])
-    np.testing.assert_array_equal(after[:7], move(before[:7], 3.0, 0.2, OU, KEY))
+    np.testing.assert_array_equal(after[:8], move(before[:8], 3.0, 0.2, OU, KEY))
+
+
+@pytest.mark.parametrize("step_m", [4.0, -4.0])
+def test_the_lasting_error_of_a_biased_gyroscope_grows_by_the_metre(step_m):
+    before = states(4, bias_rad=0.2)
+    before[RATE] = [0.0, 0.01, -0.02, 0.03]
+    now = before
+    for _ in range(5):
+        now = move(now, step_m, 0.3, EXACT, KEY)
+    # Walking backwards takes as long.
+    np.testing.assert_allclose(now[BIAS], 0.2 + 20.0 * before[RATE], rtol=1e-5)
+    np.testing.assert_array_equal(now[RATE], before[RATE])
+    # Each step goes by the error at its end: a polygon.
+    for one, start in zip(now.T.astype(float), before.T.astype(float), strict=True):
+        angles = 0.3 + 0.2 + start[RATE] * 4.0 * np.arange(1, 6)
+        expected = start[:2] + step_m * np.array([np.cos(angles).sum(), np.sin(angles).sum()])
+        assert one[:2] == pytest.approx(expected, abs=1e-3)
+
+
+def test_a_lasting_error_that_grows_past_half_a_turn_wraps():
+    before = states(2, bias_rad=3.0)
+    before[RATE] = [0.05, -0.05]
+    now = move(before, 10.0, 0.0, EXACT, KEY)
+    np.testing.assert_allclose(now[BIAS], [3.5 - 2 * pi, 2.5], rtol=1e-5)
 
 
 def test_the_likelihood_of_the_map_is_that_of_the_oracle():

@@ -31,6 +31,7 @@ from mapfilter.models.street_motion import (
     LOG_SCALE,
     NORTH,
     OFF,
+    RATE,
     STATES,
     STRETCH,
     TURN,
@@ -46,6 +47,7 @@ AREA = make_area()
 ERRORS = MotionErrors(
     step_sd_m=1.2, typical_step_m=4.0, heading_sd_rad=0.25, white_share=0.64, heading_m=18.0,
     bias_sd_rad=0.3, bias_drift_rad_per_sqrt_m=0.02, scale_sd=0.1, stretch_sd=0.07, stretch_m=12.0,
+    rate_rad_per_m=0.004, rate_share=0.3,
 )  # fmt: skip
 EXACT = MotionErrors(
     step_sd_m=0.0, heading_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0, scale_drift_per_sqrt_m=0.0,
@@ -159,8 +161,13 @@ def test_first_errors_of_heading_and_scale_are_those_of_the_options(known):
     for row, sd in ((BIAS, 0.3), (LOG_SCALE, 0.1), (TURN, 0.15), (STRETCH, 0.07)):
         assert abs(state[row].mean()) < 5 * sd / sqrt(COUNT)
         assert state[row].std() == pytest.approx(sd, rel=5 / sqrt(2 * COUNT))
-    rows = state[[BIAS, LOG_SCALE, TURN, STRETCH]]
-    assert np.abs(np.corrcoef(rows) - np.eye(4)).max() < 5 / sqrt(COUNT)
+    # Three journeys in ten have a biased gyroscope.
+    biased = state[RATE] != 0
+    assert abs(biased.mean() - 0.3) < 5 * sqrt(0.21 / COUNT)
+    assert state[RATE, biased].std() == pytest.approx(0.004, rel=5 / sqrt(0.6 * COUNT))
+    assert abs(state[RATE].mean()) < 5 * 0.004 / sqrt(COUNT)
+    rows = state[[BIAS, LOG_SCALE, TURN, STRETCH, RATE]]
+    assert np.abs(np.corrcoef(rows) - np.eye(5)).max() < 5 / sqrt(COUNT)
     turned, _ = started(Start(first_reading(), False, *place))
     # Uniform over the circle: no mean direction, and a quarter of it in each quadrant.
     assert abs(np.exp(1j * turned[BIAS]).mean()) < 5 / sqrt(COUNT)

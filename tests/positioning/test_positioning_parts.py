@@ -137,6 +137,20 @@ def test_the_way_that_holds_the_largest_share():
         assert one == (ids[at], 1.0)
 
 
+def test_what_lies_at_the_edge_of_an_area():
+    small = small_area.make_area()
+    # A twentieth of the shorter side of 70 m.
+    for place, expected in (
+        ((45.0, 35.0), False), ((3.6, 35.0), False), ((3.4, 35.0), True), ((45.0, 66.6), True),
+        ((86.4, 66.4), False), ((86.6, 35.0), True), ((45.0, -9.0), True), ((120.0, 35.0), True),
+    ):  # fmt: skip
+        assert small.at_edge(np.array([*place, 0.3, 0.0])) is expected
+    # At most 60 m.
+    wide = replace(small, lattice=replace(small.lattice, resolution_m=500.0))
+    assert wide.at_edge(np.array([59.9, 1700.0]))
+    assert not wide.at_edge(np.array([60.1, 1700.0]))
+
+
 def test_names_of_rows_and_the_spacing_before_the_start():
     assert name_of(ReportRow("serving", "A", 60, 1, -70.0, 0)) == "A"
     assert name_of(ReportRow("neighbour", None, 60, 1, -70.0, 0)) == "ARFCN 60, BSIC 1"
@@ -278,7 +292,7 @@ def test_where_a_grid_starts():
     np.testing.assert_allclose(free[0], free[35], rtol=1e-6)
     place = np.array([0, 6]), np.array([2, 8])
     state = grid.states(*place, np.array([0.1, -0.2], "f4"), np.array([0.05, 0.7], "f4"))
-    rows = [[25, 85], [65, 5], [0.1, -0.2], [0, 0], [0.05, 0.7], [0, 0], [0, 0]]
+    rows = [[25, 85], [65, 5], [0.1, -0.2], [0, 0], [0.05, 0.7], *[[0, 0]] * 3]
     np.testing.assert_allclose(state, rows, rtol=1e-6)
 
 

@@ -65,7 +65,7 @@ def test_all_that_take_the_step_agree(world):
     peer = NumpyModel(inputs)
     state = np.vstack([belief.state.astype(np.float64), np.zeros(20_000)])
     rng = np.random.default_rng(4)
-    jitter = np.array([0.5, 0.5, 0.005, 0.003, 0.0, 0.004, 0.004])
+    jitter = np.array([0.5, 0.5, 0.005, 0.003, 0.0, 0.004, 0.004, 1e-4])
     own = bench_filter.whole_step(inputs, belief, jitter.astype(np.float32), rng)
     width = LevelMemory.empty(model.evidence.levels, model.area.site_of).width
     assert own.shape == (STATES + width, 20_000)
