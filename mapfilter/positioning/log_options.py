@@ -20,8 +20,8 @@ def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str
     The step of timing advance is that of the technology of all reports that have one; a step of
     levels (the column ``level_step_db``) adds its rounding error, ``step / √12``, to the error of
     levels. Errors of dead reckoning are those measured on the recording (the log's ``imu``); what
-    is 0 there was not measured. Options that are no dataclass, lack these fields, or have other values than the
-    defaults, are not changed.
+    is 0 there was not measured. Options that are no dataclass, lack these fields, or have other
+    values than the defaults, are not changed.
     """
     default = _defaults(options)
     changes: dict[str, Any] = {}

@@ -10,6 +10,7 @@ from mapfilter.positioning.filter import locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.log_options import fitted_to_log
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.log import make_log
 
 CRS = "EPSG:32635"
@@ -97,3 +98,17 @@ def test_a_vehicle_is_located_by_timing_advances_of_lte():
         errors.append(np.hypot(*(place - here)))
     assert errors[0] < 200
     assert errors[1] > 500
+
+
+def test_errors_of_dead_reckoning_that_were_measured_on_the_recording():
+    motion = pd.DataFrame({"time_s": np.arange(5.0), "step_m": 4.0, "heading_rad": 0.1})
+    imu = ImuNoise(sigma_orient_deg=4.0, sigma_trans_m=0.2, drift_deg_per_sqrt_s=0.6, scale=0.05)
+    walked = make_log(CRS, motion=motion, imu=imu)
+    fitted, notes = fitted_to_log(BayesFilter(), walked)
+    # 4 m/s: 0.6 degrees in a second are 0.3 in the root of a metre. No bias was measured.
+    assert (fitted.heading_sd_deg, fitted.step_sd_m, fitted.scale) == (4.0, 0.2, 0.05)
+    assert fitted.drift_deg_per_sqrt_m == pytest.approx(0.3)
+    assert fitted.bias_sd_deg == BayesFilter().bias_sd_deg
+    assert "heading_sd_deg = 4" in notes[0]
+    given = BayesFilter(heading_sd_deg=9.0)
+    assert fitted_to_log(given, walked)[0].heading_sd_deg == 9.0
