@@ -50,11 +50,12 @@ if TYPE_CHECKING:
     from mapfilter.rasters.raster_set import open_rasters as open_rasters
     from mapfilter.roads.lattice import RouteLattice as RouteLattice
     from mapfilter.roads.routes import read_routes as read_routes
-    from mapfilter.simulation.imu import ImuNoise as ImuNoise
     from mapfilter.simulation.reports import ReportModel as ReportModel
     from mapfilter.simulation.walking import WalkerModel as WalkerModel
+    from mapfilter.tracks.imu_noise import ImuNoise as ImuNoise
     from mapfilter.tracks.log import TrackLog as TrackLog
     from mapfilter.tracks.log import make_log as make_log
+    from mapfilter.tracks.pdr.options import WalkOptions as WalkOptions
     from mapfilter.tracks.store import write_log as write_log
 
 _NAMES = {
@@ -77,10 +78,11 @@ _NAMES = {
     "rasters.raster_set": "RxLevRasters open_rasters",
     "roads.lattice": "RouteLattice",
     "roads.routes": "read_routes",
-    "simulation.imu": "ImuNoise",
     "simulation.reports": "ReportModel",
     "simulation.walking": "WalkerModel",
+    "tracks.imu_noise": "ImuNoise",
     "tracks.log": "TrackLog make_log",
+    "tracks.pdr.options": "WalkOptions",
     "tracks.store": "write_log",
 }
 """Names by the modules that define them."""

@@ -8,6 +8,9 @@ from pathlib import Path
 from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenOptions, open_log
+from mapfilter.tracks.pdr.options import WalkOptions
+
+_WALK = WalkOptions()
 
 
 def read_log(
@@ -18,6 +21,7 @@ def read_log(
     zone: str = "",
     columns: Mapping[str, str] | None = None,
     course_motion: bool = False,
+    walk: WalkOptions | None = _WALK,
 ) -> TrackLog:
     """Read a track log, or recordings of one journey by other programs.
 
@@ -37,6 +41,9 @@ def read_log(
         For plain CSV: column of each field, such as ``{"time": "Zeit"}``.
     course_motion : bool
         Make motion from the speed and course of positions where nothing else gives it.
+    walk : WalkOptions or None
+        How steps and headings are made of the raw sensors of a phone where nothing else gives
+        motion; None for no steps.
 
     Raises
     ------
@@ -46,6 +53,6 @@ def read_log(
         A file of a log is missing, cut off or changed since it was written.
     """
     true = [Path(path) for path in truth]
-    combine = CombineOptions(truth=true, course_motion=course_motion)
+    combine = CombineOptions(truth=true, course_motion=course_motion, walk=walk)
     options = OpenOptions(zone=zone, columns=columns or {}, combine=combine)
     return open_log(paths, crs=crs, options=options).log

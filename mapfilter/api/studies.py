@@ -35,11 +35,11 @@ from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.network import StreetNetwork, street_network
 from mapfilter.roads.routes import read_roads
 from mapfilter.roads.ways import Ways
-from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
 from mapfilter.simulation.walking import WalkerModel
+from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.log import TrackLog
 
 if TYPE_CHECKING:

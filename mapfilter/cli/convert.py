@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from mapfilter.cli.options import JsonOption, given_path, numbers
 from mapfilter.errors import ConfigError, fail
 from mapfilter.workflows.terminal import print_result
+
+if TYPE_CHECKING:
+    from mapfilter.tracks.pdr.options import WalkOptions
 
 
 def convert(
@@ -57,6 +60,17 @@ def convert(
         bool,
         typer.Option("--course-motion", help="Make motion from speed and course of positions."),
     ] = False,
+    no_steps: Annotated[
+        bool, typer.Option("--no-steps", help="Make no motion from the sensors of a phone.")
+    ] = False,
+    pose: Annotated[
+        Literal["auto", "device", "any"],
+        typer.Option("--pose", help="Walking direction: the phone's axis, by the steps, or auto."),
+    ] = "auto",
+    declination: Annotated[
+        float | None,
+        typer.Option("--declination", metavar="DEG", help="Magnetic declination, east positive."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Convert recordings of other programs to a track log."""
@@ -79,6 +93,7 @@ def convert(
             truth=true,
             offsets_s=_offsets(parse_pairs(offset or (), "--offset"), [*given, *true]),
             course_motion=course_motion,
+            walk=None if no_steps else _walk(pose, declination),
         ),
     )
     result = run_convert(given, out, options)
@@ -86,6 +101,16 @@ def convert(
         print_result(result, as_json)
     else:
         sys.stdout.write("\n".join(report_lines(result)) + "\n")
+
+
+def _walk(pose: Literal["auto", "device", "any"], declination_deg: float | None) -> WalkOptions:
+    from mapfilter.tracks.pdr.options import WalkOptions
+
+    try:
+        return WalkOptions(pose=pose, declination_deg=declination_deg)
+    except ConfigError as error:
+        expected = "degrees in -180..180"
+        raise fail(ConfigError, "--declination", expected, declination_deg) from error
 
 
 def _offsets(pairs: dict[str, str], files: list[Path]) -> dict[Path, float]:

@@ -35,9 +35,10 @@ from mapfilter.options import Below1, Degrees, NotNegative, Positive, Seed
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.kalman.filter import KalmanFilter
-from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
+from mapfilter.tracks.imu_noise import ImuNoise
+from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.readers.formats import FORMATS
 from mapfilter.tracks.readers.plain_csv import FIELDS as RECORDED_FIELDS
 from mapfilter.tracks.schema import Without
@@ -187,6 +188,11 @@ class TrackColumns(Columns):
     """
 
 
+@with_options(WalkOptions)
+class TrackWalk(Section):
+    """``[track.walk]``: steps and headings made of the raw sensors of a walker's phone."""
+
+
 class Track(Section):
     """``[track]``: a log, a folder of logs, or recordings of other programs.
 
@@ -211,6 +217,8 @@ class Track(Section):
         Longitude and latitude at which a local frame of metres has its origin.
     course_motion : bool
         Make motion from the speed and course of positions where nothing else gives it.
+    steps : bool
+        Make steps and headings of the raw sensors of a phone where nothing else gives motion.
     """
 
     path: FilePath | None = None
@@ -221,6 +229,8 @@ class Track(Section):
     zone: str = ""
     origin: Pair | None = None
     course_motion: bool = False
+    steps: bool = True
+    walk: TrackWalk = TrackWalk()
     columns: TrackColumns = TrackColumns()
 
 

@@ -1,9 +1,9 @@
-"""Options of a filter that a log itself states: steps of timing advance and of levels."""
+"""Options of a filter that a log itself states: its dead reckoning, timing advances and levels."""
 
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from math import hypot
+from math import hypot, nan
 from typing import Any, TypeVar
 
 import numpy as np
@@ -19,7 +19,8 @@ def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str
 
     The step of timing advance is that of the technology of all reports that have one; a step of
     levels (the column ``level_step_db``) adds its rounding error, ``step / √12``, to the error of
-    levels. Options that are no dataclass, lack these fields, or have other values than the
+    levels. Errors of dead reckoning are those measured on the recording (the log's ``imu``); what
+    is 0 there was not measured. Options that are no dataclass, lack these fields, or have other values than the
     defaults, are not changed.
     """
     default = _defaults(options)
@@ -36,9 +37,36 @@ def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str
         error_db = hypot(default["level_error_db"], step_db / 12**0.5)
         changes["level_error_db"] = error_db
         notes.append(f"levels in steps of {step_db:g} dB: level_error_db = {error_db:.2f}")
+    measured = {
+        name: value
+        for name, value in reckoning_errors(log).items()
+        if value > 0 and _is_default(options, default, name)
+    }
+    if measured:
+        changes |= measured
+        found = ", ".join(f"{name} = {value:.3g}" for name, value in measured.items())
+        notes.append(f"errors of dead reckoning as measured on the recording: {found}")
     if not changes:
         return options, ()
     return replace(options, **changes), tuple(notes)  # type: ignore[type-var]
+
+
+def reckoning_errors(log: TrackLog) -> dict[str, float]:
+    """Return the errors of dead reckoning that a log states, as options of the Bayes filter."""
+    imu = log.imu
+    if imu is None:
+        return {}
+    steps = log.motion[["time_s", "step_m"]].dropna()
+    moving_s = float(np.diff(steps["time_s"])[steps["step_m"].to_numpy()[1:] > 0].sum())
+    speed_mps = float(steps["step_m"].abs().sum()) / moving_s if moving_s > 0 else nan
+    drift = imu.drift_deg_per_sqrt_s / speed_mps**0.5 if speed_mps > 0 else 0.0
+    return {
+        "step_sd_m": imu.sigma_trans_m,
+        "heading_sd_deg": imu.sigma_orient_deg,
+        "bias_sd_deg": imu.bias_sd_deg,
+        "drift_deg_per_sqrt_m": drift,
+        "scale": imu.scale,
+    }
 
 
 def timing_step_m(log: TrackLog) -> float | None:

@@ -2,75 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
-
 import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats
 from mapfilter.geodesy import wrap_rad
-from mapfilter.options import Below1, Degrees, NotNegative, Options, Positive
-from mapfilter.tracks.deadreckoning import TranslationNoise, noisy_steps, steps_between
-
-
-@dataclass(frozen=True, slots=True)
-class ImuNoise(Options):
-    """Errors of a simulated inertial unit; ``[imu]`` of a configuration.
-
-    These errors are what the unit *has*. What a filter *assumes* of its unit are options of the
-    filter, such as ``[filter.bayes]``. The two white errors are Khalaf-Allah 2007, equations
-    (5)-(8); the others are zero in that paper.
-
-    Parameters
-    ----------
-    period_s : float
-        Length of an interval of dead reckoning; white noise is drawn once for each.
-    sigma_trans_m : float
-        Standard deviation of a step.
-    sigma_orient_deg : float
-        Standard deviation of a heading.
-    bias_sd_deg : float
-        Standard deviation of the journey's constant heading error.
-    drift_deg_per_sqrt_s : float
-        Random walk of the heading error: its standard deviation after t seconds is this times √t.
-    scale : float
-        The journey's steps are all multiplied by exp(N(0, this)).
-    translation_noise : {"zero_mean", "as_printed"}
-        See :func:`mapfilter.tracks.deadreckoning.noisy_steps`.
-    heading_correlation_s : float
-        Time over which heading errors are correlated by 1/e; 0 for white ones.
-    step_scale_wander : float
-        The step scale also wanders within the journey: standard deviation of its logarithm.
-    step_scale_correlation_s : float
-        Time over which the wandering step scale is correlated by 1/e.
-    turns : {"headings", "gyro"}
-        With "headings", a turn is the difference of two reported headings, so that errors cancel
-        when turns are added up. A gyro's errors accumulate.
-    gyro_noise_deg_per_sqrt_s : float
-        Angle random walk of the gyro.
-    gyro_bias_deg_per_s : float
-        Standard deviation of the gyro's constant rate error in a journey.
-
-    Raises
-    ------
-    ConfigError
-        With every value that is out of range.
-    """
-
-    period_s: Positive = 1.0
-    sigma_trans_m: NotNegative = 0.2
-    sigma_orient_deg: Degrees = 3.0
-    bias_sd_deg: Degrees = 0.0
-    drift_deg_per_sqrt_s: NotNegative = 0.0
-    scale: Below1 = 0.0
-    translation_noise: TranslationNoise = "zero_mean"
-    heading_correlation_s: NotNegative = 0.0
-    step_scale_wander: Below1 = 0.0
-    step_scale_correlation_s: NotNegative = 15.0
-    turns: Literal["headings", "gyro"] = "headings"
-    gyro_noise_deg_per_sqrt_s: NotNegative = 0.0
-    gyro_bias_deg_per_s: NotNegative = 0.0
+from mapfilter.tracks.deadreckoning import noisy_steps, steps_between
+from mapfilter.tracks.imu_noise import ImuNoise
 
 
 def noisy_motion(truth: pd.DataFrame, noise: ImuNoise, rng: np.random.Generator) -> pd.DataFrame:

@@ -13,11 +13,12 @@ from mapfilter.geodesy import same_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.network import StreetNetwork
-from mapfilter.simulation.imu import ImuNoise, noisy_motion
+from mapfilter.simulation.imu import noisy_motion
 from mapfilter.simulation.journeys import JourneyPlan, journey, ticks_s
 from mapfilter.simulation.reports import Levels, ReportModel, level_sampler, reports
 from mapfilter.simulation.routes import route
 from mapfilter.simulation.walking import Inside
+from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.log import TrackLog, make_log
 
 _ROUTE, _IMU, _RADIO, _WALKER = range(4)

@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from mapfilter.errors import Faults, InputError, fail
+from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import (
     heading_from_azimuth_rad,
-    wrap_rad,
 )
 from mapfilter.tracks.alignment import Alignment, align
 from mapfilter.tracks.frame import Frame
+from mapfilter.tracks.journey_motion import journey_motion, measured_positions
 from mapfilter.tracks.log import TrackLog, make_log
-from mapfilter.tracks.moved import (
-    by_compass,
-    motion_from_course,
-    motion_from_odometry,
-    motion_from_poses,
-    places_of_poses,
-)
+from mapfilter.tracks.moved import places_of_poses
+from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.raw_satellites import log_pseudoranges
 from mapfilter.tracks.readers.recording import Recording
 from mapfilter.tracks.sensors import SENSOR_COLUMNS
@@ -32,7 +27,6 @@ _RADIUS_68 = 1.515
 """Radius of 68 % of a two-dimensional normal distribution, in standard deviations."""
 
 _NO_JOURNEY = {"cells", "ephemerides", "ionosphere"}
-_PROVIDERS = ("gps", "fused", "flp", "network", "nlp")
 _CELL_COLUMNS = ("technology", "mcc", "mnc", "lac", "ci", "level_step_db")
 
 
@@ -52,6 +46,8 @@ class CombineOptions:
         Seconds to add to the times of a recording.
     course_motion : bool
         Whether steps are made from the speed and course of positions where nothing else gives them.
+    walk : WalkOptions or None
+        How steps are made of a phone's sensors where nothing else gives them; None for no steps.
     """
 
     crs: str = ""
@@ -59,6 +55,7 @@ class CombineOptions:
     truth: Collection[Path] = ()
     offsets_s: Mapping[Path, float] = field(default_factory=dict)
     course_motion: bool = False
+    walk: WalkOptions | None = field(default_factory=WalkOptions)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +94,17 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         if "cells" in recording.tables:
             count = len(recording.tables["cells"])
             notes.append(f"{recording.path.name}: a list of {count} cells; give it as [cells] path")
+    sensors = _sensors(shifted, frame, options.truth, notes)
+    moved = journey_motion(
+        [r for r in shifted if r.path not in options.truth],
+        sensors,
+        frame,
+        notes,
+        course_motion=options.course_motion,
+        walk=options.walk,
+    )
     tables = {
-        "motion": _motion(shifted, frame, options, notes),
+        "motion": moved.rows,
         "radio": _joined(shifted, "radio"),
         "gnss": _fixes(shifted, frame, options, notes),
         "truth": _truth(shifted, frame, options),
@@ -115,15 +121,15 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
     }
     if "radio" in given:
         given["radio"] = _radio(given["radio"])
-    sensors = {
-        name: rows.assign(time_s=rows["time_s"] - start_s)
-        for name, rows in _sensors(shifted, frame, options.truth, notes).items()
-    }
+    if moved.reckoning is not None:
+        sensors["reckoning"] = moved.reckoning
+    sensors = {name: rows.assign(time_s=rows["time_s"] - start_s) for name, rows in sensors.items()}
     log = make_log(
         frame.crs,
         **given,
         start_utc_s=start_s if alignment.absolute else float("nan"),
         notes=notes,
+        imu=moved.imu,
     )
     if not given and not sensors:
         names = ", ".join(r.path.name for r in recordings)
@@ -157,26 +163,12 @@ def _radio(rows: pd.DataFrame) -> pd.DataFrame:
     return rows.drop(columns=empty)
 
 
-def _positions(recording: Recording) -> tuple[pd.DataFrame | None, str]:
-    """Return measured positions of the best provider, and a note on those of others."""
-    rows = recording.tables.get("positions", recording.tables.get("places"))
-    if rows is None or "provider" not in rows or rows["provider"].isna().all():
-        return rows, ""
-    named = rows["provider"].fillna("").str.lower()
-    found = [name for name in _PROVIDERS if (named == name).any()]
-    if not found or (named == found[0]).all():
-        return rows, ""
-    left = int((named != found[0]).sum())
-    kept = rows[named == found[0]].reset_index(drop=True)
-    return kept, f"{recording.path.name}: {left} fixes of other providers than {found[0]} left out"
-
-
 def _fixes(
     recordings: Sequence[Recording], frame: Frame, options: CombineOptions, notes: list[str]
 ) -> pd.DataFrame | None:
     parts = []
     for recording in recordings:
-        rows, note = _positions(recording)
+        rows, note = measured_positions(recording)
         if rows is None or recording.path in options.truth:
             continue
         if note:
@@ -199,7 +191,7 @@ def _truth(
     for recording in recordings:
         rows = recording.tables.get("truth", recording.tables.get("true_places"))
         if rows is None and recording.path in options.truth:
-            rows, _ = _positions(recording)
+            rows, _ = measured_positions(recording)
             if rows is None and "poses" in recording.tables:
                 rows = places_of_poses(recording.tables["poses"])
             if rows is None:
@@ -210,36 +202,6 @@ def _truth(
             place = {"time_s": rows["time_s"], "east_m": east, "north_m": north}
             parts.append(pd.DataFrame(place))
     return pd.concat(parts, ignore_index=True).sort_values("time_s") if parts else None
-
-
-def _motion(
-    recordings: Sequence[Recording], frame: Frame, options: CombineOptions, notes: list[str]
-) -> pd.DataFrame | None:
-    """Return motion of the recording that tells it most directly; others stay sensors."""
-    makers: tuple[tuple[str, Callable[[pd.DataFrame], pd.DataFrame]], ...] = (
-        ("motion", lambda rows: by_compass(rows, frame.convergence_rad)),
-        ("odometry", motion_from_odometry),
-        ("poses", motion_from_poses),
-    )
-    for name, make in makers:
-        having = [r for r in recordings if name in r.tables and r.path not in options.truth]
-        if not having:
-            continue
-        for other in having[1:]:
-            notes.append(f"{other.path.name}: {name} not used, {having[0].path.name} has it, too")
-        moved = make(having[0].tables[name])
-        return moved.assign(heading_rad=wrap_rad(moved["heading_rad"]))
-    if options.course_motion:
-        for recording in recordings:
-            rows, _ = _positions(recording)
-            if rows is not None and "course_deg" in rows and rows["course_deg"].notna().any():
-                notes.append(f"{recording.path.name}: motion from speed and course of its fixes")
-                return motion_from_course(rows, frame.convergence_rad)
-        faults = Faults()
-        names = ", ".join(r.path.name for r in recordings)
-        faults.add(names, "positions with speed and course", "none", "leave out --course-motion")
-        faults.raise_if_any(InputError)
-    return None
 
 
 def _satellites(
@@ -286,7 +248,7 @@ def _apart(recordings: Sequence[Recording], table: str, notes: list[str]) -> lis
 def _velocity(recordings: Sequence[Recording], frame: Frame) -> pd.DataFrame | None:
     parts = []
     for recording in recordings:
-        rows, _ = _positions(recording)
+        rows, _ = measured_positions(recording)
         if rows is None or "speed_mps" not in rows:
             continue
         rows = rows[rows["speed_mps"].notna()]

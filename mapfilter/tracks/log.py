@@ -20,6 +20,7 @@ from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import projected_crs, short_crs
 from mapfilter.gnss.orbits import Almanac
+from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.satellites import place_satellites
 from mapfilter.tracks.schema import NEIGHBOUR, PLACE, TABLES, Kind, Without
 from mapfilter.tracks.tables import tidy_table
@@ -190,6 +191,8 @@ class TrackLog:
         time_s, east_m, north_m, way_id (nullable integer).
     notes : tuple of str
         What was sorted, dropped and ignored.
+    imu : ImuNoise or None
+        Errors of ``motion``, as measured when it was made of raw sensors; None where unknown.
     """
 
     crs: str
@@ -201,6 +204,7 @@ class TrackLog:
     tdoa: pd.DataFrame
     truth: pd.DataFrame
     notes: tuple[str, ...] = ()
+    imu: ImuNoise | None = None
 
     def __repr__(self) -> str:
         """Return CRS, duration, start and the number of rows per table."""
@@ -278,6 +282,7 @@ def make_log(
     almanac: Almanac | None = None,
     start_utc_s: float = float("nan"),
     notes: Sequence[str] = (),
+    imu: ImuNoise | None = None,
     names: Mapping[str, str] | None = None,
     row_numbers: Mapping[str, ArrayLike] | None = None,
 ) -> TrackLog:
@@ -299,6 +304,8 @@ def make_log(
         timestamps.
     notes : sequence of str
         Earlier notes on the tables.
+    imu : ImuNoise, optional
+        Errors of ``motion``, where they were measured.
     names : mapping, optional
         Name of each table (such as its file) in messages; ``log`` for the whole.
     row_numbers : mapping, optional
@@ -357,7 +364,9 @@ def make_log(
         where, rows = called.get("pseudoranges", "pseudoranges"), tables["pseudoranges"]
         tables["pseudoranges"], more = place_satellites(rows, almanac, start_utc_s, where)
         every_note += more
-    return TrackLog(str(crs), start_utc_s, **tables, notes=tuple(dict.fromkeys(every_note)))
+    return TrackLog(
+        str(crs), start_utc_s, **tables, notes=tuple(dict.fromkeys(every_note)), imu=imu
+    )
 
 
 def rows_by_kind(log: TrackLog) -> dict[Kind, pd.DataFrame]:

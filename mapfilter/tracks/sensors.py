@@ -29,12 +29,14 @@ SENSOR_COLUMNS: dict[str, tuple[str, ...]] = {
     "steps": ("time_s", "count"),
     "odometry": ("time_s", "speed_mps", "yaw_rate_radps", "speed_sd_mps", "yaw_rate_sd_radps"),
     "velocity": ("time_s", "speed_mps", "heading_rad"),
+    "reckoning": ("time_s", "heading_sd_rad", "disturbed", "climb", "height_m"),
 }
 """Sensors of a log and the columns of each.
 
 ``accelerometer`` includes gravity, ``linear_acceleration`` does not; ``orientation`` is the
 rotation from the device to east, north and up; ``steps`` counts since some start; ``velocity`` is
-that of a GNSS receiver, with headings counter-clockwise from grid east.
+that of a GNSS receiver, with headings counter-clockwise from grid east; ``reckoning`` belongs to
+motion made of these sensors, see :class:`mapfilter.tracks.pdr.walk.Reckoned`.
 """
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Collection, Mapping
+from dataclasses import asdict
 from difflib import get_close_matches
 from math import inf, isnan, nan
 from pathlib import Path
@@ -31,6 +32,7 @@ from mapfilter._io import (
 from mapfilter._types import Ints
 from mapfilter.errors import Faults, InputError, MapfilterError, StoreError, fail
 from mapfilter.gnss.orbits import read_yuma
+from mapfilter.tracks.imu_noise import parse_imu_noise
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.schema import OPTIONAL, SCHEMA, TABLES
 from mapfilter.tracks.sensors import FOLDER, write_sensors
@@ -44,7 +46,7 @@ _LONGEST_ROW_BYTES = 1 << 16
 _DECIMAL_COMMA = r"^\s*([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)\s*$"
 FORMAT = "mapfilter track log"
 VERSION = 1
-_KEYS = ("format", "version", "crs", "start_utc_s", "notes", "parts")
+_KEYS = ("format", "version", "crs", "start_utc_s", "notes", "imu", "parts")
 _ARROW = {"number": pa.float64(), "integer": pa.int64(), "text": pa.string()}
 
 
@@ -226,8 +228,10 @@ def write_log(
             "crs": log.crs,
             "start_utc_s": None if isnan(log.start_utc_s) else log.start_utc_s,
             "notes": list(log.notes),
-            "parts": parts,
         }
+        if log.imu is not None:
+            head["imu"] = asdict(log.imu)
+        head["parts"] = parts
         write_json(new / HEAD, head)
 
 
@@ -259,6 +263,7 @@ def read_log(folder: str | Path) -> TrackLog:
         almanac=read_yuma(beside) if beside.is_file() else None,
         start_utc_s=start_utc_s,
         notes=(*head.get("notes", ()), *ignored, *notes),
+        imu=parse_imu_noise(head.get("imu"), f"{where}, imu"),
         names={"log": where} | {table: str(path) for table, path in paths.items()},
         row_numbers={table: read.row_numbers for table, read in tables.items()},
     )

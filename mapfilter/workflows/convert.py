@@ -13,6 +13,7 @@ import pandas as pd
 from mapfilter.errors import ConfigError, OutputError, fail
 from mapfilter.geodesy import short_crs
 from mapfilter.tracks.combine import combine
+from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.open_log import OpenOptions, read_recordings
 from mapfilter.tracks.readers.recording import Recording
 from mapfilter.tracks.schema import TABLES
@@ -60,6 +61,7 @@ class Converted:
     unused: dict[str, int]
     files: tuple[FoundFile, ...]
     notes: tuple[str, ...]
+    imu: ImuNoise | None = None
 
 
 def run_convert(files: Sequence[Path], out: Path, options: OpenOptions | None = None) -> Converted:
@@ -99,6 +101,7 @@ def run_convert(files: Sequence[Path], out: Path, options: OpenOptions | None = 
         unused,
         found,
         (*notes, *combined.log.notes),
+        combined.log.imu,
     )
 
 
@@ -151,11 +154,24 @@ def report_lines(result: Converted) -> list[str]:
         lines += [f"  not used: {text}" for text in file.where]
         lines += [f"  note: {text}" for text in file.notes]
     lines += [f"note: {note}" for note in result.notes]
+    if result.imu is not None:
+        lines.append(f"errors of motion: {_errors(result.imu)}")
     held = ", ".join(f"{name} {count}" for name, count in result.rows.items() if count)
     crs = short_crs(result.crs)
     frame = "local frame" if crs == "unknown" else crs
     lines.append(f"log: {result.log} ({frame}, {result.duration_s:.1f} s; {held})")
     return lines
+
+
+def _errors(imu: ImuNoise) -> str:
+    """Return the main errors of motion in words."""
+    turns = (
+        f"heading {imu.bias_sd_deg:.0f} deg lasting, {imu.sigma_orient_deg:.1f} deg white"
+        if imu.turns == "headings"
+        else f"gyroscope {imu.gyro_bias_deg_per_s:.2g} deg/s, "
+        f"{imu.gyro_noise_deg_per_sqrt_s:.2g} deg/sqrt(s)"
+    )
+    return f"step {imu.sigma_trans_m:.2g} m, scale {imu.scale:.0%}, {turns}"
 
 
 def _rate(rate_hz: float) -> str:

@@ -9,6 +9,7 @@ from mapfilter.geodesy import projected_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.open_log import OpenedLog, OpenOptions, list_journeys, open_log
+from mapfilter.tracks.pdr.options import WalkOptions
 
 
 def open_options(track: Track) -> OpenOptions:
@@ -19,7 +20,10 @@ def open_options(track: Track) -> OpenOptions:
         zone=track.zone,
         columns=track.columns.given,
         combine=CombineOptions(
-            origin_deg=origin_deg, truth=track.truth, course_motion=track.course_motion
+            origin_deg=origin_deg,
+            truth=track.truth,
+            course_motion=track.course_motion,
+            walk=track.walk.of(WalkOptions) if track.steps else None,
         ),
     )
 

@@ -12,11 +12,11 @@ from mapfilter.errors import OutputError, fail, listed
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import check_against_plan
 from mapfilter.roads.network import street_network
-from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel, level_sampler
 from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
 from mapfilter.simulation.walking import WalkerModel, inside_buildings
+from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.store import check_log_replaceable, is_log, write_log
 from mapfilter.workflows.predict import open_ground_truth
 from mapfilter.workflows.world import World, check_cells_near, lattice_on, planned_rasters

@@ -9,7 +9,7 @@ from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.global_positioning import informed
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.candidate import CandidateFilter
-from mapfilter.simulation.imu import ImuNoise
+from mapfilter.tracks.imu_noise import ImuNoise
 
 BIASED = [
     "levels-bias10",

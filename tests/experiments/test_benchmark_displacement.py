@@ -8,12 +8,12 @@ from grid_town import levels, streets
 
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.journeys import displaced_walk, log_of
-from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.simulate import SimulationSettings
 from mapfilter.simulation.walking import WalkerModel
 from mapfilter.tracks.deadreckoning import dead_reckon
+from mapfilter.tracks.imu_noise import ImuNoise
 
 SEED = 5
 NUMBERS = range(12)

@@ -12,12 +12,12 @@ from grid_town import levels, streets
 
 from mapfilter.experiments.benchmarks.cases import CASES, USUAL
 from mapfilter.experiments.benchmarks.journeys import displaced_walk, log_of, walk
-from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.simulate import SimulationSettings
 from mapfilter.simulation.walking import WalkerModel
 from mapfilter.tracks.deadreckoning import dead_reckon
+from mapfilter.tracks.imu_noise import ImuNoise
 
 SEED = 11
 SHORT = JourneyPlan(length_m=280.0)

@@ -13,11 +13,11 @@ from mapfilter.experiments.benchmarks.plain_runs import PlainCity
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate import Fix, PositionedTrack, TrackEstimate
-from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.satellites import ReceptionModel
 from mapfilter.simulation.simulate import SimulationSettings
+from mapfilter.tracks.imu_noise import ImuNoise
 
 CHOICE = BayesFilter()
 WORLD = SimulationSettings(journey=JourneyPlan(length_m=70.0))

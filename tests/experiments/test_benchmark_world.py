@@ -22,8 +22,8 @@ from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.ways import Buildings
-from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.simulate import SimulationSettings
+from mapfilter.tracks.imu_noise import ImuNoise
 
 LATTICE = Lattice(CRS, WEST_M, SOUTH_M + 600.0, 10.0, 60, 60)
 PLAN = CellPlan(CRS, plan().cells[:2])

@@ -19,9 +19,9 @@ from mapfilter.experiments.sweep.plan import (
     noise_grid,
 )
 from mapfilter.positioning.candidate import CandidateFilter
-from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.walking import WalkerModel
+from mapfilter.tracks.imu_noise import ImuNoise
 
 SET = Reading("set", CandidateFilter(margin_db=0.0), 22.0)
 LIST = Reading("list", CandidateFilter(duplicates="list", threshold=10), 22.0)

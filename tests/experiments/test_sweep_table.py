@@ -19,7 +19,7 @@ from mapfilter.experiments.sweep.table import (
     write_part,
 )
 from mapfilter.positioning.candidate import CandidateFilter
-from mapfilter.simulation.imu import ImuNoise
+from mapfilter.tracks.imu_noise import ImuNoise
 
 NEVER = Accuracy(False, False, nan, nan, nan, nan, nan, nan, 0)
 RIGHT = Accuracy(True, True, 60.0, 84.0, 3.0, 4.0, 5.0, 9.0, 10)

@@ -8,8 +8,9 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import ConfigError
-from mapfilter.simulation.imu import ImuNoise, noisy_motion
+from mapfilter.simulation.imu import noisy_motion
 from mapfilter.tracks.deadreckoning import dead_reckon
+from mapfilter.tracks.imu_noise import ImuNoise
 
 PERFECT = ImuNoise(sigma_trans_m=0.0, sigma_orient_deg=0.0)
 

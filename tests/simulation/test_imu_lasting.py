@@ -10,7 +10,8 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import ConfigError
-from mapfilter.simulation.imu import ImuNoise, noisy_motion
+from mapfilter.simulation.imu import noisy_motion
+from mapfilter.tracks.imu_noise import ImuNoise
 
 NONE = {"sigma_trans_m": 0.0, "sigma_orient_deg": 0.0}
 WHITE = {**NONE, "sigma_orient_deg": degrees(0.1)}

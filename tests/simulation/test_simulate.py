@@ -7,11 +7,11 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import ConfigError, InputError
-from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
 from mapfilter.tracks.deadreckoning import dead_reckon
+from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import read_log, write_log
 

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapfilter.errors import InputError, OutputError, StoreError
-from mapfilter.tracks.log import make_log
+from mapfilter.tracks.imu_noise import ImuNoise
+from mapfilter.tracks.log import leave_out, make_log
 from mapfilter.tracks.schema import MISSING_SIGNS, TABLES
 from mapfilter.tracks.store import is_log, list_logs, read_log, write_log
 
@@ -50,7 +51,7 @@ def log():
 
 
 def assert_same(a, b):
-    assert (a.crs, a.notes) == (b.crs, b.notes)
+    assert (a.crs, a.notes, a.imu) == (b.crs, b.notes, b.imu)
     np.testing.assert_equal(a.start_utc_s, b.start_utc_s)
     for table in TABLES:
         pd.testing.assert_frame_equal(getattr(a, table), getattr(b, table), check_exact=True)
@@ -278,3 +279,43 @@ def test_a_log_can_be_moved(log, tmp_path):
     write_log(log, tmp_path / "a")
     shutil.move(tmp_path / "a", tmp_path / "b")
     assert_same(read_log(tmp_path / "b"), log)
+
+
+@pytest.mark.parametrize("form", ["parquet", "csv"])
+def test_errors_of_motion_travel_with_a_log(log, tmp_path, form):
+    measured = ImuNoise(
+        period_s=0.5,
+        sigma_trans_m=0.07,
+        bias_sd_deg=8.5,
+        scale=0.1,
+        turns="gyro",
+        heading_correlation_s=2.5,
+        gyro_bias_deg_per_s=0.02,
+    )
+    write_log(replace(log, imu=measured), tmp_path / "log", form)
+    back = read_log(tmp_path / "log")
+    assert back.imu == measured
+    assert leave_out(back, ["radio"]).imu == measured
+
+
+def test_a_log_without_errors_of_motion_states_none(log, tmp_path):
+    write_log(log, tmp_path / "log")
+    assert "imu" not in json.loads((tmp_path / "log" / "log.json").read_text())
+    assert read_log(tmp_path / "log").imu is None
+
+
+@pytest.mark.parametrize(
+    ("imu", "named"),
+    [
+        ({"sigma_trans_m": -1}, "imu.sigma_trans_m: expected a number >= 0, found -1"),
+        ({"sigma_trans": 1}, "imu.sigma_trans: expected one of period_s.*sigma_trans_m"),
+        ({"turns": "wheels"}, "imu.turns: expected"),
+        ([0.2, 3.0], "imu: expected errors of dead reckoning by their names"),
+        ({"scale": float("nan")}, "imu.scale"),
+        ({"period_s": 0, "bias_sd_deg": 400}, "(?s)imu.period_s.*imu.bias_sd_deg"),
+    ],
+)
+def test_wrong_errors_of_motion_are_refused(tmp_path, imu, named):
+    (tmp_path / "log.json").write_text(json.dumps({"crs": CRS, "imu": imu}))
+    with pytest.raises(InputError, match=named):
+        read_log(tmp_path)

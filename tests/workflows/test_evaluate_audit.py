@@ -9,9 +9,9 @@ from command_line import assert_done, assert_refused, mapfilter, settings
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.results import CaseResult
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
-from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
+from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.workflows.evaluate import _world as prepare_world
 from mapfilter.workflows.evaluate import load_benchmark
 from mapfilter.workflows.evaluate_audit import CHANGES

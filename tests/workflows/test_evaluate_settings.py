@@ -31,7 +31,7 @@ from mapfilter.experiments.benchmarks.global_positioning import informed
 from mapfilter.geodesy import Lattice
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.candidate import CandidateFilter
-from mapfilter.simulation.imu import ImuNoise
+from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.workflows.evaluate import _refused, load_benchmark
 from mapfilter.workflows.evaluate import _world as prepare_world
 from mapfilter.workflows.world import World, filter_choice

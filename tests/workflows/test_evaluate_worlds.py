@@ -13,9 +13,9 @@ from mapfilter.config.sections import Config
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
-from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
+from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.workflows.evaluate import WORLDS, load_benchmark
 from mapfilter.workflows.evaluate import _world as prepare_world
 from mapfilter.workflows.simulate import simulation_settings

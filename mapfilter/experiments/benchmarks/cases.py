@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
-from mapfilter.simulation.imu import ImuNoise
+from mapfilter.tracks.imu_noise import ImuNoise
 
 _WALKING_MPS = 1.4
 _NOTHING: Mapping[str, float] = MappingProxyType({})
@@ -26,7 +26,7 @@ class Case:
     ----------
     imu : mapping of str to float
         Errors of dead reckoning in which the case differs from the simulated world, by their names
-        in :class:`mapfilter.simulation.imu.ImuNoise`.
+        in :class:`mapfilter.tracks.imu_noise.ImuNoise`.
     data_sheet : mapping of str to float
         What is stated of the dead reckoning, as options of
         :class:`mapfilter.positioning.bayes.options.BayesFilter`.

@@ -15,9 +15,9 @@ import numpy as np
 
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.positioning.filter import FilterOptions
-from mapfilter.simulation.imu import ImuNoise
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
+from mapfilter.tracks.imu_noise import ImuNoise
 
 AS_PREDICTED = "as_predicted"
 """The radio world in which each place is served by the cell predicted best there."""

@@ -1,0 +1,115 @@
+"""The motion of a journey: from the recording that tells it most directly, or from raw sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import pandas as pd
+
+from mapfilter.errors import InputError, fail
+from mapfilter.geodesy import wrap_rad
+from mapfilter.tracks.frame import Frame
+from mapfilter.tracks.imu_noise import ImuNoise
+from mapfilter.tracks.moved import by_compass, motion_from_course, motion_from_poses
+from mapfilter.tracks.pdr.options import WalkOptions
+from mapfilter.tracks.pdr.vehicle import reckon_odometry, reckon_velocity
+from mapfilter.tracks.pdr.walk import reckon_walk
+from mapfilter.tracks.readers.recording import Recording
+
+_PROVIDERS = ("gps", "fused", "flp", "network", "nlp")
+
+
+def measured_positions(recording: Recording) -> tuple[pd.DataFrame | None, str]:
+    """Return measured positions of the best provider, and a note on those of others."""
+    rows = recording.tables.get("positions", recording.tables.get("places"))
+    if rows is None or "provider" not in rows or rows["provider"].isna().all():
+        return rows, ""
+    named = rows["provider"].fillna("").str.lower()
+    found = [name for name in _PROVIDERS if (named == name).any()]
+    if not found or (named == found[0]).all():
+        return rows, ""
+    left = int((named != found[0]).sum())
+    kept = rows[named == found[0]].reset_index(drop=True)
+    return kept, f"{recording.path.name}: {left} fixes of other providers than {found[0]} left out"
+
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """A motion table, its errors and its rows' further columns, as far as there are any."""
+
+    rows: pd.DataFrame | None = None
+    imu: ImuNoise | None = None
+    reckoning: pd.DataFrame | None = None
+
+
+def journey_motion(
+    recordings: Sequence[Recording],
+    sensors: Mapping[str, pd.DataFrame],
+    frame: Frame,
+    notes: list[str],
+    *,
+    course_motion: bool,
+    walk: WalkOptions | None,
+) -> Moved:
+    """Return motion of the recording that tells it most directly; others stay sensors.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Without those of the truth, on one clock.
+    sensors : mapping of str to pandas.DataFrame
+        Tables of raw sensors of all of them.
+    frame : Frame
+    notes : list of str
+        Grows by what was found.
+    course_motion : bool
+        Whether speed and course of positions make motion where nothing better does.
+    walk : WalkOptions or None
+        How steps are made of a phone's sensors, None for no steps.
+    """
+    for name in ("motion", "odometry", "poses"):
+        having = [r for r in recordings if name in r.tables]
+        if not having:
+            continue
+        for other in having[1:]:
+            notes.append(f"{other.path.name}: {name} not used, {having[0].path.name} has it, too")
+        rows = having[0].tables[name]
+        if name == "odometry":
+            moved, imu, words = reckon_odometry(rows)
+            notes += words
+            return Moved(moved, imu)
+        poses = name == "poses"
+        moved = motion_from_poses(rows) if poses else by_compass(rows, frame.convergence_rad)
+        return Moved(moved.assign(heading_rad=wrap_rad(moved["heading_rad"])))
+    if course_motion:
+        return _course(recordings, sensors, frame, notes)
+    if walk is not None:
+        walked, words = reckon_walk(sensors, walk, frame.convergence_rad)
+        if walked is None:
+            notes += words
+            return Moved()
+        notes += walked.notes
+        return Moved(walked.motion, walked.imu, walked.reckoning)
+    return Moved()
+
+
+def _course(
+    recordings: Sequence[Recording],
+    sensors: Mapping[str, pd.DataFrame],
+    frame: Frame,
+    notes: list[str],
+) -> Moved:
+    """Return motion by speed and course of positions, and by a gyroscope where there is one."""
+    turned = reckon_velocity(sensors) if "gyroscope" in sensors else None
+    if turned is not None:
+        notes += ["motion from the speed of positions and the gyroscope", *turned[2]]
+        return Moved(turned[0], turned[1])
+    for recording in recordings:
+        rows, _ = measured_positions(recording)
+        if rows is not None and "course_deg" in rows and rows["course_deg"].notna().any():
+            notes.append(f"{recording.path.name}: motion from speed and course of its fixes")
+            return Moved(motion_from_course(rows, frame.convergence_rad))
+    names = ", ".join(r.path.name for r in recordings)
+    expected = "positions with speed and course"
+    raise fail(InputError, names, expected, "none", "leave out --course-motion")

@@ -1,0 +1,41 @@
+"""Options of dead reckoning from the sensors of a phone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from annotated_types import Ge, Le
+
+from mapfilter.options import Options, Positive
+
+Pose = Literal["auto", "device", "any"]
+"""What the direction of walking is taken from."""
+
+STEP_FACTOR = 0.405
+"""Weinberg's factor: metres by the fourth root of m/s²; of the walks in ``docs/howto/raw-imu``."""
+
+
+@dataclass(frozen=True, slots=True)
+class WalkOptions(Options):
+    """How steps and headings are made of the sensors of a phone.
+
+    Parameters
+    ----------
+    pose : {"auto", "device", "any"}
+        Direction of walking, seen from the phone: its top edge or, held upright, its back
+        ("device"); the direction in which the steps accelerate it ("any", in a pocket or a bag);
+        the first where both agree within 40 degrees, else the second ("auto").
+    declination_deg : float or None
+        Magnetic declination of the place: how far east of true north the compass points. Where
+        it is not given, magnetic north is taken for true north, with an error of 8 degrees.
+    field_ut : float
+        Size of the magnetic field of the place; 0 for the median of the recording.
+    step_factor : float
+        Length of a step by the fourth root of its vertical acceleration's range in m/s².
+    """
+
+    pose: Pose = "auto"
+    declination_deg: Annotated[float, Ge(-180), Le(180)] | None = None
+    field_ut: Annotated[float, Ge(0), Le(100)] = 0.0
+    step_factor: Positive = STEP_FACTOR

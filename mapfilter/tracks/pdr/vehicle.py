@@ -1,0 +1,175 @@
+"""Dead reckoning of vehicles: speed and yaw rate, the gyroscope's bias learnt while standing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+
+from mapfilter._types import Bools, Floats
+from mapfilter.geodesy import wrap_rad
+from mapfilter.tracks.imu_noise import ImuNoise
+from mapfilter.tracks.moved import motion_from_odometry
+from mapfilter.tracks.pdr.attitude import attitude
+from mapfilter.tracks.pdr.heading import WALK_RAD_PER_SQRT_S, Compass, YawOffset, yaw_offset
+from mapfilter.tracks.pdr.signals import inertial_signals
+
+_STANDING_MPS, _GNSS_STANDING_MPS = 0.05, 0.3
+_SETTLING_S = 0.4
+_MOST_BIAS_RADPS = 0.05
+_LEAST_RATE_SD_RADPS = 5e-4
+_COURSE_MPS = 2.0
+_SPEED_SD_MPS = 0.05
+_SCALE = 0.02
+_COURSE_BIAS_DEG = 2.0
+_UNSEEN_BIAS_DEG_PER_S = 0.05
+"""Error of the bias that standing does not show: of 0.02 deg/s a count, and of warming up."""
+
+
+def reckon_odometry(rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNoise, tuple[str, ...]]:
+    """Return the motion of a vehicle with a speedometer and a yaw rate, and its errors.
+
+    The gyroscope's bias is the yaw rate while the vehicle stands, smoothed over the recording;
+    without a yaw rate there are no turns.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        The table ``odometry`` of :data:`mapfilter.tracks.sensors.SENSOR_COLUMNS`.
+
+    Returns
+    -------
+    motion : pandas.DataFrame
+        time_s, step_m, heading_rad (NaN), turn_rad.
+    imu : ImuNoise
+    notes : tuple of str
+    """
+    rows = rows.drop_duplicates("time_s")
+    motion = motion_from_odometry(rows)
+    time_s = rows["time_s"].to_numpy(dtype=np.float64)
+    speed = rows["speed_mps"].to_numpy(dtype=np.float64)
+    rate = rows["yaw_rate_radps"].to_numpy(dtype=np.float64)
+    standing = _settled(time_s, np.abs(speed) < _STANDING_MPS)
+    found = _bias(time_s, rate, standing, None)
+    correction = np.interp(time_s, found.time_s, found.offset_rad)
+    turn = motion["turn_rad"].to_numpy() + np.diff(correction, prepend=correction[0])
+    notes = _notes(
+        found, int(np.sum(standing & np.isfinite(rate))), has_rate=bool(np.isfinite(rate).any())
+    )
+    speed_sd = rows["speed_sd_mps"].median() if "speed_sd_mps" in rows else np.nan
+    imu = _noise(time_s, found, float(speed_sd) if np.isfinite(speed_sd) else _SPEED_SD_MPS)
+    return motion.assign(turn_rad=turn), imu, notes
+
+
+def reckon_velocity(
+    sensors: Mapping[str, pd.DataFrame],
+) -> tuple[pd.DataFrame, ImuNoise, tuple[str, ...]] | None:
+    """Return the motion of a vehicle by the speed of a receiver and a gyroscope in any pose.
+
+    Headings are the gyroscope's; the receiver's course, where it drives faster than 2 m/s, gives
+    their offset, and standing the gyroscope's bias.
+
+    Parameters
+    ----------
+    sensors : mapping of str to pandas.DataFrame
+        ``velocity``, ``gyroscope`` and ``accelerometer`` of
+        :data:`mapfilter.tracks.sensors.SENSOR_COLUMNS`.
+
+    Returns
+    -------
+    motion, imu, notes
+        As of :func:`reckon_odometry`, with headings where there was a course; None where the
+        sensors do not cover the speeds.
+    """
+    stretches, _ = inertial_signals(sensors)
+    rows = sensors.get("velocity")
+    if rows is None or not stretches or stretches[0].rate_radps is None:
+        return None
+    signals = max(stretches, key=lambda part: len(part.time_s))
+    rows = rows.dropna(subset=["speed_mps"]).drop_duplicates("time_s").sort_values("time_s")
+    rows = rows[rows["time_s"].between(signals.time_s[0], signals.time_s[-1])]
+    if len(rows) < 2:
+        return None
+    time_s = rows["time_s"].to_numpy(dtype=np.float64)
+    speed = rows["speed_mps"].to_numpy(dtype=np.float64)
+    course = rows["heading_rad"].to_numpy(dtype=np.float64)
+    yaw = np.interp(time_s, signals.time_s, attitude(signals).yaw_rad)
+    rate = np.gradient(yaw, time_s)
+    standing = _settled(time_s, speed < _GNSS_STANDING_MPS)
+    driving = (speed > _COURSE_MPS) & np.isfinite(course)
+    found = _bias(time_s, rate, standing, np.where(driving, course - yaw, np.nan))
+    heading = yaw + np.interp(time_s, found.time_s, found.offset_rad)
+    lasted_s = np.diff(time_s)
+    step = np.concatenate([[0.0], lasted_s * (speed[1:] + speed[:-1]) / 2])
+    middle = np.concatenate([heading[:1], (heading[1:] + heading[:-1]) / 2])
+    motion = pd.DataFrame(
+        {
+            "time_s": time_s,
+            "step_m": step,
+            "heading_rad": wrap_rad(middle) if driving.any() else np.nan,
+            "turn_rad": wrap_rad(np.diff(heading, prepend=heading[0])),
+        }
+    )
+    notes = _notes(found, int(standing.sum()), has_rate=True)
+    return motion, _noise(time_s, found, _SPEED_SD_MPS), notes
+
+
+def _settled(time_s: Floats, standing: Bools) -> Bools:
+    """Return where a vehicle has stood for 0.4 s and still stands: its body has come to rest."""
+    moving_s = np.where(standing, -np.inf, time_s)
+    settled: Bools = standing & (time_s - np.maximum.accumulate(moving_s) > _SETTLING_S)
+    settled[:-1] &= standing[1:]
+    return settled
+
+
+def _bias(time_s: Floats, rate: Floats, standing: Bools, course_offset: Floats | None) -> YawOffset:
+    """Smooth the gyroscope's bias, and the offset between its yaw and the course."""
+    second = np.floor(time_s - time_s[0]).astype(np.int64)
+    count = int(second[-1]) + 1
+    rates, sds = np.full(count, np.nan), np.full(count, np.nan)
+    usable = standing & np.isfinite(rate) & (np.abs(rate) < _MOST_BIAS_RADPS)
+    if usable.any():
+        spread = 1.4826 * float(np.median(np.abs(rate[usable] - np.median(rate[usable]))))
+        for k in np.unique(second[usable]):
+            inside = rate[usable & (second == k)]
+            rates[k] = float(np.median(inside))
+            sds[k] = max(spread / np.sqrt(len(inside)), _LEAST_RATE_SD_RADPS)
+    north = np.full(count, np.nan)
+    if course_offset is not None:
+        known = np.isfinite(course_offset)
+        north[second[known]] = np.pi / 2 - course_offset[known]
+    missing = np.isnan(north)
+    none = np.full(count, np.nan)
+    centre_s = time_s[0] + np.arange(count) + 0.5
+    compass = Compass(centre_s, np.nan_to_num(north), none, none, missing)
+    return yaw_offset(compass, rates, sds, use_compass=not missing.all())
+
+
+def _notes(found: YawOffset, stood: int, *, has_rate: bool) -> tuple[str, ...]:
+    """Return what was learnt of the gyroscope's bias."""
+    if not has_rate:
+        return ("odometry: no yaw rate, steps only",)
+    bias = f"{np.degrees(found.rate_radps):+.3f} ± {np.degrees(found.rate_sd_radps):.3f} deg/s"
+    if not stood:
+        return ("yaw rate: the vehicle never stands, so that the bias could not be learnt",)
+    return (f"yaw rate: bias {bias}, of {stood} rows at standstill",)
+
+
+def _noise(time_s: Floats, found: YawOffset, speed_sd_mps: float) -> ImuNoise:
+    period_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
+    walk = float(np.degrees(WALK_RAD_PER_SQRT_S))
+    bias = float(np.hypot(np.degrees(found.rate_sd_radps), _UNSEEN_BIAS_DEG_PER_S))
+    with_course = bool(found.sd_rad[0] < np.pi)
+    lasting = float(np.degrees(np.sqrt(np.mean(found.sd_rad**2)))) if with_course else 0.0
+    return ImuNoise(
+        period_s=period_s,
+        sigma_trans_m=speed_sd_mps * period_s,
+        sigma_orient_deg=1.0,
+        bias_sd_deg=min(lasting + _COURSE_BIAS_DEG, 180.0) if with_course else 0.0,
+        drift_deg_per_sqrt_s=walk if with_course else 0.0,
+        scale=_SCALE,
+        turns="headings" if with_course else "gyro",
+        gyro_noise_deg_per_sqrt_s=0.0 if with_course else walk,
+        gyro_bias_deg_per_s=0.0 if with_course else bias,
+    )

@@ -1,0 +1,118 @@
+"""Sensors of a phone become motion: by ``convert``, by a configuration, and from Python."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from command_line import mapfilter
+from made_phone import Leg, walk_sensors
+
+import mapfilter as mf
+from mapfilter.config.load import load_config
+from mapfilter.tracks.sensors import read_sensors
+from mapfilter.workflows.logs import open_journey
+
+START_UTC_S = 1_777_629_600
+NAMES = {
+    "accelerometer": "TotalAcceleration",
+    "gyroscope": "Gyroscope",
+    "magnetometer": "MagnetometerUncalibrated",
+}
+PLACE = ("--crs", "EPSG:32635", "--origin", "60.17,24.94")
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    """The export of Sensor Logger of a walk of 75 steps: north-east, then south."""
+    folder = tmp_path_factory.mktemp("walk")
+    sensors, _, _ = walk_sensors((Leg(35, np.pi / 4, 3.0), Leg(40, -np.pi / 2)), start_s=0.0)
+    for sensor, file in NAMES.items():
+        rows = sensors[sensor]
+        columns = {"time": ((START_UTC_S + rows["time_s"]) * 1e9).round().astype("int64")}
+        columns["seconds_elapsed"] = rows["time_s"]
+        columns |= {axis: rows.iloc[:, "xyz".index(axis) + 1] for axis in "zyx"}
+        pd.DataFrame(columns).to_csv(folder / f"{file}.csv", index=False)
+    pressure = pd.DataFrame({"time": columns["time"], "seconds_elapsed": rows["time_s"]})
+    pressure.assign(relativeAltitude=0.0, pressure=1013.0).iloc[::10].to_csv(
+        folder / "Barometer.csv", index=False
+    )
+    return folder
+
+
+def headings_deg(log):
+    rows = log.motion[log.motion["step_m"] > 0]
+    return np.degrees(rows["heading_rad"].to_numpy())
+
+
+def test_steps_of_an_app_are_in_the_log(recording, tmp_path):
+    out = tmp_path / "log"
+    done = mapfilter("convert", recording, *PLACE, "--declination", "10", "--out", out)
+    assert done.code == 0
+    assert "motion: 75 steps" in done.out
+    assert "errors of motion: step" in done.out
+    log = mf.read_log(out)
+    # Headings are of the grid: the compass 10 degrees off, and its convergence of -1.8 there.
+    first, last = np.median(headings_deg(log)[:35]), np.median(headings_deg(log)[35:])
+    assert first == pytest.approx(45 - 10 - 1.8, abs=2)
+    assert last == pytest.approx(-90 - 10 - 1.8, abs=2)
+    assert log.imu.bias_sd_deg < 15
+    assert json.loads((out / "log.json").read_text())["imu"]["scale"] == log.imu.scale
+    reckoning = read_sensors(out)["reckoning"]
+    assert len(reckoning) == len(log.motion)
+    assert (reckoning["climb"] == 0).all()
+    assert reckoning["height_m"].abs().max() < 0.1
+
+
+def test_an_unknown_declination_is_an_error_of_headings(recording, tmp_path):
+    outs = {}
+    for name, args in (("unknown", ()), ("known", ("--declination", "0"))):
+        done = mapfilter("convert", recording, *PLACE, *args, "--out", tmp_path / name)
+        assert ("magnetic north taken for true north" in done.out) == (name == "unknown")
+        outs[name] = mf.read_log(tmp_path / name)
+    np.testing.assert_allclose(headings_deg(outs["unknown"]), headings_deg(outs["known"]))
+    known_sd = outs["known"].imu.bias_sd_deg
+    assert outs["unknown"].imu.bias_sd_deg == pytest.approx(np.hypot(known_sd, 8.0))
+
+
+def test_sensors_stay_sensors_without_steps(recording, tmp_path):
+    done = mapfilter("convert", recording, *PLACE, "--no-steps", "--out", tmp_path / "log")
+    assert done.code == 0
+    log = mf.read_log(tmp_path / "log")
+    assert log.motion.empty
+    assert log.imu is None
+    assert "reckoning" not in read_sensors(tmp_path / "log")
+
+
+def test_a_wrong_declination_or_pose_is_refused(recording, tmp_path):
+    for args, said in (
+        (("--declination", "400"), "degrees in -180..180, found 400"),
+        (("--declination", "nan"), "degrees in -180..180"),
+        (("--pose", "pocket"), "pocket"),
+    ):
+        done = mapfilter("convert", recording, *args, "--out", tmp_path / "log")
+        assert done.code == 2, args
+        assert said in done.err
+        assert not (tmp_path / "log").exists()
+
+
+def test_a_configuration_and_python_take_the_same_options(recording, tmp_path):
+    text = f"""
+    [track]
+    path = "{recording}"
+    origin = [24.94, 60.17]
+    walk = {{declination_deg = 10, step_factor = 0.5}}
+    """
+    (tmp_path / "walk.toml").write_text(text)
+    config = load_config(tmp_path / "walk.toml")
+    opened = open_journey(config, recording, crs="EPSG:32635")
+    options = mf.WalkOptions(declination_deg=10.0, step_factor=0.5)
+    log = mf.read_log(recording, crs="EPSG:32635", walk=options)
+    assert log.imu == opened.log.imu
+    np.testing.assert_allclose(log.motion["step_m"], opened.log.motion["step_m"])
+    # Without an origin the place, and with it the convergence, is unknown.
+    apart = (headings_deg(opened.log) - headings_deg(log) + 180) % 360 - 180
+    np.testing.assert_allclose(apart, -1.8, atol=0.1)
+    without = load_config(tmp_path / "walk.toml", ["track.steps=false"])
+    assert open_journey(without, recording, crs="EPSG:32635").log.motion.empty
+    assert mf.read_log(recording, walk=None).motion.empty
