@@ -81,6 +81,9 @@ def test_beside_an_alternative_the_null_hypothesis_starts_anew_and_goes_its_own_
         assert abs(after.log_odds - before.log_odds) < 3
         assert after.travelled_m < main.travelled_m
     assert pairs[0][1].log_odds < pairs[0][2].log_odds - 4
+    # Taking over, it comes along.
+    assert track.takeovers == 1
+    assert track.null.log_odds < 3
 
 
 def test_a_belief_does_not_converge_beside_a_null_hypothesis(area):
