@@ -55,7 +55,7 @@ def test_the_usual_options():
         "site_share": 0.6,
         "common_share": 0.2,
         "roughness": 1.0,
-        "fault_probability": 0.1,
+        "fault_probability": 0.06,
         "fault_m": 300.0,
         "absent_db": 3.0,
         "weight": 0.35,

@@ -87,8 +87,8 @@ class Town:
         return np.array(places)[: round(length_m / STEP_M)]
 
 
-def walk_log(town, seed, length_m=1200.0, *, turned_rad=0.0, levels=True):
-    """Return a log of a walk: headings of 6°, a bias of 5°, levels 6 dB off by the way."""
+def walk_log(town, seed, length_m=1200.0, *, turned_rad=0.0, levels=True, error_db=6.0):
+    """Return a log of a walk: headings of 6°, a bias of 5°, levels that err along the way."""
     rng = np.random.default_rng(seed)
     place_m = town.walk(length_m, rng)
     moved = np.diff(place_m, axis=0)
@@ -97,7 +97,7 @@ def walk_log(town, seed, length_m=1200.0, *, turned_rad=0.0, levels=True):
     heading += np.radians(rng.normal(0, 5) + rng.normal(0, 6, heading.size))
     step_m = np.hypot(*moved.T) * rng.normal(1, 0.02) + rng.normal(0, 0.3, heading.size)
     wave = 2 * np.pi * gone_m[:, None, None] / rng.uniform(60, 500, (6, 5)) + rng.uniform(0, 6, 5)
-    level = town.levels_dbm(place_m) + 6 * np.sqrt(2 / 5) * np.sin(wave).sum(axis=-1)
+    level = town.levels_dbm(place_m) + error_db * np.sqrt(2 / 5) * np.sin(wave).sum(axis=-1)
     level += rng.normal(0, 4) + rng.normal(0, 2, level.shape)
     rows = []
     for time_s, heard in enumerate(level.tolist()):

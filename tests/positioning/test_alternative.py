@@ -111,6 +111,17 @@ def test_a_found_belief_at_the_edge_is_outside_where_the_null_hypothesis_is_more
     assert after(Belief(CONVERGED), before=OUTSIDE, null=-4.9).status is OUTSIDE
 
 
+@pytest.mark.parametrize("status", [SEARCHING, CONVERGED, TRACKING])
+def test_a_belief_that_has_left_the_area_is_outside_however_probable(status):
+    gone = resolve_alternative(
+        RULES, SEARCHING, Belief(status), NullHypothesis(CALM), None, 200.0, at_edge=True, gone=True
+    )
+    assert (gone.status, gone.belief.status) == (OUTSIDE, status)
+    # When it comes back it goes on as it was.
+    back = after(gone.belief, before=OUTSIDE, at_edge=True)
+    assert back.status is status
+
+
 def test_a_search_is_outside_where_the_null_hypothesis_is_more_probable():
     assert after(Belief(SEARCHING), null=0.0).status is SEARCHING
     out = after(Belief(SEARCHING), null=0.1)
@@ -167,7 +178,7 @@ def test_lost_is_reported_until_a_belief_converges():
     assert after(Belief(CONVERGED), before=LOST, null=-4.0).status is LOST
 
 
-PRIOR = log(0.01 / 0.99)
+PRIOR = log(1 / 19)
 
 
 @pytest.mark.parametrize(("null", "reset"), [(8.0, PRIOR), (-2.0, PRIOR), (-9.0, -9.0)])
@@ -256,8 +267,8 @@ LEVELS = LevelReport(
 )
 
 
-def test_the_null_hypothesis_is_one_in_a_hundred_at_first():
-    assert NullHypothesis().probability == pytest.approx(0.01)
+def test_the_null_hypothesis_is_one_in_twenty_at_first():
+    assert NullHypothesis().probability == pytest.approx(0.05)
     assert NullHypothesis(log(3.0)).probability == pytest.approx(0.75)
 
 

@@ -93,7 +93,7 @@ def test_the_state_before_the_first_epoch():
     assert DeadReckoning() == DeadReckoning(travelled_m=0.0, east_m=0.0, north_m=0.0)
     state = BayesState()
     assert (state.belief, state.compass, state.status) == (None, True, Status.SEARCHING)
-    assert (state.null, state.reckoning) == (NullHypothesis(log(1 / 99)), DeadReckoning())
+    assert (state.null, state.reckoning) == (NullHypothesis(log(0.05 / 0.95)), DeadReckoning())
     assert (state.alternative, state.takeovers, state.sources) == (None, 0, {})
     assert np.isnan(state.heading_rad)
     assert TimingState() == (-inf, -inf)

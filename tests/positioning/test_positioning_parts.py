@@ -151,6 +151,21 @@ def test_what_lies_at_the_edge_of_an_area():
     assert not wide.at_edge(np.array([60.1, 1700.0]))
 
 
+def test_an_area_holds_a_belief_of_which_more_than_half_lies_inside():
+    small = small_area.make_area()
+    east, north = (
+        np.array([45.0, -1.0, 90.5, 45.0, 45.0], "f4"),
+        np.array([35, 35, 35, -1, 71], "f4"),
+    )
+    for beyond in range(1, 5):
+        for inside, expected in ((0.51, True), (0.49, False)):
+            weight = np.zeros(5, "f4")
+            weight[[0, beyond]] = inside, 1 - inside
+            assert small.holds(east, north, weight) is expected
+    corners = np.array([0.0, 90.0], "f4"), np.array([0.0, 70.0], "f4")
+    assert small.holds(*corners, np.array([0.5, 0.5], "f4"))
+
+
 def test_names_of_rows_and_the_spacing_before_the_start():
     assert name_of(ReportRow("serving", "A", 60, 1, -70.0, 0)) == "A"
     assert name_of(ReportRow("neighbour", None, 60, 1, -70.0, 0)) == "ARFCN 60, BSIC 1"
