@@ -57,8 +57,10 @@ def reckoning_errors(log: TrackLog) -> dict[str, float]:
     if imu is None:
         return {}
     steps = log.motion[["time_s", "step_m"]].dropna()
-    moving_s = float(np.diff(steps["time_s"])[steps["step_m"].to_numpy()[1:] > 0].sum())
-    speed_mps = float(steps["step_m"].abs().sum()) / moving_s if moving_s > 0 else nan
+    # How long the first step took is not known.
+    length_m, took_s = steps["step_m"].abs().to_numpy()[1:], np.diff(steps["time_s"])
+    moving_s = float(took_s[length_m > 0].sum())
+    speed_mps = float(length_m.sum()) / moving_s if moving_s > 0 else nan
     drift = imu.drift_deg_per_sqrt_s / speed_mps**0.5 if speed_mps > 0 else 0.0
     return {
         "step_sd_m": imu.sigma_trans_m,
