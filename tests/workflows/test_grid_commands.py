@@ -6,9 +6,16 @@ from command_line import assert_done, mapfilter, settings
 from mapfilter.positioning.estimate_store import read_estimate
 
 
+# The data sheet of the simulated unit, and a switch that a walk of 250 m allows.
+STATED = settings(
+    filter__bayes__heading_sd_deg=6, filter__bayes__bias_sd_deg=3, filter__bayes__scale=0.01,
+    filter__bayes__switch_mass=0.9, filter__bayes__switch_hold_m=10,
+)  # fmt: skip
+
+
 def test_a_replay_by_the_grid(world, tmp_path):
     out = tmp_path / "out"
-    given = ["--db", world.database, "--log", world.journeys / "journey-0000-draw-000"]
+    given = ["--db", world.database, "--log", world.journeys / "journey-0000-draw-000", *STATED]
     found = assert_done(
         mapfilter("replay", *given, "--filter", "grid", "--out", out, "--json")
     ).json
@@ -23,7 +30,16 @@ def test_a_replay_by_the_grid(world, tmp_path):
 
 
 def test_a_benchmark_of_the_grid(world, tmp_path):
-    given = [*settings(area__resolution_m=10), "--filter", "grid", "--runs", 1, "--workers", 1]
+    given = [
+        *settings(area__resolution_m=10),
+        "--filter",
+        "grid",
+        "--runs",
+        1,
+        "--workers",
+        1,
+        *STATED,
+    ]
     given += ["--world", "easy", *settings(prediction__shadowing_db=6, journeys__length_m=1940)]
     cases = ["--case", "levels-6", "--case", "smooth-6"]
     told = mapfilter(
@@ -37,7 +53,7 @@ def test_a_benchmark_of_the_grid(world, tmp_path):
 
 
 def test_the_grid_smooths_a_track(world, tmp_path):
-    given = ["--db", world.database, "--log", world.journeys / "journey-0000-draw-000"]
+    given = ["--db", world.database, "--log", world.journeys / "journey-0000-draw-000", *STATED]
     given += ["--filter", "grid", "--out", tmp_path, "--json"]
     plain = assert_done(mapfilter("replay", *given)).json
     first = read_estimate(tmp_path / "estimate.parquet")
