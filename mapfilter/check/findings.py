@@ -41,6 +41,9 @@ REMEDIES = {
     "half-pixel-shift": "Find out whether the exporter wrote centres for corners of pixels; if so, "
     "move the raster by half a pixel.",
     "identical-rasters": "Export the raster of each cell anew; one was copied over the other.",
+    "journeys-disagree": "Look at the cell; mapfilter learn proposes a patch with the evidence.",
+    "journeys-off-map": "Add the way to the map; mapfilter learn proposes a patch.",
+    "journeys-unlisted-cell": "Add the cell to the plan, and build again.",
     "landuse-classes": "Add the classes to the table, or export the raster without blending.",
     "landuse-invalid": "Correct the land-use raster or its table.",
     "landuse-outside": "Take the land-use raster of this area.",

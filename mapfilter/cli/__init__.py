@@ -16,6 +16,7 @@ from mapfilter.cli.chain import (
     demo,
     export,
     info,
+    locate,
     merge,
     predict,
     replay,
@@ -23,6 +24,7 @@ from mapfilter.cli.chain import (
 )
 from mapfilter.cli.convert import convert
 from mapfilter.cli.experiments import bench, evaluate, reproduce, sweep
+from mapfilter.cli.learning import learn
 from mapfilter.cli.options import DONE
 from mapfilter.workflows.terminal import guarded
 
@@ -48,11 +50,13 @@ _COMMANDS: tuple[tuple[Callable[..., None], str, str], ...] = (
     (bound, "area/database --out bound", "howto/where-will-it-work.rst"),
     (convert, "walk.txt --truth watch.gpx --out walk", "howto/recordings.rst"),
     (simulate, "-c area.toml --out area", "explanation/simulated-worlds.rst"),
+    (locate, "--db fingerprints --log walk --out located", "howto/single-reports.rst"),
     (
         replay,
         "--db area/database --log walk --filter bayes --out located",
         "howto/which-filter.rst",
     ),
+    (learn, "area/database --logs walks --out learned", "tutorial/learn.rst"),
     (sweep, "-c sweep.toml --out sweep --workers 4", "howto/sweep.rst"),
     (reproduce, "khalaf-allah-2007 --trials 20 --out paper", "explanation/success-statistics.rst"),
     (evaluate, "global-positioning --case levels-6 --runs 5", "explanation/simulated-worlds.rst"),

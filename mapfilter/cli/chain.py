@@ -25,9 +25,11 @@ from mapfilter.cli.options import (
     WorkersOption,
     check_custom_filter,
     given_path,
+    refuse,
     seeded,
     toml,
 )
+from mapfilter.errors import ConfigError, fail
 from mapfilter.tracks.schema import Without
 from mapfilter.workflows.terminal import print_message, print_result, progress_bar
 
@@ -35,15 +37,35 @@ from mapfilter.workflows.terminal import print_message, print_result, progress_b
 def check(
     config: ConfigOption = None,
     settings: SetOption = None,
+    logs: Annotated[
+        Path | None,
+        typer.Option(
+            "--logs", metavar="LOGS", help="Journeys: names suspects of the database by them."
+        ),
+    ] = None,
+    database: Annotated[
+        Path | None,
+        typer.Option("--db", metavar="DB", help="With --logs: the database; then only it."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Check all inputs together before anything runs; exit code 2 if something is wrong."""
-    from mapfilter.check.findings import paragraphs
+    from mapfilter.check.findings import CheckResult, paragraphs
     from mapfilter.config.load import load_config
     from mapfilter.workflows.check import run_check
+    from mapfilter.workflows.check_suspects import checked_together, run_check_suspects
 
+    if logs is None:
+        refuse({"--db": database}, "check without --logs")
+    given = list(settings or ())
+    for key, value in (("database.path", database), ("track.path", logs)):
+        if value is not None:
+            given.append(f"{key}={toml(str(value))}")
+    loaded = load_config(config, given)
     with progress_bar("check") as progress:
-        result = run_check(load_config(config, settings or ()), progress)
+        result = CheckResult(True, ()) if database is not None else run_check(loaded, progress)
+        if logs is not None:
+            result = checked_together(result, run_check_suspects(loaded, progress))
     if as_json:
         print_result(result, as_json)
     else:
@@ -203,6 +225,59 @@ def simulate(
     with progress_bar("simulate") as progress:
         result = run_simulate(load_config(config, settings, out=out), progress)
     print_result(result, as_json)
+
+
+def locate(
+    database: Annotated[
+        Path,
+        typer.Option(
+            "--db",
+            metavar="DB",
+            help="Database; or fingerprints: logs or recordings with positions, or a table.",
+            callback=given_path,
+        ),
+    ],
+    log: Annotated[
+        Path,
+        typer.Option(
+            "--log", metavar="LOG", help="A log, recording, table, or folder.", callback=given_path
+        ),
+    ],
+    method: Annotated[
+        str,
+        typer.Option("--method", metavar="NAME", help="auto, knn, probabilistic, gp or centroid."),
+    ] = "auto",
+    crs: Annotated[
+        str | None, typer.Option("--crs", metavar="EPSG", help="CRS of metres in a table.")
+    ] = None,
+    level_error_db: Annotated[
+        float,
+        typer.Option(
+            "--level-error", metavar="DB", help="Standard deviation of levels of a database."
+        ),
+    ] = 6.0,
+    out: OutOption = None,
+    seed: SeedOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Locate each report of a log by itself, with a calibrated region."""
+    from mapfilter.workflows.locate import run_locate
+
+    if not 0 < level_error_db <= 60:
+        raise fail(ConfigError, "--level-error", "dB > 0, at most 60", level_error_db)
+    folder = (out or Path("located")).absolute()
+    with progress_bar("locate") as progress:
+        result = run_locate(
+            database,
+            log,
+            folder,
+            method=method,
+            crs=crs,
+            level_error_db=level_error_db,
+            seed=seed or 0,
+            progress=progress,
+        )
+    print_result(result.shown, as_json)
 
 
 def replay(

@@ -22,7 +22,7 @@ CELLS = "cells.parquet"
 POINTS = "points.parquet"
 
 _Layers = Literal["map", "roads", "tracks", "buildings", "water", "landuse", "landuse_table"]
-InputRole = _Layers | Literal["plan", "rasters", "database"]
+InputRole = _Layers | Literal["plan", "rasters", "database", "patch"]
 
 _LONGEST_NAME = 200
 _DAMAGED = "edited or damaged"

@@ -43,7 +43,7 @@ _F = np.float32
 _ROUGHNESS_M = 35.0
 _LOG_ODDS, _MOST_LOG_ODDS = 20.0, 8.0
 _ABSENT_BY_FAULT = log(0.7)
-_OTHER_DBM, _OTHER_SD_DB, _OTHER_M, _OTHER_WHITE_DB = -90.0, 15.0, 200.0, 4.0
+_OTHER_DBM, _OTHER_SD_DB, _OTHER_M = -90.0, 15.0, 150.0
 _NEGLIGIBLE = 1e-3
 _STEPS_PER_SD, _REACH_SD = 32, 8
 
@@ -300,21 +300,30 @@ class LevelMemory:
             other_db2=_OTHER_SD_DB**2 + (self.other_db2 - _OTHER_SD_DB**2) * keep**2,
         ), decay.astype(np.float32)
 
-    def updated(self, report: LevelReport) -> tuple[LevelMemory, LevelTerms]:
-        """Return the memory after the levels of a report whose cells have slots, and its terms."""
+    def updated(
+        self, report: LevelReport, rough_db2: Floats | None = None
+    ) -> tuple[LevelMemory, LevelTerms]:
+        """Return the memory after the levels of a report whose cells have slots, and its terms.
+
+        Where the prediction is wrong about a cell, its level is what it was before, with the same
+        fast and white errors as else, and with ``rough_db2`` (K,), what the roughness of the
+        prediction adds to the variance on average.
+        """
         slot_of, slots = self.slot_of, self.slots
         slot = np.array([slot_of[band] for band in report.cell.tolist()], dtype=np.int32)
         covariance = self.covariance_db2.copy()
         white_db2 = self.errors.white_db**2 + report.offset_db**2
         gain = np.zeros((slot.size, 2 * slots + 1))
         variance, other = np.zeros(slot.size), np.zeros(slot.size)
+        rough_db2 = np.zeros(slot.size) if rough_db2 is None else rough_db2
+        other_white_db2 = white_db2 + 0.5 * self.errors.fast_db**2 + rough_db2
         other_dbm, other_db2, used = self.other_dbm.copy(), self.other_db2.copy(), self.used.copy()
         for k, (s, level_dbm) in enumerate(zip(slot, report.level_dbm, strict=True)):
             column = covariance[:, s] + covariance[:, slots + s] + covariance[:, -1]
             variance[k] = column[s] + column[slots + s] + column[-1] + white_db2
             gain[k] = column / variance[k]
             covariance -= np.outer(gain[k], column)
-            off_dbm, off_db2 = level_dbm - other_dbm[s], other_db2[s] + _OTHER_WHITE_DB**2
+            off_dbm, off_db2 = level_dbm - other_dbm[s], other_db2[s] + other_white_db2[k]
             other[k] = -0.5 * off_dbm**2 / off_db2 - 0.5 * log(off_db2)
             other_dbm[s] += other_db2[s] / off_db2 * off_dbm
             other_db2[s] *= 1 - other_db2[s] / off_db2

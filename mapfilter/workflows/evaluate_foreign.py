@@ -29,7 +29,7 @@ from mapfilter.experiments.benchmarks.foreign import (
     write_ground,
 )
 from mapfilter.experiments.benchmarks.global_positioning import Batch
-from mapfilter.experiments.benchmarks.world import without_ways
+from mapfilter.experiments.benchmarks.world import ways_gone, without_ways
 from mapfilter.experiments.benchmarks.world_cases import CASES_OF, OtherWorld
 from mapfilter.experiments.sweep.world import SweepWorld, write_world
 from mapfilter.propagation.models import PredictionModel
@@ -209,7 +209,8 @@ def write_journeys(world: ForeignWorld, case: str, count: int, folder: Path) -> 
     Returns
     -------
     GivenInputs
-        What is wrong with the database, to compare findings with.
+        What is wrong with the database, to compare findings with; the ways that it lacks stand in
+        :func:`missing_ways_file`.
 
     Raises
     ------
@@ -222,6 +223,14 @@ def write_journeys(world: ForeignWorld, case: str, count: int, folder: Path) -> 
             _, log = RouteRuns(world, number * VARIANTS).run(CASES_OF[world.name][case])
             write_log(log, into / f"journey-{number:04d}")
     return world.given(CASES_OF[world.name][case], 0)
+
+
+def missing_ways_file(database: Path) -> Path:
+    """Return the file beside a database with the ids of the ways that it lacks, ``missing``.
+
+    The database without faults has the points of these ways.
+    """
+    return database.with_name(f"{database.name}-ways.json")
 
 
 def open_ground(world: World) -> OpenGround:
@@ -245,9 +254,12 @@ def _database(world: World, given: GivenInputs, folder: Path, seed: int, variant
     write_rasters(rasters_path, lattice, shifted, given.plan.ids)
     routes = world.routes
     if given.missing_ways > 0:
-        rng = named_rng(seed, "missing ways", str(variant))
-        half_m = config.roads.half_width_m
-        routes = without_ways(routes, world.ways, given.missing_ways, half_m, rng)
+        half_m, share = config.roads.half_width_m, given.missing_ways
+        gone = ways_gone(world.ways, share, named_rng(seed, "missing ways", str(variant)))
+        routes = without_ways(
+            routes, world.ways, share, half_m, named_rng(seed, "missing ways", str(variant))
+        )
+        write_json(missing_ways_file(folder), {"missing": gone.tolist()})
     database = build(
         open_rasters(rasters_path),
         given.plan,

@@ -14,7 +14,13 @@ from mapfilter.experiments.benchmarks.global_positioning import Batch, run_bench
 from mapfilter.experiments.benchmarks.results import summarise
 from mapfilter.experiments.benchmarks.world_cases import CASES_OF, FOREIGN, HARSH
 from mapfilter.tracks.store import read_log
-from mapfilter.workflows.evaluate_foreign import load_foreign, prepare, run_foreign, write_journeys
+from mapfilter.workflows.evaluate_foreign import (
+    load_foreign,
+    missing_ways_file,
+    prepare,
+    run_foreign,
+    write_journeys,
+)
 from mapfilter.workflows.world import World, filter_choice
 
 SMALL = [
@@ -154,6 +160,11 @@ def test_missing_ways_are_missing_in_the_database_only(made):
     )
     assert len(less.points()) <= len(full.points())
     assert len(np.unique(less.points().way_id)) <= len(np.unique(full.points().way_id))
+    file = missing_ways_file(world.folder / "database-ways-missing-0")
+    missing = json.loads(file.read_text())["missing"]
+    gone = set(full.points().way_id.tolist()) - set(less.points().way_id.tolist())
+    assert gone - {0} <= set(missing)
+    assert not set(missing) & set(less.points().way_id.tolist())
 
 
 def test_the_other_city_is_far_away(made):

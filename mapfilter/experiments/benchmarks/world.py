@@ -16,6 +16,7 @@ import shapely
 from shapely import STRtree
 
 from mapfilter._io import atomic_file, sha256_file
+from mapfilter._types import Ints
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.sweep.world import SweepWorld, opened_filter, opened_world
 from mapfilter.gnss.sky import Skyline
@@ -119,6 +120,12 @@ def _skyline(path: Path, sha256: str) -> Skyline | None:  # noqa: ARG001
     return Skyline(footprints, table["height_m"].to_numpy()) if len(footprints) else None
 
 
+def ways_gone(ways: Ways, share: float, rng: np.random.Generator) -> Ints:
+    """Draw the ids of the ways that are not known, each with this probability."""
+    ids = np.unique(ways.way_id)
+    return np.asarray(ids[rng.random(ids.size) < share])
+
+
 def without_ways(
     routes: RouteLattice, ways: Ways, share: float, half_width_m: float, rng: np.random.Generator
 ) -> RouteLattice:
@@ -134,8 +141,7 @@ def without_ways(
     share : float
         Each way is missing with this probability; parts of one way go together.
     """
-    ids = np.unique(ways.way_id)
-    gone = ids[rng.random(ids.size) < share]
+    gone = ways_gone(ways, share, rng)
     kept_way = ~np.isin(ways.way_id, gone)
     kept = ~np.isin(routes.way_id, gone) | routes.on_square
     way_id, distance_m = routes.way_id.copy(), routes.distance_to_way_m.copy()

@@ -95,7 +95,7 @@ class AlternativeRules(Options):
         Lead over its alternative, as a log Bayes factor, that a belief needs to converge.
     """
 
-    start_log_odds: float = -4.0
+    start_log_odds: float = -1.0
     search_threshold: float = 4.0
     lost_threshold: float = 8.0
     confirm_mass: Share = 0.9

@@ -278,12 +278,14 @@ class BayesModel:
             memory, decay = memory.after(length_m)
             keep = exp(-length_m / errors.fault_m)
             kept = decayed(cloud.kept, decay, keep, errors.fault_log_odds)
-        cells = np.concatenate([report.cell, self._expected(pixel, memory, report)])
+        # Cells that nobody expects say nothing, neither for the belief nor against it.
+        report = report._replace(absent=self._expected(pixel, report))
+        cells = np.concatenate([report.cell, report.absent])
         memory, kept = memory.with_cells(cells[: memory.slots], kept)
         if report.cell.size > memory.slots:
             slotted = np.isin(report.cell, memory.band)
             report = report._replace(cell=report.cell[slotted], level_dbm=report.level_dbm[slotted])
-        memory, terms = memory.updated(report)
+        memory, terms = memory.updated(report, self._mean_rough_db2(pixel, report.cell))
         absent = memory.absence(report)
         flat, rough, bands = area.flat_level_dbm, self.rough_db(), self._bands
         share, table = errors.roughness, self._bound_table
@@ -296,18 +298,27 @@ class BayesModel:
         memory = replace(memory, other_log_likelihood=other)
         return Cloud(cloud.state, kept, memory)
 
-    def _expected(self, pixel: Ints32, memory: LevelMemory, report: LevelReport) -> Ints32:
+    def _mean_rough_db2(self, pixel: Ints32, cell: Ints32) -> Floats:
+        """Return the mean variance that the roughness of the prediction adds, for each cell."""
+        rough_db = 0.1 * self.rough_db().reshape(-1, self._bands)[_sample(pixel)][:, cell]
+        return np.asarray(self.evidence.levels.roughness * np.mean(rough_db**2, axis=0))
+
+    def _expected(self, pixel: Ints32, report: LevelReport) -> Ints32:
         """Return absent cells that hypotheses expect to be in the report, most expected first."""
         absent = report.absent
-        if len(self.area.cell_ids) <= memory.slots or not absent.size:
+        if not absent.size:
             return absent
-        # Some hypotheses stand for all of them.
-        some = pixel[:: max(pixel.size // _SAMPLE, 1)]
+        some = _sample(pixel)
         level = self.area.level_dbm.reshape(-1, self._bands)[some][:, absent]
         expected = np.mean(level > report.limit_dbm, axis=0)
         order = np.argsort(-expected, kind="stable")
         found: Ints32 = absent[order[expected[order] > _LEAST_EXPECTED]]
         return found
+
+
+def _sample(pixel: Ints32) -> Ints32:
+    """Return the pixels of some hypotheses, which stand for all of them."""
+    return pixel[:: max(pixel.size // _SAMPLE, 1)]
 
 
 def _new(state: Floats32) -> Cloud:

@@ -1,0 +1,1 @@
+"""What journeys tell about a database: faults of its cells, missing ways, noise of the phone."""

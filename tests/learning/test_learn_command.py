@@ -1,0 +1,247 @@
+"""``mapfilter learn`` and ``check --logs`` from end to end, and what they refuse."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from learning_world import CRS, database_of, log_of, plan_of
+from typer.testing import CliRunner
+
+from mapfilter.cli import app
+from mapfilter.config.load import load_config
+from mapfilter.database.store import open_database
+from mapfilter.errors import ConfigError, InputError, MapfilterError
+from mapfilter.learning.blank import EVERYWHERE, blank_database, blank_log
+from mapfilter.learning.patch import read_patch
+from mapfilter.radio.cells import CellPlan
+from mapfilter.tracks.log import leave_out, make_log
+from mapfilter.tracks.store import write_log
+from mapfilter.workflows import learn_study
+from mapfilter.workflows.check_suspects import run_check_suspects
+from mapfilter.workflows.learn import run_learn
+
+FEW = ["filter.bayes.max_particles=3000", "filter.bayes.min_search_particles=3000"]
+
+
+def configured(database, logs):
+    paths = [f"database.path={json.dumps(str(database))}", f"track.path={json.dumps(str(logs))}"]
+    return load_config(None, [*paths, *FEW])
+
+
+@pytest.fixture(scope="module")
+def faulty(tmp_path_factory):
+    """A database with a cell 12 dB too weak and a silent one, and eight journeys with truth."""
+    folder = tmp_path_factory.mktemp("learn")
+    given = plan_of()
+    true = CellPlan(
+        CRS,
+        tuple(replace(c, eirp_dbm=c.eirp_dbm + 12.0 * (c.id == "S2B")) for c in given.cells),
+    )
+    database_of(given, folder / "given")
+    rng = np.random.default_rng(3)
+    for number in range(8):
+        write_log(log_of(true, rng, silent=("S1C",), blocks=20), folder / "logs" / f"j{number}")
+    return folder / "given" / "database", folder / "logs"
+
+
+@pytest.fixture(scope="module")
+def taught(faulty, tmp_path_factory):
+    out = tmp_path_factory.mktemp("taught") / "out"
+    return run_learn(configured(*faulty), out, accept=True), out
+
+
+def found(result):
+    return {(row["kind"], row["cell"]) for row in result.findings}
+
+
+def test_faults_are_named_with_truth(taught):
+    result, _ = taught
+    assert found(result) == {("offset", "S2B"), ("dead", "S1C")}
+    assert (result.logs, result.used) == (8, 8)
+
+
+def test_the_accepted_database_is_another_one_and_the_report_lies_beside_it(taught, faulty):
+    result, out = taught
+    other = open_database(out, verify="full")
+    assert result.database == out
+    assert "S1C" not in other.plan
+    before = open_database(faulty[0], verify="full").plan["S2B"].eirp_dbm
+    assert other.plan["S2B"].eirp_dbm - before == pytest.approx(12.0, abs=2.5)
+    names = {file.name for file in result.out.iterdir()}
+    assert names == {"patch.toml", "findings.csv", "cells.csv", "journeys.csv", "learned.png"}
+    assert {entry["role"] for entry in other.manifest["inputs"]} == {"database", "patch"}
+
+
+def test_tables_and_patch_say_the_same(taught):
+    result, _ = taught
+    table = pd.read_csv(result.out / "findings.csv")
+    patch = read_patch(result.out / "patch.toml")
+    assert table["kind"].tolist() == [change.kind for change in patch.changes]
+    assert (table["log_bayes_factor"] > 3).all()
+    cells = pd.read_csv(result.out / "cells.csv").set_index("cell")
+    assert cells.loc["S1C", "received"] == 0
+    assert cells.loc["S2B", "offset_db"] == pytest.approx(12.0, abs=2.5)
+    journeys = pd.read_csv(result.out / "journeys.csv")
+    assert journeys["log"].tolist() == [f"j{n}" for n in range(8)]
+    assert (journeys["trust"] > 0.9).all()
+
+
+def test_without_truth_and_interrupted_it_goes_on_where_it_was(faulty, tmp_path, monkeypatch):
+    config, out = configured(*faulty), tmp_path / "out"
+    locate, calls = learn_study.locate, []
+
+    def interrupted(*args):
+        calls.append(args)
+        if len(calls) == 4:
+            raise KeyboardInterrupt
+        return locate(*args)
+
+    monkeypatch.setattr(learn_study, "locate", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run_learn(config, out, use_truth=False)
+    shown = []
+    result = run_learn(
+        config, out, use_truth=False, resume=True, progress=lambda *at: shown.append(at)
+    )
+    # Three were kept. In a town of equal blocks the map alone places none of them: a third pass.
+    assert len(calls) == 4 + 5 + 8 + 8
+    assert "as it is" in result.notes[0]
+    assert shown[-1] == (24, 24)
+    assert [done for done, _ in shown] == sorted(done for done, _ in shown)
+    assert {("dead", "S1C")} <= found(result) <= {("offset", "S2B"), ("dead", "S1C")}
+    assert not list(tmp_path.glob(".out*"))
+    assert result.database is None
+
+
+def test_suspects_are_named_by_logs_alone(faulty, monkeypatch):
+    # With truth in place of tracks, which are tested above, the check is quick.
+    real = learn_study.study_logs
+    monkeypatch.setattr(
+        "mapfilter.workflows.check_suspects.study_logs",
+        lambda *args, **named: real(*args, **(named | {"use_truth": True})),
+    )
+    result = run_check_suspects(configured(*faulty))
+    assert result.ok
+    told = {finding.where: finding.evidence for finding in result.findings}
+    assert set(told) == {"cells S2B", "cells S1C"}
+    assert "+1" in told["cells S2B"]
+    assert "log Bayes factor" in told["cells S1C"]
+
+
+def test_a_cell_that_the_database_lacks_is_named(faulty, tmp_path):
+    database, logs = faulty
+    plan = open_database(database).plan
+    less = CellPlan(CRS, tuple(c for c in plan.cells if c.id != "I1"))
+    database_of(less, tmp_path / "less")
+    result = run_learn(configured(tmp_path / "less" / "database", logs), tmp_path / "out")
+    unlisted = [row for row in result.findings if row["kind"] == "unlisted"]
+    assert [row["cell"] for row in unlisted] == ["I1"]
+    cell = plan["I1"]
+    assert (
+        np.hypot(unlisted[0]["east_m"] - cell.east_m, unlisted[0]["north_m"] - cell.north_m) < 300
+    )
+
+
+def write(folder, log):
+    write_log(log, folder / "one")
+    return folder
+
+
+def test_logs_of_another_crs_are_refused(faulty, tmp_path):
+    logs = write(tmp_path / "logs", log_of(plan_of(), np.random.default_rng(0), crs="EPSG:32633"))
+    with pytest.raises(InputError, match="EPSG:32632"):
+        run_learn(configured(faulty[0], logs), tmp_path / "out")
+    assert not (tmp_path / "out" / "patch.toml").exists()
+
+
+@pytest.mark.parametrize("kind", ["no levels", "no radio"])
+def test_logs_without_levels_are_refused(faulty, tmp_path, kind):
+    log = log_of(plan_of(), np.random.default_rng(0), levels=False)
+    logs = write(tmp_path / "logs", leave_out(log, ["radio"]) if kind == "no radio" else log)
+    with pytest.raises(InputError, match="levels of cells"):
+        run_learn(configured(faulty[0], logs), tmp_path / "out")
+
+
+def test_empty_logs_and_empty_folders_are_refused(faulty, tmp_path):
+    logs = write(tmp_path / "logs", make_log(CRS))
+    with pytest.raises(InputError, match="levels"):
+        run_learn(configured(faulty[0], logs), tmp_path / "out")
+    (tmp_path / "none").mkdir()
+    with pytest.raises(InputError, match="track log"):
+        run_learn(configured(faulty[0], tmp_path / "none"), tmp_path / "out")
+
+
+def test_the_database_itself_is_no_output(faulty):
+    database, logs = faulty
+    with pytest.raises(ConfigError, match="in place"):
+        run_learn(configured(database, logs), database, accept=True)
+
+
+def test_other_filters_are_refused(faulty, tmp_path):
+    config = load_config(
+        None,
+        [
+            f"database.path={json.dumps(str(faulty[0]))}",
+            f"track.path={json.dumps(str(faulty[1]))}",
+            'filter.name="candidate"',
+        ],
+    )
+    with pytest.raises(ConfigError, match=r"filter\.name"):
+        run_learn(config, tmp_path / "out")
+
+
+def test_a_blank_database_has_the_points_and_no_radio(faulty, tmp_path):
+    database = open_database(faulty[0])
+    blank = blank_database(database, tmp_path / "blank")
+    assert np.array_equal(blank.points().point, database.points().point)
+    assert np.ptp(blank.field().level_dbm) == 0.0
+    log = blank_log(log_of(plan_of(), np.random.default_rng(0)))
+    assert set(log.radio["cell"]) == {EVERYWHERE}
+    assert log.radio["level_dbm"].isna().all()
+    assert log.radio["time_s"].is_unique
+    assert Path(blank.path).name == "blank"
+
+
+def told(*args):
+    return CliRunner().invoke(app, [str(arg) for arg in args])
+
+
+def test_the_command_line_prints_findings_and_accepts_the_patch(faulty, tmp_path):
+    database, logs = faulty
+    shown = told("learn", database, "--logs", logs, "--out", tmp_path / "learned", "--json")
+    assert shown.exit_code == 0, shown.output
+    found = json.loads(shown.stdout.splitlines()[-1])
+    assert {one["kind"] for one in found["findings"]} == {"offset", "dead"}
+    assert all(one["journeys"] == 8 for one in found["findings"])
+    patch = tmp_path / "learned" / "patch.toml"
+    patch.write_text(patch.read_text().replace("accept = true", "accept = false", 1))
+    out = tmp_path / "after"
+    shown = told("learn", database, "--accept", patch, "--out", out, "--json")
+    accepted = json.loads(shown.stdout.splitlines()[-1])
+    assert (accepted["changes"], accepted["refused"]) == (1, 1)
+    assert accepted["notes"] == []
+    assert open_database(out).manifest["inputs"][-1]["name"] == "patch.toml"
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (("learn", "DB"), "--logs LOGS, or --accept PATCH"),
+        (("learn", "DB", "--accept", "all"), "--logs LOGS, or --accept PATCH"),
+        (("learn", "DB", "--logs", "LOGS", "--accept", "patch.toml"), "all, with --logs"),
+        (("learn", "nowhere", "--logs", "LOGS"), "a database folder"),
+        (("learn", "DB", "--accept", "nowhere.toml"), "a readable file"),
+        (("learn", "DB", "--logs", "nowhere"), "a track log"),
+        (("check", "--db", "DB"), "--db"),
+    ],
+)
+def test_wrong_commands_are_refused(faulty, tmp_path, monkeypatch, args, message):
+    database, logs = faulty
+    monkeypatch.chdir(tmp_path)
+    names = {"DB": database, "LOGS": logs}
+    with pytest.raises(MapfilterError, match=message):
+        raise told(*(names.get(arg, arg) for arg in args)).exception
+    assert not (tmp_path / "learned" / "patch.toml").exists()

@@ -1,0 +1,121 @@
+"""Visits of reports: medians, bounds, and which cell a neighbour is."""
+
+import numpy as np
+import pytest
+from learning_world import CRS, EAST, NORTH
+
+from mapfilter.database.radioroutes import RadioField
+from mapfilter.geodesy import Lattice
+from mapfilter.learning.learn import unlisted_cells
+from mapfilter.learning.visits import Placed, predicted_dbm, visits_of
+from mapfilter.positioning.epochs import Epoch, ReportRow
+from mapfilter.radio.cells import Cell, CellPlan
+
+LATTICE = Lattice(CRS, EAST, NORTH + 400.0, 20.0, 20, 20)
+
+
+def cell(name, arfcn, bsic=0):
+    return Cell(name, name, EAST, NORTH, 30.0, None, 50.0, 1800.0, "omni", arfcn=arfcn, bsic=bsic)
+
+
+PLAN = CellPlan(CRS, (cell("A", 1), cell("B", 2), cell("C", 3), cell("D", 3)))
+
+
+def field(levels=(-70.0, -80.0, -75.0, -100.0)):
+    grid = np.broadcast_to(np.array(levels, np.float32), (20, 20, 4)).copy()
+    flat = np.zeros((20, 20))
+    return RadioField(
+        LATTICE, PLAN.ids, grid, flat.astype(np.float32), flat.astype(np.int64), flat == 0
+    )
+
+
+def serving(name, level):
+    return ReportRow("serving", name, None, None, level, 0)
+
+
+def neighbour(arfcn, level, censored=0):
+    return ReportRow("neighbour", None, arfcn, 0, level, censored)
+
+
+def journey(*reports, east=EAST + 50.0, radius=10.0):
+    epochs = [Epoch(float(i), radio=rows) for i, rows in enumerate(reports)]
+    count = len(epochs)
+    return Placed(
+        epochs, np.full(count, east), np.full(count, NORTH + 50.0), np.full(count, radius)
+    )
+
+
+def table(*journeys, of=None):
+    found = visits_of(journeys, PLAN, of or field())
+    rows = zip(found.journey, found.cell, found.level_dbm, found.received, strict=True)
+    return {(int(j), PLAN.ids[c]): (float(level), bool(heard)) for j, c, level, heard in rows}
+
+
+def test_the_level_of_a_visit_is_the_median_of_its_reports():
+    reports = [(serving("A", level),) for level in (-70.0, -60.0, -90.0)]
+    assert table(journey(*reports))[0, "A"] == (-70.0, True)
+
+
+def test_a_cell_that_is_missing_in_most_reports_was_not_received():
+    reports = [(serving("A", -70.0), neighbour(2, -85.0))] + [(serving("A", -70.0),)] * 3
+    assert table(journey(*reports))[0, "B"] == (-85.0, False)
+
+
+def test_the_bound_is_the_weakest_of_a_full_report_else_the_weakest_of_all():
+    full = (serving("A", -60.0), neighbour(2, -80.0))
+    assert table(journey(full))[0, "C"] == (-80.0, False)
+    short = (serving("A", -60.0),)
+    far = journey(short, east=EAST + 150.0)
+    assert table(journey(full), far)[1, "B"] == (-80.0, False)
+
+
+def test_of_cells_with_one_carrier_it_is_the_one_that_is_clearly_stronger():
+    report = (serving("A", -60.0), neighbour(3, -77.0))
+    found = table(journey(report))
+    assert found[0, "C"] == (-77.0, True)
+    # The phone says nothing of the weaker one.
+    assert (0, "D") not in found
+    unclear = table(journey(report), of=field((-70.0, -80.0, -75.0, -79.0)))
+    assert not {(0, "C"), (0, "D")} & {key for key, (_, heard) in unclear.items() if heard}
+
+
+def test_a_level_below_the_scale_is_a_bound():
+    report = (serving("A", -60.0), neighbour(2, -110.0, censored=-1))
+    assert table(journey(report))[0, "B"][1] is False
+
+
+@pytest.mark.parametrize("placed", [journey((serving("A", -60.0),), radius=200.0), journey()])
+def test_reports_in_unknown_places_make_no_visit(placed):
+    assert len(visits_of([placed], PLAN, field())) == 0
+
+
+def test_no_journeys_make_no_visits():
+    found = visits_of([], PLAN, field())
+    assert len(found) == 0
+    assert found.received.dtype == bool
+
+
+def test_cells_without_identity_or_of_other_networks_are_passed_over():
+    rows = (
+        serving("A", -60.0),
+        ReportRow("neighbour", None, None, None, -70.0, 0),
+        neighbour(99, -70.0),
+        ReportRow("neighbour", "Z", None, None, -70.0, 0),
+    )
+    heard = {key for key, (_, is_level) in table(journey(rows)).items() if is_level}
+    assert heard == {(0, "A")}
+
+
+def test_serving_cells_that_the_plan_lacks_are_listed_by_their_number():
+    reports = [(serving("X", -70.0),)] * 3 + [(serving("Y", -70.0),), (serving("A", -70.0),)]
+    found = unlisted_cells([journey(*reports), journey((serving("X", -60.0),))], PLAN)
+    assert [(one.cell, one.journeys) for one in found] == [("X", 2), ("Y", 1)]
+    assert found[0].east_m == EAST + 50.0
+
+
+def test_what_the_database_does_not_hold_is_unknown():
+    grid = field()
+    grid.level_dbm[:, :, 1] = np.nan
+    level = predicted_dbm(grid, PLAN, np.array([EAST + 50.0]), np.array([NORTH + 50.0]))
+    assert np.isnan(level[0, 1])
+    assert level[0, 0] == -70.0
