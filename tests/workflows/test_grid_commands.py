@@ -5,7 +5,6 @@ from command_line import assert_done, mapfilter, settings
 
 from mapfilter.positioning.estimate_store import read_estimate
 
-
 # The data sheet of the simulated unit, and a switch that a walk of 250 m allows.
 STATED = settings(
     filter__bayes__heading_sd_deg=6, filter__bayes__bias_sd_deg=3, filter__bayes__scale=0.01,
