@@ -126,10 +126,10 @@ class NumpyModel:
         errors, report, area = self.model.evidence.levels, self.levels, self.model.area
         memory = LevelMemory.empty(errors, area.site_of)
         kept = memory.start(now.shape[0])
-        expected = self.model._expected(pixel, memory, report)
-        cells = np.concatenate([report.cell, expected])[: memory.slots]
+        report = report._replace(absent=self.model._expected(pixel, report))
+        cells = np.concatenate([report.cell, report.absent])[: memory.slots]
         memory, kept = memory.with_cells(cells, kept)
-        memory, heard = memory.updated(report)
+        memory, heard = memory.updated(report, self.model._mean_rough_db2(pixel, report.cell))
         absent, total = memory.absence(report), np.zeros(now.shape[0])
         held = kept.T.astype(np.float64)
         for terms, below in ((heard, False), (absent, True)):

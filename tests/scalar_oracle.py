@@ -142,15 +142,19 @@ def levels_log_density(errors, site, levels):
     return -0.5 * (error_db @ np.linalg.solve(covariance, error_db) + log_det)
 
 
-OTHER_DBM, OTHER_DB2, OTHER_M, OTHER_WHITE_DB2 = -90.0, 15.0**2, 200.0, 4.0**2
-"""The levels of a cell that the prediction is wrong about: a Gauss-Markov process, white noise."""
+OTHER_DBM, OTHER_DB2, OTHER_M = -90.0, 15.0**2, 150.0
+"""The levels of a cell that the prediction is wrong about: a Gauss-Markov process."""
 
 
-def other_log_density(levels):
-    """Log density of levels (metres, dBm) of such a cell, but for ½ log 2π each."""
+def other_log_density(levels, errors, more_db2=0.0):
+    """Log density of levels (metres, dBm) of such a cell, but for ½ log 2π each.
+
+    They have the white errors of others, half the variance of fast ones, and what is more.
+    """
     at_m, level = np.array(levels).T
     covariance = OTHER_DB2 * np.exp(-np.abs(at_m[:, None] - at_m) / OTHER_M)
-    covariance += OTHER_WHITE_DB2 * np.eye(at_m.size)
+    white_db2 = errors.white_db**2 + errors.fast_db**2 / 2 + more_db2
+    covariance += white_db2 * np.eye(at_m.size)
     off, (_, log_det) = level - OTHER_DBM, np.linalg.slogdet(covariance)
     return -0.5 * (off @ np.linalg.solve(covariance, off) + log_det)
 

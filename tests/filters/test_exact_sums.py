@@ -106,7 +106,12 @@ def test_log_evidence_and_belief_are_those_of_the_sum_on_average(mass_exponent, 
     beliefs, log_evidence = oracle.forward(PRIOR, steps)
     model = Chain(CHANGE, believable)
     given = options(
-        count, mass_exponent=mass_exponent, resample_below=0.9, switch_mass=0.3, switch_hold_m=15.0
+        count,
+        mass_exponent=mass_exponent,
+        resample_below=0.9,
+        switch_mass=0.3,
+        switch_hold_m=15.0,
+        split_mass=0.0,
     )
     filter_, ratio, found = ParticleFilter(model, given), [], []
     for seed in range(runs):

@@ -107,6 +107,16 @@ def test_a_grid_that_is_not_believed_or_spread_goes_on_searching():
         assert {info.status for info in news} == {Status.SEARCHING}
 
 
+@pytest.mark.parametrize(
+    ("split_mass", "status"), [(0.59, Status.CONVERGED), (0.61, Status.SEARCHING)]
+)
+def test_a_grid_that_splits_searches_again(split_mass, status):
+    options = ParticleOptions(switch_mass=0.5, switch_hold_m=0.0, split_mass=split_mass)
+    belief, news = followed(GridFilter(Far(), options), [0.6, 0, 0, 0, 0.4], 1)
+    assert news[0].status is belief.status is status
+    assert np.isnan(belief.agreement_start_m) == (status is Status.SEARCHING)
+
+
 class Far(Places):
     """The same pixels a hundred metres apart."""
 

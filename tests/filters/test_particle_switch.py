@@ -166,6 +166,24 @@ def test_a_belief_may_be_kept_from_converging_by_a_reading():
     assert statuses == [Status.CONVERGED, Status.SEARCHING]
 
 
+@pytest.mark.parametrize(
+    ("split_mass", "status"), [(0.49, Status.TRACKING), (0.52, Status.SEARCHING)]
+)
+def test_a_belief_that_splits_searches_again(split_mass, status):
+    options = ParticleOptions(
+        **STILL, max_particles=64, min_search_particles=64, min_particles=64, switch_mass=0.9,
+        switch_hold_m=0.0, split_mass=split_mass, mass_exponent=1.0, resample_below=1e-9,
+    )  # fmt: skip
+    filter_, rng = ParticleFilter(Two(), options), np.random.default_rng(0)
+    found, info = filter_.update(filter_.init(0.0, rng), log(99.0), rng)
+    assert info.status is Status.CONVERGED
+    # The same evidence against the first place: one half each.
+    split, info = filter_.update(found, -log(99.0), rng)
+    assert split.summary.mass_50m == pytest.approx(0.5, abs=1e-5)
+    assert info.status is split.status is status
+    assert np.isnan(split.agreement_start_m) == (status is Status.SEARCHING)
+
+
 def test_particles_without_any_weight():
     filter_, rng = (
         ParticleFilter(Two(), ParticleOptions(max_particles=8, min_particles=4)),

@@ -297,7 +297,18 @@ def test_levels_of_a_faulty_cell_are_a_process_of_their_own():
         at_m += length_m
         levels.append((at_m, level))
         total += float(terms.other[1])
-        assert total == pytest.approx(oracle.other_log_density(levels), rel=1e-6)
+        assert total == pytest.approx(oracle.other_log_density(levels, FAULTY), rel=1e-6)
+
+
+def test_levels_of_a_faulty_cell_are_as_noisy_as_others_there():
+    memory = LevelMemory.empty(FAULTY, SITE)
+    memory, _ = memory.with_cells(np.array([2, 4], np.int32), memory.start(1))
+    given = report({4: -77.0, 2: -70.0}, offset_db=2.0)
+    rough_db2 = np.array([30.0, 7.0])
+    _, terms = memory.updated(given, rough_db2)
+    for found, level, more in zip(terms.other, (-77.0, -70.0), rough_db2, strict=True):
+        expected = oracle.other_log_density([(0.0, level)], FAULTY, 4.0 + more)
+        assert found == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize("probability", [0.01, 0.1, 0.6])
@@ -311,7 +322,9 @@ def test_one_level_is_the_mixture_over_a_fault(probability):
     for i in range(PIXELS):
         off = level - float(table[i, 3])
         right = (1 - probability) * norm.pdf(off, 0, sqrt(total_db2))
-        wrong = probability * exp(oracle.other_log_density([(0.0, level)])) / sqrt(2 * np.pi)
+        wrong = (
+            probability * exp(oracle.other_log_density([(0.0, level)], errors)) / sqrt(2 * np.pi)
+        )
         assert found[i] == pytest.approx(log(right + wrong) + 0.5 * log(2 * np.pi), abs=2e-4)
         odds = float(np.clip(log(wrong / right), -8, 8))
         assert kept[i, 13 + slot] == pytest.approx(odds, abs=2e-3)
@@ -374,7 +387,7 @@ def test_however_far_a_level_is_off_it_costs_no_more_than_that_of_a_faulty_cell(
     lasting = FAULTY.slow_db**2 + FAULTY.fast_db**2 + FAULTY.device_db**2
     right = norm.logpdf(off_db, 0, sqrt(lasting + FAULTY.white_db**2))
     right += 0.5 * log(2 * np.pi)
-    wrong = oracle.other_log_density([(0.0, -90.0)])
+    wrong = oracle.other_log_density([(0.0, -90.0)], FAULTY)
     expected = np.logaddexp(log(0.9) + right, log(0.1) + wrong)
     assert found[0] == pytest.approx(expected, abs=2e-4)
 

@@ -115,7 +115,7 @@ def test_absent_cells_that_are_expected_most_count_first(model):
 
 def test_levels_of_faulty_and_absent_cells_make_the_null_hypothesis_of_a_report(model):
     """Its log-likelihood: each level by itself about -90 dBm, 0.7 for each absence, weighted."""
-    errors = LevelErrors(weight=0.4)
+    errors = LevelErrors(weight=0.4, roughness=0.0)
     weighted = BayesModel(model.area, evidence=EvidenceOptions(levels=errors))
     rng = np.random.default_rng(6)
     state, _, _ = hypotheses(rng)
@@ -123,6 +123,6 @@ def test_levels_of_faulty_and_absent_cells_make_the_null_hypothesis_of_a_report(
     given = report([1, 2], [-70.0, -95.0], absent, -110.0)
     reading = RadioReading(levels=given)
     cloud, _ = weighted.weigh(Cloud(state, np.empty((COUNT, 0), "f4")), np.zeros(COUNT), reading)
-    alone = sum(oracle.other_log_density([(0.0, level)]) for level in (-70.0, -95.0))
+    alone = sum(oracle.other_log_density([(0.0, level)], errors) for level in (-70.0, -95.0))
     expected = alone + 2 * np.log(0.7)
     assert cloud.shared.other_log_likelihood == pytest.approx(0.4 * expected, rel=1e-5)

@@ -48,7 +48,7 @@ def test_the_usual_options():
         "clip_sd": 3.0, "height_m": 1.5,
     }  # fmt: skip
     assert asdict(AlternativeRules()) == {
-        "start_log_odds": -4.0,
+        "start_log_odds": -1.0,
         "search_threshold": 4.0,
         "lost_threshold": 8.0,
         "confirm_mass": 0.9,

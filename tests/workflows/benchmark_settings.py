@@ -47,7 +47,7 @@ OF_BAYES = {
     "step_sd_m": (0.7, "model.motion.step_sd_m"),
     "heading_sd_deg": (7.0, "model.motion.heading_sd_rad", radians(7)),
     "bias_sd_deg": (8.0, "model.motion.bias_sd_rad", radians(8)),
-    "drift_deg_per_sqrt_m": (0.3, "model.motion.bias_drift_rad_per_sqrt_m", radians(0.3)),
+    "drift_deg_per_sqrt_m": (0.4, "model.motion.bias_drift_rad_per_sqrt_m", radians(0.4)),
     "scale": (0.07, "model.motion.scale_sd"),
     "map_sd_m": (5.0, "model.weights.sd_m"),
     "map_weight_per_m": (0.2, "model.weights.weight_per_m"),
