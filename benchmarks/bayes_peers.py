@@ -19,29 +19,45 @@ from statistics import median
 from typing import Any
 
 import numpy as np
+from scipy.special import log_ndtr
 
-from mapfilter._types import Floats, Ints
+from mapfilter._types import Floats, Ints, Ints32
 from mapfilter.database.store import open_database
 from mapfilter.models.fingerprint import log_serving
-from mapfilter.models.street_motion import BIAS, EAST, LOG_SCALE, NORTH, OFF
+from mapfilter.models.level_errors import LevelMemory, LevelTerms
+from mapfilter.models.street_motion import (
+    BIAS,
+    EAST,
+    LOG_SCALE,
+    NORTH,
+    OFF,
+    RATE,
+    STATES,
+    STRETCH,
+    TURN,
+)
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.tracks.store import read_log
 from mapfilter.workflows.bench_filter import StepInputs, make_world, step_inputs, whole_step
 
 Step = Callable[[Floats], Floats]
-"""From equally weighted particles, shape (6, N), to those after a whole step."""
+"""From equally weighted particles, shape (9, N), to those after a whole step."""
 
-MAP = 5
+MAP = STATES
 """Row of a step's log-likelihood of the map, after the rows of the model's own state."""
 
-_NEW_ROWS = 4
+_MOST_ODDS, _KEPT_ODDS = 20.0, 8.0
 _RUNS, _PACKAGE_STEPS = 5, 10
-_JITTER = (0.5, 0.5, 0.005, 0.003, 0.0)
+_JITTER = (0.5, 0.5, 0.005, 0.003, 0.0, 0.004, 0.004, 1e-4)
 _TABLE_DB, _PER_DB = 64, 4
+_TABLE_SD, _PER_SD = 8, 32
 
 
 class NumpyModel:
-    """One step of the Bayes map filter's model, by whole arrays."""
+    """One step of the Bayes map filter's model, by whole arrays.
+
+    What all particles share of the errors of levels is prepared by the package itself.
+    """
 
     def __init__(self, inputs: StepInputs) -> None:
         self.model, self.motion = inputs.model, inputs.motion
@@ -52,21 +68,35 @@ class NumpyModel:
         span = np.arange(-_TABLE_DB * _PER_DB, _TABLE_DB * _PER_DB + 1) / _PER_DB
         return log_serving(span, self.model.evidence.serving)
 
+    @cached_property
+    def _below(self) -> Floats:
+        return np.asarray(
+            log_ndtr(np.arange(-_TABLE_SD * _PER_SD, _TABLE_SD * _PER_SD + 1) / _PER_SD)
+        )
+
     def move(self, state: Floats, rng: np.random.Generator) -> Floats:
         """Return particles after the step of dead reckoning and the map, with the latter's row."""
         errors, count = self.model.motion, state.shape[1]
         length_m = abs(self.motion.step_m)
-        a, b, c, d = rng.standard_normal((4, count))
+        a, b, c, d, e, f = rng.standard_normal((6, count))
         moved = np.empty_like(state)
-        bias = state[BIAS] + errors.bias_drift_rad_per_sqrt_m * length_m**0.5 * c
+        moved[RATE] = state[RATE]
+        bias = state[BIAS] + length_m * state[RATE]
+        bias += errors.bias_drift_rad_per_sqrt_m * length_m**0.5 * c
         moved[BIAS] = (bias + np.pi) % (2 * np.pi) - np.pi
-        scale = state[LOG_SCALE] + errors.scale_drift_per_sqrt_m * length_m**0.5 * d
-        moved[LOG_SCALE] = scale
-        heading = self.motion.heading_rad + moved[BIAS]
-        stretch = exp(0.5 * errors.heading_sd_rad**2)
-        along_sd_m = errors.step_sd_m * (length_m / errors.typical_step_m) ** 0.5
-        along = self.motion.step_m * stretch * np.exp(scale) + along_sd_m * a
-        across = length_m * errors.heading_sd_rad * b
+        moved[LOG_SCALE] = state[LOG_SCALE] + errors.scale_drift_per_sqrt_m * length_m**0.5 * d
+        turned, stretched = (exp(-length_m / x) for x in (errors.heading_m, errors.stretch_m))
+        turn = turned * state[TURN] + errors.turn_sd_rad * (1 - turned**2) ** 0.5 * e
+        jumps = rng.random(count) < 1 - exp(-errors.disturbances_per_m * length_m)
+        moved[TURN] = np.where(jumps, errors.disturbed_rad * e, turn)
+        new = errors.stretch_sd * (1 - stretched**2) ** 0.5
+        moved[STRETCH] = stretched * state[STRETCH] + new * f
+        heading = self.motion.heading_rad + moved[BIAS] + moved[TURN]
+        scale = moved[LOG_SCALE] + moved[STRETCH]
+        stretch = exp(0.5 * errors.white_rad**2)
+        steps = length_m / errors.typical_step_m
+        along = self.motion.step_m * stretch * np.exp(scale) + errors.step_sd_m * steps**0.5 * a
+        across = length_m * errors.white_rad / min(steps, 1.0) ** 0.5 * b
         cosine, sine = np.cos(heading), np.sin(heading)
         moved[EAST] = state[EAST] + along * cosine - across * sine
         moved[NORTH] = state[NORTH] + along * sine + across * cosine
@@ -75,26 +105,64 @@ class NumpyModel:
 
     def log_likelihood(self, state: Floats) -> Floats:
         """Return the log-likelihood of map, serving cell and levels, shape (N,)."""
-        area, levels, reading = self.model.area, self.levels, self.reading
-        now = area.level_dbm[self._pixels(state[EAST], state[NORTH])]
+        return self.weigh(state)[0]
+
+    def weigh(self, state: Floats) -> tuple[Floats, Floats]:
+        """Return the log-likelihood of a whole step, and what particles keep, shape (W, N)."""
+        area, reading = self.model.area, self.reading
+        pixel = self._pixels(state[EAST], state[NORTH])
+        now = area.level_dbm[pixel]
         level, best, second = now[:, reading.serving], now[:, -2], now[:, -1]
         margin = level - np.where(level >= best, second, best)
         middle = _TABLE_DB * _PER_DB
         place = np.clip(margin * _PER_DB + middle + 0.5, 0, 2 * middle).astype(np.int64)
         served = reading.serving_weight * self._serving[place]
-        cosine, sine = np.cos(state[BIAS]), np.sin(state[BIAS])
-        stretch = np.exp(state[LOG_SCALE])
-        back_east, back_north = levels.back_east_m, levels.back_north_m
-        east = state[EAST] - stretch * (back_east * cosine - back_north * sine)
-        north = state[NORTH] - stretch * (back_east * sine + back_north * cosine)
-        then = area.level_dbm[self._pixels(east, north)]
-        seen, before = now[:, levels.cell], then[:, levels.cell]
-        v = (levels.offset_db - seen + levels.rho * before) * levels.scale
-        v = np.clip(v, -levels.clip, levels.clip)
-        common = levels.common
-        shared = common / (1 + (levels.cell.size - 1) * common) * v.sum(axis=1) ** 2
-        matched = -0.5 * levels.weight / (1 - common) * ((v**2).sum(axis=1) - shared)
-        return np.asarray(state[MAP] + served + matched)
+        rough = 0.1 * area.flat_rough_db.reshape(area.level_dbm.shape)[pixel].astype(np.float64)
+        flat = np.asarray(pixel[0] * area.lattice.cols + pixel[1], dtype=np.int32)
+        matched, kept = self._levels(now, rough, flat)
+        return np.asarray(state[MAP] + served + matched), kept
+
+    def _levels(self, now: Floats, rough: Floats, pixel: Ints32) -> tuple[Floats, Floats]:
+        errors, report, area = self.model.evidence.levels, self.levels, self.model.area
+        memory = LevelMemory.empty(errors, area.site_of)
+        kept = memory.start(now.shape[0])
+        report = report._replace(absent=self.model._expected(pixel, report))
+        cells = np.concatenate([report.cell, report.absent])[: memory.slots]
+        memory, kept = memory.with_cells(cells, kept)
+        memory, heard = memory.updated(report, self.model._mean_rough_db2(pixel, report.cell))
+        absent, total = memory.absence(report), np.zeros(now.shape[0])
+        held = kept.T.astype(np.float64)
+        for terms, below in ((heard, False), (absent, True)):
+            for k in range(terms.cell.size):
+                total += self._one(terms, k, now, rough, held, below=below)
+        return errors.weight * total, held
+
+    def _one(
+        self, terms: LevelTerms, k: int, now: Floats, rough: Floats, kept: Floats, *, below: bool
+    ) -> Floats:
+        """Return the log-likelihood of one level or absence, and update what particles keep."""
+        means = terms.gain.shape[1]
+        slots, s, cell = (means - 1) // 2, terms.slot[k], terms.cell[k]
+        error = kept[s] + kept[slots + s] + kept[means - 1]
+        own = float(terms.variance_db2[k])
+        variance = own + self.model.evidence.levels.roughness * rough[:, cell] ** 2
+        v = float(terms.level_dbm[k]) - now[:, cell] - error
+        if below:
+            z = v / np.sqrt(variance)
+            middle = _TABLE_SD * _PER_SD
+            right = self._below[np.clip(z * _PER_SD + middle + 0.5, 0, 2 * middle).astype(np.int64)]
+            z = np.maximum(z, -_TABLE_SD)
+            hazard = np.exp(-0.5 * z**2 - 0.9189385 - right)
+            step = np.where(z < 6, -hazard * own / np.sqrt(variance), 0.0)
+        else:
+            right = -0.5 * (v**2 / variance + np.log(variance))
+            step = v * own / variance
+        before = kept[means + s].copy()
+        odds = before + float(terms.other[k]) - right
+        fine = 1 / (1 + np.exp(np.clip(odds, -_MOST_ODDS, _MOST_ODDS)))
+        kept[means + s] = np.clip(odds, -_KEPT_ODDS, _KEPT_ODDS)
+        kept[:means] += terms.gain[k][:, None] * (fine * step)
+        return np.asarray(right + np.logaddexp(0, odds) - np.logaddexp(0, before))
 
     def _mapped(self, state: Floats, off: Floats, length_m: float) -> tuple[Floats, Floats]:
         lattice, raster = self.model.area.lattice, self.model.log_map
@@ -125,16 +193,15 @@ def numpy_step(model: NumpyModel, jitter: Floats, rng: np.random.Generator) -> S
 
     def step(state: Floats) -> Floats:
         moved = model.move(state, rng)
-        log_weight = model.log_likelihood(moved)
+        log_weight, kept = model.weigh(moved)
         weight = np.exp(log_weight - log_weight.max())
         weight /= weight.sum()
         count = weight.size
         places = (np.arange(count) + rng.random()) / count
         chosen = np.minimum(np.searchsorted(np.cumsum(weight), places), count - 1)
         copies = moved[:, chosen]
-        noise = rng.standard_normal((_NEW_ROWS, count))
-        copies[:_NEW_ROWS] += jitter[:_NEW_ROWS, None] * noise
-        return copies
+        copies[:STATES] += jitter[:, None] * rng.standard_normal((STATES, count))
+        return np.concatenate([copies, kept[:, chosen]])
 
     return step
 

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from mapfilter.api.located import locate as locate
     from mapfilter.api.located import score as score
     from mapfilter.api.logs import read_log as read_log
+    from mapfilter.api.reports import locate_reports as locate_reports
     from mapfilter.api.studies import Bound as Bound
     from mapfilter.api.studies import Sweep as Sweep
     from mapfilter.api.studies import bound as bound
@@ -43,6 +44,11 @@ if TYPE_CHECKING:
     from mapfilter.positioning.estimate import StepOutput as StepOutput
     from mapfilter.positioning.estimate import TrackEstimate as TrackEstimate
     from mapfilter.positioning.filter import Filter as Filter
+    from mapfilter.positioning.fingerprints.locating import LocatedReports as LocatedReports
+    from mapfilter.positioning.fingerprints.reports import Reports as Reports
+    from mapfilter.positioning.fingerprints.tables import (
+        read_fingerprint_table as read_fingerprint_table,
+    )
     from mapfilter.positioning.kalman.filter import KalmanFilter as KalmanFilter
     from mapfilter.radio.cells import CellPlan as CellPlan
     from mapfilter.radio.cells import read_cell_plan as read_cell_plan
@@ -61,6 +67,7 @@ if TYPE_CHECKING:
 _NAMES = {
     "api.located": "Score Track locate score",
     "api.logs": "read_log",
+    "api.reports": "locate_reports",
     "api.studies": "Bound Sweep bound simulate sweep",
     "database.build": "build",
     "database.radioroutes": "RadioRouteDatabase",
@@ -73,6 +80,9 @@ _NAMES = {
     "positioning.epochs": "Epoch epochs",
     "positioning.estimate": "Fix StepOutput TrackEstimate",
     "positioning.filter": "Filter",
+    "positioning.fingerprints.locating": "LocatedReports",
+    "positioning.fingerprints.reports": "Reports",
+    "positioning.fingerprints.tables": "read_fingerprint_table",
     "positioning.kalman.filter": "KalmanFilter",
     "radio.cells": "CellPlan read_cell_plan",
     "rasters.raster_set": "RxLevRasters open_rasters",

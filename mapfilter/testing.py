@@ -35,16 +35,18 @@ from mapfilter.tracks.log import TrackLog
 
 _PLACE = ("east_m", "north_m", "covariance_m2")
 _ORDER = {
-    Status.SEARCHING: {Status.SEARCHING, Status.CONVERGED, Status.LOST},
-    Status.CONVERGED: {Status.TRACKING, Status.LOST},
-    Status.TRACKING: {Status.TRACKING, Status.LOST},
+    Status.SEARCHING: set(Status) - {Status.TRACKING},
+    Status.CONVERGED: {Status.TRACKING, Status.LOST, Status.OUTSIDE},
+    Status.TRACKING: {Status.TRACKING, Status.LOST, Status.OUTSIDE},
     Status.LOST: set(Status),
+    Status.OUTSIDE: set(Status),
 }
 _BELIEF_ORDER = {
     Status.SEARCHING: set(Status) - {Status.TRACKING},
     Status.CONVERGED: set(Status) - {Status.CONVERGED},
     Status.TRACKING: set(Status) - {Status.CONVERGED},
     Status.LOST: set(Status),
+    Status.OUTSIDE: set(Status),
 }
 """Statuses that may follow each other over epochs, and from update to update of a belief."""
 

@@ -55,14 +55,26 @@ def came_from(east_m, north_m, bias_rad, log_scale, back_east_m, back_north_m):
     return moved(east_m, north_m, bias_rad, log_scale, -length_m, heading_rad)
 
 
+def white_of(errors):
+    """Standard deviation of the part of a heading's error that is new at each step."""
+    return errors.heading_sd_rad * sqrt(errors.white_share)
+
+
+def deviation_of(errors):
+    """Standard deviation of the part that is correlated along the path."""
+    return errors.heading_sd_rad * sqrt(1 - errors.white_share)
+
+
 def step_moments(bias_rad, log_scale, step_m, heading_rad, errors):
-    """Mean and covariance of a step's displacement where the bias and the scale do not walk."""
-    length_m = abs(step_m)
-    mean_m = step_m * exp(errors.heading_sd_rad**2 / 2 + log_scale)
+    """Mean and covariance of a step's displacement where bias, scale and deviations stand still."""
+    length_m, white_rad = abs(step_m), white_of(errors)
+    mean_m = step_m * exp(white_rad**2 / 2 + log_scale)
     ahead = np.array([cos(heading_rad + bias_rad), sin(heading_rad + bias_rad)])
     left = np.array([-ahead[1], ahead[0]])
-    along_var = errors.step_sd_m**2 * length_m / errors.typical_step_m
-    across_var = (length_m * errors.heading_sd_rad) ** 2
+    steps = length_m / errors.typical_step_m
+    along_var = errors.step_sd_m**2 * steps
+    # White noise of each typical step; a longer one is measured once.
+    across_var = (length_m * white_rad) ** 2 / min(steps, 1.0)
     return mean_m * ahead, along_var * np.outer(ahead, ahead) + across_var * np.outer(left, left)
 
 
@@ -98,30 +110,66 @@ def serving_log_likelihood(level_dbm, cell, weights):
     return log_normal_cdf((margin_db + weights.hysteresis_db) / weights.sd_db)
 
 
-def beside_variance(errors, particle_spacing_m):
-    """Variance between two places of a prediction with exponential correlation (variogram)."""
-    variance = errors.roughness_db**2
-    covariance = variance * exp(-particle_spacing_m / errors.correlation_m)
-    return variance + variance - 2 * covariance
+def level_covariance(errors, site, one, other):
+    """Covariance of the errors of two lists of levels (band, metres along the path), without noise.
+
+    Slow and fast errors of two cells have the same correlation: 1 for a cell with itself; the
+    common share, and within a site that of sites, for two of them.
+    """
+    found = np.empty((len(one), len(other)))
+    for i, (a, here_m) in enumerate(one):
+        for j, (b, there_m) in enumerate(other):
+            alike = errors.common_share + errors.site_share * (site[a] == site[b])
+            alike, apart_m = 1.0 if a == b else alike, abs(here_m - there_m)
+            slow = errors.slow_db**2 * exp(-apart_m / errors.slow_m)
+            fast = errors.fast_db**2 * exp(-apart_m / errors.fast_m)
+            found[i, j] = alike * (slow + fast) + errors.device_db**2
+    return found
 
 
-def innovation_variance(errors, rho, particle_spacing_m):
-    """Variance of ``e - ρ e'``, with e a lasting error and a white one."""
-    white = errors.measurement_db**2 + beside_variance(errors, particle_spacing_m)
-    return errors.sd_db**2 * (1 - rho**2) + white * (1 + rho**2)
+def levels_log_density(errors, site, levels):
+    """Log density of all levels of a path as one Gaussian, but for ½ log 2π each.
+
+    ``levels`` are rows of band, metres along the path, error (reported less predicted level) and
+    further variance, of white noise and of what else is new.
+    """
+    if not levels:
+        return 0.0
+    key = [(band, at_m) for band, at_m, _, _ in levels]
+    error_db = np.array([one[2] for one in levels])
+    covariance = level_covariance(errors, site, key, key) + np.diag([one[3] for one in levels])
+    _, log_det = np.linalg.slogdet(covariance)
+    return -0.5 * (error_db @ np.linalg.solve(covariance, error_db) + log_det)
 
 
-def innovation_db(reported_dbm, predicted_dbm, rho=0.0, reported_then=0.0, predicted_then=0.0):
-    """``(r - p) - ρ (r' - p')``."""
-    return (reported_dbm - predicted_dbm) - rho * (reported_then - predicted_then)
+OTHER_DBM, OTHER_DB2, OTHER_M = -90.0, 15.0**2, 150.0
+"""The levels of a cell that the prediction is wrong about: a Gauss-Markov process."""
 
 
-def levels_log_likelihood(deviations, common, weight, clip):
-    """Exponent of a Gaussian with equal correlations, of clipped standardised innovations."""
-    z = np.clip(np.asarray(deviations, dtype=float), -clip, clip)
-    correlation = np.full((z.size, z.size), common)
-    np.fill_diagonal(correlation, 1.0)
-    return -0.5 * weight * float(z @ np.linalg.solve(correlation, z))
+def other_log_density(levels, errors, more_db2=0.0):
+    """Log density of levels (metres, dBm) of such a cell, but for ½ log 2π each.
+
+    They have the white errors of others, half the variance of fast ones, and what is more.
+    """
+    at_m, level = np.array(levels).T
+    covariance = OTHER_DB2 * np.exp(-np.abs(at_m[:, None] - at_m) / OTHER_M)
+    white_db2 = errors.white_db**2 + errors.fast_db**2 / 2 + more_db2
+    covariance += white_db2 * np.eye(at_m.size)
+    off, (_, log_det) = level - OTHER_DBM, np.linalg.slogdet(covariance)
+    return -0.5 * (off @ np.linalg.solve(covariance, off) + log_det)
+
+
+def level_forecast(errors, site, levels, band, at_m):
+    """Mean and variance of the error of one more level, given all before: simple kriging."""
+    wanted = [(band, at_m)]
+    variance = level_covariance(errors, site, wanted, wanted)[0, 0]
+    if not levels:
+        return 0.0, variance
+    key = [(one, there_m) for one, there_m, _, _ in levels]
+    covariance = level_covariance(errors, site, key, key) + np.diag([one[3] for one in levels])
+    by = np.linalg.solve(covariance, level_covariance(errors, site, key, wanted)[:, 0])
+    error_db = np.array([one[2] for one in levels])
+    return by @ error_db, variance - by @ level_covariance(errors, site, key, wanted)[:, 0]
 
 
 def bound_log_likelihood(level_dbm, candidates_dbm, censored, sd_db):
@@ -138,40 +186,46 @@ def bound_log_likelihood(level_dbm, candidates_dbm, censored, sd_db):
     return log(sum(likelihoods) / len(likelihoods))
 
 
-def report_log_likelihood(table, now, then, report, options, counted_m, particle_spacing_m):
-    """Log-likelihood of a whole report for one hypothesis.
+def report_log_likelihood(table, site, path, reports, options, floor):
+    """Log-likelihood of the last of some reports for one hypothesis, whose cells have no faults.
 
     Parameters
     ----------
     table : (rows, cols, cells) array
         Predicted levels.
-    now, then : (row, col)
-        Pixels of the hypothesis now and at the last report.
-    report : mapping
-        ``serving``, a band or None; ``levels``, rows of band, level, the level in the last report
-        or None, and metres since the cell was heard; ``bounds``, rows of bands, level and side.
+    path : sequence of ((row, col), metres along the path)
+        Of the hypothesis at each report.
+    reports : sequence of mapping
+        ``serving``, a band or None; ``levels``, rows of band and level; ``absent``, bands, at most
+        one; ``limit``, the level that it is below; ``bounds``, rows of bands, level and side.
     options : EvidenceOptions
-    counted_m : float
-        Metres that the report counts for.
-    particle_spacing_m : float
+    floor : float
+        Metres that the last report counts for, and how far the hypothesis may lie beside the true
+        position.
     """
-    errors, here, there = options.levels, table[now], table[then]
-    total = 0.0
+    errors, (counted_m, spacing_m) = options.levels, floor
+    beside = 2 * options.beside_db**2 * (1 - exp(-spacing_m / options.beside_m))
+    white = errors.white_db**2 + beside
+    every = [
+        [(band, at_m, level - table[pixel][band], white) for band, level in report["levels"]]
+        for (pixel, at_m), report in zip(path, reports, strict=True)
+    ]
+    before = [level for levels in every[:-1] for level in levels]
+    report, (pixel, at_m) = reports[-1], path[-1]
+    here, total = table[pixel], 0.0
     if report["serving"] is not None:
         weight = counted_m * options.serving.weight_per_m
         total += weight * serving_log_likelihood(here, report["serving"], options.serving)
-    deviations = []
-    for band, level, before, away_m in report["levels"]:
-        correlation = exp(-away_m / errors.correlation_m)
-        # ReportRow in an earlier report only, a level is news as far as its error is a new one.
-        rho, news = (0.0, 1 - correlation**2) if before is None else (correlation, 1.0)
-        v = innovation_db(level, here[band], rho, before or 0.0, there[band])
-        deviations.append(v * sqrt(news / innovation_variance(errors, rho, particle_spacing_m)))
-    if deviations:
-        total += levels_log_likelihood(deviations, errors.common, errors.weight, errors.clip_sd)
+    after = before + every[-1]
+    by_levels = levels_log_density(errors, site, after) - levels_log_density(errors, site, before)
+    for band in report["absent"]:
+        mean, variance = level_forecast(errors, site, after, band, at_m)
+        sd_db = sqrt(variance + white + errors.absent_db**2)
+        by_levels += log_normal_cdf((report["limit"] - here[band] - mean) / sd_db)
+    total += errors.weight * by_levels
     for bands, level, side in report["bounds"]:
-        weight = errors.weight * (1 - exp(-counted_m / errors.correlation_m) ** 2)
-        sd_db = hypot(errors.sd_db, errors.measurement_db)
+        weight = options.bound_weight * (1 - exp(-2 * counted_m / 50.0))
+        sd_db = sqrt(errors.slow_db**2 + errors.fast_db**2 + errors.white_db**2)
         total += weight * bound_log_likelihood(level, [here[band] for band in bands], side, sd_db)
     return total
 

@@ -29,6 +29,7 @@ from mapfilter.cli.options import (
     seeded,
     toml,
 )
+from mapfilter.errors import ConfigError, fail
 from mapfilter.tracks.schema import Without
 from mapfilter.workflows.terminal import print_message, print_result, progress_bar
 
@@ -224,6 +225,59 @@ def simulate(
     with progress_bar("simulate") as progress:
         result = run_simulate(load_config(config, settings, out=out), progress)
     print_result(result, as_json)
+
+
+def locate(
+    database: Annotated[
+        Path,
+        typer.Option(
+            "--db",
+            metavar="DB",
+            help="Database; or fingerprints: logs or recordings with positions, or a table.",
+            callback=given_path,
+        ),
+    ],
+    log: Annotated[
+        Path,
+        typer.Option(
+            "--log", metavar="LOG", help="A log, recording, table, or folder.", callback=given_path
+        ),
+    ],
+    method: Annotated[
+        str,
+        typer.Option("--method", metavar="NAME", help="auto, knn, probabilistic, gp or centroid."),
+    ] = "auto",
+    crs: Annotated[
+        str | None, typer.Option("--crs", metavar="EPSG", help="CRS of metres in a table.")
+    ] = None,
+    level_error_db: Annotated[
+        float,
+        typer.Option(
+            "--level-error", metavar="DB", help="Standard deviation of levels of a database."
+        ),
+    ] = 6.0,
+    out: OutOption = None,
+    seed: SeedOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Locate each report of a log by itself, with a calibrated region."""
+    from mapfilter.workflows.locate import run_locate
+
+    if not 0 < level_error_db <= 60:
+        raise fail(ConfigError, "--level-error", "dB > 0, at most 60", level_error_db)
+    folder = (out or Path("located")).absolute()
+    with progress_bar("locate") as progress:
+        result = run_locate(
+            database,
+            log,
+            folder,
+            method=method,
+            crs=crs,
+            level_error_db=level_error_db,
+            seed=seed or 0,
+            progress=progress,
+        )
+    print_result(result.shown, as_json)
 
 
 def replay(

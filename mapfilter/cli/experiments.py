@@ -133,7 +133,8 @@ def bench(
 
 def evaluate(
     name: Annotated[
-        str, typer.Argument(metavar="NAME", help="global-positioning, audit or ottawa.")
+        str,
+        typer.Argument(metavar="NAME", help="global-positioning, audit, ottawa or single-reports."),
     ],
     map_file: Annotated[
         Path | None,
@@ -143,7 +144,7 @@ def evaluate(
     cases: Annotated[
         list[str] | None,
         typer.Option(
-            "--case", metavar="NAME", help="A case; repeatable. Default: all without satellites."
+            "--case", metavar="NAME", help="A case or set; repeatable. Default: all but satellites."
         ),
     ] = None,
     filter_name: FilterOption = None,
@@ -158,7 +159,7 @@ def evaluate(
     data: Annotated[
         Path | None,
         typer.Option(
-            "--data", metavar="DIR", help="Folder of the Ottawa data sets.", callback=given_path
+            "--data", metavar="DIR", help="Folder of the published data sets.", callback=given_path
         ),
     ] = None,
     runs: Annotated[
@@ -189,6 +190,7 @@ def evaluate(
     from mapfilter.workflows.evaluate_foreign import load_foreign, other_world, run_foreign
     from mapfilter.workflows.evaluate_ottawa import RUNS as OTTAWA_RUNS
     from mapfilter.workflows.evaluate_ottawa import run_ottawa
+    from mapfilter.workflows.evaluate_single_reports import SETS, run_single_reports
 
     check_benchmark(name, data)
     common: dict[str, Any] = {"seed": seed, "workers": workers, "resume": resume}
@@ -200,6 +202,15 @@ def evaluate(
         folder = (out or Path("out") / "ottawa").absolute()
         with rate_bar("evaluate", "sessions") as progress:
             result = run_ottawa(data, folder, runs=runs or OTTAWA_RUNS, progress=progress, **common)
+        print_result(result, as_json)
+        return
+    if name == "single-reports" and data is not None:
+        unused = {"--map": map_file, "--bbox": bbox, "--filter": filter_name, "--config": config}
+        refuse(unused | {"--world": world, "--set": settings}, name)
+        refuse({"--runs": runs}, name)
+        folder = (out or Path("out") / name).absolute()
+        with rate_bar("evaluate", "runs") as progress:
+            result = run_single_reports(data, folder, sets=cases or SETS, progress=progress)
         print_result(result, as_json)
         return
     refuse({"--data": data}, name)

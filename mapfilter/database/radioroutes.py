@@ -19,7 +19,7 @@ from mapfilter.database.parquet import WindowReader, check_places, read_columns
 from mapfilter.errors import InputError, StoreError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.roads.ways import Bounds
+from mapfilter.roads.ways import Bounds, half_width_of
 
 Rows = Ints32
 
@@ -41,6 +41,8 @@ class RadioField:
     distance_to_way_m : numpy.ndarray of float32, shape (rows, cols)
         Distance to the nearest way's centre line, 0 in squares; off the points, that of the
         nearest point plus the distance to it.
+    half_width_m : numpy.ndarray of float32, shape (rows, cols)
+        Half the usual width of the nearest way by its class; 0 where it belongs to none.
     way_id : numpy.ndarray of int64, shape (rows, cols)
         0 where the (nearest) point belongs to no way.
     on_way : numpy.ndarray of bool, shape (rows, cols)
@@ -51,6 +53,7 @@ class RadioField:
     cell_ids: tuple[str, ...]
     level_dbm: Floats32
     distance_to_way_m: Floats32
+    half_width_m: Floats32
     way_id: Ints
     on_way: Bools
 
@@ -64,6 +67,7 @@ def fill_field(
     pixels: tuple[NDArray[Any], NDArray[Any]],
     way_id: Ints,
     distance_m: Floats32,
+    half_width_m: Floats32,
     received: Sequence[tuple[str, NDArray[Any], NDArray[Any], Floats32]],
 ) -> RadioField:
     """Spread points over a window and fill the gaps from the nearest point.
@@ -76,7 +80,8 @@ def fill_field(
     on_way[pixels] = True
     away_px, (row, col) = distance_transform_edt(~on_way, return_indices=True)
     ways, distance = np.zeros(size, dtype=np.int64), np.zeros(size)
-    ways[pixels], distance[pixels] = way_id, distance_m
+    half_width = np.zeros(size, dtype=np.float32)
+    ways[pixels], distance[pixels], half_width[pixels] = way_id, distance_m, half_width_m
     level = np.empty((*size, len(received)), dtype=np.float32)
     for i, (_, cell_row, cell_col, level_dbm) in enumerate(received):
         layer = np.full(size, np.nan, dtype=np.float32)
@@ -87,6 +92,7 @@ def fill_field(
         tuple(cell_id for cell_id, *_ in received),
         level,
         (away_px * window.resolution_m + distance[row, col]).astype(np.float32),
+        half_width[row, col],
         ways[row, col],
         on_way,
     )
@@ -276,12 +282,15 @@ class RadioRouteDatabase:
         """
         top, left, window = self._window(bounds_m)
         area = (top, left, window.rows, window.cols)
-        columns = ("row", "col", "way_id", "on_square", "distance_to_way_m")
+        columns = ("row", "col", "way_id", "way_class", "on_square", "distance_to_way_m")
         points = WindowReader([self.path / POINTS], columns, self.lattice).read(area)
         if not points or not points["row"].size:
             where = "whole lattice" if bounds_m is None else f"area {bounds_m}"
             raise fail(InputError, where, "points of the database", "none", "another area or CRS")
         order = np.lexsort((points["col"], points["row"]))
+        code, classes = _codes(points.pop("way_class"))
+        by_class_m = np.array([half_width_of(name) for name in classes], dtype=np.float32)[code]
+        half_width_m = np.where(points["way_id"] == 0, np.float32(0), by_class_m)
         points = {name: values[order] for name, values in points.items()}
         received: list[tuple[str, Rows, Rows, Floats32]] = []
         for cell_id in self.cell_ids:
@@ -292,7 +301,7 @@ class RadioRouteDatabase:
                 received.append((cell_id, row, col, found["level_dbm"]))
         on_way_m = np.where(points["on_square"], np.float32(0), points["distance_to_way_m"])
         pixels = points["row"] - top, points["col"] - left
-        return fill_field(window, pixels, points["way_id"], on_way_m, received)
+        return fill_field(window, pixels, points["way_id"], on_way_m, half_width_m[order], received)
 
     def _window(self, bounds_m: Bounds | None) -> tuple[int, int, Lattice]:
         if bounds_m is None:

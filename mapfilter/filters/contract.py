@@ -23,13 +23,15 @@ class Status(StrEnum):
     """State of a filter at an epoch.
 
     ``SEARCHING`` → ``CONVERGED`` (the first epoch at which the switch rule holds) → ``TRACKING``;
-    ``LOST`` when the evidence contradicts the belief.
+    ``LOST`` when the evidence contradicts the belief; ``OUTSIDE`` when nothing on the map explains
+    it: off the area, or in another network than the map's. No position is given then.
     """
 
     SEARCHING = "SEARCHING"
     CONVERGED = "CONVERGED"
     TRACKING = "TRACKING"
     LOST = "LOST"
+    OUTSIDE = "OUTSIDE"
 
 
 class Reason(StrEnum):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import isfinite, nan
+from math import cos, isfinite, nan, sin
 from typing import Any, Generic, Protocol
 
 import numpy as np
@@ -19,11 +19,19 @@ from scipy.special import ndtr
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
 from mapfilter.filters.hypotheses import BeliefSummary, Bins, empty_summary, summarise
-from mapfilter.filters.particle import ParticleOptions, PriorT, ReadingT, WeighingModel, switched
+from mapfilter.filters.particle import (
+    Cloud,
+    ParticleOptions,
+    PriorT,
+    ReadingT,
+    WeighingModel,
+    switched,
+)
 
 _REACH_SD = 4.0
 _READ_INTO_PIXELS = 1 / 6
 _LEAST_MASS = 1e-9
+_NOTHING = (0.0, 0.0, 0.0, 0.0)
 
 
 def taps(shift_px: float, sd_px: float) -> tuple[int, Floats32]:
@@ -118,11 +126,18 @@ class GridModel(WeighingModel[ReadingT], Protocol[PriorT, ReadingT]):
     def start(self, prior: PriorT) -> tuple[Floats32, Floats32]:
         """Return the first mass on and off the map, shape (B, rows, cols) each."""
 
-    def states(self, row: NDArray[np.intp], col: NDArray[np.intp], bias_rad: Floats32) -> Floats32:
+    def states(
+        self, row: NDArray[np.intp], col: NDArray[np.intp], bias_rad: Floats32, off: Floats32
+    ) -> Floats32:
         """Return pixels as states of the particle model, shape (R, N)."""
 
-    def transport(self, east_m: float, north_m: float, length_m: float) -> Transport:
-        """Return the effect of a displacement by dead reckoning, of some length."""
+    def transport(
+        self, east_m: float, north_m: float, length_m: float, spread_m2: float
+    ) -> Transport:
+        """Return the effect of a displacement by dead reckoning, of some length.
+
+        ``spread_m2`` is a further variance along each axis.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,8 +148,11 @@ class GridBelief:
     ----------
     on, off : ndarray of float32, shape (B, rows, cols)
         Mass of those on and off the map; together they sum to one after an update.
-    waiting_m : (float, float, float)
-        Displacement east and north, and its length, that mass has not been moved by yet.
+    shared : object
+        What the model shares between all pixels after the last reading.
+    waiting : (float, float, float, float)
+        Displacement east and north (m), its length (m) and the variance of steps without a heading
+        (m², along each axis) that mass has not been moved by yet.
     travelled_m, log_evidence, status, agreement_start_m
         As of :class:`mapfilter.filters.particle.ParticleBelief`.
     """
@@ -142,7 +160,8 @@ class GridBelief:
     on: Floats32
     off: Floats32
     model: GridModel[Any, Any]
-    waiting_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    shared: Any = None
+    waiting: tuple[float, float, float, float] = _NOTHING
     travelled_m: float = 0.0
     log_evidence: float = 0.0
     status: Status = Status.SEARCHING
@@ -156,10 +175,10 @@ class GridBelief:
     @cached_property
     def moved(self) -> GridBelief:
         """The belief with all mass moved by the displacement that waits, and weighed by the map."""
-        if self.waiting_m[2] == 0:
+        if self.waiting[2] == 0:
             return self
         model = self.model
-        step = model.transport(*self.waiting_m)
+        step = model.transport(*self.waiting)
         on, off = np.empty_like(self.on), np.empty_like(self.off)
         for b in range(on.shape[0]):
             right = taps(step.right_px[b], step.sd_right_px[b])
@@ -172,10 +191,8 @@ class GridBelief:
         leave, come_back = np.float32(step.leave), np.float32(step.come_back)
         stayed = on * (1 - leave) + off * come_back
         away = on * leave + off * (1 - come_back)
-        waiting = (0.0, 0.0, 0.0)
-        return replace(
-            self, on=stayed * step.on, off=away * np.float32(step.off), waiting_m=waiting
-        )
+        off_cost = np.float32(step.off)
+        return replace(self, on=stayed * step.on, off=away * off_cost, waiting=_NOTHING)
 
     @cached_property
     def _cloud(self) -> tuple[Floats32, Floats32]:
@@ -184,8 +201,8 @@ class GridBelief:
         both = now.on + now.off
         bias, row, col = np.nonzero(both > _LEAST_MASS)
         mass = both[bias, row, col]
-        state = self.model.states(row, col, self.model.bias_rad[bias].astype(np.float32))
-        state[-1] = now.off[bias, row, col] / mass
+        off = now.off[bias, row, col] / mass
+        state = self.model.states(row, col, self.model.bias_rad[bias].astype(np.float32), off)
         return state, (mass / mass.sum()).astype(np.float32)
 
     @property
@@ -232,21 +249,24 @@ class GridFilter(Generic[PriorT, ReadingT]):
         motion: MotionStep,
         rng: np.random.Generator,  # noqa: ARG002
     ) -> tuple[GridBelief, Reason]:
-        """Add a step to the displacement that waits for the next reading."""
+        """Add a step to the displacement that waits for the next reading.
+
+        Without a heading mass spreads to all sides, as far as the step is long.
+        """
         if not isfinite(motion.step_m):
             return belief, Reason.NO_STEP
-        if not isfinite(motion.heading_rad):
-            return belief, Reason.NO_HEADING
+        reason = Reason.USED if isfinite(motion.heading_rad) else Reason.NO_HEADING
         if motion.step_m == 0:
-            return belief, Reason.USED
-        east_m, north_m, length_m = belief.waiting_m
-        waiting_m = (
-            east_m + motion.step_m * np.cos(motion.heading_rad),
-            north_m + motion.step_m * np.sin(motion.heading_rad),
-            length_m + abs(motion.step_m),
-        )
+            return belief, reason
+        east_m, north_m, length_m, spread_m2 = belief.waiting
+        if reason is Reason.USED:
+            east_m += motion.step_m * cos(motion.heading_rad)
+            north_m += motion.step_m * sin(motion.heading_rad)
+        else:
+            spread_m2 += motion.step_m**2 / 2
+        waiting = (east_m, north_m, length_m + abs(motion.step_m), spread_m2)
         travelled_m = belief.travelled_m + abs(motion.step_m)
-        return replace(belief, waiting_m=waiting_m, travelled_m=travelled_m), Reason.USED
+        return replace(belief, waiting=waiting, travelled_m=travelled_m), reason
 
     def update(
         self,
@@ -258,9 +278,11 @@ class GridFilter(Generic[PriorT, ReadingT]):
         before = belief.moved
         both = before.on + before.off
         bias, row, col = np.nonzero(both > _LEAST_MASS * float(both.max(initial=0.0)))
-        state = self.model.states(row, col, self.model.bias_rad[bias].astype(np.float32))
+        off = before.off[bias, row, col] / both[bias, row, col]
+        state = self.model.states(row, col, self.model.bias_rad[bias].astype(np.float32), off)
         log_weight = np.zeros(bias.size)
-        reason = self.model.weigh(state, log_weight, reading)
+        nothing = np.empty((bias.size, 0), dtype=np.float32)
+        cloud, reason = self.model.weigh(Cloud(state, nothing), log_weight, reading)
         if reason is not Reason.USED:
             return belief, UpdateInfo(reason, belief.status, int(bias.size))
         highest = float(log_weight.max(initial=-np.inf))
@@ -273,8 +295,9 @@ class GridFilter(Generic[PriorT, ReadingT]):
             return belief, UpdateInfo(Reason.NO_CANDIDATES_LEFT, belief.status, int(bias.size))
         weighed = replace(
             before,
-            on=on / np.float32(total),
-            off=off / np.float32(total),
+            on=(on / np.float32(total)).astype(np.float32),
+            off=(off / np.float32(total)).astype(np.float32),
+            shared=cloud.shared,
             log_evidence=before.log_evidence + highest + float(np.log(total)),
         )
         status, agreement_start_m = switched(
@@ -282,9 +305,11 @@ class GridFilter(Generic[PriorT, ReadingT]):
             belief.travelled_m,
             belief.agreement_start_m,
             agrees=weighed.summary.mass_50m >= self.options.switch_mass
-            and self.model.can_converge(weighed.summary),
+            and self.model.can_converge(weighed.summary, reading),
             hold_m=self.options.switch_hold_m,
         )
+        if status is not Status.SEARCHING and weighed.summary.mass_50m < self.options.split_mass:
+            status, agreement_start_m = Status.SEARCHING, nan
         now = replace(weighed, status=status, agreement_start_m=agreement_start_m)
         return now, UpdateInfo(Reason.USED, status, int(bias.size))
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isfinite, nan
-from typing import Annotated, Generic, Protocol, TypeVar
+from typing import Annotated, Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from annotated_types import Ge, Gt, Le
@@ -22,7 +22,7 @@ from mapfilter.errors import Faults
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
 from mapfilter.filters.hypotheses import BeliefSummary, Bins, empty_summary, flattened, summarise
 from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
-from mapfilter.options import NotNegative, Options, Positive, Probability
+from mapfilter.options import NotNegative, Options, Positive, Probability, Share
 
 _Count = Annotated[int, Ge(1)]
 PriorT = TypeVar("PriorT", contravariant=True)
@@ -58,18 +58,21 @@ class ParticleOptions(Options):
         hypothesis,
     switch_hold_m : float
         and has done so for so many metres travelled.
+    split_mass : float
+        It searches again when less than this lies there.
     """
 
     max_particles: _Count = 20_000
     min_search_particles: _Count = 12_000
-    min_particles: _Count = 1000
+    min_particles: _Count = 3000
     particles_per_bin: Positive = 60.0
     resample_below: Probability = 0.5
     mass_exponent: Annotated[float, Gt(0), Le(1)] = 0.5
-    jitter: tuple[NotNegative, ...] = (0.2, 0.2, 0.005, 0.003, 0.0)
-    searching_jitter: tuple[NotNegative, ...] = (1.5, 1.5, 0.015, 0.009, 0.0)
+    jitter: tuple[NotNegative, ...] = (0.3, 0.3, 0.004, 0.002, 0.0, 0.004, 0.004, 1e-4)
+    searching_jitter: tuple[NotNegative, ...] = (1.5, 1.5, 0.01, 0.006, 0.0, 0.01, 0.01, 1e-4)
     switch_mass: Probability = 0.99
     switch_hold_m: NotNegative = 14.0
+    split_mass: Share = 0.5
 
     def check(self, faults: Faults) -> None:
         """Add a lower limit above the upper one."""
@@ -102,6 +105,24 @@ def switched(
     return (Status.CONVERGED if held else Status.SEARCHING), since_m
 
 
+class Cloud(NamedTuple):
+    """Hypotheses as a model weighs them.
+
+    Parameters
+    ----------
+    state : ndarray of float32, shape (R, N)
+        The first two rows are east and north in the model's frame.
+    kept : ndarray of float32, shape (N, W)
+        What each hypothesis keeps besides, such as errors that are summed out; W may be 0.
+    shared : object
+        What all of them share.
+    """
+
+    state: Floats32
+    kept: Floats32
+    shared: Any = None
+
+
 class WeighingModel(Protocol[ReadingT]):
     """Map and measurements, as particle and grid filters need them."""
 
@@ -109,18 +130,21 @@ class WeighingModel(Protocol[ReadingT]):
     def bins(self) -> Bins:
         """The area, in bins."""
 
-    def weigh(self, state: Floats32, log_weight: Floats, reading: ReadingT) -> Reason:
-        """Add a reading's log-likelihood to the log weights, in place; return why not, if so."""
+    def weigh(self, cloud: Cloud, log_weight: Floats, reading: ReadingT) -> tuple[Cloud, Reason]:
+        """Add a reading's log-likelihood to the log weights, in place.
 
-    def can_converge(self, summary: BeliefSummary) -> bool:
+        Returns the hypotheses with what they keep afterwards, and why nothing was added, if so.
+        """
+
+    def can_converge(self, summary: BeliefSummary, reading: ReadingT) -> bool:
         """Return whether a belief may count as having converged, if it agrees on a place."""
 
 
 class ParticleModel(WeighingModel[ReadingT], Protocol[PriorT, ReadingT]):
     """Motion, map and measurements, as a particle filter needs them."""
 
-    def start(self, prior: PriorT, most: int, rng: np.random.Generator) -> tuple[Floats32, Floats]:
-        """Return the first particles, shape (R, N), and their log weights, shape (N,)."""
+    def start(self, prior: PriorT, most: int, rng: np.random.Generator) -> tuple[Cloud, Floats]:
+        """Return the first particles, and their log weights, shape (N,)."""
 
     def move(
         self, state: Floats32, log_weight: Floats, motion: MotionStep, key: np.uint64
@@ -140,6 +164,8 @@ class ParticleBelief:
         Logarithms of weights, which sum to one after an update.
     bins : Bins
         The area.
+    kept, shared : ndarray of float32, shape (N, W), and object
+        As in :class:`Cloud`.
     travelled_m : float
         By dead reckoning since the start.
     log_evidence : float
@@ -151,10 +177,17 @@ class ParticleBelief:
     state: Floats32
     log_weight: Floats
     bins: Bins
+    kept: Floats32
+    shared: Any = None
     travelled_m: float = 0.0
     log_evidence: float = 0.0
     status: Status = Status.SEARCHING
     agreement_start_m: float = nan
+
+    @property
+    def cloud(self) -> Cloud:
+        """The hypotheses as models weigh them."""
+        return Cloud(self.state, self.kept, self.shared)
 
     @cached_property
     def weight(self) -> Floats32:
@@ -183,11 +216,11 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
 
     def init(self, prior: PriorT, rng: np.random.Generator) -> ParticleBelief:
         """Draw the first particles."""
-        state, log_weight = self.model.start(prior, self.options.max_particles, rng)
+        cloud, log_weight = self.model.start(prior, self.options.max_particles, rng)
         log_total, _ = normalise(log_weight, np.empty(log_weight.size, dtype=np.float32))
         if not isfinite(log_total):
             log_weight[:] = -np.log(max(log_weight.size, 1))
-        return ParticleBelief(state, log_weight, self.model.bins)
+        return ParticleBelief(cloud.state, log_weight, self.model.bins, cloud.kept, cloud.shared)
 
     def predict(
         self, belief: ParticleBelief, motion: MotionStep, rng: np.random.Generator
@@ -211,8 +244,8 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
         self, belief: ParticleBelief, reading: ReadingT, rng: np.random.Generator
     ) -> tuple[ParticleBelief, UpdateInfo]:
         """Weigh all particles, apply the switch rule, and resample where that is due."""
-        options, log_weight, state = self.options, belief.log_weight.copy(), belief.state
-        reason = self.model.weigh(state, log_weight, reading)
+        options, log_weight = self.options, belief.log_weight.copy()
+        (state, kept, shared), reason = self.model.weigh(belief.cloud, log_weight, reading)
         weight = np.empty(log_weight.size, dtype=np.float32)
         if reason is Reason.USED:
             log_total, effective = normalise(log_weight, weight)
@@ -225,9 +258,12 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             belief.status,
             belief.travelled_m,
             belief.agreement_start_m,
-            agrees=summary.mass_50m >= options.switch_mass and self.model.can_converge(summary),
+            agrees=summary.mass_50m >= options.switch_mass
+            and self.model.can_converge(summary, reading),
             hold_m=options.switch_hold_m,
         )
+        if status is not Status.SEARCHING and summary.mass_50m < options.split_mass:
+            status, agreement_start_m = Status.SEARCHING, nan
         searching = status is Status.SEARCHING
         if searching and options.mass_exponent < 1:
             weight = flattened(state, weight, belief.bins, options.mass_exponent)
@@ -244,11 +280,13 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             # Copies keep the part of their weight that they were not chosen by. Rounding may choose
             # the last one though its weight is none.
             chosen_by = np.maximum(weight[chosen], np.finfo(np.float32).tiny)
-            state, log_weight = copies, log_weight[chosen] - np.log(chosen_by)
+            state, kept, log_weight = copies, kept[chosen], log_weight[chosen] - np.log(chosen_by)
             normalise(log_weight, np.empty(wanted, dtype=np.float32))
         now = replace(
             belief,
             state=state,
+            kept=kept,
+            shared=shared,
             log_weight=log_weight,
             log_evidence=belief.log_evidence + log_total,
             status=status,

@@ -1,12 +1,4 @@
-"""How probable a report is at a place: by its levels and by its serving cell.
-
-The error of a predicted level is a Gauss-Markov process along the path, with the exponential
-autocorrelation of Gudmundson (1991): after d metres it has the correlation ``ρ = exp(-d / d_c)``.
-So a level is compared by its *innovation* ``(r - p) - ρ (r' - p')``, with r and p the level as
-reported and as predicted now and ' the same at the last report, whose variance is
-``σ² (1 - ρ²)`` and that of the measurement. The errors of different cells have a common part
-(the phone, the body, the site's surroundings): an equal correlation c between all of them, whose
-inverse is known in closed form. Innovations are clipped, because predictions err by whole houses.
+"""How probable a report is at a place by its serving cell, and by levels that are only bounds.
 
 With handover hysteresis and prediction errors the serving cell is often not the one predicted best.
 Its probability is a smooth function of the margin m, its predicted level above the best other
@@ -14,12 +6,12 @@ cell's: ``Φ((m + h) / σ)``, with h the hysteresis in the serving cell's favour
 
 In the kernels, hypotheses are given by flat pixels, shape (N,), and levels as one flat array of
 shape (pixels * bands,), whose last two bands are the best and the second best level of all cells.
+Levels themselves are compared in :mod:`mapfilter.models.level_errors`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import exp
 from typing import NamedTuple
 
 import numpy as np
@@ -27,79 +19,13 @@ from numba import njit
 from numpy.typing import ArrayLike
 from scipy.special import log_ndtr
 
-from mapfilter._kernels import cos_sin32, exp32, log32
+from mapfilter._kernels import exp32, log32
 from mapfilter._types import Floats, Floats32, Ints32
-from mapfilter.options import NotNegative, Options, Positive, Share
+from mapfilter.options import NotNegative, Options, Positive
 
 _F = np.float32
 _STEPS_PER_SD, _REACH_SD = 32, 8
 _STEPS_PER_DB, _REACH_DB = 4, 64
-
-
-@dataclass(frozen=True, slots=True)
-class LevelErrors(Options):
-    """How levels differ from their prediction.
-
-    Parameters
-    ----------
-    sd_db : float
-        Standard deviation of a prediction's error.
-    correlation_m : float
-        Distance after which its correlation is 1/e.
-    measurement_db : float
-        Standard deviation of the independent error of each report.
-    roughness_db : float
-        How much the prediction itself varies over ``correlation_m``: a hypothesis some metres
-        beside the true position predicts the levels of another place.
-    common : float
-        Correlation of the errors of different cells.
-    clip_sd : float
-        Innovations beyond so many standard deviations count as this.
-    weight : float
-        Exponent of the likelihood; below 1 where the model is not trusted to be exact.
-    """
-
-    sd_db: NotNegative = 10.0
-    correlation_m: Positive = 50.0
-    measurement_db: NotNegative = 1.5
-    roughness_db: NotNegative = 6.0
-    common: Share = 0.3
-    clip_sd: Positive = 3.0
-    weight: Share = 0.7
-
-    def offset_variance_db2(self, particle_spacing_m: float) -> float:
-        """Return the variance of a prediction so far beside the true position."""
-        return 2 * self.roughness_db**2 * (1 - exp(-particle_spacing_m / self.correlation_m))
-
-
-class LevelReading(NamedTuple):
-    """The K levels of one report, as kernels take them.
-
-    Parameters
-    ----------
-    cell : ndarray of int32, shape (K,)
-        Bands of the cells.
-    offset_db : ndarray of float32, shape (K,)
-        ``r - ρ r'``.
-    rho : ndarray of float32, shape (K,)
-        Correlation with the last report; 0 where the cell was not in it.
-    scale : ndarray of float32, shape (K,)
-        One over the innovation's standard deviation, times the root of the level's weight.
-    common, weight, clip : float
-        As in :class:`LevelErrors`.
-    back_east_m, back_north_m : float
-        Displacement by dead reckoning since the last report.
-    """
-
-    cell: Ints32
-    offset_db: Floats32
-    rho: Floats32
-    scale: Floats32
-    common: float
-    weight: float
-    clip: float
-    back_east_m: float
-    back_north_m: float
 
 
 class BoundReading(NamedTuple):
@@ -180,23 +106,16 @@ def bound_table() -> Floats32:
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
-def pixels(state: Floats32, back_east_m: float, back_north_m: float, raster: RasterFrame) -> Ints32:
-    """Return the flat pixel of each hypothesis, or of where it was before a displacement.
-
-    The displacement by dead reckoning is turned and scaled by each hypothesis's own errors. Beyond
-    the edge of the raster pixels are those of the edge.
-    """
-    east, north, bias, scale = state[0], state[1], state[2], state[3]
-    be, bn, zero = _F(back_east_m), _F(back_north_m), _F(0.0)
-    w, n, k = _F(raster.west_m), _F(raster.north_m), _F(raster.per_m)
+def pixels(state: Floats32, raster: RasterFrame) -> Ints32:
+    """Return the flat pixel of each hypothesis; beyond the raster that of its edge."""
+    east, north = state[0], state[1]
+    w, n, k, zero = _F(raster.west_m), _F(raster.north_m), _F(raster.per_m), _F(0.0)
     last_col, last_row = np.int32(raster.cols - 1), np.int32(raster.rows - 1)
     width = np.int32(raster.cols)
     pixel = np.empty(state.shape[1], dtype=np.int32)
     for i in range(pixel.size):
-        cosine, sine = cos_sin32(bias[i])
-        stretch = exp32(scale[i])
-        x = (east[i] - stretch * (be * cosine - bn * sine) - w) * k
-        y = (n - north[i] + stretch * (be * sine + bn * cosine)) * k
+        x = (east[i] - w) * k
+        y = (n - north[i]) * k
         x = x if x > zero else zero
         y = y if y > zero else zero
         col, row = np.int32(x), np.int32(y)
@@ -204,38 +123,6 @@ def pixels(state: Floats32, back_east_m: float, back_north_m: float, raster: Ras
         row = row if row < last_row else last_row
         pixel[i] = np.int32(np.int32(row * width) + col)
     return pixel
-
-
-@njit(error_model="numpy", fastmath={"contract"}, cache=True)
-def weigh_by_levels(
-    pixel: Ints32,
-    before: Ints32,
-    level_dbm: Floats32,
-    bands: int,
-    levels: LevelReading,
-    log_weight: Floats,
-) -> None:
-    """Add the log-likelihood of levels to weights, in place.
-
-    ``pixel`` and ``before`` hold each hypothesis now and at the last report.
-    """
-    count, common, weight = levels.cell.size, levels.common, levels.weight
-    cell, offset_db, rho, scale = levels.cell, levels.offset_db, levels.rho, levels.scale
-    high, low = _F(levels.clip), _F(-levels.clip)
-    own = _F(-0.5 * weight / (1.0 - common))
-    shared = _F(0.5 * weight / (1.0 - common) * common / (1.0 + (count - 1) * common))
-    width = np.uint32(bands)
-    for i in range(pixel.size):
-        now, then = np.uint32(np.uint32(pixel[i]) * width), np.uint32(np.uint32(before[i]) * width)
-        total, squares = _F(0.0), _F(0.0)
-        for j in range(count):
-            band = np.uint32(cell[j])
-            v = (offset_db[j] - level_dbm[now + band] + rho[j] * level_dbm[then + band]) * scale[j]
-            v = v if v < high else high
-            v = v if v > low else low
-            total += v
-            squares += v * v
-        log_weight[i] += own * squares + shared * total * total
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)

@@ -1,13 +1,19 @@
 """Motion over a map of streets: dead reckoning with lasting errors, and the map of ways.
 
-A hypothesis holds its position, the lasting error of its headings, the logarithm of its step scale,
-and how probably it is off the map. One step of dead reckoning (Khalaf-Allah 2007, eqs. 3-10) moves
-it; the map then weighs it by the metre. White noise of standard deviation σ on headings shortens
-the mean displacement by exp(-σ²/2), which is put back.
+A hypothesis holds its position, the errors of its headings and steps, and how probably it is off
+the map. One step of dead reckoning (Khalaf-Allah 2007, eqs. 3-10) moves it; the map then weighs it
+by the metre.
 
-The map is a hidden Markov model of two modes. *On* it, a position d metres from the nearest way
-costs ``-log(0.97 exp(-d²/2s²) + 0.03 exp(-d/30 m))`` times a weight for each metre travelled;
-the weight is small, because the offset from the centre line lasts for tens of metres. *Off* it,
+Errors of headings have three parts: a *lasting* one of the journey, which drifts, and with a biased
+gyroscope grows steadily; a *deviation*,
+which is correlated over tens of metres (magnetic disturbances, the way a phone is carried; an
+Ornstein-Uhlenbeck process), and now and then jumps to any value within tens of degrees; and white
+noise. The logarithm of the step scale has a lasting part and a deviation, too. White noise of
+standard deviation σ on headings shortens the mean displacement by exp(-σ²/2), which is put back.
+
+The map is a hidden Markov model of two modes. *On* it, a position d metres beside the nearest way
+(0 within the way's width) costs ``-log(0.97 exp(-d²/2s²) + 0.03 exp(-d/30 m))`` times a weight for
+each metre travelled; the weight is small, because the offset lasts for tens of metres. *Off* it,
 where ways are missing, each metre costs the same everywhere. The probability of being off is kept
 for each hypothesis and summed out exactly, so that no hypotheses are spent on it.
 """
@@ -15,7 +21,7 @@ for each hypothesis and summed out exactly, so that no hypotheses are spent on i
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import exp, radians
+from math import exp, radians, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -23,14 +29,17 @@ from numba import njit
 
 from mapfilter._kernels import cos_sin32, exp32, hashed, log32, normals, uniforms, wrap32
 from mapfilter._types import Floats, Floats32, Ints32
-from mapfilter.options import NotNegative, Options, Positive
+from mapfilter.options import NotNegative, Options, Positive, Share
 
-EAST, NORTH, BIAS, LOG_SCALE, OFF = range(5)
-"""Rows of the state: metres from the frame's origin, radians, a number, a probability."""
-STATES = 5
+EAST, NORTH, BIAS, LOG_SCALE, OFF, TURN, STRETCH, RATE = range(8)
+"""Rows of the state: metres from the frame's origin; lasting heading error (radians) and logarithm
+of the step scale; probability of being off the map; deviations of heading and log scale; growth of
+the lasting heading error (radians per metre)."""
+STATES = 8
 
 _F = np.float32
-_HEADING_SD_RAD, _BIAS_SD_RAD, _BIAS_DRIFT_RAD = radians(6.0), radians(3.0), radians(0.05)
+_HEADING_SD_RAD, _BIAS_SD_RAD, _BIAS_DRIFT_RAD = radians(15.0), radians(10.0), radians(0.3)
+_DISTURBED_RAD, _RATE_RAD = radians(40.0), radians(0.15)
 _MOST_SQUARES = 400
 _PARTS = 4
 _MOST_NATS = 14.0
@@ -39,7 +48,7 @@ _MOST_NATS = 14.0
 
 @dataclass(frozen=True, slots=True)
 class MotionErrors(Options):
-    """Errors of dead reckoning; those that last are estimated with the position.
+    """Errors of dead reckoning; all but the white ones are estimated with the position.
 
     Parameters
     ----------
@@ -48,24 +57,54 @@ class MotionErrors(Options):
     typical_step_m : float
         Length of the step that ``step_sd_m`` is of.
     heading_sd_rad : float
-        White noise of a heading.
+        Standard deviation of a heading: of deviation and white noise together.
+    white_share : float
+        Share of its variance that is white.
+    heading_m : float
+        Distance after which the correlation of the deviation is 1/e.
+    disturbances_per_m, disturbed_rad : float
+        How often the deviation jumps, and the standard deviation of where to.
     bias_sd_rad : float
         Standard deviation of the lasting heading error at the start.
     bias_drift_rad_per_sqrt_m : float
         Random walk of the lasting heading error.
+    rate_rad_per_m : float
+        Standard deviation of the steady growth of the lasting heading error, of biased gyroscopes.
+    rate_share : float
+        Share of journeys with such a gyroscope.
     scale_sd : float
         Standard deviation of the logarithm of the step scale at the start.
     scale_drift_per_sqrt_m : float
         Random walk of that logarithm.
+    stretch_sd, stretch_m : float
+        Standard deviation of the deviation of that logarithm, and its correlation length.
     """
 
     step_sd_m: NotNegative = 0.3
     typical_step_m: Positive = 1.4
     heading_sd_rad: NotNegative = _HEADING_SD_RAD
+    white_share: Share = 0.3
+    heading_m: Positive = 28.0
+    disturbances_per_m: NotNegative = 0.002
+    disturbed_rad: NotNegative = _DISTURBED_RAD
     bias_sd_rad: NotNegative = _BIAS_SD_RAD
     bias_drift_rad_per_sqrt_m: NotNegative = _BIAS_DRIFT_RAD
-    scale_sd: NotNegative = 0.02
+    rate_rad_per_m: NotNegative = _RATE_RAD
+    rate_share: Share = 0.5
+    scale_sd: NotNegative = 0.03
     scale_drift_per_sqrt_m: NotNegative = 0.0
+    stretch_sd: NotNegative = 0.08
+    stretch_m: Positive = 25.0
+
+    @property
+    def turn_sd_rad(self) -> float:
+        """Standard deviation of the heading's deviation."""
+        return self.heading_sd_rad * sqrt(1 - self.white_share)
+
+    @property
+    def white_rad(self) -> float:
+        """Standard deviation of the white noise of a heading."""
+        return self.heading_sd_rad * sqrt(self.white_share)
 
 
 class MapFactors(NamedTuple):
@@ -88,7 +127,7 @@ class MapWeights(Options):
     Parameters
     ----------
     sd_m : float
-        Standard deviation of the offset from the centre line, for walkers on the map.
+        Standard deviation of the offset from the way's edge, for those on the map beside it.
     weight_per_m : float
         Exponent of the map's likelihood for each metre travelled.
     off_cost_per_m : float
@@ -97,8 +136,8 @@ class MapWeights(Options):
         Rates of leaving the map and of coming back.
     """
 
-    sd_m: Positive = 4.0
-    weight_per_m: NotNegative = 1 / 18
+    sd_m: Positive = 3.0
+    weight_per_m: NotNegative = 1 / 12
     off_cost_per_m: NotNegative = 0.1
     leave_per_m: NotNegative = 1e-3
     return_per_m: NotNegative = 1e-2
@@ -114,7 +153,7 @@ class MapWeights(Options):
 
 
 def map_log_likelihood(distance_m: Floats32, sd_m: float) -> Floats32:
-    """Return the logarithm of the map's likelihood at distances from the nearest way.
+    """Return the logarithm of the map's likelihood at distances from the edge of the nearest way.
 
     Examples
     --------
@@ -129,49 +168,85 @@ def map_log_likelihood(distance_m: Floats32, sd_m: float) -> Floats32:
 def move(
     state: Floats32, step_m: float, heading_rad: float, errors: MotionErrors, key: np.uint64
 ) -> Floats32:
-    """Return all hypotheses (5 or more, N) after one measured step; further rows stay.
+    """Return all hypotheses (8 or more, N) after one measured step; further rows stay.
 
-    The lasting error is added to the heading. A step of length 0 changes nothing. ``key`` is from
+    The errors are added to the heading. A step of length 0 changes nothing. ``key`` is from
     :func:`mapfilter._kernels.draw_key`.
     """
     length = abs(step_m)
     root = length**0.5
-    stretch = exp(0.5 * errors.heading_sd_rad**2)
-    sds = (
+    white_rad = errors.white_rad
+    # A step shorter than the typical one is a part of it, with the same noise over its length.
+    parts = max(errors.typical_step_m / length, 1.0) ** 0.5 if length > 0 else 1.0
+    turned, stretched = exp(-length / errors.heading_m), exp(-length / errors.stretch_m)
+    noise = _Noise(
         _F(errors.step_sd_m * (length / errors.typical_step_m) ** 0.5),
-        _F(length * errors.heading_sd_rad),
+        _F(length * white_rad * parts),
         _F(errors.bias_drift_rad_per_sqrt_m * root),
         _F(errors.scale_drift_per_sqrt_m * root),
+        _F(turned),
+        _F(errors.turn_sd_rad * (1 - turned**2) ** 0.5),
+        _F(stretched),
+        _F(errors.stretch_sd * (1 - stretched**2) ** 0.5),
+        _F(1 - exp(-errors.disturbances_per_m * length)),
+        _F(errors.disturbed_rad),
     )
-    return np.asarray(_move(state, _F(step_m * stretch), _F(heading_rad), sds, key))
+    length_m = _F(length)
+    long_m = _F(step_m * exp(0.5 * white_rad**2))
+    return np.asarray(_move(state, long_m, length_m, _F(heading_rad), noise, key))
+
+
+class _Noise(NamedTuple):
+    """Standard deviations and factors of one step."""
+
+    along_m: np.float32
+    across_m: np.float32
+    bias_rad: np.float32
+    scale: np.float32
+    turn_keep: np.float32
+    turn_rad: np.float32
+    stretch_keep: np.float32
+    stretch: np.float32
+    jump: np.float32
+    jump_rad: np.float32
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def _move(
     state: Floats32,
     step_m: np.float32,
+    length_m: np.float32,
     heading_rad: np.float32,
-    sds: tuple[np.float32, np.float32, np.float32, np.float32],
+    noise: _Noise,
     key: np.uint64,
 ) -> Floats32:
-    along_sd_m, across_sd_m, bias_sd_rad, scale_sd = sds
     moved = np.empty_like(state)
     count = state.shape[1]
     east, north, bias, scale = state[0], state[1], state[2], state[3]
+    turn, stretch, rate = state[5], state[6], state[7]
     to_east, to_north, to_bias, to_scale = moved[0], moved[1], moved[2], moved[3]
+    to_turn, to_stretch = moved[5], moved[6]
+    moved[4] = state[4]
     for i in range(count):
-        a, b = normals(hashed(key, np.uint64(2 * i)))
-        c, d = normals(hashed(key, np.uint64(2 * i + 1)))
-        turned = wrap32(bias[i] + bias_sd_rad * c)
-        stretched = scale[i] + scale_sd * d
-        cosine, sine = cos_sin32(wrap32(heading_rad + turned))
-        along = step_m * exp32(stretched) + along_sd_m * a
-        across = across_sd_m * b
-        to_bias[i] = turned
-        to_scale[i] = stretched
+        a, b = normals(hashed(key, np.uint64(4 * i)))
+        c, d = normals(hashed(key, np.uint64(4 * i + 1)))
+        e, f = normals(hashed(key, np.uint64(4 * i + 2)))
+        u, _ = uniforms(hashed(key, np.uint64(4 * i + 3)))
+        lasting = wrap32(bias[i] + rate[i] * length_m + noise.bias_rad * c)
+        steady = scale[i] + noise.scale * d
+        beside = noise.turn_keep * turn[i] + noise.turn_rad * e
+        beside = noise.jump_rad * e if _F(u) < noise.jump else beside
+        longer = noise.stretch_keep * stretch[i] + noise.stretch * f
+        cosine, sine = cos_sin32(wrap32(heading_rad + lasting + beside))
+        along = step_m * exp32(steady + longer) + noise.along_m * a
+        across = noise.across_m * b
+        to_bias[i] = lasting
+        to_scale[i] = steady
+        to_turn[i] = beside
+        to_stretch[i] = longer
         to_east[i] = east[i] + (along * cosine - across * sine)
         to_north[i] = north[i] + (along * sine + across * cosine)
-    moved[4:] = state[4:]
+    moved[7:] = state[7:]
     return moved
 
 

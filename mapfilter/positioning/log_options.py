@@ -1,4 +1,4 @@
-"""Options of a filter that a log itself states: steps of timing advance and of levels."""
+"""Options of a filter that a log itself states: errors of motion, steps of timing and levels."""
 
 from __future__ import annotations
 
@@ -13,14 +13,19 @@ from mapfilter.tracks.log import TrackLog
 
 OptionsT = TypeVar("OptionsT")
 
+_LEAST_STEP_SD_M, _LEAST_HEADING_SD_DEG = 0.05, 0.5
+"""Least errors that a filter assumes: particles need some spread."""
+_STANDING_MPS = 0.2
+
 
 def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str, ...]]:
     """Return options with what a log states in place of defaults, and notes on the changes.
 
-    The step of timing advance is that of the technology of all reports that have one; a step of
-    levels (the column ``level_step_db``) adds its rounding error, ``step / √12``, to the error of
-    levels. Options that are no dataclass, lack these fields, or have other values than the
-    defaults, are not changed.
+    Errors of motion that were measured (``log.imu``) are those that the filter assumes; the step of
+    timing advance is that of the technology of all reports that have one; a step of levels (the
+    column ``level_step_db``) adds its rounding error, ``step / √12``, to the error of levels.
+    Options that are no dataclass, lack these fields, or have other values than the defaults, are
+    not changed.
     """
     default = _defaults(options)
     changes: dict[str, Any] = {}
@@ -36,9 +41,43 @@ def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str
         error_db = hypot(default["level_error_db"], step_db / 12**0.5)
         changes["level_error_db"] = error_db
         notes.append(f"levels in steps of {step_db:g} dB: level_error_db = {error_db:.2f}")
+    measured = {
+        name: value
+        for name, value in _motion_errors(log).items()
+        if _is_default(options, default, name) and value != default[name]
+    }
+    if measured:
+        shown = ", ".join(f"{name} = {value:.3g}" for name, value in measured.items())
+        notes.append(f"errors of motion as measured: {shown}")
+        changes |= measured
     if not changes:
         return options, ()
     return replace(options, **changes), tuple(notes)  # type: ignore[type-var]
+
+
+def _motion_errors(log: TrackLog) -> dict[str, float]:
+    """Return the errors of dead reckoning that a log states, by the names of a filter's options.
+
+    The random walk of the heading is by distance there, at the log's median speed. A constant rate
+    error of a gyroscope has no option, and is left out.
+    """
+    imu = log.imu
+    if imu is None:
+        return {}
+    found = {"step_sd_m": max(imu.sigma_trans_m, _LEAST_STEP_SD_M), "scale": imu.scale}
+    walk_deg = imu.drift_deg_per_sqrt_s
+    if imu.turns == "headings":
+        found["heading_sd_deg"] = max(imu.sigma_orient_deg, _LEAST_HEADING_SD_DEG)
+        found["bias_sd_deg"] = imu.bias_sd_deg
+    else:
+        walk_deg = hypot(walk_deg, imu.gyro_noise_deg_per_sqrt_s)
+    step_m, time_s = log.motion["step_m"].to_numpy(), log.motion["time_s"].to_numpy()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        speed_mps = np.abs(step_m[1:]) / np.diff(time_s)
+    moving = speed_mps[np.isfinite(speed_mps) & (speed_mps > _STANDING_MPS)]
+    if walk_deg > 0 and moving.size:
+        found["drift_deg_per_sqrt_m"] = walk_deg / float(np.median(moving)) ** 0.5
+    return found
 
 
 def timing_step_m(log: TrackLog) -> float | None:

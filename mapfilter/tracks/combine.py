@@ -102,6 +102,7 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         notes,
         course_motion=options.course_motion,
         walk=options.walk,
+        true=[r for r in shifted if r.path in options.truth],
     )
     tables = {
         "motion": moved.rows,

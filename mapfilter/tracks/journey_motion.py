@@ -51,6 +51,7 @@ def journey_motion(
     *,
     course_motion: bool,
     walk: WalkOptions | None,
+    true: Sequence[Recording] = (),
 ) -> Moved:
     """Return motion of the recording that tells it most directly; others stay sensors.
 
@@ -67,6 +68,8 @@ def journey_motion(
         Whether speed and course of positions make motion where nothing better does.
     walk : WalkOptions or None
         How steps are made of a phone's sensors, None for no steps.
+    true : sequence of Recording
+        Those of the truth: their speed and course, no positions, serve where no other has any.
     """
     for name in ("motion", "odometry", "poses"):
         having = [r for r in recordings if name in r.tables]
@@ -83,7 +86,7 @@ def journey_motion(
         moved = motion_from_poses(rows) if poses else by_compass(rows, frame.convergence_rad)
         return Moved(moved.assign(heading_rad=wrap_rad(moved["heading_rad"])))
     if course_motion:
-        return _course(recordings, sensors, frame, notes)
+        return _course([*recordings, *true], sensors, frame, notes)
     if walk is not None:
         walked, words = reckon_walk(sensors, walk, frame.convergence_rad)
         if walked is None:

@@ -20,9 +20,9 @@ from mapfilter.config.load import load_config
 from mapfilter.database.estimate import peak_memory_bytes
 from mapfilter.database.store import open_database
 from mapfilter.filters.contract import MotionStep
-from mapfilter.filters.particle import ParticleBelief, ParticleFilter, ParticleOptions
+from mapfilter.filters.particle import Cloud, ParticleBelief, ParticleFilter, ParticleOptions
 from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
-from mapfilter.models.fingerprint import LevelReading
+from mapfilter.models.level_errors import LevelReport
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel, Start
@@ -37,7 +37,7 @@ from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.simulate import run_simulate
 
 _LEVELS, _PER_ROW = 7, 20
-_JITTER = (0.5, 0.5, 0.005, 0.003, 0.0)
+_JITTER = (0.5, 0.5, 0.005, 0.003, 0.0, 0.004, 0.004, 1e-4)
 _TRACKS, _LENGTH_M, _CUT_M = 5, 1940.0, 300.0
 
 
@@ -67,7 +67,7 @@ class StepInputs:
     model: BayesModel
     motion: MotionStep
     reading: RadioReading
-    levels: LevelReading
+    levels: LevelReport
 
 
 @dataclass(frozen=True)
@@ -174,19 +174,8 @@ def step_inputs(model: BayesModel, log: TrackLog, count: int) -> tuple[StepInput
     pixel = area.lattice.row_col(float(truth["east_m"]), float(truth["north_m"]))
     level = area.level_dbm[int(pixel[0]), int(pixel[1]), : len(area.cell_ids)]
     cell = np.argsort(-level, kind="stable")[:_LEVELS].astype(np.int32)
-    size = cell.size
-    rho = np.full(size, 0.7, dtype=np.float32)
-    levels = LevelReading(
-        cell,
-        (0.3 * level[cell]).astype(np.float32),
-        rho,
-        np.full(size, 0.1, dtype=np.float32),
-        0.3,
-        0.7,
-        3.0,
-        4.0,
-        3.0,
-    )
+    absent = np.setdiff1d(np.arange(len(area.cell_ids), dtype=np.int32), cell)
+    levels = LevelReport(cell, level[cell] + np.float32(3.0), absent, float(level[cell].min()), 3.0)
     reading = RadioReading(int(cell[0]), 5 / 40, levels, length_m=5.0)
     return StepInputs(model, MotionStep(1.4, radians(37.0)), reading, levels), belief
 
@@ -216,17 +205,17 @@ def _step(model: BayesModel, log: TrackLog, count: int, runs: int) -> StepBench:
 def whole_step(
     given: StepInputs, belief: ParticleBelief, jitter: Floats32, rng: np.random.Generator
 ) -> Floats32:
-    """Return the particles after a step that always resamples, shape (5, N)."""
+    """Return the particles after a step that always resamples: state and what they keep."""
     model, count = given.model, belief.log_weight.size
     state, log_weight = model.move(belief.state, belief.log_weight, given.motion, draw_key(rng))
-    model.weigh(state, log_weight, given.reading)
+    cloud, _ = model.weigh(Cloud(state, belief.kept, belief.shared), log_weight, given.reading)
     weight = np.empty(count, dtype=np.float32)
     normalise(log_weight, weight)
     chosen = np.empty(count, dtype=np.int32)
     systematic(weight, rng.random(), chosen)
     copies = np.empty_like(state)
     copy_with_jitter(state, chosen, jitter, draw_key(rng), copies)
-    return copies
+    return np.concatenate([copies, cloud.kept[chosen].T])
 
 
 def _track(positioner: BayesPositioner, log: TrackLog) -> tuple[float, int]:

@@ -44,7 +44,9 @@ from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.terminal import to_jsonable
 from mapfilter.workflows.world import World, filter_choice, option_sections
 
-NAMES = ("global-positioning", "audit", "ottawa")
+NAMES = ("global-positioning", "audit", "ottawa", "single-reports")
+OF_DATA = ("ottawa", "single-reports")
+"""Benchmarks on published data."""
 RUNS = 20
 TABLE = "table.json"
 _MISSING = 0.1
@@ -145,7 +147,7 @@ def check_benchmark(name: str, data: Path | None = None) -> None:
     """Check that there is such a benchmark, and data where it needs them; ConfigError if not."""
     if name not in NAMES:
         raise fail(ConfigError, "evaluate", ", ".join(NAMES), name)
-    if name == "ottawa" and data is None:
+    if name in OF_DATA and data is None:
         raise fail(ConfigError, "--data", "the folder of the data sets", "none")
 
 

@@ -125,7 +125,7 @@ def run_ottawa(
     """
     began_s = time.perf_counter()
     chosen = options or OttawaOptions()
-    files = {part: _session_files(data, part) for part in parts}
+    files = {part: session_files(data, part) for part in parts}
     tasks = [
         Task(
             part,
@@ -189,7 +189,8 @@ def find_left_out(task: Task) -> None:
     write_left_out(LeftOut(session.name, errors_m, tuple(found)), task.result)
 
 
-def _session_files(data: Path, part: str) -> list[Path]:
+def session_files(data: Path, part: str) -> list[Path]:
+    """Return the files of the sessions of a part; InputError below two."""
     folder = data / FOLDER / part
     files = [path for path in sorted(folder.glob("*.csv")) if not path.name.startswith(LEFT_OUT)]
     if len(files) < 2:

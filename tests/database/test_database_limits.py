@@ -218,7 +218,10 @@ def test_a_field_of_two_points_by_hand():
     pixels = np.array([0, 1]), np.array([0, 3])
     heard = [("A", np.array([0]), np.array([0]), np.array([-70.0], np.float32)),
              ("B", *pixels, np.array([-80.0, -60.0], np.float32))]  # fmt: skip
-    field = fill_field(lattice, pixels, np.array([7, 9]), np.array([1.5, 2.0], np.float32), heard)
+    distance_m, half_width_m = np.array([[1.5, 2.0], [3.0, 8.5]], np.float32)
+    field = fill_field(lattice, pixels, np.array([7, 9]), distance_m, half_width_m, heard)
+    assert field.half_width_m.dtype == np.float32
+    assert field.half_width_m.tolist() == [[3.0, 3.0, 8.5, 8.5]] * 2
     assert field.way_id.tolist() == [[7, 7, 9, 9], [7, 7, 9, 9]]
     assert field.on_way.tolist() == [[True, False, False, False], [False, False, False, True]]
     np.testing.assert_array_equal(field.level_dbm[..., 1], [[-80, -80, -60, -60]] * 2)

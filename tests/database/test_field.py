@@ -58,6 +58,14 @@ def test_other_pixels_hold_what_a_nearest_point_holds(database, field):
         assert (same & np.isclose(expected, field.distance_to_way_m[row, col])).any()
 
 
+def test_the_width_is_that_of_the_nearest_ways_class(field):
+    """7 m to each side of a residential street; squares have no width of their own."""
+    assert set(np.unique(field.way_id)) == {0, 77}
+    np.testing.assert_array_equal(field.half_width_m[field.way_id == 77], 7.0)
+    np.testing.assert_array_equal(field.half_width_m[field.way_id == 0], 0.0)
+    assert field.half_width_m.dtype == np.float32
+
+
 def test_a_part_of_the_area(database, field):
     west, _, _, north = LATTICE.bounds_m
     part = database.field((west + 30, north - 90, west + 120, north - 10))

@@ -24,11 +24,12 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
     step_factor_of,
 )
 from mapfilter.experiments.benchmarks.ottawa_table import read_left_out
+from mapfilter.filters.particle import Cloud
 from mapfilter.geodesy import Lattice, unproject
-from mapfilter.models.fingerprint import LevelReading
+from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.measured_map import MeasuredMapOptions, MeasuredRows, ServingStatistics
+from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.workflows.evaluate_ottawa import Task, find_left_out, run_ottawa
 
@@ -38,9 +39,10 @@ ANTENNAS = {1: (-60.0, 40.0), 2: (300.0, 460.0), 3: (520.0, -40.0)}
 STEP_M, SPEED_MPS = 20.0, 4.0
 CHOSEN = OttawaOptions()
 QUICK = replace(
-    CHOSEN, filter=replace(CHOSEN.filter, max_particles=2000, min_search_particles=1500)
+    CHOSEN,
+    filter=replace(CHOSEN.filter, max_particles=2000, min_search_particles=1500, min_particles=500),
 )
-"""A fifteenth of the particles."""
+"""A fifth of the particles."""
 
 
 def write_ride(path, seed, start_s):
@@ -145,32 +147,49 @@ def test_a_place_where_a_cell_was_not_measured_says_less_of_its_level(found, mad
     np.testing.assert_array_equal(model.level_sd_db[np.isnan(told)], QUICK.unmeasured_db)
     np.testing.assert_array_equal(model.level_sd_db[~np.isnan(told)], told[~np.isnan(told)])
     assert np.isfinite(database.field().level_dbm).all()
-    level = LevelReading(
-        np.array([0], np.int32), *np.float32([[-100.0], [0.0], [0.1]]), 0.0, 1.0, 3.0, 0.0, 0.0
+    level = LevelReport(
+        np.array([0], np.int32), np.array([-100.0], np.float32), np.zeros(0, np.int32), -120.0, 0.0
     )
-    state = np.zeros((5, model.area.points.shape[1]), dtype=np.float32)
+    state = np.zeros((STATES, model.area.points.shape[1]), dtype=np.float32)
     state[:2] = model.area.points
-    plain, own = np.zeros((2, state.shape[1]))
-    same = np.full_like(model.level_sd_db, np.hypot(*_sds(model)))
-    BayesModel.weigh(model, state, plain, RadioReading(levels=level))
-    replace(model, level_sd_db=same).weigh(state, own, RadioReading(0, 0.0, level))
-    np.testing.assert_allclose(own, plain, atol=1e-5)
-    wide = np.zeros_like(own)
-    replace(model, level_sd_db=2 * same).weigh(state, wide, RadioReading(0, 0.0, level))
-    assert np.ptp(wide) < np.ptp(own)
+    cloud = Cloud(state, np.empty((state.shape[1], 0), np.float32))
+    errors = replace(model.evidence.levels, fault_probability=1e-300)
+    sound = replace(model, evidence=replace(model.evidence, levels=errors))
 
+    def found_by(sd_db):
+        by, log_weight = replace(sound, level_sd_db=sd_db), np.zeros(state.shape[1])
+        by.weigh(cloud, log_weight, RadioReading(levels=level))
+        return log_weight
 
-def _sds(model):
-    return model.evidence.levels.sd_db, model.evidence.levels.measurement_db
+    same = np.full_like(model.level_sd_db, errors.total_db)
+    pixel = [model.area.lattice.row_col(*place) for place in model.area.points.T
+             + np.array(model.area.origin_m)]  # fmt: skip
+    here = np.array([model.area.level_dbm[int(row), int(col), 0] for row, col in pixel])
+    for factor in (1.0, 0.5, 2.0):
+        # A map that is better than the errors' total is not believed to be.
+        total_db = max(factor, 1.0) * errors.total_db
+        variance = total_db**2 + errors.device_db**2
+        expected = -0.5 * ((-100.0 - here) ** 2 / variance + np.log(variance))
+        np.testing.assert_allclose(
+            found_by(factor * same), errors.weight * expected, rtol=5e-3, atol=5e-3
+        )
+    # At half of the pixels less is known.
+    part = same.copy()
+    part[:, ::2] *= 2
+    at = np.array([int(row) * model.area.lattice.cols + int(col) for row, col in pixel])
+    expected = np.where(at % 2 == 0, found_by(2 * same), found_by(same))
+    np.testing.assert_allclose(found_by(part), expected, rtol=1e-6)
 
 
 def test_equal_seeds_find_the_same(found, made):
     one, *others = [read_session(path) for path in sorted((made / FOLDER / "carling").iterdir())]
-    database = open_database(found.out / "carling" / one.name / "database")
-    positioner = surveyed_positioner(database, others, QUICK)
+    folder = found.out / "carling" / one.name
+    deviation = open_rasters(folder / "rxlev-deviation.tif")
+    positioner = surveyed_positioner(open_database(folder / "database"), others, QUICK, deviation)
     first, again, other = (
         find_session("carling", one, positioner, QUICK, seed, 0)[0] for seed in (7, 7, 8)
     )
+    assert first.error_m.size > 10
     assert first.error_m.tobytes() == again.error_m.tobytes()
     assert first.error_m.tobytes() != other.error_m.tobytes()
 

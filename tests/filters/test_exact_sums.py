@@ -9,7 +9,7 @@ import scalar_oracle as oracle
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.hypotheses import Bins, flattened
 from mapfilter.filters.kalman import smooth
-from mapfilter.filters.particle import ParticleFilter, ParticleOptions
+from mapfilter.filters.particle import Cloud, ParticleFilter, ParticleOptions
 
 PRIOR = np.array([0.5, 0.3, 0.2])
 CHANGE = np.array([[0.7, 0.2, 0.1], [0.1, 0.6, 0.3], [0.25, 0.05, 0.7]])
@@ -37,7 +37,7 @@ class Chain:
         # In blocks: systematic draws of places in turns would not be independent of the place.
         place = 3 * np.arange(most) // most
         state = np.stack([EAST_M[place], np.full(most, 50.0)]).astype(np.float32)
-        return state, np.log(prior[place])
+        return Cloud(state, np.empty((most, 0), "f4")), np.log(prior[place])
 
     def move(self, state, log_weight, motion, key):  # noqa: ARG002
         chance = np.random.default_rng(int(key)).random(state.shape[1])
@@ -46,13 +46,13 @@ class Chain:
         moved = np.stack([EAST_M[place], state[1]]).astype(np.float32)
         return moved, log_weight + np.log(MAP[place])
 
-    def weigh(self, state, log_weight, reading):
+    def weigh(self, cloud, log_weight, reading):
         if reading not in LIKELIHOOD:
-            return Reason.NO_READING
-        log_weight += np.log(LIKELIHOOD[reading][self.place(state)])
-        return Reason.USED
+            return cloud, Reason.NO_READING
+        log_weight += np.log(LIKELIHOOD[reading][self.place(cloud.state)])
+        return cloud, Reason.USED
 
-    def can_converge(self, summary):  # noqa: ARG002
+    def can_converge(self, summary, reading):  # noqa: ARG002
         return self.believable
 
     @staticmethod
@@ -106,7 +106,12 @@ def test_log_evidence_and_belief_are_those_of_the_sum_on_average(mass_exponent, 
     beliefs, log_evidence = oracle.forward(PRIOR, steps)
     model = Chain(CHANGE, believable)
     given = options(
-        count, mass_exponent=mass_exponent, resample_below=0.9, switch_mass=0.3, switch_hold_m=15.0
+        count,
+        mass_exponent=mass_exponent,
+        resample_below=0.9,
+        switch_mass=0.3,
+        switch_hold_m=15.0,
+        split_mass=0.0,
     )
     filter_, ratio, found = ParticleFilter(model, given), [], []
     for seed in range(runs):

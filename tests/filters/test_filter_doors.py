@@ -38,14 +38,15 @@ def test_the_usual_options():
     assert asdict(ParticleOptions()) == {
         "max_particles": 20_000,
         "min_search_particles": 12_000,
-        "min_particles": 1000,
+        "min_particles": 3000,
         "particles_per_bin": 60.0,
         "resample_below": 0.5,
         "mass_exponent": 0.5,
-        "jitter": (0.2, 0.2, 0.005, 0.003, 0.0),
-        "searching_jitter": (1.5, 1.5, 0.015, 0.009, 0.0),
+        "jitter": (0.3, 0.3, 0.004, 0.002, 0.0, 0.004, 0.004, 1e-4),
+        "searching_jitter": (1.5, 1.5, 0.01, 0.006, 0.0, 0.01, 0.01, 1e-4),
         "switch_mass": 0.99,
         "switch_hold_m": 14.0,
+        "split_mass": 0.5,
     }
     assert asdict(CandidateOptions()) == {
         "update_length_m": 22.0,

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from itertools import product
-from math import cos, exp, log, sin
+from math import cos, exp, log, nan, sin
 
 import numpy as np
 import pytest
@@ -42,14 +42,14 @@ class Tiny:
     def start(self, prior):  # noqa: ARG002
         return PRIOR[0].astype(np.float32), PRIOR[1].astype(np.float32)
 
-    def states(self, row, col, bias_rad):
-        state = np.zeros((5, row.size), dtype=np.float32)
+    def states(self, row, col, bias_rad, off):
+        state = np.zeros((6, row.size), dtype=np.float32)
         state[0], state[1] = (col + 0.5) * PIXEL_M, (ROWS - row - 0.5) * PIXEL_M
-        state[2] = bias_rad
+        state[2], state[3] = bias_rad, off
         return state
 
-    def transport(self, east_m, north_m, length_m):
-        self.asked.append((east_m, north_m, length_m))
+    def transport(self, east_m, north_m, length_m, spread_m2):
+        self.asked.append((east_m, north_m, length_m, spread_m2))
         way = [displaced(b, east_m, north_m) for b in range(3)]
         right, down = np.array(way).T
         return Transport(
@@ -64,16 +64,16 @@ class Tiny:
             COME_BACK,
         )
 
-    def weigh(self, state, log_weight, reading):
+    def weigh(self, cloud, log_weight, reading):
         if reading is None:
-            return Reason.NO_READING
-        for i, (east_m, north_m, bias_rad) in enumerate(state[:3].T):
+            return cloud, Reason.NO_READING
+        for i, (east_m, north_m, bias_rad) in enumerate(cloud.state[:3].T):
             row, col = oracle.pixel_of(float(east_m), float(north_m), PIXEL_M, ROWS, COLS)
             b = int(np.argmin(np.abs(BIAS_RAD - bias_rad)))
             log_weight[i] += log(LIKELIHOOD[reading][b, row, col])
-        return Reason.USED
+        return cloud._replace(shared=reading), Reason.USED
 
-    def can_converge(self, summary):  # noqa: ARG002
+    def can_converge(self, summary, reading):  # noqa: ARG002
         return True
 
 
@@ -135,11 +135,35 @@ def test_the_hypotheses_are_the_pixels_with_their_probability_of_being_off():
         place = (round((col + 0.5) * PIXEL_M), round((ROWS - row - 0.5) * PIXEL_M), b)
         expected[place] = (on + off, off / (on + off))
     assert belief.weight.size == len(expected)
-    for (east_m, north_m, bias_rad, _, off), weight in zip(
+    for (east_m, north_m, bias_rad, off, *_), weight in zip(
         belief.state.T, belief.weight, strict=True
     ):
         b = int(np.argmin(np.abs(BIAS_RAD - bias_rad)))
         assert (weight, off) == pytest.approx(expected[round(east_m), round(north_m), b], rel=1e-5)
+
+
+def test_the_model_weighs_pixels_with_their_probability_of_being_off_and_shares_its_memory():
+    given = []
+
+    class Curious(Tiny):
+        def weigh(self, cloud, log_weight, reading):
+            given.append(cloud)
+            return super().weigh(cloud, log_weight, reading)
+
+        def can_converge(self, summary, reading):
+            given.append(reading)
+            return super().can_converge(summary, reading)
+
+    filter_, rng = GridFilter(Curious()), np.random.default_rng(0)
+    belief, _ = filter_.update(filter_.init(None, rng), 1, rng)
+    cloud = given[0]
+    on, off = PRIOR.reshape(2, -1)
+    np.testing.assert_allclose(cloud.state[3], off / (on + off), rtol=1e-5)
+    assert (cloud.kept.shape, cloud.shared) == ((3 * ROWS * COLS, 0), None)
+    assert belief.shared == 1
+    assert filter_.predict(belief, MotionStep(1.0, 0.0), rng)[0].shared == 1
+    # The switch rule may depend on the reading; it is asked where the mass agrees only.
+    assert given[1:] in ([], [1])
 
 
 def test_steps_wait_for_a_reading_and_are_summed():
@@ -152,11 +176,28 @@ def test_steps_wait_for_a_reading_and_are_summed():
     assert same is belief
     assert info.reason is Reason.NO_READING
     weighed, _ = filter_.update(belief, 1, rng)
-    assert model.asked[-1] == pytest.approx((2.0, 4.0, 8.0))
-    assert weighed.waiting_m == (0.0, 0.0, 0.0)
+    assert model.asked[-1] == pytest.approx((2.0, 4.0, 8.0, 0.0))
+    assert weighed.waiting == (0.0, 0.0, 0.0, 0.0)
     assert weighed.travelled_m == belief.travelled_m == 8.0
     one = oracle.forward(PRIOR.ravel(), [(transition(2.0, 4.0, circular=False), likelihood(1))])
     np.testing.assert_allclose(np.stack([weighed.on, weighed.off]).ravel(), one[0][0], rtol=2e-4)
+
+
+def test_steps_without_a_heading_wait_as_a_variance_to_all_sides():
+    model, rng = Tiny(), np.random.default_rng(0)
+    filter_ = GridFilter(model)
+    belief, reasons = filter_.init(None, rng), []
+    for motion in (MotionStep(3.0, 0.0), MotionStep(4.0, nan), MotionStep(-2.0, nan)):
+        belief, reason = filter_.predict(belief, motion, rng)
+        reasons.append(reason)
+    assert reasons == [Reason.USED, Reason.NO_HEADING, Reason.NO_HEADING]
+    assert belief.travelled_m == 9.0
+    filter_.update(belief, 1, rng)
+    # The mean square of each step's distance is that of the step: a half of it on each axis.
+    assert model.asked[-1] == pytest.approx((3.0, 0.0, 9.0, 8.0 + 2.0))
+    same, reason = filter_.predict(belief, MotionStep(0.0, nan), rng)
+    assert same is belief
+    assert reason is Reason.NO_HEADING
 
 
 def test_a_reading_without_motion_weighs_only():

@@ -42,9 +42,9 @@ class Places:
         mass[0, 0] = prior
         return 0.75 * mass, 0.25 * mass
 
-    def states(self, row, col, bias_rad):
-        state = np.zeros((4, row.size), dtype=np.float32)
-        state[0], state[1], state[2] = 10.0 * col + 5.0, 5.0, bias_rad
+    def states(self, row, col, bias_rad, off):
+        state = np.zeros((5, row.size), dtype=np.float32)
+        state[0], state[1], state[2], state[3] = 10.0 * col + 5.0, 5.0, bias_rad, off
         return state
 
     def transport(self, *_):
@@ -61,11 +61,11 @@ class Places:
             0.0,
         )
 
-    def weigh(self, state, log_weight, reading):  # noqa: ARG002
+    def weigh(self, cloud, log_weight, reading):
         log_weight += reading
-        return Reason.USED
+        return cloud, Reason.USED
 
-    def can_converge(self, summary):  # noqa: ARG002
+    def can_converge(self, summary, reading):  # noqa: ARG002
         return self.believable
 
 
@@ -107,6 +107,16 @@ def test_a_grid_that_is_not_believed_or_spread_goes_on_searching():
         assert {info.status for info in news} == {Status.SEARCHING}
 
 
+@pytest.mark.parametrize(
+    ("split_mass", "status"), [(0.59, Status.CONVERGED), (0.61, Status.SEARCHING)]
+)
+def test_a_grid_that_splits_searches_again(split_mass, status):
+    options = ParticleOptions(switch_mass=0.5, switch_hold_m=0.0, split_mass=split_mass)
+    belief, news = followed(GridFilter(Far(), options), [0.6, 0, 0, 0, 0.4], 1)
+    assert news[0].status is belief.status is status
+    assert np.isnan(belief.agreement_start_m) == (status is Status.SEARCHING)
+
+
 class Far(Places):
     """The same pixels a hundred metres apart."""
 
@@ -114,8 +124,8 @@ class Far(Places):
     def bins(self):
         return Bins.over((0.0, 0.0, 500.0, 10.0))
 
-    def states(self, row, col, bias_rad):
-        return super().states(row, 10 * col, bias_rad)
+    def states(self, row, col, bias_rad, off):
+        return super().states(row, 10 * col, bias_rad, off)
 
 
 def test_a_share_of_exactly_the_switch_mass_agrees():
@@ -143,16 +153,16 @@ def test_motion_of_a_grid_that_is_absent_or_nothing():
     start = filter_.init(ONE, rng)
     for motion, why in (
         (MotionStep(nan, 0.0), Reason.NO_STEP),
-        (MotionStep(1.0, nan), Reason.NO_HEADING),
+        (MotionStep(0.0, nan), Reason.NO_HEADING),
         (MotionStep(0.0, 1.0), Reason.USED),
     ):
         assert filter_.predict(start, motion, rng) == (start, why)
     assert start.moved is start
     assert (start.travelled_m, start.log_evidence, start.status) == (0.0, 0.0, Status.SEARCHING)
     assert np.isnan(start.agreement_start_m)
-    assert start.waiting_m == (0.0, 0.0, 0.0)
+    assert start.waiting == (0.0, 0.0, 0.0, 0.0)
     np.testing.assert_allclose(np.exp(start.log_weight), start.weight)
-    assert start.state[-1].tolist() == [0.25]
+    assert start.state[3].tolist() == [0.25]
 
 
 def test_one_heading_does_not_turn():

@@ -8,7 +8,7 @@ import pytest
 from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.hypotheses import Bins
-from mapfilter.filters.particle import ParticleFilter, ParticleOptions
+from mapfilter.filters.particle import Cloud, ParticleFilter, ParticleOptions
 
 PRIOR_SD, STEP_SD, FIX_SD = 20.0, 3.0, 8.0
 PLAIN = ParticleOptions(
@@ -34,21 +34,22 @@ class LinearModel:
 
     def start(self, prior, most, rng):
         place = np.array(prior)[:, None] + PRIOR_SD * rng.standard_normal((2, most))
-        return place.astype(np.float32), np.full(most, -np.log(most))
+        cloud = Cloud(place.astype(np.float32), np.empty((most, 0), "f4"))
+        return cloud, np.full(most, -np.log(most))
 
     def move(self, state, log_weight, motion, key):
         noise = STEP_SD * np.random.default_rng(int(key)).standard_normal(state.shape)
         way = np.array([[np.cos(motion.heading_rad)], [np.sin(motion.heading_rad)]])
         return (state + motion.step_m * way + noise).astype(np.float32), log_weight
 
-    def weigh(self, state, log_weight, reading):
+    def weigh(self, cloud, log_weight, reading):
         if reading is None:
-            return Reason.NO_READING
-        off = state - np.array(reading)[:, None]
+            return cloud, Reason.NO_READING
+        off = cloud.state - np.array(reading)[:, None]
         log_weight -= 0.5 * (off**2).sum(axis=0) / FIX_SD**2
-        return Reason.USED
+        return cloud, Reason.USED
 
-    def can_converge(self, summary):
+    def can_converge(self, summary, reading):  # noqa: ARG002
         return self.believable and np.isfinite(summary.mean).all()
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.hypotheses import Bins
-from mapfilter.filters.particle import ParticleFilter, ParticleOptions
+from mapfilter.filters.particle import Cloud, ParticleFilter, ParticleOptions
 
 
 @dataclass(frozen=True)
@@ -25,18 +25,18 @@ class Two:
     def start(self, prior, most, rng):  # noqa: ARG002
         state = np.zeros((3, most), dtype=np.float32)
         state[0, most // 2 :] = 300.0
-        return state, np.full(most, float(prior))
+        return Cloud(state, np.empty((most, 0), "f4")), np.full(most, float(prior))
 
     def move(self, state, log_weight, motion, key):  # noqa: ARG002
         return state + np.float32(1.0), log_weight
 
-    def weigh(self, state, log_weight, reading):
+    def weigh(self, cloud, log_weight, reading):
         if reading is None:
-            return Reason.NO_READING
-        log_weight[state[0] < 150.0] += reading
-        return Reason.USED
+            return cloud, Reason.NO_READING
+        log_weight[cloud.state[0] < 150.0] += reading
+        return cloud, Reason.USED
 
-    def can_converge(self, summary):  # noqa: ARG002
+    def can_converge(self, summary, reading):  # noqa: ARG002
         return self.believable
 
 
@@ -115,6 +115,73 @@ def test_which_jitter_parts_copies():
     assert info.status is Status.CONVERGED
     assert found.state[2].tolist() == [0.0] * 10
     assert found.state[1].std() > 0.6
+
+
+class Remembering(Two):
+    """Keeps where each particle stands, and counts readings for all of them."""
+
+    def weigh(self, cloud, log_weight, reading):
+        cloud, reason = super().weigh(cloud, log_weight, reading)
+        kept = np.stack([cloud.state[0], log_weight.astype("f4")], axis=1)
+        return cloud._replace(kept=kept, shared=(cloud.shared or 0) + 1), reason
+
+    def can_converge(self, summary, reading):  # noqa: ARG002
+        return reading < 1.0
+
+
+@pytest.mark.parametrize("mass_exponent", [0.5, 1.0])
+def test_what_particles_keep_goes_with_them_when_they_are_drawn_anew(mass_exponent):
+    options = ParticleOptions(
+        **STILL, max_particles=64, min_search_particles=40, min_particles=4, resample_below=0.99,
+        particles_per_bin=1e-3, mass_exponent=mass_exponent,
+    )  # fmt: skip
+    filter_, rng = ParticleFilter(Remembering(), options), np.random.default_rng(0)
+    start = filter_.init(0.0, rng)
+    after, info = filter_.update(start, 2.0, rng)
+    assert info.hypotheses == 40
+    assert after.kept.shape == (40, 2)
+    np.testing.assert_array_equal(after.kept[:, 0], after.state[0])
+    assert set(after.kept[:, 0].tolist()) == {0.0, 300.0}
+    # The logarithm of the weight before: two more at the first place.
+    gain = np.where(after.state[0] < 150.0, 2.0, 0.0)
+    np.testing.assert_allclose(after.kept[:, 1], gain + start.log_weight[0], rtol=1e-6)
+    assert (start.shared, after.shared) == (None, 1)
+    moved, _ = filter_.predict(after, MotionStep(1.0, 0.0), rng)
+    assert moved.kept is after.kept
+    assert filter_.update(moved, 2.0, rng)[0].shared == 2
+    # Where no particle is left, what was kept before stays.
+    none = replace(moved, log_weight=np.full(40, -np.inf))
+    after, info = filter_.update(none, 0.5, rng)
+    assert (after, info.reason) == (none, Reason.NO_CANDIDATES_LEFT)
+
+
+def test_a_belief_may_be_kept_from_converging_by_a_reading():
+    options = ParticleOptions(
+        **STILL, max_particles=64, min_search_particles=64, min_particles=4, switch_mass=0.4,
+        switch_hold_m=0.0,
+    )  # fmt: skip
+    filter_, rng = ParticleFilter(Remembering(), options), np.random.default_rng(0)
+    start = filter_.init(0.0, rng)
+    statuses = [filter_.update(start, told, rng)[1].status for told in (0.9, 1.1)]
+    assert statuses == [Status.CONVERGED, Status.SEARCHING]
+
+
+@pytest.mark.parametrize(
+    ("split_mass", "status"), [(0.49, Status.TRACKING), (0.52, Status.SEARCHING)]
+)
+def test_a_belief_that_splits_searches_again(split_mass, status):
+    options = ParticleOptions(
+        **STILL, max_particles=64, min_search_particles=64, min_particles=64, switch_mass=0.9,
+        switch_hold_m=0.0, split_mass=split_mass, mass_exponent=1.0, resample_below=1e-9,
+    )  # fmt: skip
+    filter_, rng = ParticleFilter(Two(), options), np.random.default_rng(0)
+    found, info = filter_.update(filter_.init(0.0, rng), log(99.0), rng)
+    assert info.status is Status.CONVERGED
+    # The same evidence against the first place: one half each.
+    split, info = filter_.update(found, -log(99.0), rng)
+    assert split.summary.mass_50m == pytest.approx(0.5, abs=1e-5)
+    assert info.status is split.status is status
+    assert np.isnan(split.agreement_start_m) == (status is Status.SEARCHING)
 
 
 def test_particles_without_any_weight():

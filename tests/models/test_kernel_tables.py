@@ -1,6 +1,6 @@
 """Tables and elementary functions of the kernels, entry by entry, and the usual options."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from math import atan2, erfc, exp, log, pi, radians, sqrt
 
 import numpy as np
@@ -9,21 +9,23 @@ import pytest
 from mapfilter.models import fingerprint
 from mapfilter.models.fingerprint import (
     BoundReading,
-    LevelErrors,
-    LevelReading,
     RasterFrame,
     ServingWeights,
     bound_table,
     log_serving,
     serving_table,
 )
+from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.street_motion import (
     BIAS,
     EAST,
     LOG_SCALE,
     NORTH,
     OFF,
+    RATE,
     STATES,
+    STRETCH,
+    TURN,
     MapWeights,
     MotionErrors,
     _squares,
@@ -44,31 +46,46 @@ def test_the_usual_options():
         "weight_per_m": 1 / 22,
     }
     assert asdict(LevelErrors()) == {
-        "sd_db": 10.0,
-        "correlation_m": 50.0,
-        "measurement_db": 1.5,
-        "roughness_db": 6.0,
-        "common": 0.3,
-        "clip_sd": 3.0,
-        "weight": 0.7,
+        "slow_db": 7.0,
+        "slow_m": 200.0,
+        "fast_db": 4.0,
+        "fast_m": 20.0,
+        "white_db": 3.3,
+        "device_db": 5.0,
+        "site_share": 0.6,
+        "common_share": 0.2,
+        "roughness": 1.0,
+        "fault_probability": 0.06,
+        "fault_m": 300.0,
+        "absent_db": 3.0,
+        "weight": 0.35,
     }
     assert asdict(MotionErrors()) == {
         "step_sd_m": 0.3,
         "typical_step_m": 1.4,
-        "heading_sd_rad": radians(6),
-        "bias_sd_rad": radians(3),
-        "bias_drift_rad_per_sqrt_m": radians(0.05),
-        "scale_sd": 0.02,
+        "heading_sd_rad": radians(15),
+        "white_share": 0.3,
+        "heading_m": 28.0,
+        "disturbances_per_m": 0.002,
+        "disturbed_rad": radians(40),
+        "bias_sd_rad": radians(10),
+        "bias_drift_rad_per_sqrt_m": radians(0.3),
+        "rate_rad_per_m": radians(0.15),
+        "rate_share": 0.5,
+        "scale_sd": 0.03,
         "scale_drift_per_sqrt_m": 0.0,
+        "stretch_sd": 0.08,
+        "stretch_m": 25.0,
     }
     assert asdict(MapWeights()) == {
-        "sd_m": 4.0,
-        "weight_per_m": 1 / 18,
+        "sd_m": 3.0,
+        "weight_per_m": 1 / 12,
         "off_cost_per_m": 0.1,
         "leave_per_m": 0.001,
         "return_per_m": 0.01,
     }
-    assert (EAST, NORTH, BIAS, LOG_SCALE, OFF, STATES) == (0, 1, 2, 3, 4, 5)
+    rows = EAST, NORTH, BIAS, LOG_SCALE, OFF, TURN, STRETCH, RATE, STATES
+    assert rows == tuple(range(9))
 
 
 def test_the_table_of_margins_goes_from_minus_64_to_64_db_in_quarters():
@@ -127,18 +144,8 @@ def test_corners_of_a_raster_have_their_own_pixels():
     )
     state = np.zeros((5, 7), dtype=np.float32)
     state[:2] = places.T + np.array([[200.0], [-70.0]])
-    pixel = fingerprint.pixels(state, 0.0, 0.0, RasterFrame(200.0, -40.0, 0.1, 3, 5))
+    pixel = fingerprint.pixels(state, RasterFrame(200.0, -40.0, 0.1, 3, 5))
     assert pixel.tolist() == [0, 4, 10, 14, 0, 14, 6]
-
-
-def test_clipped_innovations_count_as_the_clip_on_both_sides():
-    level = np.array([-50.0, 50.0, 1.0], dtype=np.float32)
-    found, pixel = np.zeros(3), np.arange(3, dtype=np.int32)
-    one, none = np.ones(1, dtype=np.float32), np.zeros(1, dtype=np.float32)
-    levels = LevelReading(none.astype(np.int32), none, none, one, 0.3, 0.5, 2.0, 0.0, 0.0)
-    fingerprint.weigh_by_levels(pixel, pixel, level, 1, levels, found)
-    # With one level the common part does not matter: half of weight times square.
-    np.testing.assert_allclose(found, [-1.0, -1.0, -0.25], rtol=1e-6)
 
 
 def test_logarithms_over_all_magnitudes():
@@ -167,27 +174,42 @@ def test_angles_all_around():
     np.testing.assert_array_equal(out, [pi, 0.0, 0.0, pi / 2, -pi / 2])
 
 
+STILL = MotionErrors(
+    step_sd_m=0.0, heading_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0, stretch_sd=0.0,
+    disturbances_per_m=0.0,
+)  # fmt: skip
+
+
 def test_no_two_numbers_of_a_step_are_drawn_alike():
     count, key = 4000, np.uint64(77)
-    still = {"bias_drift_rad_per_sqrt_m": 0.0, "heading_sd_rad": 0.0, "step_sd_m": 0.0}
     state = np.zeros((STATES, count), dtype=np.float32)
-    along = move(state, 1.4, 0.0, MotionErrors(**still | {"step_sd_m": 1.0}), key)[EAST] - 1.4
-    across = move(state, 1.0, 0.0, MotionErrors(**still | {"heading_sd_rad": 1.0}), key)[NORTH]
-    walk = MotionErrors(**still | {"bias_drift_rad_per_sqrt_m": 0.5}, scale_drift_per_sqrt_m=1.0)
-    after = move(state, 1.0, 0.0, walk, key)
-    drawn = np.array([along, across, 2 * after[BIAS], after[LOG_SCALE]])
+
+    def moved(**given):
+        return move(state, 1.4, 0.0, replace(STILL, typical_step_m=1.4, **given), key)
+
+    along = moved(step_sd_m=1.0)[EAST] - 1.4
+    across = moved(heading_sd_rad=1.0, white_share=1.0)[NORTH] / 1.4
+    walk = moved(bias_drift_rad_per_sqrt_m=0.5, scale_drift_per_sqrt_m=1.0)
+    deviation = moved(heading_sd_rad=1.0, white_share=0.0, heading_m=1e-3, stretch_sd=1.0,
+                      stretch_m=1e-3)  # fmt: skip
+    jumped = moved(disturbances_per_m=0.3, disturbed_rad=1.0)[TURN] != 0
+    drawn = [along, across, walk[BIAS] / (0.5 * sqrt(1.4)), walk[LOG_SCALE] / sqrt(1.4)]
+    drawn = np.array([*drawn, deviation[TURN], deviation[STRETCH]])
+    np.testing.assert_allclose(drawn.std(axis=1), 1.0, rtol=5 / sqrt(2 * count))
     assert np.unique(np.round(drawn, 5)).size > 0.96 * drawn.size
+    # Whether there is a jump is drawn by itself, too.
+    drawn = np.vstack([drawn, jumped])
     # Neither beside each other, nor of one hypothesis and another one.
     for shift in range(1, 4):
         both = np.vstack([drawn[:, shift:], drawn[:, :-shift]])
-        off = np.corrcoef(both) - np.eye(8)
+        off = np.corrcoef(both) - np.eye(14)
         assert np.abs(off).max() < 5 / sqrt(count)
     spread = np.vstack([drawn[:, : count // 2], drawn[:, : 2 * (count // 2) : 2]])
-    assert np.abs(np.corrcoef(spread) - np.eye(8)).max() < 0.5
+    assert np.abs(np.corrcoef(spread) - np.eye(14)).max() < 0.5
 
 
 def test_a_step_of_nothing_changes_nothing():
-    state = np.array([[1.0], [2.0], [0.3], [0.1], [0.4], [9.0]], dtype=np.float32)
+    state = np.array([[1.0, 2.0, 0.3, 0.1, 0.4, -0.2, 0.05, 0.01, 9.0]], dtype=np.float32).T
     np.testing.assert_array_equal(move(state, 0.0, 1.0, MotionErrors(), np.uint64(1)), state)
 
 

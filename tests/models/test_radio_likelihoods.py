@@ -1,4 +1,4 @@
-"""Likelihoods of serving cells and levels against the scalar oracle."""
+"""Likelihoods of serving cells and of bounds against the scalar oracle."""
 
 import numpy as np
 import pytest
@@ -7,8 +7,6 @@ import scalar_oracle as oracle
 from mapfilter.models import fingerprint
 from mapfilter.models.fingerprint import (
     BoundReading,
-    LevelErrors,
-    LevelReading,
     RasterFrame,
     ServingWeights,
 )
@@ -75,59 +73,6 @@ def test_margins_beyond_the_table_count_as_its_ends():
     assert by_serving(table, 0, weights)[0] == pytest.approx(0.0, abs=1e-6)
 
 
-def innovations(table, before, reading):
-    """Standardised innovations at each pixel by the formula, from the report's two halves."""
-    rows = []
-    for now, then in zip(EVERY, before, strict=True):
-        rows.append(
-            [
-                oracle.innovation_db(r, float(table[now, c]), rho, r0, float(table[then, c])) / sd
-                for c, r, r0, rho, sd in reading
-            ]
-        )
-    return rows
-
-
-def by_levels(table, before, reading, errors):
-    cell, now, then, rho, sd = (np.array(column) for column in zip(*reading, strict=True))
-    found = np.zeros(EVERY.size)
-    offset_db, rho, scale = (one.astype(np.float32) for one in (now - rho * then, rho, 1 / sd))
-    options = (errors.common, errors.weight, errors.clip_sd)
-    levels = LevelReading(cell.astype(np.int32), offset_db, rho, scale, *options, 0.0, 0.0)
-    fingerprint.weigh_by_levels(EVERY, before, table.reshape(-1), BANDS, levels, found)
-    return found
-
-
-READING = ((2, -70.0, -74.0, 0.8, 6.0), (0, -82.0, -75.0, 0.55, 8.0), (3, -64.0, 0.0, 0.0, 11.0))
-
-
-@pytest.mark.parametrize("common", [0.0, 0.3, 0.7])
-@pytest.mark.parametrize("clip_sd", [3.0, 100.0])
-@pytest.mark.parametrize("count", [1, 2, 3])
-def test_levels_are_a_gaussian_with_equal_correlations(common, clip_sd, count):
-    errors = LevelErrors(common=common, clip_sd=clip_sd, weight=0.7)
-    table, before = raster(1), np.random.default_rng(2).permutation(EVERY)
-    reading = READING[:count]
-    expected = [
-        oracle.levels_log_likelihood(z, common, errors.weight, clip_sd)
-        for z in innovations(table, before, reading)
-    ]
-    found = by_levels(table, before, reading, errors)
-    np.testing.assert_allclose(found, expected, rtol=2e-5, atol=1e-5)
-
-
-def test_an_error_that_all_cells_share_costs_less_than_opposite_ones():
-    errors = LevelErrors(common=0.6, weight=1.0)
-    table = np.full((ROWS * COLS, BANDS), -80.0, dtype=np.float32)
-    alike, opposite = (
-        by_levels(table, EVERY, ((0, -74.0, 0.0, 0.0, 6.0), (1, other, 0.0, 0.0, 6.0)), errors)[0]
-        for other in (-74.0, -86.0)
-    )
-    # For two deviations of one: -1/(1+c) when alike, -1/(1-c) when opposite.
-    assert alike == pytest.approx(-1 / 1.6, rel=1e-5)
-    assert opposite == pytest.approx(-1 / 0.4, rel=1e-5)
-
-
 def by_bound(table, cells, level_dbm, censored, sd_db=9.0, weight=1.0):
     found = np.zeros(EVERY.size)
     bound = BoundReading(np.array(cells, dtype=np.int32), level_dbm, censored, sd_db, weight)
@@ -178,9 +123,9 @@ def test_an_ambiguous_level_far_from_all_candidates_counts_as_four_deviations():
         assert by_bound(table, (0, 1), level_dbm, 0, 9.0)[0] == pytest.approx(-8.0, rel=1e-5)
 
 
-def pixels(state, back_m=(0.0, 0.0)):
+def pixels(state):
     frame = RasterFrame(0.0, ROWS * RESOLUTION_M, 1 / RESOLUTION_M, ROWS, COLS)
-    return fingerprint.pixels(state, *back_m, frame)
+    return fingerprint.pixels(state, frame)
 
 
 def hypotheses(count=400, seed=5):
@@ -200,34 +145,11 @@ def off_edge(east_m, north_m):
     return bool(np.all(np.abs(within - np.round(within)) > 1e-4))
 
 
-@pytest.mark.parametrize("back_m", [(0.0, 0.0), (12.0, 0.0), (0.0, 17.0), (-9.0, 21.0)])
-def test_the_place_at_the_last_report_lies_against_the_displacement(back_m):
+def test_each_hypothesis_has_the_pixel_that_holds_it_or_that_of_the_edge():
     state, compared = hypotheses(), 0
-    for i, found in enumerate(pixels(state, back_m)):
-        place = oracle.came_from(*(float(x) for x in state[:4, i]), *back_m)
+    for place, found in zip(state[:2].T.astype(float), pixels(state), strict=True):
         if off_edge(*place):
             row, col = oracle.pixel_of(*place, RESOLUTION_M, ROWS, COLS)
             assert found == row * COLS + col
             compared += 1
     assert compared > 390
-
-
-def test_one_who_went_east_was_farther_west_before():
-    state = np.zeros((5, 1), dtype=np.float32)
-    state[0], state[1] = 55.0, 25.0
-    here, before = pixels(state)[0], pixels(state, (20.0, 0.0))[0]
-    assert divmod(here, COLS) == (3, 5)
-    assert divmod(before, COLS) == (3, 3)
-    # A heading error of +90° turns the way east into one north.
-    state[2] = np.pi / 2
-    assert divmod(pixels(state, (20.0, 0.0))[0], COLS) == (5, 5)
-    # Steps that are in truth twice as long reach twice as far back.
-    state[2], state[3] = 0.0, np.log(2.0)
-    assert divmod(pixels(state, (20.0, 0.0))[0], COLS) == (3, 1)
-
-
-def test_a_prediction_beside_the_truth_varies_by_the_variogram():
-    errors = LevelErrors(roughness_db=5.0, correlation_m=40.0)
-    for particle_spacing_m in (0.0, 1.5, 5.0, 40.0, 1e4):
-        expected = oracle.beside_variance(errors, particle_spacing_m)
-        assert errors.offset_variance_db2(particle_spacing_m) == pytest.approx(expected, abs=1e-12)

@@ -1,19 +1,22 @@
 """Motion over streets against the scalar oracle: signs, moments, the map, and going back."""
 
-from math import log, pi
+from dataclasses import replace
+from math import exp, log, pi, sqrt
 
 import numpy as np
 import pytest
 import scalar_oracle as oracle
 
-from mapfilter.models import fingerprint
 from mapfilter.models.street_motion import (
     BIAS,
     EAST,
     LOG_SCALE,
     NORTH,
     OFF,
+    RATE,
     STATES,
+    STRETCH,
+    TURN,
     MapWeights,
     MotionErrors,
     draw_ancestors,
@@ -24,8 +27,9 @@ from mapfilter.models.street_motion import (
 )
 
 EXACT = MotionErrors(
-    step_sd_m=0.0, heading_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0, scale_drift_per_sqrt_m=0.0
-)
+    step_sd_m=0.0, heading_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0, scale_drift_per_sqrt_m=0.0,
+    disturbances_per_m=0.0, stretch_sd=0.0,
+)  # fmt: skip
 KEY = np.uint64(11)
 
 
@@ -70,9 +74,8 @@ COUNT, SPREAD = 100_000, 5 / 100_000**0.5
 
 @pytest.mark.parametrize("step_m", [1.4, 5.0, -3.0])
 def test_the_moments_of_a_step_are_those_of_the_oracle(step_m):
-    errors = MotionErrors(
-        step_sd_m=0.4, typical_step_m=1.4, heading_sd_rad=0.35, bias_drift_rad_per_sqrt_m=0.0
-    )
+    # Nothing but white noise; half of the variance of headings would be that of deviations.
+    errors = replace(EXACT, step_sd_m=0.4, heading_sd_rad=0.35, white_share=0.5, heading_m=1e9)
     before = states(COUNT, 0.5, 0.2)
     before[:2] = 100.0
     gone = (move(before, step_m, -1.1, errors, KEY)[:2] - 100.0).astype(np.float64)
@@ -86,12 +89,7 @@ def test_the_moments_of_a_step_are_those_of_the_oracle(step_m):
 
 
 def test_bias_and_scale_walk_and_the_step_follows_them():
-    errors = MotionErrors(
-        step_sd_m=0.0,
-        heading_sd_rad=0.0,
-        bias_drift_rad_per_sqrt_m=0.1,
-        scale_drift_per_sqrt_m=0.05,
-    )
+    errors = replace(EXACT, bias_drift_rad_per_sqrt_m=0.1, scale_drift_per_sqrt_m=0.05)
     before = states(COUNT, 0.3, -0.1)
     after = move(before, 9.0, 0.7, errors, KEY)
     walked = (after[[BIAS, LOG_SCALE]] - before[[BIAS, LOG_SCALE]]).astype(np.float64)
@@ -108,29 +106,154 @@ def test_bias_and_scale_walk_and_the_step_follows_them():
 
 
 def test_a_bias_that_walks_past_half_a_turn_wraps():
-    errors = MotionErrors(bias_drift_rad_per_sqrt_m=0.2)
+    errors = replace(OU, bias_drift_rad_per_sqrt_m=0.2)
     after = move(states(2000, 3.1), 4.0, 0.0, errors, KEY)
     assert np.abs(after[BIAS]).max() <= pi + 1e-6
     # P(z > (π - 3.1) / 0.4) = 0.459; five standard errors of 2000 draws.
     assert (after[BIAS] < 0).mean() == pytest.approx(0.459, abs=0.056)
 
 
-def test_what_moved_came_from_where_it_was():
-    """The motion and the look back at the last report agree on the bias and the scale."""
-    rows, cols, side_m = 40, 40, 10.0
-    before = states(300)
-    rng = np.random.default_rng(3)
-    before[BIAS], before[LOG_SCALE] = rng.uniform(-3, 3, 300), rng.normal(0, 0.2, 300)
-    # The middles of pixels, so that rounding cannot matter.
-    before[:2] = side_m * (np.floor(before[:2] / side_m) + 0.5)
-    after = move(before, 23.0, 0.9, EXACT, KEY)
+OU = replace(
+    EXACT, heading_sd_rad=0.3, white_share=0.36, heading_m=20.0, stretch_sd=0.1, stretch_m=35.0
+)
 
-    def found(state, back_east_m, back_north_m):
-        frame = fingerprint.RasterFrame(0.0, rows * side_m, 1 / side_m, rows, cols)
-        return fingerprint.pixels(state, back_east_m, back_north_m, frame)
 
-    back = found(after, 23.0 * np.cos(0.9), 23.0 * np.sin(0.9))
-    np.testing.assert_array_equal(back, found(before, 0.0, 0.0))
+def deviating(errors, count=COUNT):
+    """Hypotheses whose deviations are those of a start: stationary."""
+    state, rng = states(count), np.random.default_rng(12)
+    state[TURN] = oracle.deviation_of(errors) * rng.standard_normal(count)
+    state[STRETCH] = errors.stretch_sd * rng.standard_normal(count)
+    return state
+
+
+@pytest.mark.parametrize("step_m", [0.7, 1.4, 30.0, -1.4])
+def test_deviations_keep_their_variance_and_forget_by_the_metre(step_m):
+    before, now = deviating(OU), deviating(OU)
+    for number in range(10):
+        now = move(now, step_m, 0.3, OU, np.uint64(number))
+    gone_m = 10 * abs(step_m)
+    for row, sd, length_m in ((TURN, 0.3 * 0.8, 20.0), (STRETCH, 0.1, 35.0)):
+        then, here = before[row].astype(float), now[row].astype(float)
+        assert abs(here.mean()) < SPREAD * sd
+        assert here.std() == pytest.approx(sd, rel=SPREAD)
+        assert np.corrcoef(then, here)[0, 1] == pytest.approx(exp(-gone_m / length_m), abs=SPREAD)
+    assert abs(np.corrcoef(now[[TURN, STRETCH]].astype(float))[0, 1]) < SPREAD
+    # The lasting errors are others: nothing was added to them.
+    np.testing.assert_array_equal(now[[BIAS, LOG_SCALE]], before[[BIAS, LOG_SCALE]])
+
+
+def test_deviations_start_to_grow_from_nothing_as_a_random_walk_does():
+    now = states(COUNT)
+    for number in range(4):
+        now = move(now, 1.5, 0.3, OU, np.uint64(number))
+    for row, sd, length_m in ((TURN, 0.3 * 0.8, 20.0), (STRETCH, 0.1, 35.0)):
+        expected = sd * sqrt(1 - exp(-2 * 6.0 / length_m))
+        assert now[row].std(dtype=float) == pytest.approx(expected, rel=SPREAD)
+
+
+def test_a_step_goes_by_the_deviations_after_it():
+    errors = replace(OU, white_share=0.0)
+    after = move(deviating(errors, 60), 9.0, 0.7, errors, KEY)
+    before = deviating(errors, 60)
+    for one, start in zip(after.T.astype(float), before.T.astype(float), strict=True):
+        turned, longer = one[BIAS] + one[TURN], one[LOG_SCALE] + one[STRETCH]
+        expected = oracle.moved(*start[:2], turned, longer, 9.0, 0.7)
+        assert one[:2] == pytest.approx(expected, abs=3e-4)
+    assert np.ptp(after[TURN]) > 0.5
+
+
+@pytest.mark.parametrize(("white_share", "step_m"), [(0.0, 1.4), (0.4, 1.4), (0.4, 9.0)])
+def test_the_mean_displacement_makes_up_for_white_noise_only(white_share, step_m):
+    """Deviations shorten the mean of where hypotheses go; what they measured was no shorter."""
+    errors = replace(OU, white_share=white_share, step_sd_m=0.2, stretch_sd=0.0)
+    before = deviating(errors)
+    gone = (move(before, step_m, -1.1, errors, KEY)[:2] - before[:2]).astype(float)
+    white_var, lasting_var = white_share * 0.09, (1 - white_share) * 0.09
+    mean_m = step_m * exp(white_var / 2) * exp(-lasting_var / 2)
+    along = np.array([np.cos(-1.1), np.sin(-1.1)])
+    error_m = np.sqrt(np.trace(np.cov(gone)) / COUNT)
+    assert np.hypot(*(gone.mean(axis=1) - mean_m * along)) < 5 * error_m
+
+
+def test_deviations_jump_now_and_then_to_any_value_within_tens_of_degrees():
+    errors = replace(OU, disturbances_per_m=0.02, disturbed_rad=0.9, heading_sd_rad=1e-3)
+    still = deviating(errors)
+    after = move(still, 5.0, 0.0, errors, KEY)
+    jumped = np.abs(after[TURN]) > 0.01
+    share = 1 - exp(-0.02 * 5.0)
+    # Nine in a thousand of the jumps lead to less than 0.01 rad; five standard errors.
+    expected = share * (1 - 0.0089)
+    assert jumped.mean() == pytest.approx(expected, abs=SPREAD * sqrt(share))
+    found = after[TURN, jumped].astype(float)
+    assert found.std() == pytest.approx(0.9, rel=SPREAD / sqrt(share))
+    assert abs(found.mean()) < 0.9 * SPREAD / sqrt(share)
+    # Steps of other lengths add up to the same share, and none leads to none.
+    parts = still
+    for number in range(10):
+        parts = move(parts, 0.5, 0.0, errors, np.uint64(100 + number))
+    spread = SPREAD * sqrt(share)
+    assert (np.abs(parts[TURN]) > 0.01).mean() == pytest.approx(expected, abs=1.5 * spread)
+    calm = move(still, 5.0, 0.0, replace(errors, disturbances_per_m=0.0), KEY)
+    assert np.abs(calm[TURN]).max() < 0.01
+    # Where to is drawn for itself.
+    always = replace(errors, disturbances_per_m=1e9, step_sd_m=1.0, bias_drift_rad_per_sqrt_m=0.1)
+    drawn = move(still, 5.0, 0.0, always, KEY)
+    new = drawn[STRETCH] - exp(-5.0 / 35.0) * still[STRETCH]
+    both = np.array([drawn[TURN], new, drawn[BIAS]], dtype=float)
+    assert drawn[TURN].std(dtype=float) == pytest.approx(0.9, rel=SPREAD)
+    assert np.abs(np.corrcoef(both) - np.eye(3)).max() < SPREAD
+    # The rest of the state is the same with and without jumps.
+    np.testing.assert_array_equal(calm[[BIAS, LOG_SCALE, STRETCH]],
+                                  after[[BIAS, LOG_SCALE, STRETCH]])  # fmt: skip
+
+
+def test_after_a_jump_the_deviation_comes_back_over_the_metres():
+    errors = replace(OU, heading_sd_rad=0.0)
+    state = states(3)
+    state[TURN] = [0.8, -0.8, 0.2]
+    for _ in range(6):
+        state = move(state, 5.0, 0.0, errors, KEY)
+    np.testing.assert_allclose(state[TURN], exp(-30 / 20) * np.array([0.8, -0.8, 0.2]), rtol=1e-5)
+
+
+def test_the_variance_of_a_heading_is_shared_by_white_noise_and_deviation():
+    for white_share in (0.0, 0.3, 1.0):
+        errors = MotionErrors(heading_sd_rad=0.2, white_share=white_share)
+        assert errors.white_rad == pytest.approx(oracle.white_of(errors), abs=1e-15)
+        assert errors.turn_sd_rad == pytest.approx(oracle.deviation_of(errors), abs=1e-15)
+        assert np.hypot(errors.white_rad, errors.turn_sd_rad) == pytest.approx(0.2)
+
+
+def test_further_rows_of_the_state_stay():
+    before = np.vstack([deviating(OU, 5), np.arange(10.0, dtype="f4").reshape(2, 5)])
+    after = move(before, 3.0, 0.2, OU, KEY)
+    np.testing.assert_array_equal(after[8:], before[8:])
+    np.testing.assert_array_equal(after[OFF], before[OFF])
+    np.testing.assert_array_equal(after[:8], move(before[:8], 3.0, 0.2, OU, KEY))
+
+
+@pytest.mark.parametrize("step_m", [4.0, -4.0])
+def test_the_lasting_error_of_a_biased_gyroscope_grows_by_the_metre(step_m):
+    before = states(4, bias_rad=0.2)
+    before[RATE] = [0.0, 0.01, -0.02, 0.03]
+    now = before
+    for _ in range(5):
+        now = move(now, step_m, 0.3, EXACT, KEY)
+    # Walking backwards takes as long.
+    np.testing.assert_allclose(now[BIAS], 0.2 + 20.0 * before[RATE], rtol=1e-5)
+    np.testing.assert_array_equal(now[RATE], before[RATE])
+    # Each step goes by the error at its end: a polygon.
+    for one, start in zip(now.T.astype(float), before.T.astype(float), strict=True):
+        angles = 0.3 + 0.2 + start[RATE] * 4.0 * np.arange(1, 6)
+        expected = start[:2] + step_m * np.array([np.cos(angles).sum(), np.sin(angles).sum()])
+        assert one[:2] == pytest.approx(expected, abs=1e-3)
+
+
+def test_a_lasting_error_that_grows_past_half_a_turn_wraps():
+    before = states(2, bias_rad=3.0)
+    before[RATE] = [0.05, -0.05]
+    now = move(before, 10.0, 0.0, EXACT, KEY)
+    np.testing.assert_allclose(now[BIAS], [3.5 - 2 * pi, 2.5], rtol=1e-5)
 
 
 def test_the_likelihood_of_the_map_is_that_of_the_oracle():

@@ -177,7 +177,12 @@ def test_hostile_logs_are_told_and_never_abort(positioner, seed):
     assert {Reason.NO_STEP, Reason.UNKNOWN_CELL} <= reasons
     assert np.isfinite(estimate.time_s).all()
     assert len(estimate) == len(epochs(log))
-    assert np.isfinite(estimate.east_m[-1])
+    # From the start on there is a position, but where nothing on the map explains what is measured.
+    outside = np.array([status is Status.OUTSIDE for status in estimate.status])
+    started = np.flatnonzero(np.isfinite(estimate.east_m))[0]
+    placed = np.isfinite(np.column_stack([estimate.east_m, estimate.north_m, estimate.radii_m]))
+    np.testing.assert_array_equal(placed[started:].all(axis=1), ~outside[started:])
+    np.testing.assert_array_equal(placed[started:].any(axis=1), ~outside[started:])
 
 
 def test_a_log_without_anything_is_an_empty_track(positioner):

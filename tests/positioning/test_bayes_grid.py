@@ -1,12 +1,14 @@
 """The particle filter against the exact one on a grid: the same model, two ways to sum."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 from cross_world import CRS, WALK, make_database, make_plan, truth
 
 from mapfilter.filters.particle import ParticleOptions
-from mapfilter.models.fingerprint import LevelErrors
+from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel
@@ -18,7 +20,8 @@ from mapfilter.tracks.log import make_log
 # Wide enough that a pixel of 5 m resolves what one step adds.
 ERRORS = MotionErrors(
     step_sd_m=4.0, typical_step_m=5.0, heading_sd_rad=0.7, bias_sd_rad=0.08,
-    bias_drift_rad_per_sqrt_m=0.004, scale_sd=0.0,
+    bias_drift_rad_per_sqrt_m=0.004, scale_sd=0.0, white_share=1.0, stretch_sd=0.0,
+    disturbances_per_m=0.0, rate_share=0.0,
 )  # fmt: skip
 COARSE_M, FINE_M = 50.0, 25.0
 
@@ -49,16 +52,16 @@ def log():
 
 def positioner(area, *, grid, count=100_000):
     # What a report counts must not depend on the number of particles.
-    levels = LevelErrors(measurement_db=6.0, roughness_db=0.0)
-    evidence = EvidenceOptions(levels=levels, spacing_m=4.0)
-    model = BayesModel(area, ERRORS, MapWeights(), evidence)
+    levels = LevelErrors(white_db=6.0)
+    evidence = EvidenceOptions(levels=levels, spacing_m=4.0, beside_db=0.0)
+    model = BayesModel(area, ERRORS, MapWeights(), evidence, remember=False)
     options = ParticleOptions(
         max_particles=count,
         min_search_particles=count,
         min_particles=count,
         mass_exponent=1.0,
-        jitter=(0.0,) * 5,
-        searching_jitter=(0.0,) * 5,
+        jitter=(0.0,) * 8,
+        searching_jitter=(0.0,) * 8,
     )
     return BayesPositioner(model, options, grid=grid)
 
@@ -85,7 +88,16 @@ def variation(a, b):
     return 0.5 * np.abs(a - b).sum()
 
 
-def test_particles_agree_with_the_grid(area, log):
+def without_headings(log):
+    """Three steps of 5 m, of which it is not known where to."""
+    motion = log.motion.copy()
+    motion.loc[11:13, ["heading_rad", "turn_rad"]] = np.nan
+    return replace(log, motion=motion)
+
+
+@pytest.mark.parametrize("change", [lambda log: log, without_headings])
+def test_particles_agree_with_the_grid(area, log, change):
+    log = change(log)
     exact = beliefs(positioner(area, grid=True), log, COARSE_M)
     for sampled, summed in zip(
         beliefs(positioner(area, grid=False), log, COARSE_M), exact, strict=True

@@ -10,7 +10,7 @@ from cross_world import make_database, walk_log
 from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Status
 from mapfilter.filters.particle import ParticleOptions
-from mapfilter.positioning.bayes.alternative import AlternativeRules
+from mapfilter.positioning.bayes.alternative import AlternativeRules, NullHypothesis
 from mapfilter.positioning.bayes.options import BayesFilter, open_area
 from mapfilter.positioning.epochs import epochs
 from mapfilter.positioning.filter import locate
@@ -52,8 +52,42 @@ def test_a_search_without_the_true_place_is_taken_over(area, seed):
     assert switches[0] < 20
 
 
-def test_a_belief_with_a_large_cusum_does_not_converge(area):
-    never = AlternativeRules(start_cusum=1e9, start_cusum_cells=1e9, converge_cusum=-1.0)
+def test_beside_an_alternative_the_null_hypothesis_starts_anew_and_goes_its_own_way(area):
+    """Only the main belief has been carried off the streets where it is measured."""
+    positioner, log, rng = FEW.over_area(area), walk_log(), np.random.default_rng(1)
+    track, pairs = positioner.begin(), []
+    for number, epoch in enumerate(epochs(log)[:90]):
+        if number == 30:
+            state = track.belief.state.copy()
+            state[:2] = state[:2, :1] + np.array([[200.0], [0.0]], dtype=np.float32)
+            astray = replace(
+                track.belief, state=state, status=Status.SEARCHING, agreement_start_m=nan
+            )
+            high = replace(track.null, log_odds=9.0)
+            track = replace(
+                track, belief=astray, status=Status.SEARCHING, null=high, alternative=None
+            )
+        before = track
+        track, _ = positioner.step(track, epoch, rng)
+        if number < 30 or before.alternative is None:
+            continue
+        if track.alternative is None:
+            break
+        pairs.append((before.alternative.null, track.alternative.null, track.null))
+    assert pairs
+    # The one beside the alternative is not the main one, which stays high.
+    assert pairs[0][0] == NullHypothesis()
+    for before, after, main in pairs:
+        assert abs(after.log_odds - before.log_odds) < 3
+        assert after.travelled_m < main.travelled_m
+    assert pairs[0][1].log_odds < pairs[0][2].log_odds - 4
+    # Taking over, it comes along.
+    assert track.takeovers == 1
+    assert track.null.log_odds < 3
+
+
+def test_a_belief_does_not_converge_beside_a_null_hypothesis(area):
+    never = AlternativeRules(start_log_odds=1e9, converge_log_odds=-12.1)
     positioner = replace(FEW.over_area(area), rules=never)
     estimate = locate(walk_log(), positioner, np.random.default_rng(0)).estimate
     assert set(estimate.status) == {Status.SEARCHING}

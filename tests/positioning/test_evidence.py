@@ -1,4 +1,4 @@
-"""Reports made ready for the map filter."""
+"""Reports made ready for the map filter, in a database on disk."""
 
 import numpy as np
 from cross_world import make_database
@@ -14,17 +14,21 @@ def report(level_dbm):
     return Epoch(0.0, radio=(ReportRow("serving", "W", None, None, level_dbm, 0),))
 
 
-def test_the_level_of_a_first_report_counts_as_it_is_and_of_a_second_its_news(tmp_path):
-    options = EvidenceOptions()
-    source = RadioSource(open_area(make_database(tmp_path)), options)
+def test_levels_are_as_reported_and_the_state_is_where_the_last_report_was_used(tmp_path):
+    area = open_area(make_database(tmp_path))
+    source = RadioSource(area, EvidenceOptions())
     update = source.first(report(-70.0))
     first = update.radio
-    assert (update.reason, update.unused) == (Reason.USED, [])
-    assert first.levels.offset_db.tolist() == [-70.0]
-    assert first.levels.rho.tolist() == [0.0]
+    assert (update.reason, update.unused, update.state) == (Reason.USED, [], DeadReckoning())
+    assert first.levels.level_dbm.tolist() == [-70.0]
+    assert first.levels.cell.tolist() == [area.band_of["W"]]
     moved = DeadReckoning().moved(MotionStep(10.0, 0.0))
-    second = source.read(update.state, moved, report(-75.0), 5.0).radio
-    rho = np.exp(-10.0 / options.levels.correlation_m)
-    np.testing.assert_allclose(second.levels.rho, rho, rtol=1e-6)
-    np.testing.assert_allclose(second.levels.offset_db, -75.0 + 70.0 * rho, rtol=1e-6)
-    assert second.levels.scale[0] > first.levels.scale[0]
+    again = source.read(update.state, moved, report(-75.0), 5.0)
+    assert again.state is moved
+    assert again.radio.levels.level_dbm.tolist() == [-75.0]
+    assert (first.length_m, again.radio.length_m) == (0.0, 10.0)
+    near = source.read(update.state, moved, report(-75.0), 1.5).radio
+    assert near.levels.offset_db < again.radio.levels.offset_db
+    # The street of the made cross is a residential one: 7 m to each side are on it.
+    assert np.all(area.distance_m[area.on_way] == 0)
+    assert area.distance_m[30 + 4, 60] == 4 * 5.0 - 7.0

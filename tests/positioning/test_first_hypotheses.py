@@ -16,6 +16,7 @@ from small_area import (
     PIXEL_M,
     POINTS,
     ROWS,
+    SITE,
     SOUTH_M,
     WEST_M,
     WIDTH_M,
@@ -30,6 +31,10 @@ from mapfilter.models.street_motion import (
     LOG_SCALE,
     NORTH,
     OFF,
+    RATE,
+    STATES,
+    STRETCH,
+    TURN,
     MapWeights,
     MotionErrors,
 )
@@ -40,12 +45,14 @@ from mapfilter.positioning.epochs import Epoch, ReportRow
 
 AREA = make_area()
 ERRORS = MotionErrors(
-    step_sd_m=1.2, typical_step_m=4.0, heading_sd_rad=0.2, bias_sd_rad=0.3,
-    bias_drift_rad_per_sqrt_m=0.02, scale_sd=0.1,
+    step_sd_m=1.2, typical_step_m=4.0, heading_sd_rad=0.25, white_share=0.64, heading_m=18.0,
+    bias_sd_rad=0.3, bias_drift_rad_per_sqrt_m=0.02, scale_sd=0.1, stretch_sd=0.07, stretch_m=12.0,
+    rate_rad_per_m=0.004, rate_share=0.3,
 )  # fmt: skip
 EXACT = MotionErrors(
-    step_sd_m=0.0, heading_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0, scale_drift_per_sqrt_m=0.0
-)
+    step_sd_m=0.0, heading_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0, scale_drift_per_sqrt_m=0.0,
+    disturbances_per_m=0.0, stretch_sd=0.0,
+)  # fmt: skip
 WEIGHTS = MapWeights(
     sd_m=6.0, weight_per_m=0.08, off_cost_per_m=0.06, leave_per_m=4e-3, return_per_m=0.03
 )
@@ -64,17 +71,17 @@ def first_reading():
 
 def likelihoods():
     """Of the first reading at every pixel."""
-    levels = [(BAND, -75.0, None, np.inf), (BANDS["D"], -90.0, None, np.inf)]
-    report = {"serving": BAND, "levels": levels, "bounds": []}
-    return np.array([
-        [exp(oracle.report_log_likelihood(LEVEL_DBM, (r, c), (r, c), report, OPTIONS, 20.0, 5.0))
+    levels = [(BAND, -75.0), (BANDS["D"], -90.0)]
+    report = {"serving": BAND, "levels": levels, "absent": [], "bounds": []}
+    return np.exp([
+        [oracle.report_log_likelihood(LEVEL_DBM, SITE, [((r, c), 0.0)], [report], OPTIONS, (20, 5))
          for c in range(COLS)] for r in range(ROWS)
     ])  # fmt: skip
 
 
 def started(prior, seed=0, count=COUNT):
-    state, log_weight = MODEL.start(prior, count, np.random.default_rng(seed))
-    return state.astype(np.float64), log_weight
+    cloud, log_weight = MODEL.start(prior, count, np.random.default_rng(seed))
+    return cloud.state.astype(np.float64), log_weight
 
 
 def pixels(state):
@@ -126,7 +133,7 @@ def test_a_fifth_of_the_first_hypotheses_lie_anywhere_off_the_map():
 def test_the_belief_of_the_filter_keeps_five_in_a_hundred_off_the_map():
     given = ParticleOptions(max_particles=COUNT, min_search_particles=COUNT, min_particles=1000)
     belief = ParticleFilter(MODEL, given).init(Start(None), np.random.default_rng(3))
-    assert belief.state.shape == (5, COUNT)
+    assert belief.state.shape == (STATES, COUNT)
     assert float(belief.weight @ belief.state[OFF]) == pytest.approx(0.05, abs=1e-5)
 
 
@@ -150,9 +157,17 @@ def test_without_a_reading_all_places_are_alike():
 def test_first_errors_of_heading_and_scale_are_those_of_the_options(known):
     place = (WEST_M + 40.0, SOUTH_M + 30.0, 6.0) if known else ()
     state, _ = started(Start(first_reading(), True, *place))
-    for row, sd in ((BIAS, 0.3), (LOG_SCALE, 0.1)):
+    # The deviation has 0.36 of the variance of headings.
+    for row, sd in ((BIAS, 0.3), (LOG_SCALE, 0.1), (TURN, 0.15), (STRETCH, 0.07)):
         assert abs(state[row].mean()) < 5 * sd / sqrt(COUNT)
         assert state[row].std() == pytest.approx(sd, rel=5 / sqrt(2 * COUNT))
+    # Three journeys in ten have a biased gyroscope.
+    biased = state[RATE] != 0
+    assert abs(biased.mean() - 0.3) < 5 * sqrt(0.21 / COUNT)
+    assert state[RATE, biased].std() == pytest.approx(0.004, rel=5 / sqrt(0.6 * COUNT))
+    assert abs(state[RATE].mean()) < 5 * 0.004 / sqrt(COUNT)
+    rows = state[[BIAS, LOG_SCALE, TURN, STRETCH, RATE]]
+    assert np.abs(np.corrcoef(rows) - np.eye(5)).max() < 5 / sqrt(COUNT)
     turned, _ = started(Start(first_reading(), False, *place))
     # Uniform over the circle: no mean direction, and a quarter of it in each quadrant.
     assert abs(np.exp(1j * turned[BIAS]).mean()) < 5 / sqrt(COUNT)
@@ -174,7 +189,7 @@ def test_a_known_start_lies_about_its_place_and_is_weighed_by_the_report():
 
 def test_a_step_moves_by_the_bias_and_weighs_by_the_map_where_it_ends():
     model, rng, count = BayesModel(AREA, EXACT, WEIGHTS), np.random.default_rng(4), 200
-    state = np.zeros((5, count), dtype=np.float32)
+    state = np.zeros((STATES, count), dtype=np.float32)
     state[EAST], state[NORTH] = (
         rng.uniform(5, WIDTH_M - 5, count),
         rng.uniform(5, HEIGHT_M - 5, count),
@@ -198,26 +213,31 @@ def test_a_step_moves_by_the_bias_and_weighs_by_the_map_where_it_ends():
 
 
 def test_a_step_without_a_heading_spreads_to_all_sides():
-    state = np.zeros((5, COUNT), dtype=np.float32)
+    state = np.zeros((STATES, COUNT), dtype=np.float32)
     state[EAST], state[NORTH], state[BIAS] = 45.0, 35.0, 0.4
     moved, _ = MODEL.move(state, np.zeros(COUNT), MotionStep(8.0, np.nan), np.uint64(5))
     gone = moved[:2].astype(np.float64) - np.array([[45.0], [35.0]])
     # The mean square of the distance is that of the step; five standard errors.
     assert np.all(np.abs(gone.mean(axis=1)) < 5 * 8.0 / sqrt(2 * COUNT))
     np.testing.assert_allclose(gone.var(axis=1), 32.0, rtol=5 * sqrt(2 / COUNT))
-    np.testing.assert_array_equal(moved[2:4], state[2:4])
+    np.testing.assert_array_equal(moved[[BIAS, LOG_SCALE, TURN, STRETCH]],
+                                  state[[BIAS, LOG_SCALE, TURN, STRETCH]])  # fmt: skip
 
 
 @pytest.mark.parametrize(("step_m", "heading_rad"), [(4.0, 0.0), (4.0, 2.2), (12.0, -1.0)])
 def test_the_grid_moves_mass_as_the_oracle_moves_hypotheses(step_m, heading_rad):
     """Over three typical steps the noise adds up; the scale's error is one of the whole way."""
     grid, steps = StreetGrid(MODEL, bin_rad=0.15), step_m / ERRORS.typical_step_m
-    way = grid.transport(step_m * np.cos(heading_rad), step_m * np.sin(heading_rad), step_m)
+    way = grid.transport(step_m * np.cos(heading_rad), step_m * np.sin(heading_rad), step_m, 0.0)
     assert grid.bias_rad.tolist() == pytest.approx(list(np.arange(-6, 7) * 0.15))
     for b, bias_rad in enumerate(grid.bias_rad):
         mean, covariance = oracle.step_moments(bias_rad, 0.0, 4.0, heading_rad, ERRORS)
         ahead = mean / np.hypot(*mean)
-        covariance = steps * covariance + (0.1 * step_m) ** 2 * np.outer(ahead, ahead)
+        # Deviations count as they do over a long way: twice their variance and their length.
+        longer = (0.1 * step_m) ** 2 + 2 * 12.0 * step_m * 0.07**2
+        turned = 2 * 18.0 * step_m * 0.15**2
+        covariance = steps * covariance + longer * np.outer(ahead, ahead)
+        covariance = covariance + turned * (np.eye(2) - np.outer(ahead, ahead))
         found = PIXEL_M * way.right_px[b], -PIXEL_M * way.down_px[b]
         assert found == pytest.approx(tuple(steps * mean), abs=1e-6)
         sd_m = PIXEL_M * way.sd_right_px[b], PIXEL_M * way.sd_down_px[b]
@@ -230,6 +250,28 @@ def test_the_grid_moves_mass_as_the_oracle_moves_hypotheses(step_m, heading_rad)
     rates = way.off, way.leave, way.come_back
     expected = exp(-0.06 * step_m), 1 - exp(-4e-3 * step_m), 1 - exp(-0.03 * step_m)
     assert rates == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_first_hypotheses_keep_what_the_first_report_says_of_errors(known):
+    """Those drawn by it, and those weighed by it: the mean errors at their own pixel."""
+    place = (WEST_M + 40.0, SOUTH_M + 30.0, 12.0) if known else ()
+    cloud, _ = MODEL.start(Start(first_reading(), True, *place), 400, np.random.default_rng(7))
+    memory, errors = cloud.shared, OPTIONS.levels
+    assert cloud.kept.shape == (400, memory.width)
+    white_db2 = errors.white_db**2 + 2 * 25.0 * (1 - exp(-5.0 / 40.0))
+    for one, (row, col) in zip(cloud.kept, pixels(cloud.state), strict=True):
+        here = LEVEL_DBM[row, col]
+        heard = [(BAND, 0.0, -75.0 - here[BAND], white_db2),
+                 (BANDS["D"], 0.0, -90.0 - here[BANDS["D"]], white_db2)]  # fmt: skip
+        for band in range(4):
+            # C was in no report; it stands beside D.
+            if band not in memory.slot_of:
+                continue
+            slot = memory.slot_of[band]
+            found = one[[slot, memory.slots + slot, 2 * memory.slots]].sum()
+            mean, _ = oracle.level_forecast(errors, SITE, heard, band, 0.0)
+            assert found == pytest.approx(mean, abs=5e-3)
 
 
 @pytest.mark.parametrize("known", [False, True])

@@ -10,6 +10,7 @@ from mapfilter.positioning.filter import locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.log_options import fitted_to_log
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.log import make_log
 
 CRS = "EPSG:32635"
@@ -56,7 +57,8 @@ def test_what_the_user_set_stays():
 
 def test_steps_of_levels_add_their_rounding_error():
     fitted, notes = fitted_to_log(BayesFilter(), log(level_step_db=12.0))
-    assert fitted.level_error_db == pytest.approx((10.0**2 + 12.0**2 / 12) ** 0.5)
+    usual_db = BayesFilter().level_error_db
+    assert fitted.level_error_db == pytest.approx((usual_db**2 + 12.0**2 / 12) ** 0.5)
     assert "levels in steps of 12 dB" in notes[0]
     assert fitted_to_log(BayesFilter(), log(level_step_db=0.0))[1] == ()
     assert fitted_to_log(BayesFilter(), log(level_step_db=10.0, censored=1))[1] == ()
@@ -97,3 +99,36 @@ def test_a_vehicle_is_located_by_timing_advances_of_lte():
         errors.append(np.hypot(*(place - here)))
     assert errors[0] < 200
     assert errors[1] > 500
+
+
+def moving(**imu):
+    motion = pd.DataFrame({"time_s": np.arange(50.0), "step_m": 4.0, "heading_rad": 0.0})
+    return make_log(CRS, motion=motion, imu=ImuNoise(**imu))
+
+
+def test_measured_errors_of_motion_are_those_that_are_assumed():
+    given = moving(
+        sigma_trans_m=0.1,
+        sigma_orient_deg=8.0,
+        bias_sd_deg=12.0,
+        scale=0.07,
+        drift_deg_per_sqrt_s=0.4,
+    )
+    fitted, notes = fitted_to_log(BayesFilter(), given)
+    found = (fitted.step_sd_m, fitted.heading_sd_deg, fitted.bias_sd_deg, fitted.scale)
+    assert found == (0.1, 8.0, 12.0, 0.07)
+    # 0.4 degrees per root second at 4 m/s.
+    assert fitted.drift_deg_per_sqrt_m == pytest.approx(0.2)
+    assert notes[0].startswith("errors of motion as measured: step_sd_m = 0.1, scale = 0.07")
+    kept, _ = fitted_to_log(BayesFilter(heading_sd_deg=2.0), given)
+    assert (kept.heading_sd_deg, kept.bias_sd_deg) == (2.0, 12.0)
+    kalman, _ = fitted_to_log(KalmanFilter(), given)
+    assert (kalman.step_sd_m, kalman.heading_sd_deg) == (0.1, 8.0)
+
+
+def test_errors_of_a_gyroscope_are_a_drift():
+    given = moving(turns="gyro", gyro_noise_deg_per_sqrt_s=0.3, sigma_trans_m=0.0)
+    fitted, _ = fitted_to_log(BayesFilter(), given)
+    assert fitted.drift_deg_per_sqrt_m == pytest.approx(0.15)
+    assert fitted.heading_sd_deg == BayesFilter().heading_sd_deg
+    assert fitted.step_sd_m == 0.05

@@ -1,7 +1,7 @@
 """Defaults of positioning, limits of its options, and thresholds of its decisions."""
 
 from dataclasses import asdict, dataclass, replace
-from math import inf, nan, radians
+from math import inf, log, nan, radians
 
 import numpy as np
 import pytest
@@ -11,13 +11,14 @@ from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Status
 from mapfilter.filters.hypotheses import BeliefSummary
 from mapfilter.filters.particle import ParticleOptions
-from mapfilter.models.fingerprint import LevelErrors, ServingWeights
+from mapfilter.models.fingerprint import ServingWeights
+from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.positioning.bayes.alternative import (
     TRANSITIONS,
     AlternativeHypothesis,
     AlternativeRules,
-    EvidenceCusum,
+    NullHypothesis,
     Outcome,
     judge,
     report,
@@ -25,7 +26,7 @@ from mapfilter.positioning.bayes.alternative import (
 )
 from mapfilter.positioning.bayes.evidence import RadioReading
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
-from mapfilter.positioning.bayes.radio import EvidenceOptions, RadioHistory
+from mapfilter.positioning.bayes.radio import EvidenceOptions
 from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
 from mapfilter.positioning.bayes.timing import TimingState
 from mapfilter.positioning.candidate import CandidateFilter
@@ -47,27 +48,36 @@ def test_the_usual_options():
         "clip_sd": 3.0, "height_m": 1.5,
     }  # fmt: skip
     assert asdict(AlternativeRules()) == {
-        "start_cusum": 5.0,
-        "start_cusum_cells": 2.5,
+        "start_log_odds": -1.0,
         "search_threshold": 4.0,
-        "lost_threshold": 10.0,
-        "lost_threshold_cells": 6.0,
+        "lost_threshold": 8.0,
         "confirm_mass": 0.9,
         "abandon_threshold": -25.0,
         "abandon_after_m": 800.0,
-        "converge_cusum": 2.5,
+        "converge_log_odds": -5.0,
         "converge_threshold": 2.0,
     }
     evidence = EvidenceOptions()
     assert (evidence.spacing_m, evidence.first_m, evidence.use_levels) == (5.0, 25.0, True)
     assert (evidence.serving, evidence.levels) == (ServingWeights(), LevelErrors())
+    weights = evidence.full_list, evidence.bound_weight, evidence.beside_db, evidence.beside_m
+    assert (*weights, evidence.serving_with_levels) == (6, 0.5, 6.0, 50.0, 1.0)
     bound = BayesFilter(bias_sd_deg=1.5).over_area(small_area.make_area())
     model = bound.model
     narrow = MotionErrors(bias_sd_rad=radians(1.5))
-    assert (model.motion, model.weights, model.evidence) == (narrow, MapWeights(), evidence)
-    more = 4 / 3
-    few = ParticleOptions(int(20_000 * more**0.5), int(12_000 * more**0.5), 1000)
-    assert (bound.options, bound.rules) == (few, AlternativeRules())
+    assert (model.motion, model.weights, model.remember) == (narrow, MapWeights(), True)
+    # The total of a level's error is rounded to tenths of a dB in the options.
+    levels, usual = model.evidence.levels, LevelErrors()
+    assert levels.total_db == pytest.approx(8.7)
+    assert levels.total_db == pytest.approx(usual.total_db, abs=0.1)
+    for name in ("slow_db", "fast_db", "white_db"):
+        share = getattr(levels, name) / levels.total_db
+        assert share == pytest.approx(getattr(usual, name) / usual.total_db)
+    rest = {name: getattr(usual, name) for name in ("slow_db", "fast_db", "white_db")}
+    assert replace(levels, **rest) == usual
+    assert replace(model.evidence, levels=usual) == evidence
+    particles = ParticleOptions(switch_mass=0.998, switch_hold_m=30.0)
+    assert (bound.options, bound.rules) == (particles, AlternativeRules())
     # The step of timing advance is rounded to decimetres in the options.
     assert (bound.satellites, bound.timing) == (GnssOptions(), TimingOptions(step_m=553.5))
     assert (bound.smooth, bound.grid) == (False, False)
@@ -80,17 +90,12 @@ def test_the_usual_options():
 
 
 def test_the_state_before_the_first_epoch():
-    history = RadioHistory.empty(3)
-    np.testing.assert_array_equal(history.level_dbm, [nan] * 3)
-    np.testing.assert_array_equal(history.received_at_m, [-inf] * 3)
-    assert history.used is None
     assert DeadReckoning() == DeadReckoning(travelled_m=0.0, east_m=0.0, north_m=0.0)
     state = BayesState()
     assert (state.belief, state.compass, state.status) == (None, True, Status.SEARCHING)
-    assert (state.cusum, state.reckoning) == (EvidenceCusum(0.0, 0.8), DeadReckoning())
+    assert (state.null, state.reckoning) == (NullHypothesis(log(0.05 / 0.95)), DeadReckoning())
     assert (state.alternative, state.takeovers, state.sources) == (None, 0, {})
     assert np.isnan(state.heading_rad)
-    assert state.leading is None
     assert TimingState() == (-inf, -inf)
     gnss = GnssState()
     assert (gnss.receiver, gnss.fix_used_at_m, gnss.compared_at_m) == (None, -inf, -inf)
@@ -109,7 +114,7 @@ def test_each_source_of_evidence_begins_with_its_own_state():
     begun = positioner.begin().sources
     assert isinstance(begun["gnss"], GnssState)
     assert (begun["timing"], begun["first fix"]) == (TimingState(), None)
-    assert begun["radio"].received_at_m.size == len(positioner.area.cell_ids)
+    assert begun["radio"] is None
 
 
 def test_when_satellites_are_compared_again():
@@ -120,19 +125,26 @@ def test_when_satellites_are_compared_again():
     assert GnssState().due(options, 0.0, 0.0)
 
 
-def test_wide_errors_get_more_particles():
-    def numbers(bias_sd_deg, scale_sd):
-        given = {"max_particles": 1000, "min_search_particles": 600, "min_particles": 10}
-        options = BayesFilter(bias_sd_deg=bias_sd_deg, scale=scale_sd, **given)
-        found = options.over_area(small_area.make_area()).options
-        return found.max_particles, found.min_search_particles, found.min_particles
-
-    assert numbers(1.5, 0.015) == (1000, 600, 10)
-    assert numbers(0.0, 0.0) == (1000, 600, 10)
-    # Four times in one of the two are twice as many, and both together four times.
-    assert numbers(6.0 + 1e-9, 0.015) == (2000, 1200, 10)
-    assert numbers(6.0 + 1e-9, 0.06) == (4000, 2400, 10)
-    assert numbers(40.0, 0.5) == (5000, 3000, 10)
+def test_options_reach_their_models():
+    given = BayesFilter(
+        level_error_db=12.0, level_correlation_m=90.0, device_error_db=1.5, fault_probability=0.2,
+        level_weight=0.8, heading_sd_deg=20.0, bias_sd_deg=4.0, drift_deg_per_sqrt_m=0.1,
+        scale=0.07, step_sd_m=0.2, map_sd_m=6.0, levels=False, min_particles=700,
+    )  # fmt: skip
+    bound = given.over_area(small_area.make_area())
+    errors, motion = bound.model.evidence.levels, bound.model.motion
+    assert errors.total_db == pytest.approx(12.0)
+    assert errors.slow_db / errors.fast_db == pytest.approx(7 / 4)
+    assert errors.white_db / errors.fast_db == pytest.approx(3.3 / 4)
+    assert (errors.slow_m, errors.fast_m) == (90.0, 9.0)
+    rest = errors.device_db, errors.fault_probability, errors.weight
+    assert rest == (1.5, 0.2, 0.8)
+    assert motion == MotionErrors(
+        step_sd_m=0.2, heading_sd_rad=radians(20), bias_sd_rad=radians(4),
+        bias_drift_rad_per_sqrt_m=radians(0.1), scale_sd=0.07,
+    )  # fmt: skip
+    assert bound.model.weights == MapWeights(sd_m=6.0)
+    assert (bound.model.evidence.use_levels, bound.options.min_particles) == (False, 700)
 
 
 def test_the_names_of_filters():
@@ -193,27 +205,6 @@ def test_timing_options_are_above_0(name):
     assert getattr(TimingOptions(**{name: 0.5}), name) == 0.5
 
 
-def test_the_cusum_by_hand():
-    calm = EvidenceCusum()
-    # 1.5 · 0.8 · (-2) - (-2) = -0.4: no shortfall.
-    after = calm.after(-2.0, -2.0, 300.0)
-    share = 1 - np.exp(-1.0)
-    assert after.sum == 0.0
-    assert after.usual == pytest.approx(0.8 + share * 0.2)
-    worse = calm.after(-2.0, -5.0, 300.0)
-    assert worse.sum == pytest.approx(5.0 - 2.4)
-    # With a shortfall nothing is learnt.
-    assert worse.usual == 0.8
-    again = worse.after(-2.0, -1.0, 10.0)
-    assert again.sum == pytest.approx(2.6 - 1.4)
-    assert calm.after(-2.0, 5.0, 300.0).usual == pytest.approx(0.8 + share * (0.5 - 0.8))
-    assert EvidenceCusum(usual=9.0).after(-2.0, -5.0, 300.0).usual == pytest.approx(
-        9 + share * (2.0 - 9)
-    )
-    assert calm.after(0.0, -50.0, 10.0) is calm
-    assert EvidenceCusum(3.0, 1.1).reset() == EvidenceCusum(0.0, 1.1)
-
-
 @dataclass(frozen=True)
 class Belief:
     """The part of a belief that decisions depend on."""
@@ -233,11 +224,11 @@ def belief(status, evidence=0.0, east_m=0.0, mass=1.0):
 S, C, T, L = Status.SEARCHING, Status.CONVERGED, Status.TRACKING, Status.LOST
 
 
-def outcome(main, lead, *, status=S, east_m=500.0, mass=0.5, gone_m=0.0, cusum=0.0, cells=False):
+def outcome(main, lead, *, status=S, east_m=500.0, mass=0.5, gone_m=0.0, null=-9.0):
     other = AlternativeHypothesis(
-        belief(status, lead, east_m, mass), 100.0, 0.0, cusum=EvidenceCusum(cusum)
+        belief(status, lead, east_m, mass), 100.0, 0.0, null=NullHypothesis(null)
     )
-    return judge(AlternativeRules(), belief(main), other, 100.0 + gone_m, cells_only=cells)
+    return judge(AlternativeRules(), belief(main), other, 100.0 + gone_m)
 
 
 def test_outcomes_at_their_thresholds():
@@ -246,66 +237,54 @@ def test_outcomes_at_their_thresholds():
     assert outcome(T, 0.0, east_m=50.1, mass=0.9) is Outcome.UNDECIDED
     assert outcome(T, 0.0, east_m=50.0, mass=0.89) is Outcome.UNDECIDED
     assert (outcome(S, 4.0), outcome(S, 3.9)) == (Outcome.AHEAD, Outcome.UNDECIDED)
-    assert (outcome(T, 10.0), outcome(T, 9.9)) == (Outcome.AHEAD, Outcome.UNDECIDED)
-    assert (outcome(T, 6.0, cells=True), outcome(T, 5.9, cells=True)) == (
-        Outcome.AHEAD, Outcome.UNDECIDED,
-    )  # fmt: skip
-    assert outcome(S, 5.0, cells=True) is Outcome.AHEAD
-    assert outcome(T, 10.0, status=C) is outcome(T, 10.0, status=T) is Outcome.WON
-    assert outcome(T, 10.0, status=C, cusum=2.5) is Outcome.WON
-    assert outcome(T, 10.0, status=C, cusum=2.6) is Outcome.AHEAD
-    assert outcome(T, 10.0, status=C, cusum=4.9) is Outcome.AHEAD
-    assert outcome(T, 10.0, status=C, cusum=5.0) is Outcome.SUSPECT
+    assert (outcome(T, 8.0), outcome(T, 7.9)) == (Outcome.AHEAD, Outcome.UNDECIDED)
+    assert outcome(T, 8.0, status=C) is outcome(T, 8.0, status=T) is Outcome.WON
+    assert outcome(T, 8.0, status=C, null=-5.0) is Outcome.WON
+    assert outcome(T, 8.0, status=C, null=-4.9) is Outcome.AHEAD
+    assert outcome(T, 8.0, status=C, null=0.0) is Outcome.AHEAD
+    assert outcome(T, 8.0, status=C, null=0.1) is Outcome.SUSPECT
+    assert outcome(T, 8.0, status=S, null=0.1) is Outcome.SUSPECT
     assert (outcome(T, -25.0), outcome(T, -24.9)) == (Outcome.ABANDONED, Outcome.UNDECIDED)
     assert (outcome(T, 0.0, gone_m=800.0), outcome(T, 0.0, gone_m=799.0)) == (
         Outcome.ABANDONED, Outcome.UNDECIDED,
     )  # fmt: skip
 
 
-def resolved(main, lead, cusum=0.0, own=0.0, cells=False, before=None):
-    other = AlternativeHypothesis(
-        belief(S, lead, 500.0, 0.5), 100.0, 0.0, cusum=EvidenceCusum(own, 1.2)
-    )
-    return resolve_alternative(
-        AlternativeRules(),
-        before or (S if main is C else main),
-        belief(main),
-        EvidenceCusum(cusum, 0.9),
-        other,
-        200.0,
-        cells_only=cells,
-    )
+def resolved(main, lead, null=-9.0, own=-9.0, before=None):
+    other = AlternativeHypothesis(belief(S, lead, 500.0, 0.5), 100.0, 0.0, null=NullHypothesis(own))
+    reported = before or (S if main is C else main)
+    rules = AlternativeRules()
+    null = NullHypothesis(null)
+    return resolve_alternative(rules, reported, belief(main), null, other, 200.0, at_edge=False)
 
 
 def test_resolutions_at_their_thresholds():
-    # No belief converges with a large CUSUM, nor with an alternative close behind.
+    # No belief converges beside a null hypothesis, nor with an alternative close behind.
     alone = resolve_alternative(
-        AlternativeRules(), S, belief(C), EvidenceCusum(2.5), None, 0.0, cells_only=False
+        AlternativeRules(), S, belief(C), NullHypothesis(-5.0), None, 0.0, at_edge=True
     )
     assert (alone.status, alone.alternative, alone.taken_over) == (C, None, False)
     assert resolved(C, -2.0).status is C
     assert resolved(C, -1.9).status is S
-    assert resolved(T, 12.0, own=4.9).taken_over is False
-    over = resolved(T, 12.0, cusum=9.0, own=5.0)
-    assert (over.taken_over, over.status, over.cusum) == (True, L, EvidenceCusum(5.0, 1.2))
+    assert resolved(T, 12.0, own=0.0).taken_over is False
+    over = resolved(T, 12.0, null=9.0, own=0.1)
+    assert (over.taken_over, over.status, over.null) == (True, L, NullHypothesis(0.1))
     assert np.isnan(over.belief.agreement_start_m)
-    assert resolved(T, 12.0, own=2.5, cells=True).taken_over is True
-    assert resolved(T, 12.0, own=2.4, cells=True).taken_over is False
-    search = resolved(S, 5.0, cusum=9.0, own=1.0)
-    assert (search.taken_over, search.status, search.cusum) == (True, S, EvidenceCusum(0.0, 0.9))
+    search = resolved(S, 5.0, null=9.0, own=-1.0)
+    assert (search.taken_over, search.status, search.null) == (True, S, NullHypothesis(-1.0))
     assert search.belief.status is S
-    kept = resolved(T, 12.0, cusum=9.0, own=1.0)
-    assert (kept.status, kept.cusum, kept.alternative.cusum.sum) == (
+    kept = resolved(T, 12.0, null=9.0, own=-1.0)
+    assert (kept.status, kept.null, kept.alternative.null) == (
         L,
-        EvidenceCusum(9.0, 0.9),
-        1.0,
+        NullHypothesis(9.0),
+        NullHypothesis(-1.0),
     )
     other = AlternativeHypothesis(
         belief(S, 3.0), 0.0, main_log_evidence=-4.0, gnss_log_bayes_factor=0.5
     )
     assert other.log_bayes_factor(belief(T, 2.0)) == 3.0 - (2.0 + 4.0) + 0.5
     assert np.isnan(other.start_s)
-    assert other.sources == {}
+    assert (other.sources, other.null) == ({}, NullHypothesis())
 
 
 def test_every_outcome_has_a_transition():
@@ -319,13 +298,7 @@ def test_converged_lasts_for_one_epoch_and_lost_until_convergence():
     for before in Status:
         for found in (S, T, L):
             _, status = report(before, belief(found), found)
-            assert status is (L if (before, found) == (L, S) else found)
+            # One that was found and searches is lost.
+            assert status is (L if found is S and before in (C, T, L) else found)
         now, status = report(before, belief(C), C)
-        assert now.status is status is (C if before in (S, T) else T)
-
-
-def test_the_leading_belief():
-    main, other = belief(T), AlternativeHypothesis(belief(S), 0.0, 0.0)
-    assert BayesState(main, T, alternative=other).leading is main
-    assert BayesState(main, L, alternative=other).leading is other.belief
-    assert BayesState(main, L).leading is main
+        assert now.status is status is (T if before in (C, L) else C)

@@ -111,8 +111,9 @@ def test_dead_reckoning_adds_up():
     moved = start.moved(MotionStep(-2.0, pi / 2))
     assert moved.travelled_m == 12.0
     assert (moved.east_m, moved.north_m) == pytest.approx((1.0, 0.0))
-    # Without a heading, along that of the frame.
-    assert start.moved(MotionStep(2.0, nan)).east_m == 3.0
+    # Without a heading it is not known where to: the displacement stays.
+    assert start.moved(MotionStep(2.0, nan)) == DeadReckoning(12.0, 1.0, 2.0)
+    assert start.moved(MotionStep(-2.0, nan)) == DeadReckoning(12.0, 1.0, 2.0)
 
 
 def test_the_way_that_holds_the_largest_share():
@@ -134,6 +135,35 @@ def test_the_way_that_holds_the_largest_share():
     for place, at in (((-50.0, 999.0), (0, 0)), ((999.0, -50.0), (6, 8)), ((-1.0, -1.0), (6, 0))):
         one = area.matched_way(*np.array([[place[0]], [place[1]]], "f4"), np.ones(1, "f4"))
         assert one == (ids[at], 1.0)
+
+
+def test_what_lies_at_the_edge_of_an_area():
+    small = small_area.make_area()
+    # A twentieth of the shorter side of 70 m.
+    for place, expected in (
+        ((45.0, 35.0), False), ((3.6, 35.0), False), ((3.4, 35.0), True), ((45.0, 66.6), True),
+        ((86.4, 66.4), False), ((86.6, 35.0), True), ((45.0, -9.0), True), ((120.0, 35.0), True),
+    ):  # fmt: skip
+        assert small.at_edge(np.array([*place, 0.3, 0.0])) is expected
+    # At most 60 m.
+    wide = replace(small, lattice=replace(small.lattice, resolution_m=500.0))
+    assert wide.at_edge(np.array([59.9, 1700.0]))
+    assert not wide.at_edge(np.array([60.1, 1700.0]))
+
+
+def test_an_area_holds_a_belief_of_which_more_than_half_lies_inside():
+    small = small_area.make_area()
+    east, north = (
+        np.array([45.0, -1.0, 90.5, 45.0, 45.0], "f4"),
+        np.array([35, 35, 35, -1, 71], "f4"),
+    )
+    for beyond in range(1, 5):
+        for inside, expected in ((0.51, True), (0.49, False)):
+            weight = np.zeros(5, "f4")
+            weight[[0, beyond]] = inside, 1 - inside
+            assert small.holds(east, north, weight) is expected
+    corners = np.array([0.0, 90.0], "f4"), np.array([0.0, 70.0], "f4")
+    assert small.holds(*corners, np.array([0.5, 0.5], "f4"))
 
 
 def test_names_of_rows_and_the_spacing_before_the_start():
@@ -206,8 +236,8 @@ def test_fixes_are_filtered_by_their_own_covariance():
 
 
 MOTION = MotionErrors(
-    step_sd_m=0.4, typical_step_m=1.6, heading_sd_rad=0.2, bias_sd_rad=0.1,
-    bias_drift_rad_per_sqrt_m=0.03, scale_sd=0.05,
+    step_sd_m=0.4, typical_step_m=1.6, heading_sd_rad=0.25, white_share=0.64, heading_m=18.0,
+    bias_sd_rad=0.1, bias_drift_rad_per_sqrt_m=0.03, scale_sd=0.05, stretch_sd=0.07, stretch_m=12.0,
 )  # fmt: skip
 WEIGHTS = MapWeights(sd_m=6.0, weight_per_m=0.05, off_cost_per_m=0.02, leave_per_m=4e-3,
                      return_per_m=0.03)  # fmt: skip
@@ -226,19 +256,21 @@ def test_what_a_stretch_of_dead_reckoning_does_on_the_grid(compass):
         assert grid.bias_rad.size == 72
         np.testing.assert_allclose(np.diff(np.unwrap(grid.bias_rad)), radians(5))
     east_m, north_m, length_m = 12.0, -5.0, 16.0
-    step = grid.transport(east_m, north_m, length_m)
+    step = grid.transport(east_m, north_m, length_m, 7.0)
     stretch, way = exp(0.02), hypot(east_m, north_m)
     for b, bias in enumerate(grid.bias_rad):
         angle = np.arctan2(north_m, east_m) + bias
         right, up = stretch * way * cos(angle) / 10, stretch * way * sin(angle) / 10
         assert (step.right_px[b], -step.down_px[b]) == pytest.approx((right, up), abs=1e-9)
-        # Ten steps of 1.6 m; the scale errs by 5 % of the whole way.
-        along, across = 10 * 0.16 + (0.05 * 16) ** 2, 10 * (1.6 * 0.2) ** 2
+        # Ten steps of 1.6 m; the scale errs by 5 % of the whole way. Deviations of 7 % and 0.15
+        # over twice their length count as white noise.
+        along = 10 * 0.16 + (0.05 * 16) ** 2 + 24 * 16 * 0.07**2
+        across = 10 * (1.6 * 0.2) ** 2 + 36 * 16 * 0.15**2
         axis = np.array([cos(angle), sin(angle)])
         side = np.array([-axis[1], axis[0]])
         spread = along * np.outer(axis, axis) + across * np.outer(side, side)
         found = (10 * step.sd_right_px[b]) ** 2, (10 * step.sd_down_px[b]) ** 2
-        assert found == pytest.approx(np.diagonal(spread), rel=1e-9)
+        assert found == pytest.approx(np.diagonal(spread) + 7.0, rel=1e-9)
     width = 0.04 if compass else radians(5)
     assert step.turned_bins == pytest.approx(0.03 * 4 / width)
     told = [[exp(0.05 * 16 * oracle.map_log_likelihood(float(d), 6.0)) for d in row]
@@ -273,8 +305,10 @@ def test_where_a_grid_starts():
     assert sum(part.sum() for part in exact.start(Start(None))) == pytest.approx(1.0)
     free, _ = StreetGrid(grid.model, compass=False).start(Start(None, compass=False))
     np.testing.assert_allclose(free[0], free[35], rtol=1e-6)
-    state = grid.states(np.array([0, 6]), np.array([2, 8]), np.array([0.1, -0.2], "f4"))
-    np.testing.assert_allclose(state, [[25, 85], [65, 5], [0.1, -0.2], [0, 0], [0.05, 0.05]])
+    place = np.array([0, 6]), np.array([2, 8])
+    state = grid.states(*place, np.array([0.1, -0.2], "f4"), np.array([0.05, 0.7], "f4"))
+    rows = [[25, 85], [65, 5], [0.1, -0.2], [0, 0], [0.05, 0.7], *[[0, 0]] * 3]
+    np.testing.assert_allclose(state, rows, rtol=1e-6)
 
 
 @dataclass(frozen=True, slots=True)

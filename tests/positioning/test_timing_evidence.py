@@ -9,7 +9,6 @@ import pytest
 from cross_world import CRS, LATTICE, make_database, walk_log
 
 from mapfilter.filters.contract import Reason
-from mapfilter.positioning.bayes import filter as bayes
 from mapfilter.positioning.bayes.options import BayesFilter, open_area
 from mapfilter.positioning.bayes.timing import TimingSource, TimingState
 from mapfilter.positioning.epochs import Difference, Epoch, ReportRow
@@ -116,23 +115,3 @@ def test_times_of_arrival_shorten_the_search(area):
     ]
     assert switch[1] is not None
     assert switch[1] < 0.7 * (switch[0] or len(log.truth))
-
-
-@pytest.mark.parametrize("level_dbm", [-70.0, nan])
-def test_differences_between_reports_of_levels_do_not_make_it_a_log_of_cells(
-    area, level_dbm, monkeypatch
-):
-    seen, resolve_alternative = set(), bayes.resolve_alternative
-
-    def watched(*given, cells_only):
-        seen.add(cells_only)
-        return resolve_alternative(*given, cells_only=cells_only)
-
-    monkeypatch.setattr(bayes, "resolve_alternative", watched)
-    log = walk_log(((0.0, 40.0),))
-    rows = pd.DataFrame({"time_s": log.truth["time_s"], "cell": "E", "reference": "W"})
-    radio = log.radio.assign(level_dbm=level_dbm)
-    told = make_log(CRS, motion=log.motion, radio=radio, tdoa=rows.assign(difference_m=0.0))
-    few = BayesFilter(max_particles=500, min_search_particles=300, min_particles=100)
-    locate(told, few.over_area(area), np.random.default_rng(1))
-    assert seen == {np.isnan(level_dbm)}

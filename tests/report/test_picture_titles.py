@@ -47,7 +47,7 @@ def track(*statuses, error_m=0.0):
     return TrackEstimate.of_fixes(CRS, "candidate", fixes)
 
 
-SEARCHING, CONVERGED, TRACKING, LOST = Status
+SEARCHING, CONVERGED, TRACKING, LOST, OUTSIDE = Status
 
 
 @pytest.mark.parametrize(

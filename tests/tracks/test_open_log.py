@@ -136,3 +136,16 @@ def test_read_log_of_the_front_door(made, tmp_path):
     assert len(mf.read_log(tmp_path / "zeit.csv", columns=names).gnss) == 3
     with pytest.raises(InputError, match="known format"):
         mf.read_log(tmp_path / "zeit.csv")
+
+
+def test_speed_and_course_of_the_truth_make_motion_on_request(made):
+    (path,) = made("opencellid")
+    combine = CombineOptions(truth=[path], course_motion=True)
+    log = open_log(path, options=OpenOptions(combine=combine)).log
+    assert (len(log.truth), len(log.gnss)) == (COUNT, 0)
+    assert log.motion["step_m"].sum() == pytest.approx(2.2 * 2 * (COUNT - 1), rel=0.01)
+    (alone,) = made("gpx")
+    with pytest.raises(InputError, match=r"watch\.gpx: expected positions with speed and course"):
+        open_log(
+            alone, options=OpenOptions(combine=CombineOptions(truth=[alone], course_motion=True))
+        )

@@ -168,6 +168,13 @@ def test_stairs_and_lifts():
     assert lift.end_s == pytest.approx(175, abs=3)
 
 
+def test_a_landing_does_not_part_stairs():
+    profile = [(0, 0), (60, 0), (70, 3), (75, 3), (85, 6), (120, 6)]
+    (stairs,) = climbs(building(profile), np.arange(0, 120, 0.6))
+    assert stairs.rise_m == pytest.approx(6, abs=0.8)
+    assert stairs.end_s - stairs.begin_s == pytest.approx(25, abs=4)
+
+
 def test_weather_doors_and_noise_are_no_climbs():
     weather = building([(0, 0), (1800, 12)])
     assert climbs(weather, np.arange(0, 1800, 0.6)) == ()
@@ -212,6 +219,19 @@ def test_a_vehicles_bias_is_learnt_while_it_stands():
     assert abs(unlearnt["turn_rad"].sum() - drive(0.0, stands=False)[1]) > 0.9 * 0.004 * 239
     assert loose.gyro_bias_deg_per_s > imu.gyro_bias_deg_per_s
     assert "never stands" in notes[0]
+
+
+def test_a_stand_after_driving_teaches_the_bias_once_the_body_has_settled():
+    rows, true_rad = drive(0.004)
+    rows = rows.iloc[300:].reset_index(drop=True)
+    true_rad -= 10.0 * 6.0 / 60.0
+    began = int(np.flatnonzero(rows["speed_mps"] == 0)[0])
+    # The body swings back in the first 0.4 s.
+    rows.loc[began : began + 3, "yaw_rate_radps"] -= 0.03
+    motion, _, _ = reckon_odometry(rows)
+    lasted_s = np.ptp(rows["time_s"])
+    found_radps = (motion["turn_rad"].sum() - true_rad) / lasted_s
+    assert abs(found_radps) < 0.15 * 0.004
 
 
 def test_a_turntable_is_no_bias():

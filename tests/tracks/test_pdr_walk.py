@@ -67,6 +67,7 @@ def test_the_pose_of_the_phone_does_not_matter(pose, lead_rad):
     np.testing.assert_allclose(one.motion["turn_rad"], other.motion["turn_rad"], atol=5e-3)
     assert apart_deg(one.motion["heading_rad"], other.motion["heading_rad"]).max() < 0.5
     assert apart_deg(stepped(other)["heading_rad"], true_rad).max() < 5
+    assert other.imu.bias_sd_deg > 20 > reckoned(plain).imu.bias_sd_deg
 
 
 def test_headings_follow_the_axis_of_a_phone_held_across_the_walk():
@@ -304,21 +305,35 @@ def test_the_log_of_a_walk_is_read_as_it_was_written(tmp_path):
     pd.testing.assert_frame_equal(back.motion, log.motion)
 
 
-def test_a_phone_put_into_a_pocket_while_walking():
-    """From the hand to a pocket in 1 s, turned there by 110 degrees about an oblique axis."""
-    sensors, true_s, true_rad = walk_sensors((Leg(60, 0.5), Leg(60, -1.2, 0.0)))
-    moves_s = true_s[30]
+def moved(sensors, moves_s, turned):
+    """Return the sensors of a phone that is turned to another pose in 1 s."""
     time_s = sensors["gyroscope"]["time_s"].to_numpy()
-    share = np.clip(time_s - moves_s, 0, 1)
-    axis = np.array([0.2, 0.9, 0.4]) / np.linalg.norm([0.2, 0.9, 0.4])
-    pose = Rotation.from_rotvec(np.outer(share * np.radians(110), axis))
+    pose = Rotation.from_rotvec(np.outer(np.clip(time_s - moves_s, 0, 1), turned))
     turning = (pose[:-1].inv() * pose[1:]).as_rotvec() * 100.0
+    found = {}
     for name, rows in sensors.items():
         values = pose.inv().apply(rows.iloc[:, 1:].to_numpy(copy=True))
         if name == "gyroscope":
             values += np.concatenate([turning, [[0, 0, 0]]])
-        sensors[name] = pd.DataFrame(np.column_stack([time_s, values]), columns=rows.columns)
-    found = reckoned(sensors)
+        found[name] = pd.DataFrame(np.column_stack([time_s, values]), columns=rows.columns)
+    return found
+
+
+def test_a_phone_raised_after_a_turn_still_points_forward():
+    sensors, true_s, true_rad = walk_sensors((Leg(30, 0.5), Leg(60, 2.5)), Phone(push_mps2=0.0))
+    raised = moved(sensors, true_s[50], np.radians([85.0, 0.0, 0.0]))
+    rows = stepped(reckoned(raised, pose="device"))
+    nearest = np.abs(rows["time_s"].to_numpy()[:, None] - true_s).argmin(axis=1)
+    away = np.abs(rows["time_s"].to_numpy() - true_s[50] - 0.5) > 2
+    assert apart_deg(rows["heading_rad"], true_rad[nearest])[away].max() < 6
+
+
+def test_a_phone_put_into_a_pocket_while_walking():
+    """From the hand to a pocket in 1 s, turned there by 110 degrees about an oblique axis."""
+    sensors, true_s, true_rad = walk_sensors((Leg(60, 0.5), Leg(60, -1.2, 0.0)))
+    moves_s = true_s[30]
+    axis = np.array([0.2, 0.9, 0.4]) / np.linalg.norm([0.2, 0.9, 0.4])
+    found = reckoned(moved(sensors, moves_s, np.radians(110) * axis))
     rows = stepped(found)
     assert len(rows) == pytest.approx(120, abs=3)
     settled = np.abs(rows["time_s"].to_numpy() - moves_s - 0.5) > 2

@@ -1,12 +1,19 @@
 """Values of recordings: units, codes, identities, and what programs get wrong."""
 
 import numpy as np
+import pandas as pd
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from made_recordings import COUNT, LEVEL_DBM, MADE, gnettrack
 from made_satellites import nmea, sentence
 
+from mapfilter.errors import InputError
 from mapfilter.tracks.combine import combine
+from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
+from mapfilter.tracks.readers.recorded_values import duplicates
+from mapfilter.tracks.readers.times import parse_times
 
 
 @pytest.fixture
@@ -171,3 +178,62 @@ def test_compass_and_turn_degrees(tmp_path):
     assert motion["heading_rad"].tolist()[:2] == pytest.approx([0.0, np.pi / 2])
     assert np.isnan(motion["heading_rad"].iloc[2])
     assert motion["turn_rad"].tolist() == pytest.approx([0.0, np.pi / 2, -np.pi])
+
+
+@settings(max_examples=60)
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([0.0, -0.0, 1.0, np.nan, -np.nan]),
+            st.sampled_from(["a", "b", None]),
+            st.sampled_from([2.0, 3.0]),
+        ),
+        max_size=30,
+    )
+)
+def test_duplicates_are_those_of_pandas(rows):
+    table = pd.DataFrame(rows, columns=["x", "word", "y"])
+    table["word"] = pd.Categorical(table["word"], categories=["a", "b"])
+    table = table.astype({"x": float, "y": float})
+    assert duplicates(table).tolist() == table.duplicated().tolist()
+
+
+TIMES = [
+    ["2026-05-01T10:00:00.000Z", "2026-05-01 10:00:00.123456+02:00"],
+    ["2026-05-01T10:00:00", " 2026-05-01 10:00:01.5 "],
+    ["2026-05-01", "2026-05-02"],
+    ["1850-01-01T00:00:00", "2026-05-01T00:00:00"],
+    ["2026-05-01T10:00:60Z", "2026-05-01T10:00:00Z"],
+    ["2026-05-01T10:00:00Z", "2026-05-01T10:00:00"],
+    ["2026-05-01T10:00Z", "2026-13-01T10:00Z"],
+    ["2026-05-01T10:00:00Z", ""],
+]
+
+
+@pytest.mark.parametrize("texts", TIMES)
+@pytest.mark.parametrize("zone", ["", "Europe/Brussels"])
+def test_plain_times_are_those_of_the_slow_reader(texts, zone, tmp_path):
+    path = tmp_path / "times.csv"
+    rows = [f'"{text}",60.17{i},24.94' for i, text in enumerate(texts)]
+    path.write_text("\n".join(["time,lat,lon", *rows]))
+    expected, zoned = parse_times(np.array(texts, dtype=object), zone)
+    try:
+        found = read_recording(path, "csv", ReadOptions(zone))
+    except InputError:
+        assert not np.isfinite(expected).any()
+        return
+    known = np.sort(expected[np.isfinite(expected)])
+    assert found.tables["positions"]["time_s"].to_numpy() == pytest.approx(known, abs=1e-6)
+    assert found.clock.absolute == zoned
+
+
+def test_a_quoted_separator_in_a_file_of_blanks(written):
+    lines = MADE["smartloc"][1].splitlines()
+    at = next(i for i, line in enumerate(lines) if line.startswith("point3"))
+    words = lines[at].split(" ")
+    lines[at] = " ".join([*words[:8], '"', *words[9:]])
+    lines[at + 1] += ' "a b"'
+    whole = read_recording(written("smartloc")).tables
+    found = read_recording(written("smartloc", "\n".join(lines))).tables
+    for name, rows in whole.items():
+        assert len(found[name]) >= len(rows) - 5, name

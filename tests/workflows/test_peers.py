@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from mapfilter.database.store import open_database
+from mapfilter.models.level_errors import LevelMemory
+from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.tracks.store import read_log
 from mapfilter.workflows import bench_filter
@@ -32,11 +34,14 @@ def test_numpy_weighs_like_the_filter(world):
     inputs, belief = bench_filter.step_inputs(model, log, 4000)
     peer = NumpyModel(inputs)
     log_weight = np.zeros(4000)
-    model.weigh(belief.state, log_weight, peer.reading)
+    cloud, _ = model.weigh(belief.cloud, log_weight, peer.reading)
     state = np.vstack([belief.state.astype(np.float64), np.zeros(4000)])
-    off = np.abs(peer.log_likelihood(state) - log_weight)
-    # Single precision puts a particle at a pixel's very edge into the next one.
-    assert np.mean(off < 1e-3) > 0.998
+    found, kept = peer.weigh(state)
+    assert (kept.shape, np.ptp(log_weight) > 3) == (cloud.kept.T.shape, True)
+    # Single precision puts a particle at a pixel's very edge into the next one, and at the edge of
+    # a step of the table of absences into the next step.
+    assert np.mean(np.abs(found - log_weight) < 2e-3) > 0.995
+    assert np.mean(np.abs(kept - cloud.kept.T) < 5e-3) > 0.995
 
 
 def test_numpy_moves_like_the_filter(world):
@@ -60,13 +65,15 @@ def test_all_that_take_the_step_agree(world):
     peer = NumpyModel(inputs)
     state = np.vstack([belief.state.astype(np.float64), np.zeros(20_000)])
     rng = np.random.default_rng(4)
-    jitter = np.array([0.5, 0.5, 0.005, 0.003, 0.0])
+    jitter = np.array([0.5, 0.5, 0.005, 0.003, 0.0, 0.004, 0.004, 1e-4])
     own = bench_filter.whole_step(inputs, belief, jitter.astype(np.float32), rng)
+    width = LevelMemory.empty(model.evidence.levels, model.area.site_of).width
+    assert own.shape == (STATES + width, 20_000)
     others = [numpy_step(peer, jitter, rng), stone_soup_step(peer, rng)]
     for step in others:
         if step is not None:
             found = step(state)
-            assert found.shape == (MAP + 1, 20_000)
+            assert found.shape[0] in (MAP + 1, MAP + 1 + width)
             assert found[:2].mean(axis=1) == pytest.approx(own[:2].mean(axis=1), abs=1.5)
     several = particles_step(peer, rng, 3)
     if several is not None:

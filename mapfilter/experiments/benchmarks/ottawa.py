@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from math import hypot
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -106,7 +107,7 @@ class OttawaOptions:
         evidence = replace(
             evidence,
             serving=ServingWeights(weight_per_m=self.serving_weight_per_m),
-            levels=replace(evidence.levels, measurement_db=self.measurement_db),
+            levels=replace(evidence.levels, white_db=self.measurement_db),
         )
         return replace(bound, model=replace(bound.model, motion=motion, evidence=evidence))
 
@@ -162,8 +163,10 @@ def surveyed_positioner(
         level_sd_db = _level_sd_db(deviation, area, options.unmeasured_db)
         levels = evidence.levels
         usual_db = float(np.nanmedian(deviation.read()))
-        lasting_db2 = usual_db**2 - levels.measurement_db**2
-        levels = replace(levels, sd_db=max(lasting_db2, 1.0) ** 0.5)
+        lasting_db = max(usual_db**2 - levels.white_db**2, 1.0) ** 0.5
+        before_db = hypot(levels.slow_db, levels.fast_db)
+        slow_db, fast_db = (lasting_db * db / before_db for db in (levels.slow_db, levels.fast_db))
+        levels = replace(levels, slow_db=slow_db, fast_db=fast_db)
         evidence = replace(evidence, levels=levels)
     crs = database.lattice.crs
     places = np.concatenate([other.places(crs) for other in others])

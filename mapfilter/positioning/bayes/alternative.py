@@ -1,31 +1,39 @@
 """Detection of a wrong belief, and its replacement by a more probable alternative.
 
-Each reading has a log-likelihood under the belief, and an expected one if the belief is right. The
-shortfall, less a slack, feeds a CUSUM (Page, 1954). When that is large, an *alternative* starts
-from scratch beside the belief. Both then predict the same readings; the difference of their log
-evidence is the logarithm of the Bayes factor between "the position is anywhere" and "the position
-is where the belief has it". The alternative has a CUSUM, too: one that fails itself is *suspect*.
+Two hypotheses compete with the belief. The *null hypothesis* is that it describes none of what is
+measured: the position is outside the map, or database and network do not belong together. It has
+likelihoods of its own, which fit every reading moderately well. Its log odds against the belief are
+bounded from below, as it may become true at any time: so they are a CUSUM (Page, 1954).
+
+When they are large, an *alternative* starts from scratch beside the belief. Both then predict the
+same readings; the difference of their log evidence is the logarithm of the Bayes factor between
+"the position is anywhere" and "the position is where the belief has it". The alternative has a null
+hypothesis, too: one that is improbable beside it is *suspect*.
 
 After each reading, the alternative has one outcome, and a table gives what follows. Searching or
 found is the status of the belief that was there first:
 
 ===============  =========  ================  =========  =======  ===========
-Outcome          Belief     Goes on, as       Reported   CUSUM    Alternative
+Outcome          Belief     Goes on, as       Reported   Null     Alternative
 ===============  =========  ================  =========  =======  ===========
 none, undecided  any        belief            its own    kept     kept
 confirmed        any        belief            its own    reset    dropped
 abandoned        any        belief            its own    reset    dropped
-ahead            searching  other, SEARCHING  SEARCHING  reset    took over
+ahead            searching  other, SEARCHING  SEARCHING  other's  took over
 ahead            found      belief            LOST       kept     kept
 ahead, suspect   searching  other, SEARCHING  SEARCHING  other's  took over
 ahead, suspect   found      other, SEARCHING  LOST       other's  took over
-won              searching  other, CONVERGED  CONVERGED  reset    took over
-won              found      other, TRACKING   TRACKING   reset    took over
+won              searching  other, CONVERGED  CONVERGED  other's  took over
+won              found      other, TRACKING   TRACKING   other's  took over
 ===============  =========  ================  =========  =======  ===========
 
 Then, by the status reported before: ``LOST`` stays while the belief searches and becomes
-``TRACKING`` when it converges; ``CONVERGED`` lasts for one epoch. A belief does not converge while
-its CUSUM is large or the alternative close behind, as the true position may have died out of it.
+``TRACKING`` when it converges; ``CONVERGED`` lasts for one epoch. A belief that had converged and
+splits is ``LOST``. While the null hypothesis is more probable than the belief, one that had
+converged is ``LOST``, too, and ``OUTSIDE`` where it lies at the edge of the area; one that searches
+is ``OUTSIDE``, and so is one that has left the area. A belief does not converge while the null
+hypothesis is not improbable or the alternative close behind, as the true position may have died out
+of it.
 """
 
 from __future__ import annotations
@@ -33,8 +41,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from math import exp, hypot, nan
-from typing import Any, Literal, NamedTuple
+from math import exp, hypot, log, nan
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from mapfilter.filters.contract import Status
 from mapfilter.filters.grid import GridBelief
@@ -42,11 +50,20 @@ from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.options import NotNegative, Options, Share
 
+if TYPE_CHECKING:
+    from mapfilter.positioning.bayes.evidence import RadioReading
+
 MapBelief = ParticleBelief | GridBelief
 
-_USUAL, _MIN_USUAL, _MAX_USUAL = 0.8, 0.5, 2.0
-_SLACK = 1.5
-_LEARNT_OVER_M = 300.0
+_LEAST_LOG_ODDS, _MOST_LOG_ODDS = -12.0, 12.0
+_PRIOR_LOG_ODDS = log(0.05 / 0.95)
+_SERVING_NATS = 0.7
+_MAP_NATS_PER_M = 0.03
+_TERMS_FACTOR = 1.5
+_UNKNOWN_NATS = 0.5
+"""Log-likelihood, below 0, under the null hypothesis: of a serving cell at full weight, of the map
+per metre, and of other terms as a multiple of what is expected of them; and the gain from a serving
+cell that the map does not have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,13 +74,13 @@ class AlternativeRules(Options):
 
     Parameters
     ----------
-    start_cusum, start_cusum_cells : float
-        CUSUM at which an alternative starts; the second where only serving cells are reported.
+    start_log_odds : float
+        Log odds of the null hypothesis at which an alternative starts.
     search_threshold : float
         Log Bayes factor from which a belief that still searches is replaced.
-    lost_threshold, lost_threshold_cells : float
+    lost_threshold : float
         Log Bayes factor from which a belief that had converged is LOST and may be replaced: being
-        carried away unmeasured is rare. The second where only serving cells are reported.
+        carried away unmeasured is rare.
     confirm_mass : float
         Share of the alternative within 50 m of its leading position, at most 50 m from that of the
         belief, at which the belief is confirmed.
@@ -71,55 +88,66 @@ class AlternativeRules(Options):
         Log Bayes factor at which an alternative is abandoned.
     abandon_after_m : float
         Distance after which an undecided alternative is abandoned.
-    converge_cusum : float
-        Largest CUSUM with which a belief converges, or an alternative wins.
+    converge_log_odds : float
+        Largest log odds of the null hypothesis with which a belief converges, or an alternative
+        wins.
     converge_threshold : float
         Lead over its alternative, as a log Bayes factor, that a belief needs to converge.
     """
 
-    start_cusum: NotNegative = 5.0
-    start_cusum_cells: NotNegative = 2.5
+    start_log_odds: float = -1.0
     search_threshold: float = 4.0
-    lost_threshold: float = 10.0
-    lost_threshold_cells: float = 6.0
+    lost_threshold: float = 8.0
     confirm_mass: Share = 0.9
     abandon_threshold: float = -25.0
     abandon_after_m: NotNegative = 800.0
-    converge_cusum: float = 2.5
+    converge_log_odds: float = -5.0
     converge_threshold: float = 2.0
-
-    def alarms(self, cusum: EvidenceCusum, *, cells_only: bool) -> bool:
-        """Return whether a CUSUM is large enough to start an alternative."""
-        return cusum.sum >= (self.start_cusum_cells if cells_only else self.start_cusum)
 
 
 @dataclass(frozen=True, slots=True)
-class EvidenceCusum:
-    """Shortfall of the log-likelihood of readings against its expectation.
+class NullHypothesis:
+    """Log odds that a belief describes none of what is measured.
 
-    Parameters
-    ----------
-    usual : float
-        Ratio of log-likelihood to its expectation; learnt slowly, as the errors of no network are
-        exactly those of the model.
+    ``travelled_m`` is the distance that the belief had travelled at the last reading.
     """
 
-    sum: float = 0.0
-    usual: float = _USUAL
+    log_odds: float = _PRIOR_LOG_ODDS
+    travelled_m: float = 0.0
 
-    def after(self, expected: float, gained: float, length_m: float) -> EvidenceCusum:
-        """Add a reading by its expected and actual log-likelihood, ``length_m`` after the last."""
-        if expected >= 0:
-            return self
-        total = max(0.0, self.sum + _SLACK * self.usual * expected - gained)
-        # Learning during a shortfall would make a wrong belief usual.
-        share = 0.0 if total > 0 else 1.0 - exp(-length_m / _LEARNT_OVER_M)
-        ratio = min(max(gained / expected, _MIN_USUAL), _MAX_USUAL)
-        return EvidenceCusum(total, self.usual + share * (ratio - self.usual))
+    @property
+    def probability(self) -> float:
+        """Its probability beside the belief."""
+        return 1 / (1 + exp(-self.log_odds))
 
-    def reset(self) -> EvidenceCusum:
-        """Return a sum of 0, with the ratio learnt."""
-        return replace(self, sum=0.0)
+    def after(
+        self,
+        reading: RadioReading,
+        other_log_likelihood: float,
+        gained: float,
+        travelled_m: float,
+    ) -> NullHypothesis:
+        """Add a reading.
+
+        Parameters
+        ----------
+        other_log_likelihood : float
+            Of its levels, if the prediction is wrong about all cells.
+        gained : float
+            Log-likelihood of the reading, and of the map since the last one, under the belief.
+        travelled_m : float
+            By the belief.
+        """
+        expected = other_log_likelihood + _TERMS_FACTOR * reading.expected
+        expected -= _MAP_NATS_PER_M * (travelled_m - self.travelled_m)
+        known = reading.serving >= 0
+        expected += (-_SERVING_NATS if known else _UNKNOWN_NATS) * reading.serving_weight
+        log_odds = self.log_odds + expected - gained
+        return NullHypothesis(min(max(log_odds, _LEAST_LOG_ODDS), _MOST_LOG_ODDS), travelled_m)
+
+    def reset(self) -> NullHypothesis:
+        """Return it as at the start, unless it is less probable."""
+        return replace(self, log_odds=min(self.log_odds, _PRIOR_LOG_ODDS))
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,8 +164,8 @@ class AlternativeHypothesis:
         State of the sources of evidence that depends on the belief.
     gnss_log_bayes_factor : float
         Contribution of rejected satellites to the log Bayes factor; bounded, as all may be faulty.
-    cusum : EvidenceCusum
-        Of the alternative itself.
+    null : NullHypothesis
+        Beside the alternative itself.
     """
 
     belief: MapBelief
@@ -146,7 +174,7 @@ class AlternativeHypothesis:
     start_s: float = nan
     sources: Mapping[str, Any] = field(default_factory=dict)
     gnss_log_bayes_factor: float = 0.0
-    cusum: EvidenceCusum = field(default_factory=EvidenceCusum)
+    null: NullHypothesis = field(default_factory=NullHypothesis)
 
     def log_bayes_factor(self, main: MapBelief) -> float:
         """Return the logarithm of the Bayes factor in favour of the alternative."""
@@ -169,18 +197,18 @@ class Transition(NamedTuple):
     """Row of the table.
 
     ``takes_over`` is the status of the alternative where it replaces the belief, else None.
-    ``reported`` is the status to report; None for that of the belief. ``cusum`` is kept, reset or
+    ``reported`` is the status to report; None for that of the belief. ``null`` is kept, reset or
     the other's; ``keeps`` is whether the alternative stays beside the belief.
     """
 
     takes_over: Status | None
     reported: Status | None
-    cusum: Literal["kept", "reset", "other's"]
+    null: Literal["kept", "reset", "other's"]
     keeps: bool
 
 
 _SEARCHING, _CONVERGED = Status.SEARCHING, Status.CONVERGED
-_TRACKING, _LOST = Status.TRACKING, Status.LOST
+_TRACKING, _LOST, _OUTSIDE = Status.TRACKING, Status.LOST, Status.OUTSIDE
 
 TRANSITIONS: Mapping[tuple[Outcome, bool], Transition] = {
     # Outcome, and whether the belief is still searching.
@@ -190,17 +218,19 @@ TRANSITIONS: Mapping[tuple[Outcome, bool], Transition] = {
     (Outcome.CONFIRMED, False): Transition(None, None, "reset", False),
     (Outcome.ABANDONED, True): Transition(None, None, "reset", False),
     (Outcome.ABANDONED, False): Transition(None, None, "reset", False),
-    (Outcome.AHEAD, True): Transition(_SEARCHING, _SEARCHING, "reset", False),
+    (Outcome.AHEAD, True): Transition(_SEARCHING, _SEARCHING, "other's", False),
     (Outcome.AHEAD, False): Transition(None, _LOST, "kept", True),
     (Outcome.SUSPECT, True): Transition(_SEARCHING, _SEARCHING, "other's", False),
     (Outcome.SUSPECT, False): Transition(_SEARCHING, _LOST, "other's", False),
-    (Outcome.WON, True): Transition(_CONVERGED, _CONVERGED, "reset", False),
-    (Outcome.WON, False): Transition(_TRACKING, _TRACKING, "reset", False),
+    (Outcome.WON, True): Transition(_CONVERGED, _CONVERGED, "other's", False),
+    (Outcome.WON, False): Transition(_TRACKING, _TRACKING, "other's", False),
 }
 
 REPORTED: Mapping[tuple[Status, Status], Status] = {
     # Status reported before, and found now; others are reported as found.
     (_LOST, _SEARCHING): _LOST,
+    (_TRACKING, _SEARCHING): _LOST,
+    (_CONVERGED, _SEARCHING): _LOST,
     (_LOST, _CONVERGED): _TRACKING,
     (_CONVERGED, _CONVERGED): _TRACKING,
 }
@@ -211,7 +241,7 @@ class Resolution(NamedTuple):
 
     belief: MapBelief
     status: Status
-    cusum: EvidenceCusum
+    null: NullHypothesis
     alternative: AlternativeHypothesis | None = None
     taken_over: bool = False
 
@@ -220,37 +250,62 @@ def resolve_alternative(
     rules: AlternativeRules,
     before: Status,
     main: MapBelief,
-    cusum: EvidenceCusum,
+    null: NullHypothesis,
     alternative: AlternativeHypothesis | None,
     travelled_m: float,
     *,
-    cells_only: bool,
+    at_edge: bool,
+    gone: bool = False,
 ) -> Resolution:
     """Apply the table after a belief and its alternative were weighed by the same reading.
 
-    ``before`` is the status reported at the last epoch; ``cells_only`` is whether only serving
-    cells are reported, no levels.
+    ``before`` is the status reported at the last epoch; ``at_edge`` whether the belief lies at the
+    edge of the area, ``gone`` whether most of it lies beyond.
     """
-    if main.status is _CONVERGED and (
-        cusum.sum > rules.converge_cusum
-        or (alternative and alternative.log_bayes_factor(main) > -rules.converge_threshold)
-    ):
+    if main.status is _CONVERGED and doubted(rules, main, null, alternative):
         main = replace(main, status=_SEARCHING)
     outcome = Outcome.UNDECIDED
     if alternative is not None:
-        outcome = judge(rules, main, alternative, travelled_m, cells_only=cells_only)
+        outcome = judge(rules, main, alternative, travelled_m)
     row = TRANSITIONS[outcome, main.status is _SEARCHING]
     belief, taken_over = main, row.takes_over is not None
-    if row.cusum == "reset":
-        cusum = cusum.reset()
+    if row.null == "reset":
+        null = null.reset()
     if row.takes_over and alternative:
         belief = replace(alternative.belief, status=row.takes_over)
         if row.takes_over is _SEARCHING:
             belief = replace(belief, agreement_start_m=nan)
-        if row.cusum == "other's":
-            cusum = alternative.cusum
-    belief, status = report(before, belief, row.reported or belief.status)
-    return Resolution(belief, status, cusum, alternative if row.keeps else None, taken_over)
+        if row.null == "other's":
+            null = alternative.null
+    found = row.reported or belief.status
+    belief, status = report(before, belief, found)
+    status = _OUTSIDE if gone else under_null(rules, before, status, null, at_edge=at_edge)
+    return Resolution(belief, status, null, alternative if row.keeps else None, taken_over)
+
+
+def under_null(
+    rules: AlternativeRules, before: Status, found: Status, null: NullHypothesis, *, at_edge: bool
+) -> Status:
+    """Return the status to report where the null hypothesis may be more probable."""
+    was = before in (_LOST, _OUTSIDE)
+    if null.log_odds <= (rules.converge_log_odds if was else 0.0):
+        return found
+    if found is _SEARCHING or before is _OUTSIDE or at_edge:
+        return _OUTSIDE
+    return _LOST
+
+
+def doubted(
+    rules: AlternativeRules,
+    main: MapBelief,
+    null: NullHypothesis,
+    alternative: AlternativeHypothesis | None,
+) -> bool:
+    """Return whether the null hypothesis or an alternative is too probable to converge."""
+    if null.log_odds > rules.converge_log_odds:
+        return True
+    ahead = -rules.converge_threshold
+    return alternative is not None and alternative.log_bayes_factor(main) > ahead
 
 
 def report(before: Status, belief: MapBelief, found: Status) -> tuple[MapBelief, Status]:
@@ -269,8 +324,6 @@ def judge(
     main: MapBelief,
     alternative: AlternativeHypothesis,
     travelled_m: float,
-    *,
-    cells_only: bool,
 ) -> Outcome:
     """Compare a belief and its alternative after the same readings."""
     log_bayes_factor = alternative.log_bayes_factor(main)
@@ -278,12 +331,12 @@ def judge(
     apart_m = hypot(other.mean[0] - mean[0], other.mean[1] - mean[1])
     if apart_m <= NEAR_M and other.mass_50m >= rules.confirm_mass:
         return Outcome.CONFIRMED
-    needed = rules.lost_threshold_cells if cells_only else rules.lost_threshold
-    if log_bayes_factor >= (rules.search_threshold if main.status is _SEARCHING else needed):
+    searching = main.status is _SEARCHING
+    if log_bayes_factor >= (rules.search_threshold if searching else rules.lost_threshold):
         converged = alternative.belief.status in (_CONVERGED, _TRACKING)
-        if converged and alternative.cusum.sum <= rules.converge_cusum:
+        if converged and alternative.null.log_odds <= rules.converge_log_odds:
             return Outcome.WON
-        suspect = rules.alarms(alternative.cusum, cells_only=cells_only)
+        suspect = alternative.null.log_odds > 0
         return Outcome.SUSPECT if suspect else Outcome.AHEAD
     gone_m = travelled_m - alternative.start_m
     if log_bayes_factor <= rules.abandon_threshold or gone_m >= rules.abandon_after_m:

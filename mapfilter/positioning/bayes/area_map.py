@@ -9,14 +9,16 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
-from mapfilter._types import Bools, Floats32, Ints, Ints32
+from mapfilter._types import Bools, Bytes, Floats, Floats32, Ints, Ints32
 from mapfilter.database.radioroutes import RadioField
 from mapfilter.geodesy import Lattice
 from mapfilter.models.fingerprint import RasterFrame
+from mapfilter.models.level_errors import roughness
 from mapfilter.models.street_motion import map_log_likelihood
 from mapfilter.radio.cells import CellPlan
 
 _BELOW_FLOOR_DB = 6.0
+_EDGE_M, _EDGE_SHARE = 60.0, 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +36,7 @@ class AreaMap:
     level_dbm : ndarray of float32, shape (rows, cols, C + 2)
         Levels, and the strongest and second strongest of each pixel.
     distance_m : ndarray of float32, shape (rows, cols)
-        To the nearest way.
+        To the edge of the nearest way, 0 on it.
     way_id : ndarray of int64, shape (rows, cols)
         Id of the way of the nearest point; 0 where that belongs to no way.
     on_way : ndarray of bool, shape (rows, cols)
@@ -83,7 +85,7 @@ class AreaMap:
             field.cell_ids,
             frozenset(plan.ids),
             level,
-            field.distance_to_way_m,
+            np.maximum(field.distance_to_way_m - field.half_width_m, 0),
             field.way_id,
             field.on_way,
             _carriers(plan, field.cell_ids),
@@ -115,6 +117,20 @@ class AreaMap:
         return self.level_dbm.reshape(-1)
 
     @cached_property
+    def flat_rough_db(self) -> Bytes:
+        """Local standard deviation of the levels in tenths of a dB, in the same order."""
+        rough_db = roughness(self.level_dbm, self.lattice.resolution_m)
+        return np.minimum(np.rint(10 * rough_db), 255).astype(np.uint8).reshape(-1)
+
+    @cached_property
+    def site_of(self) -> Ints:
+        """Number of the site of each band; cells at one place are of one site."""
+        places = {cell: self.sites[cell][:2] for cell in self.cell_ids if cell in self.sites}
+        numbers: dict[object, int] = {}
+        found = [numbers.setdefault(places.get(c, c), len(numbers)) for c in self.cell_ids]
+        return np.array(found, dtype=np.int64)
+
+    @cached_property
     def band_of(self) -> dict[str, int]:
         """Band of each cell."""
         return {cell: band for band, cell in enumerate(self.cell_ids)}
@@ -137,6 +153,17 @@ class AreaMap:
         return np.stack([(col + 0.5) * step, (self.lattice.rows - row - 0.5) * step]).astype(
             np.float32
         )
+
+    def at_edge(self, place_m: Floats) -> bool:
+        """Return whether a place in the local frame is near the edge of the area, or beyond."""
+        inside = [min(place_m[i], self.size_m[i] - place_m[i]) for i in range(2)]
+        return bool(min(inside) < min(_EDGE_M, _EDGE_SHARE * min(self.size_m)))
+
+    def holds(self, east_m: Floats32, north_m: Floats32, weight: Floats32) -> bool:
+        """Return whether most of a belief in the local frame lies in the area."""
+        width_m, height_m = self.size_m
+        inside = (east_m >= 0) & (east_m <= width_m) & (north_m >= 0) & (north_m <= height_m)
+        return bool(np.sum(weight[inside]) > 0.5)
 
     def log_map(self, sd_m: float) -> Floats32:
         """Return the map's log-likelihood at every pixel."""

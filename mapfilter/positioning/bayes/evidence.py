@@ -18,7 +18,8 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Reason
-from mapfilter.models.fingerprint import BoundReading, LevelReading
+from mapfilter.models.fingerprint import BoundReading
+from mapfilter.models.level_errors import LevelReport
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
@@ -53,13 +54,18 @@ class RadioReading:
     serving : int
         Band of the serving cell; -1 where none is used.
     serving_weight : float
-        Power of the serving cell's likelihood.
+        Power of the serving cell's likelihood; with a band of -1 that of a cell that the map does
+        not have, 0 where none serves.
+    levels : LevelReport or None
+        Levels inside the scale, and cells that are absent.
     bounds : tuple of BoundReading
         Levels at an end of the scale, and levels of one of several candidate cells.
     terms : tuple of Term
         Of timing, fixes and satellites; added after the report, in this order.
     expected : float
-        Expected log-likelihood if the belief is right.
+        Expected log-likelihood of the terms if the belief is right.
+    doubted : bool
+        Whether the null hypothesis, or an alternative, is too probable for a belief to converge.
     length_m : float
         Distance since the last report that was used; 0 for the first.
     timing_advance : float
@@ -68,12 +74,13 @@ class RadioReading:
 
     serving: int = -1
     serving_weight: float = 0.0
-    levels: LevelReading | None = None
+    levels: LevelReport | None = None
     bounds: tuple[BoundReading, ...] = ()
     terms: tuple[Term, ...] = ()
     expected: float = 0.0
     length_m: float = 0.0
     timing_advance: float = nan
+    doubted: bool = False
 
 
 class Context(NamedTuple):

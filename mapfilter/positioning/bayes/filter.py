@@ -18,11 +18,14 @@ import numpy as np
 from mapfilter.filters.contract import BeliefFilter, MotionStep, Reason, Status
 from mapfilter.filters.grid import GridBelief, GridFilter
 from mapfilter.filters.particle import ParticleFilter, ParticleOptions
-from mapfilter.models.fingerprint import BoundReading, LevelReading
+from mapfilter.models.fingerprint import BoundReading
+from mapfilter.models.level_errors import LevelReport
 from mapfilter.positioning.bayes.alternative import (
     AlternativeHypothesis,
     AlternativeRules,
     MapBelief,
+    NullHypothesis,
+    doubted,
     report,
     resolve_alternative,
 )
@@ -46,7 +49,7 @@ from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.source import FirstFix, GnssSource
 
-_MORE_PARTICLES, _MORE_SEARCHING = 12, 8
+_MORE_PARTICLES, _MORE_SEARCHING = 6, 3
 """Factors of the numbers of particles where headings are unknown."""
 
 
@@ -108,7 +111,8 @@ class BayesPositioner(Filter[BayesState]):
         """The filters of a single belief, for headings with and without a compass."""
         known = self.options
         if self.grid:
-            grids = {compass: StreetGrid(self.model, compass) for compass in (True, False)}
+            model = replace(self.model, remember=False)
+            grids = {compass: StreetGrid(model, compass) for compass in (True, False)}
             return {compass: GridFilter(grid, known) for compass, grid in grids.items()}
         # Every place times every heading: most of them die out after a few steps.
         most = _MORE_PARTICLES * known.max_particles
@@ -176,8 +180,8 @@ class BayesPositioner(Filter[BayesState]):
         return BayesSmoother(self.area, self.model.motion) if self.smooth else None
 
     def hypotheses(self, state: BayesState) -> Hypotheses | None:
-        """Return the hypotheses of the leading belief."""
-        belief, (west, south) = state.leading, self.area.origin_m
+        """Return the hypotheses of the belief."""
+        belief, (west, south) = state.belief, self.area.origin_m
         if belief is None:
             return None
         return Hypotheses(
@@ -271,23 +275,32 @@ class BayesPositioner(Filter[BayesState]):
         reading = joined(updates)
         if reading is None:
             return state, Reason.USED
-        update = self.filters[state.compass].update
+        update, rules = self.filters[state.compass].update, self.rules
+        doubt = doubted(rules, before, state.null, state.alternative)
+        reading = replace(reading, doubted=doubt or self.area.at_edge(before.summary.mean))
         belief, info = update(before, reading, rng)
         if info.reason is not Reason.USED:
             return replace(state, belief=belief), info.reason
-        gained = belief.log_evidence - before.log_evidence
-        cusum = state.cusum.after(reading.expected, gained, reading.length_m)
+        null = _challenged(state.null, reading, before, belief)
         sources, alternative = state.sources, state.alternative
         if alternative is not None:
             terms = joined(updates, alternative=True) or RadioReading()
+            terms = replace(terms, doubted=alternative.null.log_odds > rules.converge_log_odds)
             other, _ = update(alternative.belief, terms, rng)
-            gained = other.log_evidence - alternative.belief.log_evidence
-            own = alternative.cusum.after(reading.expected, gained, reading.length_m)
-            alternative = replace(alternative, belief=other, cusum=own)
+            own = _challenged(alternative.null, terms, alternative.belief, other)
+            alternative = replace(alternative, belief=other, null=own)
         travelled_m = state.reckoning.travelled_m
-        cells_only = self._radio.cells_only(reading, sources[self._radio.name])
+        at_edge = self.area.at_edge(belief.summary.mean)
+        gone = not self.area.holds(belief.state[0], belief.state[1], belief.weight)
         now = resolve_alternative(
-            self.rules, state.status, belief, cusum, alternative, travelled_m, cells_only=cells_only
+            rules,
+            state.status,
+            belief,
+            null,
+            alternative,
+            travelled_m,
+            at_edge=at_edge,
+            gone=gone,
         )
         if now.taken_over and alternative is not None:
             sources = {**sources, **alternative.sources}
@@ -296,7 +309,7 @@ class BayesPositioner(Filter[BayesState]):
         if (
             state.alternative is None
             and now.status is not Status.CONVERGED
-            and (self.rules.alarms(now.cusum, cells_only=cells_only) or disputed)
+            and (now.null.log_odds >= rules.start_log_odds or disputed)
         ):
             alternative = self._alternative(state, now.belief, epoch, rng)
         after = replace(
@@ -304,7 +317,7 @@ class BayesPositioner(Filter[BayesState]):
             belief=now.belief,
             status=now.status,
             sources=sources,
-            cusum=now.cusum,
+            null=now.null,
             alternative=alternative,
             takeovers=state.takeovers + now.taken_over,
         )
@@ -325,13 +338,12 @@ class BayesPositioner(Filter[BayesState]):
             main.log_evidence,
             epoch.time_s,
             sources,
-            cusum=state.cusum.reset(),
         )
 
     def _without_compass(self, belief: MapBelief, rng: np.random.Generator) -> MapBelief:
         """Spread a belief over all headings."""
         if isinstance(belief, GridBelief):
-            grid = StreetGrid(self.model, compass=False)
+            grid = StreetGrid(replace(self.model, remember=False), compass=False)
             count = grid.bias_rad.size
             on, off = (
                 np.repeat(mass.sum(axis=0, keepdims=True) / count, count, axis=0)
@@ -340,10 +352,22 @@ class BayesPositioner(Filter[BayesState]):
             return replace(belief, on=on, off=off, model=grid)
         state = self.model.any_heading(belief.state, _MORE_PARTICLES, rng)
         log_weight = np.tile(belief.log_weight, _MORE_PARTICLES) - np.log(_MORE_PARTICLES)
-        return replace(belief, state=state, log_weight=log_weight)
+        kept = np.tile(belief.kept, (_MORE_PARTICLES, 1))
+        return replace(belief, state=state, log_weight=log_weight, kept=kept)
+
+
+def _challenged(
+    null: NullHypothesis, reading: RadioReading, before: MapBelief, after: MapBelief
+) -> NullHypothesis:
+    """Return the null hypothesis beside a belief after a reading."""
+    other = 0.0
+    if reading.levels is not None and after.shared is not None:
+        other = after.shared.other_log_likelihood
+    gained = after.log_evidence - before.log_evidence
+    return null.after(reading, other, gained, after.travelled_m)
 
 
 def _every_kind() -> RadioReading:
-    one, none = np.ones(1, dtype=np.float32), np.zeros(1, dtype=np.int32)
-    levels = LevelReading(none, one, one, one, 0.3, 1.0, 3.0, 0.0, 0.0)
+    one, none = np.full(1, -60, dtype=np.float32), np.zeros(1, dtype=np.int32)
+    levels = LevelReport(none, one, none, -100.0, 1.0)
     return RadioReading(0, 1.0, levels, (BoundReading(none, -60.0, 1, 8.0, 1.0),))

@@ -13,6 +13,7 @@ from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Reason
 from mapfilter.filters.grid import Transport
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
+from mapfilter.filters.particle import Cloud
 from mapfilter.geodesy import wrap_rad
 from mapfilter.models.street_motion import BIAS, EAST, NORTH, OFF, STATES
 from mapfilter.positioning.bayes.evidence import RadioReading
@@ -25,8 +26,9 @@ _CIRCLE_BINS = 72
 class StreetGrid:
     """Ways and radio maps of an area on its lattice, times bins of the lasting heading error.
 
-    The step scale is no dimension of the grid: its standard deviation widens the motion. Without a
-    compass the heading error is uniform.
+    The step scale is no dimension of the grid, nor are deviations of headings and steps: they widen
+    the motion. Errors of levels are not remembered from one report to the next. Without a compass
+    the heading error is uniform.
     """
 
     model: BayesModel
@@ -55,7 +57,8 @@ class StreetGrid:
         """Return mass on the ways and off them: by the first evidence, or about a known start."""
         area = self.model.area
         row, col = np.indices(area.on_way.shape).reshape(2, -1)
-        state = self.states(row, col, np.zeros(row.size, dtype=np.float32))
+        nothing = np.zeros(row.size, dtype=np.float32)
+        state = self.states(row, col, nothing, nothing)
         log_weight = np.zeros(row.size)
         on_map = area.on_way / max(area.on_way.sum(), 1)
         if isfinite(prior.east_m):
@@ -64,7 +67,7 @@ class StreetGrid:
             log_weight -= (dx**2 + dy**2) / (2 * prior.sd_m**2)
             on_map = np.full(on_map.shape, 1 / row.size)
         if prior.reading is not None:
-            self.model.weigh(state, log_weight, prior.reading)
+            self.weigh(Cloud(state, np.empty((row.size, 0), np.float32)), log_weight, prior.reading)
         likely = np.exp(log_weight - log_weight.max()).reshape(on_map.shape)
         bias = np.ones(self.bias_rad.size)
         if self.compass and self.model.motion.bias_sd_rad > 0:
@@ -74,30 +77,37 @@ class StreetGrid:
         total = on.sum() + off.sum()
         return (on / total).astype(np.float32), (off / total).astype(np.float32)
 
-    def states(self, row: NDArray[np.intp], col: NDArray[np.intp], bias_rad: Floats32) -> Floats32:
+    def states(
+        self, row: NDArray[np.intp], col: NDArray[np.intp], bias_rad: Floats32, off: Floats32
+    ) -> Floats32:
         """Return pixels as states of the particle model."""
         lattice = self.model.area.lattice
         state = np.zeros((STATES, row.size), dtype=np.float32)
         state[EAST] = (col + 0.5) * lattice.resolution_m
         state[NORTH] = (lattice.rows - row - 0.5) * lattice.resolution_m
         state[BIAS] = bias_rad
-        state[OFF] = OFF_AT_START
+        state[OFF] = off
         return state
 
-    def transport(self, east_m: float, north_m: float, length_m: float) -> Transport:
+    def transport(
+        self, east_m: float, north_m: float, length_m: float, spread_m2: float
+    ) -> Transport:
         """Return the transport of the mass of each bin by a displacement of dead reckoning."""
         motion, over = self.model.motion, self.model.weights.over(length_m)
         pixel_m = self.model.area.lattice.resolution_m
-        stretch = exp(0.5 * motion.heading_sd_rad**2)
+        stretch = exp(0.5 * motion.white_rad**2)
         cosine, sine = np.cos(self.bias_rad), np.sin(self.bias_rad)
         right = stretch * (east_m * cosine - north_m * sine) / pixel_m
         up = stretch * (east_m * sine + north_m * cosine) / pixel_m
         steps = length_m / motion.typical_step_m
         along_var = steps * motion.step_sd_m**2 + (motion.scale_sd * length_m) ** 2
-        across_var = steps * (motion.typical_step_m * motion.heading_sd_rad) ** 2
+        across_var = steps * (motion.typical_step_m * motion.white_rad) ** 2
+        # Deviations spread like white noise that has the same variance over a long way.
+        along_var += 2 * motion.stretch_m * length_m * motion.stretch_sd**2
+        across_var += 2 * motion.heading_m * length_m * motion.turn_sd_rad**2
         heading = np.arctan2(up, right)
-        east_var = along_var * np.cos(heading) ** 2 + across_var * np.sin(heading) ** 2
-        north_var = along_var * np.sin(heading) ** 2 + across_var * np.cos(heading) ** 2
+        east_var = along_var * np.cos(heading) ** 2 + across_var * np.sin(heading) ** 2 + spread_m2
+        north_var = along_var * np.sin(heading) ** 2 + across_var * np.cos(heading) ** 2 + spread_m2
         width_rad = 2 * pi / _CIRCLE_BINS if self.circular else self.bin_rad
         return Transport(
             right,
@@ -111,10 +121,12 @@ class StreetGrid:
             over.come_back,
         )
 
-    def weigh(self, state: Floats32, log_weight: Floats, reading: RadioReading) -> Reason:
+    def weigh(
+        self, cloud: Cloud, log_weight: Floats, reading: RadioReading
+    ) -> tuple[Cloud, Reason]:
         """Add the log-likelihood of a reading, in place."""
-        return self.model.weigh(state, log_weight, reading)
+        return self.model.weigh(cloud, log_weight, reading)
 
-    def can_converge(self, summary: BeliefSummary) -> bool:
-        """Return whether the leading hypothesis is on the map rather than off it."""
-        return self.model.can_converge(summary)
+    def can_converge(self, summary: BeliefSummary, reading: RadioReading) -> bool:
+        """Return whether the leading hypothesis is on the map, and nothing else is as probable."""
+        return self.model.can_converge(summary, reading)

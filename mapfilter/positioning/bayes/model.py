@@ -10,16 +10,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import isfinite, pi, sqrt
+from math import exp, isfinite, pi, sqrt
 
 import numpy as np
 
-from mapfilter._types import Floats, Floats32, Ints32
+from mapfilter._types import Bytes, Floats, Floats32, Ints32
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
+from mapfilter.filters.particle import Cloud
 from mapfilter.filters.resampling import systematic
 from mapfilter.models import fingerprint
-from mapfilter.models.fingerprint import LevelReading
+from mapfilter.models.level_errors import (
+    LevelMemory,
+    LevelReport,
+    decayed,
+    weigh_by_absence,
+    weigh_by_levels,
+)
 from mapfilter.models.measured_map import ServingStatistics
 from mapfilter.models.street_motion import (
     BIAS,
@@ -27,7 +34,10 @@ from mapfilter.models.street_motion import (
     LOG_SCALE,
     NORTH,
     OFF,
+    RATE,
     STATES,
+    STRETCH,
+    TURN,
     MapWeights,
     MotionErrors,
     interpolate,
@@ -41,6 +51,10 @@ from mapfilter.positioning.bayes.radio import EvidenceOptions
 _F = np.float32
 OFF_AT_START = 0.05
 _OFF_SHARE, _TRIES = 0.2, 2
+_AT_ONCE = 50_000
+_NEW_M = 50.0
+_LEAST_EXPECTED = 0.02
+_SAMPLE = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,12 +80,17 @@ class Start:
 
 @dataclass(frozen=True)
 class BayesModel:
-    """Ways and radio maps of an area, and the errors of measurements."""
+    """Ways and radio maps of an area, and the errors of measurements.
+
+    ``remember`` is whether hypotheses keep the errors of levels from one report to the next; else
+    each report counts by the share of its errors that is new.
+    """
 
     area: AreaMap
     motion: MotionErrors = field(default_factory=MotionErrors)
     weights: MapWeights = field(default_factory=MapWeights)
     evidence: EvidenceOptions = field(default_factory=EvidenceOptions)
+    remember: bool = True
 
     @property
     def timed_by_sites(self) -> bool:
@@ -96,7 +115,7 @@ class BayesModel:
     def _bound_table(self) -> Floats32:
         return fingerprint.bound_table()
 
-    def start(self, prior: Start, most: int, rng: np.random.Generator) -> tuple[Floats32, Floats]:
+    def start(self, prior: Start, most: int, rng: np.random.Generator) -> tuple[Cloud, Floats]:
         """Draw the first hypotheses: by the first evidence, or about a known start.
 
         Without a known start they are drawn in proportion to their likelihood from the points on
@@ -114,9 +133,17 @@ class BayesModel:
         bias = rng.standard_normal(most) * self.motion.bias_sd_rad
         state[BIAS] = bias if prior.compass else pi * (2 * rng.random(most) - 1)
         state[LOG_SCALE] = self.motion.scale_sd * rng.standard_normal(most)
-        if isfinite(prior.east_m) and prior.reading is not None:
-            self.weigh(state, log_weight, prior.reading)
-        return state, log_weight
+        state[TURN] = self.motion.turn_sd_rad * rng.standard_normal(most)
+        state[STRETCH] = self.motion.stretch_sd * rng.standard_normal(most)
+        biased = rng.random(most) < self.motion.rate_share
+        state[RATE] = self.motion.rate_rad_per_m * rng.standard_normal(most) * biased
+        cloud = _new(state)
+        if prior.reading is not None:
+            # Hypotheses that were drawn by this evidence keep what it says of the levels' errors.
+            drawn_by = not isfinite(prior.east_m)
+            weighed = log_weight.copy() if drawn_by else log_weight
+            cloud, _ = self.weigh(cloud, weighed, prior.reading)
+        return cloud, log_weight
 
     def _spread(
         self,
@@ -148,11 +175,13 @@ class BayesModel:
         self, points: Floats32, reading: RadioReading | None, count: int, rng: np.random.Generator
     ) -> tuple[Ints32, float]:
         """Draw points by their likelihood; return them and the logarithm of its mean."""
-        state = np.zeros((STATES, points.shape[1]), dtype=np.float32)
-        state[EAST : NORTH + 1] = points
         log_weight = np.zeros(points.shape[1])
         if reading is not None:
-            self.weigh(state, log_weight, reading)
+            for first in range(0, points.shape[1], _AT_ONCE):
+                part = slice(first, first + _AT_ONCE)
+                state = np.zeros((STATES, points[:, part].shape[1]), dtype=np.float32)
+                state[EAST : NORTH + 1] = points[:, part]
+                self.weigh(_new(state), log_weight[part], reading)
         most = log_weight.max()
         weight = np.exp(log_weight - most)
         chosen = np.empty(count, dtype=np.int32)
@@ -186,41 +215,114 @@ class BayesModel:
         weigh_by_map(found, moved[OFF], self.weights.over(length_m), weighed)
         return moved, weighed
 
-    def weigh(self, state: Floats32, log_weight: Floats, reading: RadioReading) -> Reason:
+    def weigh(
+        self, cloud: Cloud, log_weight: Floats, reading: RadioReading
+    ) -> tuple[Cloud, Reason]:
         """Add the log-likelihood of a report, then of each further term, in place."""
-        flat = self.area.flat_level_dbm
-        bands = len(self.area.cell_ids) + 2
-        used = False
+        # A serving cell that the map lacks weighs all hypotheses alike.
+        used = reading.serving_weight > 0
         if reading.serving >= 0 or reading.levels is not None or reading.bounds:
-            now = self._pixels(state, 0.0, 0.0)
+            pixel = self._pixels(cloud.state)
             used = True
             if reading.serving >= 0 and reading.serving_weight > 0:
-                table, weight = self._serving_table, reading.serving_weight
-                fingerprint.weigh_by_serving(
-                    now, flat, bands, reading.serving, table, weight, log_weight
-                )
+                self._weigh_serving(pixel, log_weight, reading)
             if reading.levels is not None:
-                levels = reading.levels
-                then = self._pixels(state, levels.back_east_m, levels.back_north_m)
-                fingerprint.weigh_by_levels(now, then, flat, bands, levels, log_weight)
+                length_m = reading.length_m
+                cloud = self._weigh_levels(cloud, pixel, log_weight, reading.levels, length_m)
+            flat, bands, table = self.area.flat_level_dbm, self._bands, self._bound_table
             for bound in reading.bounds:
-                fingerprint.weigh_by_bound(now, flat, bands, bound, self._bound_table, log_weight)
+                fingerprint.weigh_by_bound(pixel, flat, bands, bound, table, log_weight)
         for term in reading.terms:
-            log_weight += term.log_likelihood(state)
+            log_weight += term.log_likelihood(cloud.state)
             used = True
-        return Reason.USED if used else Reason.NO_READING
+        return cloud, Reason.USED if used else Reason.NO_READING
 
-    def can_converge(self, summary: BeliefSummary) -> bool:
-        """Return whether the leading hypothesis is on the map rather than off it."""
-        return bool(summary.mean[OFF] < 0.5)
+    def can_converge(self, summary: BeliefSummary, reading: RadioReading) -> bool:
+        """Return whether the leading hypothesis is on the map, and nothing else is as probable."""
+        return bool(summary.mean[OFF] < 0.5) and not reading.doubted
 
-    def _pixels(self, state: Floats32, back_east_m: float, back_north_m: float) -> Ints32:
-        """Return the pixel of each hypothesis, moved back by a displacement of dead reckoning."""
-        return np.asarray(fingerprint.pixels(state, back_east_m, back_north_m, self.area.frame))
+    def rough_db(self) -> Bytes:
+        """Return what is added to the deviation of levels, in tenths of a dB, flat as levels."""
+        return self.area.flat_rough_db
+
+    @property
+    def _bands(self) -> int:
+        return len(self.area.cell_ids) + 2
+
+    def _pixels(self, state: Floats32) -> Ints32:
+        return np.asarray(fingerprint.pixels(state, self.area.frame))
+
+    def _weigh_serving(self, pixel: Ints32, log_weight: Floats, reading: RadioReading) -> None:
+        flat, table = self.area.flat_level_dbm, self._serving_table
+        cell, weight = reading.serving, reading.serving_weight
+        fingerprint.weigh_by_serving(pixel, flat, self._bands, cell, table, weight, log_weight)
+
+    def _weigh_levels(
+        self,
+        cloud: Cloud,
+        pixel: Ints32,
+        log_weight: Floats,
+        report: LevelReport,
+        length_m: float,
+    ) -> Cloud:
+        """Add the log-likelihood of levels and absent cells; return what hypotheses keep now."""
+        errors, area = self.evidence.levels, self.area
+        memory: LevelMemory | None = cloud.shared
+        weight = errors.weight
+        if memory is None or not self.remember:
+            memory = LevelMemory.empty(errors, area.site_of)
+            kept = memory.start(pixel.size)
+            if not self.remember and length_m > 0:
+                weight *= 1 - exp(-2 * length_m / _NEW_M)
+        else:
+            memory, decay = memory.after(length_m)
+            keep = exp(-length_m / errors.fault_m)
+            kept = decayed(cloud.kept, decay, keep, errors.fault_log_odds)
+        # Cells that nobody expects say nothing, neither for the belief nor against it.
+        report = report._replace(absent=self._expected(pixel, report))
+        cells = np.concatenate([report.cell, report.absent])
+        memory, kept = memory.with_cells(cells[: memory.slots], kept)
+        if report.cell.size > memory.slots:
+            slotted = np.isin(report.cell, memory.band)
+            report = report._replace(cell=report.cell[slotted], level_dbm=report.level_dbm[slotted])
+        memory, terms = memory.updated(report, self._mean_rough_db2(pixel, report.cell))
+        absent = memory.absence(report)
+        flat, rough, bands = area.flat_level_dbm, self.rough_db(), self._bands
+        share, table = errors.roughness, self._bound_table
+        weigh_by_levels(kept, pixel, flat, rough, bands, terms, share, weight, log_weight)
+        if absent.cell.size:
+            weigh_by_absence(
+                kept, pixel, flat, rough, bands, absent, table, share, weight, log_weight
+            )
+        other = weight * (float(terms.other.sum()) + float(absent.other.sum()))
+        memory = replace(memory, other_log_likelihood=other)
+        return Cloud(cloud.state, kept, memory)
+
+    def _mean_rough_db2(self, pixel: Ints32, cell: Ints32) -> Floats:
+        """Return the mean variance that the roughness of the prediction adds, for each cell."""
+        rough_db = 0.1 * self.rough_db().reshape(-1, self._bands)[_sample(pixel)][:, cell]
+        return np.asarray(self.evidence.levels.roughness * np.mean(rough_db**2, axis=0))
+
+    def _expected(self, pixel: Ints32, report: LevelReport) -> Ints32:
+        """Return absent cells that hypotheses expect to be in the report, most expected first."""
+        absent = report.absent
+        if not absent.size:
+            return absent
+        some = _sample(pixel)
+        level = self.area.level_dbm.reshape(-1, self._bands)[some][:, absent]
+        expected = np.mean(level > report.limit_dbm, axis=0)
+        order = np.argsort(-expected, kind="stable")
+        found: Ints32 = absent[order[expected[order] > _LEAST_EXPECTED]]
+        return found
 
 
-_MIN_VARIANCE = 0.25
-"""Least variance of an innovation, as a share of the usual one."""
+def _sample(pixel: Ints32) -> Ints32:
+    """Return the pixels of some hypotheses, which stand for all of them."""
+    return pixel[:: max(pixel.size // _SAMPLE, 1)]
+
+
+def _new(state: Floats32) -> Cloud:
+    return Cloud(state, np.empty((state.shape[1], 0), dtype=np.float32))
 
 
 @dataclass(frozen=True)
@@ -244,44 +346,25 @@ class MeasuredMapModel(BayesModel):
         """Whether timing advances are compared with the distances of sites: not with maps."""
         return self.serving_model is None
 
-    def weigh(self, state: Floats32, log_weight: Floats, reading: RadioReading) -> Reason:
-        """Add the log-likelihood of a report and of further terms, in place."""
-        serving_model = self.serving_model
-        if serving_model is None or reading.serving < 0:
-            return super().weigh(state, log_weight, reading)
-        pixel = self._pixels(state, 0.0, 0.0)
-        found = serving_model.log_serving(reading.serving, pixel)
+    def rough_db(self) -> Bytes:
+        """Return by how much the map's deviation exceeds that of the options."""
+        return super().rough_db() if self.level_sd_db is None else self._rough_db
+
+    @cached_property
+    def _rough_db(self) -> Bytes:
+        sd_db = np.zeros((self.area.level_dbm[..., 0].size, self._bands))
+        if self.level_sd_db is not None:
+            sd_db[:, :-2] = self.level_sd_db.reshape(len(self.area.cell_ids), -1).T
+        more_db = np.sqrt(np.maximum(sd_db**2 - self.evidence.levels.total_db**2, 0.0))
+        tenths: Bytes = np.minimum(np.rint(10 * more_db), 255).astype(np.uint8).reshape(-1)
+        return tenths
+
+    def _weigh_serving(self, pixel: Ints32, log_weight: Floats, reading: RadioReading) -> None:
+        model = self.serving_model
+        if model is None:
+            super()._weigh_serving(pixel, log_weight, reading)
+            return
+        found = model.log_serving(reading.serving, pixel)
         if isfinite(reading.timing_advance):
-            found = found + serving_model.log_advance(
-                reading.serving, pixel, reading.timing_advance
-            )
+            found = found + model.log_advance(reading.serving, pixel, reading.timing_advance)
         log_weight += reading.serving_weight * found
-        levels = reading.levels
-        if levels is not None and self.level_sd_db is not None:
-            log_weight += self._log_levels(state, pixel, levels, self.level_sd_db)
-            reading = replace(reading, levels=None)
-        super().weigh(state, log_weight, replace(reading, serving_weight=0.0))
-        return Reason.USED
-
-    def _log_levels(
-        self, state: Floats32, now: Ints32, levels: LevelReading, sd_db: Floats32
-    ) -> Floats32:
-        """Return the log-likelihood of levels with a standard deviation for each pixel.
-
-        As :func:`mapfilter.models.fingerprint.weigh_by_levels`, but with independent errors of
-        different cells.
-        """
-        table = self.area.level_dbm
-        table = table.reshape(-1, table.shape[-1])
-        then = self._pixels(state, levels.back_east_m, levels.back_north_m)
-        usual = self.evidence.levels
-        found = np.zeros(now.size, dtype=np.float32)
-        for cell, offset_db, rho, scale in zip(
-            levels.cell, levels.offset_db, levels.rho, levels.scale, strict=True
-        ):
-            innovation_db = offset_db - table[now, cell] + rho * table[then, cell]
-            more_db2 = sd_db[cell][now] ** 2 - usual.measurement_db**2 - usual.sd_db**2
-            wider = 1 + np.maximum(more_db2 * (1 - rho**2) * scale**2, _MIN_VARIANCE - 1)
-            square = np.minimum((innovation_db * scale) ** 2 / wider, levels.clip**2)
-            found -= np.float32(0.5 * levels.weight) * (square + np.log(wider))
-        return found

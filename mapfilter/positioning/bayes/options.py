@@ -11,7 +11,7 @@ from annotated_types import Ge, Gt, Le
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults
 from mapfilter.filters.particle import ParticleOptions
-from mapfilter.models.fingerprint import LevelErrors
+from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.options import Below1, NotNegative, Options, Positive, Probability
 from mapfilter.positioning.bayes.area_map import AreaMap
@@ -20,8 +20,9 @@ from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.radio import EvidenceOptions
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 
-_NARROW_BIAS_RAD, _NARROW_SCALE = radians(1.5), 0.015
-_MOST_TIMES = 5.0
+_SLOW, _FAST, _WHITE = 7.0, 4.0, 3.3
+_TOTAL_DB = (_SLOW**2 + _FAST**2 + _WHITE**2) ** 0.5
+_FAST_OF_SLOW_M = 0.1
 
 Particles = Annotated[int, Ge(10), Le(10_000_000)]
 
@@ -36,14 +37,15 @@ class BayesFilter(Options):
     """The Bayes map filter: a particle filter over streets, serving cells and levels.
 
     What it assumes of errors need not be what they are: a noise that is taken too large costs some
-    metres until the filter has converged, one taken too small costs wrong positions.
+    metres until the filter has converged, one taken too small costs wrong positions. The defaults
+    are for a phone without a data sheet.
 
     Parameters
     ----------
     step_sd_m : float
         Assumed deviation of a step's length.
     heading_sd_deg : float
-        Assumed deviation of a heading, white.
+        Assumed deviation of a heading: of errors that last for tens of metres, and white noise.
     bias_sd_deg : float
         Assumed deviation of the journey's constant heading error.
     drift_deg_per_sqrt_m : float
@@ -51,7 +53,7 @@ class BayesFilter(Options):
     scale : float
         Assumed deviation of the journey's step scale.
     map_sd_m : float
-        Deviation of positions from the points of the map.
+        Deviation of positions from the edges of ways, beside them.
     map_weight_per_m : float
         Weight of the map for each metre travelled.
     off_cost_per_m : float
@@ -61,7 +63,11 @@ class BayesFilter(Options):
     level_error_db : float
         Assumed deviation of levels from the prediction.
     level_correlation_m : float
-        Distance over which such errors are correlated by 1/e.
+        Distance over which most of such an error is correlated by 1/e.
+    device_error_db : float
+        Assumed deviation of the error that the device adds to all levels.
+    fault_probability : float
+        Assumed share of cells that the prediction is wrong about: off, moved, rotated.
     level_weight : float
         Exponent of the likelihood of levels.
     report_spacing_m : float
@@ -92,23 +98,25 @@ class BayesFilter(Options):
     """
 
     step_sd_m: NotNegative = 0.3
-    heading_sd_deg: NotNegative = 6.0
-    bias_sd_deg: NotNegative = 3.0
-    drift_deg_per_sqrt_m: NotNegative = 0.05
-    scale: Below1 = 0.02
-    map_sd_m: Positive = 4.0
-    map_weight_per_m: NotNegative = 1 / 18
+    heading_sd_deg: NotNegative = 15.0
+    bias_sd_deg: NotNegative = 10.0
+    drift_deg_per_sqrt_m: NotNegative = 0.3
+    scale: Below1 = 0.03
+    map_sd_m: Positive = 3.0
+    map_weight_per_m: NotNegative = 1 / 12
     off_cost_per_m: NotNegative = 0.1
     levels: bool = True
-    level_error_db: Positive = 10.0
-    level_correlation_m: Positive = 50.0
-    level_weight: Annotated[float, Gt(0), Le(1)] = 0.7
+    level_error_db: Positive = 8.7
+    level_correlation_m: Positive = 200.0
+    device_error_db: NotNegative = 5.0
+    fault_probability: Probability = 0.06
+    level_weight: Annotated[float, Gt(0), Le(1)] = 0.35
     report_spacing_m: NotNegative = 5.0
     max_particles: Annotated[int, Ge(100), Le(10_000_000)] = 20_000
     min_search_particles: Particles = 12_000
-    min_particles: Particles = 1000
-    switch_mass: Probability = 0.99
-    switch_hold_m: NotNegative = 14.0
+    min_particles: Particles = 3000
+    switch_mass: Probability = 0.998
+    switch_hold_m: NotNegative = 30.0
     smooth: bool = False
     satellite_sd_m: Positive = 2.0
     antenna_height_m: Annotated[float, Ge(-1e4), Le(1e4)] = 100.0
@@ -142,20 +150,23 @@ class BayesFilter(Options):
             scale_sd=self.scale,
         )
         weights = MapWeights(self.map_sd_m, self.map_weight_per_m, self.off_cost_per_m)
+        share = self.level_error_db / _TOTAL_DB
         levels = LevelErrors(
-            sd_db=self.level_error_db,
-            correlation_m=self.level_correlation_m,
+            slow_db=share * _SLOW,
+            slow_m=self.level_correlation_m,
+            fast_db=share * _FAST,
+            fast_m=_FAST_OF_SLOW_M * self.level_correlation_m,
+            white_db=share * _WHITE,
+            device_db=self.device_error_db,
+            fault_probability=self.fault_probability,
             weight=self.level_weight,
         )
         evidence = EvidenceOptions(
             levels=levels, spacing_m=self.report_spacing_m, use_levels=self.levels
         )
-        # The numbers of particles are those for small lasting errors; wide ones take more.
-        width = (motion.bias_sd_rad / _NARROW_BIAS_RAD) * (motion.scale_sd / _NARROW_SCALE)
-        times = min(max(width**0.5, 1.0), _MOST_TIMES)
         particles = ParticleOptions(
-            max_particles=int(times * self.max_particles),
-            min_search_particles=int(times * self.min_search_particles),
+            max_particles=self.max_particles,
+            min_search_particles=self.min_search_particles,
             min_particles=self.min_particles,
             switch_mass=self.switch_mass,
             switch_hold_m=self.switch_hold_m,

@@ -1,23 +1,23 @@
 """Radio reports as evidence: which cells and levels are used, and with which weight.
 
-Errors of a predicted map last for tens of metres, so a report adds little soon after the last one.
-A report is used ``spacing_m`` after the last one that was; serving cells count in proportion to the
-distance, and levels by the part of their error that is new (see
-:mod:`mapfilter.models.fingerprint`).
+A report is used ``spacing_m`` after the last one that was. Serving cells count in proportion to the
+distance, because errors of a predicted map last for tens of metres; those of levels are estimated
+(:mod:`mapfilter.models.level_errors`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import exp, inf, isfinite, nan, sqrt
-from typing import ClassVar
+from math import exp, isfinite, nan, sqrt
+from typing import Annotated, ClassVar
 
 import numpy as np
+from annotated_types import Ge
 
-from mapfilter._types import Floats
 from mapfilter.filters.contract import Reason
-from mapfilter.models.fingerprint import BoundReading, LevelErrors, LevelReading, ServingWeights
-from mapfilter.options import NotNegative, Options
+from mapfilter.models.fingerprint import BoundReading, ServingWeights
+from mapfilter.models.level_errors import LevelErrors, LevelReport
+from mapfilter.options import NotNegative, Options, Positive, Share
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import (
     Context,
@@ -30,9 +30,10 @@ from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.tracks.schema import SERVING, Kind
 
-_SERVING_NATS = 0.5
-_MAP_NATS_PER_M = 0.03
-"""Expected log-likelihood, below 0: of a serving cell at full weight, and of the map per metre."""
+_NEIGHBOURS_FOR_ABSENCE = 2
+"""A phone that reports fewer may not measure neighbours at all."""
+_BOUND_M = 50.0
+"""Bounds that are nearer to each other repeat the same error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +48,16 @@ class EvidenceOptions(Options):
         Distance that the first report counts for, and the most that any report does.
     use_levels : bool
         Use levels, too, not serving cells only.
+    serving_with_levels : float
+        Share of a serving cell's weight where levels are reported, too: given these, it depends on
+        the position no more.
+    full_list : int
+        With so many neighbours or more a report may have left out others, weaker than these; with
+        fewer, all cells above the floor are in it.
+    bound_weight : float
+        Exponent of the likelihood of bounds and of levels of one of several cells.
+    beside_db, beside_m : float
+        How much predictions vary over a distance, as hypotheses lie beside the true position.
     """
 
     serving: ServingWeights = field(default_factory=ServingWeights)
@@ -54,29 +65,15 @@ class EvidenceOptions(Options):
     spacing_m: NotNegative = 5.0
     first_m: NotNegative = 25.0
     use_levels: bool = True
+    serving_with_levels: Share = 1.0
+    full_list: Annotated[int, Ge(0)] = 6
+    bound_weight: Share = 0.5
+    beside_db: NotNegative = 6.0
+    beside_m: Positive = 50.0
 
-
-@dataclass(frozen=True, eq=False)
-class RadioHistory:
-    """Levels received so far, and where the last report was used.
-
-    Parameters
-    ----------
-    level_dbm, received_at_m : ndarray, shape (C,)
-        Last level of each cell inside the scale, and the distance travelled then; NaN and minus
-        infinity before the first.
-    used : DeadReckoning or None
-        Dead reckoning at the last report that was used.
-    """
-
-    level_dbm: Floats
-    received_at_m: Floats
-    used: DeadReckoning | None = None
-
-    @classmethod
-    def empty(cls, cells: int) -> RadioHistory:
-        """Return the history before the first report."""
-        return cls(np.full(cells, nan), np.full(cells, -inf))
+    def offset_db(self, particle_spacing_m: float) -> float:
+        """Return the standard deviation of a prediction so far beside the true position."""
+        return self.beside_db * sqrt(2 * (1 - exp(-particle_spacing_m / self.beside_m)))
 
 
 @dataclass(frozen=True)
@@ -88,119 +85,98 @@ class RadioSource(EvidenceSource):
     name: ClassVar[str] = "radio"
     kinds: ClassVar[frozenset[Kind]] = frozenset({"serving", "neighbour"})
 
-    def begin(self) -> RadioHistory:
-        """Return the history before the first report."""
-        return RadioHistory.empty(len(self.area.cell_ids))
+    def begin(self) -> DeadReckoning | None:
+        """Return no report yet: the state is dead reckoning at the last one that was used."""
+        return None
 
     def first(self, epoch: Epoch) -> EvidenceUpdate:
         """Read a report as if it were the first."""
-        return self.read(self.begin(), DeadReckoning(), epoch, FIRST_SPACING_M)
+        return self.read(None, DeadReckoning(), epoch, FIRST_SPACING_M)
 
     def update(self, state: BayesState, epoch: Epoch, context: Context) -> EvidenceUpdate:
         """Read the epoch's report."""
-        history = state.sources[self.name]
-        return self.read(history, state.reckoning, epoch, context.particle_spacing_m)
+        used = state.sources[self.name]
+        return self.read(used, state.reckoning, epoch, context.particle_spacing_m)
 
-    def due(self, history: RadioHistory, travelled_m: float) -> bool:
+    def due(self, used: DeadReckoning | None, travelled_m: float) -> bool:
         """Return whether a report would be used after so many metres."""
-        used = history.used
         return used is None or travelled_m - used.travelled_m >= self.options.spacing_m
-
-    def cells_only(self, reading: RadioReading, history: RadioHistory) -> bool:
-        """Return whether the serving cell is the only evidence by radio, as no levels are reported.
-
-        A reading of satellites or timing alone, between two reports, is no sign of that.
-        """
-        if reading.levels is not None or reading.bounds:
-            return False
-        return reading.serving >= 0 or not np.isfinite(history.received_at_m).any()
 
     def read(
         self,
-        history: RadioHistory,
+        used: DeadReckoning | None,
         reckoning: DeadReckoning,
         epoch: Epoch,
         particle_spacing_m: float,
     ) -> EvidenceUpdate:
-        """Prepare a report for the model, and update the history.
+        """Prepare a report for the model.
 
         The hypotheses nearest to the true position lie up to ``particle_spacing_m`` from it.
         """
         options = self.options
-        serving, reason, rows = self._serving(epoch)
-        due = self.due(history, reckoning.travelled_m)
-        if not due or not epoch.radio:
+        served, serving, reason, rows = self._serving(epoch)
+        if not self.due(used, reckoning.travelled_m) or not epoch.radio:
             if epoch.radio and reason is Reason.USED:
                 reason = Reason.NOT_MOVED_ENOUGH
-            return EvidenceUpdate(history, unused=_unused(epoch, rows), reason=reason)
-        first = history.used is None
-        since_m = 1e9 if history.used is None else reckoning.travelled_m - history.used.travelled_m
-        counted_m = min(since_m, options.first_m)
-        levels: LevelReading | None = None
+            return EvidenceUpdate(used, unused=_unused(epoch, rows), reason=reason)
+        length_m = 0.0 if used is None else reckoning.travelled_m - used.travelled_m
+        counted_m = options.first_m if used is None else min(length_m, options.first_m)
+        levels: LevelReport | None = None
         bounds: tuple[BoundReading, ...] = ()
-        expected_levels = 0.0
-        level_dbm, received_at_m = history.level_dbm, history.received_at_m
         if options.use_levels:
-            inside, others, unknown = self._placed(epoch, serving)
-            rows += unknown
+            inside, others, unplaced = self._placed(epoch, served, serving)
+            rows += unplaced
             bounds = tuple(self._bound(bands, row, counted_m) for bands, row in others)
             if inside:
-                levels, new = self._levels(history, reckoning, inside, particle_spacing_m)
-                expected_levels = 0.5 * levels.weight * new
-                level_dbm, received_at_m = level_dbm.copy(), received_at_m.copy()
-                level_dbm[list(inside)] = list(inside.values())
-                received_at_m[list(inside)] = reckoning.travelled_m
+                levels = self._levels(inside, epoch, particle_spacing_m)
         unused = _unused(epoch, rows)
-        if serving < 0 and levels is None and not bounds:
-            return EvidenceUpdate(history, unused=unused, reason=reason)
-        weight = counted_m * options.serving.weight_per_m
-        by_cell = _SERVING_NATS * weight * (serving >= 0)
-        by_map = _MAP_NATS_PER_M * min(since_m, 100.0)
+        unknown = reason in (Reason.UNKNOWN_CELL, Reason.NO_POINTS_IN_CELL)
+        if serving < 0 and levels is None and not bounds and (used is None or not unknown):
+            return EvidenceUpdate(used, unused=unused, reason=reason)
+        share = 1.0 if levels is None else options.serving_with_levels
         reading = RadioReading(
             serving,
-            weight,
+            counted_m * options.serving.weight_per_m * share * (serving >= 0 or unknown),
             levels,
             bounds,
-            expected=-(by_cell + by_map) - expected_levels,
-            length_m=0.0 if first else since_m,
-            timing_advance=_timing_advance(epoch) if serving >= 0 else nan,
+            length_m=length_m,
+            timing_advance=served.timing_advance if served is not None else nan,
         )
-        after = RadioHistory(level_dbm, received_at_m, reckoning)
-        return EvidenceUpdate(after, unused=unused, radio=reading, reason=reason)
+        return EvidenceUpdate(reckoning, unused=unused, radio=reading, reason=reason)
 
-    def _serving(self, epoch: Epoch) -> tuple[int, Reason, list[_Unplaced]]:
-        """Return the band of the serving cell, or -1 and the reason; and further serving rows."""
+    def _serving(self, epoch: Epoch) -> tuple[ReportRow | None, int, Reason, list[_Unplaced]]:
+        """Return the row of the serving cell and its band, or None, -1 and the reason.
+
+        Also return further serving rows.
+        """
         named = [row for row in epoch.radio if row.role == SERVING and row.cell is not None]
         if not named:
-            return -1, Reason.NO_SERVING_CELL if epoch.radio else Reason.NO_READING, []
+            return None, -1, Reason.NO_SERVING_CELL if epoch.radio else Reason.NO_READING, []
         more = [(row, Reason.SECOND_SERVING_CELL) for row in named[1:]]
         cell = str(named[0].cell)
         if cell in self.area.band_of:
-            return self.area.band_of[cell], Reason.USED, more
+            return named[0], self.area.band_of[cell], Reason.USED, more
         known = cell in self.area.known_ids
-        return -1, Reason.NO_POINTS_IN_CELL if known else Reason.UNKNOWN_CELL, more
+        return None, -1, Reason.NO_POINTS_IN_CELL if known else Reason.UNKNOWN_CELL, more
 
     def _placed(
-        self, epoch: Epoch, serving: int
+        self, epoch: Epoch, served: ReportRow | None, serving: int
     ) -> tuple[dict[int, float], list[tuple[tuple[int, ...], ReportRow]], list[_Unplaced]]:
         """Sort levels: of one cell and inside the scale, other ones, and those without a band."""
         inside: dict[int, float] = {}
         others: list[tuple[tuple[int, ...], ReportRow]] = []
         unplaced: list[_Unplaced] = []
-        served = False
         for row in epoch.radio:
             if row.role == SERVING:
-                # A second or unknown serving cell has its reason already.
-                bands: tuple[int, ...] = () if served or serving < 0 else (serving,)
-                served = True
-                if not bands:
+                # A second, unknown or nameless serving cell has its reason already.
+                if row is not served:
                     continue
+                bands: tuple[int, ...] = (serving,)
             elif row.cell is not None:
                 band = self.area.band_of.get(row.cell)
                 bands = (band,) if band is not None else ()
             elif row.arfcn is not None:
-                key = (row.arfcn, -1 if row.bsic is None else row.bsic)
-                bands = tuple(b for b in self.area.carriers.get(key, ()) if b != serving)
+                bands = tuple(b for b in self.area.carriers.get(_carrier(row), ()) if b != serving)
             else:
                 unplaced.append((row, Reason.NO_CELL))
                 continue
@@ -215,53 +191,51 @@ class RadioSource(EvidenceSource):
         return inside, others, unplaced
 
     def _levels(
-        self,
-        history: RadioHistory,
-        reckoning: DeadReckoning,
-        inside: dict[int, float],
-        particle_spacing_m: float,
-    ) -> tuple[LevelReading, float]:
-        """Return levels with their innovation's weights, and the sum of the shares that are new."""
-        errors = self.options.levels
-        count = len(inside)
-        cell = np.fromiter(inside, np.int32, count)
-        level = np.fromiter(inside.values(), np.float64, count)
-        used = history.used or reckoning
-        received_at_m = history.received_at_m[cell]
-        together = received_at_m == used.travelled_m if history.used else np.zeros(count, np.bool_)
-        correlation = np.exp(-(reckoning.travelled_m - received_at_m) / errors.correlation_m)
-        rho = np.where(together, correlation, 0.0)
-        before = np.where(together, history.level_dbm[cell], 0.0)
-        # A level that was missing from the last report only still has most of its former error.
-        new = np.where(together, 1.0, 1.0 - correlation**2)
-        white = errors.measurement_db**2 + errors.offset_variance_db2(particle_spacing_m)
-        variance = errors.sd_db**2 * (1 - rho**2) + white * (1 + rho**2)
-        reading = LevelReading(
-            cell,
-            (level - rho * before).astype(np.float32),
-            rho.astype(np.float32),
-            np.sqrt(new / variance).astype(np.float32),
-            errors.common,
-            errors.weight,
-            errors.clip_sd,
-            reckoning.east_m - used.east_m,
-            reckoning.north_m - used.north_m,
+        self, inside: dict[int, float], epoch: Epoch, particle_spacing_m: float
+    ) -> LevelReport:
+        """Return levels, and the cells that are absent though a report has room for them."""
+        options, count = self.options, len(inside)
+        absent: list[int] = []
+        limit_dbm = self.area.floor_dbm
+        neighbours = sum(row.role != SERVING for row in epoch.radio)
+        if neighbours >= _NEIGHBOURS_FOR_ABSENCE:
+            if neighbours >= options.full_list:
+                limit_dbm = min(row.level_dbm for row in epoch.radio if isfinite(row.level_dbm))
+            present = self._present(epoch)
+            absent = [band for band in range(len(self.area.cell_ids)) if band not in present]
+        return LevelReport(
+            np.fromiter(inside, np.int32, count),
+            np.fromiter(inside.values(), np.float32, count),
+            np.array(absent, dtype=np.int32),
+            limit_dbm,
+            options.offset_db(particle_spacing_m),
         )
-        return reading, float(np.sum(new))
+
+    def _present(self, epoch: Epoch) -> set[int]:
+        """Return the bands that rows of a report are of, or may be of, with and without levels."""
+        area, present = self.area, set[int]()
+        for row in epoch.radio:
+            if row.cell is not None:
+                present.update({area.band_of[row.cell]} if row.cell in area.band_of else ())
+            elif row.arfcn is not None:
+                present.update(area.carriers.get(_carrier(row), ()))
+            else:
+                return set(range(len(area.cell_ids)))
+        return present
 
     def _bound(self, bands: tuple[int, ...], row: ReportRow, counted_m: float) -> BoundReading:
-        errors = self.options.levels
-        weight = errors.weight * (1.0 - exp(-2.0 * counted_m / errors.correlation_m))
-        sd_db = sqrt(errors.sd_db**2 + errors.measurement_db**2)
+        weight = self.options.bound_weight * (1.0 - exp(-2.0 * counted_m / _BOUND_M))
         cells = np.array(bands, dtype=np.int32)
-        return BoundReading(cells, row.level_dbm, row.censored, sd_db, weight)
+        return BoundReading(
+            cells, row.level_dbm, row.censored, self.options.levels.total_db, weight
+        )
 
 
 _Unplaced = tuple[ReportRow, Reason]
 
 
-def _timing_advance(epoch: Epoch) -> float:
-    return next((row.timing_advance for row in epoch.radio if row.role == SERVING), nan)
+def _carrier(row: ReportRow) -> tuple[int, int]:
+    return -1 if row.arfcn is None else row.arfcn, -1 if row.bsic is None else row.bsic
 
 
 def _unused(epoch: Epoch, rows: list[_Unplaced]) -> list[UnusedReading]:

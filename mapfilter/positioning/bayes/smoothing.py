@@ -9,7 +9,7 @@ beliefs a path follows the dead reckoning, bent to end at the later one.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import log
+from math import exp, log
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +18,15 @@ from mapfilter._kernels import draw_key
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.hypotheses import Bins, summarise
 from mapfilter.filters.resampling import systematic
-from mapfilter.models.street_motion import STATES, MotionErrors, draw_ancestors
+from mapfilter.models.street_motion import (
+    BIAS,
+    LOG_SCALE,
+    OFF,
+    STRETCH,
+    TURN,
+    MotionErrors,
+    draw_ancestors,
+)
 from mapfilter.positioning.bayes.alternative import MapBelief
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.state import BayesState
@@ -26,6 +34,7 @@ from mapfilter.positioning.estimate import TrackEstimate
 
 _MAX_BYTES = 400 * 2**20
 _JUMPS = 1e-4
+_ROWS = OFF + 1
 _PLACE = ("east_m", "north_m", "covariance_m2", "radii_m", "mass_50m")
 _SMOOTHED = (*_PLACE, "way_id", "way_probability")
 
@@ -88,11 +97,15 @@ class BayesSmoother:
         east_m, north_m, travelled_m = self.moved[-1]
         weight = belief.log_weight.astype(np.float32)
         epoch = len(self.moved) - 1
-        return Kept(epoch, belief.state[:STATES], weight, (east_m, north_m), travelled_m)
+        # Lasting errors and deviations together are what leads a hypothesis on.
+        state = belief.state[:_ROWS].copy()
+        state[BIAS] += belief.state[TURN]
+        state[LOG_SCALE] += belief.state[STRETCH]
+        return Kept(epoch, state, weight, (east_m, north_m), travelled_m)
 
     def close(self) -> None:
         """Keep the last belief, from which paths go back."""
-        belief = self.last.leading if self.last is not None else None
+        belief = self.last.belief if self.last is not None else None
         if belief is not None and self.kept and self.kept[-1].epoch < len(self.moved) - 1:
             self.kept.append(self._keep(belief))
 
@@ -155,10 +168,13 @@ def _paths(
     for later, earlier in zip(kept[:0:-1], kept[-2::-1], strict=True):
         length_m = later.travelled_m - earlier.travelled_m
         steps = length_m / errors.typical_step_m
-        across = errors.typical_step_m * errors.heading_sd_rad
+        across = errors.typical_step_m * errors.white_rad
         place_var = steps * max(errors.step_sd_m, across) ** 2 + jitter[0] ** 2
-        bias_var = errors.bias_drift_rad_per_sqrt_m**2 * length_m + jitter[2] ** 2
-        scale_var = errors.scale_drift_per_sqrt_m**2 * length_m + jitter[3] ** 2
+        turn_var = errors.turn_sd_rad**2 * _new_share(length_m, errors.heading_m)
+        stretch_var = errors.stretch_sd**2 * _new_share(length_m, errors.stretch_m)
+        place_var += length_m**2 * max(turn_var, stretch_var) / 3
+        bias_var = errors.bias_drift_rad_per_sqrt_m**2 * length_m + turn_var + jitter[2] ** 2
+        scale_var = errors.scale_drift_per_sqrt_m**2 * length_m + stretch_var + jitter[3] ** 2
         moved_m = (later.moved_m[0] - earlier.moved_m[0], later.moved_m[1] - earlier.moved_m[1])
         variances = (place_var, bias_var, scale_var)
         log_jump = log(_JUMPS * place_var / (width_m * height_m))
@@ -173,6 +189,11 @@ def _paths(
         )
         states.append(earlier.state[:, chosen])
     return states[::-1]
+
+
+def _new_share(length_m: float, correlation_m: float) -> float:
+    """Return the share of a deviation's variance that is new after a distance."""
+    return 1 - exp(-2 * length_m / correlation_m)
 
 
 def _between(kept: list[Kept], states: list[Floats32], moved: Floats, index: int) -> Floats32:

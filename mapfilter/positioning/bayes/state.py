@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import cos, isfinite, nan, sin, sqrt
 from typing import Any
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.hypotheses import empty_summary
 from mapfilter.models.street_motion import STATES
-from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, EvidenceCusum, MapBelief
+from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief, NullHypothesis
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
 from mapfilter.positioning.integrity import sample_tail
@@ -31,10 +31,12 @@ class DeadReckoning:
     north_m: float = 0.0
 
     def moved(self, step: MotionStep) -> DeadReckoning:
-        """Add a step; without a heading along the frame's first axis."""
+        """Add a step; without a heading the displacement stays."""
         if not isfinite(step.step_m):
             return self
-        heading = step.heading_rad if isfinite(step.heading_rad) else 0.0
+        if not isfinite(step.heading_rad):
+            return replace(self, travelled_m=self.travelled_m + abs(step.step_m))
+        heading = step.heading_rad
         return DeadReckoning(
             self.travelled_m + abs(step.step_m),
             self.east_m + step.step_m * cos(heading),
@@ -60,8 +62,8 @@ class BayesState:
         Of the last step; without a compass relative to the first one.
     compass : bool
         Headings are those of a compass.
-    cusum : EvidenceCusum
-        Of the belief.
+    null : NullHypothesis
+        That the belief describes none of what is measured.
     alternative : AlternativeHypothesis or None
         Tested against the belief; None while nothing contradicts it.
     takeovers : int
@@ -74,15 +76,9 @@ class BayesState:
     reckoning: DeadReckoning = field(default_factory=DeadReckoning)
     heading_rad: float = nan
     compass: bool = True
-    cusum: EvidenceCusum = field(default_factory=EvidenceCusum)
+    null: NullHypothesis = field(default_factory=NullHypothesis)
     alternative: AlternativeHypothesis | None = None
     takeovers: int = 0
-
-    @property
-    def leading(self) -> MapBelief | None:
-        """The belief that positions come from: the alternative's while the main one is LOST."""
-        lost = self.status is Status.LOST and self.alternative is not None
-        return self.alternative.belief if lost and self.alternative else self.belief
 
     @property
     def particle_spacing_m(self) -> float:
@@ -101,9 +97,9 @@ def step_output(
     reason: Reason,
     unused: tuple[UnusedReading, ...],
 ) -> StepOutput:
-    """Summarise the leading belief; ``reason`` is whether the epoch's report was used."""
-    belief, (west, south) = state.leading, area.origin_m
-    if belief is None:
+    """Summarise the belief; ``reason`` is whether the epoch's report was used."""
+    belief, (west, south) = state.belief, area.origin_m
+    if belief is None or state.status is Status.OUTSIDE:
         summary, count, way = empty_summary(STATES), 0, (0, nan)
     else:
         summary, count = belief.summary, belief.log_weight.size
@@ -130,4 +126,4 @@ def step_output(
     if belief is None or not count:
         return output
     places = belief.state[0], belief.state[1], belief.weight
-    return output.protected(sample_tail(*places, summary.mean, p_none=0.0))
+    return output.protected(sample_tail(*places, summary.mean, p_none=state.null.probability))

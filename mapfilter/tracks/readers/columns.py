@@ -15,9 +15,11 @@ import pyarrow.compute as pc
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.tracks.readers.lines import LONGEST_LINE, blocks, good_lines, parsed
 from mapfilter.tracks.readers.recording import Reading
-from mapfilter.tracks.readers.times import parse_times, unix_seconds
+from mapfilter.tracks.readers.times import parse_times, unix_seconds, utc_from_local_s
 
 SEPARATORS = ",;\t|"
+_EARLIEST_S, _LATEST_S = -2_208_988_800.0, 4_102_444_800.0
+"""The years 1900 to 2099."""
 _LEAST_UNIX_S = 1e8
 _NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
 _WHOLE = r"^[-+]?(\d{1,18}|[0-8]\d{18})$"
@@ -101,6 +103,8 @@ class Columns:
                 pass
             else:
                 return unix_seconds(np.where(np.abs(number) > _LEAST_UNIX_S, number, np.nan)), True
+        if column is not None and (found := _plain_times(column, zone, layout)) is not None:
+            return found
         return parse_times(self.texts(*names), zone, layout)
 
     def number(self, *names: str) -> Floats:
@@ -140,6 +144,29 @@ class Columns:
             self.reading.note(f"{self.find(*names)}: {bad} values are no numbers, taken as missing")
         column = pc.replace_substring_regex(column, r"^\+", "")
         return pc.cast(pc.if_else(good, column, None), kind)
+
+
+def _plain_times(column: pa.ChunkedArray, zone: str, layout: str) -> tuple[Floats, bool] | None:
+    """Return times that are all of one plain layout, all of them with a zone or none; else None.
+
+    It gives what :func:`parse_times` does, in a tenth of its time.
+    """
+    trimmed = pc.utf8_trim_whitespace(column)
+    for own in ("UTC", None) if layout == "ISO8601" else (None,):
+        try:
+            if layout == "ISO8601":
+                moments = pc.cast(trimmed, pa.timestamp("ns", own))
+            else:
+                moments = pc.strptime(trimmed, format=layout, unit="ns")
+        except pa.ArrowInvalid:
+            continue
+        ns = np.asarray(pc.cast(moments, pa.int64()).to_numpy(), dtype=np.int64)
+        time_s = ns // 10**9 + ns % 10**9 / 1e9
+        time_s[(time_s < _EARLIEST_S) | (time_s >= _LATEST_S)] = np.nan
+        if own is None and zone:
+            time_s = utc_from_local_s(time_s, zone)
+        return time_s, bool(own or zone)
+    return None
 
 
 def header_columns(
@@ -229,4 +256,6 @@ def value_columns(
 
 def split_blanks(data: bytes) -> bytes:
     """Return a text in which runs of blanks and tabs are one blank, none at a line's ends."""
-    return re.sub(rb"^ | $", b"", re.sub(rb"[ \t]+", b" ", data), flags=re.MULTILINE)
+    # Single blanks are no match: a list of every blank would be larger than the text.
+    single = re.sub(rb"[ \t]{2,}|\t", b" ", data)
+    return re.sub(rb"^ | $", b"", single, flags=re.MULTILINE)

@@ -123,6 +123,8 @@ def read_recording(
         with np.errstate(all="ignore"):
             for part in parts_of(text) if known.by_rows else (text,):
                 known.read(part, reading, options)
+        # A large text and the tables need not be in memory at the same time.
+        del text
         return reading.done(known.name)
     except InputError as error:
         if found is None or found is known:

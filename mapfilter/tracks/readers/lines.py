@@ -97,7 +97,9 @@ def _mended(
             fields = next(csv.reader([words], delimiter=separator), [])
         except csv.Error:
             fields = []
-        fields = [value.replace(separator, " ").replace("\n", " ") for value in fields]
+        # A separator within quotes would separate again.
+        other = "_" if separator == " " else " "
+        fields = [value.replace(separator, other).replace("\n", " ") for value in fields]
     if len(fields) > count and not any(value.strip() for value in fields[count:]):
         fields = fields[:count]
     if least <= len(fields) < count:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -42,9 +43,7 @@ def _is_tum(text: Text) -> bool:
 def _plain(data: bytes) -> memoryview:
     """Return lines separated by single blanks, comments blanked out."""
     blanks = split_blanks(data.replace(b",", b" "))
-    return memoryview(
-        b"\n".join(b"" if line.startswith(b"#") else line for line in blanks.split(b"\n"))
-    )
+    return memoryview(re.sub(rb"^#.*$", b"", blanks, flags=re.MULTILINE))
 
 
 def _read_kitti(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001

@@ -6,19 +6,49 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from pandas.api.types import union_categoricals
 
+from mapfilter._types import Bools
 from mapfilter.tracks.readers.tables import Field
 
 
 def joined_parts(parts: list[pd.DataFrame]) -> pd.DataFrame:
-    """Return parts of a table in one; texts stay categories."""
+    """Return parts of a table in one; texts stay categories. The list is emptied."""
     if len(parts) == 1:
-        return parts[0]
-    first = parts[0]
-    texts = [name for name in first.columns if isinstance(first[name].dtype, pd.CategoricalDtype)]
-    words = dict.fromkeys(texts, object)
-    rows = pd.concat([part.astype(words) for part in parts], ignore_index=True)
-    return rows.assign(**{name: _texts(rows[name]) for name in texts})
+        return parts.pop()
+    names = list(parts[0].columns)
+    columns = {}
+    for name in names:
+        # Column by column, so that no table is in memory twice.
+        own = [part.pop(name) for part in parts]
+        if isinstance(own[0].dtype, pd.CategoricalDtype):
+            every = union_categoricals(own, sort_categories=True)
+            columns[name] = _categories(every.codes, every.categories.tolist())
+        else:
+            columns[name] = np.concatenate([values.to_numpy() for values in own])
+    parts.clear()
+    return pd.DataFrame(columns, copy=False)
+
+
+def duplicates(rows: pd.DataFrame) -> Bools:
+    """Return which rows repeat an earlier one in everything."""
+    code = np.zeros(len(rows), dtype=np.uint64)
+    for name in rows:
+        values = rows[name]
+        categories = isinstance(values.dtype, pd.CategoricalDtype)
+        if categories:
+            numbers = values.cat.codes.to_numpy(dtype=np.int64)
+        else:
+            # One zero, and one NaN.
+            numbers = values.to_numpy(dtype=np.float64) + 0.0
+            numbers[np.isnan(numbers)] = np.nan
+        code = code * np.uint64(1_000_003) + pd.util.hash_array(numbers)
+    # Few rows share their hash with another, so that exact comparison is cheap.
+    alike = np.flatnonzero(pd.Series(code).duplicated(keep=False).to_numpy())
+    found = np.zeros(len(rows), dtype=bool)
+    if alike.size:
+        found[alike] = rows.iloc[alike].duplicated().to_numpy()
+    return found
 
 
 def checked_values(known: Field, given: Any, count: int) -> Any:

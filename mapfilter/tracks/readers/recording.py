@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import InputError, MapfilterError, fail
-from mapfilter.tracks.readers.recorded_values import checked_values, joined_parts
+from mapfilter.tracks.readers.recorded_values import checked_values, duplicates, joined_parts
 from mapfilter.tracks.readers.tables import RECORDED, Field
 
 ClockKind = Literal["utc", "gps", "local", "monotonic"]
@@ -255,11 +255,8 @@ class Reading:
         if (np.diff(time) < 0).any():
             rows = rows.sort_values("time_s", kind="stable", ignore_index=True)
             time = rows["time_s"].to_numpy()
-        equal = np.flatnonzero(np.diff(time) == 0)
-        if equal.size:
-            among = np.union1d(equal, equal + 1)
-            duplicate = np.zeros(len(rows), dtype=bool)
-            duplicate[among] = rows.iloc[among].duplicated().to_numpy()
+        if (np.diff(time) == 0).any():
+            duplicate = duplicates(rows)
             if duplicate.any():
                 self.note(f"{table}: {int(duplicate.sum())} exact duplicate rows dropped")
                 rows = rows[~duplicate].reset_index(drop=True)

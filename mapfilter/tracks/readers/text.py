@@ -119,7 +119,7 @@ def read_text(path: Path, most_bytes: int = -1) -> Text:
     data = _as_utf8(path, data, notes)
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    if not data.strip():
+    if not data or data.isspace():
         raise fail(InputError, str(path), "a recording", "an empty file")
     return Text(path, data, tuple(notes))
 

@@ -1,0 +1,1 @@
+"""Positions from single reports: fingerprints, without motion."""

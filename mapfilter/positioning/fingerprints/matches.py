@@ -1,0 +1,200 @@
+"""From one report to weights of the database's reports, and from these to a position."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from mapfilter._types import Floats, Ints, Ints32
+from mapfilter.errors import InputError, fail
+from mapfilter.positioning.fingerprints.matching import (
+    ByCell,
+    Distances,
+    LevelErrors,
+    Likelihoods,
+    Scale,
+    filled,
+    usual_levels,
+)
+from mapfilter.positioning.fingerprints.options import (
+    Centroid,
+    Method,
+    Neighbours,
+    Probabilistic,
+    SurveyMaps,
+)
+from mapfilter.positioning.fingerprints.reports import Reports
+from mapfilter.positioning.fingerprints.survey_levels import surveyed_levels
+
+_NO_LEVEL_DBM = -30.0
+_NEGLIGIBLE = 1e-4
+_MOST = 4000
+_TINY = 1e-6
+_ROUNDS = 60
+_SOFT_M = 1.0
+
+
+class Received(NamedTuple):
+    """One report to be located: cells by index, levels, serving cell (-1: none), steps (or NaN)."""
+
+    cell: Ints32
+    level_dbm: Floats
+    serving: int
+    timing_advance: float
+
+
+class Match(NamedTuple):
+    """Reports of the database that a report resembles.
+
+    Parameters
+    ----------
+    reports : ndarray, shape (K,)
+        Indices in the database.
+    weight : ndarray, shape (K,)
+        Sums to one.
+    mismatch : float
+        How unlike the best of them are; comparable between reports, larger is worse.
+    """
+
+    reports: Ints
+    weight: Floats
+    mismatch: float
+
+
+Matcher = Callable[[Received], Match]
+
+
+class Position(NamedTuple):
+    """East and north, the root mean square distance of the matched places, and the mismatch."""
+
+    east_m: float
+    north_m: float
+    spread_m: float
+    mismatch: float
+
+
+@dataclass(frozen=True, eq=False)
+class Locator:
+    """A method over a database; a function from one report to a position."""
+
+    places: Floats
+    matcher: Matcher
+    median: bool
+
+    def __call__(self, received: Received) -> Position:
+        """Return the position of a report that has at least one cell of the database."""
+        match = self.matcher(received)
+        places = self.places[match.reports]
+        at = match.weight @ places
+        if self.median:
+            at = _geometric_median(places, match.weight, at)
+        spread_m = float(np.sqrt(match.weight @ np.sum((places - at) ** 2, axis=1)))
+        return Position(float(at[0]), float(at[1]), spread_m, match.mismatch)
+
+
+def locator(method: Method, database: Reports) -> Locator:
+    """Return a method over the reports of a database, all with positions.
+
+    Raises
+    ------
+    InputError
+        There are none.
+    """
+    if not len(database):
+        raise fail(InputError, "database", "reports with positions and transmitters", "none")
+    places = database.places
+    if isinstance(method, Centroid):
+        return Locator(places, _centroid(database), median=False)
+    known = np.isfinite(database.level_dbm)
+    # Logs of serving cells alone have no levels; all cells then count alike.
+    floor_dbm = float(database.level_dbm[known].min()) - 1.0 if known.any() else _NO_LEVEL_DBM
+    if isinstance(method, Neighbours):
+        scale = Scale(method.representation, floor_dbm, method.exponent)
+        return Locator(places, _neighbours(database, method, scale), median=False)
+    if isinstance(method, SurveyMaps):
+        database = surveyed_levels(database)
+    return Locator(places, _posterior(database, method, floor_dbm), median=True)
+
+
+def _centroid(database: Reports) -> Matcher:
+    by_cell, usual_dbm = ByCell.of(database), usual_levels(database)
+
+    def match(received: Received) -> Match:
+        cell = received.serving
+        if cell < 0 or by_cell.first[cell] == by_cell.first[cell + 1]:
+            level_dbm = filled(received.level_dbm, received.cell, usual_dbm)
+            # Of equally strong ones the first of the database, whatever the order of readings.
+            cell = int(received.cell[level_dbm == level_dbm.max()].min())
+        own = by_cell.report[by_cell.of_cell(cell)]
+        return Match(own, np.full(len(own), 1 / len(own)), 0.0)
+
+    return match
+
+
+def _neighbours(database: Reports, method: Neighbours, scale: Scale) -> Matcher:
+    distances = Distances.to(database, method.metric, scale)
+    k = min(method.k, len(database))
+
+    def match(received: Received) -> Match:
+        distance = distances.of(received.cell, received.level_dbm)
+        index = np.argpartition(distance, k - 1)[:k]
+        near = distance[index]
+        weight = (near + _TINY) ** -method.weight_power
+        # Powers of small distances overflow sums of others: relative to the largest.
+        weight /= weight.max()
+        return Match(index, weight / weight.sum(), float(near.mean()))
+
+    return match
+
+
+def _posterior(database: Reports, method: Probabilistic | SurveyMaps, floor_dbm: float) -> Matcher:
+    errors = LevelErrors(method.level_db, method.shared_db, method.absence_per_db, floor_dbm)
+    likelihoods = Likelihoods.at(database, errors)
+    out = np.log(max(method.outliers, np.finfo(np.float64).tiny))
+    inlier = np.log(max(1 - method.outliers, np.finfo(np.float64).tiny))
+
+    def match(received: Received) -> Match:
+        cells, levels = likelihoods.of(received.cell, received.level_dbm)
+        effective = min(len(received.cell), method.effective_readings)
+        share = effective / len(received.cell)
+        levels = share * levels + _timing(database, received, method.timing_sd_steps)
+        # An outlier goes by its cells alone; the levels of others are -n/2 on average.
+        log_weight = share * cells + np.logaddexp(inlier + levels, out - effective / 2)
+        best = float(log_weight.max())
+        weight = np.exp(log_weight - best)
+        index = np.flatnonzero(weight > _NEGLIGIBLE)
+        if len(index) > _MOST:
+            index = index[np.argpartition(-weight[index], _MOST)[:_MOST]]
+        mismatch = -(best + float(np.log(weight[index].sum())))
+        return Match(index, weight[index] / weight[index].sum(), mismatch)
+
+    return match
+
+
+def _timing(database: Reports, received: Received, sd_steps: float) -> Floats:
+    """Return log-likelihoods of the timing advance where the same cell serves, else 0."""
+    found = np.zeros(len(database))
+    if received.serving < 0 or np.isnan(received.timing_advance):
+        return found
+    apart = received.timing_advance - database.timing_advance
+    same = (database.serving == received.serving) & np.isfinite(apart)
+    found[same] = -0.5 * (apart[same] / sd_steps) ** 2
+    # Where none was reported it may be any: as far off as two deviations.
+    found[(database.serving == received.serving) & ~np.isfinite(apart)] = -2.0
+    return found
+
+
+def _geometric_median(places: Floats, weight: Floats, start: Floats) -> Floats:
+    """Return the place with the least mean distance to weighted places (Weiszfeld 1937)."""
+    at = start
+    for _ in range(_ROUNDS):
+        distance_m = np.sqrt(np.sum((places - at) ** 2, axis=1) + _SOFT_M**2)
+        pull = weight / distance_m
+        new = pull @ places / pull.sum()
+        if np.abs(new - at).max() < _SOFT_M / 100:
+            return np.asarray(new)
+        at = new
+    return at

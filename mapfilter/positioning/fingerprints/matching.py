@@ -1,0 +1,273 @@
+"""How alike two reports are: distances between fingerprints, and log-likelihoods.
+
+Both are sums over transmitters that two reports share, less what each has alone, so that only
+shared transmitters are looked at one by one. Representations and metrics are those of
+Torres-Sospedra et al., Expert Systems with Applications 42 (2015), 9263-9278.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from mapfilter._types import Floats, Ints, Ints32
+from mapfilter.positioning.fingerprints.reports import Reports
+
+Representation = Literal["positive", "exponential", "powed"]
+Metric = Literal["sorensen", "euclidean", "manhattan"]
+
+_ALPHA_DB = 24.0
+_LEAST = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class ByCell:
+    """Readings of reports sorted by transmitter.
+
+    Parameters
+    ----------
+    first : ndarray, shape (C + 1,)
+        Readings of cell c are those from ``first[c]`` to ``first[c + 1]``.
+    report : ndarray, shape (N,)
+        Reports of the readings, ascending within a cell.
+    order : ndarray, shape (N,)
+        Where each reading is among those of the reports.
+    """
+
+    count: int
+    first: Ints
+    report: Ints
+    order: Ints
+
+    @classmethod
+    def of(cls, reports: Reports) -> ByCell:
+        """Sort the readings of reports."""
+        order = np.argsort(reports.cell, kind="stable")
+        first = np.searchsorted(reports.cell[order], np.arange(len(reports.cell_ids) + 1))
+        return cls(len(reports), first, reports.report[order], order)
+
+    def of_cell(self, cell: int) -> slice:
+        """Return where the readings of a cell are."""
+        return slice(int(self.first[cell]), int(self.first[cell + 1]))
+
+
+def usual_levels(reports: Reports) -> Floats:
+    """Return the mean level of each cell, shape (C,); that of all where a cell has none."""
+    known = np.isfinite(reports.level_dbm)
+    cells = len(reports.cell_ids)
+    count = np.bincount(reports.cell[known], minlength=cells)
+    total = np.bincount(reports.cell[known], reports.level_dbm[known], minlength=cells)
+    overall = float(reports.level_dbm[known].mean()) if known.any() else 0.0
+    return np.where(count > 0, total / np.maximum(count, 1), overall)
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """Representation of levels as numbers that grow from not received to strong.
+
+    Parameters
+    ----------
+    floor_dbm : float
+        1 dB below the weakest level of the database; stands for "not received".
+    exponent : float
+        Of ``powed``.
+    """
+
+    representation: Representation
+    floor_dbm: float
+    exponent: float
+
+    @property
+    def absent(self) -> float:
+        """Value of a cell that was not received."""
+        return float(np.exp(self._top / -_ALPHA_DB)) if self.representation == "exponential" else 0
+
+    @property
+    def _top(self) -> float:
+        # Levels are relative to 0 dBm; a floor at or above it has no span of its own.
+        return max(-self.floor_dbm, 1.0)
+
+    def __call__(self, level_dbm: Floats) -> Floats:
+        """Return by how much the value of each level exceeds that of a cell not received."""
+        # Weaker than all of the database is received still.
+        above_db = np.maximum(level_dbm - self.floor_dbm, 0.5)
+        if self.representation == "exponential":
+            return np.asarray(np.exp((above_db - self._top) / _ALPHA_DB) - self.absent)
+        power = self.exponent if self.representation == "powed" else 1.0
+        return np.asarray((above_db / self._top) ** power)
+
+
+@dataclass(frozen=True, eq=False)
+class Distances:
+    """Distances from reports to those of a database.
+
+    Parameters
+    ----------
+    value : ndarray, shape (N,)
+        Represented levels of the database, sorted by cell.
+    total, total2 : ndarray, shape (R,)
+        Sum and sum of squares of each report's.
+    """
+
+    by_cell: ByCell
+    scale: Scale
+    metric: Metric
+    usual_dbm: Floats
+    value: Floats
+    total: Floats
+    total2: Floats
+
+    @classmethod
+    def to(cls, reports: Reports, metric: Metric, scale: Scale) -> Distances:
+        """Represent the reports of a database."""
+        by_cell, usual_dbm = ByCell.of(reports), usual_levels(reports)
+        level_dbm = filled(reports.level_dbm, reports.cell, usual_dbm)
+        value = scale(level_dbm)[by_cell.order]
+        total, total2 = _sums(by_cell, value), _sums(by_cell, value**2)
+        return cls(by_cell, scale, metric, usual_dbm, value, total, total2)
+
+    def of(self, cell: Ints32, level_dbm: Floats) -> Floats:
+        """Return the distances of one report to all of the database, shape (R,)."""
+        own = self.scale(filled(level_dbm, cell, self.usual_dbm))
+        shared = np.zeros(self.by_cell.count)
+        for one, value in zip(cell.tolist(), own.tolist(), strict=True):
+            where = self.by_cell.of_cell(one)
+            known = self.value[where]
+            both: Floats = known * value if self.metric == "euclidean" else np.minimum(known, value)
+            shared[self.by_cell.report[where]] += both
+        if self.metric == "euclidean":
+            squared = self.total2 + float(np.sum(own**2)) - 2 * shared
+            return np.asarray(np.sqrt(np.maximum(squared, 0.0)))
+        apart: Floats = np.maximum(self.total + own.sum() - 2 * shared, 0.0)
+        if self.metric == "manhattan":
+            return apart
+        absent = 2 * self.scale.absent * (len(self.by_cell.first) - 1)
+        return np.asarray(apart / np.maximum(self.total + own.sum() + absent, _LEAST))
+
+
+def filled(level_dbm: Floats, cell: Ints32, usual_dbm: Floats) -> Floats:
+    """Return levels, those that are missing being the usual ones of their cells."""
+    return np.where(np.isnan(level_dbm), usual_dbm[cell], level_dbm)
+
+
+@dataclass(frozen=True, slots=True)
+class LevelErrors:
+    """Errors of levels between two reports of one place, on different days.
+
+    Parameters
+    ----------
+    level_db : float
+        Of each level, independent of the others.
+    shared_db : float
+        Of all levels of a report alike: another phone, a pocket, a body.
+    absence_per_db : float
+        Loss of log-likelihood for each dB by which a cell was above the floor that only one of the
+        two reports has.
+    floor_dbm : float
+    """
+
+    level_db: float
+    shared_db: float
+    absence_per_db: float
+    floor_dbm: float
+
+
+@dataclass(frozen=True, eq=False)
+class Likelihoods:
+    """Log-likelihoods of reports at those of a database.
+
+    Parameters
+    ----------
+    level_dbm, variance_db2 : ndarray, shape (N,)
+        Of the database, sorted by cell; missing levels are NaN.
+    loss : ndarray, shape (N,)
+        Of log-likelihood, if a cell is not received.
+    absence : ndarray, shape (R,)
+        Loss of each report if none of its cells is received.
+    usual_dbm : ndarray, shape (C,)
+        Stands for missing levels.
+    least_db2 : float
+        Least of the variances.
+    predicted : bool
+        Whether the absence of a cell weaker than all that were reported is no evidence.
+    """
+
+    by_cell: ByCell
+    errors: LevelErrors
+    level_dbm: Floats
+    variance_db2: Floats
+    loss: Floats
+    absence: Floats
+    usual_dbm: Floats
+    least_db2: float
+    predicted: bool
+
+    @classmethod
+    def at(cls, reports: Reports, errors: LevelErrors) -> Likelihoods:
+        """Prepare the reports of a database."""
+        by_cell, usual_dbm = ByCell.of(reports), usual_levels(reports)
+        level_dbm = reports.level_dbm[by_cell.order]
+        variance_db2 = errors.level_db**2 + reports.sd_db[by_cell.order] ** 2
+        cell = reports.cell[by_cell.order]
+        loss = _absence(filled(level_dbm, cell, usual_dbm), errors)
+        absence = _sums(by_cell, loss)
+        least_db2 = float(variance_db2.min()) if variance_db2.size else 1.0
+        return cls(
+            by_cell,
+            errors,
+            level_dbm,
+            variance_db2,
+            loss,
+            absence,
+            usual_dbm,
+            least_db2,
+            reports.predicted,
+        )
+
+    def of(self, cell: Ints32, level_dbm: Floats) -> tuple[Floats, Floats]:
+        """Return log-likelihoods of one report: of which cells it has, and of their levels, (R,).
+
+        The shared error is integrated out: levels d_i with variances v_i about a common offset of
+        variance t have the log-likelihood
+        ``-(s2 - s1^2 / (s0 + 1/t)) / 2 - log(1 + t s0) / 2``, with ``s_k = sum d_i^k / v_i``, and a
+        logarithm of each variance relative to the least of the database.
+        """
+        strength_dbm = filled(level_dbm, cell, self.usual_dbm)
+        own = _absence(strength_dbm, self.errors)
+        count, lost, absence = self.by_cell.count, self.loss, self.absence
+        if self.predicted:
+            # Phones report the strongest cells: the absence of weaker ones is no evidence.
+            least_dbm = max(float(strength_dbm.min()), self.errors.floor_dbm)
+            lost = _absence(self.level_dbm, replace(self.errors, floor_dbm=least_dbm))
+            absence = _sums(self.by_cell, lost)
+        received = -absence - own.sum()
+        s0, s1, s2, logs = np.zeros((4, count))
+        least_db2 = self.least_db2
+        for one, dbm, own_loss in zip(cell.tolist(), level_dbm.tolist(), own.tolist(), strict=True):
+            where = self.by_cell.of_cell(one)
+            report = self.by_cell.report[where]
+            received[report] += lost[where] + own_loss
+            if np.isnan(dbm):
+                continue
+            apart_db, variance_db2 = dbm - self.level_dbm[where], self.variance_db2[where]
+            known = np.isfinite(apart_db)
+            report, apart_db, variance_db2 = report[known], apart_db[known], variance_db2[known]
+            s0[report] += 1 / variance_db2
+            s1[report] += apart_db / variance_db2
+            s2[report] += apart_db**2 / variance_db2
+            logs[report] += np.log(variance_db2 / least_db2)
+        shared_db2 = self.errors.shared_db**2
+        explained = s1**2 * shared_db2 / (1 + shared_db2 * s0)
+        return received, -0.5 * (s2 - explained + np.log1p(shared_db2 * s0) + logs)
+
+
+def _sums(by_cell: ByCell, values: Floats) -> Floats:
+    """Return the sum of values, sorted by cell, for each report."""
+    found = np.bincount(by_cell.report, values, minlength=by_cell.count)
+    return np.asarray(found, dtype=np.float64)
+
+
+def _absence(level_dbm: Floats, errors: LevelErrors) -> Floats:
+    return np.asarray(errors.absence_per_db * np.maximum(level_dbm - errors.floor_dbm, 0.0))

@@ -1,0 +1,339 @@
+"""Reports: the transmitters received at one time, and where that was, if it is known.
+
+Reports with positions are the fingerprint database; reports without are what is to be located.
+Cells, Wi-Fi access points, BLE beacons and LoRaWAN gateways are all transmitters with an id.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from mapfilter._types import Bools, Floats, Ints, Ints32
+from mapfilter.errors import InputError, fail
+from mapfilter.geodesy import same_crs
+from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.schema import SERVING
+
+_LARGEST_GAP_S = 30.0
+"""Between two true positions farther apart in time than this, none is interpolated."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Reports:
+    """R reports with N readings in all.
+
+    Parameters
+    ----------
+    crs : str
+        Projected CRS of the positions.
+    cell_ids : tuple of str
+        Transmitters, each once.
+    first : ndarray of int64, shape (R + 1,)
+        The readings of report i are those from ``first[i]`` to ``first[i + 1]``.
+    cell : ndarray of int32, shape (N,)
+        Index into ``cell_ids``; each cell at most once in a report.
+    level_dbm : ndarray, shape (N,)
+        NaN: received, but the level is missing.
+    sd_db : ndarray, shape (N,)
+        Standard deviation of the level's error, besides that of a new reading; 0 for measurements.
+    serving : ndarray of int32, shape (R,)
+        Index of the serving cell; -1 without one.
+    timing_advance : ndarray, shape (R,)
+        Steps, of the serving cell; NaN where not reported.
+    time_s : ndarray, shape (R,)
+    east_m, north_m : ndarray, shape (R,)
+        True position; NaN where unknown.
+    block : ndarray of int32, shape (R,)
+        Log or session; what is left out together in cross-validation. -1: by place.
+    notes : tuple of str
+        What was left out, and why.
+    predicted : bool
+        Whether the levels are those of a map, of all cells; phones report the strongest only.
+    """
+
+    crs: str
+    cell_ids: tuple[str, ...]
+    first: Ints
+    cell: Ints32
+    level_dbm: Floats
+    sd_db: Floats
+    serving: Ints32
+    timing_advance: Floats
+    time_s: Floats
+    east_m: Floats
+    north_m: Floats
+    block: Ints32
+    notes: tuple[str, ...] = ()
+    predicted: bool = False
+
+    def __len__(self) -> int:
+        return len(self.first) - 1
+
+    def __repr__(self) -> str:
+        placed = int(np.isfinite(self.east_m).sum())
+        return (
+            f"Reports({len(self)}, {placed} with position; {len(self.cell)} readings of "
+            f"{len(self.cell_ids)} transmitters)"
+        )
+
+    @property
+    def report(self) -> Ints:
+        """Report that each reading belongs to, shape (N,)."""
+        return np.repeat(np.arange(len(self)), np.diff(self.first))
+
+    @property
+    def places(self) -> Floats:
+        """True positions, shape (R, 2)."""
+        return np.column_stack([self.east_m, self.north_m])
+
+    def readings(self, index: int) -> tuple[Ints32, Floats]:
+        """Return cells and levels of one report."""
+        own = slice(int(self.first[index]), int(self.first[index + 1]))
+        return self.cell[own], self.level_dbm[own]
+
+    def some(self, kept: Ints | Bools, *notes: str) -> Reports:
+        """Return some of the reports; cells keep their indices."""
+        chosen = np.arange(len(self))[kept]
+        counts = np.diff(self.first)[chosen]
+        first = np.concatenate([[0], np.cumsum(counts)])
+        # Readings of the kept reports, in their order.
+        own = np.repeat(self.first[chosen] - first[:-1], counts) + np.arange(first[-1])
+        return Reports(
+            self.crs,
+            self.cell_ids,
+            first,
+            self.cell[own],
+            self.level_dbm[own],
+            self.sd_db[own],
+            self.serving[chosen],
+            self.timing_advance[chosen],
+            self.time_s[chosen],
+            self.east_m[chosen],
+            self.north_m[chosen],
+            self.block[chosen],
+            (*self.notes, *notes),
+            self.predicted,
+        )
+
+    def placed(self) -> Reports:
+        """Return the reports with a position and a reading, over the cells that they received."""
+        kept = np.isfinite(self.east_m) & np.isfinite(self.north_m) & (np.diff(self.first) > 0)
+        if kept.all():
+            return self.compact()
+        count = int((~kept).sum())
+        note = f"{count} reports left out: no position, or nothing received"
+        return self.some(kept, note).compact()
+
+    def compact(self) -> Reports:
+        """Return the reports over those cells only that were received in one of them."""
+        used = np.bincount(self.cell, minlength=len(self.cell_ids)) > 0
+        if used.all():
+            return self
+        return self.named_as([name for name, has in zip(self.cell_ids, used, strict=True) if has])[
+            0
+        ]
+
+    def named_as(self, cell_ids: Sequence[str]) -> tuple[Reports, Ints]:
+        """Return the reports over other cells, and how many readings of each have no such cell.
+
+        Those readings are left out: a transmitter that the database does not have is no evidence
+        for any place.
+        """
+        place_of = {cell_id: i for i, cell_id in enumerate(cell_ids)}
+        new = np.array([place_of.get(cell_id, -1) for cell_id in self.cell_ids] + [-1], np.int32)
+        cell = new[self.cell]
+        known = cell >= 0
+        unknown = np.bincount(self.report[~known], minlength=len(self))
+        counts = np.diff(self.first) - unknown
+        found = Reports(
+            self.crs,
+            tuple(cell_ids),
+            np.concatenate([[0], np.cumsum(counts)]),
+            cell[known],
+            self.level_dbm[known],
+            self.sd_db[known],
+            new[self.serving],
+            self.timing_advance,
+            self.time_s,
+            self.east_m,
+            self.north_m,
+            self.block,
+            self.notes,
+            self.predicted,
+        )
+        return found, unknown
+
+
+def make_reports(
+    crs: str,
+    report: ArrayLike,
+    cell: Sequence[str] | ArrayLike,
+    level_dbm: ArrayLike,
+    *,
+    count: int,
+    places: ArrayLike | None = None,
+    time_s: ArrayLike | None = None,
+    block: ArrayLike | None = None,
+    serving: ArrayLike | None = None,
+    timing_advance: ArrayLike | None = None,
+    sd_db: ArrayLike | None = None,
+    notes: Sequence[str] = (),
+) -> Reports:
+    """Make reports of readings in any order.
+
+    Of several readings of one cell in one report the strongest counts.
+
+    Parameters
+    ----------
+    report : (N,) array of int
+        Report of each reading, from 0.
+    cell : sequence of N str
+    level_dbm : (N,) array
+        NaN where missing.
+    count : int
+        Number of reports; some may have no reading.
+    places : (count, 2) array, optional
+        East and north, NaN where unknown.
+    time_s, block, timing_advance : (count,) array, optional
+    serving : sequence of ``count`` str, optional
+        Serving cell of each report, empty where there is none.
+    sd_db : (N,) array, optional
+
+    Examples
+    --------
+    >>> made = make_reports("EPSG:32635", [1, 0, 1], ["a", "a", "b"], [-70, -60, -80], count=2)
+    >>> made.first.tolist(), made.cell.tolist(), made.level_dbm.tolist()
+    ([0, 1, 3], [0, 0, 1], [-60.0, -70.0, -80.0])
+    """
+    names = np.asarray(cell, dtype=str)
+    served = np.asarray(serving if serving is not None else np.full(count, ""), dtype=str)
+    cell_ids = np.unique(np.concatenate([names, served[served != ""]]))
+    index = np.searchsorted(cell_ids, names).astype(np.int32)
+    which, level = np.asarray(report, np.int64), np.asarray(level_dbm, np.float64)
+    error = np.zeros(len(which)) if sd_db is None else np.asarray(sd_db, np.float64)
+    order = np.lexsort((-np.where(np.isnan(level), -np.inf, level), index, which))
+    which, index, level, error = which[order], index[order], level[order], error[order]
+    again = np.zeros(len(which), np.bool_)
+    again[1:] = (which[1:] == which[:-1]) & (index[1:] == index[:-1])
+    found = list(notes)
+    if again.any():
+        found.append(f"{int(again.sum())} readings left out: a cell twice in one report")
+        which, index = which[~again], index[~again]
+        level, error = level[~again], error[~again]
+    served_index = np.where(served == "", -1, np.searchsorted(cell_ids, served))
+
+    def column(given: ArrayLike | None, otherwise: float) -> Floats:
+        return np.full(count, otherwise) if given is None else np.asarray(given, np.float64)
+
+    east_m, north_m = column(None, np.nan), column(None, np.nan)
+    if places is not None:
+        east_m, north_m = np.asarray(places, np.float64).reshape(count, 2).T.copy()
+    return Reports(
+        crs,
+        tuple(cell_ids.tolist()),
+        np.searchsorted(which, np.arange(count + 1)).astype(np.int64),
+        index,
+        level,
+        error,
+        served_index.astype(np.int32),
+        column(timing_advance, np.nan),
+        column(time_s, np.nan) if time_s is not None else np.arange(count, dtype=np.float64),
+        east_m,
+        north_m,
+        column(block, -1).astype(np.int32),
+        tuple(found),
+    )
+
+
+def reports_of_log(log: TrackLog, block: int = -1) -> Reports:
+    """Return the reports of a log: its radio rows of equal time, with the true position then.
+
+    Rows without the cell's id, such as neighbours known by carrier and BSIC alone, are left out.
+    """
+    radio = log.radio
+    time_s, report = np.unique(radio["time_s"].to_numpy(np.float64), return_inverse=True)
+    known = radio["cell"].notna().to_numpy(np.bool_)
+    notes = list(log.notes)
+    if not known.all():
+        notes.append(f"{int((~known).sum())} readings left out: cell unknown")
+    cell = radio["cell"].to_numpy(object)
+    is_serving = known & (radio["role"] == SERVING).to_numpy(np.bool_)
+    serving = np.full(len(time_s), "", dtype=object)
+    serving[report[is_serving]] = cell[is_serving]
+    advance = np.full(len(time_s), np.nan)
+    steps = pd.to_numeric(radio["timing_advance"]).to_numpy(np.float64, na_value=np.nan)
+    advance[report[is_serving]] = steps[is_serving]
+    return make_reports(
+        log.crs,
+        report[known],
+        cell[known].astype(str),
+        radio["level_dbm"].to_numpy(np.float64)[known],
+        count=len(time_s),
+        places=_true_places(log.truth, time_s),
+        time_s=time_s,
+        block=np.full(len(time_s), block),
+        serving=serving.astype(str),
+        timing_advance=advance,
+        notes=notes,
+    )
+
+
+def _true_places(truth: pd.DataFrame, time_s: Floats) -> Floats:
+    """Return true positions at times, shape (T, 2); NaN outside the truth and in its gaps."""
+    known_s = truth["time_s"].to_numpy(np.float64)
+    places = np.full((len(time_s), 2), np.nan)
+    if not len(known_s) or not len(time_s):
+        return places
+    after = np.clip(np.searchsorted(known_s, time_s), 0, len(known_s) - 1)
+    before = np.maximum(after - (known_s[after] != time_s), 0)
+    inside = (time_s >= known_s[0]) & (time_s <= known_s[-1])
+    inside &= known_s[after] - known_s[before] <= _LARGEST_GAP_S
+    for i, name in enumerate(("east_m", "north_m")):
+        values = np.interp(time_s, known_s, truth[name].to_numpy(np.float64))
+        places[:, i] = np.where(inside, values, np.nan)
+    return places
+
+
+def joined_reports(parts: Sequence[Reports]) -> Reports:
+    """Return the reports of several sources as one; blocks of -1 stay, others are renumbered.
+
+    Raises
+    ------
+    InputError
+        There is none, or they are in several CRS.
+    """
+    if not parts:
+        raise fail(InputError, "reports", "at least one log", "none")
+    for part in parts:
+        if not same_crs(part.crs, parts[0].crs):
+            expected = f"all reports in {parts[0].crs}"
+            raise fail(InputError, "reports, crs", expected, part.crs, "logs of several zones")
+    offset, base = 0, 0
+    report, cell, blocks, serving = [], [], [], []
+    for part in parts:
+        names = np.array([*part.cell_ids, ""], dtype=str)
+        report.append(part.report + offset)
+        cell.append(names[part.cell])
+        serving.append(names[part.serving])
+        blocks.append(np.where(part.block < 0, -1, part.block + base))
+        offset += len(part)
+        base += int(part.block.max(initial=-1)) + 1
+    return make_reports(
+        parts[0].crs,
+        np.concatenate(report),
+        np.concatenate(cell),
+        np.concatenate([part.level_dbm for part in parts]),
+        count=offset,
+        places=np.concatenate([part.places for part in parts]),
+        time_s=np.concatenate([part.time_s for part in parts]),
+        block=np.concatenate(blocks),
+        serving=np.concatenate(serving),
+        timing_advance=np.concatenate([part.timing_advance for part in parts]),
+        sd_db=np.concatenate([part.sd_db for part in parts]),
+        notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
+    )

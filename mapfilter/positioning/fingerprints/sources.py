@@ -1,0 +1,125 @@
+"""Fingerprints from what there is: track logs with truth, radio-route databases, tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import ceil, sqrt
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.errors import InputError, fail
+from mapfilter.positioning.fingerprints.reports import (
+    Reports,
+    joined_reports,
+    make_reports,
+    reports_of_log,
+)
+from mapfilter.radio.cells import CellPlan
+from mapfilter.tracks.log import TrackLog
+
+MOST_POINTS = 20_000
+"""A radio-route database is thinned to about so many places."""
+
+STRONGEST = 7
+"""Cells in a report of a phone: a serving cell and six neighbours."""
+
+
+def reports_of_logs(logs: Sequence[TrackLog], plan: CellPlan | None = None) -> Reports:
+    """Return the reports of several logs, each a block of its own.
+
+    Cells without id are named by carrier and BSIC where a plan has exactly one such cell.
+    """
+    named = logs if plan is None else [named_neighbours(log, plan) for log in logs]
+    return joined_reports([reports_of_log(log, 0) for log in named])
+
+
+def named_neighbours(log: TrackLog, plan: CellPlan) -> TrackLog:
+    """Return a log whose cells without id have that of the only cell of their carrier and BSIC."""
+    known: dict[tuple[int, int], list[str]] = {}
+    for cell in plan.cells:
+        if cell.arfcn is not None and cell.bsic is not None:
+            known.setdefault((cell.arfcn, cell.bsic), []).append(cell.id)
+    radio = log.radio
+    rows = zip(radio["cell"], radio["arfcn"], radio["bsic"], strict=True)
+    found: list[str | None] = []
+    for cell, arfcn, bsic in rows:
+        ids = [] if arfcn is pd.NA or bsic is pd.NA else known.get((int(arfcn), int(bsic)), [])
+        found.append(ids[0] if pd.isna(cell) and len(ids) == 1 else cell)
+    return replace(log, radio=radio.assign(cell=pd.Series(found, index=radio.index, dtype=object)))
+
+
+def reports_of_database(database: RadioRouteDatabase, level_error_db: float = 6.0) -> Reports:
+    """Return the levels of a radio-route database as reports at its points.
+
+    Parameters
+    ----------
+    level_error_db : float
+        Standard deviation of the error of its levels.
+
+    Raises
+    ------
+    InputError
+        No cell is received at any of its points.
+    """
+    lattice = database.lattice
+    parts = [database.cell_points(cell_id, np.inf) for cell_id in database.cell_ids]
+    place = [row.astype(np.int64) * lattice.cols + col for row, col, _ in parts]
+    every = np.concatenate([np.empty(0, dtype=np.int64), *place])
+    places = np.unique(every)
+    if not len(places):
+        raise fail(InputError, str(database.path), "points with levels", "none")
+    step = max(1, ceil(sqrt(len(places) / MOST_POINTS)))
+    row, col = places // lattice.cols, places % lattice.cols
+    thin = (row % step == 0) & (col % step == 0)
+    # A thin corridor may miss all of a coarse lattice.
+    kept = places[thin] if thin.any() else places[:: step**2]
+    at = np.searchsorted(kept, every)
+    there = (at < len(kept)) & (kept[np.minimum(at, len(kept) - 1)] == every)
+    names = np.repeat(np.array(database.cell_ids, dtype=str), [len(part[0]) for part in parts])
+    level_dbm = np.concatenate([part[2] for part in parts]).astype(np.float64)
+    east_m, north_m = lattice.east_north(kept // lattice.cols, kept % lattice.cols)
+    found = make_reports(
+        lattice.crs,
+        at[there],
+        names[there],
+        level_dbm[there],
+        count=len(kept),
+        places=np.column_stack([east_m, north_m]),
+        sd_db=np.full(int(there.sum()), level_error_db),
+    )
+    return replace(found, predicted=True)
+
+
+def simulated_reports(
+    database: Reports, count: int, strongest: int, shared_db: float, rng: np.random.Generator
+) -> Reports:
+    """Draw reports at places of predicted levels, with the errors that are stated for these.
+
+    Each has the strongest cells, with independent errors and one that all share.
+    """
+    drawn = database.some(rng.choice(len(database), min(count, len(database)), replace=False))
+    report = drawn.report
+    shared = shared_db * rng.standard_normal(len(drawn))
+    level_dbm = drawn.level_dbm + shared[report]
+    level_dbm = level_dbm + drawn.sd_db * rng.standard_normal(len(level_dbm))
+    order = np.lexsort((-level_dbm, report))
+    rank = np.arange(len(order)) - drawn.first[report[order]]
+    kept = order[rank < strongest]
+    names = np.array(drawn.cell_ids, dtype=str)
+    return make_reports(
+        drawn.crs,
+        report[kept],
+        names[drawn.cell[kept]],
+        level_dbm[kept],
+        count=len(drawn),
+        places=drawn.places,
+    )
+
+
+def is_table(path: Path) -> bool:
+    """Return whether a path is a file that may be a table of fingerprints."""
+    return path.is_file() and path.suffix.lower() in (".csv", ".tsv", ".txt")

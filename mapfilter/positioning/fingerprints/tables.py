@@ -1,0 +1,176 @@
+"""Tables of fingerprints: a row for each report, a column for each transmitter.
+
+As published for Wi-Fi benchmarks (UJIIndoorLoc and its successors): positions in some columns, and
+levels in dBm in all others, 100 or nothing where a transmitter was not received.
+"""
+
+from __future__ import annotations
+
+import csv
+import warnings
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from mapfilter._types import Bools, Floats
+from mapfilter.errors import InputError, fail, listed
+from mapfilter.geodesy import project, projected_crs, utm_crs
+from mapfilter.positioning.fingerprints.reports import Reports, make_reports
+
+NOT_RECEIVED_DBM = 100.0
+"""Stands for a transmitter that was not received."""
+
+_METRES = (("east_m", "north_m"), ("x_m", "y_m"), ("x", "y"))
+_DEGREES = (("lon_deg", "lat_deg"), ("longitude", "latitude"), ("lon", "lat"))
+_OTHER = frozenset(
+    (
+        *("floor", "building", "buildingid", "spaceid", "relativeposition", "userid", "phoneid"),
+        *("timestamp", "time", "time_s", "z", "z_m", "altitude", "accuracy", "accuracy_m"),
+        *("id", "session"),
+    )
+)
+_LEVEL_DBM = (-200.0, 0.0)
+_LONGEST = 40
+_MERCATOR = "EPSG:3857"
+_SEPARATORS = (",", ";", "\t")
+
+
+def read_fingerprint_table(path: Path | str, crs: str | None = None) -> Reports:
+    """Read a table of fingerprints.
+
+    Columns ``east_m, north_m`` (or ``x, y``) hold metres, ``lon, lat`` (or ``longitude, latitude``)
+    degrees, or metres where they cannot be degrees. Columns such as ``floor`` and ``userid`` are
+    not used; all others are transmitters. Levels that are none are left out and counted.
+
+    Parameters
+    ----------
+    crs : str, optional
+        Projected CRS: required for metres in ``x, y``; that of metres in ``longitude, latitude``
+        is Web Mercator, as in UJIIndoorLoc, when left out.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, has no column of positions or of levels, a column twice, or no row
+        with a level; or the CRS is unknown.
+    """
+    path = Path(path)
+    table, notes = _read(path)
+    names = {name: str(name).strip() for name in table.columns}
+    lower = {text.lower(): name for name, text in names.items()}
+    used = next((p for p in (*_METRES, *_DEGREES) if set(p) <= lower.keys()), None)
+    places = np.full((len(table), 2), np.nan)
+    if used is not None:
+        places = np.column_stack([_numbers(table[lower[name]]) for name in used])
+    taken = set(used or ())
+    cells = [name for text, name in lower.items() if text not in taken | _OTHER]
+    if not cells:
+        expected = "a column for each transmitter"
+        raise fail(InputError, f"{path}, header", expected, listed(list(names.values())))
+    levels = np.column_stack([_numbers(table[name]) for name in cells])
+    crs, places = _projected(path, crs, places, degrees=used in _DEGREES, known=used is not None)
+    received = np.isfinite(levels) & (levels != NOT_RECEIVED_DBM)
+    levels, received, odd = _checked(levels, received)
+    if odd:
+        low, high = _LEVEL_DBM
+        notes.append(f"{path.name}: {odd} levels left out: not in {low:g}..{high:g} dBm")
+    if not received.any():
+        expected = f"levels in dBm, {NOT_RECEIVED_DBM:g} where not received"
+        raise fail(InputError, str(path), expected, "none", "another kind of table")
+    report, column = np.nonzero(received)
+    return make_reports(
+        crs,
+        report,
+        np.array([names[name] for name in cells], dtype=str)[column],
+        levels[report, column],
+        count=len(table),
+        places=places,
+        notes=notes,
+    )
+
+
+def _read(path: Path) -> tuple[pd.DataFrame, list[str]]:
+    expected = "a table with a header line"
+    try:
+        text = path.read_text(encoding="utf-8-sig", errors="replace")
+    except OSError as error:
+        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
+    lines = [line for line in text.splitlines() if line.strip()]
+    if not lines:
+        raise fail(InputError, str(path), expected, "an empty file", "cut off")
+    separator = max(_SEPARATORS, key=lines[0].count)
+    named = [name.strip().lower() for name in _fields(lines[0], separator)]
+    if len(set(named)) < len(named):
+        twice = sorted({name for name in named if named.count(name) > 1})
+        raise fail(InputError, f"{path}, header", "each column once", listed(twice))
+    # Rows that are too short end in empty fields; which field of one too long is which is unknown.
+    kept = [line for line in lines[1:] if len(_fields(line, separator)) <= len(named)]
+    notes = []
+    if len(kept) < len(lines) - 1:
+        count = len(lines) - 1 - len(kept)
+        notes = [f"{path.name}: {count} rows left out: too many fields"]
+    if not kept:
+        raise fail(InputError, str(path), f"{expected} and rows", "no rows", "cut off")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", pd.errors.DtypeWarning)
+            table = pd.read_csv(
+                StringIO("\n".join([lines[0], *kept])),
+                sep=separator,
+                index_col=False,
+                low_memory=False,
+            )
+    except (ValueError, pd.errors.ParserError, pd.errors.ParserWarning) as error:
+        got = str(error).splitlines()[0]
+        raise fail(InputError, str(path), expected, got, "cut off, or no text") from error
+    return table, notes
+
+
+def _fields(line: str, separator: str) -> list[str]:
+    if '"' not in line:
+        return line.split(separator)
+    try:
+        return next(csv.reader([line], delimiter=separator), [])
+    except csv.Error:
+        return line.split(separator)
+
+
+def _numbers(column: pd.Series) -> Floats:
+    if pd.api.types.is_bool_dtype(column.dtype):
+        return np.full(len(column), np.nan)
+    try:
+        numbers = pd.to_numeric(column, errors="coerce")
+    except OverflowError:
+        # A whole number of hundreds of digits.
+        numbers = pd.to_numeric(column.astype(str).str.slice(0, _LONGEST), errors="coerce")
+    return np.asarray(numbers.to_numpy(np.float64, na_value=np.nan))
+
+
+def _checked(levels: Floats, received: Bools) -> tuple[Floats, Bools, int]:
+    low, high = _LEVEL_DBM
+    right = np.asarray((levels >= low) & (levels <= high))
+    return levels, received & right, int((received & ~right).sum())
+
+
+def _projected(
+    path: Path, crs: str | None, places: Floats, *, degrees: bool, known: bool
+) -> tuple[str, Floats]:
+    """Return CRS and positions in metres."""
+    finite = np.asarray(np.isfinite(places).all(axis=1))
+    places = np.where(finite[:, np.newaxis], places, np.nan)
+    largest = np.abs(places[finite]).max(axis=0, initial=0.0)
+    if known and degrees and finite.any() and bool(np.all(largest <= (180.0, 90.0))):
+        lon_deg, lat_deg = places.T
+        middle = np.median(places[finite], axis=0)
+        found = projected_crs(crs or utm_crs(float(middle[0]), float(middle[1])))
+        return found, np.column_stack(project(found, lon_deg, lat_deg))
+    if crs is None and degrees:
+        crs = _MERCATOR
+    if crs is None:
+        hint = (
+            "give --crs, such as EPSG:32630; for a frame of its own any projected CRS of the place"
+        )
+        raise fail(InputError, f"{path}, positions", "a CRS of the metres", "none", hint)
+    return projected_crs(crs, "--crs"), places

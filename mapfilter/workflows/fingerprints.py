@@ -1,0 +1,110 @@
+"""The inputs of ``mapfilter locate``: databases, logs, recordings and tables, as reports."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from mapfilter.database.manifest import MANIFEST
+from mapfilter.database.store import open_database
+from mapfilter.errors import Faults, InputError, MapfilterError
+from mapfilter.positioning.fingerprints.reports import Reports
+from mapfilter.positioning.fingerprints.sources import (
+    is_table,
+    reports_of_database,
+    reports_of_logs,
+)
+from mapfilter.positioning.fingerprints.tables import read_fingerprint_table
+from mapfilter.radio.cells import CellPlan
+from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.open_log import list_journeys, open_log
+from mapfilter.tracks.readers import plain_csv
+from mapfilter.tracks.readers.columns import header_names, likely_separator
+from mapfilter.tracks.readers.formats import find_format, format_of
+from mapfilter.tracks.readers.text import read_text
+from mapfilter.tracks.store import is_log
+
+_PEEKED_BYTES = 1 << 18
+
+
+def read_database(
+    path: Path, crs: str | None, level_error_db: float
+) -> tuple[Reports, CellPlan | None]:
+    """Return a radio-route database, or fingerprints, as reports; and the plan of the former.
+
+    Raises
+    ------
+    MapfilterError
+        There is none of these, or it is damaged.
+    """
+    if (path / MANIFEST).is_file():
+        opened = open_database(path)
+        return reports_of_database(opened, level_error_db), opened.plan
+    return read_reports(path, crs)[0], None
+
+
+def read_reports(
+    path: Path, crs: str | None, plan: CellPlan | None = None
+) -> tuple[Reports, Sequence[str]]:
+    """Return the reports of logs, recordings or a table, and the name of each block.
+
+    Parameters
+    ----------
+    crs : str, optional
+        For recordings, and for metres in a table.
+    plan : CellPlan, optional
+        Gives cells its ids.
+
+    Raises
+    ------
+    InputError
+        With the faults of all logs.
+    """
+    if _is_fingerprints(path):
+        return read_fingerprint_table(path, crs), ()
+    faults, logs, names = Faults(), list[TrackLog](), list[str]()
+    for one in _journeys(path):
+        try:
+            opened = open_log(one, crs=crs or (logs[0].crs if logs else ""), plan=plan)
+        except MapfilterError as error:
+            faults.found.extend(error.faults)
+        else:
+            logs.append(_with_positions(opened.log))
+            names.append(opened.name)
+    faults.raise_if_any(InputError)
+    return reports_of_logs(logs, plan), names
+
+
+def _journeys(path: Path) -> list[Path]:
+    """Return the logs of a folder, or its recordings: each is a visit of its own."""
+    found = list_journeys(path)
+    if found == [path] and path.is_dir() and not is_log(path):
+        return [one for one in sorted(path.iterdir()) if one.is_file() and format_of(one)]
+    return found
+
+
+def _with_positions(log: TrackLog) -> TrackLog:
+    """Return a log whose ground truth is the GNSS fixes, where it has no other."""
+    if len(log.truth) or log.gnss.empty:
+        return log
+    fixes = log.gnss[["time_s", "east_m", "north_m"]]
+    note = "positions by GNSS taken for the truth, as there is no other"
+    return replace(log, truth=fixes.drop_duplicates("time_s"), notes=(*log.notes, note))
+
+
+def _is_fingerprints(path: Path) -> bool:
+    """Return whether a file is a table with a column for each transmitter."""
+    if not is_table(path):
+        return False
+    try:
+        text = read_text(path, _PEEKED_BYTES)
+    except InputError:
+        return True
+    found = find_format(text)
+    if found is not plain_csv.FORMAT:
+        return found is None and not is_log(path.parent)
+    # Times and positions are in both; levels in one column are those of a recording.
+    names = header_names(text.first_line, likely_separator(text.first_line))
+    levels = {*plain_csv.FIELDS["level_dbm"], *plain_csv.FIELDS["bars"], *plain_csv.FIELDS["cell"]}
+    return not levels & set(names)

@@ -1,0 +1,189 @@
+"""``mapfilter locate``: a position and its region from each report of a log, without motion."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mapfilter._io import atomic_file, ensure_writable_folder, write_json
+from mapfilter._parallel import Progress
+from mapfilter._types import Floats
+from mapfilter.errors import Faults, InputError, MapfilterError
+from mapfilter.positioning.fingerprints.locating import (
+    LocatedReports,
+    ReportLocator,
+    figures_of,
+    fit_locator,
+    locate_by,
+    usual_readings,
+)
+from mapfilter.positioning.fingerprints.matches import locator
+from mapfilter.positioning.fingerprints.options import AUTO, Centroid, method_name
+from mapfilter.positioning.fingerprints.reports import Reports
+from mapfilter.report.canvas import BLUE, GREY, save
+from mapfilter.report.curves import Distribution, plot_cumulative
+from mapfilter.workflows.fingerprints import read_database, read_reports
+from mapfilter.workflows.terminal import to_jsonable
+
+POSITIONS, FIGURES, PICTURE = "positions.csv", "figures.json", "errors.png"
+_SHARE = 0.95
+
+
+@dataclass(frozen=True)
+class LocateResult:
+    """Reports located by themselves.
+
+    Parameters
+    ----------
+    database_reports, transmitters : int
+        Places of the database, and what was received there.
+    figures : mapping
+        Counts and scores, see :func:`mapfilter.positioning.fingerprints.locating.figures_of`.
+    centroid_mean_m, centroid_median_m : float
+        Errors of the mean place of the serving, or strongest, cell; NaN without ground truth.
+    """
+
+    database_reports: int
+    transmitters: int
+    figures: dict[str, Any]
+    centroid_mean_m: float
+    centroid_median_m: float
+    notes: tuple[str, ...]
+    seconds: float
+    outputs: tuple[Path, ...]
+
+    @property
+    def shown(self) -> dict[str, Any]:
+        """All figures in one mapping, as the command prints them."""
+        own = asdict(self)
+        figures = own.pop("figures")
+        return {**figures, **own}
+
+
+def run_locate(
+    database: Path,
+    log: Path,
+    out: Path,
+    *,
+    method: str = AUTO,
+    crs: str | None = None,
+    level_error_db: float = 6.0,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> LocateResult:
+    """Locate every report of a log, write a table, and score it where there is ground truth.
+
+    Parameters
+    ----------
+    database : Path
+        A radio-route database; or fingerprints: a log with ground truth, a folder of such logs,
+        recordings of other programs with positions, or a table (CSV).
+    log : Path
+        A log, a folder of logs, a recording, or a table of fingerprints.
+    out : Path
+        Gets ``positions.csv``, ``figures.json``, and ``errors.png`` where there is ground truth.
+    crs : str, optional
+        Of metres in a table.
+    level_error_db : float
+        Of the levels of a radio-route database.
+    seed : int
+        Of the reports by which regions of a radio-route database are calibrated.
+
+    Raises
+    ------
+    MapfilterError
+        An input is missing or wrong, there is no such method, or the output cannot be written.
+    """
+    began_s = time.perf_counter()
+    known, (reports, names) = _inputs(database, log, crs, level_error_db)
+    ensure_writable_folder(out)
+    rng, strongest = np.random.default_rng(seed), usual_readings(reports)
+    fitted = fit_locator(known, method, rng, strongest=strongest, progress=progress)
+    located = locate_by(fitted, reports)
+    baseline_m = _centroid_errors_m(fitted, reports)
+    figures = figures_of(located)
+    outputs = [_write_positions(located, names, reports, out / POSITIONS)]
+    if np.isfinite(located.error_m).any():
+        outputs.append(_draw(located, baseline_m, out / PICTURE))
+    scored = baseline_m[np.isfinite(baseline_m)]
+    notes = tuple(dict.fromkeys((*fitted.database.notes, *located.notes, *_advice(fitted))))
+    result = LocateResult(
+        len(fitted.database),
+        len(fitted.database.cell_ids),
+        figures,
+        float(scored.mean()) if scored.size else float("nan"),
+        float(np.median(scored)) if scored.size else float("nan"),
+        notes,
+        round(time.perf_counter() - began_s, 3),
+        (*outputs, out / FIGURES),
+    )
+    write_json(out / FIGURES, to_jsonable(result.shown))
+    return result
+
+
+def _inputs(
+    database: Path, log: Path, crs: str | None, level_error_db: float
+) -> tuple[Reports, tuple[Reports, Sequence[str]]]:
+    """Read both inputs, and report the faults of both."""
+    faults = Faults()
+    known, query, plan = None, None, None
+    try:
+        known, plan = read_database(database, crs, level_error_db)
+    except MapfilterError as error:
+        faults.found.extend(error.faults)
+    try:
+        query = read_reports(log, known.crs if known is not None else crs, plan)
+    except MapfilterError as error:
+        faults.found.extend(error.faults)
+    if known is None or query is None:
+        raise InputError(tuple(faults.found))
+    return known, query
+
+
+def _centroid_errors_m(fitted: ReportLocator, reports: Reports) -> Floats:
+    plain = locator(Centroid(), fitted.database)
+    baseline = ReportLocator(Centroid(), fitted.database, plain, None, ())
+    return locate_by(baseline, reports).error_m
+
+
+def _write_positions(
+    located: LocatedReports, names: Sequence[str], reports: Reports, path: Path
+) -> Path:
+    table = located.to_dataframe()
+    if len(names) > 1:
+        table.insert(0, "log", [names[block] for block in reports.block.tolist()])
+    table = table.round({name: 3 for name in table if str(name).endswith("_m")})
+    table = table.round({"lon_deg": 8, "lat_deg": 8})
+    with atomic_file(path) as temporary:
+        table.to_csv(temporary, index=False, lineterminator="\n")
+    return path
+
+
+def _draw(located: LocatedReports, baseline_m: Floats, path: Path) -> Path:
+    curves = []
+    given = ((method_name(located.method), located.error_m, BLUE), ("centroid", baseline_m, GREY))
+    for name, error_m, colour in given:
+        known_m = error_m[np.isfinite(error_m)]
+        if known_m.size:
+            label = f"{name}, median {np.median(known_m):.3g} m"
+            curves.append(Distribution(label, known_m, colour))
+    most_m = max(float(np.quantile(curve.errors_m, 0.98)) for curve in curves)
+    title = "Errors of single reports, without motion"
+    return save(plot_cumulative(curves, title=title, most_m=max(most_m, 1.0), share=_SHARE), path)
+
+
+def _advice(fitted: ReportLocator) -> list[str]:
+    if fitted.regions is None:
+        return ["no radii: fewer than 20 reports of the database can be left out to calibrate them"]
+    if fitted.database.predicted:
+        return ["radii hold if the database's levels are as accurate as --level-error states"]
+    first = fitted.validations[0]
+    if first.blocks != "logs":
+        more = "on another day, or with another phone, errors are larger"
+        return [f"radii are calibrated with {first.blocks} of one survey left out: {more}"]
+    return []

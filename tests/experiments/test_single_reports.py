@@ -1,0 +1,44 @@
+"""Single reports of published data: accuracy, coverage, and damaged files."""
+
+import numpy as np
+import pytest
+
+from mapfilter.errors import ConfigError, InputError
+from mapfilter.experiments.benchmarks.single_reports import read_wifi
+from mapfilter.workflows.evaluate_single_reports import run_single_reports
+
+
+def test_published_data_are_located_better_than_by_three_neighbours(shared_data, tmp_path):
+    sets = ("LIB1", "TUT1", "uottawa")
+    result = run_single_reports(
+        shared_data, tmp_path, sets=sets, methods=("auto", "probabilistic", "centroid", "3-nn")
+    )
+    rows = {(row.data, row.method): row for row in result.rows}
+    for name in sets:
+        assert rows[name, "auto"].mean_m < rows[name, "3-nn"].mean_m
+        assert 0.9 < rows[name, "auto"].within_95 < 0.99
+        assert (tmp_path / f"{name}.png").is_file()
+    assert rows["TUT1", "auto"].mean_m == pytest.approx(5.86, abs=0.05)
+    assert rows["uottawa", "auto"].median_m < 85 < 105 < rows["uottawa", "centroid"].median_m
+    assert 0.93 < rows["uottawa", "probabilistic"].within_95 < 0.97
+    assert rows["uottawa", "auto"].located == 330
+
+
+def test_training_and_test_reports_share_no_row(shared_data):
+    training, test = read_wifi(shared_data / "fingerprint-wifi", "TUT1")
+    assert (len(training), len(test)) == (1476, 490)
+    assert np.isfinite(training.level_dbm).all()
+    assert training.level_dbm.max() <= 0
+
+
+def test_a_missing_or_damaged_file_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"UJI1\.mat"):
+        read_wifi(tmp_path, "UJI1")
+    (tmp_path / "UJI1.mat").write_bytes(b"MATLAB 5.0 MAT-file" + bytes(200))
+    with pytest.raises(InputError, match="fingerprints"):
+        read_wifi(tmp_path, "UJI1")
+
+
+def test_an_unknown_set_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match="UJI1, TUT1"):
+        run_single_reports(tmp_path, tmp_path, sets=("UJI2",))

@@ -1,0 +1,201 @@
+"""Distances and likelihoods against sklearn and dense formulas that share no code with them."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from made_fingerprints import reports_at
+from scipy.stats import multivariate_normal
+from sklearn.neighbors import NearestNeighbors
+
+from mapfilter.positioning.fingerprints.matches import Received, locator
+from mapfilter.positioning.fingerprints.matching import (
+    Distances,
+    LevelErrors,
+    Likelihoods,
+    Scale,
+)
+from mapfilter.positioning.fingerprints.options import Centroid, Neighbours, Probabilistic
+
+SKLEARN = {"sorensen": "braycurtis", "euclidean": "euclidean", "manhattan": "manhattan"}
+
+
+def made(seed, count=25, cells=8, missing=0.5):
+    rng = np.random.default_rng(seed)
+    level = np.round(rng.uniform(-95, -40, (count, cells)))
+    level[rng.random(level.shape) < missing] = np.nan
+    level[np.isnan(level).all(axis=1), 0] = -80.0
+    names = tuple(f"c{i}" for i in range(cells))
+    return rng.uniform(0, 100, (count, 2)), level, names
+
+
+def dense(level_dbm, representation, floor_dbm, exponent):
+    """As the formulas of Torres-Sospedra et al. (2015) state them, for whole tables."""
+    positive = np.where(np.isnan(level_dbm), 0.0, level_dbm - floor_dbm)
+    if representation == "exponential":
+        return np.exp(positive / 24) / np.exp(-floor_dbm / 24)
+    power = exponent if representation == "powed" else 1.0
+    return positive**power / (-floor_dbm) ** power
+
+
+@pytest.mark.parametrize("metric", SKLEARN)
+@pytest.mark.parametrize("representation", ["positive", "exponential", "powed"])
+@settings(max_examples=20)
+@given(seed=st.integers(0, 10_000))
+def test_distances_are_those_of_sklearn(metric, representation, seed):
+    places, level, names = made(seed)
+    reports = reports_at(places, level, names=names).compact()
+    used = [names.index(name) for name in reports.cell_ids]
+    floor_dbm = np.nanmin(level) - 1
+    scale = Scale(representation, floor_dbm, 1.7)
+    found = Distances.to(reports, metric, scale)
+    own = np.array([found.of(*reports.readings(i)) for i in range(len(reports))])
+    table = dense(level[:, used], representation, floor_dbm, 1.7)
+    search = NearestNeighbors(metric=SKLEARN[metric], algorithm="brute").fit(table)
+    distance, index = search.kneighbors(table, n_neighbors=len(table))
+    expected = np.empty_like(own)
+    np.put_along_axis(expected, index, distance, axis=1)
+    np.testing.assert_allclose(own, expected, atol=2e-7)
+
+
+@pytest.mark.parametrize("k", [1, 4, 25, 99])
+def test_a_position_is_the_weighted_mean_of_sklearns_neighbours(k):
+    places, level, names = made(3)
+    reports = reports_at(places, level, names=names).placed()
+    _, queries, _ = made(4, count=10)
+    asked = reports_at(places[:10], queries, names=names).named_as(reports.cell_ids)[0]
+    method = Neighbours(k=k, metric="manhattan", representation="positive", weight_power=2.0)
+    by = locator(method, reports)
+    floor_dbm = np.nanmin(level) - 1
+    columns = [names.index(name) for name in reports.cell_ids]
+    table = dense(level[:, columns], "positive", floor_dbm, 1)
+    received = queries[:, columns]
+    weaker = np.where(received <= floor_dbm, floor_dbm + 0.5, received)
+    asked_table = dense(weaker, "positive", floor_dbm, 1)
+    search = NearestNeighbors(metric="manhattan", algorithm="brute").fit(table)
+    distance, index = search.kneighbors(asked_table, n_neighbors=min(k, len(table)))
+    for i in range(10):
+        cell, level_dbm = asked.readings(i)
+        found = by(Received(cell, level_dbm, -1, np.nan))
+        weight = 1 / (distance[i] + 1e-6) ** 2
+        mean = weight @ places[index[i]] / weight.sum()
+        np.testing.assert_allclose((found.east_m, found.north_m), mean, rtol=1e-9)
+
+
+def brute_force_log_likelihood(known, asked, errors, sd_db, least_db):
+    """Return the two parts by dictionaries and a multivariate normal distribution."""
+    floor = errors.floor_dbm
+    alone = set(known) ^ set(asked)
+    lost = -sum(
+        errors.absence_per_db * max((known | asked)[name] - floor, 0.0) for name in sorted(alone)
+    )
+    both = sorted(set(known) & set(asked))
+    apart = np.array([asked[name] - known[name] for name in both])
+    if not both:
+        return lost, 0.0
+    variance = errors.level_db**2 + np.array([sd_db[name] ** 2 for name in both])
+    covariance = np.diag(variance) + errors.shared_db**2
+    normal = multivariate_normal(np.zeros(len(both)), covariance).logpdf(apart)
+    return lost, normal + len(both) * np.log(np.sqrt(2 * np.pi) * least_db)
+
+
+@settings(max_examples=20)
+@given(
+    seed=st.integers(0, 10_000),
+    level_db=st.floats(0.5, 12),
+    shared_db=st.floats(0, 12),
+    absence=st.floats(0.01, 1),
+)
+def test_likelihoods_are_those_of_a_multivariate_normal(seed, level_db, shared_db, absence):
+    places, level, names = made(seed, count=6, cells=5)
+    rng = np.random.default_rng(seed)
+    sd_db = rng.uniform(0, 6, level.shape)
+    report, cell = np.nonzero(np.isfinite(level))
+    reports = reports_at(places, level, names=names, sd_db=sd_db[report, cell])
+    errors = LevelErrors(level_db, shared_db, absence, float(np.nanmin(level)) - 1)
+    least_db = np.hypot(level_db, sd_db[report, cell].min())
+    likelihoods = Likelihoods.at(reports, errors)
+    asked, dbm = reports.readings(0)
+    query = {reports.cell_ids[c]: value for c, value in zip(asked, dbm, strict=True)}
+    lost, normal = likelihoods.of(asked, dbm)
+    for i in range(len(reports)):
+        own, values = reports.readings(i)
+        known = {reports.cell_ids[c]: v for c, v in zip(own, values, strict=True)}
+        sd = {name: sd_db[i, names.index(name)] for name in known}
+        expected = brute_force_log_likelihood(known, query, errors, sd, least_db)
+        np.testing.assert_allclose((lost[i], normal[i]), expected, rtol=1e-7, atol=1e-7)
+
+
+def test_an_offset_that_all_levels_share_costs_less_than_independent_errors():
+    places = np.array([[0.0, 0.0], [50.0, 0.0]])
+    level = np.array([[-60.0, -70.0, -80.0], [-60.0, -70.0, -80.0]])
+    level[1] += [9.0, -9.0, 9.0]
+    reports = reports_at(places, level, names=("a", "b", "c"))
+    errors = LevelErrors(4.0, 8.0, 0.2, -95.0)
+    _, found = Likelihoods.at(reports, errors).of(np.arange(3, dtype=np.int32), level[0] + 9.0)
+    assert found[0] > found[1] + 3
+
+
+def test_a_missing_level_counts_as_received():
+    places, level = np.array([[0.0, 0.0], [50.0, 0.0]]), np.array([[-60.0, -70], [-60, np.nan]])
+    reports = reports_at(places, level, names=("a", "b"))
+    errors = LevelErrors(4.0, 3.0, 0.2, -95.0)
+    likelihoods = Likelihoods.at(reports, errors)
+    both = np.arange(2, dtype=np.int32)
+    lost, _ = likelihoods.of(both, np.array([-60.0, np.nan]))
+    assert lost[0] == 0
+    # As strong as the cell usually is.
+    assert lost[1] == pytest.approx(-0.2 * 25)
+    _, levels = likelihoods.of(both, np.array([-60.0, np.nan]))
+    assert levels[0] == levels[1]
+
+
+@pytest.mark.parametrize("method", [Neighbours(k=3), Probabilistic(), Centroid()])
+@settings(max_examples=20)
+@given(seed=st.integers(0, 1000))
+def test_the_order_of_readings_does_not_matter(method, seed):
+    places, level, names = made(seed)
+    reports = reports_at(places, level, names=names).placed()
+    by = locator(method, reports)
+    cell, dbm = reports.readings(seed % len(reports))
+    first = by(Received(cell, dbm, -1, np.nan))
+    again = by(Received(cell[::-1], dbm[::-1], -1, np.nan))
+    np.testing.assert_allclose(first, again, rtol=1e-6, atol=1e-5)
+
+
+@pytest.mark.parametrize("method", [Neighbours(k=3), Probabilistic(), Centroid()])
+@settings(max_examples=20)
+@given(seed=st.integers(0, 1000))
+def test_a_position_lies_among_the_places_of_the_database(method, seed):
+    places, level, names = made(seed)
+    reports = reports_at(places, level, names=names).placed()
+    found = locator(method, reports)(Received(*reports.readings(0), -1, np.nan))
+    at = np.array([found.east_m, found.north_m])
+    assert (at >= places.min(axis=0) - 1e-6).all()
+    assert (at <= places.max(axis=0) + 1e-6).all()
+    assert found.spread_m >= 0
+
+
+def test_the_timing_advance_counts_for_the_same_serving_cell_only():
+    places = np.array([[0.0, 0.0], [100.0, 0.0], [200.0, 0.0]])
+    level = np.array([[-80.0, np.nan], [-80.0, np.nan], [np.nan, -80.0]])
+    reports = reports_at(
+        places, level, names=("a", "b"), serving=["a", "a", "b"], timing_advance=[1, 4, 1]
+    )
+    by = locator(Probabilistic(), reports)
+    cell, dbm = np.array([0], dtype=np.int32), np.array([-80.0])
+    assert by(Received(cell, dbm, 0, 4.0)).east_m == pytest.approx(100, abs=2)
+    assert by(Received(cell, dbm, 0, 1.0)).east_m == pytest.approx(0, abs=2)
+    unknown = by(Received(cell, dbm, 0, np.nan))
+    assert unknown.spread_m > 40
+
+
+def test_a_mismatch_grows_with_strange_levels():
+    places, level, names = made(1, missing=0.0)
+    reports = reports_at(places, level, names=names).placed()
+    cell, dbm = reports.readings(0)
+    strange = np.where(np.arange(len(dbm)) % 2, -40.0, -95.0)
+    for method in (Neighbours(k=1), Probabilistic()):
+        by = locator(method, reports)
+        usual = by(Received(cell, dbm, -1, np.nan)).mismatch
+        assert by(Received(cell, strange, -1, np.nan)).mismatch > usual
