@@ -30,6 +30,7 @@ def street_field():
         (),
         np.zeros((120, 120, 0), np.float32),
         nothing.astype(np.float32),
+        np.full((120, 120), 7.5, np.float32),
         nothing.astype(np.int64),
         on,
     )

@@ -24,9 +24,8 @@ PLAN = CellPlan(CRS, (cell("A", 1), cell("B", 2), cell("C", 3), cell("D", 3)))
 def field(levels=(-70.0, -80.0, -75.0, -100.0)):
     grid = np.broadcast_to(np.array(levels, np.float32), (20, 20, 4)).copy()
     flat = np.zeros((20, 20))
-    return RadioField(
-        LATTICE, PLAN.ids, grid, flat.astype(np.float32), flat.astype(np.int64), flat == 0
-    )
+    away = flat.astype(np.float32)
+    return RadioField(LATTICE, PLAN.ids, grid, away, away, flat.astype(np.int64), flat == 0)
 
 
 def serving(name, level):
