@@ -65,6 +65,8 @@ class OttawaOptions:
         Length of the step that ``filter.step_sd_m`` is of.
     scale_drift_per_sqrt_m : float
         Random walk of the logarithm of the step scale.
+    white_share : float
+        Share of a heading's variance that is white.
     serving_weight_per_m : float
         Weight of a serving cell for each metre travelled.
     measurement_db : float
@@ -83,12 +85,17 @@ class OttawaOptions:
             map_sd_m=16.0,
             level_error_db=5.0,
             level_correlation_m=100.0,
+            device_error_db=2.0,
+            level_weight=0.7,
+            switch_mass=0.99,
+            switch_hold_m=14.0,
             max_particles=10_000,
             min_search_particles=7_000,
         )
     )
     typical_step_m: float = 14.0
     scale_drift_per_sqrt_m: float = 0.005
+    white_share: float = 0.7
     serving_weight_per_m: float = 1 / 150
     measurement_db: float = 3.0
     unmeasured_db: float = 8.0
@@ -102,6 +109,11 @@ class OttawaOptions:
             bound.model.motion,
             typical_step_m=self.typical_step_m,
             scale_drift_per_sqrt_m=self.scale_drift_per_sqrt_m,
+            # Bearings by satellites know neither magnets nor gyroscopes.
+            white_share=self.white_share,
+            disturbances_per_m=0.0,
+            rate_share=0.0,
+            stretch_sd=0.0,
         )
         evidence = bound.model.evidence
         evidence = replace(
