@@ -250,6 +250,19 @@ def _move(
     return moved
 
 
+def moved_back(state: Floats32, east_m: float, north_m: float) -> Floats32:
+    """Return hypotheses where they were before a displacement by dead reckoning.
+
+    It is turned and scaled by each hypothesis's errors as they are now; only positions change.
+    """
+    turned, stretch = state[BIAS] + state[TURN], np.exp(state[LOG_SCALE] + state[STRETCH])
+    cosine, sine = np.cos(turned), np.sin(turned)
+    before = state.copy()
+    before[EAST] -= stretch * (_F(east_m) * cosine - _F(north_m) * sine)
+    before[NORTH] -= stretch * (_F(east_m) * sine + _F(north_m) * cosine)
+    return before
+
+
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
 def interpolate(
     state: Floats32, raster: Floats32, west_m: float, north_m: float, per_m: float

@@ -185,6 +185,7 @@ def test_quickstart_shows_only_commands_that_exist():
     assert commands - shown <= {
         "merge",
         "convert",
+        "learn",
         "bench",
         "bound",
         "evaluate",

@@ -20,6 +20,8 @@ SMALL = [
     "cells.indoor=1",
     "journeys.length_m=250",
     "filter.bayes.max_particles=4000",
+    "filter.bayes.switch_mass=0.8",
+    "filter.bayes.switch_hold_m=5",
     "filter.bayes.min_search_particles=4000",
 ]
 CASES = ("levels-6", "cell-6")
