@@ -186,6 +186,7 @@ def test_quickstart_shows_only_commands_that_exist():
         "merge",
         "convert",
         "learn",
+        "locate",
         "bench",
         "bound",
         "evaluate",

@@ -74,13 +74,13 @@ def test_no_pictures_where_none_are_wanted(tmp_path):
 def test_the_alert_limit_and_the_risk_are_part_of_the_benchmark(tmp_path, usual):
     _, plain = usual
     wide = foreign(
-        tmp_path, "integrity.alert_limit_m=1e5", "integrity.risk=1e-6", 'output.pictures="none"'
+        tmp_path, "integrity.alert_limit_m=1e5", "integrity.risk=1e-2", 'output.pictures="none"'
     )
     for one, other in zip(plain.cases, wide.cases, strict=True):
-        assert other.protection_m > one.protection_m
+        assert other.protection_m <= one.protection_m
         assert other.coverage_95 == one.coverage_95
-        assert other.exceeded <= one.exceeded
-        assert other.epochs_unavailable + other.epochs_unavailable_misleading == 0
+        assert other.exceeded >= one.exceeded
+        assert other.epochs_unavailable < one.epochs_unavailable
     given = [arg for setting in SMALL for arg in ("--set", setting)]
     again = mapfilter(
         "evaluate", "global-positioning", "--world", "foreign", *given, "--runs", 2, "--seed", 1,
