@@ -4,15 +4,15 @@ A position may be used while its protection level is at most the alert limit. Ea
 one of five regions (Tossaint et al. 2007, *The Stanford - ESA integrity diagram*, Navigation 54(2),
 after the diagram of the WAAS laboratory at Stanford):
 
-=========================  =======================  ===========================================
-Region                     Protection level         Error
-=========================  =======================  ===========================================
-``available``              at most the alert limit  at most the protection level
-``misleading``             at most the alert limit  above the level, at most the alert limit
-``hazardous``              at most the alert limit  above the alert limit
-``unavailable``            above, or none           at most the protection level
-``unavailable_misleading`` above                    above the protection level
-=========================  =======================  ===========================================
+==========================  =======================  ===========================================
+Region                      Protection level         Error
+==========================  =======================  ===========================================
+``available``               at most the alert limit  at most the protection level
+``misleading``              at most the alert limit  above the level, at most the alert limit
+``hazardous``               at most the alert limit  above the alert limit
+``unavailable``             above, or none           at most the protection level
+``unavailable_misleading``  above                    above the protection level
+==========================  =======================  ===========================================
 """
 
 from __future__ import annotations
