@@ -39,11 +39,11 @@ def test_the_options_that_were_chosen():
     model = options.positioner(area).model
     assert asdict(model.motion) == {
         "step_sd_m": 1.0, "typical_step_m": 14.0, "heading_sd_rad": radians(10),
-        "white_share": 0.3, "heading_m": 28.0, "disturbances_per_m": 0.002,
+        "white_share": 0.7, "heading_m": 28.0, "disturbances_per_m": 0.0,
         "disturbed_rad": radians(40), "bias_sd_rad": radians(6),
         "bias_drift_rad_per_sqrt_m": radians(0.2), "rate_rad_per_m": radians(0.15),
-        "rate_share": 0.5, "scale_sd": 0.15,
-        "scale_drift_per_sqrt_m": 0.005, "stretch_sd": 0.08, "stretch_m": 25.0,
+        "rate_share": 0.0, "scale_sd": 0.15,
+        "scale_drift_per_sqrt_m": 0.005, "stretch_sd": 0.0, "stretch_m": 25.0,
     }  # fmt: skip
     assert model.weights.sd_m == 16.0
     particles, evidence = options.filter, model.evidence
