@@ -372,7 +372,7 @@ class LevelMemory:
 def roughness(level_dbm: Floats32, resolution_m: float) -> Floats32:
     """Return the local standard deviation of predicted levels, (rows, cols, C), in dB.
 
-    It is that of a square of 35 m, at least 3 x 3 pixels.
+    It is that of a square of 45 to 50 m at pixels of 5 to 10 m, and of 3 x 3 pixels at least.
     """
     size = max(2 * round(_ROUGHNESS_M / resolution_m / 2) + 1, 3)
     found = np.empty(level_dbm.shape, dtype=np.float32)
