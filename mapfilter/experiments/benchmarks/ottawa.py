@@ -86,9 +86,9 @@ class OttawaOptions:
             level_error_db=5.0,
             level_correlation_m=100.0,
             device_error_db=2.0,
-            level_weight=0.7,
+            level_weight=0.5,
             switch_mass=0.998,
-            switch_hold_m=14.0,
+            switch_hold_m=30.0,
             max_particles=10_000,
             min_search_particles=7_000,
         )
