@@ -352,7 +352,7 @@ class BayesPositioner(Filter[BayesState]):
             return replace(belief, on=on, off=off, model=grid)
         state = self.model.any_heading(belief.state, _MORE_PARTICLES, rng)
         log_weight = np.tile(belief.log_weight, _MORE_PARTICLES) - np.log(_MORE_PARTICLES)
-        kept = np.tile(belief.kept, (_MORE_PARTICLES, 1))
+        kept = np.tile(belief.kept, (1, _MORE_PARTICLES))
         return replace(belief, state=state, log_weight=log_weight, kept=kept)
 
 
