@@ -229,20 +229,21 @@ class BayesPositioner(Filter[BayesState]):
         """Ask all sources for their evidence; return the state with theirs, and the evidence."""
         history = state.sources[self._radio.name]
         due = bool(epoch.radio) and self._radio.due(history, state.reckoning.travelled_m)
-        context, updates = Context(particle_spacing_m, due), []
+        context, updates, states = Context(particle_spacing_m, due), [], {}
         for source in self.sources:
             if state.belief is None:
                 update = source.first(epoch)
             else:
                 update = source.update(state, epoch, context)
             updates.append(update)
-            state = replace(
-                state,
-                sources={**state.sources, source.name: update.state},
-                belief=update.belief or state.belief,
-                alternative=update.alternative or state.alternative,
-            )
-        return state, updates
+            states[source.name] = update.state
+            if update.belief or update.alternative:
+                state = replace(
+                    state,
+                    belief=update.belief or state.belief,
+                    alternative=update.alternative or state.alternative,
+                )
+        return replace(state, sources=states), updates
 
     def _started(
         self,
