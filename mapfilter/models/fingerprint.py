@@ -21,6 +21,7 @@ from scipy.special import log_ndtr
 
 from mapfilter._kernels import exp32, log32
 from mapfilter._types import Floats, Floats32, Ints32
+from mapfilter.models.cell_faults import mixed
 from mapfilter.options import NotNegative, Options, Positive
 
 _F = np.float32
@@ -62,11 +63,14 @@ class ServingWeights(Options):
         σ of the margin's error.
     weight_per_m : float
         Exponent of the likelihood for each metre travelled, because errors last.
+    fault_nats : float
+        Negative log-likelihood of a serving cell whose prediction is wrong.
     """
 
     hysteresis_db: NotNegative = 2.0
     sd_db: Positive = 9.0
     weight_per_m: NotNegative = 1 / 22
+    fault_nats: NotNegative = 0.7
 
 
 class RasterFrame(NamedTuple):
@@ -168,15 +172,18 @@ def weigh_by_serving(
     cell: int,
     table: Floats32,
     weight: float,
+    odds: Floats32,
+    other: float,
     log_weight: Floats,
 ) -> None:
     """Add the log-likelihood of the serving cell, times a weight, to weights, in place.
 
-    ``cell`` is its band, ``table`` that of :func:`serving_table`.
+    ``cell`` is its band, ``table`` that of :func:`serving_table`. ``odds`` (N,) are the log odds of
+    its fault, updated in place, and ``other`` is the log-likelihood with a fault.
     """
     middle = _F(_REACH_DB * _STEPS_PER_DB)
     zero, last = _F(0.0), _F(2 * _REACH_DB * _STEPS_PER_DB)
-    per_db, w, half = _F(_STEPS_PER_DB), _F(weight), _F(0.5)
+    per_db, w, half, wrong = _F(_STEPS_PER_DB), _F(weight), _F(0.5), _F(weight * other)
     own, first, second = np.uint32(cell), np.uint32(bands - 2), np.uint32(bands - 1)
     width = np.uint32(bands)
     for i in range(pixel.size):
@@ -187,4 +194,5 @@ def weigh_by_serving(
         place = (level - other) * per_db + middle + half
         place = place if place > zero else zero
         place = place if place < last else last
-        log_weight[i] += w * table[np.int32(place)]
+        _, gained, odds[i] = mixed(odds[i], wrong, w * table[np.int32(place)])
+        log_weight[i] += gained

@@ -14,10 +14,8 @@ from numba import njit
 
 from mapfilter._kernels import exp32, log32
 from mapfilter._types import Bytes, Floats, Floats32, Ints32
+from mapfilter.models.cell_faults import mixed
 from mapfilter.models.fingerprint import REACH_SD, STEPS_PER_SD
-
-LOG_ODDS, MOST_LOG_ODDS = 20.0, 8.0
-"""Bounds of the log odds of a fault: of a report's, and of those that hypotheses keep."""
 
 _F = np.float32
 _BLOCK = 256
@@ -102,7 +100,7 @@ def weigh_by_levels(
                 variance = own + more[j]
                 per = _ONE / variance
                 right = -_HALF * (v * v * per + log32(variance))
-                fine, gained, odds[j] = _mixed(odds[j], other, right)
+                fine, gained, odds[j] = mixed(odds[j], other, right)
                 total[j] += gained
                 innovation[j] = fine * v * own * per
             _corrected(kept, first, count, terms.gain[k], innovation)
@@ -156,7 +154,7 @@ def weigh_by_absence(
             for j in range(count):
                 right[j] = table[np.uint32(place[j])]
             for j in range(count):
-                fine, gained, odds[j] = _mixed(odds[j], other, right[j])
+                fine, gained, odds[j] = mixed(odds[j], other, right[j])
                 total[j] += gained
                 # Above six deviations the truncation moves nothing, and the density is none.
                 z = below[j] if below[j] > _F(-8.0) else _F(-8.0)
@@ -166,28 +164,6 @@ def weigh_by_absence(
             _corrected(kept, first, count, terms.gain[k], below)
         for j in range(count):
             log_weight[first + j] += w * total[j]
-
-
-@njit(inline="always")
-def _mixed(
-    before: np.float32, other: np.float32, right: np.float32
-) -> tuple[np.float32, np.float32, np.float32]:
-    """Mix the likelihoods of a level with and without a fault.
-
-    Returns the probability that the cell is fine, the log-likelihood, and the new log odds of a
-    fault.
-    """
-    most, cap = _F(LOG_ODDS), _F(MOST_LOG_ODDS)
-    whole = before + other - right
-    odds = whole if whole < most else most
-    odds = odds if odds > -most else -most
-    fine = _ONE / (_ONE + exp32(odds))
-    # Beyond the bound the logarithm of one plus the odds is that of the odds.
-    beyond = whole - odds if whole > odds else _ZERO
-    gained = right + beyond - log32(fine * (_ONE + exp32(before)))
-    after = odds if odds < cap else cap
-    after = after if after > -cap else -cap
-    return fine, gained, after
 
 
 @njit(inline="always")

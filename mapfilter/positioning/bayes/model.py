@@ -220,11 +220,11 @@ class BayesModel:
         if reading.serving >= 0 or reading.levels is not None or reading.bounds:
             pixel = self._pixels(cloud.state)
             used = True
+            cloud = self._aged(cloud, reading)
             if reading.serving >= 0 and reading.serving_weight > 0:
-                self._weigh_serving(pixel, log_weight, reading)
+                self._weigh_serving(cloud, pixel, log_weight, reading)
             if reading.levels is not None:
-                length_m = reading.length_m
-                cloud = self._weigh_levels(cloud, pixel, log_weight, reading.levels, length_m)
+                cloud = self._weigh_levels(cloud, pixel, log_weight, reading)
             flat, bands, table = self.area.flat_level_dbm, self._bands, self._bound_table
             for bound in reading.bounds:
                 fingerprint.weigh_by_bound(pixel, flat, bands, bound, table, log_weight)
@@ -248,32 +248,41 @@ class BayesModel:
     def _pixels(self, state: Floats32) -> Ints32:
         return np.asarray(fingerprint.pixels(state, self.area.frame))
 
-    def _weigh_serving(self, pixel: Ints32, log_weight: Floats, reading: RadioReading) -> None:
-        flat, table = self.area.flat_level_dbm, self._serving_table
-        cell, weight = reading.serving, reading.serving_weight
-        fingerprint.weigh_by_serving(pixel, flat, self._bands, cell, table, weight, log_weight)
-
-    def _weigh_levels(
-        self,
-        cloud: Cloud,
-        pixel: Ints32,
-        log_weight: Floats,
-        report: LevelReport,
-        length_m: float,
-    ) -> Cloud:
-        """Add the log-likelihood of levels and absent cells; return what hypotheses keep now."""
-        errors, area = self.evidence.levels, self.area
-        memory: LevelMemory | None = cloud.shared
-        weight = errors.weight
+    def _aged(self, cloud: Cloud, reading: RadioReading) -> Cloud:
+        """Return hypotheses with what they keep of the cells' errors, as a reading finds it."""
+        errors, memory, length_m = self.evidence.levels, cloud.shared, reading.length_m
         if memory is None or not self.remember:
-            memory = LevelMemory.empty(errors, area.site_of)
-            kept = memory.start(pixel.size)
-            if not self.remember and length_m > 0:
-                weight *= 1 - exp(-2 * length_m / _NEW_M)
+            memory = LevelMemory.empty(errors, self.area.site_of)
+            kept = memory.start(cloud.state.shape[1])
         else:
             memory, decay = memory.after(length_m)
             keep = exp(-length_m / errors.fault_m)
             kept = decayed(cloud.kept, decay, keep, errors.fault_log_odds)
+        memory, kept = memory.with_cells(
+            np.array([reading.serving][: reading.serving >= 0], np.int32), kept
+        )
+        return Cloud(cloud.state, kept, memory)
+
+    def _weigh_serving(
+        self, cloud: Cloud, pixel: Ints32, log_weight: Floats, reading: RadioReading
+    ) -> None:
+        flat, table = self.area.flat_level_dbm, self._serving_table
+        cell, weight = reading.serving, reading.serving_weight
+        odds = cloud.shared.fault_odds(cell, cloud.kept)
+        other = -self.evidence.serving.fault_nats
+        fingerprint.weigh_by_serving(
+            pixel, flat, self._bands, cell, table, weight, odds, other, log_weight
+        )
+
+    def _weigh_levels(
+        self, cloud: Cloud, pixel: Ints32, log_weight: Floats, reading: RadioReading
+    ) -> Cloud:
+        """Add the log-likelihood of levels and absent cells; return what hypotheses keep now."""
+        errors, area, report = self.evidence.levels, self.area, reading.levels
+        assert report is not None
+        memory, kept, weight = cloud.shared, cloud.kept, errors.weight
+        if not self.remember and reading.length_m > 0:
+            weight *= 1 - exp(-2 * reading.length_m / _NEW_M)
         # Cells that nobody expects say nothing, neither for the belief nor against it.
         report = report._replace(absent=self._expected(pixel, report))
         cells = np.concatenate([report.cell, report.absent])
@@ -353,10 +362,12 @@ class MeasuredMapModel(BayesModel):
         tenths: Bytes = np.minimum(np.rint(10 * more_db), 255).astype(np.uint8).reshape(-1)
         return tenths
 
-    def _weigh_serving(self, pixel: Ints32, log_weight: Floats, reading: RadioReading) -> None:
+    def _weigh_serving(
+        self, cloud: Cloud, pixel: Ints32, log_weight: Floats, reading: RadioReading
+    ) -> None:
         model = self.serving_model
         if model is None:
-            super()._weigh_serving(pixel, log_weight, reading)
+            super()._weigh_serving(cloud, pixel, log_weight, reading)
             return
         found = model.log_serving(reading.serving, pixel)
         if isfinite(reading.timing_advance):
