@@ -58,7 +58,7 @@ MapBelief = ParticleBelief | GridBelief
 _LEAST_LOG_ODDS, _MOST_LOG_ODDS = -12.0, 12.0
 _PRIOR_LOG_ODDS = log(0.05 / 0.95)
 _SERVING_NATS = 0.7
-_MAP_NATS_PER_M = 0.03
+_MAP_NATS_PER_M = 0.04
 _TERMS_FACTOR = 1.5
 _UNKNOWN_NATS = 0.5
 """Log-likelihood, below 0, under the null hypothesis: of a serving cell at full weight, of the map
