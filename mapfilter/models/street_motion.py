@@ -138,7 +138,7 @@ class MapWeights(Options):
 
     sd_m: Positive = 3.0
     weight_per_m: NotNegative = 1 / 12
-    off_cost_per_m: NotNegative = 0.1
+    off_cost_per_m: NotNegative = 0.04
     leave_per_m: NotNegative = 1e-3
     return_per_m: NotNegative = 1e-2
 

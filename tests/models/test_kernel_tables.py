@@ -42,6 +42,7 @@ def log_cdf(x):
 def test_the_usual_options():
     assert asdict(ServingWeights()) == {
         "hysteresis_db": 2.0,
+        "fault_nats": 0.7,
         "sd_db": 9.0,
         "weight_per_m": 1 / 22,
     }
@@ -80,7 +81,7 @@ def test_the_usual_options():
     assert asdict(MapWeights()) == {
         "sd_m": 3.0,
         "weight_per_m": 1 / 12,
-        "off_cost_per_m": 0.1,
+        "off_cost_per_m": 0.04,
         "leave_per_m": 0.001,
         "return_per_m": 0.01,
     }
@@ -122,7 +123,9 @@ def test_a_margin_is_looked_up_at_the_nearest_quarter():
     # The second best is worth its name where there are three cells: the other two are at 0.
     level[:, 4] = np.where(np.array(MARGINS_DB) > 0, 0.0, level[:, 4])
     found, pixel = np.zeros(len(MARGINS_DB)), np.arange(len(MARGINS_DB), dtype=np.int32)
-    fingerprint.weigh_by_serving(pixel, level.ravel(), 5, 1, marked(), 1.0, found)
+    sound = np.full(len(MARGINS_DB), -80.0, dtype=np.float32)
+    given = 5, 1, marked(), 1.0, sound, -0.7
+    fingerprint.weigh_by_serving(pixel, level.ravel(), *given, found)
     np.testing.assert_array_equal(found, PLACES)
 
 

@@ -26,11 +26,13 @@ def raster(seed=0, low=-110.0, high=-50.0):
 EVERY = np.arange(ROWS * COLS, dtype=np.int32)
 
 
-def by_serving(table, cell, weights, weight=1.0):
-    found = np.zeros(EVERY.size)
-    fingerprint.weigh_by_serving(
-        EVERY, table.reshape(-1), BANDS, cell, fingerprint.serving_table(weights), weight, found
-    )
+def by_serving(table, cell, weights, weight=1.0, before=0.0, odds=None):
+    """Log-likelihoods, added to what is there; a fault is next to impossible without its odds."""
+    found = np.full(EVERY.size, before)
+    odds = np.full(EVERY.size, -80.0, dtype=np.float32) if odds is None else odds
+    margins = fingerprint.serving_table(weights)
+    given = BANDS, cell, margins, weight, odds, -weights.fault_nats
+    fingerprint.weigh_by_serving(EVERY, table.reshape(-1), *given, found)
     return found
 
 
@@ -56,11 +58,31 @@ def test_the_best_cell_is_not_compared_with_itself():
 def test_a_serving_weight_is_an_exponent_and_adds_to_what_is_there():
     table, weights = raster(), ServingWeights()
     once = by_serving(table, 2, weights)
-    found = np.full(EVERY.size, -1.0)
-    fingerprint.weigh_by_serving(
-        EVERY, table.reshape(-1), BANDS, 2, fingerprint.serving_table(weights), 0.25, found
-    )
+    found = by_serving(table, 2, weights, 0.25, before=-1.0)
     np.testing.assert_allclose(found, -1.0 + 0.25 * once, rtol=1e-6)
+
+
+def test_a_serving_cell_may_be_at_fault():
+    """The mixture over both, and the odds of the fault given the reading, by Bayes' rule."""
+    table, weights, weight = raster(), ServingWeights(fault_nats=1.1), 0.4
+    prior = np.linspace(0.01, 0.9, EVERY.size)
+    odds = np.log(prior / (1 - prior)).astype(np.float32)
+    found = by_serving(table, 1, weights, weight, odds=odds)
+    sound = np.array([oracle.serving_log_likelihood(row[:CELLS], 1, weights) for row in table])
+    right, wrong = (1 - prior) * np.exp(weight * sound), prior * np.exp(-1.1 * weight)
+    np.testing.assert_allclose(found, np.log(right + wrong), rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(odds, np.clip(np.log(wrong / right), -8, 8), rtol=1e-4, atol=1e-4)
+
+
+def test_readings_against_a_cell_make_its_fault_certain_and_then_cost_the_same_everywhere():
+    table, weights = raster(), ServingWeights()
+    table[:, :CELLS] = [-60.0, -110.0, -110.0, -110.0]
+    table[:, CELLS:] = [-60.0, -110.0]
+    odds = np.full(EVERY.size, -2.75, dtype=np.float32)
+    costs = [by_serving(table, 1, weights, 0.3, odds=odds)[0] for _ in range(12)]
+    assert costs[0] < -0.8
+    np.testing.assert_allclose(costs[-1], -0.3 * weights.fault_nats, rtol=0.01)
+    np.testing.assert_array_equal(odds, 8.0)
 
 
 def test_margins_beyond_the_table_count_as_its_ends():

@@ -104,7 +104,7 @@ class BayesFilter(Options):
     scale: Below1 = 0.03
     map_sd_m: Positive = 3.0
     map_weight_per_m: NotNegative = 1 / 12
-    off_cost_per_m: NotNegative = 0.1
+    off_cost_per_m: NotNegative = 0.04
     levels: bool = True
     level_error_db: Positive = 8.7
     level_correlation_m: Positive = 200.0
@@ -115,8 +115,8 @@ class BayesFilter(Options):
     max_particles: Annotated[int, Ge(100), Le(10_000_000)] = 20_000
     min_search_particles: Particles = 12_000
     min_particles: Particles = 3000
-    switch_mass: Probability = 0.998
-    switch_hold_m: NotNegative = 30.0
+    switch_mass: Probability = 0.995
+    switch_hold_m: NotNegative = 20.0
     smooth: bool = False
     satellite_sd_m: Positive = 2.0
     antenna_height_m: Annotated[float, Ge(-1e4), Le(1e4)] = 100.0
