@@ -48,6 +48,8 @@ def mixed(
     # Beyond the bound the logarithm of one plus the odds is that of the odds.
     beyond = whole - odds if whole > odds else _ZERO
     gained = right + beyond - log32(fine * (_ONE + exp32(before)))
-    after = odds if odds < cap else cap
-    after = after if after > -cap else -cap
+    after = whole if whole < cap else cap
+    # Faults that are next to impossible from the start stay so.
+    least = before if before < -cap else -cap
+    after = after if after > least else least
     return fine, gained, after

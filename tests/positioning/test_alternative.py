@@ -299,7 +299,7 @@ def test_a_reading_adds_the_difference_of_its_log_likelihoods(travelled_m):
     assert odds_after(null, timed, 0.0, -3.0) == pytest.approx(-3.0)
     both = RadioReading(2, 0.5, LEVELS, expected=-2.0)
     assert odds_after(null, both, -6.0, -12.0, 20.0) == pytest.approx(
-        -3.0 + (-6.0 - 0.35 - 0.6 - 3.0) + 12.0
+        -3.0 + (-6.0 - 0.35 - 0.8 - 3.0) + 12.0
     )
 
 
@@ -307,11 +307,11 @@ def test_a_reading_adds_the_difference_of_its_log_likelihoods(travelled_m):
 def test_the_map_counts_by_the_metres_between_readings_of_any_kind(reading):
     """Satellites alone, too, tell that one follows the ways."""
     null = NullHypothesis(-3.0, 55.0)
-    # The map costs 0.03 a metre since the last reading, and 0.2 under the belief.
+    # The map costs 0.04 a metre since the last reading, and 0.2 under the belief.
     now = null.after(reading, 0.0, -0.2, 75.0)
-    assert now.log_odds == pytest.approx(-3.0 - 0.6 + 0.2)
+    assert now.log_odds == pytest.approx(-3.0 - 0.8 + 0.2)
     again = now.after(reading, 0.0, 0.0, 85.0)
-    assert again.log_odds == pytest.approx(now.log_odds - 0.3)
+    assert again.log_odds == pytest.approx(now.log_odds - 0.4)
     assert again.reset().travelled_m == 85.0
 
 
