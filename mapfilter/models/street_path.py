@@ -65,8 +65,8 @@ def weigh_path(
         away, product = off[i], one
         total = _F(0.0)
         for k in range(count + 1):
-            col = np.int32((ends_m[0, i] + east_m[k]) * per_m)
-            row = rows - 1 - np.int32((ends_m[1, i] + north_m[k]) * per_m)
+            col = int((ends_m[0, i] + east_m[k]) * per_m)
+            row = rows - 1 - int((ends_m[1, i] + north_m[k]) * per_m)
             col = min(max(col, 0), cols - 1)
             row = min(max(row, 0), rows - 1)
             away = away * (one - come_back) + (one - away) * leave

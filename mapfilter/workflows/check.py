@@ -93,7 +93,7 @@ class _Checks:
         self.config, self.findings = config, Findings()
         self.plan_name = str(config.surveyed_plan or config.cells.plan or "plan by rule")
         # Layers and tracks replace the map, so that only a box places the rasters.
-        replaced = config.roads.layer is not None or bool(config.roads.tracks.files)
+        replaced = config.roads.replace_map
         self._is_placed = config.area.has_box or (config.area.has_extent and not replaced)
 
     @contextmanager

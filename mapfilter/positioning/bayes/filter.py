@@ -53,6 +53,9 @@ from mapfilter.positioning.gnss.source import FirstFix, GnssSource
 
 _MORE_PARTICLES, _MORE_SEARCHING = 6, 3
 """Factors of the numbers of particles where headings are unknown."""
+_MORE_BY_MAP = 3
+"""Factor of both where the map alone is the evidence, with and without a compass: many places stay
+possible for long."""
 
 
 @dataclass(frozen=True)
@@ -107,8 +110,7 @@ class BayesPositioner(Filter[BayesState]):
 
     @property
     def _by_map_alone(self) -> bool:
-        """Whether the map alone may start a belief: there are no cells, and no grid, which needs a
-        start."""
+        """Whether the map alone may start a belief: there are no cells; a grid needs a start."""
         return not self.area.cell_ids and not self.grid
 
     @cached_property
@@ -124,9 +126,13 @@ class BayesPositioner(Filter[BayesState]):
             grids = {compass: StreetGrid(model, compass) for compass in (True, False)}
             return {compass: GridFilter(grid, known) for compass, grid in grids.items()}
         # Every place times every heading: most of them die out after a few steps.
-        most = _MORE_PARTICLES * known.max_particles
-        searching = _MORE_SEARCHING * known.min_search_particles
+        more = _MORE_BY_MAP if self._by_map_alone else 1
+        most = more * _MORE_PARTICLES * known.max_particles
+        searching = more * _MORE_SEARCHING * known.min_search_particles
         unknown = replace(known, max_particles=most, min_search_particles=searching)
+        if more > 1:
+            most_known, least = more * known.max_particles, more * known.min_search_particles
+            known = replace(known, max_particles=most_known, min_search_particles=least)
         return {
             True: ParticleFilter(self.model, known),
             False: ParticleFilter(self.model, unknown),
@@ -333,7 +339,7 @@ class BayesPositioner(Filter[BayesState]):
             belief=now.belief,
             status=now.status,
             sources=sources,
-            null=now.null,
+            null=null if self._by_map_alone and not now.taken_over else now.null,
             alternative=alternative,
             takeovers=state.takeovers + now.taken_over,
         )
@@ -348,12 +354,18 @@ class BayesPositioner(Filter[BayesState]):
         if started is None:
             return None
         belief, sources = started
+        null = NullHypothesis()
+        if self._by_map_alone:
+            # Many alternatives may follow each other, and each begins with the streets that fit
+            # best: what speaks for a position off the map must not be forgotten with each.
+            null = NullHypothesis(max(state.null.log_odds, null.log_odds))
         return AlternativeHypothesis(
             belief,
             state.reckoning.travelled_m,
             main.log_evidence,
             epoch.time_s,
             sources,
+            null=null,
         )
 
     def _without_compass(self, belief: MapBelief, rng: np.random.Generator) -> MapBelief:

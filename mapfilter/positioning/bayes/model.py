@@ -147,7 +147,11 @@ class BayesModel:
         if prior.path is not None:
             turns = possible_turns_rad(self.motion.bias_sd_rad, compass=prior.compass)
             ends = ends_of_path(self.area, self.weights, prior.path, turns, most, rng)
-            state[EAST : NORTH + 1], state[OFF], log_weight = ends.place_m, ends.off, ends.log_weight
+            state[EAST : NORTH + 1], state[OFF], log_weight = (
+                ends.place_m,
+                ends.off,
+                ends.log_weight,
+            )
             state[BIAS] = wrap_rad(ends.turned_rad - state[TURN])
         biased = rng.random(most) < self.motion.rate_share
         state[RATE] = self.motion.rate_rad_per_m * rng.standard_normal(most) * biased

@@ -57,9 +57,8 @@ def possible_turns_rad(bias_sd_rad: float, *, compass: bool) -> tuple[Floats, Fl
         return 2 * pi * np.arange(count) / count - pi, np.zeros(count), 2 * pi / count
     step_rad = max(min(_BIN_RAD, 0.5 * bias_sd_rad), 1e-6)
     side = ceil(3 * bias_sd_rad / step_rad)
-    turned = step_rad * np.arange(-side, side + 1)
-    prior = -0.5 * (turned / bias_sd_rad) ** 2 if bias_sd_rad > 0 else np.zeros(turned.size)
-    return turned, prior, step_rad
+    turned = step_rad * np.arange(-side, side + 1, dtype=np.float64)
+    return turned, -0.5 * (turned / max(bias_sd_rad, 1e-6)) ** 2, step_rad
 
 
 def ends_of_path(
