@@ -53,9 +53,6 @@ from mapfilter.positioning.gnss.source import FirstFix, GnssSource
 
 _MORE_PARTICLES, _MORE_SEARCHING = 6, 3
 """Factors of the numbers of particles where headings are unknown."""
-_MORE_BY_MAP = 3
-"""Factor of both where the map alone is the evidence, with and without a compass: many places stay
-possible for long."""
 
 
 @dataclass(frozen=True)
@@ -126,13 +123,9 @@ class BayesPositioner(Filter[BayesState]):
             grids = {compass: StreetGrid(model, compass) for compass in (True, False)}
             return {compass: GridFilter(grid, known) for compass, grid in grids.items()}
         # Every place times every heading: most of them die out after a few steps.
-        more = _MORE_BY_MAP if self._by_map_alone else 1
-        most = more * _MORE_PARTICLES * known.max_particles
-        searching = more * _MORE_SEARCHING * known.min_search_particles
+        most = _MORE_PARTICLES * known.max_particles
+        searching = _MORE_SEARCHING * known.min_search_particles
         unknown = replace(known, max_particles=most, min_search_particles=searching)
-        if more > 1:
-            most_known, least = more * known.max_particles, more * known.min_search_particles
-            known = replace(known, max_particles=most_known, min_search_particles=least)
         return {
             True: ParticleFilter(self.model, known),
             False: ParticleFilter(self.model, unknown),

@@ -15,6 +15,7 @@ from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.options import Below1, NotNegative, Options, Positive, Probability
+from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel
@@ -28,10 +29,9 @@ _FAST_OF_SLOW_M = 0.1
 VEHICLE: Mapping[str, float] = {
     "step_sd_m": 0.05,
     "heading_sd_deg": 1.5,
-    "drift_deg_per_sqrt_m": 0.2,
+    "drift_deg_per_sqrt_m": 0.25,
     "scale": 0.02,
     "off_cost_per_m": 0.15,
-    "switch_hold_m": 100.0,
 }
 """Defaults of vehicles, where they differ."""
 _VEHICLE_MOTION: Mapping[str, float] = {
@@ -40,6 +40,13 @@ _VEHICLE_MOTION: Mapping[str, float] = {
     "stretch_sd": 0.02,
 }
 _VEHICLE_LEAVES_PER_M = 3e-4
+
+_MORE_BY_MAP = 3
+_LEAST_HOLD_BY_MAP_M = 100.0
+_CONVERGE_BY_MAP = -7.0
+"""Where the map alone is the evidence: factor of the numbers of particles, as many places stay
+possible for long; least distance for which the switch rule must hold, and largest log odds of the
+null hypothesis, as a path fits streets of another place for some hundred metres."""
 
 Particles = Annotated[int, Ge(10), Le(10_000_000)]
 
@@ -209,6 +216,15 @@ class BayesFilter(Options):
             switch_mass=self.switch_mass,
             switch_hold_m=self.switch_hold_m,
         )
+        rules = AlternativeRules()
+        if not area.cell_ids:
+            rules = replace(rules, converge_log_odds=_CONVERGE_BY_MAP)
+            particles = replace(
+                particles,
+                max_particles=_MORE_BY_MAP * self.max_particles,
+                min_search_particles=_MORE_BY_MAP * self.min_search_particles,
+                switch_hold_m=max(self.switch_hold_m, _LEAST_HOLD_BY_MAP_M),
+            )
         satellites = GnssOptions(
             zenith_m=self.satellite_sd_m,
             height_m=self.antenna_height_m,
@@ -217,6 +233,7 @@ class BayesFilter(Options):
         return BayesPositioner(
             BayesModel(area, motion, weights, evidence),
             particles,
+            rules,
             grid=self.name == "grid",
             satellites=satellites,
             timing=TimingOptions(step_m=self.timing_step_m, advance_sd_m=self.timing_sd_m),
