@@ -120,14 +120,14 @@ def cases(data: Path, folder: Path) -> Iterator[Case]:
             log = as_log(crs, with_errors(perfect(truth), seed), truth)
             yield Case("own", drive, "made", log, everywhere, seed)
     for drive, truth in truths.items():
-        for seed in SEEDS:
+        for seed in SEEDS[:2]:
             motion = turned_about(with_errors(perfect(truth), seed))
             yield Case("turned", drive, "made", as_log(crs, motion, truth), everywhere, seed)
     for drive, truth in truths.items():
         raster = folder / f"{drive}.tif"
         without_piece(data / "roads.tif", truth, raster)
         away = options.over(over_raster(raster, folder / drive))
-        for seed in SEEDS:
+        for seed in SEEDS[:2]:
             log = as_log(crs, with_errors(perfect(truth), seed), truth)
             yield Case("away", drive, "made", log, away, seed)
 

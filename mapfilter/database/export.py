@@ -72,7 +72,7 @@ def export_cog(database: RadioRouteDatabase, path: Path | str) -> None:
 def export_geopackage(
     database: RadioRouteDatabase, path: Path | str, cells: Sequence[str] = ()
 ) -> None:
-    """Write a database as GeoPackage: layers ``points``, ``cells`` if it has any, and one per cell named.
+    """Write a database as GeoPackage: layers ``points`` and, with cells, ``cells`` and those named.
 
     ``path`` ends in .gpkg; an older file is replaced. The points of ``cells``, within the
     database's margin, become a layer each.

@@ -43,6 +43,7 @@ from mapfilter.workflows.terminal import to_jsonable
 from mapfilter.workflows.world import filter_choice, outside_m, plan_antennas, planned_cells
 
 _AWAY_M = 5000.0
+_BY_CELLS = ("candidate", "grid")
 
 
 def check_log(path: Path, log: TrackLog, lattice: Lattice, faults: Faults) -> None:
@@ -356,6 +357,8 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
             pictures = draw_track(database, log, track, into) if drawn else ()
         has_cells = database is None or bool(database.cell_ids)
         lack = lacking(log, track.estimate, cells=has_cells)
+        if lack and not has_cells and config.filter.name in _BY_CELLS:
+            lack = f"the filter {config.filter.name} needs cells to start, the database has none"
         if isinstance(options, KalmanFilter):
             lack = "" if track.estimate.converged_at is not None else "too little was measured"
         if "no motion" in lack and "velocity" in opened.sensors:

@@ -46,7 +46,7 @@ def make_town(seed: int) -> Town:
     pairs = [*zip(number[:-1].ravel(), number[1:].ravel(), strict=True)]
     pairs += zip(number[:, :-1].ravel(), number[:, 1:].ravel(), strict=True)
     kept = tuple((int(a), int(b)) for a, b in pairs if rng.random() > 1 / 6)
-    return Town(grid.reshape(-1, 2) + [WEST_M, SOUTH_M], kept)
+    return Town(grid.reshape(-1, 2) + np.array([WEST_M, SOUTH_M]), kept)
 
 
 def drive(town: Town, seed: int, length_m: float) -> np.ndarray:
@@ -83,7 +83,7 @@ def wander(seed: int, length_m: float) -> np.ndarray:
     bend = np.repeat(rng.uniform(-0.05, 0.05, count // 12 + 1), 12)[:count]
     heading = np.cumsum(bend)
     steps = STEP_M * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
-    return np.cumsum(steps, axis=0) + [WEST_M + SIDE_M / 2, SOUTH_M + SIDE_M / 2]
+    return np.cumsum(steps, axis=0) + np.array([WEST_M, SOUTH_M]) + SIDE_M / 2
 
 
 def odometry(path, seed, *, scale=0.01, walk_deg=0.15, compass_sd_deg=None):

@@ -145,7 +145,9 @@ def test_standing_still_changes_nothing(vehicle):
 
 def test_the_filter_keeps_the_contract(town):
     path = drive(TOWN, 6, 300.0)
-    small = BayesFilter(vehicle=True, max_particles=600, min_search_particles=200, min_particles=100)
+    small = BayesFilter(
+        vehicle=True, max_particles=600, min_search_particles=200, min_particles=100
+    )
     check_filter(small, town, as_log(path, odometry(path, 6)))
 
 

@@ -291,7 +291,8 @@ class BayesPositioner(Filter[BayesState]):
         if reading is None:
             return state, Reason.USED
         update, rules = self.filters[state.compass].update, self.rules
-        doubt = doubted(rules, before, state.null, state.alternative)
+        plain = self._by_map_alone and not state.path.is_distinctive
+        doubt = plain or doubted(rules, before, state.null, state.alternative)
         reading = replace(reading, doubted=doubt or self.area.at_edge(before.summary.mean))
         belief, info = update(before, reading, rng)
         if info.reason is not Reason.USED:
@@ -300,7 +301,8 @@ class BayesPositioner(Filter[BayesState]):
         sources, alternative = state.sources, state.alternative
         if alternative is not None:
             terms = joined(updates, alternative=True) or RadioReading()
-            terms = replace(terms, doubted=alternative.null.log_odds > rules.converge_log_odds)
+            doubt = plain or alternative.null.log_odds > rules.converge_log_odds
+            terms = replace(terms, doubted=doubt)
             other, _ = update(alternative.belief, terms, rng)
             own = _challenged(alternative.null, terms, alternative.belief, other)
             alternative = replace(alternative, belief=other, null=own)

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import ceil, cos, isfinite, sin
+from math import atan2, ceil, cos, isfinite, pi, radians, sin
 
 import numpy as np
 
 from mapfilter._types import Floats32
 from mapfilter.filters.contract import MotionStep
+from mapfilter.geodesy import wrap_rad
 
 LEG_M = 5.0
 """Distance between two points of a path."""
 PATH_M = 50.0
 """Length of a path that a belief starts with."""
+_BEND_RAD = radians(3.0)
+_LEAST_TURNED_RAD = 1.5 * pi
+"""A leg that bends by less is straight; so much turning, as of three right angles, makes a path
+distinctive."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +53,13 @@ class RecentPath:
         Since the path began.
     points : tuple of DeadReckoning
         Oldest first, one leg apart.
+    turned_rad : float
+        Sum of all bends between legs since the path began.
     """
 
     here: DeadReckoning = field(default_factory=DeadReckoning)
     points: tuple[DeadReckoning, ...] = (DeadReckoning(),)
+    turned_rad: float = 0.0
 
     def moved(self, step: MotionStep) -> RecentPath:
         """Add a step; one without a length or heading ends the path, and another begins."""
@@ -60,15 +68,24 @@ class RecentPath:
         if not (isfinite(step.step_m) and isfinite(step.heading_rad)):
             return RecentPath()
         here = self.here.moved(step)
-        points = self.points
-        if here.travelled_m - points[-1].travelled_m >= LEG_M:
-            points = (*points, here)[-ceil(PATH_M / LEG_M) - 1 :]
-        return replace(self, here=here, points=points)
+        if here.travelled_m - self.points[-1].travelled_m < LEG_M:
+            return replace(self, here=here)
+        bend_rad = _bend_rad(self.points[-2], self.points[-1], here) if len(self.points) > 1 else 0
+        points = (*self.points, here)[-ceil(PATH_M / LEG_M) - 1 :]
+        return RecentPath(here, points, self.turned_rad + max(bend_rad - _BEND_RAD, 0.0))
 
     @property
     def whole(self) -> bool:
         """Whether it is long enough for a belief to start with."""
         return self.here.travelled_m - self.points[0].travelled_m >= PATH_M
+
+    @property
+    def is_distinctive(self) -> bool:
+        """Whether it has turned so much that the map alone can tell where it lies.
+
+        A long straight, or the wide curves of a motorway, fit many roads and the gaps of a map.
+        """
+        return self.turned_rad >= _LEAST_TURNED_RAD
 
     @property
     def earlier_m(self) -> Floats32:
@@ -78,3 +95,10 @@ class RecentPath:
             [(point.east_m - here.east_m, point.north_m - here.north_m) for point in self.points],
             dtype=np.float32,
         )
+
+
+def _bend_rad(first: DeadReckoning, middle: DeadReckoning, last: DeadReckoning) -> float:
+    """Return the angle between two legs."""
+    before = atan2(middle.north_m - first.north_m, middle.east_m - first.east_m)
+    after = atan2(last.north_m - middle.north_m, last.east_m - middle.east_m)
+    return abs(float(wrap_rad(after - before)))
