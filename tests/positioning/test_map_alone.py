@@ -145,9 +145,8 @@ def test_standing_still_changes_nothing(vehicle):
 
 def test_the_filter_keeps_the_contract(town):
     path = drive(TOWN, 6, 300.0)
-    small = BayesFilter(
-        vehicle=True, max_particles=600, min_search_particles=200, min_particles=100
-    )
+    few = {"max_particles": 600, "min_search_particles": 200, "min_particles": 100}
+    small = BayesFilter(vehicle=True, **few)
     check_filter(small, town, as_log(path, odometry(path, 6)))
 
 
@@ -185,9 +184,28 @@ def test_a_recent_path_is_that_of_its_steps(steps):
     assert np.allclose((recent.here.east_m, recent.here.north_m), at_m)
     spacing_m = np.diff([point.travelled_m for point in recent.points])
     assert np.all(spacing_m >= LEG_M - 1e-9)
+    assert recent.is_distinctive == (recent.turned_rad >= 1.5 * np.pi)
     assert recent.whole == (gone_m - first.travelled_m >= PATH_M)
     start_m = np.array([first.east_m, first.north_m])
     assert np.allclose(recent.earlier_m[0], start_m - at_m, atol=1e-3)
+
+
+@pytest.mark.parametrize(("corners", "distinctive"), [(3, False), (4, True)])
+def test_a_path_is_distinctive_after_some_right_angles(corners, distinctive):
+    recent = RecentPath()
+    for k in range(60 * (corners + 1)):
+        recent = recent.moved(MotionStep(1.0, np.pi / 2 * (k // 60)))
+    # Of each corner, the 3 degrees of a leg that counts as straight are lost, up to twice.
+    assert recent.turned_rad == pytest.approx(corners * np.pi / 2, abs=corners * 0.11)
+    assert recent.is_distinctive == distinctive
+    assert not recent.moved(MotionStep(np.nan, 0.0)).is_distinctive
+
+
+def test_a_long_drive_along_a_straight_road_is_not_claimed(vehicle):
+    path = np.stack([np.arange(0.0, 1100.0, 2.0), np.zeros(550)], axis=-1)
+    path = path + np.array([455_000.0, 5_430_600.0])
+    _, _, found = located(vehicle, as_log(path, odometry(path, 1)))
+    assert not found.any()
 
 
 def test_possible_turns_cover_the_circle_or_three_deviations():

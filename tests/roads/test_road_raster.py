@@ -72,7 +72,7 @@ def test_a_line_drawn_one_pixel_wide_is_that_line_within_a_pixel(tmp_path):
     centres = shapely.points(2 * col + 1.0, 200 - (2 * row + 1.0))
     path = write(tmp_path / "roads.tif", (shapely.distance(line, centres) <= 1).astype(np.uint8))
     ways = read_raster_ways(path, {"road": 1}, CRS, box(100, 100))
-    placed = shapely.transform(line, lambda at: at + [WEST_M, NORTH_M - 200])
+    placed = shapely.transform(line, lambda at: at + np.array([WEST_M, NORTH_M - 200]))
     assert shapely.hausdorff_distance(shapely.union_all(ways.geometry), placed) < 2.0
     lattice = raster_lattice(path, 5.0)
     assert lattice.bounds_m == box(100, 100)
