@@ -24,7 +24,8 @@ from scipy.special import log_ndtr
 from mapfilter._types import Floats, Ints, Ints32
 from mapfilter.database.store import open_database
 from mapfilter.models.fingerprint import log_serving
-from mapfilter.models.level_errors import LevelMemory, LevelTerms
+from mapfilter.models.level_kernels import LevelTerms
+from mapfilter.models.level_memory import LevelMemory
 from mapfilter.models.street_motion import (
     BIAS,
     EAST,
@@ -131,7 +132,7 @@ class NumpyModel:
         memory, kept = memory.with_cells(cells, kept)
         memory, heard = memory.updated(report, self.model._mean_rough_db2(pixel, report.cell))
         absent, total = memory.absence(report), np.zeros(now.shape[0])
-        held = kept.T.astype(np.float64)
+        held = kept.astype(np.float64)
         for terms, below in ((heard, False), (absent, True)):
             for k in range(terms.cell.size):
                 total += self._one(terms, k, now, rough, held, below=below)

@@ -281,7 +281,7 @@ class GridFilter(Generic[PriorT, ReadingT]):
         off = before.off[bias, row, col] / both[bias, row, col]
         state = self.model.states(row, col, self.model.bias_rad[bias].astype(np.float32), off)
         log_weight = np.zeros(bias.size)
-        nothing = np.empty((bias.size, 0), dtype=np.float32)
+        nothing = np.empty((0, bias.size), dtype=np.float32)
         cloud, reason = self.model.weigh(Cloud(state, nothing), log_weight, reading)
         if reason is not Reason.USED:
             return belief, UpdateInfo(reason, belief.status, int(bias.size))

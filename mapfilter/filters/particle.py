@@ -112,7 +112,7 @@ class Cloud(NamedTuple):
     ----------
     state : ndarray of float32, shape (R, N)
         The first two rows are east and north in the model's frame.
-    kept : ndarray of float32, shape (N, W)
+    kept : ndarray of float32, shape (W, N)
         What each hypothesis keeps besides, such as errors that are summed out; W may be 0.
     shared : object
         What all of them share.
@@ -164,7 +164,7 @@ class ParticleBelief:
         Logarithms of weights, which sum to one after an update.
     bins : Bins
         The area.
-    kept, shared : ndarray of float32, shape (N, W), and object
+    kept, shared : ndarray of float32, shape (W, N), and object
         As in :class:`Cloud`.
     travelled_m : float
         By dead reckoning since the start.
@@ -280,7 +280,8 @@ class ParticleFilter(Generic[PriorT, ReadingT]):
             # Copies keep the part of their weight that they were not chosen by. Rounding may choose
             # the last one though its weight is none.
             chosen_by = np.maximum(weight[chosen], np.finfo(np.float32).tiny)
-            state, kept, log_weight = copies, kept[chosen], log_weight[chosen] - np.log(chosen_by)
+            log_weight = log_weight[chosen] - np.log(chosen_by)
+            state, kept = copies, np.take(kept, chosen, axis=1)
             normalise(log_weight, np.empty(wanted, dtype=np.float32))
         now = replace(
             belief,

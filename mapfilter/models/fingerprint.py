@@ -24,7 +24,7 @@ from mapfilter._types import Floats, Floats32, Ints32
 from mapfilter.options import NotNegative, Options, Positive
 
 _F = np.float32
-_STEPS_PER_SD, _REACH_SD = 32, 8
+STEPS_PER_SD, REACH_SD = 32, 8
 _STEPS_PER_DB, _REACH_DB = 4, 64
 
 
@@ -100,8 +100,8 @@ def serving_table(weights: ServingWeights) -> Floats32:
 
 def bound_table() -> Floats32:
     """Return log Φ at -8 to 8 standard deviations, for the kernel."""
-    steps = _REACH_SD * _STEPS_PER_SD
-    sds = np.arange(-steps, steps + 1) / _STEPS_PER_SD
+    steps = REACH_SD * STEPS_PER_SD
+    sds = np.arange(-steps, steps + 1) / STEPS_PER_SD
     return np.asarray(log_ndtr(sds), dtype=np.float32)
 
 
@@ -141,7 +141,7 @@ def weigh_by_bound(
     cells, censored = bound.cells, bound.censored
     per_db, w, zero = _F(1.0 / bound.sd_db), _F(bound.weight), _F(0.0)
     reported, share = _F(bound.level_dbm), _F(1.0 / cells.size)
-    middle, last = _F(_REACH_SD * _STEPS_PER_SD), _F(2 * _REACH_SD * _STEPS_PER_SD)
+    middle, last = _F(REACH_SD * STEPS_PER_SD), _F(2 * REACH_SD * STEPS_PER_SD)
     width = np.uint32(bands)
     for i in range(pixel.size):
         at = np.uint32(np.uint32(pixel[i]) * width)
@@ -153,7 +153,7 @@ def weigh_by_bound(
                 v = v if v > _F(-4.0) else _F(-4.0)
                 total += exp32(_F(-0.5) * v * v)
             else:
-                place = (v if censored < 0 else -v) * _F(_STEPS_PER_SD) + middle + _F(0.5)
+                place = (v if censored < 0 else -v) * _F(STEPS_PER_SD) + middle + _F(0.5)
                 place = place if place > zero else zero
                 place = place if place < last else last
                 total += exp32(table[np.int32(place)])

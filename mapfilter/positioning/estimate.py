@@ -129,9 +129,8 @@ class StepOutput:
         if tail is None:
             return self
         wide_m = max(tail.radius_m(0.99), float(self.fix.radii_m[-1]))
-        level_m = tail.protection_m(risk)
-        fix = replace(self.fix, radius_99_m=wide_m, protection_m=level_m)
-        return replace(self, fix=fix, tail=tail)
+        fix = replace(self.fix, radius_99_m=wide_m, protection_m=tail.protection_m(risk))
+        return StepOutput(fix, self.evidence, self.unused, tail)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

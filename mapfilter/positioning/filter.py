@@ -187,7 +187,7 @@ def locate(
         if risk != DEFAULT_RISK:
             output = output.protected(output.tail, risk)
         # A tail is as large as a belief.
-        outputs.append(replace(output, tail=None))
+        outputs.append(StepOutput(output.fix, output.evidence, output.unused))
         if smoother is not None:
             smoother.add(before, state)
         if snapshots:
@@ -263,8 +263,8 @@ class _Album:
         self.taken: list[Snapshot] = []
 
     def add(self, state: Any, epoch: Epoch, output: StepOutput) -> None:
-        fix, found = output.fix, self.filter.hypotheses(state)
-        if found is None or not self.open:
+        fix, found = output.fix, self.filter.hypotheses(state) if self.open else None
+        if found is None:
             return
         if self.taken:
             moved = (step.step_m for step in epoch.motion if isfinite(step.step_m))

@@ -215,7 +215,7 @@ def whole_step(
     systematic(weight, rng.random(), chosen)
     copies = np.empty_like(state)
     copy_with_jitter(state, chosen, jitter, draw_key(rng), copies)
-    return np.concatenate([copies, cloud.kept[chosen].T])
+    return np.concatenate([copies, cloud.kept[:, chosen]])
 
 
 def _track(positioner: BayesPositioner, log: TrackLog) -> tuple[float, int]:

@@ -152,7 +152,7 @@ def test_a_place_where_a_cell_was_not_measured_says_less_of_its_level(found, mad
     )
     state = np.zeros((STATES, model.area.points.shape[1]), dtype=np.float32)
     state[:2] = model.area.points
-    cloud = Cloud(state, np.empty((state.shape[1], 0), np.float32))
+    cloud = Cloud(state, np.empty((0, state.shape[1]), np.float32))
     errors = replace(model.evidence.levels, fault_probability=1e-300)
     sound = replace(model, evidence=replace(model.evidence, levels=errors))
 

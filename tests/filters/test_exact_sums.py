@@ -37,7 +37,7 @@ class Chain:
         # In blocks: systematic draws of places in turns would not be independent of the place.
         place = 3 * np.arange(most) // most
         state = np.stack([EAST_M[place], np.full(most, 50.0)]).astype(np.float32)
-        return Cloud(state, np.empty((most, 0), "f4")), np.log(prior[place])
+        return Cloud(state, np.empty((0, most), "f4")), np.log(prior[place])
 
     def move(self, state, log_weight, motion, key):  # noqa: ARG002
         chance = np.random.default_rng(int(key)).random(state.shape[1])

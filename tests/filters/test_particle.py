@@ -34,7 +34,7 @@ class LinearModel:
 
     def start(self, prior, most, rng):
         place = np.array(prior)[:, None] + PRIOR_SD * rng.standard_normal((2, most))
-        cloud = Cloud(place.astype(np.float32), np.empty((most, 0), "f4"))
+        cloud = Cloud(place.astype(np.float32), np.empty((0, most), "f4"))
         return cloud, np.full(most, -np.log(most))
 
     def move(self, state, log_weight, motion, key):

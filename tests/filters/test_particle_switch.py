@@ -25,7 +25,7 @@ class Two:
     def start(self, prior, most, rng):  # noqa: ARG002
         state = np.zeros((3, most), dtype=np.float32)
         state[0, most // 2 :] = 300.0
-        return Cloud(state, np.empty((most, 0), "f4")), np.full(most, float(prior))
+        return Cloud(state, np.empty((0, most), "f4")), np.full(most, float(prior))
 
     def move(self, state, log_weight, motion, key):  # noqa: ARG002
         return state + np.float32(1.0), log_weight
@@ -122,7 +122,7 @@ class Remembering(Two):
 
     def weigh(self, cloud, log_weight, reading):
         cloud, reason = super().weigh(cloud, log_weight, reading)
-        kept = np.stack([cloud.state[0], log_weight.astype("f4")], axis=1)
+        kept = np.stack([cloud.state[0], log_weight.astype("f4")])
         return cloud._replace(kept=kept, shared=(cloud.shared or 0) + 1), reason
 
     def can_converge(self, summary, reading):  # noqa: ARG002
@@ -139,12 +139,12 @@ def test_what_particles_keep_goes_with_them_when_they_are_drawn_anew(mass_expone
     start = filter_.init(0.0, rng)
     after, info = filter_.update(start, 2.0, rng)
     assert info.hypotheses == 40
-    assert after.kept.shape == (40, 2)
-    np.testing.assert_array_equal(after.kept[:, 0], after.state[0])
-    assert set(after.kept[:, 0].tolist()) == {0.0, 300.0}
+    assert after.kept.shape == (2, 40)
+    np.testing.assert_array_equal(after.kept[0], after.state[0])
+    assert set(after.kept[0].tolist()) == {0.0, 300.0}
     # The logarithm of the weight before: two more at the first place.
     gain = np.where(after.state[0] < 150.0, 2.0, 0.0)
-    np.testing.assert_allclose(after.kept[:, 1], gain + start.log_weight[0], rtol=1e-6)
+    np.testing.assert_allclose(after.kept[1], gain + start.log_weight[0], rtol=1e-6)
     assert (start.shared, after.shared) == (None, 1)
     moved, _ = filter_.predict(after, MotionStep(1.0, 0.0), rng)
     assert moved.kept is after.kept

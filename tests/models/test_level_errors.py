@@ -12,16 +12,9 @@ from scipy.stats import norm, truncnorm
 
 from mapfilter.errors import ConfigError
 from mapfilter.models.fingerprint import bound_table
-from mapfilter.models.level_errors import (
-    SLOTS,
-    LevelErrors,
-    LevelMemory,
-    LevelReport,
-    decayed,
-    roughness,
-    weigh_by_absence,
-    weigh_by_levels,
-)
+from mapfilter.models.level_errors import LevelErrors, LevelReport, roughness
+from mapfilter.models.level_kernels import Prediction, decayed, weigh_by_absence, weigh_by_levels
+from mapfilter.models.level_memory import SLOTS, LevelMemory
 
 SITE = np.array([0, 0, 1, 1, 1, 2])
 PIXELS = 30
@@ -54,11 +47,12 @@ def weighed(memory, kept, pixel, table, given, rough_db=None):
     memory, terms = memory.updated(given)
     rough = np.zeros(table.size, np.uint8) if rough_db is None else rough_db.ravel()
     pixel, flat, bands = pixel.astype(np.int32), table.ravel(), table.shape[1]
-    options = errors.roughness, errors.weight, log_weight
-    weigh_by_levels(kept, pixel, flat, rough, bands, terms, *options)
+    predicted = Prediction(flat, rough, bands, errors.roughness)
+    weigh_by_levels(kept, pixel, predicted, terms, errors.weight, log_weight)
     if given.absent.size:
         absent = memory.absence(given)
-        weigh_by_absence(kept, pixel, flat, rough, bands, absent, bound_table(), *options)
+        table, weight = bound_table(), errors.weight
+        weigh_by_absence(kept, pixel, predicted, absent, table, weight, log_weight)
     return memory, kept, log_weight
 
 
@@ -115,7 +109,7 @@ class Walk:
         """The same by the memory."""
         slot, slots = self.memory.slot_of[band], self.memory.slots
         of = [slot, slots + slot, 2 * slots]
-        mean = self.kept[:, of].astype(np.float64).sum(axis=1)
+        mean = self.kept[of].astype(np.float64).sum(axis=0)
         return mean, self.memory.covariance_db2[np.ix_(of, of)].sum()
 
 
@@ -213,7 +207,7 @@ def test_new_cells_in_the_slots_of_others_follow_from_those_that_stay():
         return [*slots, *(of.slots + s for s in slots), 2 * of.slots]
 
     known = memory.covariance_db2[np.ix_(rows(memory, stay), rows(memory, stay))]
-    mean = kept[:, rows(memory, stay)].astype(np.float64)
+    mean = kept[rows(memory, stay)].astype(np.float64).T
     prior = joint_prior(SOUND, site, stay)
     both = joint_prior(SOUND, site, stay + new)
     size, old = len(stay + new), len(stay)
@@ -224,14 +218,14 @@ def test_new_cells_in_the_slots_of_others_follow_from_those_that_stay():
     covariance = np.linalg.inv(precision)
     found = after.covariance_db2[np.ix_(rows(after, stay + new), rows(after, stay + new))]
     np.testing.assert_allclose(found, covariance, rtol=1e-6, atol=1e-8)
-    held = now[:, rows(after, stay + new)]
+    held = now[rows(after, stay + new)].T
     np.testing.assert_allclose(held, shift @ covariance, rtol=1e-4, atol=1e-4)
     # Nothing is known of a fault of the new ones; what is known of the others stays.
     odds = slice(2 * after.slots + 1, None)
     slots = [after.slot_of[band] for band in new]
-    np.testing.assert_allclose(now[:, odds][:, slots], SOUND.fault_log_odds, rtol=1e-6)
+    np.testing.assert_allclose(now[odds][slots], SOUND.fault_log_odds, rtol=1e-6)
     others = [memory.slot_of[band] for band in stay]
-    np.testing.assert_array_equal(now[:, odds][:, others], kept[:, odds][:, others])
+    np.testing.assert_array_equal(now[odds][others], kept[odds][others])
     assert memory.with_cells(np.array([3, 5], np.int32), kept) == (memory, kept)
 
 
@@ -240,9 +234,9 @@ def test_the_memory_before_the_first_report():
     assert (few.slots, few.width, many.slots, many.width) == (6, 19, 24, 73)
     assert few.slot_of == {}
     kept = few.start(3)
-    assert (kept.shape, kept.dtype) == ((3, 19), np.float32)
-    np.testing.assert_array_equal(kept[:, :13], 0.0)
-    np.testing.assert_allclose(kept[:, 13:], log(1e-300), rtol=1e-6)
+    assert (kept.shape, kept.dtype) == ((19, 3), np.float32)
+    np.testing.assert_array_equal(kept[:13], 0.0)
+    np.testing.assert_allclose(kept[13:], log(1e-300), rtol=1e-6)
     assert LevelErrors(fault_probability=0.2).fault_log_odds == pytest.approx(log(0.25))
     total = LevelErrors(slow_db=3.0, fast_db=4.0, white_db=12.0).total_db
     assert total == pytest.approx(13.0)
@@ -327,7 +321,7 @@ def test_one_level_is_the_mixture_over_a_fault(probability):
         )
         assert found[i] == pytest.approx(log(right + wrong) + 0.5 * log(2 * np.pi), abs=2e-4)
         odds = float(np.clip(log(wrong / right), -8, 8))
-        assert kept[i, 13 + slot] == pytest.approx(odds, abs=2e-3)
+        assert kept[13 + slot, i] == pytest.approx(odds, abs=2e-3)
         # Where the level is not the cell's, it says nothing of the errors.
         sure = right / (right + wrong)
         for row, variance in (
@@ -336,25 +330,25 @@ def test_one_level_is_the_mixture_over_a_fault(probability):
             (12, errors.device_db**2),
         ):
             expected = sure * variance / total_db2 * off
-            assert kept[i, row] == pytest.approx(expected, rel=2e-3, abs=2e-3)
+            assert kept[row, i] == pytest.approx(expected, rel=2e-3, abs=2e-3)
     before = log(probability / (1 - probability))
-    assert kept[:, 13 + slot].min() < before - 0.5 < before + 3 < kept[:, 13 + slot].max()
+    assert kept[13 + slot].min() < before - 0.5 < before + 3 < kept[13 + slot].max()
 
 
 def test_a_fault_is_forgotten_over_the_metres_that_it_lasts():
     memory = LevelMemory.empty(FAULTY, SITE)
     kept = memory.start(4)
     usual = log(0.1 / 0.9)
-    kept[:, 13:] = np.array([-8.0, -3.0, 0.5, 8.0], dtype=np.float32)[:, None]
-    kept[:, :13] = np.arange(13.0)
+    kept[13:] = np.array([-8.0, -3.0, 0.5, 8.0], dtype=np.float32)
+    kept[:13] = np.arange(13.0)[:, None]
     _, now = moved(memory, kept, 120.0)
     share = exp(-120 / 300)
     expected = usual + share * (np.array([-8.0, -3.0, 0.5, 8.0]) - usual)
-    np.testing.assert_allclose(now[:, 13:], np.repeat(expected[:, None], 6, axis=1), rtol=1e-5)
+    np.testing.assert_allclose(now[13:], np.tile(expected, (6, 1)), rtol=1e-5)
     decay = [exp(-120 / 150)] * 6 + [exp(-120 / 15)] * 6 + [1.0]
-    np.testing.assert_allclose(now[:, :13], np.tile(np.arange(13) * decay, (4, 1)), rtol=1e-5)
+    np.testing.assert_allclose(now[:13].T, np.tile(np.arange(13) * decay, (4, 1)), rtol=1e-5)
     # Hypotheses keep their own copies.
-    assert kept[0, 12] == 12.0
+    assert kept[12, 0] == 12.0
 
 
 def test_the_odds_of_a_fault_are_bounded_so_that_it_may_end():
@@ -368,8 +362,8 @@ def test_the_odds_of_a_fault_are_bounded_so_that_it_may_end():
         memory, kept, gained = weighed(memory, kept, pixel, table, report({1: -80.0}))
         totals.append(gained)
     slot = 13 + memory.slot_of[1]
-    assert kept[0, slot] < -3
-    assert kept[1, slot] == 8.0
+    assert kept[slot, 0] < -3
+    assert kept[slot, 1] == 8.0
     # Where it is certainly faulty, the level has the likelihood of the other process.
     one = LevelMemory.empty(errors, SITE)
     for _ in range(12):
@@ -406,10 +400,10 @@ def test_a_cell_that_is_off_by_itself_stops_counting_while_others_go_on():
             memory, kept, gained = weighed(memory, kept, pixel, table, report(levels))
             total += float(gained[0])
         error_db = {
-            band: float(kept[0, [slot, 6 + slot, 12]].sum())
+            band: float(kept[[slot, 6 + slot, 12], 0].sum())
             for band, slot in memory.slot_of.items()
         }
-        odds = {band: float(kept[0, 13 + slot]) for band, slot in memory.slot_of.items()}
+        odds = {band: float(kept[13 + slot, 0]) for band, slot in memory.slot_of.items()}
         found[probability] = total, error_db, odds
     (total, error_db, odds), (without, _, _) = found.values()
     assert odds[3] > 3
@@ -436,7 +430,7 @@ def test_roughness_widens_a_level_at_its_pixel():
     off = -74.0 - table[:, 3].astype(float)
     expected = norm.logpdf(off, 0, np.sqrt(variance)) + 0.5 * log(2 * np.pi)
     np.testing.assert_allclose(found, expected, atol=2e-4)
-    held = kept[:, [after.slot_of[3], 6 + after.slot_of[3], 12]].sum(axis=1)
+    held = kept[[after.slot_of[3], 6 + after.slot_of[3], 12]].sum(axis=0)
     np.testing.assert_allclose(held, lasting / variance * off, rtol=1e-3, atol=1e-3)
 
 
@@ -466,7 +460,7 @@ def test_an_absent_cell_is_below_the_limit_and_its_errors_are_those_of_a_truncat
     slot = after.slot_of[2]
     for row, variance in ((slot, 16.0), (6 + slot, 9.0), (12, 4.0)):
         expected = variance / 64.0 * mean_db
-        np.testing.assert_allclose(kept[:, row], expected, rtol=1e-3, atol=2e-4)
+        np.testing.assert_allclose(kept[row], expected, rtol=1e-3, atol=2e-4)
     # Nothing is learnt of the covariance.
     held = after.covariance_db2
     assert (held[slot, slot], held[-1, -1]) == pytest.approx((16.0, 4.0))
@@ -504,9 +498,9 @@ def test_an_absent_cell_may_be_faulty(predicted_dbm):
     rounding = exp(norm.logpdf(edge) - norm.logcdf(edge)) / 64 + 1e-3
     assert found[0] == pytest.approx(log(right + wrong), abs=rounding)
     slot = after.slot_of[1]
-    assert kept[0, 13 + slot] == pytest.approx(log(wrong / right), abs=rounding)
+    assert kept[13 + slot, 0] == pytest.approx(log(wrong / right), abs=rounding)
     mean_db = truncnorm.mean(-np.inf, edge, scale=sd_db) * right / (right + wrong)
-    held = kept[0, [slot, 6 + slot, 12]].sum()
+    held = kept[[slot, 6 + slot, 12], 0].sum()
     assert held == pytest.approx(lasting / sd_db**2 * mean_db, rel=0.03, abs=1e-3)
 
 
@@ -516,10 +510,10 @@ def test_an_absence_that_was_certain_says_nothing_and_an_impossible_one_is_finit
     given = report({}, absent=[0], limit_dbm=-100.0)
     _, kept, found = weighed(memory, memory.start(2), np.arange(2), table, given)
     assert found[0] == pytest.approx(0.0, abs=1e-6)
-    np.testing.assert_array_equal(kept[0, :13], 0.0)
+    np.testing.assert_array_equal(kept[:13, 0], 0.0)
     # Beyond eight deviations the probability is that of eight.
     assert found[1] == pytest.approx(norm.logcdf(-8.0), abs=1e-4)
-    assert np.isfinite(kept[1]).all()
+    assert np.isfinite(kept[:, 1]).all()
 
 
 @pytest.mark.parametrize("resolution_m", [2.5, 5.0, 10.0, 30.0])

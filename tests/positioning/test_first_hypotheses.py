@@ -258,9 +258,9 @@ def test_first_hypotheses_keep_what_the_first_report_says_of_errors(known):
     place = (WEST_M + 40.0, SOUTH_M + 30.0, 12.0) if known else ()
     cloud, _ = MODEL.start(Start(first_reading(), True, *place), 400, np.random.default_rng(7))
     memory, errors = cloud.shared, OPTIONS.levels
-    assert cloud.kept.shape == (400, memory.width)
+    assert cloud.kept.shape == (memory.width, 400)
     white_db2 = errors.white_db**2 + 2 * 25.0 * (1 - exp(-5.0 / 40.0))
-    for one, (row, col) in zip(cloud.kept, pixels(cloud.state), strict=True):
+    for one, (row, col) in zip(cloud.kept.T, pixels(cloud.state), strict=True):
         here = LEVEL_DBM[row, col]
         heard = [(BAND, 0.0, -75.0 - here[BAND], white_db2),
                  (BANDS["D"], 0.0, -90.0 - here[BANDS["D"]], white_db2)]  # fmt: skip

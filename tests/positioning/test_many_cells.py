@@ -6,7 +6,8 @@ import scalar_oracle as oracle
 
 from mapfilter.filters.particle import Cloud
 from mapfilter.geodesy import Lattice
-from mapfilter.models.level_errors import SLOTS, LevelErrors, LevelReport
+from mapfilter.models.level_errors import LevelErrors, LevelReport
+from mapfilter.models.level_memory import SLOTS
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import RadioReading
@@ -60,7 +61,7 @@ def test_reports_count_exactly_while_cells_come_and_go(model):
         level = np.round(4 * rng.uniform(-100, -70, 5)) / 4
         length_m = length_m if cloud is not None else 0.0
         at_m += length_m
-        before = Cloud(state, np.empty((COUNT, 0), "f4")) if cloud is None else cloud
+        before = Cloud(state, np.empty((0, COUNT), "f4")) if cloud is None else cloud
         reading = RadioReading(levels=report(cells, level), length_m=length_m)
         cloud, _ = model.weigh(before._replace(state=state), total, reading)
         for path, r, c in zip(paths, row, col, strict=True):
@@ -78,7 +79,7 @@ def test_of_a_report_of_too_many_cells_the_first_count(model):
     level = np.round(4 * np.random.default_rng(3).uniform(-100, -70, CELLS)) / 4
     found = np.zeros(COUNT)
     reading = RadioReading(levels=report(cells, level))
-    cloud, _ = model.weigh(Cloud(state, np.empty((COUNT, 0), "f4")), found, reading)
+    cloud, _ = model.weigh(Cloud(state, np.empty((0, COUNT), "f4")), found, reading)
     assert set(cloud.shared.slot_of) == set(cells[:SLOTS].tolist())
     for value, r, c in zip(found, row, col, strict=True):
         levels = [(int(cell), 0.0, level[k] - float(LEVEL_DBM[r, c, cell]), 9.0)
@@ -96,7 +97,7 @@ def test_absent_cells_that_are_expected_most_count_first(model):
 
     def held(limit_dbm):
         given = report(heard, [-75.0, -80.0, -71.5], absent, limit_dbm)
-        cloud = Cloud(state, np.empty((200, 0), "f4"))
+        cloud = Cloud(state, np.empty((0, 200), "f4"))
         cloud, _ = model.weigh(cloud, np.zeros(200), RadioReading(levels=given))
         share = (LEVEL_DBM[row, col][:, absent] > limit_dbm).mean(axis=0)
         return set(cloud.shared.slot_of) - set(heard.tolist()), share
@@ -122,7 +123,7 @@ def test_levels_of_faulty_and_absent_cells_make_the_null_hypothesis_of_a_report(
     absent = [4, 5] if SLOTS < CELLS else []
     given = report([1, 2], [-70.0, -95.0], absent, -110.0)
     reading = RadioReading(levels=given)
-    cloud, _ = weighted.weigh(Cloud(state, np.empty((COUNT, 0), "f4")), np.zeros(COUNT), reading)
+    cloud, _ = weighted.weigh(Cloud(state, np.empty((0, COUNT), "f4")), np.zeros(COUNT), reading)
     alone = sum(oracle.other_log_density([(0.0, level)], errors) for level in (-70.0, -95.0))
     expected = alone + 2 * np.log(0.7)
     assert cloud.shared.other_log_likelihood == pytest.approx(0.4 * expected, rel=1e-5)

@@ -203,7 +203,7 @@ def test_a_serving_cell_that_the_map_lacks_weighs_all_hypotheses_alike(cell):
     assert after is moved
     assert (reading.serving, reading.levels, reading.bounds) == (-1, None, ())
     assert reading.serving_weight == pytest.approx(9.0 * 0.04)
-    log_weight, cloud = np.full(50, -2.0), Cloud(hypotheses(50), np.empty((50, 0), "f4"))
+    log_weight, cloud = np.full(50, -2.0), Cloud(hypotheses(50), np.empty((0, 50), "f4"))
     assert BayesModel(AREA, evidence=OPTIONS).weigh(cloud, log_weight, reading) == (
         cloud, Reason.USED,
     )  # fmt: skip
@@ -338,7 +338,7 @@ def test_whole_reports_have_the_likelihood_of_the_oracle():
     reports = []
     for index, (at_m, reading, report) in enumerate(four_reports()):
         state = hypotheses(200, seed=21 + index)
-        before = Cloud(state, np.empty((200, 0), "f4")) if cloud is None else cloud
+        before = Cloud(state, np.empty((0, 200), "f4")) if cloud is None else cloud
         log_weight = np.full(200, -3.0)
         cloud, reason = model.weigh(before._replace(state=state), log_weight, reading)
         assert reason is Reason.USED
@@ -375,7 +375,7 @@ def test_what_is_not_remembered_counts_by_what_is_new_in_it():
     model = BayesModel(AREA, evidence=OPTIONS, remember=False)
     levels = replace(OPTIONS, serving=replace(OPTIONS.serving, weight_per_m=0.0))
     used, first, _, _ = read(serving("A", -70.0), named("C", -82.0), options=levels)
-    state, nothing = hypotheses(), np.empty((500, 0), "f4")
+    state, nothing = hypotheses(), np.empty((0, 500), "f4")
     log_weight = np.zeros(500)
     cloud, _ = model.weigh(Cloud(state, nothing), log_weight, first)
     for gone_m in (6.0, 40.0, 500.0):
@@ -394,7 +394,7 @@ def test_where_the_prediction_is_rough_levels_count_less():
     _, reading, _, _ = read(serving("A", -70.0), options=rough)
     reading = replace(reading, serving=-1)
     state, log_weight = hypotheses(300), np.zeros(300)
-    BayesModel(AREA, evidence=rough).weigh(Cloud(state, np.empty((300, 0), "f4")), log_weight,
+    BayesModel(AREA, evidence=rough).weigh(Cloud(state, np.empty((0, 300), "f4")), log_weight,
                                            reading)  # fmt: skip
     errors = rough.levels
     variance = errors.slow_db**2 + errors.fast_db**2 + errors.white_db**2 + errors.device_db**2
@@ -420,7 +420,7 @@ def test_a_fix_is_a_clipped_gaussian_about_its_place(fix, covariance):
     log_weight = np.zeros(50)
     update = FirstFix(AREA.origin_m).first(Epoch(0.0, fix=fix))
     reading = RadioReading(terms=update.terms)
-    _, reason = BayesModel(AREA).weigh(Cloud(state, np.empty((50, 0), "f4")), log_weight, reading)
+    _, reason = BayesModel(AREA).weigh(Cloud(state, np.empty((0, 50), "f4")), log_weight, reading)
     assert reason is Reason.USED
     for east, north in state[:2].T.astype(float):
         off = np.array([east - 40.0, north - 30.0])

@@ -242,20 +242,21 @@ class BayesPositioner(Filter[BayesState]):
         """Ask all sources for their evidence; return the state with theirs, and the evidence."""
         history = state.sources[self._radio.name]
         due = bool(epoch.radio) and self._radio.due(history, state.reckoning.travelled_m)
-        context, updates = Context(particle_spacing_m, due), []
+        context, updates, states = Context(particle_spacing_m, due), [], {}
         for source in self.sources:
             if state.belief is None:
                 update = source.first_after(state, epoch)
             else:
                 update = source.update(state, epoch, context)
             updates.append(update)
-            state = replace(
-                state,
-                sources={**state.sources, source.name: update.state},
-                belief=update.belief or state.belief,
-                alternative=update.alternative or state.alternative,
-            )
-        return state, updates
+            states[source.name] = update.state
+            if update.belief or update.alternative:
+                state = replace(
+                    state,
+                    belief=update.belief or state.belief,
+                    alternative=update.alternative or state.alternative,
+                )
+        return replace(state, sources=states), updates
 
     def _started(
         self,
@@ -375,7 +376,7 @@ class BayesPositioner(Filter[BayesState]):
             return replace(belief, on=on, off=off, model=grid)
         state = self.model.any_heading(belief.state, _MORE_PARTICLES, rng)
         log_weight = np.tile(belief.log_weight, _MORE_PARTICLES) - np.log(_MORE_PARTICLES)
-        kept = np.tile(belief.kept, (_MORE_PARTICLES, 1))
+        kept = np.tile(belief.kept, (1, _MORE_PARTICLES))
         return replace(belief, state=state, log_weight=log_weight, kept=kept)
 
 

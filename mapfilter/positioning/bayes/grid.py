@@ -68,7 +68,7 @@ class StreetGrid:
             log_weight -= (dx**2 + dy**2) / (2 * prior.sd_m**2)
             on_map = np.full(on_map.shape, 1 / row.size)
         if prior.reading is not None:
-            self.weigh(Cloud(state, np.empty((row.size, 0), np.float32)), log_weight, prior.reading)
+            self.weigh(Cloud(state, np.empty((0, row.size), np.float32)), log_weight, prior.reading)
         likely = np.exp(log_weight - log_weight.max()).reshape(on_map.shape)
         bias = np.ones(self.bias_rad.size)
         if self.compass and self.model.motion.bias_sd_rad > 0:

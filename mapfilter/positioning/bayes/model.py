@@ -21,13 +21,9 @@ from mapfilter.filters.particle import Cloud
 from mapfilter.filters.resampling import systematic
 from mapfilter.geodesy import wrap_rad
 from mapfilter.models import fingerprint
-from mapfilter.models.level_errors import (
-    LevelMemory,
-    LevelReport,
-    decayed,
-    weigh_by_absence,
-    weigh_by_levels,
-)
+from mapfilter.models.level_errors import LevelReport
+from mapfilter.models.level_kernels import Prediction, decayed, weigh_by_absence, weigh_by_levels
+from mapfilter.models.level_memory import LevelMemory
 from mapfilter.models.measured_map import ServingStatistics
 from mapfilter.models.street_motion import (
     BIAS,
@@ -305,13 +301,11 @@ class BayesModel:
             report = report._replace(cell=report.cell[slotted], level_dbm=report.level_dbm[slotted])
         memory, terms = memory.updated(report, self._mean_rough_db2(pixel, report.cell))
         absent = memory.absence(report)
-        flat, rough, bands = area.flat_level_dbm, self.rough_db(), self._bands
-        share, table = errors.roughness, self._bound_table
-        weigh_by_levels(kept, pixel, flat, rough, bands, terms, share, weight, log_weight)
+        predicted = Prediction(area.flat_level_dbm, self.rough_db(), self._bands, errors.roughness)
+        weigh_by_levels(kept, pixel, predicted, terms, weight, log_weight)
         if absent.cell.size:
-            weigh_by_absence(
-                kept, pixel, flat, rough, bands, absent, table, share, weight, log_weight
-            )
+            table = self._bound_table
+            weigh_by_absence(kept, pixel, predicted, absent, table, weight, log_weight)
         other = weight * (float(terms.other.sum()) + float(absent.other.sum()))
         memory = replace(memory, other_log_likelihood=other)
         return Cloud(cloud.state, kept, memory)
@@ -340,7 +334,7 @@ def _sample(pixel: Ints32) -> Ints32:
 
 
 def _new(state: Floats32) -> Cloud:
-    return Cloud(state, np.empty((state.shape[1], 0), dtype=np.float32))
+    return Cloud(state, np.empty((0, state.shape[1]), dtype=np.float32))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,201 @@
+"""Compiled kernels of :mod:`mapfilter.models.level_errors`: levels and absent cells as evidence.
+
+Hypotheses go through in blocks that stay in the cache; within a block each loop runs over its
+hypotheses, so that the arithmetic is vectorised. What hypotheses keep has shape (W, N): a row for
+each slot's slow error, each fast one, that of the device, then the log odds of each slot's fault.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from mapfilter._kernels import exp32, log32
+from mapfilter._types import Bytes, Floats, Floats32, Ints32
+from mapfilter.models.fingerprint import REACH_SD, STEPS_PER_SD
+
+LOG_ODDS, MOST_LOG_ODDS = 20.0, 8.0
+"""Bounds of the log odds of a fault: of a report's, and of those that hypotheses keep."""
+
+_F = np.float32
+_BLOCK = 256
+_HALF, _ONE, _ZERO = _F(0.5), _F(1.0), _F(0.0)
+_LOG_ROOT_TWO_PI = _F(0.9189385)
+
+
+class LevelTerms(NamedTuple):
+    """One report prepared for :func:`weigh_by_levels` or :func:`weigh_by_absence`.
+
+    ``gain`` (K, 2S + 1) and ``variance_db2`` (K,) are those of sequential Kalman updates;
+    ``other`` (K,) the log-likelihoods of the levels if the prediction is wrong.
+    """
+
+    cell: Ints32
+    slot: Ints32
+    level_dbm: Floats32
+    gain: Floats32
+    variance_db2: Floats32
+    other: Floats32
+
+
+class Prediction(NamedTuple):
+    """Predicted levels and their roughness (tenths of a dB), flat over pixels and ``bands``.
+
+    ``share`` of the local variance is added to that of an innovation.
+    """
+
+    level_dbm: Floats32
+    rough_db: Bytes
+    bands: int
+    share: float
+
+
+@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+def decayed(kept: Floats32, decay: Floats32, fault_keep: float, fault_log_odds: float) -> Floats32:
+    """Return what hypotheses keep, (W, N), after a distance."""
+    now = np.empty_like(kept)
+    means = decay.size
+    keep, usual = _F(fault_keep), _F(fault_log_odds)
+    for d in range(means):
+        factor = decay[d]
+        for i in range(kept.shape[1]):
+            now[d, i] = factor * kept[d, i]
+    for d in range(means, kept.shape[0]):
+        for i in range(kept.shape[1]):
+            now[d, i] = usual + (kept[d, i] - usual) * keep
+    return now
+
+
+@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+def weigh_by_levels(
+    kept: Floats32,
+    pixel: Ints32,
+    predicted: Prediction,
+    terms: LevelTerms,
+    weight: float,
+    log_weight: Floats,
+) -> None:
+    """Add the log-likelihood of levels to weights and update what hypotheses keep, in place."""
+    means = terms.gain.shape[1]
+    slots = (means - 1) // 2
+    share, w = _F(0.01 * predicted.share), _F(weight)
+    innovation, more = np.empty(_BLOCK, np.float32), np.empty(_BLOCK, np.float32)
+    total = np.empty(_BLOCK, np.float32)
+    width = np.uint32(predicted.bands)
+    for first in range(0, pixel.size, _BLOCK):
+        count = min(_BLOCK, pixel.size - first)
+        total[:] = _ZERO
+        for k in range(terms.cell.size):
+            s, cell = terms.slot[k], np.uint32(terms.cell[k])
+            for j in range(count):
+                at = np.uint32(np.uint32(pixel[first + j]) * width) + cell
+                rough = _F(predicted.rough_db[at])
+                innovation[j] = predicted.level_dbm[at]
+                more[j] = share * rough * rough
+            slow, fast = kept[s, first:], kept[slots + s, first:]
+            device, odds = kept[means - 1, first:], kept[means + s, first:]
+            level, own, other = terms.level_dbm[k], terms.variance_db2[k], terms.other[k]
+            for j in range(count):
+                v = level - innovation[j] - slow[j] - fast[j] - device[j]
+                variance = own + more[j]
+                per = _ONE / variance
+                right = -_HALF * (v * v * per + log32(variance))
+                fine, gained, odds[j] = _mixed(odds[j], other, right)
+                total[j] += gained
+                innovation[j] = fine * v * own * per
+            _corrected(kept, first, count, terms.gain[k], innovation)
+        for j in range(count):
+            log_weight[first + j] += w * total[j]
+
+
+@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+def weigh_by_absence(
+    kept: Floats32,
+    pixel: Ints32,
+    predicted: Prediction,
+    terms: LevelTerms,
+    table: Floats32,
+    weight: float,
+    log_weight: Floats,
+) -> None:
+    """Add the log-likelihood that cells are below a level, and update as above, in place.
+
+    ``table`` is that of :func:`mapfilter.models.fingerprint.bound_table`. Means move to those of
+    the truncated normal distribution.
+    """
+    means = terms.gain.shape[1]
+    slots = (means - 1) // 2
+    share, w = _F(0.01 * predicted.share), _F(weight)
+    middle, last = _F(REACH_SD * STEPS_PER_SD) + _HALF, _F(2 * REACH_SD * STEPS_PER_SD)
+    below, per_sd = np.empty(_BLOCK, np.float32), np.empty(_BLOCK, np.float32)
+    right, total = np.empty(_BLOCK, np.float32), np.empty(_BLOCK, np.float32)
+    place = np.empty(_BLOCK, np.int32)
+    width = np.uint32(predicted.bands)
+    for first in range(0, pixel.size, _BLOCK):
+        count = min(_BLOCK, pixel.size - first)
+        total[:] = _ZERO
+        for k in range(terms.cell.size):
+            s, cell = terms.slot[k], np.uint32(terms.cell[k])
+            for j in range(count):
+                at = np.uint32(np.uint32(pixel[first + j]) * width) + cell
+                rough = _F(predicted.rough_db[at])
+                below[j] = predicted.level_dbm[at]
+                per_sd[j] = share * rough * rough
+            slow, fast = kept[s, first:], kept[slots + s, first:]
+            device, odds = kept[means - 1, first:], kept[means + s, first:]
+            limit, own, other = terms.level_dbm[k], terms.variance_db2[k], terms.other[k]
+            for j in range(count):
+                per = _ONE / np.sqrt(own + per_sd[j])
+                z = (limit - below[j] - slow[j] - fast[j] - device[j]) * per
+                at_step = z * _F(STEPS_PER_SD) + middle
+                at_step = at_step if at_step > _ZERO else _ZERO
+                at_step = at_step if at_step < last else last
+                below[j], per_sd[j], place[j] = z, per, np.int32(at_step)
+            for j in range(count):
+                right[j] = table[np.uint32(place[j])]
+            for j in range(count):
+                fine, gained, odds[j] = _mixed(odds[j], other, right[j])
+                total[j] += gained
+                # Above six deviations the truncation moves nothing, and the density is none.
+                z = below[j] if below[j] > _F(-8.0) else _F(-8.0)
+                hazard = exp32(-_HALF * z * z - _LOG_ROOT_TWO_PI - right[j])
+                hazard = hazard if z < _F(6.0) else _ZERO
+                below[j] = -fine * hazard * own * per_sd[j]
+            _corrected(kept, first, count, terms.gain[k], below)
+        for j in range(count):
+            log_weight[first + j] += w * total[j]
+
+
+@njit(inline="always")
+def _mixed(
+    before: np.float32, other: np.float32, right: np.float32
+) -> tuple[np.float32, np.float32, np.float32]:
+    """Mix the likelihoods of a level with and without a fault.
+
+    Returns the probability that the cell is fine, the log-likelihood, and the new log odds of a
+    fault.
+    """
+    most, cap = _F(LOG_ODDS), _F(MOST_LOG_ODDS)
+    whole = before + other - right
+    odds = whole if whole < most else most
+    odds = odds if odds > -most else -most
+    fine = _ONE / (_ONE + exp32(odds))
+    # Beyond the bound the logarithm of one plus the odds is that of the odds.
+    beyond = whole - odds if whole > odds else _ZERO
+    gained = right + beyond - log32(fine * (_ONE + exp32(before)))
+    after = odds if odds < cap else cap
+    after = after if after > -cap else -cap
+    return fine, gained, after
+
+
+@njit(inline="always")
+def _corrected(kept: Floats32, first: int, count: int, gain: Floats32, step: Floats32) -> None:
+    """Add the gains times the steps of a block of hypotheses to the means, in place."""
+    for d in range(gain.size):
+        by = gain[d]
+        if by != _ZERO:
+            row = kept[d, first:]
+            for j in range(count):
+                row[j] += by * step[j]

@@ -1,0 +1,245 @@
+"""What a belief knows of the errors of predicted levels, after the reports so far.
+
+A Kalman filter over the errors of :mod:`mapfilter.models.level_errors`. Its covariance is shared by
+all hypotheses of a belief; the means and the odds of faults are theirs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import exp, log
+
+import numpy as np
+
+from mapfilter._types import Floats, Floats32, Ints, Ints32
+from mapfilter.models.level_errors import LevelErrors, LevelReport
+from mapfilter.models.level_kernels import LevelTerms
+
+SLOTS = 24
+"""Most cells whose errors are estimated at a time."""
+
+_ABSENT_BY_FAULT = log(0.7)
+_OTHER_DBM, _OTHER_SD_DB, _OTHER_M = -90.0, 15.0, 150.0
+_NEGLIGIBLE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class LevelMemory:
+    """What all hypotheses of a belief share of the errors of levels.
+
+    A slot is for one cell. The errors are ordered: slow ones of all slots, fast ones of all slots,
+    the device's.
+
+    Parameters
+    ----------
+    errors : LevelErrors
+        How large they are.
+    site : ndarray of int, shape (C,)
+        Number of each band's site.
+    band : ndarray of int32, shape (S,)
+        Band of each slot; -1 for none yet.
+    prior_db2, covariance_db2 : ndarray, shape (2S + 1, 2S + 1)
+        Covariance of the errors before any level, and given the levels so far.
+    other_dbm, other_db2 : ndarray, shape (S,)
+        Mean and variance of the next level of a cell that the prediction is wrong about.
+    used : ndarray of int, shape (S,)
+        Number of the report that last used a slot.
+    reports : int
+        Reports so far.
+    other_log_likelihood : float
+        Of the last report, if the prediction is wrong about all of its cells.
+    """
+
+    errors: LevelErrors
+    site: Ints
+    band: Ints32
+    prior_db2: Floats
+    covariance_db2: Floats
+    other_dbm: Floats
+    other_db2: Floats
+    used: Ints
+    reports: int = 0
+    other_log_likelihood: float = 0.0
+
+    @classmethod
+    def empty(cls, errors: LevelErrors, site: Ints) -> LevelMemory:
+        """Return the memory before the first report, with as many slots as cells up to a limit."""
+        slots = min(site.size, SLOTS)
+        covariance = np.zeros((2 * slots + 1, 2 * slots + 1))
+        covariance[-1, -1] = errors.device_db**2
+        return cls(
+            errors,
+            site,
+            np.full(slots, -1, dtype=np.int32),
+            covariance,
+            covariance,
+            np.full(slots, _OTHER_DBM),
+            np.full(slots, _OTHER_SD_DB**2),
+            np.full(slots, -1),
+        )
+
+    @property
+    def slots(self) -> int:
+        """Number of slots."""
+        return self.band.size
+
+    @property
+    def width(self) -> int:
+        """Numbers that each hypothesis keeps: means of errors, then log odds of faults."""
+        return 3 * self.slots + 1
+
+    @property
+    def slot_of(self) -> dict[int, int]:
+        """Slot of each band that has one."""
+        return {band: slot for slot, band in enumerate(self.band.tolist()) if band >= 0}
+
+    def start(self, count: int) -> Floats32:
+        """Return what hypotheses keep before the first report, shape (width, count)."""
+        kept = np.zeros((self.width, count), dtype=np.float32)
+        kept[2 * self.slots + 1 :] = self.errors.fault_log_odds
+        return kept
+
+    def correlation(self, one: Ints32, other: Ints32) -> Floats:
+        """Return the correlation of the errors of two lists of bands before any level."""
+        own = 1 - self.errors.site_share - self.errors.common_share
+        same_site = self.site[one][:, None] == self.site[other][None, :]
+        same = one[:, None] == other[None, :]
+        found = self.errors.common_share + self.errors.site_share * same_site + own * same
+        return np.asarray(found, dtype=np.float64)
+
+    def with_cells(self, bands: Ints32, kept: Floats32) -> tuple[LevelMemory, Floats32]:
+        """Give cells slots; those unused for longest lose theirs.
+
+        The errors of new cells are expected from those of the others, by their correlation. Returns
+        the memory and what the hypotheses keep, (width, N).
+        """
+        slot_of = self.slot_of
+        wanted = [band for band in bands.tolist() if band not in slot_of]
+        held = [slot_of[band] for band in bands.tolist() if band in slot_of]
+        if not wanted:
+            return self, kept
+        order = [slot for slot in np.lexsort((self.band >= 0, self.used)) if slot not in held]
+        at = np.array(order[: len(wanted)], dtype=np.intp)
+        band = self.band.copy()
+        band[at] = wanted[: at.size]
+        rest = np.array([s for s in np.flatnonzero(self.band >= 0) if s not in at], dtype=np.intp)
+        slots = self.slots
+        # Slow and fast errors have the same correlations, so one regression serves both.
+        by: Floats = np.zeros((at.size, rest.size))
+        if rest.size:
+            known = self.correlation(band[rest], band[rest])
+            by = np.asarray(np.linalg.solve(known, self.correlation(band[rest], band[at])).T)
+        left = self.correlation(band[at], band[at])
+        if rest.size:
+            left = left - by @ self.correlation(band[rest], band[at])
+        turn, noise = np.eye(2 * slots + 1), np.zeros((2 * slots + 1, 2 * slots + 1))
+        for part, sd_db in ((0, self.errors.slow_db), (slots, self.errors.fast_db)):
+            turn[part + at] = 0.0
+            turn[np.ix_(part + at, part + rest)] = by
+            noise[np.ix_(part + at, part + at)] = sd_db**2 * left
+        prior = np.zeros_like(self.prior_db2)
+        held_now = np.flatnonzero(band >= 0)
+        correlation = self.correlation(band[held_now], band[held_now])
+        prior[np.ix_(held_now, held_now)] = self.errors.slow_db**2 * correlation
+        prior[np.ix_(slots + held_now, slots + held_now)] = self.errors.fast_db**2 * correlation
+        prior[-1, -1] = self.errors.device_db**2
+        kept = kept.copy()
+        for part in (0, slots):
+            kept[part + at] = by.astype(np.float32) @ kept[part + rest]
+        kept[2 * slots + 1 + at] = self.errors.fault_log_odds
+        other_dbm, other_db2, used = self.other_dbm.copy(), self.other_db2.copy(), self.used.copy()
+        other_dbm[at], other_db2[at], used[at] = _OTHER_DBM, _OTHER_SD_DB**2, self.reports
+        return replace(
+            self,
+            band=band,
+            prior_db2=prior,
+            covariance_db2=turn @ self.covariance_db2 @ turn.T + noise,
+            other_dbm=other_dbm,
+            other_db2=other_db2,
+            used=used,
+        ), kept
+
+    def after(self, length_m: float) -> tuple[LevelMemory, Floats32]:
+        """Return the memory after a distance, and the factor of each mean, shape (2S + 1,)."""
+        errors, slots = self.errors, self.slots
+        decay = np.ones(2 * slots + 1)
+        decay[:slots], decay[slots:-1] = (
+            exp(-length_m / errors.slow_m),
+            exp(-length_m / errors.fast_m),
+        )
+        both = np.outer(decay, decay)
+        keep = exp(-length_m / _OTHER_M)
+        return replace(
+            self,
+            covariance_db2=self.covariance_db2 * both + self.prior_db2 * (1 - both),
+            other_dbm=_OTHER_DBM + (self.other_dbm - _OTHER_DBM) * keep,
+            other_db2=_OTHER_SD_DB**2 + (self.other_db2 - _OTHER_SD_DB**2) * keep**2,
+        ), decay.astype(np.float32)
+
+    def updated(
+        self, report: LevelReport, rough_db2: Floats | None = None
+    ) -> tuple[LevelMemory, LevelTerms]:
+        """Return the memory after the levels of a report whose cells have slots, and its terms.
+
+        Where the prediction is wrong about a cell, its level is what it was before, with the same
+        fast and white errors as else, and with ``rough_db2`` (K,), what the roughness of the
+        prediction adds to the variance on average.
+        """
+        slot_of, slots = self.slot_of, self.slots
+        slot = np.array([slot_of[band] for band in report.cell.tolist()], dtype=np.int32)
+        covariance = self.covariance_db2.copy()
+        white_db2 = self.errors.white_db**2 + report.offset_db**2
+        gain = np.zeros((slot.size, 2 * slots + 1))
+        variance, other = np.zeros(slot.size), np.zeros(slot.size)
+        rough_db2 = np.zeros(slot.size) if rough_db2 is None else rough_db2
+        other_white_db2 = white_db2 + 0.5 * self.errors.fast_db**2 + rough_db2
+        other_dbm, other_db2, used = self.other_dbm.copy(), self.other_db2.copy(), self.used.copy()
+        for k, (s, level_dbm) in enumerate(zip(slot, report.level_dbm, strict=True)):
+            column = covariance[:, s] + covariance[:, slots + s] + covariance[:, -1]
+            variance[k] = column[s] + column[slots + s] + column[-1] + white_db2
+            gain[k] = column / variance[k]
+            covariance -= np.outer(gain[k], column)
+            off_dbm, off_db2 = level_dbm - other_dbm[s], other_db2[s] + other_white_db2[k]
+            other[k] = -0.5 * off_dbm**2 / off_db2 - 0.5 * log(off_db2)
+            other_dbm[s] += other_db2[s] / off_db2 * off_dbm
+            other_db2[s] *= 1 - other_db2[s] / off_db2
+        gain[np.abs(gain) < _NEGLIGIBLE / 10] = 0.0
+        used[slot] = self.reports
+        memory = replace(
+            self,
+            covariance_db2=covariance,
+            other_dbm=other_dbm,
+            other_db2=other_db2,
+            used=used,
+            reports=self.reports + 1,
+        )
+        terms = LevelTerms(
+            report.cell,
+            slot,
+            report.level_dbm,
+            gain.astype(np.float32),
+            variance.astype(np.float32),
+            other.astype(np.float32),
+        )
+        return memory, terms
+
+    def absence(self, report: LevelReport) -> LevelTerms:
+        """Return the terms of absent cells that have slots; levels are the limit."""
+        slot_of, slots = self.slot_of, self.slots
+        held = [(band, slot_of[band]) for band in report.absent.tolist() if band in slot_of]
+        cell, slot = np.array(held, dtype=np.int32).reshape(-1, 2).T.copy()
+        covariance = self.covariance_db2
+        column = covariance[:, slot] + covariance[:, slots + slot] + covariance[:, -1:]
+        at = np.arange(slot.size)
+        variance = column[slot, at] + column[slots + slot, at] + column[-1, at]
+        variance += self.errors.white_db**2 + report.offset_db**2 + self.errors.absent_db**2
+        gain = (column / variance).T
+        gain[np.abs(gain) < _NEGLIGIBLE] = 0.0
+        return LevelTerms(
+            cell,
+            slot,
+            np.full(cell.size, report.limit_dbm, dtype=np.float32),
+            np.ascontiguousarray(gain, dtype=np.float32),
+            variance.astype(np.float32),
+            np.full(cell.size, _ABSENT_BY_FAULT, dtype=np.float32),
+        )
