@@ -42,8 +42,8 @@ _VEHICLE_MOTION: Mapping[str, float] = {
 _VEHICLE_LEAVES_PER_M = 3e-4
 
 _MORE_BY_MAP = 3
-_LEAST_HOLD_BY_MAP_M = 100.0
-_CONVERGE_BY_MAP = -7.0
+_LEAST_HOLD_BY_MAP_M = 200.0
+_CONVERGE_BY_MAP = -8.0
 """Where the map alone is the evidence: factor of the numbers of particles, as many places stay
 possible for long; least distance for which the switch rule must hold, and largest log odds of the
 null hypothesis, as a path fits streets of another place for some hundred metres."""
