@@ -3,8 +3,8 @@
 DATA is a folder with ``kitti-osm``: drives of KITTI, a raster of the roads about them, and stereo
 odometry of drive 00. Other drives have perfect odometry plus made errors. Each drive is also turned
 about (every left turn a right one: a path of which the map holds nothing), and located on a map
-from which the piece about it is cut. Settings were chosen on drives 02 and 07, and on drives 01, 02,
-05 and 07 turned about; the others judge.
+from which the piece about it is cut. Settings were chosen on drives 02 and 07, and on drives 01,
+02, 05 and 07 turned about; the others judge.
 """
 
 import sys
