@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 import rasterio
 import shapely
@@ -22,6 +23,7 @@ from mapfilter.positioning.filter import locate
 from mapfilter.roads.index import RouteSource
 from mapfilter.roads.raster import read_raster_ways
 from mapfilter.testing import check_filter
+from mapfilter.tracks.log import make_log
 
 TOWN = make_town(5)
 FOUND = (Status.CONVERGED, Status.TRACKING)
@@ -116,6 +118,17 @@ def test_the_walkers_defaults_do_not_claim_a_wrong_position(town):
     path = drive(TOWN, 4, 1500.0)
     _, error_m, found = located(BayesFilter().over(town), as_log(path, odometry(path, 4)))
     assert not np.any(error_m[found] > 50)
+
+
+def test_a_fix_starts_the_belief_where_there_is_one(vehicle):
+    path = drive(TOWN, 3, 600.0)
+    log = as_log(path, odometry(path, 3))
+    fix = pd.DataFrame({"time_s": [0.25], "east_m": [path[1, 0]], "north_m": [path[1, 1]]})
+    fix = fix.assign(var_east_m2=25.0, var_north_m2=25.0, cov_east_north_m2=0.0)
+    log = make_log(CRS, motion=log.motion, truth=log.truth, gnss=fix)
+    estimate, error_m, _ = located(vehicle, log)
+    assert np.all(estimate.hypotheses > 0)
+    assert np.median(error_m) < 10
 
 
 def test_too_short_or_broken_a_path_starts_nothing(vehicle):
