@@ -95,6 +95,10 @@ def build(
     config: ConfigOption = None,
     settings: SetOption = None,
     out: OutOption = None,
+    roads_only: Annotated[
+        bool,
+        typer.Option("--roads-only", help="A database without cells: no rasters, no cell plan."),
+    ] = False,
     dry_run: DryRunOption = False,
     workers: WorkersOption = 1,
     cluster: ClusterOption = None,
@@ -105,7 +109,8 @@ def build(
     from mapfilter.config.load import load_config
     from mapfilter.workflows.build import run_build, run_dry_build
 
-    loaded = load_config(config, settings or (), out=out)
+    given = [*(settings or ()), *(["database.cells=false"] if roads_only else [])]
+    loaded = load_config(config, given, out=out)
     if dry_run:
         print_result(run_dry_build(loaded), as_json)
         return

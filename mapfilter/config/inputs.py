@@ -288,6 +288,10 @@ class Roads(Section):
         Column of the class of way.
     id_column : str, optional
         Column of the number of the way; by default the file's own, from 1.
+    raster : Path, optional
+        Raster of roads that replaces the ways and squares of the map.
+    raster_classes : dict
+        Value of its pixels for each class of way, such as ``residential = 1``; others are no roads.
     landuse : Path, optional
         Land-use raster that alone decides which points belong to the map; ways only name them.
     landuse_table : Path, optional
@@ -306,6 +310,8 @@ class Roads(Section):
     layer_name: str | None = None
     class_column: str | None = None
     id_column: str | None = None
+    raster: FilePath | None = None
+    raster_classes: dict[str, int] = Field(default_factory=dict)
     landuse: FilePath | None = None
     landuse_table: FilePath | None = None
     tracks: Tracks = Tracks()
@@ -319,9 +325,16 @@ class Roads(Section):
             raise ValueError("layer with layer_name, class_column and id_column")
         if self.water_layer is None and self.water_layer_name is not None:
             raise ValueError("water_layer with water_layer_name")
-        if self.layer is not None and self.tracks.files:
-            raise ValueError("layer, or tracks.files, not both")
+        if (self.raster is None) != (not self.raster_classes):
+            raise ValueError("raster and raster_classes together")
+        if (self.layer is not None) + (self.raster is not None) + bool(self.tracks.files) > 1:
+            raise ValueError("one of layer, raster and tracks.files")
         return self
+
+    @property
+    def replace_map(self) -> bool:
+        """Whether ways come from elsewhere than the map."""
+        return self.layer is not None or self.raster is not None or bool(self.tracks.files)
 
 
 @with_options(GroundTruthErrors)
@@ -403,6 +416,9 @@ class Database(Section):
     ----------
     path : Path, optional
         Folder of the database; by default ``database`` in the output folder.
+    cells : bool
+        Whether it holds cells; without them it is built of the roads alone, for positioning by map
+        and dead reckoning.
     margin_db : float
         A point belongs to its best server and to cells at most this much weaker.
     floor_dbm : float
@@ -412,6 +428,7 @@ class Database(Section):
     """
 
     path: FilePath | None = None
+    cells: bool = True
     margin_db: NotNegative = MARGIN_DB
     floor_dbm: Annotated[float, Ge(-150), Le(0)] = FLOOR_DBM
     tile_px: Annotated[int, Ge(16), Le(8192)] = TILE_PX

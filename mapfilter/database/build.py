@@ -25,7 +25,7 @@ from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.sources import LatticeRoutes, Routes, check_aligned, overlap
 from mapfilter.database.store import open_database
-from mapfilter.database.tiles import TileRows, TileTask, read_tiles, tile_windows
+from mapfilter.database.tiles import TileRows, TileTask, read_tiles, roads_tile, tile_windows
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import CellPlan
@@ -153,6 +153,40 @@ def build(
         }
         inputs = (*inputs, InputFile("rasters", rasters.path.name, digest.result()))
         head = Head(rasters.lattice, job.plan, parameters, attribution, inputs, counts)
+        head.write(folder, written.parts)
+    return open_database(out)
+
+
+def build_roads(
+    routes: RouteLattice | Routes,
+    out: Path | str,
+    *,
+    tile_px: int = TILE_PX,
+    inputs: Sequence[InputFile] = (),
+    attribution: str = "",
+    progress: Progress | None = None,
+) -> RadioRouteDatabase:
+    """Build a database of roads alone, and open it: for positioning by map and dead reckoning.
+
+    It holds all points of the roads, and no cells. Parameters and errors are those of
+    :func:`build`.
+    """
+    check_parameters(MARGIN_DB, FLOOR_DBM, tile_px)
+    source = LatticeRoutes(routes) if isinstance(routes, RouteLattice) else routes
+    lattice, out = source.lattice, Path(out)
+    windows = [w for w in tile_windows(lattice, tile_px) if source.holds(lattice.window(*w))]
+    check_replaceable(out, MANIFEST, FORMAT)
+    parameters = {"margin_db": MARGIN_DB, "floor_dbm": FLOOR_DBM, "tile_px": tile_px}
+    with atomic_dir(out) as folder:
+        tiles = (roads_tile(source.part(lattice.window(*window)), lattice) for window in windows)
+        written = write_parts(folder, lattice.crs, (), tiles, len(windows), progress=progress)
+        if written.points == 0:
+            expected = "a point near a way or in a square"
+            hint = "roads beside the area, or narrower than its pixels"
+            raise fail(InputError, "roads", expected, "none", hint)
+        counts = {"points": written.points, "points_below_floor": 0, "points_off_rasters": 0}
+        plan = CellPlan(lattice.crs, ())
+        head = Head(lattice, plan, parameters, attribution, tuple(inputs), counts)
         head.write(folder, written.parts)
     return open_database(out)
 

@@ -20,7 +20,7 @@ from mapfilter.database.manifest import POINTS, apart
 from mapfilter.database.parquet import WindowReader, read_columns
 from mapfilter.database.radioroutes import Points, RadioRouteDatabase
 from mapfilter.database.tiles import tile_windows
-from mapfilter.errors import OutputError, fail
+from mapfilter.errors import InputError, OutputError, fail
 from mapfilter.rasters.geotiff import new_geotiff
 
 BANDS = (("best_server", ""), ("best_level_dbm", "dBm"), ("margin_db", "dB"))
@@ -40,9 +40,14 @@ def export_cog(database: RadioRouteDatabase, path: Path | str) -> None:
 
     Raises
     ------
+    InputError
+        The database is of roads alone.
     OutputError
         The file cannot be written.
     """
+    if not database.cell_ids:
+        hint = "a database of roads alone; export it to .gpkg"
+        raise fail(InputError, str(database.path), "cells", "none", hint)
     lattice = database.lattice
     columns = ("row", "col", *(name for name, _ in BANDS))
     reader = WindowReader([database.path / POINTS], columns, lattice)
@@ -67,7 +72,7 @@ def export_cog(database: RadioRouteDatabase, path: Path | str) -> None:
 def export_geopackage(
     database: RadioRouteDatabase, path: Path | str, cells: Sequence[str] = ()
 ) -> None:
-    """Write a database as GeoPackage: layers ``points`` and ``cells``, and one per cell named.
+    """Write a database as GeoPackage: layers ``points`` and, with cells, ``cells`` and those named.
 
     ``path`` ends in .gpkg; an older file is replaced. The points of ``cells``, within the
     database's margin, become a layer each.
@@ -84,10 +89,12 @@ def export_geopackage(
         raise fail(OutputError, str(path), "a name that ends in .gpkg", path.suffix or "no suffix")
     crs = database.lattice.crs
     # A column without any value has no type that a GeoPackage knows.
-    table = pd.DataFrame([asdict(cell) for cell in database.plan.cells]).dropna(axis=1, how="all")
-    place = gpd.points_from_xy(table["east_m"], table["north_m"])
-    plan = gpd.GeoDataFrame(table, geometry=place, crs=crs)
-    layers = {"points": _points(database), "cells": plan}
+    layers = {"points": _points(database)}
+    if database.cell_ids:
+        table = pd.DataFrame([asdict(cell) for cell in database.plan.cells])
+        table = table.dropna(axis=1, how="all")
+        place = gpd.points_from_xy(table["east_m"], table["north_m"])
+        layers["cells"] = gpd.GeoDataFrame(table, geometry=place, crs=crs)
     # Layers of a GeoPackage are tables, whose names SQLite compares without case.
     names = apart({cell_id: f"cell {cell_id}" for cell_id in cells})
     for cell_id, name in names.items():

@@ -94,7 +94,7 @@ class _Manifest(_Strict):
     software: str
     crs: str
     lattice: _Lattice
-    cells: Annotated[list[str], Field(min_length=1)]
+    cells: list[str]
     parameters: _Parameters
     attribution: str
     inputs: list[_Input]

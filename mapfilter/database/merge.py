@@ -219,7 +219,11 @@ def _check(
         if cell_id not in cells:
             faults.add("without", "a cell of the databases", repr(cell_id))
     left = tuple(cell for cell in cells.values() if cell.id not in set(without))
-    if not left:
+    for database in databases:
+        if not database.cell_ids:
+            hint = "roads alone are not merged: build them together"
+            faults.add(str(database.path), "a database with cells", "none", hint)
+    if not left and not faults.found:
         faults.add("without", "a cell that is left", "none")
     faults.raise_if_any(InputError)
     base = first.lattice

@@ -47,11 +47,15 @@ ROWS_IN_MEMORY = 1 << 22
 
 
 def points_table(places: pa.Table, levels: TileLevels, cell_ids: tuple[str, ...]) -> pa.Table:
-    """Return rows of ``points.parquet``: the places with a level above the floor."""
-    received = levels.best >= 0
+    """Return rows of ``points.parquet``: the places with a level above the floor.
+
+    Without cells these are all places; their best server is an empty text.
+    """
+    received = levels.best >= 0 if cell_ids else np.ones(levels.best.size, dtype=np.bool_)
     table = places.filter(pa.array(received))
+    best = levels.best[received] if cell_ids else np.zeros(levels.best.size, dtype=np.int32)
     columns = {
-        "best_server": dictionary(levels.best[received], cell_ids),
+        "best_server": dictionary(best, cell_ids or ("",)),
         "best_level_dbm": levels.best_level_dbm[received],
         "margin_db": levels.margin_db[received],
     }
@@ -116,7 +120,7 @@ class PartWriter:
             self._points.append(points)
         for cell, rows in levels_rows(places, levels):
             self._levels.setdefault(cell, []).append(rows)
-        self._waiting += levels.cell.size
+        self._waiting += levels.cell.size if self._cell_ids else places.num_rows
         if self._waiting >= ROWS_IN_MEMORY:
             self._flush()
 

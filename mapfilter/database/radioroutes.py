@@ -111,7 +111,7 @@ class Points:
     way_class : tuple of (numpy.ndarray of int32, tuple of str)
         Codes and the names that they stand for.
     best_server : numpy.ndarray of int32
-        Index into the database's ``cell_ids``.
+        Index into the database's ``cell_ids``; -1 where it has none.
     margin_db : numpy.ndarray of float32
         Best level above the second best, NaN where only one cell is predicted.
     """
@@ -147,7 +147,7 @@ class RadioRouteDatabase:
     lattice : Lattice
         Where the points lie.
     plan : CellPlan
-        The cells, in the lattice's CRS.
+        The cells, in the lattice's CRS; none in a database of roads alone.
     margin_db : float
         A point belongs to its best server and to every cell at most this much weaker.
     floor_dbm : float
@@ -198,7 +198,8 @@ class RadioRouteDatabase:
         order = np.argsort(table["point"].to_numpy())
         server, names = _codes(table["best_server"])
         try:
-            rank = np.array([self.plan.index(name) for name in names], dtype=np.int32)
+            known = [self.plan.index(name) if self.cell_ids else -1 for name in names]
+            rank = np.array(known, dtype=np.int32)
         except InputError as error:
             expected = "best servers among the cells"
             raise fail(StoreError, str(file), expected, names, "parts mixed up") from error

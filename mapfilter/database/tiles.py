@@ -113,6 +113,12 @@ def read_tile(task: TileTask) -> TileRows:
     return TileRows(places, received_levels(level, task.floor_dbm).of_cells(task.numbers))
 
 
+def roads_tile(part: RoutePart, lattice: Lattice) -> TileRows:
+    """Return a tile of roads alone, without levels."""
+    routes = part if isinstance(part, RouteLattice) else part()
+    return TileRows(places_table(routes, lattice), received_levels(np.empty((0, len(routes))), 0.0))
+
+
 def received_levels(level_dbm: Floats, floor_dbm: float) -> TileLevels:
     """Return the levels above the floor of those of shape (cells, points), NaN where unknown.
 

@@ -104,7 +104,7 @@ class CellPlan:
     crs : str
         Projected CRS in metres.
     cells : tuple of Cell
-        At least one; ids are unique.
+        Ids are unique. A database of roads alone has none.
     notes : tuple of str
         What was filled in or left out when it was read.
     """
@@ -185,8 +185,6 @@ def _check_cells(
     ranges: bool = True,
 ) -> None:
     """Note the faults of cells: of each field (unless checked already), and of all together."""
-    if not cells and not faults.found:
-        faults.add("cell plan", "at least one cell", "none")
     first: dict[str, int] = {}
     for i, cell in enumerate(cells):
         if ranges:
@@ -287,6 +285,8 @@ def read_cell_plan(
             notes += (f"{left_out} of {len(whole)} cells left out: far from the area",)
         whole = inside
     cells = tuple(Cell(**{k: v for k, v in row.values.items() if k in known}) for row in whole)
+    if not cells and not faults.found:
+        faults.add(str(path), "at least one cell", "none")
     _check_cells(cells, lambda i, name: f"{path} row {whole[i].line}, {name}", faults, ranges=False)
     faults.raise_if_any(InputError)
     return CellPlan(crs, cells, notes)

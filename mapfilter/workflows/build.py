@@ -10,11 +10,11 @@ from typing import Any
 from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress, executor_of
 from mapfilter.config.sections import Config
-from mapfilter.database.build import build
+from mapfilter.database.build import build, build_roads
 from mapfilter.database.estimate import BuildEstimate, dry_run
 from mapfilter.database.manifest import InputFile
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.errors import InputError, fail
+from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters
@@ -41,7 +41,7 @@ class BuildResult:
     """Counts, folder and pictures of a database that was built."""
 
     points: int
-    """Points that receive at least one cell."""
+    """Points that receive at least one cell; without cells, all."""
     cells: int
     routable_points: int
     """Points of the roads, including those that receive no cell."""
@@ -75,6 +75,8 @@ def run_build(
     """
     began_s = time.perf_counter()
     target, section = config.database_path, config.database
+    if not section.cells:
+        return _build_roads(config, progress)
     rasters, plan, world = _raster_world(config)
     ensure_writable_folder(target.parent)
     tiles_a_task = 1
@@ -112,8 +114,36 @@ def run_build(
     )
 
 
+def _build_roads(config: Config, progress: Progress | None) -> BuildResult:
+    """Build a database without cells."""
+    began_s = time.perf_counter()
+    world, target = World.of(config), config.database_path
+    ensure_writable_folder(target.parent)
+    database = build_roads(
+        world.route_tiles,
+        target,
+        tile_px=config.database.tile_px,
+        inputs=[InputFile.of(role, path) for role, path in world.streets.files],
+        attribution=world.streets.attribution,
+        progress=progress,
+    )
+    clear_pictures(config.pictures_path, NETWORK_PICTURES)
+    points = int(database.manifest["counts"]["points"])
+    return BuildResult(
+        points=points,
+        cells=0,
+        routable_points=points,
+        database=target,
+        seconds=time.perf_counter() - began_s,
+        notes=(*map_cover(world), *world.streets.notes),
+    )
+
+
 def run_dry_build(config: Config) -> BuildEstimate:
     """Estimate size, memory and time of a build, writing nothing."""
+    if not config.database.cells:
+        hint = "a database of roads alone is built in little more time than they are read in"
+        raise fail(ConfigError, "database.cells", "true for --dry-run", "false", hint)
     began_s = time.perf_counter()
     rasters, plan, world = _raster_world(config)
     section, routes = config.database, world.route_tiles

@@ -34,7 +34,7 @@ from mapfilter.workflows.check_places import (
     check_ways,
 )
 from mapfilter.workflows.survey import survey_inputs
-from mapfilter.workflows.world import World, area_lattice, planned_rasters
+from mapfilter.workflows.world import World, planned_rasters, roads_lattice
 
 _STAGES = 5
 
@@ -93,7 +93,7 @@ class _Checks:
         self.config, self.findings = config, Findings()
         self.plan_name = str(config.surveyed_plan or config.cells.plan or "plan by rule")
         # Layers and tracks replace the map, so that only a box places the rasters.
-        replaced = config.roads.layer is not None or bool(config.roads.tracks.files)
+        replaced = config.roads.replace_map
         self._is_placed = config.area.has_box or (config.area.has_extent and not replaced)
 
     @contextmanager
@@ -105,6 +105,8 @@ class _Checks:
             self.findings.add_faults(error, code, severity)
 
     def rasters(self) -> RxLevRasters | None:
+        if not self.config.database.cells:
+            return None
         path = self.config.rasters_path
         if path.exists():
             return self._opened(path, lambda: planned_rasters(self.config))
@@ -114,6 +116,8 @@ class _Checks:
 
     def ground_truth(self) -> RxLevRasters | None:
         path = self.config.rasters.ground_truth
+        if not self.config.database.cells:
+            return None
         if path is None or path.exists():
             return None if path is None else self._opened(path, lambda: open_rasters(path))
         self.findings.add("ground-truth-missing", str(path), "There is nothing.", "warning")
@@ -146,9 +150,10 @@ class _Checks:
             # Why the rasters, which give the area, cannot be read is reported already.
             return None
         try:
-            return area_lattice(config.area)
+            return roads_lattice(config)
         except MapfilterError as error:
-            of_map = all(fault.where.startswith(str(config.area.map)) for fault in error.faults)
+            sources = str(config.area.map), str(config.roads.raster)
+            of_map = all(fault.where.startswith(sources) for fault in error.faults)
             self.findings.add_faults(error, "map-invalid" if of_map else "area-invalid")
             return None
 
@@ -169,6 +174,8 @@ class _Checks:
 
     def plan(self, lattice: Lattice | None) -> CellPlan | None:
         surveyed_plan = self.config.surveyed_plan
+        if not self.config.database.cells:
+            return None
         if lattice is not None and (surveyed_plan is None or surveyed_plan.exists()):
             with self._reported("plan-invalid"):
                 return World(self.config, lattice).plan
@@ -218,7 +225,7 @@ class _Checks:
             with self._reported("roads-invalid"):
                 ways = world.ways
                 if rasters is not None:
-                    files = (config.roads.layer, *config.roads.tracks.files)
+                    files = (config.roads.layer, config.roads.raster, *config.roads.tracks.files)
                     source = next(
                         (str(path) for path in files if path is not None), config.area.map
                     )

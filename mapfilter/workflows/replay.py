@@ -43,6 +43,7 @@ from mapfilter.workflows.terminal import to_jsonable
 from mapfilter.workflows.world import filter_choice, outside_m, plan_antennas, planned_cells
 
 _AWAY_M = 5000.0
+_BY_CELLS = ("candidate", "grid")
 
 
 def check_log(path: Path, log: TrackLog, lattice: Lattice, faults: Faults) -> None:
@@ -90,18 +91,24 @@ class _Logs:
         faults.raise_if_any(InputError)
 
 
-def lacking(log: TrackLog, estimate: TrackEstimate) -> str:
-    """Return the missing data of a log that cannot be located, or an empty text."""
+def lacking(log: TrackLog, estimate: TrackEstimate, *, cells: bool = True) -> str:
+    """Return the missing data of a log that cannot be located, or an empty text.
+
+    Without ``cells`` in the database, motion is all that it needs.
+    """
     serving = (log.radio["role"] == SERVING) & log.radio["cell"].notna()
     moved = log.motion["step_m"].notna()
     lacks = []
-    if not serving.any() and not (estimate.hypotheses > 0).any():
+    if not cells:
+        if moved.any() and not (estimate.hypotheses > 0).any():
+            lacks.append("too short a way with steps and headings, or turns")
+    elif not serving.any() and not (estimate.hypotheses > 0).any():
         lacks.append("no serving cell")
     elif not (estimate.hypotheses > 0).any():
         lacks.append("no serving cell of which the database has points")
     if not moved.any():
         lacks.append("no motion")
-    elif not (moved & log.motion["heading_rad"].notna()).any():
+    elif cells and not (moved & log.motion["heading_rad"].notna()).any():
         turns = log.motion["turn_rad"].notna().any()
         lacks.append("no heading" + (" (turns alone do not give one)" if turns else ""))
     return " and ".join(lacks)
@@ -348,7 +355,10 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
             pictures = _draw_errors(log, track, into) if drawn else ()
         else:
             pictures = draw_track(database, log, track, into) if drawn else ()
-        lack = lacking(log, track.estimate)
+        has_cells = database is None or bool(database.cell_ids)
+        lack = lacking(log, track.estimate, cells=has_cells)
+        if lack and not has_cells and config.filter.name in _BY_CELLS:
+            lack = f"the filter {config.filter.name} needs cells to start, the database has none"
         if isinstance(options, KalmanFilter):
             lack = "" if track.estimate.converged_at is not None else "too little was measured"
         if "no motion" in lack and "velocity" in opened.sensors:

@@ -56,7 +56,10 @@ class BestServers:
 
 @dataclass(frozen=True, eq=False)
 class ServedPoints:
-    """The points of a database, at most one for each pixel of a picture."""
+    """The points of a database, at most one for each pixel of a picture.
+
+    In a database without cells all count as served by a first one.
+    """
 
     window: Window
     """Their pixels on the database's lattice."""
@@ -182,13 +185,15 @@ def served_points(database: RadioRouteDatabase, window: Window | None = None) ->
         if not read or not len(read["row"]):
             continue
         at = (read["row"] - top) // step, (read["col"] - left) // step
-        server = pc.index_in(read["best_server"].cast(pa.string()), value_set=ids).to_numpy()
+        server = np.zeros(len(read["row"]), dtype=np.int32)
+        if database.cell_ids:
+            server = pc.index_in(read["best_server"].cast(pa.string()), value_set=ids).to_numpy()
+            counts += np.bincount(server, minlength=len(counts))
         margin_db = np.asarray(read["margin_db"])
         best.server[at], best.level_dbm[at] = server, read["best_level_dbm"]
         best.margin_db[at] = np.where(np.isnan(margin_db), np.inf, margin_db)
         on_square[at] = read["on_square"]
         np.add.at(number, at, 1)
-        counts += np.bincount(server, minlength=len(counts))
     return ServedPoints((top, left, rows, cols), step, best, number, on_square, counts)
 
 

@@ -22,6 +22,7 @@ from mapfilter.roads.landuse import LandUse, read_landuse
 from mapfilter.roads.layers import read_layer_buildings, read_layer_water
 from mapfilter.roads.maps import check_on_map, map_bounds_deg, resolve_map
 from mapfilter.roads.osm import read_water
+from mapfilter.roads.raster import raster_lattice, read_raster_ways
 from mapfilter.roads.routes import Roads, gaps, read_roads, unused_classes, within_reach_m
 from mapfilter.roads.ways import Bounds, Buildings, Water, Ways, clip_ways
 from mapfilter.simulation.synthetic_city import SyntheticCity, manhattan, synthetic_city
@@ -84,6 +85,22 @@ def area_lattice(area: Area, *, on_map: bool = True) -> Lattice:
         check_on_map(area.map, crs, bounds_m)
     check_scale(crs, bounds_m, "area.crs")
     return Lattice.covering(crs, bounds_m, area.resolution_m)
+
+
+def roads_lattice(config: Config) -> Lattice:
+    """Return the lattice of a configuration's area; without box and map, that of a road raster.
+
+    Errors are those of :func:`area_lattice` and of the raster.
+    """
+    area, raster = config.area, config.roads.raster
+    if area.has_extent or raster is None:
+        return area_lattice(area)
+    lattice = raster_lattice(raster, area.resolution_m)
+    if lattice.rows * lattice.cols > LARGEST_AREA_PX:
+        expected = f"at most {LARGEST_AREA_PX:.0e} pixels"
+        got = f"{lattice.rows * lattice.cols:.1e} at {area.resolution_m:g} m"
+        raise fail(ConfigError, f"{raster}, area.resolution_m", expected, got, "a large raster")
+    return lattice
 
 
 def pixels_on(
@@ -242,6 +259,7 @@ class Streets:
         named: list[tuple[InputRole, Path | None]] = [
             ("map", resolve_map(self.config.area.map) if self._has_map else None),
             ("roads", roads.layer),
+            ("roads", roads.raster),
             *(("tracks", path) for path in roads.tracks.files),
             ("buildings", self.config.buildings.layer),
             ("water", roads.water_layer if roads.cut_water else None),
@@ -276,6 +294,9 @@ class Streets:
         if roads.tracks.files:
             wide_m = within_reach_m(lattice.bounds_m, roads.half_width_m, by_class_m)
             return _corridors(self.config, lattice.crs, wide_m)
+        if roads.raster is not None:
+            wide_m = within_reach_m(lattice.bounds_m, roads.half_width_m, by_class_m)
+            return Roads(read_raster_ways(roads.raster, roads.raster_classes, lattice.crs, wide_m))
         if roads.layer is None and self._city is not None:
             walking, squares = roads.profile == "walking", self._city.squares
             ways = self._city.ways if walking else self._city.driving_ways
@@ -285,7 +306,7 @@ class Streets:
         if roads.layer is None and not self._has_map:
             if roads.landuse is not None:
                 return Roads(Ways.none(lattice.crs))
-            expected = "roads without a map: roads.layer or roads.tracks.files"
+            expected = "roads without a map: roads.layer, roads.raster or roads.tracks.files"
             raise fail(ConfigError, "roads", expected, "none")
         return read_roads(
             self.config.area.map if roads.layer is None else roads.layer,

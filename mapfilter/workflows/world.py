@@ -34,6 +34,7 @@ from mapfilter.workflows.streets import LARGEST_AREA_PX as LARGEST_AREA_PX
 from mapfilter.workflows.streets import Streets
 from mapfilter.workflows.streets import area_lattice as area_lattice
 from mapfilter.workflows.streets import check_scale as check_scale
+from mapfilter.workflows.streets import roads_lattice as roads_lattice
 
 FARTHEST_M = 50_000.0
 """No cell is received from farther away."""
@@ -165,7 +166,7 @@ class World:
     @classmethod
     def of(cls, config: Config) -> World:
         """Return the world of a configuration's area."""
-        return cls(config, area_lattice(config.area))
+        return cls(config, roads_lattice(config))
 
     @cached_property
     def streets(self) -> Streets:
@@ -291,8 +292,7 @@ def map_cover(world: World) -> tuple[str, ...]:
     """
     config, lattice = world.config, world.lattice
     area, roads = config.area, config.roads
-    replaced = roads.layer is not None or roads.tracks.files
-    if not area.has_box or not area.map_is_a_file or replaced:
+    if not area.has_box or not area.map_is_a_file or roads.replace_map:
         return ()
     if _declared_share(area, lattice) >= _ENOUGH:
         return ()

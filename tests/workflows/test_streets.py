@@ -168,12 +168,18 @@ def test_tracks_become_ways(tmp_path):
 @pytest.mark.parametrize(
     ("settings", "told"),
     [
-        (["area.map=none"], "roads without a map: roads.layer or roads.tracks.files"),
-        ([*BOX, "area.map=none"], "roads without a map: roads.layer or roads.tracks.files"),
+        (["area.map=none"], "roads.layer, roads.raster or roads.tracks.files"),
+        (
+            [*BOX, "area.map=none"],
+            "roads.layer, roads.raster or roads.tracks.files",
+        ),
         (["roads.class_column=kind"], "layer with layer_name, class_column and id_column"),
         (["buildings.levels_column=x"], "layer with layer_name, height_column and levels_column"),
         (["roads.water_layer_name=x"], "water_layer with water_layer_name"),
-        (["roads.layer=a.shp", "roads.tracks.files=b.csv"], "layer, or tracks.files, not both"),
+        (
+            ["roads.layer=a.shp", "roads.tracks.files=b.csv"],
+            "layer, raster and tracks.files",
+        ),
         (["roads.layer=none.shp"], "none.shp: expected a vector file, found no such file"),
         (["roads.half_width_by_class_m.path=-1"], "half_width_by_class_m.path"),
     ],

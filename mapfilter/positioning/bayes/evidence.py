@@ -21,6 +21,7 @@ from mapfilter.filters.contract import Reason
 from mapfilter.models.fingerprint import BoundReading
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief
+from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import UnusedReading
@@ -101,7 +102,8 @@ class EvidenceUpdate(NamedTuple):
     ``alternative_terms`` are given. ``expected`` is the log-likelihood of the terms if the belief
     is right. ``belief`` and ``alternative`` replace those of the filter unless None. ``disputed``
     asks for an alternative. ``radio`` and ``reason`` (whether the serving cell is used) come from
-    the radio reports only.
+    the radio reports only. ``path`` is the way that a belief starts with, where the map alone is
+    the evidence.
     """
 
     state: Any
@@ -114,6 +116,7 @@ class EvidenceUpdate(NamedTuple):
     disputed: bool = False
     radio: RadioReading | None = None
     reason: Reason | None = None
+    path: RecentPath | None = None
 
 
 class EvidenceSource(ABC):
@@ -136,6 +139,13 @@ class EvidenceSource(ABC):
 
         Also called for an alternative, which starts from one epoch while the belief goes on.
         """
+
+    def first_after(self, state: BayesState, epoch: Epoch) -> EvidenceUpdate:  # noqa: ARG002
+        """Return evidence for a first belief or an alternative, with regard to the motion so far.
+
+        Only sources that need that motion differ from :meth:`first`.
+        """
+        return self.first(epoch)
 
     def start(self, belief: MapBelief, epoch: Epoch, travelled_m: float) -> tuple[MapBelief, Any]:  # noqa: ARG002
         """Adapt a belief just started; also return the state that depends on it, None if none."""

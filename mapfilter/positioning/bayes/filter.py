@@ -38,7 +38,9 @@ from mapfilter.positioning.bayes.evidence import (
     joined,
 )
 from mapfilter.positioning.bayes.grid import StreetGrid
+from mapfilter.positioning.bayes.map_source import MapSource
 from mapfilter.positioning.bayes.model import BayesModel, Start
+from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.bayes.radio import RadioSource
 from mapfilter.positioning.bayes.smoothing import BayesSmoother
 from mapfilter.positioning.bayes.state import BayesState, step_output
@@ -100,7 +102,13 @@ class BayesPositioner(Filter[BayesState]):
             FirstFix(area.origin_m),
             self._radio,
             *self.more_sources,
+            *((MapSource(),) if self._by_map_alone else ()),
         )
+
+    @property
+    def _by_map_alone(self) -> bool:
+        """Whether the map alone may start a belief: there are no cells; a grid needs a start."""
+        return not self.area.cell_ids and not self.grid
 
     @cached_property
     def _radio(self) -> RadioSource:
@@ -198,7 +206,11 @@ class BayesPositioner(Filter[BayesState]):
         for raw in epoch.motion:
             step, heading_rad = headed(raw, state.heading_rad)
             belief, compass, alternative = state.belief, state.compass, state.alternative
-            reckoning, why = state.reckoning, Reason.NOT_STARTED
+            reckoning, why, path = state.reckoning, Reason.NOT_STARTED, state.path
+            if self._by_map_alone:
+                known = isfinite(raw.heading_rad) == compass or not path.here.travelled_m
+                path = (path if known else RecentPath()).moved(step)
+                why = Reason.USED if isfinite(step.step_m) else Reason.NO_STEP
             if belief is None:
                 compass = isfinite(raw.heading_rad)
             else:
@@ -220,6 +232,7 @@ class BayesPositioner(Filter[BayesState]):
                 heading_rad=heading_rad,
                 compass=compass,
                 alternative=alternative,
+                path=path,
             )
         return state, unused
 
@@ -232,7 +245,7 @@ class BayesPositioner(Filter[BayesState]):
         context, updates, states = Context(particle_spacing_m, due), [], {}
         for source in self.sources:
             if state.belief is None:
-                update = source.first(epoch)
+                update = source.first_after(state, epoch)
             else:
                 update = source.update(state, epoch, context)
             updates.append(update)
@@ -256,7 +269,9 @@ class BayesPositioner(Filter[BayesState]):
         reading = joined(updates)
         if reading is None:
             return None
-        belief = self.filters[state.compass].init(Start(reading, state.compass), rng)
+        path = next((one.path for one in updates if one.path is not None), None)
+        prior = Start(reading, state.compass, path=path)
+        belief = self.filters[state.compass].init(prior, rng)
         states = {}
         for source in self.sources:
             belief, own = source.start(belief, epoch, state.reckoning.travelled_m)
@@ -277,7 +292,8 @@ class BayesPositioner(Filter[BayesState]):
         if reading is None:
             return state, Reason.USED
         update, rules = self.filters[state.compass].update, self.rules
-        doubt = doubted(rules, before, state.null, state.alternative)
+        plain = self._by_map_alone and not state.path.is_distinctive
+        doubt = plain or doubted(rules, before, state.null, state.alternative)
         reading = replace(reading, doubted=doubt or self.area.at_edge(before.summary.mean))
         belief, info = update(before, reading, rng)
         if info.reason is not Reason.USED:
@@ -286,7 +302,8 @@ class BayesPositioner(Filter[BayesState]):
         sources, alternative = state.sources, state.alternative
         if alternative is not None:
             terms = joined(updates, alternative=True) or RadioReading()
-            terms = replace(terms, doubted=alternative.null.log_odds > rules.converge_log_odds)
+            doubt = plain or alternative.null.log_odds > rules.converge_log_odds
+            terms = replace(terms, doubted=doubt)
             other, _ = update(alternative.belief, terms, rng)
             own = _challenged(alternative.null, terms, alternative.belief, other)
             alternative = replace(alternative, belief=other, null=own)
@@ -318,7 +335,7 @@ class BayesPositioner(Filter[BayesState]):
             belief=now.belief,
             status=now.status,
             sources=sources,
-            null=now.null,
+            null=null if self._by_map_alone and not now.taken_over else now.null,
             alternative=alternative,
             takeovers=state.takeovers + now.taken_over,
         )
@@ -328,17 +345,23 @@ class BayesPositioner(Filter[BayesState]):
         self, state: BayesState, main: MapBelief, epoch: Epoch, rng: np.random.Generator
     ) -> AlternativeHypothesis | None:
         """Start an alternative from this epoch's evidence alone, as if it were the first."""
-        updates = [source.first(epoch) for source in self.sources]
+        updates = [source.first_after(state, epoch) for source in self.sources]
         started = self._started(updates, state, epoch, rng)
         if started is None:
             return None
         belief, sources = started
+        null = NullHypothesis()
+        if self._by_map_alone:
+            # Many alternatives may follow each other, and each begins with the streets that fit
+            # best: what speaks for a position off the map must not be forgotten with each.
+            null = NullHypothesis(max(state.null.log_odds, null.log_odds))
         return AlternativeHypothesis(
             belief,
             state.reckoning.travelled_m,
             main.log_evidence,
             epoch.time_s,
             sources,
+            null=null,
         )
 
     def _without_compass(self, belief: MapBelief, rng: np.random.Generator) -> MapBelief:

@@ -19,6 +19,7 @@ from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.filters.particle import Cloud
 from mapfilter.filters.resampling import systematic
+from mapfilter.geodesy import wrap_rad
 from mapfilter.models import fingerprint
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.level_kernels import Prediction, decayed, weigh_by_absence, weigh_by_levels
@@ -42,10 +43,15 @@ from mapfilter.models.street_motion import (
 )
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.path import RecentPath
+from mapfilter.positioning.bayes.path_start import (
+    OFF_AT_START,
+    ends_of_path,
+    possible_turns_rad,
+)
 from mapfilter.positioning.bayes.radio import EvidenceOptions
 
 _F = np.float32
-OFF_AT_START = 0.05
 _OFF_SHARE, _TRIES = 0.2, 2
 _AT_ONCE = 50_000
 _NEW_M = 50.0
@@ -65,6 +71,8 @@ class Start:
         Headings are those of a compass; else their lasting error is uniform.
     east_m, north_m, sd_m : float
         Known start in the CRS of the database; NaN for an unknown one.
+    path : RecentPath or None
+        Way to the start, where the map alone is the first evidence.
     """
 
     reading: RadioReading | None
@@ -72,6 +80,7 @@ class Start:
     east_m: float = float("nan")
     north_m: float = float("nan")
     sd_m: float = float("nan")
+    path: RecentPath | None = None
 
 
 @dataclass(frozen=True)
@@ -124,13 +133,22 @@ class BayesModel:
             place = np.array([[prior.east_m - west], [prior.north_m - south]])
             state[EAST : NORTH + 1] = place + prior.sd_m * rng.standard_normal((2, most))
             state[OFF] = OFF_AT_START
-        else:
+        elif prior.path is None:
             self._spread(state, log_weight, prior.reading, rng)
         bias = rng.standard_normal(most) * self.motion.bias_sd_rad
         state[BIAS] = bias if prior.compass else pi * (2 * rng.random(most) - 1)
         state[LOG_SCALE] = self.motion.scale_sd * rng.standard_normal(most)
         state[TURN] = self.motion.turn_sd_rad * rng.standard_normal(most)
         state[STRETCH] = self.motion.stretch_sd * rng.standard_normal(most)
+        if prior.path is not None:
+            turns = possible_turns_rad(self.motion.bias_sd_rad, compass=prior.compass)
+            ends = ends_of_path(self.area, self.weights, prior.path, turns, most, rng)
+            state[EAST : NORTH + 1], state[OFF], log_weight = (
+                ends.place_m,
+                ends.off,
+                ends.log_weight,
+            )
+            state[BIAS] = wrap_rad(ends.turned_rad - state[TURN])
         biased = rng.random(most) < self.motion.rate_share
         state[RATE] = self.motion.rate_rad_per_m * rng.standard_normal(most) * biased
         cloud = _new(state)

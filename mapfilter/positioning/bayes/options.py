@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 from math import radians
-from typing import Annotated
+from typing import Annotated, Any
 
 from annotated_types import Ge, Gt, Le
 
@@ -14,6 +15,7 @@ from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.street_motion import MapWeights, MotionErrors
 from mapfilter.options import Below1, NotNegative, Options, Positive, Probability
+from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel
@@ -23,6 +25,28 @@ from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 _SLOW, _FAST, _WHITE = 7.0, 4.0, 3.3
 _TOTAL_DB = (_SLOW**2 + _FAST**2 + _WHITE**2) ** 0.5
 _FAST_OF_SLOW_M = 0.1
+
+VEHICLE: Mapping[str, float] = {
+    "step_sd_m": 0.05,
+    "heading_sd_deg": 1.5,
+    "drift_deg_per_sqrt_m": 0.25,
+    "scale": 0.02,
+    "off_cost_per_m": 0.15,
+}
+"""Defaults of vehicles, where they differ."""
+_VEHICLE_MOTION: Mapping[str, float] = {
+    "disturbances_per_m": 0.0,
+    "rate_rad_per_m": radians(0.01),
+    "stretch_sd": 0.02,
+}
+_VEHICLE_LEAVES_PER_M = 3e-4
+
+_MORE_BY_MAP = 3
+_LEAST_HOLD_BY_MAP_M = 200.0
+_CONVERGE_BY_MAP = -8.0
+"""Where the map alone is the evidence: factor of the numbers of particles, as many places stay
+possible for long; least distance for which the switch rule must hold, and largest log odds of the
+null hypothesis, as a path fits streets of another place for some hundred metres."""
 
 Particles = Annotated[int, Ge(10), Le(10_000_000)]
 
@@ -42,6 +66,9 @@ class BayesFilter(Options):
 
     Parameters
     ----------
+    vehicle : bool
+        Dead reckoning is that of a vehicle (wheels, camera, lidar), which keeps to ways: errors of
+        motion and weights of the map that have their defaults are those of vehicles.
     step_sd_m : float
         Assumed deviation of a step's length.
     heading_sd_deg : float
@@ -97,6 +124,7 @@ class BayesFilter(Options):
         Assumed deviation of a timing advance besides its rounding.
     """
 
+    vehicle: bool = False
     step_sd_m: NotNegative = 0.3
     heading_sd_deg: NotNegative = 15.0
     bias_sd_deg: NotNegative = 10.0
@@ -140,8 +168,22 @@ class BayesFilter(Options):
         """Return the filter over the area of a database, which is read as a whole."""
         return self.over_area(open_area(database))
 
+    @property
+    def resolved(self) -> BayesFilter:
+        """Options with the defaults of vehicles in place of those of walkers, where asked for."""
+        if not self.vehicle:
+            return self
+        default = {one.name: one.default for one in fields(self)}
+        taken: dict[str, Any] = {
+            name: value for name, value in VEHICLE.items() if getattr(self, name) == default[name]
+        }
+        return replace(self, **taken)
+
     def over_area(self, area: AreaMap) -> BayesPositioner:
         """Return the filter over an area."""
+        return self.resolved._over_area(area)
+
+    def _over_area(self, area: AreaMap) -> BayesPositioner:
         motion = MotionErrors(
             step_sd_m=self.step_sd_m,
             heading_sd_rad=radians(self.heading_sd_deg),
@@ -150,6 +192,9 @@ class BayesFilter(Options):
             scale_sd=self.scale,
         )
         weights = MapWeights(self.map_sd_m, self.map_weight_per_m, self.off_cost_per_m)
+        if self.vehicle:
+            motion = replace(motion, **_VEHICLE_MOTION)
+            weights = replace(weights, leave_per_m=_VEHICLE_LEAVES_PER_M)
         share = self.level_error_db / _TOTAL_DB
         levels = LevelErrors(
             slow_db=share * _SLOW,
@@ -171,6 +216,15 @@ class BayesFilter(Options):
             switch_mass=self.switch_mass,
             switch_hold_m=self.switch_hold_m,
         )
+        rules = AlternativeRules()
+        if not area.cell_ids:
+            rules = replace(rules, converge_log_odds=_CONVERGE_BY_MAP)
+            particles = replace(
+                particles,
+                max_particles=_MORE_BY_MAP * self.max_particles,
+                min_search_particles=_MORE_BY_MAP * self.min_search_particles,
+                switch_hold_m=max(self.switch_hold_m, _LEAST_HOLD_BY_MAP_M),
+            )
         satellites = GnssOptions(
             zenith_m=self.satellite_sd_m,
             height_m=self.antenna_height_m,
@@ -179,6 +233,7 @@ class BayesFilter(Options):
         return BayesPositioner(
             BayesModel(area, motion, weights, evidence),
             particles,
+            rules,
             grid=self.name == "grid",
             satellites=satellites,
             timing=TimingOptions(step_m=self.timing_step_m, advance_sd_m=self.timing_sd_m),

@@ -25,7 +25,8 @@ from mapfilter.positioning.bayes.evidence import (
     EvidenceUpdate,
     RadioReading,
 )
-from mapfilter.positioning.bayes.state import FIRST_SPACING_M, BayesState, DeadReckoning
+from mapfilter.positioning.bayes.path import DeadReckoning
+from mapfilter.positioning.bayes.state import FIRST_SPACING_M, BayesState
 from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.tracks.schema import SERVING, Kind

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from math import cos, isfinite, nan, sin, sqrt
+from dataclasses import dataclass, field
+from math import isfinite, nan, sqrt
 from typing import Any
 
-from mapfilter.filters.contract import MotionStep, Reason, Status
+from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import empty_summary
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief, NullHypothesis
 from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.path import DeadReckoning as DeadReckoning
+from mapfilter.positioning.bayes.path import RecentPath
 from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
 from mapfilter.positioning.integrity import sample_tail
 
@@ -20,28 +22,6 @@ FIRST_SPACING_M = 5.0
 
 _STREET_SHARE = 0.3
 _MIN_SPACING_M = 1.5
-
-
-@dataclass(frozen=True, slots=True)
-class DeadReckoning:
-    """Distance and displacement since the start, in the frame of the headings."""
-
-    travelled_m: float = 0.0
-    east_m: float = 0.0
-    north_m: float = 0.0
-
-    def moved(self, step: MotionStep) -> DeadReckoning:
-        """Add a step; without a heading the displacement stays."""
-        if not isfinite(step.step_m):
-            return self
-        if not isfinite(step.heading_rad):
-            return replace(self, travelled_m=self.travelled_m + abs(step.step_m))
-        heading = step.heading_rad
-        return DeadReckoning(
-            self.travelled_m + abs(step.step_m),
-            self.east_m + step.step_m * cos(heading),
-            self.north_m + step.step_m * sin(heading),
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +48,8 @@ class BayesState:
         Tested against the belief; None while nothing contradicts it.
     takeovers : int
         Number of alternatives that have replaced the belief.
+    path : RecentPath
+        The last metres, where the map alone may start a belief.
     """
 
     belief: MapBelief | None = None
@@ -79,6 +61,7 @@ class BayesState:
     null: NullHypothesis = field(default_factory=NullHypothesis)
     alternative: AlternativeHypothesis | None = None
     takeovers: int = 0
+    path: RecentPath = field(default_factory=RecentPath)
 
     @property
     def particle_spacing_m(self) -> float:

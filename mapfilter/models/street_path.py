@@ -1,0 +1,80 @@
+"""How well a path of dead reckoning fits the streets that it would end on.
+
+From an unknown start, a path of some tens of metres is laid through every place of the map, in
+every direction. Each time it is weighed by the same map as hypotheses are
+(:mod:`mapfilter.models.street_motion`), leg by leg, including that of being off the map.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from mapfilter._kernels import log32
+from mapfilter._types import Floats32
+from mapfilter.models.street_motion import MapFactors
+
+_F = np.float32
+
+
+@njit(error_model="numpy", fastmath={"contract"}, cache=True)
+def weigh_path(
+    ends_m: Floats32,
+    earlier_m: Floats32,
+    turned_rad: float,
+    on_map: Floats32,
+    resolution_m: float,
+    factors: MapFactors,
+    log_likelihood: Floats32,
+    off: Floats32,
+) -> None:
+    """Fill the log-likelihood of a path at each of its possible ends, and of being off there.
+
+    Parameters
+    ----------
+    ends_m : ndarray of float32, shape (2, P)
+        East and north of the ends in the frame of ``on_map``, whose origin is its south-western
+        corner.
+    earlier_m : ndarray of float32, shape (K, 2)
+        East and north of earlier points relative to the end, by dead reckoning; oldest first, one
+        leg apart.
+    turned_rad : float
+        Angle that is added to the headings of dead reckoning.
+    on_map : ndarray of float32, shape (rows, cols)
+        Likelihood of one leg on the map: the exponential of
+        :func:`~mapfilter.models.street_motion.map_log_likelihood` times the factors' exponent.
+    resolution_m : float
+        Side of its pixels; each point takes the value of the pixel that holds it.
+    factors : MapFactors
+        Of one leg.
+    log_likelihood, off : ndarray of float32, shape (P,)
+        Filled. ``off`` is the probability that the path has ended off the map; before the path it
+        is that given.
+    """
+    rows, cols = on_map.shape
+    cosine, sine, per_m = np.cos(turned_rad), np.sin(turned_rad), _F(1.0 / resolution_m)
+    count = len(earlier_m)
+    east_m, north_m = np.empty(count + 1, np.float32), np.empty(count + 1, np.float32)
+    for k in range(count):
+        east_m[k] = _F(earlier_m[k, 0] * cosine - earlier_m[k, 1] * sine)
+        north_m[k] = _F(earlier_m[k, 0] * sine + earlier_m[k, 1] * cosine)
+    east_m[count], north_m[count] = _F(0.0), _F(0.0)
+    one, off_cost = _F(1.0), _F(factors.off)
+    leave, come_back = _F(factors.leave), _F(factors.come_back)
+    for i in range(ends_m.shape[1]):
+        away, product = off[i], one
+        total = _F(0.0)
+        for k in range(count + 1):
+            col = int((ends_m[0, i] + east_m[k]) * per_m)
+            row = rows - 1 - int((ends_m[1, i] + north_m[k]) * per_m)
+            col = min(max(col, 0), cols - 1)
+            row = min(max(row, 0), rows - 1)
+            away = away * (one - come_back) + (one - away) * leave
+            likely = away * off_cost + (one - away) * on_map[row, col]
+            away = away * off_cost / likely
+            product *= likely
+            if product < _F(1e-20):
+                total += log32(product)
+                product = one
+        log_likelihood[i] = total + log32(product)
+        off[i] = away

@@ -1,0 +1,139 @@
+"""Commands over roads alone: a road raster, its database, and drives of KITTI located over it."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import rasterio
+from command_line import mapfilter
+
+WEST_M, NORTH_M, SIDE_PX = 455_000.0, 5_431_000.0, 400
+
+
+@pytest.fixture
+def roads(tmp_path):
+    """A raster of three streets, one of them a footway, and a configuration."""
+    values = np.zeros((SIDE_PX, SIDE_PX), dtype=np.uint8)
+    values[100, 20:380] = values[20:380, 200] = 1
+    values[300, 50:150] = 2
+    with rasterio.open(
+        tmp_path / "roads.tif", "w", driver="GTiff", height=SIDE_PX, width=SIDE_PX, count=1,
+        dtype="uint8", crs="EPSG:32632", transform=rasterio.Affine(1, 0, WEST_M, 0, -1, NORTH_M),
+    ) as target:  # fmt: skip
+        target.write(values, 1)
+    (tmp_path / "roads.toml").write_text(
+        '[area]\nmap = "none"\n[roads]\nraster = "roads.tif"\n'
+        "raster_classes = { residential = 1, footway = 2 }\n"
+        '[database]\ncells = false\n[output]\ndir = "out"\n'
+    )
+    return tmp_path / "roads.toml"
+
+
+def write_drive(folder):
+    """A short drive along a street."""
+    time_s = np.arange(40.0)
+    pd.DataFrame({"time_s": time_s, "step_m": 2.0, "turn_rad": 0.0}).to_csv(
+        folder / "drive.csv", index=False
+    )
+    return folder / "drive.csv"
+
+
+def test_a_road_raster_is_checked_built_and_described(roads):
+    assert mapfilter("check", "-c", roads).out.strip() == "Nothing found that looks wrong."
+    built = mapfilter("build", "-c", roads, "--json").json
+    assert (built["cells"], built["pictures"]) == (0, [])
+    shown = mapfilter("info", built["database"], "--json").json
+    assert shown["points"] == built["points"] == built["routable_points"] > 300
+    assert shown["bounds_m"] == [WEST_M, NORTH_M - 400, WEST_M + 400, NORTH_M]
+    assert [one["role"] for one in shown["inputs"]] == ["roads"]
+    without = mapfilter(
+        "build", "-c", roads, "--set", "roads.half_width_by_class_m.footway=0", "--json"
+    ).json
+    assert without["points"] < built["points"]
+
+
+def test_the_flag_needs_neither_plan_nor_rasters(roads):
+    text = roads.read_text().replace("cells = false", "cells = true")
+    roads.write_text(text)
+    refused = mapfilter("build", "-c", roads)
+    assert (refused.code, "not predicted yet" in refused.err) == (2, True)
+    assert mapfilter("build", "--roads-only", "-c", roads).code == 0
+
+
+def test_what_a_database_of_roads_alone_cannot_do_is_refused(roads):
+    built = mapfilter("build", "-c", roads, "--json").json["database"]
+    drive = write_drive(roads.parent)
+    for command in (
+        ("build", "-c", roads, "--dry-run"),
+        ("bound", built, "--out", roads.parent / "bound"),
+        ("export", built, "--to", roads.parent / "roads.tif.tif"),
+        ("merge", built, built, "--out", roads.parent / "merged"),
+    ):
+        outcome = mapfilter(*command)
+        assert outcome.code == 2, command
+        assert "Traceback" not in outcome.err
+        assert "expected" in outcome.err
+    for name in ("candidate", "grid"):
+        out = roads.parent / name
+        outcome = mapfilter("replay", "--db", built, "--log", drive, "--filter", name, "--out", out)
+        assert (outcome.code, f"the filter {name} needs cells" in outcome.err) == (3, True)
+
+
+def test_a_drive_that_is_too_short_is_said_to_be(roads):
+    built = mapfilter("build", "-c", roads, "--json").json["database"]
+    drive = roads.parent / "drive.csv"
+    pd.DataFrame({"time_s": [0.0, 1.0], "step_m": 2.0, "turn_rad": 0.0}).to_csv(drive, index=False)
+    outcome = mapfilter("replay", "--db", built, "--log", drive, "--out", roads.parent / "short")
+    assert (outcome.code, "too short a way" in outcome.err) == (3, True)
+
+
+@pytest.mark.parametrize(
+    ("setting", "expected"),
+    [
+        ("roads.raster_classes.residential=7", "pixels of value 7"),
+        ('roads.layer="roads.tif"', "one of layer, raster and tracks.files"),
+        ("area.resolution_m=0.001", "at most 4e+08 pixels"),
+        ('area.crs="EPSG:32633"', "another zone"),
+    ],
+)
+def test_faults_of_a_road_raster_are_named_by_check_and_build(roads, setting, expected):
+    given = ["-c", roads, "--set", setting]
+    if "crs" in setting:
+        given += ["--set", "area.bbox=8.385,49.025,8.388,49.027"]
+    built, checked = mapfilter("build", *given), mapfilter("check", *given)
+    assert (built.code, checked.code) == (2, 2)
+    assert expected in built.err
+    assert expected in checked.out + checked.err
+
+
+def test_real_odometry_is_located_on_real_streets(tmp_path, shared_data):
+    data = shared_data / "kitti-osm"
+    if not data.exists():
+        pytest.skip("the drives of KITTI are not in the shared data")
+    for name in ("orb-slam", "s-ptam"):
+        motion, truth = data / "odometry" / f"{name}-00.csv", data / "truth" / "00.csv"
+        log = tmp_path / "logs" / name
+        done = mapfilter("convert", motion, "--truth", truth, "--crs", "EPSG:32632", "--out", log)
+        assert done.code == 0, done.err
+    settings = [
+        "--set", "area.map=none", "--set", f"roads.raster={data / 'roads.tif'}",
+        "--set", "roads.raster_classes={road = 1}", "--set", "filter.bayes.vehicle=true",
+        "--set", "output.pictures=none",
+    ]  # fmt: skip
+    built = mapfilter("build", "--roads-only", *settings, "--out", tmp_path / "out", "--json").json
+    result = mapfilter(
+        "replay", *settings, "--db", built["database"], "--log", tmp_path / "logs",
+        "--out", tmp_path / "located", "--json",
+    ).json  # fmt: skip
+    assert (result["successes"], result["wrong"]) == (2, 0)
+    for name in ("orb-slam", "s-ptam"):
+        estimate = pd.read_parquet(tmp_path / "located" / name / "estimate.parquet")
+        true = pd.read_csv(data / "truth" / "00.csv")
+        east_m, north_m = (
+            np.interp(estimate["time_s"], true["time_s"], true[axis])
+            for axis in ("east_m", "north_m")
+        )
+        error_m = np.hypot(estimate["east_m"] - east_m, estimate["north_m"] - north_m)
+        found = estimate["status"].isin(["CONVERGED", "TRACKING"])
+        assert found.mean() > 0.5
+        assert np.median(error_m[found]) < 5
+        assert (error_m[found] > 50).mean() == 0
