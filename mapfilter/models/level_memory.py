@@ -101,7 +101,8 @@ class LevelMemory:
 
     def fault_odds(self, band: int, kept: Floats32) -> Floats32:
         """Return the row of what hypotheses keep with the log odds of a cell's fault, (N,)."""
-        return kept[2 * self.slots + 1 + self.slot_of[band]]
+        row: Floats32 = kept[2 * self.slots + 1 + self.slot_of[band]]
+        return row
 
     def correlation(self, one: Ints32, other: Ints32) -> Floats:
         """Return the correlation of the errors of two lists of bands before any level."""
