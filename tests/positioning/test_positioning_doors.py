@@ -56,6 +56,7 @@ def test_the_usual_options():
         "abandon_after_m": 800.0,
         "converge_log_odds": -5.0,
         "converge_threshold": 2.0,
+        "map_nats_per_m": 0.04,
     }
     evidence = EvidenceOptions()
     assert (evidence.spacing_m, evidence.first_m, evidence.use_levels) == (5.0, 25.0, True)

@@ -57,13 +57,12 @@ MapBelief = ParticleBelief | GridBelief
 
 _LEAST_LOG_ODDS, _MOST_LOG_ODDS = -12.0, 12.0
 _PRIOR_LOG_ODDS = log(0.05 / 0.95)
-_SERVING_NATS = 0.7
-_MAP_NATS_PER_M = 0.04
-_TERMS_FACTOR = 1.5
-_UNKNOWN_NATS = 0.5
-"""Log-likelihood, below 0, under the null hypothesis: of a serving cell at full weight, of the map
-per metre, and of other terms as a multiple of what is expected of them; and the gain from a serving
-cell that the map does not have."""
+_SERVING_NATS, _TERMS_FACTOR, _UNKNOWN_NATS = 0.7, 1.5, 0.5
+"""Negative log-likelihood, under the null hypothesis, of a serving cell at full weight; that of
+other terms as a multiple of what is expected of them; the gain from a serving cell that the map
+does not have."""
+MAP_NATS_PER_M = 0.04
+"""Negative log-likelihood of the map for each metre, under the null hypothesis."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +92,8 @@ class AlternativeRules(Options):
         wins.
     converge_threshold : float
         Lead over its alternative, as a log Bayes factor, that a belief needs to converge.
+    map_nats_per_m : float
+        Negative log-likelihood of the map for each metre under the null hypothesis.
     """
 
     start_log_odds: float = -1.0
@@ -103,6 +104,7 @@ class AlternativeRules(Options):
     abandon_after_m: NotNegative = 800.0
     converge_log_odds: float = -5.0
     converge_threshold: float = 2.0
+    map_nats_per_m: NotNegative = MAP_NATS_PER_M
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +128,7 @@ class NullHypothesis:
         other_log_likelihood: float,
         gained: float,
         travelled_m: float,
+        map_nats_per_m: float = MAP_NATS_PER_M,
     ) -> NullHypothesis:
         """Add a reading.
 
@@ -137,9 +140,11 @@ class NullHypothesis:
             Log-likelihood of the reading, and of the map since the last one, under the belief.
         travelled_m : float
             By the belief.
+        map_nats_per_m : float
+            Negative log-likelihood of the map for each metre, under the null hypothesis.
         """
         expected = other_log_likelihood + _TERMS_FACTOR * reading.expected
-        expected -= _MAP_NATS_PER_M * (travelled_m - self.travelled_m)
+        expected -= map_nats_per_m * (travelled_m - self.travelled_m)
         known = reading.serving >= 0
         expected += (-_SERVING_NATS if known else _UNKNOWN_NATS) * reading.serving_weight
         log_odds = self.log_odds + expected - gained

@@ -298,14 +298,14 @@ class BayesPositioner(Filter[BayesState]):
         belief, info = update(before, reading, rng)
         if info.reason is not Reason.USED:
             return replace(state, belief=belief), info.reason
-        null = _challenged(state.null, reading, before, belief)
+        null = _challenged(rules, state.null, reading, before, belief)
         sources, alternative = state.sources, state.alternative
         if alternative is not None:
             terms = joined(updates, alternative=True) or RadioReading()
             doubt = plain or alternative.null.log_odds > rules.converge_log_odds
             terms = replace(terms, doubted=doubt)
             other, _ = update(alternative.belief, terms, rng)
-            own = _challenged(alternative.null, terms, alternative.belief, other)
+            own = _challenged(rules, alternative.null, terms, alternative.belief, other)
             alternative = replace(alternative, belief=other, null=own)
         travelled_m = state.reckoning.travelled_m
         at_edge = self.area.at_edge(belief.summary.mean)
@@ -381,14 +381,18 @@ class BayesPositioner(Filter[BayesState]):
 
 
 def _challenged(
-    null: NullHypothesis, reading: RadioReading, before: MapBelief, after: MapBelief
+    rules: AlternativeRules,
+    null: NullHypothesis,
+    reading: RadioReading,
+    before: MapBelief,
+    after: MapBelief,
 ) -> NullHypothesis:
     """Return the null hypothesis beside a belief after a reading."""
     other = 0.0
     if reading.levels is not None and after.shared is not None:
         other = after.shared.other_log_likelihood
     gained = after.log_evidence - before.log_evidence
-    return null.after(reading, other, gained, after.travelled_m)
+    return null.after(reading, other, gained, after.travelled_m, rules.map_nats_per_m)
 
 
 def _every_kind() -> RadioReading:
