@@ -117,16 +117,31 @@ class NumpyModel:
         margin = level - np.where(level >= best, second, best)
         middle = _TABLE_DB * _PER_DB
         place = np.clip(margin * _PER_DB + middle + 0.5, 0, 2 * middle).astype(np.int64)
-        served = reading.serving_weight * self._serving[place]
+        right = reading.serving_weight * self._serving[place]
         rough = 0.1 * area.flat_rough_db.reshape(area.level_dbm.shape)[pixel].astype(np.float64)
         flat = np.asarray(pixel[0] * area.lattice.cols + pixel[1], dtype=np.int32)
-        matched, kept = self._levels(now, rough, flat)
+        served, odds = self._served(right)
+        matched, kept = self._levels(now, rough, flat, odds)
         return np.asarray(state[MAP] + served + matched), kept
 
-    def _levels(self, now: Floats, rough: Floats, pixel: Ints32) -> tuple[Floats, Floats]:
+    def _served(self, right: Floats) -> tuple[Floats, Floats]:
+        """Return the log-likelihood of the serving cell, and the log odds of its fault."""
+        evidence = self.model.evidence
+        other = -evidence.serving.fault_nats * self.reading.serving_weight
+        before = evidence.levels.fault_log_odds
+        odds = before + other - right
+        served = right + np.logaddexp(0, odds) - np.logaddexp(0, before)
+        return served, np.clip(odds, -_KEPT_ODDS, _KEPT_ODDS)
+
+    def _levels(
+        self, now: Floats, rough: Floats, pixel: Ints32, odds: Floats
+    ) -> tuple[Floats, Floats]:
         errors, report, area = self.model.evidence.levels, self.levels, self.model.area
         memory = LevelMemory.empty(errors, area.site_of)
         kept = memory.start(now.shape[0])
+        first = np.array([self.reading.serving], dtype=np.int32)
+        memory, kept = memory.with_cells(first, kept)
+        memory.fault_odds(self.reading.serving, kept)[:] = odds
         report = report._replace(absent=self.model._expected(pixel, report))
         cells = np.concatenate([report.cell, report.absent])[: memory.slots]
         memory, kept = memory.with_cells(cells, kept)

@@ -72,12 +72,16 @@ _PREDICTS = "levels are predicted here, and the ground truth is drawn"
 _NO_JOURNEYS = "journeys are simulated here"
 _RUNS = "use --runs"
 _NO_TIMING = "no timing advances are simulated"
+_WAYS = "journeys follow the ways of a map"
 REFUSED: Mapping[str, str] = {
     "prediction.ground_truth.write": _PREDICTS,
     "prediction.ground_truth.seed": _DRAWN,
     "prediction.survey": _PREDICTS,
     "rasters": _PREDICTS,
+    "roads.raster": _WAYS,
+    "roads.raster_classes": _WAYS,
     "database.path": "the database is built here",
+    "database.cells": "the cases are of cells",
     "journeys.count": _RUNS,
     "journeys.draws": _RUNS,
     "journeys.seed": _DRAWN,

@@ -35,7 +35,7 @@ def test_the_options_that_were_chosen():
     assert (FOLDER, LEFT_OUT) == ("cell-ottawa-lte", ("OpenCellID_20200830",))
     assert (GOOD_M, MAP_M, LONGEST_GAP_S, METHODS) == (20.0, 50.0, 30.0, ("bayes", "smoothed"))
     options = OttawaOptions()
-    area = SimpleNamespace(size_m=(100.0, 100.0))
+    area = SimpleNamespace(size_m=(100.0, 100.0), cell_ids=("A",))
     model = options.positioner(area).model
     assert asdict(model.motion) == {
         "step_sd_m": 1.0, "typical_step_m": 14.0, "heading_sd_rad": radians(10),

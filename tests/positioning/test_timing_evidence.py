@@ -88,7 +88,19 @@ def test_readings_of_unknown_cells_are_reported_unused(area):
         ("tdoa", "E", Reason.SECOND_READING),
     ]
     untimed = Epoch(0.0, radio=(ReportRow("serving", "W", None, None, nan, 0),))
-    assert read(area, untimed) == (TimingState(), (), None, 0, [], None, None, False, None, None)
+    assert read(area, untimed) == (
+        TimingState(),
+        (),
+        None,
+        0,
+        [],
+        None,
+        None,
+        False,
+        None,
+        None,
+        None,
+    )
 
 
 def test_times_of_arrival_shorten_the_search(area):

@@ -13,7 +13,10 @@ REFUSED_SECTIONS = ("prediction.survey.", "rasters.", "track.", "sweep.")
 REFUSED = {
     "prediction.ground_truth.write",
     "prediction.ground_truth.seed",
+    "roads.raster",
+    "roads.raster_classes",
     "database.path",
+    "database.cells",
     "journeys.count",
     "journeys.draws",
     "journeys.seed",
@@ -44,6 +47,7 @@ OF_KALMAN = tuple(
 
 # Name of the setting: its value, the option, and the option's value where it has another unit.
 OF_BAYES = {
+    "vehicle": (True, "model.weights.off_cost_per_m", 0.15),
     "step_sd_m": (0.7, "model.motion.step_sd_m"),
     "heading_sd_deg": (7.0, "model.motion.heading_sd_rad", radians(7)),
     "bias_sd_deg": (8.0, "model.motion.bias_sd_rad", radians(8)),

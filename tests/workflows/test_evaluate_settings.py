@@ -39,7 +39,7 @@ from mapfilter.workflows.world import World, filter_choice
 LATTICE = Lattice("EPSG:32629", 500_000.0, 4_500_000.0, 10.0, 2, 2)
 EMPTY = np.zeros((2, 2), dtype=np.float32)
 AREA = AreaMap(
-    LATTICE, (), frozenset(), EMPTY[..., None], EMPTY, EMPTY.astype(int), EMPTY > 0, {}, -110.0
+    LATTICE, ("A",), frozenset(), EMPTY[..., None], EMPTY, EMPTY.astype(int), EMPTY > 0, {}, -110.0
 )
 SMALL = {
     "area.map": "manhattan",
