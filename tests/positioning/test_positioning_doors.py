@@ -54,7 +54,7 @@ def test_the_usual_options():
         "confirm_mass": 0.9,
         "abandon_threshold": -25.0,
         "abandon_after_m": 800.0,
-        "converge_log_odds": -9.0,
+        "converge_log_odds": -5.0,
         "converge_threshold": 2.0,
         "map_nats_per_m": 0.04,
     }
@@ -240,8 +240,8 @@ def test_outcomes_at_their_thresholds():
     assert (outcome(S, 4.0), outcome(S, 3.9)) == (Outcome.AHEAD, Outcome.UNDECIDED)
     assert (outcome(T, 8.0), outcome(T, 7.9)) == (Outcome.AHEAD, Outcome.UNDECIDED)
     assert outcome(T, 8.0, status=C) is outcome(T, 8.0, status=T) is Outcome.WON
-    assert outcome(T, 8.0, status=C, null=-9.0) is Outcome.WON
-    assert outcome(T, 8.0, status=C, null=-8.9) is Outcome.AHEAD
+    assert outcome(T, 8.0, status=C, null=-5.0) is Outcome.WON
+    assert outcome(T, 8.0, status=C, null=-4.9) is Outcome.AHEAD
     assert outcome(T, 8.0, status=C, null=0.0) is Outcome.AHEAD
     assert outcome(T, 8.0, status=C, null=0.1) is Outcome.SUSPECT
     assert outcome(T, 8.0, status=S, null=0.1) is Outcome.SUSPECT
@@ -262,7 +262,7 @@ def resolved(main, lead, null=-9.0, own=-9.0, before=None):
 def test_resolutions_at_their_thresholds():
     # No belief converges beside a null hypothesis, nor with an alternative close behind.
     alone = resolve_alternative(
-        AlternativeRules(), S, belief(C), NullHypothesis(-9.0), None, 0.0, at_edge=True
+        AlternativeRules(), S, belief(C), NullHypothesis(-5.0), None, 0.0, at_edge=True
     )
     assert (alone.status, alone.alternative, alone.taken_over) == (C, None, False)
     assert resolved(C, -2.0).status is C

@@ -102,7 +102,7 @@ class AlternativeRules(Options):
     confirm_mass: Share = 0.9
     abandon_threshold: float = -25.0
     abandon_after_m: NotNegative = 800.0
-    converge_log_odds: float = -9.0
+    converge_log_odds: float = -5.0
     converge_threshold: float = 2.0
     map_nats_per_m: NotNegative = MAP_NATS_PER_M
 

@@ -43,10 +43,11 @@ _VEHICLE_LEAVES_PER_M = 3e-4
 
 _MORE_BY_MAP = 3
 _LEAST_MASS_BY_MAP, _LEAST_HOLD_BY_MAP_M = 0.998, 200.0
-_NATS_PER_M_BY_MAP = 0.03
+_CONVERGE_BY_MAP, _NATS_PER_M_BY_MAP = -8.0, 0.03
 """Where the map alone is the evidence: factor of the numbers of particles, as many places stay
-possible for long; least mass and distance of the switch rule, and what a metre costs under the null
-hypothesis, as a path fits streets of another place for some hundred metres."""
+possible for long; least mass and distance of the switch rule; largest log odds of the null
+hypothesis, and its cost of a metre, as a path fits streets of another place for some hundred
+metres."""
 
 Particles = Annotated[int, Ge(10), Le(10_000_000)]
 
@@ -218,7 +219,9 @@ class BayesFilter(Options):
         )
         rules = AlternativeRules()
         if not area.cell_ids:
-            rules = replace(rules, map_nats_per_m=_NATS_PER_M_BY_MAP)
+            rules = replace(
+                rules, converge_log_odds=_CONVERGE_BY_MAP, map_nats_per_m=_NATS_PER_M_BY_MAP
+            )
             particles = replace(
                 particles,
                 max_particles=_MORE_BY_MAP * self.max_particles,
