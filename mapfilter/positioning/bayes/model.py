@@ -276,9 +276,8 @@ class BayesModel:
             memory, decay = memory.after(length_m)
             keep = exp(-length_m / errors.fault_m)
             kept = decayed(cloud.kept, decay, keep, errors.fault_log_odds)
-        memory, kept = memory.with_cells(
-            np.array([reading.serving][: reading.serving >= 0], np.int32), kept
-        )
+        served = [reading.serving] if reading.serving >= 0 else []
+        memory, kept = memory.with_cells(np.array(served, dtype=np.int32), kept)
         return Cloud(cloud.state, kept, memory)
 
     def _weigh_serving(
