@@ -58,9 +58,6 @@ MapBelief = ParticleBelief | GridBelief
 LEAST_LOG_ODDS = -12.0
 _MOST_LOG_ODDS, _BEYOND = 12.0, 3.0
 _PRIOR_LOG_ODDS = log(0.05 / 0.95)
-_SERVING_NATS, _UNKNOWN_NATS = 0.7, 0.5
-"""Negative log-likelihood, under the null hypothesis, of a serving cell at full weight; the gain
-from a serving cell that the map does not have."""
 MAP_NATS_PER_M = 0.04
 """Negative log-likelihood of the map for each metre, under the null hypothesis."""
 
@@ -150,10 +147,8 @@ class NullHypothesis:
         least_log_odds : float
             Bound from below: the null hypothesis may become true at any time.
         """
-        expected = other_log_likelihood + reading.under_null
+        expected = reading.radio_under_null(other_log_likelihood) + reading.under_null
         expected -= map_nats_per_m * (travelled_m - self.travelled_m)
-        known = reading.serving >= 0
-        expected += (-_SERVING_NATS if known else _UNKNOWN_NATS) * reading.serving_weight
         log_odds = self.log_odds + expected - gained
         return NullHypothesis(min(max(log_odds, least_log_odds), _MOST_LOG_ODDS), travelled_m)
 

@@ -27,6 +27,10 @@ from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.tracks.schema import Kind
 
+_SERVING_NATS, _UNKNOWN_NATS = 0.7, 0.5
+"""Negative log-likelihood, under the null hypothesis, of a serving cell at full weight; the gain
+from a serving cell that the map does not have."""
+
 
 class Term(Protocol):
     """A log-likelihood over hypotheses."""
@@ -82,6 +86,14 @@ class RadioReading:
     length_m: float = 0.0
     timing_advance: float = nan
     doubted: bool = False
+
+    def radio_under_null(self, other_log_likelihood: float) -> float:
+        """Return the log-likelihood of the report under the null hypothesis.
+
+        ``other_log_likelihood`` is that of its levels if the prediction is wrong about all cells.
+        """
+        each = -_SERVING_NATS if self.serving >= 0 else _UNKNOWN_NATS
+        return other_log_likelihood + each * self.serving_weight
 
 
 class Context(NamedTuple):
