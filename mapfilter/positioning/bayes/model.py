@@ -54,7 +54,7 @@ from mapfilter.positioning.bayes.radio import EvidenceOptions
 _F = np.float32
 _OFF_SHARE, _TRIES = 0.2, 2
 _BEYOND_M, _BEYOND_SHARE, _BEYOND_AT_START = 300.0, 0.15, 0.05
-_BEYOND_COST_PER_M = 0.03
+_BEYOND_COST_PER_M = 0.015
 _AT_ONCE = 50_000
 _NEW_M = 50.0
 _LEAST_EXPECTED = 0.02
