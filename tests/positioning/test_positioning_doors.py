@@ -86,7 +86,7 @@ def test_the_usual_options():
     assert (reading.serving, reading.serving_weight, reading.levels, reading.bounds) == (
         -1, 0.0, None, (),
     )  # fmt: skip
-    assert (reading.expected, reading.length_m, reading.terms) == (0.0, 0.0, ())
+    assert (reading.under_null, reading.length_m, reading.terms) == (0.0, 0.0, ())
     assert np.isnan(reading.timing_advance)
 
 

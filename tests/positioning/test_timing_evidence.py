@@ -46,7 +46,8 @@ def test_a_timing_advance_is_a_ring(area):
     away = np.hypot([100.0, 113.6, 300.0], 28.5)
     expected = -0.5 * np.minimum(((117.15 - away) / sigma) ** 2, 9.0)
     np.testing.assert_allclose(gain, expected, atol=1e-6)
-    assert update.expected == pytest.approx(-0.5)
+    # Under the null hypothesis half as bad again as is expected at the true position.
+    assert update.under_null == pytest.approx(-0.75)
 
 
 def test_errors_that_last_count_once(area):
@@ -57,7 +58,7 @@ def test_errors_that_last_count_once(area):
     share = 1 - np.exp(-2 * 5.0 / 50.0)
     np.testing.assert_allclose(soon.terms[0].log_likelihood(place), share * whole)
     still = read(area, epoch, (0.0, -inf), 0.0)
-    assert (still.terms, still.expected) == ((), 0)
+    assert (still.terms, still.under_null) == ((), 0)
     assert still.state == (0.0, -inf)
 
 

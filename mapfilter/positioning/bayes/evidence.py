@@ -123,7 +123,6 @@ class EvidenceUpdate(NamedTuple):
     terms: tuple[Term, ...] = ()
     alternative_terms: tuple[Term, ...] | None = None
     under_null: float = 0.0
-    alternative_under_null: float | None = None
     unused: Sequence[UnusedReading] = ()
     belief: MapBelief | None = None
     alternative: AlternativeHypothesis | None = None
@@ -131,6 +130,7 @@ class EvidenceUpdate(NamedTuple):
     radio: RadioReading | None = None
     reason: Reason | None = None
     path: RecentPath | None = None
+    alternative_under_null: float | None = None
 
 
 class EvidenceSource(ABC):

@@ -40,8 +40,6 @@ _VEHICLE_MOTION: Mapping[str, float] = {
     "stretch_sd": 0.02,
 }
 _VEHICLE_LEAVES_PER_M = 3e-4
-_DISTURBED_SHARE = 0.4
-"""Share of the variance of headings that disturbances contribute."""
 
 _MORE_BY_MAP = 3
 _LEAST_MASS_BY_MAP, _LEAST_HOLD_BY_MAP_M = 0.998, 200.0
@@ -195,10 +193,9 @@ class BayesFilter(Options):
             scale_sd=self.scale,
         )
         # Disturbances are part of the headings' errors: small errors leave no room for large jumps.
-        apart_rad2 = motion.heading_m * motion.disturbed_rad**2
-        motion = replace(
-            motion, disturbances_per_m=_DISTURBED_SHARE * motion.heading_sd_rad**2 / apart_rad2
-        )
+        usual = MotionErrors()
+        share = (motion.heading_sd_rad / usual.heading_sd_rad) ** 2
+        motion = replace(motion, disturbances_per_m=share * usual.disturbances_per_m)
         weights = MapWeights(self.map_sd_m, self.map_weight_per_m, self.off_cost_per_m)
         if self.vehicle:
             motion = replace(motion, **_VEHICLE_MOTION)
