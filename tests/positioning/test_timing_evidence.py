@@ -9,6 +9,7 @@ import pytest
 from cross_world import CRS, LATTICE, make_database, walk_log
 
 from mapfilter.filters.contract import Reason
+from mapfilter.positioning.bayes.evidence import EvidenceUpdate
 from mapfilter.positioning.bayes.options import BayesFilter, open_area
 from mapfilter.positioning.bayes.timing import TimingSource, TimingState
 from mapfilter.positioning.epochs import Difference, Epoch, ReportRow
@@ -89,19 +90,7 @@ def test_readings_of_unknown_cells_are_reported_unused(area):
         ("tdoa", "E", Reason.SECOND_READING),
     ]
     untimed = Epoch(0.0, radio=(ReportRow("serving", "W", None, None, nan, 0),))
-    assert read(area, untimed) == (
-        TimingState(),
-        (),
-        None,
-        0,
-        [],
-        None,
-        None,
-        False,
-        None,
-        None,
-        None,
-    )
+    assert read(area, untimed) == EvidenceUpdate(TimingState(), unused=[])
 
 
 def test_times_of_arrival_shorten_the_search(area):
