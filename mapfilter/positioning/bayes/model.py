@@ -244,8 +244,9 @@ class BayesModel:
         found = interpolate(moved, self.log_map, step / 2, (rows - 0.5) * step, 1 / step)
         beyond = self.area.beyond(moved)
         if beyond.any() and self.weights.weight_per_m > 0:
-            # Beyond the area nobody knows the ways.
-            found[beyond] = -_BEYOND_COST_PER_M / self.weights.weight_per_m
+            # Beyond the area nobody knows the ways; if these are all there is, it is off the map.
+            cost = _BEYOND_COST_PER_M if self.area.cell_ids else self.weights.off_cost_per_m
+            found[beyond] = -cost / self.weights.weight_per_m
         weigh_by_map(found, moved[OFF], self.weights.over(length_m), weighed)
         return moved, weighed
 
