@@ -110,7 +110,7 @@ def test_a_drive_test_alone_says_what_it_lacks(database, recordings, tmp_path):
     cells = recordings / "cells.csv"
     done = replayed(database, tmp_path / "out", "--log", cells)
     assert done.code == 3
-    assert "nothing is located in cells: no motion" in done.err
+    assert "nothing is located in cells: no motion (mapfilter locate needs none)" in done.err
 
 
 def test_speed_and_course_become_motion_on_request(database, recordings, tmp_path):
@@ -122,7 +122,12 @@ def test_speed_and_course_become_motion_on_request(database, recordings, tmp_pat
     path = tmp_path / "drive.csv"
     done = replayed(database, tmp_path / "out", "--log", path, "--without", "gnss")
     assert done.code == 3
-    assert "no motion (track.course_motion makes it from speed and course)" in done.err
+    remedy = "no motion (--course-motion, track.course_motion, makes it from speed and course)"
+    assert remedy in done.err
+    # As the truth they are no sensor any more, and yet make motion.
+    given = ("--log", path, "--truth", path)
+    assert remedy in replayed(database, tmp_path / "out", *given).err
+    assert replayed(database, tmp_path / "out", *given, "--course-motion").code == 0
     given = ("--log", path, "--course-motion", "--without", "gnss")
     done = replayed(database, tmp_path / "out", *given)
     assert done.code == 0, done.err

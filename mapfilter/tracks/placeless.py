@@ -1,0 +1,32 @@
+"""Logs in a local frame: without positions they fit any database."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from mapfilter.geodesy import short_crs
+from mapfilter.tracks.log import TrackLog
+
+LOCAL_FRAME_HINT = "a local frame: convert it with --crs, and --origin where it has positions"
+
+
+def is_local_frame(crs: str) -> bool:
+    """Return whether a CRS has no name, as that of a log without positions on the earth.
+
+    Examples
+    --------
+    >>> is_local_frame("EPSG:32635"), is_local_frame("+proj=tmerc +lat_0=0 +lon_0=0 +type=crs")
+    (False, True)
+    """
+    return short_crs(crs) == "unknown" or crs.startswith("+proj")
+
+
+def in_frame(log: TrackLog, crs: str) -> TrackLog:
+    """Return a log that names no CRS and holds no positions as one in ``crs``.
+
+    Its headings then are relative to that grid's north. Other logs are returned as they are.
+    """
+    if not is_local_frame(log.crs) or not (log.truth.empty and log.gnss.empty):
+        return log
+    note = f"no positions in the log: taken to be in {short_crs(crs)}"
+    return replace(log, crs=crs, notes=(*log.notes, note))
