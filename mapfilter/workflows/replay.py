@@ -74,6 +74,17 @@ class _Logs:
                 faults.found.extend(error.faults)
         faults.raise_if_any(InputError)
 
+    def check_siteless(self) -> None:
+        """Refuse logs of which a filter without a map would need sites."""
+        for path in self.paths:
+            log = leave_out(self.open(path).log, self.config.track.without)
+            if len(log.radio) or len(log.tdoa):
+                hint = (
+                    "filters without a map take the sites from there, or from a database (--db); "
+                    "--without radio,tdoa leaves positions and dead reckoning"
+                )
+                raise fail(ConfigError, "cells.plan", "a cell plan", "none", hint)
+
 
 _NAMED = 3
 
@@ -257,7 +268,9 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
 
     @cache
     def sites(crs: str) -> CellPlan:
-        return planned_cells(config, crs) if database is None else database.plan
+        if database is not None:
+            return database.plan
+        return planned_cells(config, crs) if config.cells.plan else CellPlan(crs, ())
 
     filters: dict[tuple[str, ...], Filter[Any]] = {}
 
@@ -273,6 +286,8 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         plan = sites(crs)
         return cast(KalmanFilter, fitted).over_sites(plan, plan_antennas(config, plan))
 
+    if database is None and config.cells.plan is None:
+        journeys.check_siteless()
     if database is not None:
         journeys.check(database.lattice)
         over(database.lattice.crs, options)
@@ -311,13 +326,17 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
 
 
 def _database(config: Config, options: FilterOptions) -> RadioRouteDatabase | None:
-    """Open the database, unless the filter only needs sites, and a cell plan has them."""
-    if isinstance(options, KalmanFilter):
-        if config.cells.plan is not None:
-            return None
-        if config.database.path is None:
-            hint = "filters without a map take the sites from there, or from a database (--db)"
-            raise fail(ConfigError, "cells.plan", "a cell plan", "none", hint)
+    """Open the database, unless the filter only needs sites, or not even these."""
+    stated = config.database.path is not None
+    if isinstance(options, KalmanFilter) and (config.cells.plan is not None or not stated):
+        return None
+    if not (stated or config.database_path.exists()):
+        found = f"none, and nothing at {shown(str(config.database_path))}"
+        hint = (
+            "give --db; mapfilter build makes one, of streets alone with --roads-only; without "
+            "any, mapfilter locate takes logs, and --filter ekf positions"
+        )
+        raise fail(ConfigError, "database.path", "a radio-route database", found, hint)
     return open_database(config.database_path, verify="full")
 
 

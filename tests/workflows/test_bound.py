@@ -40,7 +40,9 @@ def test_a_database_is_bound(database, tmp_path):
         assert raster.descriptions == tuple(name for name, _ in BANDS)
         assert raster.units[0] == "m"
         assert raster.crs.to_epsg() == 32631
-    assert_refused(mapfilter("info", tmp_path / "b" / "bound.tif"), "the bound of a database")
+    shown = assert_done(mapfilter("info", tmp_path / "b" / "bound.tif", "--json")).json
+    assert (shown["kind"], shown["crs"]) == ("bound", "EPSG:32631")
+    assert shown["bands"] == [name for name, _ in BANDS]
     ways = pd.read_parquet(tmp_path / "b" / "ways.parquet")
     assert ways["points"].sum() == found["points"]
     assert ways["starts"].sum() == found["starts"]

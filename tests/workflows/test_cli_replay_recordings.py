@@ -150,3 +150,28 @@ def test_refusals(database, recordings, tmp_path):
         assert_refused(mapfilter("replay", "--db", database, "--out", out, *more), told)
         assert not out.exists()
     assert json.loads((database / "manifest.json").read_text())
+
+
+def test_without_a_database_the_remedies_are_named(recordings, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    given = ("replay", "--log", recordings, "--out", tmp_path / "out")
+    told = "database.path: expected a radio-route database, found none, and nothing at"
+    assert_refused(mapfilter(*given), told, "--roads-only", "mapfilter locate", "--filter ekf")
+    assert_refused(mapfilter(*given, "--filter", "ekf"), "cells.plan", "--without radio,tdoa")
+
+
+def test_positions_alone_need_neither_database_nor_plan(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    second = np.arange(60)
+    rng = np.random.default_rng(4)
+    true_deg = 60.17 + second * 1.4 / 111_195
+    seen_deg = true_deg + rng.normal(0, 5, 60) / 111_195
+    for name, lat in (("truth.csv", true_deg), ("fixes.csv", seen_deg)):
+        rows = {"time": 1_777_629_600 + second, "lat": lat, "lon": 24.94}
+        pd.DataFrame(rows).to_csv(tmp_path / name, index=False)
+    files = ("--log", tmp_path / "fixes.csv", "--truth", tmp_path / "truth.csv")
+    for more in (("--filter", "ekf"), ("--filter", "ukf", "--smooth")):
+        done = mapfilter("replay", *files, *more, "--out", tmp_path / "out", "--json")
+        assert done.code == 0, done.err
+        assert done.json["switched"]
+        assert done.json["error_mean_m"] < 5

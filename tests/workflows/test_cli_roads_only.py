@@ -88,6 +88,13 @@ def test_a_drive_that_is_too_short_is_said_to_be(roads):
     assert (outcome.code, "too short a way" in outcome.err) == (3, True)
 
 
+def test_a_filter_without_a_map_over_roads_alone_measures_too_little(roads):
+    built = mapfilter("build", "-c", roads, "--json").json["database"]
+    drive, out = write_drive(roads.parent), roads.parent / "ekf"
+    done = mapfilter("replay", "--db", built, "--log", drive, "--filter", "ekf", "--out", out)
+    assert (done.code, "too little was measured" in done.err) == (3, True)
+
+
 def test_a_drive_that_fits_no_street_ends_with_advice(roads):
     built = mapfilter("build", "-c", roads, "--json").json["database"]
     drive = write_drive(roads.parent)
