@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from pyproj import CRS
+
 from mapfilter.geodesy import short_crs
 from mapfilter.tracks.log import TrackLog
 
-LOCAL_FRAME_HINT = "a local frame: convert it with --crs, and --origin where it has positions"
+LOCAL_FRAME = "a local frame"
+LOCAL_FRAME_HINT = "convert it with --crs EPSG:CODE, and --origin LAT,LON of its own metres"
 
 
 def is_local_frame(crs: str) -> bool:
-    """Return whether a CRS has no name, as that of a log without positions on the earth.
+    """Return whether a CRS has no name: that of a log in metres of its own.
 
     Examples
     --------
@@ -19,6 +22,15 @@ def is_local_frame(crs: str) -> bool:
     (False, True)
     """
     return short_crs(crs) == "unknown" or crs.startswith("+proj")
+
+
+def is_placed(crs: str) -> bool:
+    """Return whether a CRS lies elsewhere than at 0, 0 (degrees), where unplaced frames lie."""
+    operation = CRS.from_user_input(crs).coordinate_operation
+    if not is_local_frame(crs) or operation is None:
+        return True
+    names = ("Latitude of natural origin", "Longitude of natural origin")
+    return any(one.value for one in operation.params if one.name in names)
 
 
 def in_frame(log: TrackLog, crs: str) -> TrackLog:

@@ -14,7 +14,7 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenedLog
-from mapfilter.tracks.placeless import LOCAL_FRAME_HINT, in_frame, is_local_frame
+from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, in_frame, is_local_frame
 from mapfilter.tracks.schema import SERVING
 from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.world import outside_m
@@ -68,7 +68,7 @@ def _is_near(path: Path, log: TrackLog, lattice: Lattice, findings: Findings) ->
     if not same_crs(log.crs, lattice.crs):
         evidence = f"The log is in {short_crs(log.crs)}, the area in {short_crs(lattice.crs)}."
         if is_local_frame(log.crs):
-            evidence = f"The log is in {LOCAL_FRAME_HINT}."
+            evidence = f"The log is in {LOCAL_FRAME}: {LOCAL_FRAME_HINT}."
         findings.add("crs-mixed", str(path), evidence)
         return False
     for table in ("truth", "gnss"):

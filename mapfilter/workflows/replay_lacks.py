@@ -15,7 +15,7 @@ from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.log_options import by_streets_alone
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenedLog
-from mapfilter.tracks.placeless import LOCAL_FRAME_HINT, is_local_frame
+from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
 from mapfilter.tracks.schema import SERVING
 from mapfilter.workflows.world import outside_m
 
@@ -32,7 +32,7 @@ def check_log(path: Path, log: TrackLog, lattice: Lattice, faults: Faults) -> No
         expected = f"{short_crs(lattice.crs)}, the database's"
         local = is_local_frame(log.crs)
         hint = LOCAL_FRAME_HINT if local else "log of another area or zone"
-        faults.add(f"{path}, crs", expected, "none" if local else log.crs, hint)
+        faults.add(f"{path}, crs", expected, LOCAL_FRAME if local else log.crs, hint)
         return
     for table in ("truth", "gnss"):
         places = getattr(log, table)

@@ -124,7 +124,7 @@ def test_a_log_without_a_frame_is_one_of_the_database(roads):
     assert placed.code == 0, placed.err
     refused = mapfilter("replay", "--db", built, "--log", log, "--out", roads.parent / "b")
     assert refused.code == 2
-    assert "found none (likely: a local frame: convert it with --crs, and --origin" in refused.err
+    assert "found a local frame (likely: convert it with --crs EPSG:CODE, and --ori" in refused.err
 
 
 @pytest.mark.parametrize(
