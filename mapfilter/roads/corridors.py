@@ -230,7 +230,7 @@ def corridors(
     notes = [f"ways are corridors of {half_width_m:g} m to either side of tracks"]
     for count, why in (
         (coarse, f"less accurate than max_accuracy_m = {max_accuracy_m:g} m"),
-        (alone, f"more than max_gap_m = {max_gap_m:g} m from those before and after"),
+        (alone, f"more than max_gap_m = {max_gap_m:g} m from the others, or standing"),
     ):
         if count:
             notes.append(f"{count} positions left out: {why}")

@@ -122,7 +122,7 @@ def test_positions_that_are_left_out_are_counted_by_their_cause():
     positions = Positions(east, np.zeros(east.size), accuracy_m)
     assert corridors(CRS, [positions], 10.0).notes[1:] == (
         "2 positions left out: less accurate than max_accuracy_m = 50 m",
-        "9 positions left out: more than max_gap_m = 100 m from those before and after",
+        "9 positions left out: more than max_gap_m = 100 m from the others, or standing",
     )
 
 
