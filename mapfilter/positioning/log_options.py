@@ -109,7 +109,8 @@ def _motion_errors(log: TrackLog) -> dict[str, float]:
 def turns_of_vehicle(log: TrackLog) -> bool:
     """Return whether motion has turns, no headings, and the speed of a vehicle."""
     motion = log.motion
-    turns_alone = motion["turn_rad"].notna().any() and motion["heading_rad"].isna().all()
+    # The first row turns by nothing.
+    turns_alone = motion["turn_rad"].notna().sum() > 1 and motion["heading_rad"].isna().all()
     return bool(turns_alone) and usual_top_mps(log) > _VEHICLE_MPS
 
 

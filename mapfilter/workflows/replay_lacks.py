@@ -127,8 +127,12 @@ def lacking(
     serving = (log.radio["role"] == SERVING) & log.radio["cell"].notna()
     moved = log.motion["step_m"].notna()
     lacks = []
+    turned = log.motion[["heading_rad", "turn_rad"]].notna().any(axis=1) & moved
     if not cells:
-        if moved.any() and not (estimate.hypotheses > 0).any():
+        # The first row turns by nothing.
+        if moved.any() and turned.sum() < 2:
+            lacks.append("no headings and no turns")
+        elif moved.any() and not (estimate.hypotheses > 0).any():
             lacks.append("too short a way with steps and headings, or turns")
     elif not serving.any() and not (estimate.hypotheses > 0).any():
         lacks.append("no serving cell")
@@ -136,11 +140,10 @@ def lacking(
         lacks.append("no serving cell of which the database has points")
     if not moved.any():
         lacks.append("no motion")
-    elif cells and not (moved & log.motion["heading_rad"].notna()).any():
-        turned = log.motion["turn_rad"].notna().any()
-        if not (turned and turns):
-            hint = " (turns alone do not give one; the filter bayes needs none)" if turned else ""
-            lacks.append(f"no heading{hint}")
+    elif cells and not (moved & log.motion["heading_rad"].notna()).any() and not turned.any():
+        lacks.append("no heading")
+    elif cells and not (moved & log.motion["heading_rad"].notna()).any() and not turns:
+        lacks.append("no heading (turns alone do not give one; the filter bayes needs none)")
     return " and ".join(lacks)
 
 

@@ -95,6 +95,15 @@ def test_a_filter_without_a_map_over_roads_alone_measures_too_little(roads):
     assert (done.code, "too little was measured" in done.err) == (3, True)
 
 
+def test_steps_without_turns_are_said_to_be(roads):
+    built = mapfilter("build", "-c", roads, "--json").json["database"]
+    drive = roads.parent / "drive.csv"
+    pd.DataFrame({"time": range(60), "wheel_speed_kmh": 30.0}).to_csv(drive, index=False)
+    done = mapfilter("replay", "--db", built, "--log", drive, "--out", roads.parent / "a", "--json")
+    assert (done.code, "no headings and no turns" in done.err) == (3, True)
+    assert not any("taken for a vehicle" in note for note in done.json["notes"])
+
+
 def test_a_drive_that_fits_no_street_ends_with_advice(roads):
     built = mapfilter("build", "-c", roads, "--json").json["database"]
     drive = write_drive(roads.parent)

@@ -292,3 +292,45 @@ def test_what_is_no_recording_of_a_journey_is_named(name, content, told, tmp_pat
     with pytest.raises(InputError) as caught:
         run_convert([tmp_path / name], tmp_path / "log")
     assert told in str(caught.value)
+
+
+@pytest.mark.parametrize("speed", ["speed_mps", "speed_kmh"])
+@pytest.mark.parametrize("rate", ["yaw_rate_radps", "yaw_rate_degps"])
+def test_a_speed_and_a_yaw_rate_are_odometry(speed, rate, tmp_path):
+    """Ten seconds at 9 m/s, turning by 0.1 rad/s: 90 m and 1 rad."""
+    told = 9.0 if speed == "speed_mps" else 32.4
+    turned = 0.1 if rate == "yaw_rate_radps" else np.degrees(0.1)
+    rows = "".join(f"{k},{told},{turned}\n" for k in range(11))
+    (tmp_path / "drive.csv").write_text(f"time,{speed},{rate}\n{rows}")
+    run_convert([tmp_path / "drive.csv"], tmp_path / "log")
+    motion = read_log(tmp_path / "log").motion
+    assert motion["step_m"].sum() == pytest.approx(90.0)
+    assert motion["turn_rad"].sum() == pytest.approx(1.0)
+    # Beside positions it is the speed of their receiver, and no motion unless asked for.
+    rows = "".join(f"{k},{told},{turned},60.1{k},24.9\n" for k in range(11))
+    (tmp_path / "drive.csv").write_text(f"time,{speed},{rate},lat,lon\n{rows}")
+    run_convert([tmp_path / "drive.csv"], tmp_path / "log")
+    assert read_log(tmp_path / "log").motion.empty
+
+
+def test_dates_of_a_plain_table(tmp_path):
+    path = tmp_path / "drive.csv"
+
+    def converted_of(*times):
+        rows = "".join(f"{when};60,17{k};24,94\n" for k, when in enumerate(times))
+        path.write_text(f"time;lat;lon\n{rows}")
+        return run_convert([path], tmp_path / "log", OpenOptions(zone="Europe/Helsinki"))
+
+    converted_of("2.11.2026 10:00:00,5", "2.11.2026 10:00:03,5", "2.11.2026 10:00:06.5")
+    log = read_log(tmp_path / "log")
+    # 10:00 in Helsinki is 8:00 in UTC in winter.
+    start_s = pd.Timestamp("2026-11-02T08:00:00.5Z").timestamp()
+    assert (log.start_utc_s + log.gnss["time_s"] - start_s).tolist() == [0.0, 3.0, 6.0]
+    for given, hint in (
+        ("11/02/2026 10:00:00", "day or month first? Years come first"),
+        ("yesterday", "found 'yesterday'"),
+        ("32.13.2026 10:00", "found '32.13.2026 10:00'"),
+    ):
+        with pytest.raises(InputError, match="ISO 8601 such as 2026-05-01T10:00:00") as caught:
+            converted_of(given, given)
+        assert hint in str(caught.value)
