@@ -63,7 +63,9 @@ def lack_of(
     if estimate.converged_at is not None:
         return ""
     if isinstance(options, KalmanFilter):
-        return "too little was measured"
+        given = len(log.pseudoranges)
+        unused = f" ({given} pseudoranges: only the filter bayes uses them, over a map)"
+        return "too little was measured" + (unused if given else "")
     has_cells = database is None or bool(database.cell_ids)
     if database is not None and by_streets_alone(options, log, database):
         has_cells = False

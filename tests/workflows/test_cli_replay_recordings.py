@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from command_line import ONE, assert_done, assert_refused, mapfilter, settings
 from conftest import PLAN, TOML
+from made_recordings import MADE
 
 from mapfilter.geodesy import unproject
 from mapfilter.positioning.estimate_store import read_estimate
@@ -158,6 +159,15 @@ def test_without_a_database_the_remedies_are_named(recordings, tmp_path, monkeyp
     told = "database.path: expected a radio-route database, found none, and nothing at"
     assert_refused(mapfilter(*given), told, "--roads-only", "mapfilter locate", "--filter ekf")
     assert_refused(mapfilter(*given, "--filter", "ekf"), "cells.plan", "--without radio,tdoa")
+
+
+def test_pseudoranges_that_no_filter_without_a_map_uses_are_said_to_be(tmp_path):
+    file, text = MADE["smartloc"]
+    (tmp_path / file).write_text(text)
+    given = ("replay", "--log", tmp_path / file, "--filter", "ekf", "--out", tmp_path / "out")
+    done = mapfilter(*given)
+    assert done.code == 3
+    assert "pseudoranges: only the filter bayes uses them, over a map" in done.err
 
 
 def test_positions_alone_need_neither_database_nor_plan(tmp_path, monkeypatch):
