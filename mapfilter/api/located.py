@@ -16,9 +16,10 @@ from mapfilter.positioning import filter as loop
 from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
 from mapfilter.positioning.integrity import DEFAULT_RISK
 from mapfilter.positioning.locators import DEFAULT, as_filter, filter_options
-from mapfilter.positioning.log_options import fitted_to_log
+from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.placeless import in_frame
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -106,7 +107,9 @@ def locate(
     filter : options, str, Filter or class
         Options such as ``BayesFilter(level_error_db=8.0)``, the name of a filter, or a custom
         filter (see the page "Extending"). The Bayes map filter when left out. What the log states
-        takes the place of defaults: the step of timing advance by technology, and of levels.
+        takes the place of defaults: the step of timing advance by technology, and of levels; turns
+        without headings, at a vehicle's speed, are a vehicle's. A log of motion alone is located by
+        the streets alone.
     seed : int or numpy.random.Generator
         Equal logs, databases, options and seeds give equal bytes.
     ways : bool
@@ -124,11 +127,13 @@ def locate(
         The filter is none, a custom filter fails, or the risk does not lie between 0 and 1.
     """
     rng = np.random.default_rng(seed)
-    log = name_by_plan(log, database.plan)
+    log = name_by_plan(in_frame(log, database.lattice.crs), database.plan)
     options, notes = fitted_to_log(
         filter_options(filter) if isinstance(filter, str) else filter, log
     )
-    bound = as_filter(options, database, ways=ways)
+    alone = by_streets_alone(options, log, database)
+    notes = (*notes, STREETS_ALONE) if alone else notes
+    bound = as_filter(options, database.without_cells() if alone else database, ways=ways)
     log = replace(log, notes=(*log.notes, *notes)) if notes else log
     return Track(loop.locate(log, bound, rng, snapshots=snapshots, risk=risk), log, database)
 

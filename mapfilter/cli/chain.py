@@ -158,8 +158,8 @@ def export(
 
 
 def info(path: PathArgument, as_json: JsonOption = False) -> None:
-    """Describe a database, raster set or log."""
-    from mapfilter.workflows.databases import run_info
+    """Describe a database, raster, log, recording, map or table."""
+    from mapfilter.workflows.info import run_info
 
     print_result(run_info(path), as_json)
 

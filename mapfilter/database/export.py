@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -103,6 +103,17 @@ def export_geopackage(
         columns = {"row": row, "col": col, "level_dbm": level_dbm}
         place = gpd.points_from_xy(east, north)
         layers[name] = gpd.GeoDataFrame(columns, geometry=place, crs=crs)
+    write_layers(layers, path)
+
+
+def write_layers(layers: Mapping[str, gpd.GeoDataFrame], path: Path) -> None:
+    """Write the layers of a GeoPackage; equal layers give equal bytes.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
     with atomic_file(path) as temporary, _fixed_date():
         try:
             for name, layer in layers.items():

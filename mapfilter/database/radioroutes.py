@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -210,6 +210,10 @@ class RadioRouteDatabase:
             best_server=rank[server[order]],
             way_class=(way_class[order], classes),
         )
+
+    def without_cells(self) -> RadioRouteDatabase:
+        """Return the same points as a database of roads alone."""
+        return replace(self, plan=CellPlan(self.plan.crs, ()))
 
     def __getstate__(self) -> dict[str, Any]:
         # What was read is not sent to other processes; they read it themselves.

@@ -33,6 +33,7 @@ _UNITS: dict[str, Quantity] = {"dbm": "level", "db": "loss"}
 _KINDS: tuple[Quantity, ...] = ("level", "loss", "deviation")
 _BLOCK_PX = 256
 _LEAST_BLOCK_BYTES = 1 << 26
+_BY_BAND = ("driver", "interleave", "tiled", "blockxsize", "blockysize", "sparse_ok")
 _INDEX_ENTRY_BYTES = 4
 _MOST_BLOCKS_LOOKED_AT = 20_000
 _SQUARE_TOLERANCE = 1e-6
@@ -54,6 +55,8 @@ def new_geotiff(
     overviews: Literal["average", "nearest"] = "nearest",
 ) -> Iterator[DatasetWriter]:
     """Open a new cloud-optimised GeoTIFF of float32 bands; it is put in place when all is written.
+
+    With more than 256 bands it is a tiled one, band by band, without overviews.
 
     Parameters
     ----------
@@ -92,8 +95,11 @@ def new_geotiff(
         "sparse_ok": True,
         "bigtiff": "if_safer",
     }
-    cog = {"blocksize": _BLOCK_PX, "compress": "DEFLATE", "predictor": "YES"}
-    cog |= {"overview_resampling": overviews, "bigtiff": "if_safer"}
+    form: dict[str, Any] = {"driver": "COG", "blocksize": _BLOCK_PX, "predictor": "YES"}
+    form |= {"overview_resampling": overviews}
+    if _BLOCK_PX**2 * 4 * len(bands) > _LEAST_BLOCK_BYTES:
+        # There all bands of a block lie together: hundreds of them are more than is read again.
+        form = {key: profile[key] for key in _BY_BAND} | {"predictor": 3}
     with atomic_file(path) as temporary:
         unfinished = temporary.with_name("bands.tif")
         try:
@@ -103,7 +109,7 @@ def new_geotiff(
                     target.set_band_description(band, name)
                     target.set_band_unit(band, unit)
                 yield target
-            copy_raster(unfinished, temporary, driver="COG", **cog)
+            copy_raster(unfinished, temporary, compress="DEFLATE", bigtiff="if_safer", **form)
         except (RasterioError, CPLE_BaseError) as error:
             expected = "a raster that can be written"
             raise fail(OutputError, str(path), expected, _reason(error)) from error

@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import to_hex, to_rgb
+from matplotlib.colors import hsv_to_rgb, to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
@@ -47,6 +47,9 @@ _DISTINCT = (
 )
 _TINTS = ((1.0, 0.5), (0.0, 0.35), (1.0, 0.72))
 """Grey level that is mixed in, and how much of it, from one round of the colours to the next."""
+
+_GOLDEN, _ROOT_2, _ROOT_3 = (5**0.5 - 1) / 2, 2**0.5, 3**0.5
+"""Irrational steps of hue, saturation and value from one further colour to the next."""
 
 _STYLE: dict[Any, Any] = {
     "axes.edgecolor": GREY,
@@ -196,19 +199,25 @@ def distinct_colours(count: int) -> list[str]:
     """Return colours that distinguish ``count`` groups, also for the colour-blind.
 
     The first seven are those of Okabe and Ito (2008) with a darker yellow, the next eight differ
-    from them in lightness, the next 45 are lighter and darker ones of these; then they repeat,
-    which is why maps also name every group in its place.
+    from them in lightness, the next 45 are lighter and darker ones of these; further ones go round
+    the hues by the golden angle. No two are equal, but not all can be told apart by eye, which is
+    why maps also name every group in its place.
 
     Examples
     --------
-    >>> len(set(distinct_colours(60))), len(distinct_colours(100))
-    (60, 100)
+    >>> len(set(distinct_colours(60))), len(set(distinct_colours(1000)))
+    (60, 1000)
     """
     colours = list(_DISTINCT)
     for grey, share in _TINTS:
         mixed = (1 - share) * np.array([to_rgb(colour) for colour in _DISTINCT]) + share * grey
         colours += [to_hex(colour) for colour in mixed]
-    return [colours[i % len(colours)] for i in range(count)]
+    more = range(max(count - len(colours), 0))
+    hues = [
+        (_GOLDEN * i % 1, 0.35 + 0.5 * (_ROOT_2 * i % 1), 0.55 + 0.4 * (_ROOT_3 * i % 1))
+        for i in more
+    ]
+    return [*colours, *(to_hex(tuple(hsv_to_rgb(hue))) for hue in hues)][:count]
 
 
 def grouped(count: int) -> str:

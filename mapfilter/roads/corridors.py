@@ -222,16 +222,18 @@ def corridors(
     lengths_m = {"max_accuracy_m": max_accuracy_m, "max_gap_m": max_gap_m}
     _check(sessions, min_sessions, half_width_m=half_width_m, **lengths_m)
     step_m = half_width_m / 2
-    pieces, aside = [], 0
+    pieces, coarse, alone = [], 0, 0
     for session, positions in enumerate(sessions):
-        found, left_out = _pieces(positions, session, max_accuracy_m, max_gap_m, step_m)
+        found, inaccurate, lonely = _pieces(positions, session, max_accuracy_m, max_gap_m, step_m)
         pieces += found
-        aside += left_out
+        coarse, alone = coarse + inaccurate, alone + lonely
     notes = [f"ways are corridors of {half_width_m:g} m to either side of tracks"]
-    if aside:
-        why = f"less accurate than max_accuracy_m = {max_accuracy_m:g} m, or more than "
-        why += f"max_gap_m = {max_gap_m:g} m from the positions before and after"
-        notes.append(f"{aside} positions left out: {why}")
+    for count, why in (
+        (coarse, f"less accurate than max_accuracy_m = {max_accuracy_m:g} m"),
+        (alone, f"more than max_gap_m = {max_gap_m:g} m from the others, or standing"),
+    ):
+        if count:
+            notes.append(f"{count} positions left out: {why}")
     if not pieces:
         hint = "tracks with gaps: raise max_gap_m"
         raise fail(InputError, "tracks", "positions that follow each other", "none", hint)
@@ -282,8 +284,11 @@ def _check(sessions: Sequence[Positions], min_sessions: int, **lengths_m: float)
 
 def _pieces(
     positions: Positions, session: int, max_accuracy_m: float, max_gap_m: float, step_m: float
-) -> tuple[list[_Piece], int]:
-    """Return the parts of a session without gaps, and how many positions are in none."""
+) -> tuple[list[_Piece], int, int]:
+    """Return the parts of a session without gaps, and how many positions are in none of them.
+
+    They are counted apart: those that are not accurate, and those that are alone.
+    """
     place_m = np.column_stack([positions.east_m, positions.north_m])
     known = np.full(len(place_m), np.nan)
     if positions.accuracy_m is not None:
@@ -292,7 +297,7 @@ def _pieces(
     place_m, known = place_m[good], known[good]
     accuracy_m = np.fmax(np.where(np.isnan(known), _UNKNOWN_ACCURACY_M, known), _BEST_ACCURACY_M)
     gaps = np.flatnonzero(np.hypot(*np.diff(place_m, axis=0).T) > max_gap_m) + 1
-    pieces, aside = [], int((~good).sum())
+    pieces, aside = [], 0
     for part in np.split(np.arange(len(place_m)), gaps):
         # Positions at least a step from the last one kept: none of standing still.
         kept: list[int] = []
@@ -303,7 +308,7 @@ def _pieces(
             aside += len(part)
             continue
         pieces.append(_sampled(session, place_m[kept], accuracy_m[kept], step_m))
-    return pieces, aside
+    return pieces, int((~good).sum()), aside
 
 
 def _sampled(session: int, place_m: Floats, accuracy_m: Floats, step_m: float) -> _Piece:

@@ -31,6 +31,7 @@ SESSION_GAP_S = 1800.0
 _FILES_NAMED = 3
 _SUFFIXES = (".csv", ".log", ".tsv")
 _RECORDED_SUFFIXES = (".txt", ".gz")
+_HEAD_OF_LOG = "log.json"
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +129,8 @@ def read_measurements(
     Parameters
     ----------
     files : sequence of Path or str
-        Files, or folders whose .csv, .tsv and .log files are taken.
+        Files, or folders whose .csv, .tsv and .log files are taken; with ``recorded`` track logs
+        and folders of them, too.
     crs : str, optional
         Projected CRS for the positions; the UTM zone of the measurements when left out.
     format : {"auto", "csv", "opencellid", "towercollector", "antennas"}
@@ -208,8 +210,12 @@ def _expanded(
     suffixes = _SUFFIXES if recorded is None else (*_SUFFIXES, *_RECORDED_SUFFIXES)
     found: list[Path] = []
     for path in map(Path, files):
-        if path.is_dir():
-            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in suffixes)
+        if path.is_dir() and not (recorded is not None and _is_log(path)):
+            inside = sorted(
+                inner
+                for inner in path.iterdir()
+                if (_is_log(inner) if inner.is_dir() else inner.suffix.lower() in suffixes)
+            )
             if not inside:
                 raise fail(InputError, str(path), f"files {', '.join(suffixes)}", "none")
             found += inside
@@ -218,6 +224,10 @@ def _expanded(
     if not found:
         raise fail(InputError, "measurements", "at least one file", "none")
     return found
+
+
+def _is_log(folder: Path) -> bool:
+    return (folder / _HEAD_OF_LOG).is_file()
 
 
 def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:

@@ -28,6 +28,8 @@ _LEAST_CORRELATION = 0.5
 _METRES_PER_DEGREE = 111_195.0
 _REMARKABLE_S = 1.5
 
+_APART_S = 3600.0
+
 _Track = tuple[Floats, Floats, Floats]
 
 
@@ -67,7 +69,25 @@ def align(recordings: Sequence[Recording], given_s: Mapping[Path, float]) -> Ali
         offsets.append(offset_s + given_s.get(first.path, 0.0))
         if note:
             notes.append(f"{recording.path.name}: {note}")
+    notes += _apart(recordings, offsets)
     return Alignment(tuple(offsets), first.clock.absolute, tuple(notes))
+
+
+def _apart(recordings: Sequence[Recording], offsets_s: Sequence[float]) -> list[str]:
+    """Return a note where recordings lie hours apart, as those of several journeys do."""
+    spans = [
+        (begin + offset, end + offset)
+        for (begin, end), offset in zip(map(_span, recordings), offsets_s, strict=True)
+    ]
+    latest, gaps_s = -np.inf, []
+    for begin, end in sorted(spans):
+        if begin - latest > _APART_S and np.isfinite(latest):
+            gaps_s.append(begin - latest)
+        latest = max(latest, end)
+    if not gaps_s:
+        return []
+    hours = max(gaps_s) / 3600
+    return [f"recordings lie up to {hours:.1f} h apart; of several journeys convert each alone"]
 
 
 def _reference(recordings: Sequence[Recording]) -> int:

@@ -27,6 +27,7 @@ _RADIUS_68 = 1.515
 """Radius of 68 % of a two-dimensional normal distribution, in standard deviations."""
 
 _NO_JOURNEY = {"cells", "ephemerides", "ionosphere"}
+_CELLS_HINT = "give it as [cells] plan"
 _CELL_COLUMNS = ("technology", "mcc", "mnc", "lac", "ci", "level_step_db")
 
 
@@ -81,8 +82,10 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
     if not journey:
         names = ", ".join(r.path.name for r in recordings)
         expected = "a recording of a journey"
-        got = "only lists of cells or orbits"
-        raise fail(InputError, names, expected, got, "give a list as [cells] path")
+        orbits = any("ephemerides" in r.tables for r in recordings)
+        got = "only orbits of satellites" if orbits else "only a list of cells"
+        hint = "name them together with a recording of pseudoranges" if orbits else _CELLS_HINT
+        raise fail(InputError, names, expected, got, hint)
     alignment = align(journey, options.offsets_s)
     shifted = [
         _shifted(recording, offset)
@@ -93,7 +96,7 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
     for recording in recordings:
         if "cells" in recording.tables:
             count = len(recording.tables["cells"])
-            notes.append(f"{recording.path.name}: a list of {count} cells; give it as [cells] path")
+            notes.append(f"{recording.path.name}: a list of {count} cells; {_CELLS_HINT}")
     sensors = _sensors(shifted, frame, options.truth, notes)
     moved = journey_motion(
         [r for r in shifted if r.path not in options.truth],

@@ -358,7 +358,7 @@ def make_log(
     faults.raise_if_any(InputError)
     placeless = int(tables["pseudoranges"][list(PLACE)].isna().any(axis=1).sum())
     if almanac is None and placeless:
-        why = "without the place of their satellite, of no use without an almanac beside the log"
+        why = "without the place of their satellite: give the day's navigation file (RINEX), too"
         every_note += (f"pseudoranges: {placeless} rows {why}",)
     if almanac is not None:
         where, rows = called.get("pseudoranges", "pseudoranges"), tables["pseudoranges"]

@@ -6,11 +6,15 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+import geopandas as gpd
 import numpy as np
+import pandas as pd
+import shapely
 
 from mapfilter._io import atomic_file, ensure_writable_folder
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats
+from mapfilter.database.export import write_layers
 from mapfilter.database.store import open_database
 from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.first_fix import FirstFixOptions
@@ -26,8 +30,14 @@ NOTES = (
     "approximate: gradients are those of planes fitted to the levels within the correlation length",
     "approximate: levels along a path count as 1 + length / (2 x correlation length) looks",
     "motion is taken as known without error; a real filter needs longer",
+    "without_plane_bound: share of the points where levels tell nothing of the place along one "
+    "direction; plane_bound_m is the median over the others",
+    "cells_unclear, levels_unclear: share of the journeys on which not even an ideal filter "
+    "converges; levels_wrong: of the others, the share in a wrong place; twins: share with a place "
+    "that looks alike",
 )
 _DECIMALS = 3
+_FILES = ("bound.tif", "bound.gpkg", "ways.parquet", "twins.parquet")
 
 _BOUND_TITLE = "Least position error along the street from one report of levels"
 _FIX_TITLE = "Expected metres to convergence of an ideal filter"
@@ -89,9 +99,11 @@ def run_bound(
     radio, ways, twins = found.radio, found.by_way(), found.twins()
     rasters = {name: on_lattice(radio, values) for name, values in found.at_points().items()}
     write_bound(rasters, radio.lattice, out / "bound.tif", database.attribution)
-    for table, name in ((ways, "ways.parquet"), (twins, "twins.parquet")):
-        with atomic_file(out / name) as temporary:
-            table.to_parquet(temporary, index=False)
+    layers = {"ways": _ways_as_points(ways, found), "twins": _twins_as_lines(twins, found)}
+    for name, layer in layers.items():
+        with atomic_file(out / f"{name}.parquet") as temporary:
+            layer.to_parquet(temporary, index=False)
+    write_layers(layers, out / "bound.gpkg")
     base = BaseMap(radio.lattice.bounds_m, attribution=database.attribution)
     on_map = radio.lattice, database.plan, base
     along, fix = rasters["along_bound_m"], rasters["levels_to_fix_m"]
@@ -105,8 +117,28 @@ def run_bound(
         "twins.png": plot_twins(rasters["twin_error"], pairs_m, *on_map),
     }
     drawn = [save(picture, out / name) for name, picture in pictures.items()]
-    tables = [out / name for name in ("bound.tif", "ways.parquet", "twins.parquet")]
+    tables = [out / name for name in _FILES]
     return _summary(found, began_s, (*tables, *drawn))
+
+
+def _ways_as_points(ways: pd.DataFrame, found: MapBound) -> gpd.GeoDataFrame:
+    """Return the table of ways with the points of each as geometry."""
+    radio = found.radio
+    place_m = np.column_stack(radio.lattice.east_north(radio.row, radio.col))
+    order = np.argsort(radio.way_id, kind="stable")
+    ids, first = np.unique(radio.way_id[order], return_index=True)
+    parts = map(shapely.MultiPoint, np.split(place_m[order], first[1:]))
+    geometry = gpd.GeoSeries(list(parts), index=ids, crs=radio.lattice.crs)
+    return gpd.GeoDataFrame(
+        ways, geometry=geometry.loc[ways["way_id"]].to_numpy(), crs=geometry.crs
+    )
+
+
+def _twins_as_lines(twins: pd.DataFrame, found: MapBound) -> gpd.GeoDataFrame:
+    """Return the table of twins with a line from each place to its twin."""
+    ends_m = twins[["east_m", "north_m", "twin_east_m", "twin_north_m"]].to_numpy()
+    lines = shapely.linestrings(ends_m.reshape(-1, 2, 2))
+    return gpd.GeoDataFrame(twins, geometry=lines, crs=found.radio.lattice.crs)
 
 
 def _summary(found: MapBound, began_s: float, outputs: tuple[Path, ...]) -> BoundResult:

@@ -9,11 +9,12 @@ import numpy as np
 from mapfilter.check.findings import Findings, Severity
 from mapfilter.config.sections import Config
 from mapfilter.errors import MapfilterError, listed
-from mapfilter.geodesy import Lattice, same_crs
+from mapfilter.geodesy import Lattice, same_crs, short_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenedLog
+from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, in_frame, is_local_frame
 from mapfilter.tracks.schema import SERVING
 from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.world import outside_m
@@ -40,8 +41,11 @@ def check_logs(
             findings.add_faults(error, "log-invalid")
             continue
         _check_recordings(opened, findings)
-        if lattice is not None and _is_near(path, opened.log, lattice, findings) and plan:
-            _check_cells(path, name_by_plan(opened.log, plan), plan, findings)
+        log = opened.log if lattice is None else in_frame(opened.log, lattice.crs)
+        near = lattice is not None and _is_near(path, log, lattice, findings)
+        # Motion without any reports is located by the streets alone.
+        if near and plan and (len(log.radio) or log.motion.empty):
+            _check_cells(path, name_by_plan(log, plan), plan, findings)
 
 
 def _check_recordings(opened: OpenedLog, findings: Findings) -> None:
@@ -62,7 +66,9 @@ def _check_recordings(opened: OpenedLog, findings: Findings) -> None:
 
 def _is_near(path: Path, log: TrackLog, lattice: Lattice, findings: Findings) -> bool:
     if not same_crs(log.crs, lattice.crs):
-        evidence = f"The log is in {log.crs}, the area in {lattice.crs}."
+        evidence = f"The log is in {short_crs(log.crs)}, the area in {short_crs(lattice.crs)}."
+        if is_local_frame(log.crs):
+            evidence = f"The log is in {LOCAL_FRAME}: {LOCAL_FRAME_HINT}."
         findings.add("crs-mixed", str(path), evidence)
         return False
     for table in ("truth", "gnss"):

@@ -17,8 +17,9 @@ from mapfilter.positioning.fingerprints.sources import (
 )
 from mapfilter.positioning.fingerprints.tables import read_fingerprint_table
 from mapfilter.radio.cells import CellPlan
+from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.open_log import list_journeys, open_log
+from mapfilter.tracks.open_log import OpenOptions, list_journeys, open_log
 from mapfilter.tracks.readers import plain_csv
 from mapfilter.tracks.readers.columns import header_names, likely_separator
 from mapfilter.tracks.readers.formats import find_format, format_of
@@ -26,6 +27,8 @@ from mapfilter.tracks.readers.text import read_text
 from mapfilter.tracks.store import is_log
 
 _PEEKED_BYTES = 1 << 18
+_WITHOUT_STEPS = OpenOptions(combine=CombineOptions(walk=None))
+"""Single reports need no motion."""
 
 
 def read_database(
@@ -66,7 +69,8 @@ def read_reports(
     faults, logs, names = Faults(), list[TrackLog](), list[str]()
     for one in _journeys(path):
         try:
-            opened = open_log(one, crs=crs or (logs[0].crs if logs else ""), plan=plan)
+            frame = crs or (logs[0].crs if logs else "")
+            opened = open_log(one, crs=frame, plan=plan, options=_WITHOUT_STEPS)
         except MapfilterError as error:
             faults.found.extend(error.faults)
         else:

@@ -41,7 +41,7 @@ from mapfilter.propagation.shadowing import named_rng
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.workflows.logs import journeys_of, open_journey
-from mapfilter.workflows.replay import check_log
+from mapfilter.workflows.replay_lacks import check_log
 from mapfilter.workflows.world import filter_choice
 
 _LEAST_KNOWN = 0.3

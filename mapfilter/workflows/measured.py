@@ -1,4 +1,4 @@
-"""Recordings of other programs as measurements of a survey."""
+"""Recordings of other programs, and track logs, as measurements of a survey."""
 
 from __future__ import annotations
 
@@ -9,17 +9,22 @@ import pandas as pd
 
 from mapfilter._types import Bools, Floats
 from mapfilter.errors import InputError, fail
+from mapfilter.geodesy import unproject
 from mapfilter.survey.measurement_files import Rows
+from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_placed
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import format_of, read_recording
-from mapfilter.tracks.readers.recording import Recording
+from mapfilter.tracks.schema import TABLES
+from mapfilter.tracks.store import is_log, read_log
 
 _LONGEST_S = 10.0
 _UNKNOWN = -1.0
+_IDENTITY = ("mcc", "mnc", "lac", "ci")
+_EXPECTED = "levels of cells, and positions"
 
 
 def recorded_rows(path: Path) -> Rows | None:
-    """Return the levels of a recording with their positions; None for no known format.
+    """Return the levels of a recording or log with their positions; None for no known format.
 
     A level is placed between the positions before and after it, where they are at most 10 s apart,
     or at a position of its own time. Levels of no cell, and bounds, are set aside.
@@ -29,6 +34,8 @@ def recorded_rows(path: Path) -> Rows | None:
     InputError
         The recording holds no usable row, or lacks cells or positions.
     """
+    if is_log(path):
+        return _log_rows(path)
     known = format_of(path)
     if known is None:
         return None
@@ -37,16 +44,42 @@ def recorded_rows(path: Path) -> Rows | None:
     lacking = [name for name in ("radio", "positions") if name not in tables]
     if lacking:
         got = f"{known.title} of {', '.join(tables)}"
-        raise fail(InputError, str(path), "levels of cells, and positions", got)
+        hint = ""
+        if "radio" in tables and {"true_places", "places"} & set(tables):
+            hint = "convert it with --origin LAT,LON, and name the log"
+        raise fail(InputError, str(path), _EXPECTED, got, hint)
     rows = Rows(path, read=recording.rows)
     for unusable in recording.unusable:
         rows.aside[f"rows left out: {unusable.reason}"] += unusable.count
-    _add(rows, recording)
+    _add(rows, tables["radio"], tables["positions"], absolute=recording.clock.absolute)
     return rows
 
 
-def _add(rows: Rows, recording: Recording) -> None:
-    radio, positions = recording.tables["radio"], recording.tables["positions"]
+def _log_rows(path: Path) -> Rows:
+    """Return the levels of a track log, placed by its ground truth, else by its fixes."""
+    log = read_log(path)
+    if not is_placed(log.crs):
+        raise fail(InputError, f"{path}, crs", "a CRS", LOCAL_FRAME, LOCAL_FRAME_HINT)
+    places = log.gnss if log.truth.empty else log.truth
+    if log.radio.empty or places.empty:
+        held = [name for name in TABLES if len(getattr(log, name))]
+        raise fail(InputError, str(path), _EXPECTED, f"a log of {', '.join(held) or 'nothing'}")
+    lon_deg, lat_deg = unproject(log.crs, places["east_m"], places["north_m"])
+    accuracy_m = np.full(len(places), np.nan)
+    if log.truth.empty:
+        accuracy_m = np.sqrt(places["var_east_m2"] + places["var_north_m2"]).to_numpy()
+    start_s = log.start_utc_s if np.isfinite(log.start_utc_s) else 0.0
+    degrees = {"lat_deg": lat_deg, "lon_deg": lon_deg, "accuracy_m": accuracy_m}
+    positions = pd.DataFrame({"time_s": places["time_s"].to_numpy() + start_s, **degrees})
+    radio = log.radio.assign(time_s=log.radio["time_s"] + start_s)
+    missing = [name for name in _IDENTITY if name not in radio]
+    radio = radio.assign(**{name: pd.array([pd.NA] * len(radio), "Int64") for name in missing})
+    rows = Rows(path, read=len(radio))
+    _add(rows, radio, positions, absolute=bool(np.isfinite(log.start_utc_s)))
+    return rows
+
+
+def _add(rows: Rows, radio: pd.DataFrame, positions: pd.DataFrame, *, absolute: bool) -> None:
     named = radio["cell"].notna().to_numpy()
     level = radio["level_dbm"].notna().to_numpy() & (radio["censored"].fillna(0) == 0).to_numpy()
     places, placed = _places(positions, radio["time_s"].to_numpy(dtype=np.float64))
@@ -64,12 +97,12 @@ def _add(rows: Rows, recording: Recording) -> None:
     rows.cell.extend(rows.cells[cell] for cell in cells)
     rows.session.extend([0] * int(kept.sum()))
     time_s = radio["time_s"].to_numpy(dtype=np.float64)
-    if not recording.clock.absolute:
+    if not absolute:
         # Counted from an unknown start, or in an unknown zone: the order alone matters.
         time_s = time_s - time_s.min() + 1.0
     columns = [time_s, *places[:2], radio["level_dbm"].to_numpy(dtype=np.float64), places[2]]
     rows.values.frombytes(np.ascontiguousarray(np.stack(columns)[:, kept].T).tobytes())
-    parts = radio[["mcc", "mnc", "lac", "ci"]].fillna(_UNKNOWN).to_numpy(dtype=np.int64)[kept]
+    parts = radio[list(_IDENTITY)].fillna(_UNKNOWN).to_numpy(dtype=np.int64)[kept]
     whole = (parts >= 0).all(axis=1)
     for cell, identity in zip(cells[whole], parts[whole].tolist(), strict=True):
         mcc, mnc, lac, ci = identity

@@ -14,7 +14,6 @@ import numpy as np
 
 from mapfilter._io import ensure_writable_folder, path_fault, shown, write_json
 from mapfilter._parallel import Progress
-from mapfilter._types import Floats
 from mapfilter.config.sections import Config
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
@@ -23,12 +22,12 @@ from mapfilter.evaluation.accuracy import Accuracy, Outcome, Truth, accuracy, ou
 from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.evaluation.success import SuccessSummary, summarise
 from mapfilter.filters.contract import Reason
-from mapfilter.geodesy import Lattice, same_crs
-from mapfilter.positioning.estimate import PositionedTrack, TrackEstimate
+from mapfilter.geodesy import Lattice
+from mapfilter.positioning.estimate import PositionedTrack
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.filter import Filter, FilterOptions, locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
-from mapfilter.positioning.log_options import fitted_to_log
+from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import CellPlan
 from mapfilter.report.canvas import save
@@ -36,29 +35,12 @@ from mapfilter.report.errors import plot_error_over_distance
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog, leave_out
 from mapfilter.tracks.open_log import OpenedLog
-from mapfilter.tracks.schema import SERVING
+from mapfilter.tracks.placeless import in_frame
 from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.pictures import ESTIMATES, FIGURES, SUMMARY, clear_results, draw_track
+from mapfilter.workflows.replay_lacks import advice_of, check_log, lack_of
 from mapfilter.workflows.terminal import to_jsonable
-from mapfilter.workflows.world import filter_choice, outside_m, plan_antennas, planned_cells
-
-_AWAY_M = 5000.0
-_BY_CELLS = ("candidate", "grid")
-
-
-def check_log(path: Path, log: TrackLog, lattice: Lattice, faults: Faults) -> None:
-    """Note a log in another CRS than the database, or far outside its lattice.
-
-    Its truth, or its GNSS fixes, may not all lie more than 5 km outside.
-    """
-    if not same_crs(log.crs, lattice.crs):
-        expected = f"{lattice.crs}, the database's"
-        faults.add(f"{path}, crs", expected, log.crs, "log of another area or zone")
-        return
-    for table in ("truth", "gnss"):
-        places = getattr(log, table)
-        east_m, north_m = places["east_m"].to_numpy(), places["north_m"].to_numpy()
-        _check_near(f"{path}, {table}", east_m, north_m, lattice, faults)
+from mapfilter.workflows.world import filter_choice, plan_antennas, planned_cells
 
 
 class _Logs:
@@ -71,6 +53,8 @@ class _Logs:
 
     def open(self, path: Path) -> OpenedLog:
         opened = self._kept.get(path) or open_journey(self.config, path, self._crs)
+        if self._crs:
+            opened = replace(opened, log=in_frame(opened.log, self._crs))
         if opened.recordings:
             self._kept[path] = opened
         return opened
@@ -90,48 +74,16 @@ class _Logs:
                 faults.found.extend(error.faults)
         faults.raise_if_any(InputError)
 
-
-def lacking(log: TrackLog, estimate: TrackEstimate, *, cells: bool = True) -> str:
-    """Return the missing data of a log that cannot be located, or an empty text.
-
-    Without ``cells`` in the database, motion is all that it needs.
-    """
-    serving = (log.radio["role"] == SERVING) & log.radio["cell"].notna()
-    moved = log.motion["step_m"].notna()
-    lacks = []
-    if not cells:
-        if moved.any() and not (estimate.hypotheses > 0).any():
-            lacks.append("too short a way with steps and headings, or turns")
-    elif not serving.any() and not (estimate.hypotheses > 0).any():
-        lacks.append("no serving cell")
-    elif not (estimate.hypotheses > 0).any():
-        lacks.append("no serving cell of which the database has points")
-    if not moved.any():
-        lacks.append("no motion")
-    elif cells and not (moved & log.motion["heading_rad"].notna()).any():
-        turns = log.motion["turn_rad"].notna().any()
-        lacks.append("no heading" + (" (turns alone do not give one)" if turns else ""))
-    return " and ".join(lacks)
-
-
-def _check_near(
-    where: str, east_m: Floats, north_m: Floats, lattice: Lattice, faults: Faults
-) -> None:
-    if not east_m.size or outside_m(east_m, north_m, lattice).min() <= _AWAY_M:
-        return
-    box = lattice.bounds_m
-    found = east_m.min(), north_m.min(), east_m.max(), north_m.max()
-    swapped = outside_m(north_m, east_m, lattice).min() <= _AWAY_M
-    faults.add(
-        where,
-        f"positions near the database's {_box(*box)}",
-        _box(*found),
-        "east and north swapped" if swapped else "log of another area or zone",
-    )
-
-
-def _box(west_m: float, south_m: float, east_m: float, north_m: float) -> str:
-    return f"{west_m:.0f}..{east_m:.0f} m east, {south_m:.0f}..{north_m:.0f} m north"
+    def check_siteless(self) -> None:
+        """Refuse logs of which a filter without a map would need sites."""
+        for path in self.paths:
+            log = leave_out(self.open(path).log, self.config.track.without)
+            if len(log.radio) or len(log.tdoa):
+                hint = (
+                    "filters without a map take the sites from there, or from a database (--db); "
+                    "--without radio,tdoa leaves positions and dead reckoning"
+                )
+                raise fail(ConfigError, "cells.plan", "a cell plan", "none", hint)
 
 
 _NAMED = 3
@@ -316,22 +268,26 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
 
     @cache
     def sites(crs: str) -> CellPlan:
-        return planned_cells(config, crs) if database is None else database.plan
+        if database is not None:
+            return database.plan
+        return planned_cells(config, crs) if config.cells.plan else CellPlan(crs, ())
 
     filters: dict[tuple[str, ...], Filter[Any]] = {}
 
     def over(crs: str, fitted: FilterOptions, *notes: str) -> Filter[Any]:
         key = (crs, *notes)
         if key not in filters:
-            filters[key] = bound(crs, fitted)
+            filters[key] = bound(crs, fitted, cells=STREETS_ALONE not in notes)
         return filters[key]
 
-    def bound(crs: str, fitted: FilterOptions) -> Filter[Any]:
+    def bound(crs: str, fitted: FilterOptions, *, cells: bool = True) -> Filter[Any]:
         if database is not None and not isinstance(fitted, KalmanFilter):
-            return fitted.over(database)
+            return fitted.over(database if cells else database.without_cells())
         plan = sites(crs)
         return cast(KalmanFilter, fitted).over_sites(plan, plan_antennas(config, plan))
 
+    if database is None and config.cells.plan is None:
+        journeys.check_siteless()
     if database is not None:
         journeys.check(database.lattice)
         over(database.lattice.crs, options)
@@ -345,6 +301,8 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         name, crs = opened.name, opened.log.crs if database is None else database.lattice.crs
         log = leave_out(name_by_plan(opened.log, sites(crs)), config.track.without)
         fitted, notes = fitted_to_log(options, log)
+        if database is not None and by_streets_alone(fitted, log, database):
+            notes = (*notes, STREETS_ALONE)
         filter_ = over(crs, fitted, *notes)
         log = replace(log, notes=(*log.notes, *notes))
         rng = named_rng(config.journeys.seed, "replay", name)
@@ -355,14 +313,9 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
             pictures = _draw_errors(log, track, into) if drawn else ()
         else:
             pictures = draw_track(database, log, track, into) if drawn else ()
-        has_cells = database is None or bool(database.cell_ids)
-        lack = lacking(log, track.estimate, cells=has_cells)
-        if lack and not has_cells and config.filter.name in _BY_CELLS:
-            lack = f"the filter {config.filter.name} needs cells to start, the database has none"
-        if isinstance(options, KalmanFilter):
-            lack = "" if track.estimate.converged_at is not None else "too little was measured"
-        if "no motion" in lack and "velocity" in opened.sensors:
-            lack += " (track.course_motion makes it from speed and course)"
+        if database is not None and (STREETS_ALONE in notes or not database.cell_ids):
+            log = replace(log, notes=(*log.notes, *advice_of(log, fitted, track.estimate)))
+        lack = lack_of(opened, log, options, track.estimate, database)
         logs.append(_write(name, log, track, into, pictures, lack))
         if progress is not None:
             progress(index + 1, count)
@@ -373,13 +326,17 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
 
 
 def _database(config: Config, options: FilterOptions) -> RadioRouteDatabase | None:
-    """Open the database, unless the filter only needs sites, and a cell plan has them."""
-    if isinstance(options, KalmanFilter):
-        if config.cells.plan is not None:
-            return None
-        if config.database.path is None:
-            hint = "filters without a map take the sites from there, or from a database (--db)"
-            raise fail(ConfigError, "cells.plan", "a cell plan", "none", hint)
+    """Open the database, unless the filter only needs sites, or not even these."""
+    stated = config.database.path is not None
+    if isinstance(options, KalmanFilter) and (config.cells.plan is not None or not stated):
+        return None
+    if not (stated or config.database_path.exists()):
+        found = f"none, and nothing at {shown(str(config.database_path))}"
+        hint = (
+            "give --db; mapfilter build makes one, of streets alone with --roads-only; without "
+            "any, mapfilter locate takes logs, and --filter ekf positions"
+        )
+        raise fail(ConfigError, "database.path", "a radio-route database", found, hint)
     return open_database(config.database_path, verify="full")
 
 

@@ -27,6 +27,7 @@ from mapfilter.roads.routes import Roads, gaps, read_roads, unused_classes, with
 from mapfilter.roads.ways import Bounds, Buildings, Water, Ways, clip_ways
 from mapfilter.simulation.synthetic_city import SyntheticCity, manhattan, synthetic_city
 from mapfilter.survey.measurements import Measurements, read_measurements
+from mapfilter.tracks.store import is_log
 from mapfilter.workflows.measured import recorded_rows
 
 LARGEST_AREA_PX = 400_000_000
@@ -341,7 +342,9 @@ class Streets:
 def _parts(path: Path) -> list[Path]:
     """Return the files of a folder, or a file, a shapefile with its table."""
     if path.is_dir():
-        return sorted(inner for inner in path.iterdir() if inner.is_file())
+        inside = sorted(path.iterdir())
+        logs = [file for inner in inside if is_log(inner) for file in sorted(inner.iterdir())]
+        return [inner for inner in (*inside, *logs) if inner.is_file()]
     table = path.with_suffix(".dbf")
     return [path, table] if path.suffix.lower() == ".shp" and table.is_file() else [path]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.options import VEHICLE, BayesFilter, GridFilter
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.filter import locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
@@ -132,3 +132,46 @@ def test_errors_of_a_gyroscope_are_a_drift():
     assert fitted.drift_deg_per_sqrt_m == pytest.approx(0.15)
     assert fitted.heading_sd_deg == BayesFilter().heading_sd_deg
     assert fitted.step_sd_m == 0.05
+
+
+def turning(speed_mps, lasts_s=120, **columns):
+    time_s = np.arange(lasts_s, dtype=np.float64)
+    rows = {"time_s": time_s, "step_m": speed_mps, "turn_rad": 0.01} | columns
+    return make_log(CRS, motion=pd.DataFrame(rows))
+
+
+@pytest.mark.parametrize("options", [BayesFilter(), GridFilter()])
+def test_turns_without_headings_at_a_vehicles_speed_are_a_vehicles(options):
+    fitted, notes = fitted_to_log(options, turning(9.0))
+    assert fitted.vehicle is True
+    assert fitted.resolved.heading_sd_deg == VEHICLE["heading_sd_deg"]
+    assert notes == (
+        "motion: turns without headings at up to 9 m/s: taken for a vehicle's "
+        "(filter.bayes.vehicle)",
+    )
+    # Waiting at lights for most of the time does not make a walker of a car.
+    in_traffic = np.where(np.arange(120) % 60 < 20, 9.0, 0.0)
+    assert fitted_to_log(options, turning(in_traffic))[0].vehicle is True
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        turning(1.4),
+        turning(4.0),
+        turning(9.0, heading_rad=0.1),
+        turning(9.0, turn_rad=np.nan),
+        turning(9.0, lasts_s=5),
+        turning(np.where(np.arange(120) == 60, 40.0, 1.4)),
+        make_log(CRS, motion=pd.DataFrame({"time_s": [0.0, 1.0], "turn_rad": 0.1})),
+    ],
+)
+def test_other_motion_is_not_taken_for_a_vehicles(given):
+    assert fitted_to_log(BayesFilter(), given) == (BayesFilter(), ())
+
+
+def test_whose_motion_it_is_can_be_stated():
+    assert fitted_to_log(BayesFilter(vehicle=False), turning(9.0))[0].vehicle is False
+    assert fitted_to_log(BayesFilter(vehicle=True), turning(1.4))[0].vehicle is True
+    assert BayesFilter().resolved == BayesFilter()
+    assert fitted_to_log(CandidateFilter(), turning(9.0)) == (CandidateFilter(), ())

@@ -10,6 +10,7 @@ from mapfilter.errors import OutputError
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters import geotiff as raster_writer
 from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.raster_set import open_rasters
 
 LATTICE = Lattice("EPSG:32629", 531_000.0, 4_556_000.0, 5.0, 512, 512)
 
@@ -51,3 +52,18 @@ def test_the_final_file_does_not_fit(tmp_path, monkeypatch, size):
 
     monkeypatch.setattr(raster_writer, "copy_raster", copy_to_a_full_disk)
     assert_told(tmp_path / "x.tif")
+
+
+def test_a_thousand_bands_can_be_read_again(tmp_path):
+    """In blocks of 256 x 256 pixels the bands of one would fill more than 64 MiB."""
+    lattice = Lattice("EPSG:32635", 385_000.0, 6_672_000.0, 5.0, 257, 260)
+    ids = [f"ap-{number}" for number in range(1100)]
+    path = tmp_path / "rxlev.tif"
+    levels = np.full((lattice.rows, lattice.cols), np.nan, dtype=np.float32)
+    levels[3, 7] = -70.0
+    write_rasters(
+        path, lattice, ((cell, levels - number / 100) for number, cell in enumerate(ids)), ids
+    )
+    found = open_rasters(path)
+    assert found.cell_ids == tuple(ids)
+    assert found.read()[1099, 3, 7] == np.float32(-80.99)

@@ -83,6 +83,7 @@ def test_truth_is_wider_than_the_estimate_over_it():
 
 def test_no_colour_repeats_on_a_map_of_sixty_cells():
     assert len(set(distinct_colours(60))) == 60
+    assert len(set(distinct_colours(2000))) == 2000
     assert distinct_colours(9) == distinct_colours(60)[:9]
 
 

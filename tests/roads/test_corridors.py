@@ -109,7 +109,21 @@ def test_standing_still_gaps_and_poor_positions():
     found = corridors(CRS, [Positions(east + jitter, north, accuracy_m)], 10.0)
     assert len(found.ways) == 2
     assert shapely.bounds(found.ways.geometry)[:, 3].max() < 5
-    assert "1 positions left out" in found.notes[1]
+    assert found.notes[1:] == ("1 positions left out: less accurate than max_accuracy_m = 50 m",)
+
+
+def test_positions_that_are_left_out_are_counted_by_their_cause():
+    """Alone, not accurate, or both: a gap of 200 m is no matter of accuracy."""
+    apart = np.arange(0.0, 2000.0, 200.0)
+    near = np.arange(5000.0, 5100.0, 5.0)
+    east = np.concatenate([apart, near])
+    accuracy_m = np.full(east.size, 3.0)
+    accuracy_m[[0, 12]] = 80.0
+    positions = Positions(east, np.zeros(east.size), accuracy_m)
+    assert corridors(CRS, [positions], 10.0).notes[1:] == (
+        "2 positions left out: less accurate than max_accuracy_m = 50 m",
+        "9 positions left out: more than max_gap_m = 100 m from the others, or standing",
+    )
 
 
 def test_ways_of_few_sessions_are_left_out_on_request(town):

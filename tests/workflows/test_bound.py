@@ -1,13 +1,23 @@
 """``mapfilter bound``: a small made city from its database to raster, tables and pictures."""
 
+from dataclasses import fields
+from pathlib import Path
+
+import geopandas
+import numpy as np
 import pandas as pd
 import pytest
 import rasterio
 from command_line import assert_done, assert_refused, mapfilter
 
+import mapfilter as mf
 from mapfilter.evaluation.map_bound import BANDS
+from mapfilter.workflows.bound import NOTES, BoundResult
+
+DOCS = Path(__file__).parents[2] / "docs"
 
 FILES = {
+    "bound.gpkg",
     "bound.tif",
     "ways.parquet",
     "twins.parquet",
@@ -40,20 +50,48 @@ def test_a_database_is_bound(database, tmp_path):
         assert raster.descriptions == tuple(name for name, _ in BANDS)
         assert raster.units[0] == "m"
         assert raster.crs.to_epsg() == 32631
-    assert_refused(mapfilter("info", tmp_path / "b" / "bound.tif"), "the bound of a database")
+    shown = assert_done(mapfilter("info", tmp_path / "b" / "bound.tif", "--json")).json
+    assert (shown["kind"], shown["crs"]) == ("bound", "EPSG:32631")
+    assert shown["bands"] == [name for name, _ in BANDS]
     ways = pd.read_parquet(tmp_path / "b" / "ways.parquet")
     assert ways["points"].sum() == found["points"]
     assert ways["starts"].sum() == found["starts"]
+    # The same on the map: each way's points, in the database's CRS.
+    placed = geopandas.read_parquet(tmp_path / "b" / "ways.parquet")
+    layer = geopandas.read_file(tmp_path / "b" / "bound.gpkg", layer="ways")
+    for one in (placed, layer):
+        assert one.crs.to_epsg() == 32631
+        assert one.count_coordinates().tolist() == ways["points"].tolist()
+    points = mf.open_database(database).points()
+    lattice = mf.open_database(database).lattice
+    for way_id, geometry in zip(placed["way_id"], placed.geometry, strict=True):
+        mine = points.way_id == way_id
+        east_m, north_m = lattice.east_north(points.row[mine], points.col[mine])
+        bounds = east_m.min(), north_m.min(), east_m.max(), north_m.max()
+        assert geometry.bounds == pytest.approx(bounds)
+    twins = geopandas.read_file(tmp_path / "b" / "bound.gpkg", layer="twins")
+    assert np.allclose(twins.length, np.hypot(
+        twins["twin_east_m"] - twins["east_m"], twins["twin_north_m"] - twins["north_m"]
+    ))  # fmt: skip
+
+
+def test_every_key_of_the_summary_has_a_sentence():
+    page = (DOCS / "howto" / "where-will-it-work.rst").read_text()
+    for one in fields(BoundResult):
+        if one.name not in ("notes", "outputs", "seconds"):
+            assert f"``{one.name}``" in page, one.name
+    assert any(note.startswith("without_plane_bound: ") for note in NOTES)
 
 
 def test_equal_seeds_give_equal_bytes_and_others_other_journeys(database, tmp_path):
     few = ["--spacing", "200", "--journeys", "1"]
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):
         assert_done(mapfilter("bound", database, "--out", tmp_path / name, "--seed", seed, *few))
-    raster, ways = (
+    raster, ways, layers = (
         [(tmp_path / name / file).read_bytes() for name in "abc"]
-        for file in ("bound.tif", "ways.parquet")
+        for file in ("bound.tif", "ways.parquet", "bound.gpkg")
     )
+    assert layers[0] == layers[1] != layers[2]
     assert raster[0] == raster[1] != raster[2]
     assert ways[0] == ways[1] != ways[2]
 

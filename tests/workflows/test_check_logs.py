@@ -37,6 +37,12 @@ def test_cells_that_the_plan_lacks(check, log):
     assert "No serving cell is named" in check(log)["log-cells-unknown"]["evidence"]
 
 
+def test_motion_alone_is_no_fault(check, log):
+    for table in ("radio", "gnss", "truth"):
+        (log / f"{table}.csv").unlink(missing_ok=True)
+    assert check(log) == {}
+
+
 def test_logs_of_another_place_or_system(check, log):
     change(log / "truth.csv", east_m=lambda e: e + 50_000)
     assert "All positions (truth) lie 50 km or more outside." in str(check(log))

@@ -313,5 +313,5 @@ def test_out_of_memory_is_one_message(monkeypatch):
     def full(*_args, **_more):
         raise MemoryError
 
-    monkeypatch.setattr("mapfilter.workflows.databases.run_info", full)
+    monkeypatch.setattr("mapfilter.workflows.info.run_info", full)
     assert_refused(mapfilter("info", "x"), "memory: expected enough of it, found none left")

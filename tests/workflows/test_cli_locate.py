@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from command_line import assert_done, assert_refused, contents, mapfilter
+from made_recordings import MADE
 
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.store import write_log
@@ -196,3 +197,13 @@ def test_a_table_with_times_is_no_recording(tmp_path):
     found = assert_done(mapfilter("locate", *given, "--out", tmp_path / "out", "--json")).json
     assert found["transmitters"] == 2
     assert found["error_median_m"] < 3
+
+
+def test_recordings_with_sensors_make_no_steps(tmp_path):
+    file, text = MADE["indoor"]
+    for number in range(3):
+        (tmp_path / f"{number}-{file}").write_text(text)
+    given = ("--db", tmp_path, "--log", tmp_path / f"0-{file}", "--out", tmp_path / "out", "--json")
+    notes = " ".join(assert_done(mapfilter("locate", *given)).json["notes"])
+    assert "local" in notes or "a frame of its own" in notes
+    assert "steps" not in notes

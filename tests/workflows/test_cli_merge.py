@@ -37,12 +37,16 @@ def test_best_server_as_geotiff(world, tmp_path):
     with rasterio.open(file) as source:
         assert json.loads(source.tags()["CELLS"]) == ["A", "B", "C"]
         assert source.count == 3
-    assert_refused(mapfilter("info", file), "best servers that mapfilter export wrote")
+    shown = assert_done(mapfilter("info", file, "--json")).json
+    assert (shown["kind"], shown["bands"][0]) == ("best servers", "best_server")
 
 
 def test_info_knows_a_geopackage(world, tmp_path):
     assert_done(mapfilter("export", world.database, "--to", tmp_path / "points.gpkg"))
-    assert_refused(mapfilter("info", tmp_path / "points.gpkg"), "an exported database")
+    layers = assert_done(mapfilter("info", tmp_path / "points.gpkg", "--json")).json["layers"]
+    shown = {one["layer"]: (one["geometry"], one["features"]) for one in layers}
+    points = mapfilter("info", world.database, "--json").json["points"]
+    assert shown == {"points": ("Point", points), "cells": ("Point", 3)}
 
 
 def test_resume_of_nothing_is_a_build(own_world):

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from command_line import ONE, assert_done, assert_refused, change, contents, mapfilter, put
 
+import mapfilter as mf
 from mapfilter.config.load import load_config
 from mapfilter.filters.contract import Reason
 from mapfilter.geodesy import unproject
@@ -82,7 +83,7 @@ def test_all_cells_unknown_with_pictures(log, replay, tmp_path):
     [
         ((), "no serving cell and no motion"),
         (("motion",), "no serving cell"),
-        (("radio", "truth"), "no motion"),
+        (("radio", "truth"), "no motion (mapfilter locate needs none)"),
         (("truth",), "no serving cell and no motion"),
     ],
 )
@@ -202,8 +203,11 @@ def test_several_logs_are_summed_up_without_truth(own_world, replay, tmp_path):
     ("columns", "lack"),
     [
         (["time_s", "step_m"], "no heading"),
-        (["time_s", "step_m", "turn_rad"], "no heading (turns alone do not give one)"),
-        (["time_s", "heading_rad"], "no motion"),
+        (
+            ["time_s", "step_m", "turn_rad"],
+            "no heading (turns alone do not give one; the filter bayes needs none)",
+        ),
+        (["time_s", "heading_rad"], "no motion (mapfilter locate needs none)"),
     ],
 )
 def test_logs_whose_motion_lacks_something(columns, lack, log, replay):
@@ -212,6 +216,48 @@ def test_logs_whose_motion_lacks_something(columns, lack, log, replay):
     outcome = replay(log)
     assert outcome.code == 3
     assert outcome.err == f"mapfilter: nothing is located in my-walk: {lack}\n"
+
+
+def test_turns_alone_are_enough_for_the_bayes_filter(log, replay):
+    heading = pd.read_csv(log / "motion.csv")["heading_rad"]
+    change(log / "motion.csv", turn_rad=lambda _: heading.diff().fillna(0.0))
+    change(log / "motion.csv", heading_rad=put(None))
+    found = assert_done(replay(log, "--json", "--filter", "bayes")).json
+    assert (found["partial"], found["epochs"] > 100) == (False, True)
+
+
+def test_what_converged_lacks_nothing(log, replay):
+    """With fixes a position is found, whatever else there is not."""
+    motion = pd.read_csv(log / "motion.csv").drop(columns="heading_rad")
+    motion.to_csv(log / "motion.csv", index=False)
+    truth = pd.read_csv(log / "truth.csv")
+    fixes = truth[["time_s", "east_m", "north_m"]].assign(var_east_m2=9.0, var_north_m2=9.0)
+    fixes.to_csv(log / "gnss.csv", index=False)
+    outcome = assert_done(replay(log, "--json", "--filter", "bayes"))
+    assert outcome.json["switched"]
+    assert outcome.err == ""
+
+
+def test_a_log_of_motion_alone_is_located_by_the_streets(log, replay, world):
+    for table in ("radio", "gnss", "truth"):
+        (log / f"{table}.csv").unlink(missing_ok=True)
+    outcome = assert_done(replay(log, "--json", "--filter", "bayes", "--set=output.pictures=all"))
+    assert (
+        "no cells and no positions in the log: located by the streets alone"
+        in (outcome.json["notes"])
+    )
+    database = mf.open_database(world.database)
+    roads = database.without_cells()
+    assert (len(database.cell_ids), roads.cell_ids) == (3, ())
+    assert np.array_equal(roads.points().point, database.points().point)
+    assert roads.field().level_dbm.shape[2] == 0
+    track = mf.locate(mf.read_log(log), database)
+    assert (track.estimate.hypotheses > 0).any()
+    # The candidate filter cannot, and no filter with a step or two.
+    assert "no serving cell" in replay(log, "--filter", "candidate").err
+    pd.read_csv(log / "motion.csv").iloc[:4].to_csv(log / "motion.csv", index=False)
+    short = replay(log, "--filter", "bayes")
+    assert (short.code, "too short a way" in short.err) == (3, True)
 
 
 def test_a_log_with_a_header_and_no_rows(log, replay):

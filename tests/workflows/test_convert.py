@@ -195,7 +195,7 @@ def test_odometry_makes_steps_and_turns(made, tmp_path):
 
 
 def test_lists_alone_are_no_journey(made, tmp_path):
-    with pytest.raises(InputError, match="give a list as"):
+    with pytest.raises(InputError, match="give it as"):
         converted(made("opencellid-cells"), tmp_path / "log")
     result = converted(made("opencellid-cells", "opencellid"), tmp_path / "log")
     assert any("a list of 30 cells" in note for note in result.notes)
@@ -265,3 +265,72 @@ def test_places_where_no_satellite_can_be_are_left_out(made, tmp_path):
     result = converted([path], tmp_path / "log")
     assert "pseudoranges: 1 places of satellites are none, left out" in result.notes
     assert read_log(tmp_path / "log").pseudoranges["x_m"].isna().sum() == 1
+
+
+def test_recordings_of_several_journeys_are_named(tmp_path):
+    for number, day_s in enumerate([0, 300, 86_400]):
+        rows = "".join(f"{1_777_629_600 + day_s + k},60.1{k},24.9\n" for k in range(9))
+        (tmp_path / f"{number}.csv").write_text(f"time,lat,lon\n{rows}")
+    files = [tmp_path / f"{number}.csv" for number in range(3)]
+    notes = run_convert(files, tmp_path / "log").notes
+    assert "recordings lie up to 23.9 h apart; of several journeys convert each alone" in notes
+    assert not any("apart" in note for note in run_convert(files[:2], tmp_path / "two").notes)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "told"),
+    [
+        ("a.mat", b"MATLAB 5.0 MAT-file, Platform: GLNXA64\0\1", "found a MATLAB file"),
+        ("a.pbf", b"\0\0\0\r\n\tOSMHeader", "an OpenStreetMap extract (likely: a map; use it as"),
+        ("a.tif", b"II*\0", "found a TIFF raster (likely: roads.raster, or [rasters] path)"),
+        ("a.16n", MADE["rinex-nav"][1], "found only orbits of satellites (likely: name them toge"),
+        ("a.csv", MADE["opencellid-cells"][1], "only a list of cells (likely: give it as [cells] "),
+    ],
+)
+def test_what_is_no_recording_of_a_journey_is_named(name, content, told, tmp_path):
+    (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(InputError) as caught:
+        run_convert([tmp_path / name], tmp_path / "log")
+    assert told in str(caught.value)
+
+
+@pytest.mark.parametrize("speed", ["speed_mps", "speed_kmh"])
+@pytest.mark.parametrize("rate", ["yaw_rate_radps", "yaw_rate_degps"])
+def test_a_speed_and_a_yaw_rate_are_odometry(speed, rate, tmp_path):
+    """Ten seconds at 9 m/s, turning by 0.1 rad/s: 90 m and 1 rad."""
+    told = 9.0 if speed == "speed_mps" else 32.4
+    turned = 0.1 if rate == "yaw_rate_radps" else np.degrees(0.1)
+    rows = "".join(f"{k},{told},{turned}\n" for k in range(11))
+    (tmp_path / "drive.csv").write_text(f"time,{speed},{rate}\n{rows}")
+    run_convert([tmp_path / "drive.csv"], tmp_path / "log")
+    motion = read_log(tmp_path / "log").motion
+    assert motion["step_m"].sum() == pytest.approx(90.0)
+    assert motion["turn_rad"].sum() == pytest.approx(1.0)
+    # Beside positions it is the speed of their receiver, and no motion unless asked for.
+    rows = "".join(f"{k},{told},{turned},60.1{k},24.9\n" for k in range(11))
+    (tmp_path / "drive.csv").write_text(f"time,{speed},{rate},lat,lon\n{rows}")
+    run_convert([tmp_path / "drive.csv"], tmp_path / "log")
+    assert read_log(tmp_path / "log").motion.empty
+
+
+def test_dates_of_a_plain_table(tmp_path):
+    path = tmp_path / "drive.csv"
+
+    def converted_of(*times):
+        rows = "".join(f"{when};60,17{k};24,94\n" for k, when in enumerate(times))
+        path.write_text(f"time;lat;lon\n{rows}")
+        return run_convert([path], tmp_path / "log", OpenOptions(zone="Europe/Helsinki"))
+
+    converted_of("2.11.2026 10:00:00,5", "2.11.2026 10:00:03,5", "2.11.2026 10:00:06.5")
+    log = read_log(tmp_path / "log")
+    # 10:00 in Helsinki is 8:00 in UTC in winter.
+    start_s = pd.Timestamp("2026-11-02T08:00:00.5Z").timestamp()
+    assert (log.start_utc_s + log.gnss["time_s"] - start_s).tolist() == [0.0, 3.0, 6.0]
+    for given, hint in (
+        ("11/02/2026 10:00:00", "day or month first? Years come first"),
+        ("yesterday", "found 'yesterday'"),
+        ("32.13.2026 10:00", "found '32.13.2026 10:00'"),
+    ):
+        with pytest.raises(InputError, match="ISO 8601 such as 2026-05-01T10:00:00") as caught:
+            converted_of(given, given)
+        assert hint in str(caught.value)

@@ -132,22 +132,6 @@ def test_simulating_without_ground_truth(own_world):
     assert_refused(outcome, told, "prediction.ground_truth.write = true", 'radio = "as_predicted"')
 
 
-@pytest.mark.parametrize(
-    ("name", "hint"),
-    [
-        ("helsinki.osm.pbf", "a map; use it as area.map"),
-        ("map.osm", "a map; use it as area.map"),
-        ("cells.csv", "a cell plan; use it as cells.plan"),
-        ("motion.csv", "a part of a log; name the folder that it lies in"),
-        ("world.toml", "a configuration; give it to a command with -c"),
-    ],
-)
-def test_info_of_files_that_are_none_of_its_own(name, hint, tmp_path):
-    (tmp_path / name).write_text("cell,site\n")
-    told = f"{name}: expected a database, raster or log folder, found a file (likely: {hint})"
-    assert_refused(mapfilter("info", tmp_path / name), told)
-
-
 def test_info_of_a_part_of_a_log(log):
     assert_refused(mapfilter("info", log / "log.json"), "a part of a log; name the folder")
     assert json.loads((log / "log.json").read_text())

@@ -6,8 +6,14 @@ from command_line import assert_done, assert_refused, mapfilter
 from made_recordings import COUNT, LEVEL_DBM, MADE
 
 from mapfilter.errors import InputError
+from mapfilter.geodesy import project
 from mapfilter.survey.measurements import read_measurements
+from mapfilter.tracks.combine import CombineOptions
+from mapfilter.tracks.open_log import OpenOptions
+from mapfilter.workflows.convert import run_convert
 from mapfilter.workflows.measured import recorded_rows
+
+UTM = OpenOptions(combine=CombineOptions(crs="EPSG:32635"))
 
 
 @pytest.fixture
@@ -61,6 +67,53 @@ def test_levels_lie_between_the_positions_before_and_after(made):
     assert rows.columns[1] == pytest.approx([60.1725])
     assert rows.columns[3].tolist() == [-80.0]
     assert rows.aside["levels without a position within 10 s"] == 2
+
+
+def test_a_track_log_is_measured_as_its_recording(made, tmp_path):
+    """By hand from the recording: levels at their own times, and where the fixes are."""
+    path = made("towercollector")
+    run_convert([path], tmp_path / "logs" / "one", UTM)
+    whole = read(path)
+    for given in (tmp_path / "logs" / "one", tmp_path / "logs"):
+        found = read(given)
+        assert found.cell_ids == whole.cell_ids
+        assert found.identities == whole.identities
+        for mine, theirs in (
+            (found.east_m, whole.east_m),
+            (found.north_m, whole.north_m),
+            (found.level_dbm, whole.level_dbm),
+            (found.time_s, whole.time_s),
+        ):
+            order, other = (
+                np.lexsort((found.cell, found.time_s)),
+                np.lexsort((whole.cell, whole.time_s)),
+            )
+            assert np.allclose(mine[order], theirs[other], atol=1e-3)
+    config = tmp_path / "survey.toml"
+    config.write_text(
+        '[area]\nmap = "none"\n[prediction]\nmodel = "survey"\n'
+        '[prediction.survey]\nfiles = ["logs"]\n[roads.tracks]\nfiles = ["logs"]\n'
+    )
+    assert mapfilter("check", "-c", config).code == 0
+
+
+def test_a_log_in_metres_of_its_own_has_to_be_placed(made, tmp_path):
+    path = made("indoor")
+    told = r"with --origin LAT,LON, and name the log"
+    with pytest.raises(InputError, match=told):
+        read(path)
+    run_convert([path], tmp_path / "log")
+    with pytest.raises(InputError, match="log, crs: expected a CRS, found a local frame"):
+        read(tmp_path / "log")
+    placed = OpenOptions(combine=CombineOptions(origin_deg=(60.17, 24.94)))
+    run_convert([path], tmp_path / "placed", placed)
+    found = read(tmp_path / "placed")
+    # The first waypoint is 100 m east and 50 m north of the origin.
+    east_m, north_m = project("EPSG:32635", [24.94 + 100 / 55_400], [60.17 + 50 / 111_400])
+    assert np.hypot(found.east_m[0] - east_m, found.north_m[0] - north_m) < 5
+    run_convert([made("kitti")], tmp_path / "drive")
+    with pytest.raises(InputError, match=r"a local frame|found a log of motion"):
+        read(tmp_path / "drive")
 
 
 def test_files_without_cells_or_positions_are_told(made, tmp_path):

@@ -67,9 +67,10 @@ class BayesFilter(Options):
 
     Parameters
     ----------
-    vehicle : bool
+    vehicle : bool or None
         Dead reckoning is that of a vehicle (wheels, camera, lidar), which keeps to ways: errors of
-        motion and weights of the map that have their defaults are those of vehicles.
+        motion and weights of the map that have their defaults are those of vehicles. None: where
+        motion has turns, no headings, and a vehicle's speed.
     step_sd_m : float
         Assumed deviation of a step's length.
     heading_sd_deg : float
@@ -125,7 +126,7 @@ class BayesFilter(Options):
         Assumed deviation of a timing advance besides its rounding.
     """
 
-    vehicle: bool = False
+    vehicle: bool | None = None
     step_sd_m: NotNegative = 0.3
     heading_sd_deg: NotNegative = 15.0
     bias_sd_deg: NotNegative = 10.0

@@ -335,5 +335,15 @@ def joined_reports(parts: Sequence[Reports]) -> Reports:
         serving=np.concatenate(serving),
         timing_advance=np.concatenate([part.timing_advance for part in parts]),
         sd_db=np.concatenate([part.sd_db for part in parts]),
-        notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
+        notes=_joined_notes(parts),
     )
+
+
+def _joined_notes(parts: Sequence[Reports]) -> tuple[str, ...]:
+    """Return the notes of all parts, each once; those that begin with a count are added up."""
+    counts: dict[str, int] = {}
+    for note in (note for part in parts for note in part.notes):
+        number, _, rest = note.partition(" ")
+        text, count = (rest, int(number)) if number.isdigit() else (note, 0)
+        counts[text] = counts.get(text, 0) + count
+    return tuple(f"{count} {text}" if count else text for text, count in counts.items())

@@ -95,7 +95,8 @@ class SiteModels:
 
     Path loss is that of COST 231 Hata at the cell's frequency and height, whatever the distance;
     antennas are the plan's sectors by formula, or the measured ones that cells name
-    (:func:`mapfilter.radio.msi.read_antennas`), as seen from 1 km.
+    (:func:`mapfilter.radio.msi.read_antennas`), as seen from 1 km. A plan without cells is one for
+    fixes and dead reckoning alone.
 
     Raises
     ------
@@ -118,9 +119,10 @@ class SiteModels:
                 faults.add(f"cell {cell.id!r}, antenna", expected, repr(cell.antenna), hint)
         faults.raise_if_any(InputError)
         self.cells: Mapping[str, Cell] = {cell.id: cell for cell in plan.cells}
-        first = plan.cells[0]
-        lon, lat = unproject(plan.crs, first.east_m, first.north_m)
-        self.convergence_rad = grid_convergence_rad(plan.crs, float(lon), float(lat))
+        self.convergence_rad = 0.0
+        for first in plan.cells[:1]:
+            lon, lat = unproject(plan.crs, first.east_m, first.north_m)
+            self.convergence_rad = grid_convergence_rad(plan.crs, float(lon), float(lat))
         self.of = lru_cache(maxsize=4096)(self._of)
         self.level = lru_cache(maxsize=65_536)(self._level)
         self.neighbours = lru_cache(maxsize=65_536)(self._neighbours)

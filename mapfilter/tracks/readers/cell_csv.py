@@ -194,7 +194,7 @@ CELL_LIST = Format(
     "opencellid-cells",
     "an OpenCellID or MLS cell list",
     "OpenCellID, Mozilla location service (CSV of cells, both header dialects)",
-    "cells; no journey: it is named, and left to ``[cells] path``",
+    "cells; no journey: it is named, and left to ``[cells] plan``",
     _is_cell_list,
     _read_cell_list,
     by_rows=True,

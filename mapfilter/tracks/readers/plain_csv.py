@@ -9,7 +9,7 @@ from difflib import get_close_matches
 import numpy as np
 
 from mapfilter._types import Floats
-from mapfilter.errors import Faults, InputError
+from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio.identities import BARS_DBM, levels_of_bars, technology
 from mapfilter.tracks.readers.columns import (
     Columns,
@@ -74,11 +74,14 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
 """Fields that a column map may name, and the names of columns that are known without one."""
 
 _KMH = 1 / 3.6
+_SPEEDS = ("speed_mps", "speed_kmh")
 _CONTENT = (
     *(("lat_deg", "lon_deg"), ("east_m", "north_m"), ("step_m",), ("level_dbm",), ("bars",)),
     *(("acc_x",), ("gyr_x",), ("mag_x",), ("pressure_hpa",), ("wheel_speed_mps",)),
     *(("wheel_speed_kmh",), ("steps",)),
+    *((speed, rate) for speed in _SPEEDS for rate in ("yaw_rate_radps", "yaw_rate_degps")),
 )
+_TIMES = "seconds, Unix time, or ISO 8601 such as 2026-05-01T10:00:00+02:00"
 
 
 @dataclass(frozen=True)
@@ -184,15 +187,23 @@ def _times(mapped: _Mapped, reading: Reading, options: ReadOptions) -> Floats:
     reading.notes[:] = [note for note in reading.notes if not note.endswith("taken as missing")]
     time_s, zoned = mapped.rows.times(*mapped.names("time"), zone=options.zone)
     reading.clock = Clock("utc") if zoned else Clock("local", options.zone)
+    if len(time_s) and not np.isfinite(time_s).any():
+        first = next((text for text in mapped.texts("time").tolist() if text), "nothing")
+        hint = "day or month first? Years come first, or dots between" if "/" in first else ""
+        raise fail(InputError, f"{reading.path}, time", _TIMES, repr(first[:40]), hint)
     return time_s
 
 
 def _add_odometry(mapped: _Mapped, reading: Reading, time_s: Floats) -> None:
-    if not (mapped.has("wheel_speed_mps") or mapped.has("wheel_speed_kmh")):
+    wheels = mapped.has("wheel_speed_mps") or mapped.has("wheel_speed_kmh")
+    turned = mapped.has("yaw_rate_radps") or mapped.has("yaw_rate_degps")
+    # Beside positions a speed is that of their receiver.
+    if not wheels and (not turned or mapped.has("lat_deg", "lon_deg")):
         return
-    speed = mapped.number("wheel_speed_mps")
-    if mapped.has("wheel_speed_kmh"):
-        speed = _KMH * mapped.number("wheel_speed_kmh")
+    name = "wheel_speed" if wheels else "speed"
+    speed = mapped.number(f"{name}_mps")
+    if mapped.has(f"{name}_kmh"):
+        speed = _KMH * mapped.number(f"{name}_kmh")
     yaw = mapped.number("yaw_rate_radps")
     if mapped.has("yaw_rate_degps"):
         yaw = np.radians(mapped.number("yaw_rate_degps"))

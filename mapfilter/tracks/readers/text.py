@@ -11,6 +11,11 @@ from pathlib import Path
 
 from mapfilter.errors import InputError, fail
 
+_HINTS = {
+    "an OpenStreetMap extract": "a map; use it as area.map",
+    "a TIFF raster": "roads.raster, or [rasters] path",
+    "an SQLite database": "if a GeoPackage, layers of a map; use it as roads.layer",
+}
 _LARGEST_BYTES = 1 << 31
 _LARGEST_UNPACKED_BYTES = 1 << 30
 _HEAD_BYTES = 1 << 16
@@ -29,6 +34,9 @@ _ARCHIVES = {
     b"SQLite": "an SQLite database",
     b"II*\x00": "a TIFF raster",
     b"MM\x00*": "a TIFF raster",
+    b"MATLAB 5.0 MAT-file": "a MATLAB file",
+    b"\x00\x00\x00\r\n\tOSMHeader": "an OpenStreetMap extract",
+    b"\x00\x00\x00\x0e\n\tOSMHeader": "an OpenStreetMap extract",
 }
 
 
@@ -114,7 +122,7 @@ def read_text(path: Path, most_bytes: int = -1) -> Text:
         data = _unpacked(path, data, notes)
     for start, what in _ARCHIVES.items():
         if data.startswith(start):
-            hint = "unpack it first" if "archive" in what else ""
+            hint = "unpack it first" if "archive" in what else _HINTS.get(what, "")
             raise fail(InputError, str(path), "a recording as text", what, hint)
     data = _as_utf8(path, data, notes)
     if b"\r" in data:

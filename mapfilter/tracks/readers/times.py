@@ -16,6 +16,8 @@ from mapfilter.gnss.orbits import LEAPS_UTC_S, WEEK_S
 
 GPS_EPOCH_S = datetime(1980, 1, 6, tzinfo=UTC).timestamp()
 _UNITS = ((1e17, 1e9), (1e14, 1e6), (1e11, 1e3))
+_DOTTED = re.compile(r"^\s*(\d\d?)\.(\d\d?)\.((?:19|20)\d\d)(?!\d)")
+"""Day, month and year with dots, which no one writes in another order."""
 _OFFSET = re.compile(r"(?:UTC|GMT)?([+-])(\d{1,2})(?::?([0-5]\d))?")
 
 
@@ -66,7 +68,8 @@ def parse_times(texts: np.ndarray, zone: str = "", layout: str = "ISO8601") -> t
     zone : str
         Zone of times that state none.
     layout : str
-        Format as of ``strptime``, or "ISO8601"; numbers are Unix times then.
+        Format as of ``strptime``, or "ISO8601"; numbers are Unix times then, and days with dots
+        (31.12.2026) are read, too.
 
     Returns
     -------
@@ -92,6 +95,10 @@ def parse_times(texts: np.ndarray, zone: str = "", layout: str = "ISO8601") -> t
     # Other years are beyond the range of timestamps, or no dates.
     if layout == "ISO8601":
         plain = plain.str.replace(",", ".", regex=False)
+        if plain.str.match(_DOTTED).any():
+            plain = plain.str.replace(
+                _DOTTED, lambda m: f"{m[3]}-{int(m[2]):02d}-{int(m[1]):02d}", regex=True
+            )
     plain = plain.where(plain.str.match(r"\s*(?:19|20)\d\d"), "")
     moments = pd.to_datetime(plain, format=layout, utc=True, errors="coerce")
     seconds = (moments - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy(dtype=np.float64)

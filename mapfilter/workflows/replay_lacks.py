@@ -1,0 +1,169 @@
+"""What a log lacks to be located, and logs that lie elsewhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from mapfilter._types import Floats
+from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.errors import Faults
+from mapfilter.geodesy import Lattice, same_crs, short_crs
+from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.estimate import TrackEstimate
+from mapfilter.positioning.kalman.filter import KalmanFilter
+from mapfilter.positioning.log_options import by_streets_alone
+from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.open_log import OpenedLog
+from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
+from mapfilter.tracks.schema import SERVING
+from mapfilter.workflows.world import outside_m
+
+_AWAY_M = 5000.0
+_BY_CELLS = ("candidate", "grid")
+
+
+def check_log(path: Path, log: TrackLog, lattice: Lattice, faults: Faults) -> None:
+    """Note a log in another CRS than the database, or far outside its lattice.
+
+    Its truth, or its GNSS fixes, may not all lie more than 5 km outside.
+    """
+    if not same_crs(log.crs, lattice.crs):
+        expected = f"{short_crs(lattice.crs)}, the database's"
+        local = is_local_frame(log.crs)
+        hint = LOCAL_FRAME_HINT if local else "log of another area or zone"
+        faults.add(f"{path}, crs", expected, LOCAL_FRAME if local else log.crs, hint)
+        return
+    for table in ("truth", "gnss"):
+        places = getattr(log, table)
+        east_m, north_m = places["east_m"].to_numpy(), places["north_m"].to_numpy()
+        _check_near(f"{path}, {table}", east_m, north_m, lattice, faults)
+
+
+def lack_of(
+    opened: OpenedLog,
+    log: TrackLog,
+    options: Any,
+    estimate: TrackEstimate,
+    database: RadioRouteDatabase | None,
+) -> str:
+    """Return what a log lacks that was not located, with a remedy; else an empty text.
+
+    Parameters
+    ----------
+    opened : OpenedLog
+        The log as it was opened, with its sensors and recordings.
+    log : TrackLog
+        What of it the filter was given.
+    options
+        Of the filter.
+    database : RadioRouteDatabase or None
+        None where the filter only takes sites.
+    """
+    if estimate.converged_at is not None:
+        return ""
+    if isinstance(options, KalmanFilter):
+        given = len(log.pseudoranges)
+        unused = f" ({given} pseudoranges: only the filter bayes uses them, over a map)"
+        return "too little was measured" + (unused if given else "")
+    has_cells = database is None or bool(database.cell_ids)
+    if database is not None and by_streets_alone(options, log, database):
+        has_cells = False
+    lack = lacking(log, estimate, cells=has_cells, turns=isinstance(options, BayesFilter))
+    name = str(getattr(options, "name", ""))
+    if lack and not has_cells and name in _BY_CELLS:
+        return f"the filter {name} needs cells to start, the database has none"
+    if "no motion" not in lack:
+        return lack
+    if _has_course(opened):
+        return f"{lack} (--course-motion, track.course_motion, makes it from speed and course)"
+    if has_cells and len(log.radio):
+        return f"{lack} (mapfilter locate needs none)"
+    return lack
+
+
+def advice_of(log: TrackLog, options: Any, estimate: TrackEstimate) -> tuple[str, ...]:
+    """Return notes on a log that streets alone did not locate.
+
+    Parameters
+    ----------
+    options
+        Of the filter, as fitted to the log.
+    """
+    if estimate.converged_at is not None or not isinstance(options, BayesFilter):
+        return ()
+    along_m = float(log.motion["step_m"].abs().sum())
+    notes = [
+        f"never converged in {along_m:.0f} m: by streets alone it takes about a kilometre, with "
+        "turns, all of it on the map"
+    ]
+    if not options.vehicle:
+        notes.append(
+            "motion taken for a walker's; where wheels, a camera or a lidar measured it, set "
+            "filter.bayes.vehicle = true"
+        )
+    return tuple(notes)
+
+
+def _has_course(opened: OpenedLog) -> bool:
+    """Return whether positions of the log, or of its truth, state speed and course."""
+    if "velocity" in opened.sensors:
+        return True
+    for recording in opened.recordings:
+        rows = recording.tables.get("positions")
+        if rows is not None and "course_deg" in rows and rows["course_deg"].notna().any():
+            return True
+    return False
+
+
+def lacking(
+    log: TrackLog, estimate: TrackEstimate, *, cells: bool = True, turns: bool = False
+) -> str:
+    """Return the missing data of a log that was not located, or an empty text.
+
+    Without ``cells`` in the database, motion is all that it needs. ``turns`` says whether the
+    filter does without headings.
+    """
+    if estimate.converged_at is not None:
+        return ""
+    serving = (log.radio["role"] == SERVING) & log.radio["cell"].notna()
+    moved = log.motion["step_m"].notna()
+    lacks = []
+    turned = log.motion[["heading_rad", "turn_rad"]].notna().any(axis=1) & moved
+    if not cells:
+        # The first row turns by nothing.
+        if moved.any() and turned.sum() < 2:
+            lacks.append("no headings and no turns")
+        elif moved.any() and not (estimate.hypotheses > 0).any():
+            lacks.append("too short a way with steps and headings, or turns")
+    elif not serving.any() and not (estimate.hypotheses > 0).any():
+        lacks.append("no serving cell")
+    elif not (estimate.hypotheses > 0).any():
+        lacks.append("no serving cell of which the database has points")
+    if not moved.any():
+        lacks.append("no motion")
+    elif cells and not (moved & log.motion["heading_rad"].notna()).any() and not turned.any():
+        lacks.append("no heading")
+    elif cells and not (moved & log.motion["heading_rad"].notna()).any() and not turns:
+        lacks.append("no heading (turns alone do not give one; the filter bayes needs none)")
+    return " and ".join(lacks)
+
+
+def _check_near(
+    where: str, east_m: Floats, north_m: Floats, lattice: Lattice, faults: Faults
+) -> None:
+    if not east_m.size or outside_m(east_m, north_m, lattice).min() <= _AWAY_M:
+        return
+    box = lattice.bounds_m
+    found = east_m.min(), north_m.min(), east_m.max(), north_m.max()
+    swapped = outside_m(north_m, east_m, lattice).min() <= _AWAY_M
+    faults.add(
+        where,
+        f"positions near the database's {_box(*box)}",
+        _box(*found),
+        "east and north swapped" if swapped else "log of another area or zone",
+    )
+
+
+def _box(west_m: float, south_m: float, east_m: float, north_m: float) -> str:
+    return f"{west_m:.0f}..{east_m:.0f} m east, {south_m:.0f}..{north_m:.0f} m north"

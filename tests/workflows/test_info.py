@@ -1,0 +1,129 @@
+"""``info`` says what files and folders of all kinds are, and where to use them."""
+
+import gzip
+
+import geopandas
+import numpy as np
+import pytest
+import rasterio
+import shapely
+from command_line import assert_done, assert_refused, mapfilter
+from made_recordings import MADE
+
+from mapfilter.roads.maps import resolve_map
+
+
+def info(path):
+    return assert_done(mapfilter("info", path, "--json")).json
+
+
+def write_raster(path, values, **tags):
+    with rasterio.open(
+        path, "w", driver="GTiff", height=values.shape[0], width=values.shape[1], count=1,
+        dtype=values.dtype, crs="EPSG:32632", transform=rasterio.Affine(2, 0, 100, 0, -2, 900),
+    ) as target:  # fmt: skip
+        target.write(values, 1)
+        target.update_tags(**tags)
+
+
+def test_a_map():
+    found = info(resolve_map("helsinki"))
+    assert (found["kind"], found["use"]) == ("map", "area.map")
+    box = found["bounds_deg"]
+    assert 24.9 < box["west"] < box["east"] < 25.0 < 60.1 < box["south"] < box["north"] < 60.2
+
+
+def test_a_map_that_is_none(tmp_path):
+    (tmp_path / "town.osm.pbf").write_text("cell,site\n")
+    assert_refused(mapfilter("info", tmp_path / "town.osm.pbf"), "town.osm.pbf: expected")
+
+
+def test_a_raster_of_roads_is_no_raster_of_levels(tmp_path):
+    values = np.zeros((30, 40), dtype=np.uint8)
+    values[3, 5:20], values[9, 2] = 1, 7
+    write_raster(tmp_path / "roads.tif", values)
+    found = info(tmp_path / "roads.tif")
+    assert (found["kind"], found["values"]) == ("classes", [0, 1, 7])
+    assert found["bounds_m"] == [100.0, 840.0, 180.0, 900.0]
+    assert "roads.raster" in found["use"]
+    # Levels without a unit keep their own fault: they may be losses.
+    write_raster(tmp_path / "HD1.tif", np.full((3, 3), -80.0, dtype=np.float32))
+    assert_refused(mapfilter("info", tmp_path / "HD1.tif"), "set quantity = level or loss")
+
+
+def test_layers(tmp_path):
+    roads = {"class": ["road"], "geometry": [shapely.LineString([(0, 0), (9, 9)])]}
+    frame = geopandas.GeoDataFrame(roads, crs="EPSG:32632")
+    for name in ("roads.gpkg", "roads.geojson", "roads.json"):
+        frame.to_file(tmp_path / name, driver="GPKG" if name.endswith("gpkg") else "GeoJSON")
+        (layer,) = info(tmp_path / name)["layers"]
+        assert (layer["layer"], layer["features"]) == ("roads", 1)
+        assert layer["columns"] == "class"
+    (tmp_path / "cut.gpkg").write_bytes((tmp_path / "roads.gpkg").read_bytes()[:900])
+    assert_refused(mapfilter("info", tmp_path / "cut.gpkg"), "cut.gpkg: expected a layer")
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "use"),
+    [
+        ("cell,site,lat,lon,height_m\nA,S,60,24,30\n", "cell plan", "cells.plan"),
+        ("TX_ID;SITE_NAME;LATITUDE;LONGITUDE\nA;S;60;24\n", "cell plan", "cells.plan"),
+        ("latitude,longitude\n39.7,-104.9\n", "table", "mapfilter convert --column"),
+        ("x,y,ap1,ap2\n1,2,-60,100\n", "table", "mapfilter locate --db"),
+    ],
+)
+def test_tables(text, kind, use, tmp_path):
+    (tmp_path / "some.csv").write_text(text)
+    found = info(tmp_path / "some.csv")
+    assert (found["kind"], found["rows"]) == (kind, 1)
+    assert use in found["use"]
+
+
+def test_configurations(tmp_path):
+    (tmp_path / "area.toml").write_text('[area]\nmap = "helsinki"\n')
+    assert info(tmp_path / "area.toml")["use"] == "mapfilter check -c area.toml"
+    (tmp_path / "area.toml").write_text('[area]\nmop = "helsinki"\n')
+    assert_refused(mapfilter("info", tmp_path / "area.toml"), "area.mop")
+
+
+def test_recordings_and_what_they_are_for(tmp_path):
+    for name, use in (
+        ("nmea", "mapfilter replay --log, or mapfilter convert"),
+        ("rinex-nav", "beside a recording of pseudoranges"),
+        ("opencellid-cells", "cells.plan"),
+    ):
+        file, text = MADE[name][:2]
+        path = tmp_path / file
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        found = info(path)
+        assert (found["kind"], found["format"]) == ("recording", name)
+        assert use in found["use"]
+
+
+def test_a_folder_of_recordings(tmp_path):
+    folder = tmp_path / "all" / "day"
+    folder.mkdir(parents=True)
+    for number in range(2):
+        (folder / f"{number}.csv").write_text(MADE["opencellid"][1])
+    (folder / "README.md").write_text("of my phone\n")
+    found = info(folder)
+    assert (found["kind"], found["files"]) == ("recordings", 2)
+    assert found["formats"] == {"opencellid": 2}
+    assert_refused(mapfilter("info", tmp_path / "all"), "name one of day")
+
+
+def test_an_output_folder_names_what_it_holds(world):
+    assert_refused(mapfilter("info", world.out), "name one of ", "database, journeys")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "told"),
+    [
+        ("towers.json", b'{"a": 1}\n', "it begins with '{\"a\": 1}'"),
+        ("graph.gz", gzip.compress(b"<graphml>"), "a binary file"),
+        ("motion.csv", b"time_s\n", "a part of a log; name the folder that it lies in"),
+    ],
+)
+def test_files_of_other_kinds(name, content, told, tmp_path):
+    (tmp_path / name).write_bytes(content)
+    assert_refused(mapfilter("info", tmp_path / name), told)
