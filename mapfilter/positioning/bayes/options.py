@@ -195,8 +195,8 @@ class BayesFilter(Options):
         )
         # Disturbances are part of the headings' errors: with small ones large jumps are rarer.
         usual = MotionErrors()
-        share = motion.heading_sd_rad / usual.heading_sd_rad
-        motion = replace(motion, disturbances_per_m=share * usual.disturbances_per_m)
+        times = motion.heading_sd_rad / usual.heading_sd_rad
+        motion = replace(motion, disturbances_per_m=times * usual.disturbances_per_m)
         weights = MapWeights(self.map_sd_m, self.map_weight_per_m, self.off_cost_per_m)
         if self.vehicle:
             motion = replace(motion, **_VEHICLE_MOTION)
