@@ -15,6 +15,7 @@ from mapfilter.tracks.readers import (
     gnsslogger,
     gpx,
     indoor,
+    nemo,
     nmea,
     phone_sensors,
     plain_csv,
@@ -22,6 +23,7 @@ from mapfilter.tracks.readers import (
     rinex,
     rinex_navigation,
     smartloc,
+    tems,
 )
 from mapfilter.tracks.readers.columns import header_names, likely_separator
 from mapfilter.tracks.readers.format import Format, ReadOptions
@@ -46,14 +48,17 @@ FORMATS: tuple[Format, ...] = (
     antennas.FORMAT,
     poses.KITTI,
     poses.TUM,
+    nemo.FORMAT,
+    tems.FORMAT,
     plain_csv.FORMAT,
 )
 """All formats, in the order in which a file is compared with them."""
 
 _PEEKED_BYTES = 1 << 18
 _NOT_READ = {
-    ".nmf": "a Nemo log; export measurements and positions as CSV, and map the columns",
-    ".trp": "a TEMS log; export it as tab-delimited text, and map the columns",
+    ".nmf": "a Nemo log that is no text of Nemo file format 2; export it as CSV, map the columns",
+    ".dt1": "a Nemo log of version 1; export it as CSV, and map the columns",
+    ".trp": "a binary TEMS log; export it as tab-delimited text",
     ".kml": "KML; export GPX, or a table as CSV",
     ".kmz": "KML; export GPX, or a table as CSV",
     ".geojson": "GeoJSON; export GPX, or a table as CSV",
