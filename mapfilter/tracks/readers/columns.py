@@ -277,6 +277,9 @@ def value_columns(
 
 def split_blanks(data: bytes) -> bytes:
     """Return a text in which runs of blanks and tabs are one blank, none at a line's ends."""
-    # Single blanks are no match: a list of every blank would be larger than the text.
-    single = re.sub(rb"[ \t]{2,}|\t", b" ", data)
-    return re.sub(rb"^ | $", b"", single, flags=re.MULTILINE)
+    if b"\t" in data or b"  " in data:
+        # Single blanks are no match: a list of every blank would be larger than the text.
+        data = re.sub(rb"[ \t]{2,}|\t", b" ", data)
+    if b"\n " in data or b" \n" in data or data[:1] == b" " or data[-1:] == b" ":
+        data = re.sub(rb"^ | $", b"", data, flags=re.MULTILINE)
+    return data
