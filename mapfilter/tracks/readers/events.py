@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.tracks.readers.columns import Columns
-from mapfilter.tracks.readers.lines import LONGEST_LINE, blocks
+from mapfilter.tracks.readers.lines import LONGEST_LINE, blocks, line_texts
 from mapfilter.tracks.readers.recording import Reading
 from mapfilter.tracks.readers.times import seconds_of_day, without_midnights
 
@@ -133,19 +133,11 @@ def _short(lines: pa.Array, number: Ints, kept: Bools, reading: Reading) -> Bool
 def _lines(block: bytes, separator: str) -> pa.Array:
     """Return the lines of a block; separators within the quotes of a line are blanks."""
     code = np.frombuffer(block, dtype=np.uint8)
-    ends = np.flatnonzero(code == _LINE_FEED)
-    if not len(block) or code[-1] != _LINE_FEED:
-        ends = np.append(ends, len(code))
-    starts = np.concatenate([[0], ends[:-1] + 1]).astype(np.int64)
     if b'"' in block:
         quotes = np.cumsum(code == _QUOTE, dtype=np.int32)
         places = np.flatnonzero(code == ord(separator))
-        line = np.searchsorted(starts, places, side="right") - 1
-        before = np.where(starts > 0, quotes[np.maximum(starts - 1, 0)], 0)
-        inside = (quotes[places] - before[line]) % 2 == 1
+        feeds = np.flatnonzero(code == _LINE_FEED)
+        before = np.concatenate([[0], quotes[feeds]])[np.searchsorted(feeds, places)]
         code = code.copy()
-        code[places[inside]] = _BLANK
-    # A line's feed belongs to it here, and is trimmed.
-    edges = np.append(starts, min(int(ends[-1]) + 1, len(code))).astype(np.int32)
-    whole = pa.StringArray.from_buffers(len(starts), pa.py_buffer(edges), pa.py_buffer(code))
-    return pc.utf8_rtrim(whole, "\n")
+        code[places[(quotes[places] - before) % 2 == 1]] = _BLANK
+    return line_texts(code)

@@ -11,6 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
 from pyarrow import csv as arrow_csv
 
 from mapfilter._types import Bools, Ints
@@ -38,6 +40,17 @@ def blocks(data: memoryview, first_line: int) -> Iterator[tuple[bytes, int]]:
         yield block, first_line
         first_line += block.count(b"\n")
         start = end
+
+
+def line_texts(code: NDArray[np.uint8]) -> pa.StringArray:
+    """Return the lines of a UTF-8 text, given as its bytes."""
+    ends = np.flatnonzero(code == _LINE_FEED)
+    if not len(code) or code[-1] != _LINE_FEED:
+        ends = np.append(ends, len(code))
+    # A line's feed belongs to it here, and is trimmed.
+    edges = np.concatenate([[0], ends[:-1] + 1, [min(int(ends[-1]) + 1, len(code))]])
+    buffers = pa.py_buffer(edges.astype(np.int32)), pa.py_buffer(np.ascontiguousarray(code))
+    return pc.utf8_rtrim(pa.StringArray.from_buffers(len(ends), *buffers), "\n")
 
 
 def good_lines(
