@@ -112,6 +112,22 @@ class Columns:
             return found
         return parse_times(self.texts(*names), zone, layout)
 
+    def contains(self, part: str, *names: str) -> Bools:
+        """Return in which rows a column contains a text."""
+        column = self._raw(*names)
+        if column is None:
+            return np.zeros(len(self), dtype=bool)
+        return np.asarray(pc.match_substring(column, part).to_numpy(), dtype=bool)
+
+    def changes(self, *names: str) -> Bools:
+        """Return in which rows a column differs from the row before; the first one does not."""
+        changed = np.zeros(len(self), dtype=bool)
+        column = self._raw(*names)
+        if column is not None and len(self) > 1:
+            trimmed = pc.utf8_trim_whitespace(column)
+            changed[1:] = pc.not_equal(trimmed.slice(1), trimmed.slice(0, len(self) - 1)).to_numpy()
+        return changed
+
     def seconds_of_day(self, *names: str) -> Floats:
         """Return times of day of a column, NaN where it has none; see :func:`seconds_of_day`."""
         column = self._raw(*names)

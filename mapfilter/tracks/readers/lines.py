@@ -57,6 +57,8 @@ def good_lines(
     block: bytes, first_line: int, count: int, separator: str, reading: Reading, least: int
 ) -> tuple[bytes, Ints]:
     """Return the lines that have all fields, and their numbers; refuse the others."""
+    if least < count and b'"' not in block:
+        block = _padded(block, count, separator, least)
     code = np.frombuffer(block, dtype=np.uint8)
     ends = np.flatnonzero(code == _LINE_FEED)
     if not len(block) or block[-1] != _LINE_FEED:
@@ -85,6 +87,19 @@ def good_lines(
                 rows.append(first_line + at)
     reading.rows += int(right.sum())
     return b"\n".join(good), np.array(rows, dtype=np.int64)
+
+
+def _padded(block: bytes, count: int, separator: str, least: int) -> bytes:
+    """Return lines in which absent last fields are empty ones."""
+    code = np.frombuffer(block, dtype=np.uint8)
+    ends = np.append(np.flatnonzero(code == _LINE_FEED), len(code))
+    starts = np.concatenate([[0], ends[:-1] + 1])
+    places = np.flatnonzero(code == ord(separator))
+    fields = np.searchsorted(places, ends) - np.searchsorted(places, starts) + 1
+    absent = np.where((fields >= least) & (ends > starts), np.maximum(count - fields, 0), 0)
+    if not absent.any():
+        return block
+    return bytes(np.insert(code, np.repeat(ends, absent), ord(separator)).tobytes())
 
 
 def _runs(right: Bools) -> Iterator[tuple[tuple[int, int], bool]]:
