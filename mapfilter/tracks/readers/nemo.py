@@ -41,8 +41,8 @@ from mapfilter.tracks.readers.text import Text
 from mapfilter.tracks.readers.times import utc_from_local_s
 
 _BEGIN = re.compile(r"#(?:PRODUCT|FF|ID|START)[,;\t]")
-_EVENT = re.compile(r"(?:GPS|CELLMEAS|CHI|SEI|RRCSM|L3SM)([,;\t])\d{1,2}:\d\d:\d\d\.\d{1,3}\1")
-_START = re.compile(r'#START[,;\t][^,;\t]*[,;\t]\d*[,;\t]"?(\d{1,2})\.(\d{1,2})\.(\d{4})')
+_EVENT = re.compile(r"(?:GPS|CELLMEAS|CHI|SEI|RRCSM|L3SM)([,;\t])\d{1,2}:\d\d:\d\d[.,]\d{1,3}\1")
+_START = re.compile(r'#START([,;\t])[^;\t\n]*?\1\d*\1"?(\d{1,2})\.(\d{1,2})\.(\d{4})')
 _PRODUCT = re.compile(r'#PRODUCT[,;\t]+"?([^",;\t]*)"?[,;\t]"?([\d.]*)')
 _KINDS = ("GPS", "CELLMEAS", "CHI", "SEI")
 _SCANNERS = ("OFDMSCAN", "PILOTSCAN", "FREQSCAN")
@@ -146,7 +146,7 @@ def _midnight_s(head: str) -> float | None:
     """Return the midnight before the start, in seconds as if the zone were UTC."""
     if (found := _START.search(head)) is None:
         return None
-    day, month, year = map(int, found.groups())
+    day, month, year = map(int, found.groups()[1:])
     try:
         return datetime(year, month, day, tzinfo=UTC).timestamp()
     except ValueError:
