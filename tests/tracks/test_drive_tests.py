@@ -209,3 +209,12 @@ def test_an_export_without_cells_and_positions_is_no_recording(read):
     text = "Time\tMS\tMessage Type\tAll-LAC\n" + "13:00:00\tMS1\tPaging\t3021\n" * 3
     with pytest.raises(InputError, match="usable row of tems"):
         read(text)
+
+
+def test_a_column_map_goes_before_the_names_of_tems(tmp_path):
+    path = tmp_path / "drive.txt"
+    path.write_text(MADE["tems"][1].replace("01/05/2026", "2026-05-01"))
+    own = {"time": "Timestamp", "lat_deg": "All-Latitude", "lon_deg": "All-Longitude"}
+    assert read_recording(path, options=ReadOptions(columns=own)).format == "csv"
+    other = {"time": "Zeit", "lat_deg": "Breite"}
+    assert read_recording(path, options=ReadOptions(columns=other)).format == "tems"

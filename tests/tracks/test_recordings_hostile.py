@@ -162,7 +162,16 @@ def test_a_gpx_with_entities_is_not_expanded(read):
         read("gpx", data)
 
 
-BY_PARTS = ["towercollector", "opencellid", "opencellid-cells", "phyphox", "sensorlogger", "csv"]
+BY_PARTS = [
+    "tems",
+    "tems/lte",
+    "towercollector",
+    "opencellid",
+    "opencellid-cells",
+    "phyphox",
+    "sensorlogger",
+    "csv",
+]
 
 
 @pytest.mark.parametrize("name", BY_PARTS)

@@ -117,7 +117,9 @@ def read_recording(
         raise InputError(tuple(replace(f, hint=hint or f.hint) for f in error.faults)) from error
     found = find_format(text)
     known = format_named(name) if name else found
-    if known is None and options is not None and options.columns:
+    own = options is not None and bool(options.columns)
+    if own and not name and (known is None or (known is tems.FORMAT and _named(text, options))):
+        # The columns of such an export are chosen, and may be named.
         known = plain_csv.FORMAT
     if known is None:
         raise _unknown(path, text)
@@ -139,6 +141,13 @@ def read_recording(
             for fault in error.faults
         )
         raise InputError(named) from error
+
+
+def _named(text: Text, options: ReadOptions | None) -> bool:
+    """Return whether a file has every column of a column map."""
+    columns = {} if options is None else options.columns
+    names = header_names(text.first_line, likely_separator(text.first_line))
+    return all(column.lower() in names for column in columns.values())
 
 
 def _unknown(path: Path, text: Text) -> MapfilterError:
