@@ -163,10 +163,22 @@ def _add_serving_lte(rows: Columns, reading: Reading, time_s: Floats) -> None:
     known = (enb >= 0) & (part >= 0) & (part < _CELLS_OF_ENB)
     ci = np.where(known, _CELLS_OF_ENB * enb + part, np.nan)
     # An identity is in the messages that have it: it holds until carrier or PCI change.
-    cell = pd.DataFrame({name: columns[name] for name in ("arfcn", "bsic")}).ffill().fillna(-1)
-    run = (cell != cell.shift()).any(axis=1).cumsum().to_numpy()
-    columns["ci"] = pd.Series(ci).groupby(run).ffill().to_numpy()
+    cell = pd.DataFrame({name: columns[name] for name in ("arfcn", "bsic")} | {"ci": ci})
+    cell = pd.concat([_last_serving(reading), cell])
+    shown = cell[["arfcn", "bsic"]].ffill().fillna(-1)
+    run = (shown != shown.shift()).any(axis=1).cumsum().to_numpy()
+    columns["ci"] = cell["ci"].groupby(run).ffill().to_numpy()[len(cell) - len(rows) :]
     _add_cells(rows, reading, {**columns, "time_s": time_s}, "LTE", "serving")
+
+
+def _last_serving(reading: Reading) -> pd.DataFrame:
+    """Return the last serving cell of LTE of the part of the file read before, if any."""
+    names = ["arfcn", "bsic", "ci"]
+    for part in reversed(reading.tables.get("radio", [])):
+        last = part[(part["role"] == "serving") & (part["technology"] == "LTE")]
+        if len(last):
+            return last.iloc[-1:][names]
+    return pd.DataFrame({name: np.zeros(0) for name in names})
 
 
 def _add_listed(
