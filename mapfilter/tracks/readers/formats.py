@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from pathlib import Path
 
@@ -54,6 +55,7 @@ FORMATS: tuple[Format, ...] = (
 )
 """All formats, in the order in which a file is compared with them."""
 
+_SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
 _PEEKED_BYTES = 1 << 18
 _NOT_READ = {
     ".nmf": "a Nemo log that is no text of Nemo file format 2; export it as CSV, map the columns",
@@ -150,6 +152,16 @@ def _named(text: Text, options: ReadOptions | None) -> bool:
     return all(column.lower() in names for column in columns.values())
 
 
+def _other_separators(path: Path, text: Text) -> str:
+    """Return the hint for a file that would be of a known format with other separators."""
+    head = "\n".join(text.head)
+    for own, other in itertools.permutations("\t;, ", 2):
+        found = find_format(Text(path, head.replace(own, other).encode()))
+        if own in head and found is not None:
+            return f"{found.title} with {_SEPARATORS[own]} where {_SEPARATORS[other]} should be"
+    return ""
+
+
 def _unknown(path: Path, text: Text) -> MapfilterError:
     """Return the error for a file of no known format."""
     names = set(header_names(text.first_line, likely_separator(text.first_line)))
@@ -157,6 +169,8 @@ def _unknown(path: Path, text: Text) -> MapfilterError:
     hint = _NOT_READ.get(path.suffix.lower(), "")
     if not hint and len(names) > 1 and names & fields:
         hint = "a CSV without a column of times, or with other names: --column FIELD=COLUMN"
+    if not hint:
+        hint = _other_separators(path, text)
     expected = f"a recording in a known format ({', '.join(f.name for f in FORMATS)})"
     got = f"none of them; it begins with {text.first_line[:60]!r}"
     return fail(InputError, str(path), expected, got, hint)

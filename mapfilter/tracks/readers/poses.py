@@ -18,7 +18,7 @@ from mapfilter.tracks.readers.lines import blocks
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.text import Text, read_text
 
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d{1,3})?")
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d{1,3})?|[-+]?(nan|inf)", re.IGNORECASE)
 _FRAME_S = 0.1
 _UNIX_S = 1e8
 _CROOKED = 0.05
@@ -26,14 +26,22 @@ _CROOKED = 0.05
 
 def _count(text: Text, count: int) -> bool:
     lines = [line for line in text.head[:30] if line.strip() and not line.startswith("#")][:20]
-    return bool(lines) and sum(_numbers(line) == count for line in lines) > 0.5 * len(lines)
+    right = sum(_numbers(line, count) for line in lines)
+    return bool(lines) and right > 0.5 * len(lines)
 
 
-def _numbers(line: str) -> int:
-    try:
-        return len([float(word) for word in line.replace(",", " ").split()])
-    except ValueError:
-        return 0
+def _numbers(line: str, count: int) -> bool:
+    """Return whether a line has so many numbers; commas separate, or are decimal ones."""
+    return any(
+        len(words) == count and all(map(_NUMBER.fullmatch, words))
+        for words in (line.replace(",", other).replace(";", " ").split() for other in " .")
+    )
+
+
+def _comma(text: Text, count: int) -> bytes:
+    """Return what a comma stands for: a blank, or a decimal point."""
+    lines = (line.replace(",", ".").replace(";", " ") for line in text.head[:30] if "," in line)
+    return b"." if any(_numbers(line, count) for line in lines) else b" "
 
 
 def _is_kitti(text: Text) -> bool:
@@ -47,9 +55,10 @@ def _is_tum(text: Text) -> bool:
 def _parts(
     text: Text, reading: Reading, names: Sequence[str]
 ) -> Iterator[tuple[Columns, dict[str, Floats]]]:
-    """Yield the columns of a text, part by part; values are separated by blanks or commas."""
+    """Yield the columns of a text, part by part; blanks, commas or semicolons separate values."""
+    comma = _comma(text, len(names))
     for block, first_line in blocks(memoryview(text.data), 1):
-        data = split_blanks(block.replace(b",", b" "))
+        data = split_blanks(block.replace(b",", comma).replace(b";", b" "))
         if b"#" in data:
             data = re.sub(rb"^#.*$", b"", data, flags=re.MULTILINE)
         rows = value_columns(memoryview(data), reading, names, " ", first_line)
@@ -108,7 +117,8 @@ def _read_tum(text: Text, reading: Reading, options: ReadOptions) -> None:  # no
 
 def _tum_clock(text: Text) -> Literal["utc", "monotonic"]:
     """Return the clock by the times at the file's beginning: Unix times are large."""
-    words = [line.replace(",", " ").split()[:1] for line in text.head]
+    comma = _comma(text, 8).decode()
+    words = [line.replace(",", comma).replace(";", " ").split()[:1] for line in text.head]
     known = [float(word[0]) for word in words if word and _NUMBER.fullmatch(word[0])]
     return "utc" if known and float(np.median(known)) > _UNIX_S else "monotonic"
 
