@@ -250,7 +250,7 @@ def header_names(header: str, separator: str) -> tuple[str, ...]:
 
 def line_columns(
     lines: Sequence[bytes],
-    numbers: Sequence[int],
+    numbers: Sequence[int] | Ints,
     reading: Reading,
     names: Sequence[str],
     separator: str,

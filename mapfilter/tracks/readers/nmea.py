@@ -34,6 +34,10 @@ _DIGITS = np.array([int(c, 16) if (c := chr(i)) in hexdigits else -1 for i in ra
 _MANY, _NEARLY_ALL = 10, 0.95
 
 
+_Sentences = tuple[list[bytes], list[Ints]]
+"""Parts of several sentences, separated by line feeds, and the lines of each."""
+
+
 def _matches(text: Text) -> bool:
     lines = [line.strip() for line in text.head[:200] if line.strip()]
     found = sum(_SENTENCE.match(line.encode()) is not None for line in lines)
@@ -60,15 +64,13 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: 
     reading.add("positions", columns, columns["line"])
 
 
-def _sentences(data: bytes, reading: Reading) -> dict[bytes, tuple[list[bytes], list[int]]]:
+def _sentences(data: bytes, reading: Reading) -> dict[bytes, _Sentences]:
     """Return the sentences of each kind that is read, with right checksums, and their lines.
-
-    Sentences are in parts of several, separated by line feeds.
 
     Some programs write wrong checksums throughout: a kind of which nearly none is right is taken.
     """
-    found: dict[bytes, tuple[list[bytes], list[int]]] = {kind: ([], []) for kind in _KINDS}
-    wrong: dict[bytes, tuple[list[bytes], list[int]]] = {kind: ([], []) for kind in _KINDS}
+    found: dict[bytes, _Sentences] = {kind: ([], []) for kind in _KINDS}
+    wrong: dict[bytes, _Sentences] = {kind: ([], []) for kind in _KINDS}
     for block, first_line in blocks(memoryview(data), 1):
         code = np.frombuffer(block + b"\n   ", dtype=np.uint8)
         ends = np.flatnonzero(code == _LINE_FEED)
@@ -93,14 +95,14 @@ def _sentences(data: bytes, reading: Reading) -> dict[bytes, tuple[list[bytes], 
                 if mask.any():
                     spans = zip((dollar[mask] + 1).tolist(), stops[mask].tolist(), strict=True)
                     lines.append(b"\n".join(block[first:last].strip() for first, last in spans))
-                    numbers.extend(number[mask].tolist())
+                    numbers.append(number[mask])
     for kind, (lines, numbers) in wrong.items():
-        count = len(numbers)
-        if count >= _MANY and count > _NEARLY_ALL * (count + len(found[kind][1])):
+        count = sum(map(len, numbers))
+        if count >= _MANY and count > _NEARLY_ALL * (count + sum(map(len, found[kind][1]))):
             reading.note(f"{kind.decode()}: nearly all {count} checksums are wrong; taken")
             found[kind] = (lines, numbers)
         else:
-            reading.refuse(np.array(numbers, dtype=np.int64), "checksum is wrong")
+            reading.refuse(_joined(numbers), "checksum is wrong")
     return found
 
 
@@ -130,11 +132,16 @@ def _total(code: NDArray[np.uint8], dollar: Ints, star: Ints) -> Ints:
     return np.asarray(total[np.maximum(star, 1) - 1] ^ total[np.maximum(dollar, 0)], dtype=np.int64)
 
 
-def _table(kind: bytes, lines: list[bytes], numbers: list[int], reading: Reading) -> Columns:
+def _joined(numbers: list[Ints]) -> Ints:
+    return np.concatenate(numbers) if numbers else np.zeros(0, dtype=np.int64)
+
+
+def _table(kind: bytes, lines: list[bytes], numbers: list[Ints], reading: Reading) -> Columns:
     names = ["talker", *_KINDS[kind]]
     names += [f"field{i}" for i in range(len(names), _FIELDS)]
     rows = reading.rows
-    table = line_columns(lines, numbers, reading, names, ",", ragged=len(_KINDS[kind]) + 1)
+    places = _joined(numbers)
+    table = line_columns(lines, places, reading, names, ",", ragged=len(_KINDS[kind]) + 1)
     reading.rows = rows
     return table
 
@@ -144,21 +151,18 @@ def _dates(tables: dict[bytes, Columns]) -> pd.DataFrame:
     parts = []
     rmc, zda = tables[b"RMC"], tables[b"ZDA"]
     if len(rmc):
-        words = rmc.texts("date")
+        words, index = np.unique(rmc.texts("date").astype(str), return_inverse=True)
         years = np.array([_year(word) for word in words])
-        good = np.isfinite(years)
-        parts.append(
-            _days(rmc, [word[2:4] for word in words], [word[:2] for word in words], years, good)
-        )
+        months, days = ([word[i : i + 2] for word in words] for i in (2, 0))
+        parts.append(_days(rmc, months, days, years, index))
     if len(zda):
-        years = zda.number("year")
         parts.append(
             _days(
                 zda,
                 zda.texts("month").tolist(),
                 zda.texts("day").tolist(),
-                years,
-                np.isfinite(years),
+                zda.number("year"),
+                np.arange(len(zda)),
             )
         )
     rows = (
@@ -175,15 +179,20 @@ def _year(word: str) -> float:
 
 
 def _days(
-    rows: Columns, months: Sequence[str], days: Sequence[str], years: Floats, good: np.ndarray
+    rows: Columns, months: Sequence[str], days: Sequence[str], years: Floats, index: Ints
 ) -> pd.DataFrame:
+    """Return line, midnight and time of day of sentences; ``index`` is the date of each."""
     texts = [
-        f"{year:.0f}-{month:0>2}-{day:0>2}" if ok else ""
-        for year, month, day, ok in zip(years, months, days, good, strict=True)
+        f"{year:.0f}-{month:0>2}-{day:0>2}" if np.isfinite(year) else ""
+        for year, month, day in zip(years, months, days, strict=True)
     ]
     moments = pd.to_datetime(pd.Series(texts), format="%Y-%m-%d", errors="coerce", utc=True)
     midnight = (moments - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy()
-    columns = {"line": rows.line, "midnight_s": midnight, "of_day_s": _of_day(rows.texts("time"))}
+    columns = {
+        "line": rows.line,
+        "midnight_s": midnight[index],
+        "of_day_s": _of_day(rows.texts("time")),
+    }
     return pd.DataFrame(columns)
 
 
