@@ -1,6 +1,6 @@
 """RINEX 2 and 3: observations of code ranges.
 
-Lines of fixed columns are read one by one, so that a damaged one loses only itself.
+Lines have fixed columns, and are read each for itself, so that a damaged one loses only itself.
 """
 
 from __future__ import annotations
@@ -8,13 +8,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime, timedelta
-from typing import Any
 
 import numpy as np
 
 from mapfilter.gnss.broadcast import GPS_EPOCH_UTC_S
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.rinex_epochs import Observations, read_epochs
 from mapfilter.tracks.readers.text import Text
 from mapfilter.tracks.readers.times import utc_from_gps_s
 
@@ -96,29 +96,31 @@ def read_header(lines: Lines, reading: Reading) -> dict[str, list[str]]:
 
 
 def _read_observation(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
-    lines = Lines(text.data)
+    at = text.data.find(b"END OF HEADER")
+    end = text.data.find(b"\n", at) if at >= 0 else -1
+    lines = Lines(text.data[: end + 1] if end >= 0 else text.data)
     header = read_header(lines, reading)
     version = fixed_number(header.get("RINEX VERSION / TYPE", [""])[0][:9])
     system = header.get("TIME OF FIRST OBS", [""])[0][48:51].strip() or "GPS"
     reading.clock = Clock("utc" if system in ("GLO", "UTC") else "gps")
-    rows: list[tuple[float, str, str, float, float, int]] = []
-    epochs = _epochs3 if version >= 3 else _epochs2
-    epochs(lines, header, reading, rows)
-    if not rows:
-        return
-    seconds, names, codes, ranges, levels, numbers = (
-        list(column) for column in zip(*rows, strict=True)
-    )
-    elapsed = np.array(seconds) - _SYSTEMS.get(system, 0.0)
-    utc = elapsed + GPS_EPOCH_UTC_S if reading.clock.kind == "utc" else utc_from_gps_s(elapsed)
-    columns: dict[str, Any] = {
-        "time_s": utc,
-        "satellite": names,
-        "signal": codes,
-        "pseudorange_m": ranges,
-        "cn0_dbhz": levels,
-    }
-    reading.add("satellites", columns, numbers)
+    if version >= 3:
+        body = memoryview(text.data)[end + 1 :] if end >= 0 else memoryview(b"")
+        found = read_epochs(body, lines.at + 1, _types3(header), _CODES, reading)
+    else:
+        lines = Lines(text.data)
+        read_header(lines, reading)
+        found = _epochs2(lines, header, reading)
+    for some in found:
+        elapsed = some.gps_s - _SYSTEMS.get(system, 0.0)
+        utc = elapsed + GPS_EPOCH_UTC_S if reading.clock.kind == "utc" else utc_from_gps_s(elapsed)
+        columns = {
+            "time_s": utc,
+            "satellite": some.satellite,
+            "signal": some.signal,
+            "pseudorange_m": some.pseudorange_m,
+            "cn0_dbhz": some.cn0_dbhz,
+        }
+        reading.add("satellites", columns, some.line)
 
 
 def _types3(header: dict[str, list[str]]) -> dict[str, list[str]]:
@@ -128,29 +130,6 @@ def _types3(header: dict[str, list[str]]) -> dict[str, list[str]]:
         letter = line[:1].strip() or letter
         types.setdefault(letter, []).extend(line[6:60].split())
     return types
-
-
-def _epochs3(
-    lines: Lines,
-    header: dict[str, list[str]],
-    reading: Reading,
-    rows: list[tuple[float, str, str, float, float, int]],
-) -> None:
-    types = _types3(header)
-    second, good = float("nan"), False
-    for line in lines:
-        if not line.strip():
-            continue
-        reading.rows += 1
-        if line.startswith(">"):
-            second = gps_seconds(line[1:29].split())
-            # Flags from 2 on are events: header lines follow, no observations.
-            good = bool(np.isfinite(second)) and line[31:32] in ("0", "1", " ", "")
-            if not np.isfinite(second):
-                reading.refuse(lines.at, "epoch: no date and time")
-            continue
-        if good:
-            _observe(line[:3], line[3:], types.get(line[:1], []), second, lines.at, reading, rows)
 
 
 def _observe(
@@ -185,8 +164,8 @@ def _epochs2(
     lines: Lines,
     header: dict[str, list[str]],
     reading: Reading,
-    rows: list[tuple[float, str, str, float, float, int]],
-) -> None:
+) -> list[Observations]:
+    rows: list[tuple[float, str, str, float, float, int]] = []
     words = " ".join(line[6:] for line in header.get("# / TYPES OF OBSERV", [])).split()
     per = max(1, -(-len(words) // 5))
     for line in lines:
@@ -215,6 +194,10 @@ def _epochs2(
             reading.rows += 1
             name = f"G{name[1:]}" if name[:1] == " " else name
             _observe(name, values, words, second, number, reading, rows)
+    if not rows:
+        return []
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    return [Observations(*columns)]
 
 
 FORMAT = Format(
