@@ -6,6 +6,8 @@ from fuzz import MUTATIONS, fuzz
 from made_recordings import COUNT, MADE
 
 from mapfilter.errors import InputError, MapfilterError
+from mapfilter.tracks.readers import gnsslogger
+from mapfilter.tracks.readers import lines as lines_reader
 from mapfilter.tracks.readers import text as texts
 from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.readers.recording import Recording
@@ -294,3 +296,28 @@ def test_a_large_file_is_read_part_by_part(name, read, monkeypatch):
     assert parts.rows == whole.rows
     for table, rows in whole.tables.items():
         assert parts.tables[table].equals(rows), table
+
+
+BY_BLOCKS = ["antennas", "kitti", "tum", "nmea", "gnsslogger", "rinex-obs", "indoor"]
+
+
+@pytest.mark.parametrize("name", BY_BLOCKS)
+def test_a_large_file_is_read_block_by_block(name, read, monkeypatch):
+    lines = MADE[name][1].splitlines()
+    lines[len(lines) // 2] = "bad"
+    data = "\n".join(lines).encode()
+    whole = read(name, data)
+    monkeypatch.setattr(lines_reader, "_BLOCK_BYTES", 300)
+    monkeypatch.setattr(gnsslogger, "_BLOCK_BYTES", 300)
+    blocks = read(name, data)
+    assert {one.reason: one.count for one in blocks.unusable} == {
+        one.reason: one.count for one in whole.unusable
+    }
+    assert blocks.rows == whole.rows
+    for table, rows in whole.tables.items():
+        keys = [key for key in ("time_s", "satellite", "cell") if key in rows]
+        mine, other = (
+            of.sort_values(keys, kind="stable").reset_index(drop=True)
+            for of in (blocks.tables[table], rows)
+        )
+        assert mine.equals(other), table

@@ -25,11 +25,12 @@ _BLOCK_BYTES = 1 << 21
 _LINE_FEED = 10
 
 
-def blocks(data: memoryview, first_line: int) -> Iterator[tuple[bytes, int]]:
+def blocks(data: memoryview, first_line: int, size_bytes: int = 0) -> Iterator[tuple[bytes, int]]:
     """Cut a text into blocks of whole lines; yield each with the number of its first line."""
+    size = size_bytes or _BLOCK_BYTES
     start = 0
     while start < len(data):
-        end = min(start + _BLOCK_BYTES, len(data))
+        end = min(start + size, len(data))
         while end < len(data):
             piece = bytes(data[end : end + _BLOCK_BYTES])
             cut = piece.find(b"\n")
