@@ -1,5 +1,7 @@
 """Damaged recordings: every reader reads what is whole, or refuses with a message; none crashes."""
 
+import time
+
 import numpy as np
 import pytest
 from fuzz import MUTATIONS, fuzz
@@ -321,3 +323,12 @@ def test_a_large_file_is_read_block_by_block(name, read, monkeypatch):
             for of in (blocks.tables[table], rows)
         )
         assert mine.equals(other), table
+
+
+def test_a_number_of_many_digits_takes_no_time(tmp_path):
+    path = tmp_path / "digits.txt"
+    path.write_text(f"{'9' * 50_000}x\n" * 20)
+    began_s = time.process_time()
+    with pytest.raises(InputError, match="none of them"):
+        read_recording(path)
+    assert time.process_time() - began_s < 2.0

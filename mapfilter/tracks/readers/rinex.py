@@ -18,7 +18,7 @@ from mapfilter.tracks.readers.rinex_epochs import Observations, read_epochs
 from mapfilter.tracks.readers.text import Text
 from mapfilter.tracks.readers.times import utc_from_gps_s
 
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eEdD][-+]?\d+)?")
+_NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eEdD][-+]?\d+)?")
 _SYSTEMS = {"GPS": 0.0, "GAL": 0.0, "QZS": 0.0, "IRN": 0.0, "BDT": 14.0}
 _CODES = {
     **dict.fromkeys("GJS", ("C1C", "C1P", "C1W", "C1X", "C1")),
