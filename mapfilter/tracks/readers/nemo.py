@@ -31,11 +31,18 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from mapfilter._types import Bools, Floats, Ints
-from mapfilter.tracks.readers.columns import Columns
+from mapfilter._types import Ints
 from mapfilter.tracks.readers.events import Events, read_events
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.identities import add_radio, available
+from mapfilter.tracks.readers.nemo_identities import (
+    Identities,
+    context_size,
+    followed,
+    identity_at,
+    nothing_known,
+    of_systems,
+)
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.text import Text
 from mapfilter.tracks.readers.times import utc_from_local_s
@@ -49,7 +56,6 @@ _SCANNERS = ("OFDMSCAN", "PILOTSCAN", "FREQSCAN")
 _KMH = 1 / 3.6
 _MOST = {"headers": 64, "channels": 64, "channel_size": 32, "cells": 500, "size": 64}
 _NO_MAC = "00:00:00:00:00:00"
-_DEDICATED = 5.0
 
 
 @dataclass(frozen=True)
@@ -72,39 +78,6 @@ _SYSTEMS = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class _Known:
-    """Values that hold from a line on: (N,) lines and (N, K) values."""
-
-    line: Ints
-    values: Floats
-
-    def at(self, lines: Ints) -> Floats:
-        """Return the values of the last line before each, (M, K), NaN where there is none."""
-        at = np.searchsorted(self.line, lines) - 1
-        found = np.full((len(lines), self.values.shape[1]), np.nan)
-        found[at >= 0] = self.values[at[at >= 0]]
-        return found
-
-    def then(self, line: Ints, values: Floats) -> _Known:
-        """Return the last of these values, and those that follow."""
-        return _Known(
-            np.concatenate([self.line[-1:], line]), np.concatenate([self.values[-1:], values])
-        )
-
-
-def _nothing(count: int) -> _Known:
-    return _Known(np.zeros(0, dtype=np.int64), np.zeros((0, count)))
-
-
-@dataclass(frozen=True)
-class _Identities:
-    """Network (mcc, mnc) and serving cell (carrier, PCI, state, ci, lac) of one system."""
-
-    network: _Known
-    serving: _Known
-
-
 def _matches(text: Text) -> bool:
     lines = [line.lstrip() for line in text.head[:200]]
     return any(_BEGIN.match(line) or _EVENT.match(line) for line in lines)
@@ -125,7 +98,11 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
         reading.note("no date in #START: times count from an unknown day")
     else:
         reading.clock = Clock("local", options.zone)
-    known = {family: _Identities(_nothing(2), _nothing(5)) for family in ("GSM", "UMTS", "LTE")}
+    systems = {
+        family: [number for number, one in _SYSTEMS.items() if one.family == family]
+        for family in ("GSM", "UMTS", "LTE")
+    }
+    known = {family: nothing_known() for family in systems}
     others: dict[str, int] = {}
     for events in read_events(text.data, _separator(text), _KINDS, reading, others):
         if midnight_s is not None:
@@ -133,8 +110,13 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
             if options.zone:
                 events.time_s[:] = utc_from_local_s(events.time_s, options.zone)
         _add_positions(events, reading)
-        known = {family: _followed(events, family, known[family]) for family in known}
-        _add_cells(events, reading, known)
+        known = {
+            family: followed(events, family, numbers, known[family])
+            for family, numbers in systems.items()
+        }
+        others["CELLMEAS"] = others.get("CELLMEAS", 0) + _add_cells(events, reading, known)
+    if count := others.pop("CELLMEAS", 0):
+        reading.note(f"{count} CELLMEAS of other systems (NR, CDMA, …) are not read")
     if count := sum(others.pop(name, 0) for name in _SCANNERS):
         reading.note(f"{count} rows of scanners are not read")
     others = {name: count for name, count in others.items() if not name.startswith("#")}
@@ -157,7 +139,7 @@ def _add_positions(events: Events, reading: Reading) -> None:
     at = np.flatnonzero(events.kind == "GPS")
     if not at.size:
         return
-    shift = _context(events, at)
+    shift = context_size(events, at)
     places = {"lon": 3, "lat": 4, "height": 5, "speed": 9}
     rows = events.columns(at, **{name: shift + place for name, place in places.items()})
     columns = {
@@ -170,58 +152,14 @@ def _add_positions(events: Events, reading: Reading) -> None:
     reading.add("positions", columns, rows.line)
 
 
-def _context(events: Events, at: Ints) -> Ints:
-    """Return how many ids of a context stand before the parameters."""
-    count, _ = events.columns(at, context=2).whole("context")
-    return np.clip(count, 0, _MOST["headers"])
-
-
-def _followed(events: Events, family: str, known: _Identities) -> _Identities:
-    """Return what a system is known by after these events."""
-    network, serving = known.network, known.serving
-    at, system = _of_systems(events, "SEI")
-    of = [number for number, one in _SYSTEMS.items() if one.family == family]
-    at = at[np.isin(system, of)]
-    if at.size:
-        shift = _context(events, at)
-        rows = events.columns(at, mcc=shift + 6, mnc=shift + 7)
-        values = np.stack([available(*rows.whole(name)) for name in ("mcc", "mnc")], axis=1)
-        named = ~np.isnan(values[:, 0])
-        network = network.then(rows.line[named], values[named])
-    at, system = _of_systems(events, "CHI")
-    at = at[np.isin(system, of)]
-    if at.size and family != "GSM":
-        shift = _context(events, at)
-        lte = family == "LTE"
-        rows = events.columns(
-            at,
-            arfcn=shift + (7 if lte else 6),
-            bsic=shift + (8 if lte else -99),
-            state=shift + 5,
-            ci=shift + (9 if lte else 7),
-            lac=shift + (10 if lte else 8),
-        )
-        values = np.stack([available(*rows.whole(name)) for name in rows.names], axis=1)
-        serving = serving.then(rows.line, values)
-    return _Identities(network, serving)
-
-
-def _of_systems(events: Events, kind: str) -> tuple[Ints, Ints]:
-    """Return the events of a kind, and the radio system of each."""
-    at = np.flatnonzero(events.kind == kind)
-    if not at.size:
-        return at, np.zeros(0, dtype=np.int64)
-    return at, events.columns(at, system=_context(events, at) + 3).whole("system")[0]
-
-
-def _add_cells(events: Events, reading: Reading, known: dict[str, _Identities]) -> None:
-    at, system = _of_systems(events, "CELLMEAS")
+def _add_cells(events: Events, reading: Reading, known: dict[str, Identities]) -> int:
+    """Add the cells of all systems that are read; return the number of events of others."""
+    at, system = of_systems(events, "CELLMEAS")
     for number, layout in _SYSTEMS.items():
         of = at[system == number]
         if of.size:
             _add_system(events, of, layout, reading, known.get(layout.family))
-    if strange := int((~np.isin(system, list(_SYSTEMS))).sum()):
-        reading.note(f"{strange} CELLMEAS of other systems (NR, CDMA, …) are not read")
+    return int((~np.isin(system, list(_SYSTEMS))).sum())
 
 
 def _add_system(
@@ -229,7 +167,7 @@ def _add_system(
     at: Ints,
     layout: _System,
     reading: Reading,
-    known: _Identities | None,
+    known: Identities | None,
 ) -> None:
     event, place, size = _cells(events, at, layout, reading)
     if not event.size:
@@ -259,7 +197,14 @@ def _add_system(
         if known is not None:
             active = np.bincount(np.searchsorted(at, event), kind == 0, len(at))
             alone = active[np.searchsorted(at, event)] == 1
-            identity = _identity(rows, columns, layout, known, alone)
+            if layout.family == "GSM":
+                identity = {name: available(*rows.whole(name)) for name in ("ci", "lac")}
+                mcc, mnc = known.network.at(rows.line).T
+                identity |= {"mcc": mcc, "mnc": mnc}
+            else:
+                identity = identity_at(
+                    rows.line, columns["arfcn"], columns["bsic"], layout.family, known, alone
+                )
             columns |= {name: np.where(serving, one, np.nan) for name, one in identity.items()}
     kept = {name: values[good] for name, values in columns.items()}
     kept["role"] = np.array(["neighbour", "serving"], dtype=object)[serving[good].astype(np.int64)]
@@ -269,7 +214,7 @@ def _add_system(
 
 def _cells(events: Events, at: Ints, layout: _System, reading: Reading) -> tuple[Ints, Ints, Ints]:
     """Return of each cell of CELLMEAS its event, where its parameters begin, and their number."""
-    begin = _context(events, at) + 5
+    begin = context_size(events, at) + 5
     good = np.ones(len(at), dtype=bool)
 
     def counted(where: Ints, name: str) -> Ints:
@@ -290,35 +235,6 @@ def _cells(events: Events, at: Ints, layout: _System, reading: Reading) -> tuple
     row = np.repeat(np.arange(len(at)), count)
     nth = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
     return at[row], begin[row] + 2 + nth * size[row], size[row]
-
-
-def _identity(
-    rows: Columns,
-    columns: dict[str, Floats],
-    layout: _System,
-    known: _Identities,
-    alone: Bools,
-) -> dict[str, Floats]:
-    """Return the identity of each cell, as if it were the serving one."""
-    mcc, mnc = known.network.at(rows.line).T
-    if layout.family == "GSM":
-        ci, lac = available(*rows.whole("ci")), available(*rows.whole("lac"))
-        return {"mcc": mcc, "mnc": mnc, "ci": ci, "lac": lac}
-    arfcn, bsic, state, ci, lac = known.serving.at(rows.line).T
-    same = arfcn == columns["arfcn"]
-    if layout.family == "LTE":
-        same &= bsic == columns["bsic"]
-    else:
-        # Of an active set of several cells, and after soft handovers, it is not known which.
-        same &= alone & (state != _DEDICATED)
-    ci, lac = np.where(same, ci, np.nan), np.where(same, lac, np.nan)
-    there = ~np.isnan(ci)
-    return {
-        "mcc": np.where(there, mcc, np.nan),
-        "mnc": np.where(there, mnc, np.nan),
-        "ci": ci,
-        "lac": lac,
-    }
 
 
 FORMAT = Format(
