@@ -5,6 +5,7 @@ Lines have fixed columns, and are read each for itself, so that a damaged one lo
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime, timedelta
@@ -19,6 +20,7 @@ from mapfilter.tracks.readers.text import Text
 from mapfilter.tracks.readers.times import utc_from_gps_s
 
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eEdD][-+]?\d+)?")
+_NAME = re.compile(r"[GRECJIS]\d\d")
 _SYSTEMS = {"GPS": 0.0, "GAL": 0.0, "QZS": 0.0, "IRN": 0.0, "BDT": 14.0}
 _CODES = {
     **dict.fromkeys("GJS", ("C1C", "C1P", "C1W", "C1X", "C1")),
@@ -132,10 +134,24 @@ def _types3(header: dict[str, list[str]]) -> dict[str, list[str]]:
     return types
 
 
+_Places = dict[str, list[tuple[str, int, int]]]
+"""Of each constellation its codes that are there, with their columns and those of their levels."""
+
+
+def _places(types: Sequence[str]) -> _Places:
+    places: _Places = {}
+    for letter, codes in _CODES.items():
+        for code in (code for code in codes if code in types):
+            level = next((t for t in types if t[0] == "S" and t[1:] == code[1:]), None)
+            at = -1 if level is None else 16 * types.index(level)
+            places.setdefault(letter, []).append((code, 16 * types.index(code), at))
+    return places
+
+
 def _observe(
     name: str,
     values: str,
-    types: Sequence[str],
+    places: _Places,
     second: float,
     number: int,
     reading: Reading,
@@ -143,18 +159,13 @@ def _observe(
 ) -> None:
     """Add the first code range that a line of observations has."""
     name = name.replace(" ", "0")
-    if not re.fullmatch(r"[GRECJIS]\d\d", name):
+    if not _NAME.fullmatch(name):
         reading.refuse(number, "no satellite such as G07")
         return
-    for code in _CODES[name[0]]:
-        if code not in types:
-            continue
-        at = 16 * types.index(code)
+    for code, at, level in places.get(name[0], ()):
         range_m = fixed_number(values[at : at + 14])
-        if np.isfinite(range_m) and range_m != 0:
-            level = next((t for t in types if t[0] == "S" and t[1:] == code[1:]), None)
-            place = 16 * types.index(level) if level else 0
-            cn0 = fixed_number(values[place : place + 14]) if level else float("nan")
+        if math.isfinite(range_m) and range_m != 0:
+            cn0 = fixed_number(values[level : level + 14]) if level >= 0 else math.nan
             rows.append((second, name, code, range_m, cn0, number))
             return
     reading.refuse(number, "no code range on L1 (E1, B1)")
@@ -168,6 +179,7 @@ def _epochs2(
     rows: list[tuple[float, str, str, float, float, int]] = []
     words = " ".join(line[6:] for line in header.get("# / TYPES OF OBSERV", [])).split()
     per = max(1, -(-len(words) // 5))
+    places = _places(words)
     for line in lines:
         if not line.strip():
             continue
@@ -193,7 +205,7 @@ def _epochs2(
                 break
             reading.rows += 1
             name = f"G{name[1:]}" if name[:1] == " " else name
-            _observe(name, values, words, second, number, reading, rows)
+            _observe(name, values, places, second, number, reading, rows)
     if not rows:
         return []
     columns = [np.array(column) for column in zip(*rows, strict=True)]
