@@ -47,7 +47,7 @@ def _matches(text: Text) -> bool:
 def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
     reading.program, reading.clock = "NMEA 0183 receiver", Clock("utc")
     kinds = _sentences(text.data, reading)
-    tables = {kind: _table(kind, *kinds[kind], reading) for kind in _KINDS}
+    tables = {kind: _table(kind, *kinds.pop(kind), reading) for kind in _KINDS}
     dates = _dates(tables)
     if dates.empty:
         reading.note("no date in the file (neither RMC nor ZDA): times count from a midnight")
