@@ -294,10 +294,10 @@ def test_a_reading_adds_the_difference_of_its_log_likelihoods(travelled_m):
     # Without any its weight is nothing.
     none = replace(unknown, serving_weight=0.0)
     assert odds_after(null, none, 0.0, 0.0) == pytest.approx(-3.0)
-    # Other terms are half as bad again as is expected of them.
-    timed = RadioReading(expected=-2.0)
+    # Other terms are as given.
+    timed = RadioReading(under_null=-3.0)
     assert odds_after(null, timed, 0.0, -3.0) == pytest.approx(-3.0)
-    both = RadioReading(2, 0.5, LEVELS, expected=-2.0)
+    both = RadioReading(2, 0.5, LEVELS, under_null=-3.0)
     assert odds_after(null, both, -6.0, -12.0, 20.0) == pytest.approx(
         -3.0 + (-6.0 - 0.35 - 0.8 - 3.0) + 12.0
     )

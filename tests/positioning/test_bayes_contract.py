@@ -26,7 +26,7 @@ from mapfilter.testing import ContractError, check_belief_filter
 from mapfilter.tracks.log import make_log
 
 FEW = ParticleOptions(max_particles=4000, min_search_particles=2000, min_particles=500)
-READING = RadioReading(0, 0.5, expected=-0.2, length_m=5.0)
+READING = RadioReading(0, 0.5, under_null=-0.3, length_m=5.0)
 
 
 @pytest.fixture(scope="module")

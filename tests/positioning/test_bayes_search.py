@@ -87,7 +87,7 @@ def test_beside_an_alternative_the_null_hypothesis_starts_anew_and_goes_its_own_
 
 
 def test_a_belief_does_not_converge_beside_a_null_hypothesis(area):
-    never = AlternativeRules(start_log_odds=1e9, converge_log_odds=-12.1)
+    never = AlternativeRules(start_log_odds=1e9, converge_log_odds=-1e6)
     positioner = replace(FEW.over_area(area), rules=never)
     estimate = locate(walk_log(), positioner, np.random.default_rng(0)).estimate
     assert set(estimate.status) == {Status.SEARCHING}

@@ -54,7 +54,7 @@ def test_the_usual_options():
         "confirm_mass": 0.9,
         "abandon_threshold": -25.0,
         "abandon_after_m": 800.0,
-        "converge_log_odds": -5.0,
+        "converge_log_odds": -12.0,
         "converge_threshold": 2.0,
         "map_nats_per_m": 0.04,
     }
@@ -86,7 +86,7 @@ def test_the_usual_options():
     assert (reading.serving, reading.serving_weight, reading.levels, reading.bounds) == (
         -1, 0.0, None, (),
     )  # fmt: skip
-    assert (reading.expected, reading.length_m, reading.terms) == (0.0, 0.0, ())
+    assert (reading.under_null, reading.length_m, reading.terms) == (0.0, 0.0, ())
     assert np.isnan(reading.timing_advance)
 
 
@@ -142,8 +142,11 @@ def test_options_reach_their_models():
     assert rest == (1.5, 0.2, 0.8)
     assert motion == MotionErrors(
         step_sd_m=0.2, heading_sd_rad=radians(20), bias_sd_rad=radians(4),
+        disturbances_per_m=motion.disturbances_per_m,
         bias_drift_rad_per_sqrt_m=radians(0.1), scale_sd=0.07,
     )  # fmt: skip
+    # Disturbances are a share of the variance: 0.002 a metre at 15°.
+    assert motion.disturbances_per_m == pytest.approx(0.002 * (20 / 15) ** 2)
     assert bound.model.weights == MapWeights(sd_m=6.0)
     assert (bound.model.evidence.use_levels, bound.options.min_particles) == (False, 700)
 
@@ -225,7 +228,7 @@ def belief(status, evidence=0.0, east_m=0.0, mass=1.0):
 S, C, T, L = Status.SEARCHING, Status.CONVERGED, Status.TRACKING, Status.LOST
 
 
-def outcome(main, lead, *, status=S, east_m=500.0, mass=0.5, gone_m=0.0, null=-9.0):
+def outcome(main, lead, *, status=S, east_m=500.0, mass=0.5, gone_m=0.0, null=-12.0):
     other = AlternativeHypothesis(
         belief(status, lead, east_m, mass), 100.0, 0.0, null=NullHypothesis(null)
     )
@@ -240,8 +243,8 @@ def test_outcomes_at_their_thresholds():
     assert (outcome(S, 4.0), outcome(S, 3.9)) == (Outcome.AHEAD, Outcome.UNDECIDED)
     assert (outcome(T, 8.0), outcome(T, 7.9)) == (Outcome.AHEAD, Outcome.UNDECIDED)
     assert outcome(T, 8.0, status=C) is outcome(T, 8.0, status=T) is Outcome.WON
-    assert outcome(T, 8.0, status=C, null=-5.0) is Outcome.WON
-    assert outcome(T, 8.0, status=C, null=-4.9) is Outcome.AHEAD
+    assert outcome(T, 8.0, status=C, null=-12.0) is Outcome.WON
+    assert outcome(T, 8.0, status=C, null=-11.9) is Outcome.AHEAD
     assert outcome(T, 8.0, status=C, null=0.0) is Outcome.AHEAD
     assert outcome(T, 8.0, status=C, null=0.1) is Outcome.SUSPECT
     assert outcome(T, 8.0, status=S, null=0.1) is Outcome.SUSPECT
@@ -251,7 +254,7 @@ def test_outcomes_at_their_thresholds():
     )  # fmt: skip
 
 
-def resolved(main, lead, null=-9.0, own=-9.0, before=None):
+def resolved(main, lead, null=-12.0, own=-12.0, before=None):
     other = AlternativeHypothesis(belief(S, lead, 500.0, 0.5), 100.0, 0.0, null=NullHypothesis(own))
     reported = before or (S if main is C else main)
     rules = AlternativeRules()
@@ -262,7 +265,7 @@ def resolved(main, lead, null=-9.0, own=-9.0, before=None):
 def test_resolutions_at_their_thresholds():
     # No belief converges beside a null hypothesis, nor with an alternative close behind.
     alone = resolve_alternative(
-        AlternativeRules(), S, belief(C), NullHypothesis(-5.0), None, 0.0, at_edge=True
+        AlternativeRules(), S, belief(C), NullHypothesis(-12.0), None, 0.0, at_edge=True
     )
     assert (alone.status, alone.alternative, alone.taken_over) == (C, None, False)
     assert resolved(C, -2.0).status is C

@@ -160,7 +160,7 @@ def test_without_levels_only_the_serving_cell_counts():
     _, reading, _, _ = read(*rows, options=replace(OPTIONS, use_levels=False))
     assert (reading.serving, reading.levels, reading.bounds) == (A, None, ())
     # No report expects anything of itself: its levels are compared by the null hypothesis.
-    assert reading.expected == read(*rows)[1].expected == 0.0
+    assert reading.under_null == read(*rows)[1].under_null == 0.0
 
 
 def test_a_report_counts_by_the_metres_since_the_last_one():

@@ -9,6 +9,7 @@ import pytest
 from cross_world import CRS, LATTICE, make_database, walk_log
 
 from mapfilter.filters.contract import Reason
+from mapfilter.positioning.bayes.evidence import EvidenceUpdate
 from mapfilter.positioning.bayes.options import BayesFilter, open_area
 from mapfilter.positioning.bayes.timing import TimingSource, TimingState
 from mapfilter.positioning.epochs import Difference, Epoch, ReportRow
@@ -46,7 +47,8 @@ def test_a_timing_advance_is_a_ring(area):
     away = np.hypot([100.0, 113.6, 300.0], 28.5)
     expected = -0.5 * np.minimum(((117.15 - away) / sigma) ** 2, 9.0)
     np.testing.assert_allclose(gain, expected, atol=1e-6)
-    assert update.expected == pytest.approx(-0.5)
+    # Under the null hypothesis half as bad again as is expected at the true position.
+    assert update.under_null == pytest.approx(-0.75)
 
 
 def test_errors_that_last_count_once(area):
@@ -57,7 +59,7 @@ def test_errors_that_last_count_once(area):
     share = 1 - np.exp(-2 * 5.0 / 50.0)
     np.testing.assert_allclose(soon.terms[0].log_likelihood(place), share * whole)
     still = read(area, epoch, (0.0, -inf), 0.0)
-    assert (still.terms, still.expected) == ((), 0)
+    assert (still.terms, still.under_null) == ((), 0)
     assert still.state == (0.0, -inf)
 
 
@@ -88,19 +90,7 @@ def test_readings_of_unknown_cells_are_reported_unused(area):
         ("tdoa", "E", Reason.SECOND_READING),
     ]
     untimed = Epoch(0.0, radio=(ReportRow("serving", "W", None, None, nan, 0),))
-    assert read(area, untimed) == (
-        TimingState(),
-        (),
-        None,
-        0,
-        [],
-        None,
-        None,
-        False,
-        None,
-        None,
-        None,
-    )
+    assert read(area, untimed) == EvidenceUpdate(TimingState(), unused=[])
 
 
 def test_times_of_arrival_shorten_the_search(area):

@@ -55,12 +55,9 @@ if TYPE_CHECKING:
 
 MapBelief = ParticleBelief | GridBelief
 
-_LEAST_LOG_ODDS, _MOST_LOG_ODDS = -12.0, 12.0
+LEAST_LOG_ODDS = -12.0
+_MOST_LOG_ODDS, _BEYOND = 12.0, 3.0
 _PRIOR_LOG_ODDS = log(0.05 / 0.95)
-_SERVING_NATS, _TERMS_FACTOR, _UNKNOWN_NATS = 0.7, 1.5, 0.5
-"""Negative log-likelihood, under the null hypothesis, of a serving cell at full weight; that of
-other terms as a multiple of what is expected of them; the gain from a serving cell that the map
-does not have."""
 MAP_NATS_PER_M = 0.04
 """Negative log-likelihood of the map for each metre, under the null hypothesis."""
 
@@ -102,9 +99,13 @@ class AlternativeRules(Options):
     confirm_mass: Share = 0.9
     abandon_threshold: float = -25.0
     abandon_after_m: NotNegative = 800.0
-    converge_log_odds: float = -5.0
+    converge_log_odds: float = -12.0
     converge_threshold: float = 2.0
     map_nats_per_m: NotNegative = MAP_NATS_PER_M
+
+    def least_log_odds(self, *, searching: bool) -> float:
+        """Return the bound of the null hypothesis, lower while a belief has to refute it."""
+        return min(LEAST_LOG_ODDS, self.converge_log_odds - _BEYOND if searching else 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +130,7 @@ class NullHypothesis:
         gained: float,
         travelled_m: float,
         map_nats_per_m: float = MAP_NATS_PER_M,
+        least_log_odds: float = LEAST_LOG_ODDS,
     ) -> NullHypothesis:
         """Add a reading.
 
@@ -142,13 +144,13 @@ class NullHypothesis:
             By the belief.
         map_nats_per_m : float
             Negative log-likelihood of the map for each metre, under the null hypothesis.
+        least_log_odds : float
+            Bound from below: the null hypothesis may become true at any time.
         """
-        expected = other_log_likelihood + _TERMS_FACTOR * reading.expected
+        expected = reading.radio_under_null(other_log_likelihood) + reading.under_null
         expected -= map_nats_per_m * (travelled_m - self.travelled_m)
-        known = reading.serving >= 0
-        expected += (-_SERVING_NATS if known else _UNKNOWN_NATS) * reading.serving_weight
         log_odds = self.log_odds + expected - gained
-        return NullHypothesis(min(max(log_odds, _LEAST_LOG_ODDS), _MOST_LOG_ODDS), travelled_m)
+        return NullHypothesis(min(max(log_odds, least_log_odds), _MOST_LOG_ODDS), travelled_m)
 
     def reset(self) -> NullHypothesis:
         """Return it as at the start, unless it is less probable."""

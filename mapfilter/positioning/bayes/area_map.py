@@ -159,6 +159,12 @@ class AreaMap:
         inside = [min(place_m[i], self.size_m[i] - place_m[i]) for i in range(2)]
         return bool(min(inside) < min(_EDGE_M, _EDGE_SHARE * min(self.size_m)))
 
+    def beyond(self, state: Floats32) -> Bools:
+        """Return whether each hypothesis, by its first two rows, lies beyond the area, (N,)."""
+        (width_m, height_m), east_m, north_m = self.size_m, state[0], state[1]
+        found: Bools = (east_m < 0) | (east_m > width_m) | (north_m < 0) | (north_m > height_m)
+        return found
+
     def holds(self, east_m: Floats32, north_m: Floats32, weight: Floats32) -> bool:
         """Return whether most of a belief in the local frame lies in the area."""
         width_m, height_m = self.size_m

@@ -27,6 +27,10 @@ from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.tracks.schema import Kind
 
+_SERVING_NATS, _UNKNOWN_NATS = 0.7, 0.5
+"""Negative log-likelihood, under the null hypothesis, of a serving cell at full weight; the gain
+from a serving cell that the map does not have."""
+
 
 class Term(Protocol):
     """A log-likelihood over hypotheses."""
@@ -63,8 +67,8 @@ class RadioReading:
         Levels at an end of the scale, and levels of one of several candidate cells.
     terms : tuple of Term
         Of timing, fixes and satellites; added after the report, in this order.
-    expected : float
-        Expected log-likelihood of the terms if the belief is right.
+    under_null : float
+        Log-likelihood of the terms under the null hypothesis.
     doubted : bool
         Whether the null hypothesis, or an alternative, is too probable for a belief to converge.
     length_m : float
@@ -78,10 +82,18 @@ class RadioReading:
     levels: LevelReport | None = None
     bounds: tuple[BoundReading, ...] = ()
     terms: tuple[Term, ...] = ()
-    expected: float = 0.0
+    under_null: float = 0.0
     length_m: float = 0.0
     timing_advance: float = nan
     doubted: bool = False
+
+    def radio_under_null(self, other_log_likelihood: float) -> float:
+        """Return the log-likelihood of the report under the null hypothesis.
+
+        ``other_log_likelihood`` is that of its levels if the prediction is wrong about all cells.
+        """
+        each = -_SERVING_NATS if self.serving >= 0 else _UNKNOWN_NATS
+        return other_log_likelihood + each * self.serving_weight
 
 
 class Context(NamedTuple):
@@ -99,17 +111,18 @@ class EvidenceUpdate(NamedTuple):
     """What one source contributes at one epoch.
 
     ``state`` is the source's state afterwards. ``terms`` hold for both beliefs unless
-    ``alternative_terms`` are given. ``expected`` is the log-likelihood of the terms if the belief
-    is right. ``belief`` and ``alternative`` replace those of the filter unless None. ``disputed``
-    asks for an alternative. ``radio`` and ``reason`` (whether the serving cell is used) come from
-    the radio reports only. ``path`` is the way that a belief starts with, where the map alone is
-    the evidence.
+    ``alternative_terms`` are given. ``under_null`` is the log-likelihood of the terms under the
+    null hypothesis, that of the alternative in ``alternative_under_null`` if it differs. ``belief``
+    and ``alternative`` replace those of the filter unless None. ``disputed`` asks for an
+    alternative. ``radio`` and ``reason`` (whether the serving cell is used) come from the radio
+    reports only. ``path`` is the way that a belief starts with, where the map alone is the
+    evidence.
     """
 
     state: Any
     terms: tuple[Term, ...] = ()
     alternative_terms: tuple[Term, ...] | None = None
-    expected: float = 0.0
+    under_null: float = 0.0
     unused: Sequence[UnusedReading] = ()
     belief: MapBelief | None = None
     alternative: AlternativeHypothesis | None = None
@@ -117,6 +130,7 @@ class EvidenceUpdate(NamedTuple):
     radio: RadioReading | None = None
     reason: Reason | None = None
     path: RecentPath | None = None
+    alternative_under_null: float | None = None
 
 
 class EvidenceSource(ABC):
@@ -169,5 +183,8 @@ def joined(updates: Sequence[EvidenceUpdate], *, alternative: bool = False) -> R
     if radio is None and not terms:
         return None
     radio = radio or RadioReading()
-    expected = radio.expected + sum(one.expected for one in updates)
-    return replace(radio, terms=tuple(terms), expected=expected)
+    under_null = radio.under_null
+    for one in updates:
+        other = alternative and one.alternative_under_null is not None
+        under_null += (one.alternative_under_null or 0.0) if other else one.under_null
+    return replace(radio, terms=tuple(terms), under_null=under_null)

@@ -392,7 +392,9 @@ def _challenged(
     if reading.levels is not None and after.shared is not None:
         other = after.shared.other_log_likelihood
     gained = after.log_evidence - before.log_evidence
-    return null.after(reading, other, gained, after.travelled_m, rules.map_nats_per_m)
+    searching = before.status is Status.SEARCHING
+    least = rules.least_log_odds(searching=searching)
+    return null.after(reading, other, gained, after.travelled_m, rules.map_nats_per_m, least)
 
 
 def _every_kind() -> RadioReading:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import exp, isfinite, pi, sqrt
+from math import exp, isfinite, log, pi, sqrt
 
 import numpy as np
 
@@ -53,6 +53,8 @@ from mapfilter.positioning.bayes.radio import EvidenceOptions
 
 _F = np.float32
 _OFF_SHARE, _TRIES = 0.2, 2
+_BEYOND_M, _BEYOND_SHARE, _BEYOND_AT_START = 300.0, 0.15, 0.05
+_BEYOND_COST_PER_M = 0.015
 _AT_ONCE = 50_000
 _NEW_M = 50.0
 _LEAST_EXPECTED = 0.02
@@ -104,8 +106,9 @@ class BayesModel:
 
     @cached_property
     def bins(self) -> Bins:
-        """Bins of 25 m over the area."""
-        return Bins.over((0.0, 0.0, *self.area.size_m))
+        """Bins of 25 m over the area and what surrounds it."""
+        (width_m, height_m), more_m = self.area.size_m, _BEYOND_M
+        return Bins.over((-more_m, -more_m, width_m + more_m, height_m + more_m))
 
     @cached_property
     def log_map(self) -> Floats32:
@@ -124,7 +127,8 @@ class BayesModel:
         """Draw the first hypotheses: by the first evidence, or about a known start.
 
         Without a known start they are drawn in proportion to their likelihood from the points on
-        ways and from places anywhere; those on ways are spread over their pixel.
+        ways and from places anywhere; those on ways are spread over their pixel. Others lie around
+        the area, as one may come into it.
         """
         state = np.zeros((STATES, most), dtype=np.float32)
         log_weight = np.full(most, -np.log(most))
@@ -167,23 +171,38 @@ class BayesModel:
         rng: np.random.Generator,
     ) -> None:
         """Fill places on the map and off it; off it more of them, with smaller weights."""
-        resolution_m, size_m = self.area.lattice.resolution_m, np.array(self.area.size_m)
-        count = state.shape[1]
-        middle = count - int(_OFF_SHARE * count)
-        anywhere = (size_m * rng.random((_TRIES * (count - middle), 2))).T.astype(np.float32)
-        for part, points, spread_m, off in (
-            (slice(0, middle), self.area.points, resolution_m, 0.0),
-            (slice(middle, count), anywhere, 0.0, 1.0),
+        size_m, spread_m = np.array(self.area.size_m), self.area.lattice.resolution_m
+        beyond = int(_BEYOND_SHARE * state.shape[1])
+        off = int(_OFF_SHARE * state.shape[1])
+        on = state.shape[1] - off - beyond
+        anywhere = (size_m * rng.random((_TRIES * off, 2))).T.astype(np.float32)
+        inside = 1 - _BEYOND_AT_START
+        first = 0
+        for count, points, pixel_m, is_off, share in (
+            (on, self.area.points, spread_m, 0.0, inside * (1 - OFF_AT_START)),
+            (off, anywhere, 0.0, 1.0, inside * OFF_AT_START),
+            (beyond, self._around(beyond, rng), 0.0, OFF_AT_START, _BEYOND_AT_START),
         ):
-            if not points.shape[1] or part.start == part.stop:
+            part = slice(first, first + count)
+            first += count
+            if not points.shape[1] or not count:
                 log_weight[part] = -np.inf
                 continue
-            chosen, log_mean = self._likely(points, reading, part.stop - part.start, rng)
-            beside = rng.random((2, chosen.size), dtype=np.float32) - _F(0.5)
-            state[EAST : NORTH + 1, part] = points[:, chosen] + _F(spread_m) * beside
-            state[OFF, part] = off
-            share = OFF_AT_START if off else 1 - OFF_AT_START
-            log_weight[part] = log_mean + np.log(share / chosen.size)
+            chosen, log_mean = self._likely(points, reading, count, rng)
+            beside = rng.random((2, count), dtype=np.float32) - _F(0.5)
+            state[EAST : NORTH + 1, part] = points[:, chosen] + _F(pixel_m) * beside
+            state[OFF, part] = is_off
+            log_weight[part] = log_mean + np.log(share / count)
+
+    def _around(self, count: int, rng: np.random.Generator) -> Floats32:
+        """Draw places around the area, shape (2, count)."""
+        size_m = np.array(self.area.size_m)[:, None]
+        found = np.empty((2, 0), dtype=np.float32)
+        while found.shape[1] < count:
+            some = (size_m + 2 * _BEYOND_M) * rng.random((2, 4 * count)) - _BEYOND_M
+            places = some.astype(np.float32)
+            found = np.concatenate([found, places[:, np.flatnonzero(self.area.beyond(places))]], 1)
+        return found[:, :count]
 
     def _likely(
         self, points: Floats32, reading: RadioReading | None, count: int, rng: np.random.Generator
@@ -226,6 +245,10 @@ class BayesModel:
         weighed = log_weight.copy()
         rows, step = self.area.lattice.rows, self.area.lattice.resolution_m
         found = interpolate(moved, self.log_map, step / 2, (rows - 0.5) * step, 1 / step)
+        beyond = self.area.beyond(moved)
+        if beyond.any() and self.weights.weight_per_m > 0:
+            # Beyond the area nobody knows the ways.
+            found[beyond] = -_BEYOND_COST_PER_M / self.weights.weight_per_m
         weigh_by_map(found, moved[OFF], self.weights.over(length_m), weighed)
         return moved, weighed
 
@@ -238,7 +261,7 @@ class BayesModel:
         if reading.serving >= 0 or reading.levels is not None or reading.bounds:
             pixel = self._pixels(cloud.state)
             used = True
-            cloud = self._aged(cloud, reading)
+            cloud, before = self._aged(cloud, reading), log_weight.copy()
             if reading.serving >= 0 and reading.serving_weight > 0:
                 self._weigh_serving(cloud, pixel, log_weight, reading)
             if reading.levels is not None:
@@ -246,6 +269,12 @@ class BayesModel:
             flat, bands, table = self.area.flat_level_dbm, self._bands, self._bound_table
             for bound in reading.bounds:
                 fingerprint.weigh_by_bound(pixel, flat, bands, bound, table, log_weight)
+            beyond = self.area.beyond(cloud.state)
+            if beyond.any():
+                other = cloud.shared.other_log_likelihood if reading.levels is not None else 0.0
+                # Predictions at the edge may hold, or not.
+                unknown = before[beyond] + reading.radio_under_null(other)
+                log_weight[beyond] = np.logaddexp(log_weight[beyond], unknown) - log(2)
         for term in reading.terms:
             log_weight += term.log_likelihood(cloud.state)
             used = True

@@ -192,6 +192,10 @@ class BayesFilter(Options):
             bias_drift_rad_per_sqrt_m=radians(self.drift_deg_per_sqrt_m),
             scale_sd=self.scale,
         )
+        # Disturbances are part of the headings' errors: small errors leave no room for large jumps.
+        usual = MotionErrors()
+        share = (motion.heading_sd_rad / usual.heading_sd_rad) ** 2
+        motion = replace(motion, disturbances_per_m=share * usual.disturbances_per_m)
         weights = MapWeights(self.map_sd_m, self.map_weight_per_m, self.off_cost_per_m)
         if self.vehicle:
             motion = replace(motion, **_VEHICLE_MOTION)

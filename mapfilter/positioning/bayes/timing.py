@@ -25,6 +25,9 @@ from mapfilter.positioning.estimate import UnusedReading
 from mapfilter.positioning.gnss.options import TimingOptions
 from mapfilter.tracks.schema import Kind
 
+_NULL_FACTOR = 1.5
+"""Log-likelihood under the null hypothesis, as a multiple of what is expected of the belief."""
+
 
 class TimingState(NamedTuple):
     """Distances travelled when timing advances and differences were last used."""
@@ -62,9 +65,9 @@ class TimingTerm:
         return np.asarray(-0.5 * self.weight * square)
 
     @property
-    def expected(self) -> float:
-        """Expected log-likelihood at the true position."""
-        return -0.5 * self.weight * self.reading_m.size
+    def under_null(self) -> float:
+        """Log-likelihood under the null hypothesis, from what is expected at the true position."""
+        return -0.5 * _NULL_FACTOR * self.weight * self.reading_m.size
 
 
 @dataclass(frozen=True)
@@ -102,8 +105,8 @@ class TimingSource(EvidenceSource):
         share = _new_share(travelled_m - state.difference_m, self.options.difference_memory_m)
         if share > 0 and self._add_differences(epoch, share, terms, unused):
             state = state._replace(difference_m=travelled_m)
-        expected = sum(one.expected for one in terms)
-        return EvidenceUpdate(state, tuple(terms), expected=expected, unused=unused)
+        under_null = sum(one.under_null for one in terms)
+        return EvidenceUpdate(state, tuple(terms), under_null=under_null, unused=unused)
 
     @property
     def _layout(self) -> StateLayout:

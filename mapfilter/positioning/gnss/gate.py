@@ -47,6 +47,7 @@ _RESET_GATE = 0.5
 _F = np.float32
 _FIX_SD_M = 10.0
 _FIX_CLIP = 5.0
+_ANYWHERE_NATS, _MOST_REFUTED_NATS, _ENOUGH_SATELLITES = -8.0, 5.0, 3
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,17 @@ class FixTerm:
         det = var_x * var_y - cross**2
         square = (var_y * dx**2 - 2 * cross * dx * dy + var_x * dy**2) / det
         return np.asarray(-0.5 * np.minimum(square, _FIX_CLIP**2), dtype=np.float64)
+
+
+def refutation(log_weight: Floats, gain: Floats) -> float:
+    """Return the log-likelihood of a reading under the null hypothesis, less that of a belief.
+
+    Under the null hypothesis the reading may be of anywhere in the area: what a wide belief expects
+    refutes nothing, what agrees with a narrow one does, up to a bound, as readings may be faulty.
+    """
+    total = np.logaddexp.reduce(log_weight + gain) - np.logaddexp.reduce(log_weight)
+    less = _ANYWHERE_NATS - float(total - gain.max())
+    return min(max(less, -_MOST_REFUTED_NATS), 0.0)
 
 
 def widened(fix: GnssFix, times: float) -> GnssFix:
@@ -119,13 +131,15 @@ class GnssState:
 class GnssComparison(NamedTuple):
     """Outcome of comparing an epoch's fix and pseudoranges with a belief.
 
-    ``belief`` carries clock and height in its hypotheses. ``compared`` is whether there was
+    ``belief`` carries clock and height in its hypotheses; ``under_null`` is the log-likelihood
+    under the null hypothesis, relative to that under the belief. ``compared`` is whether there was
     anything to compare; ``unused`` holds kind, name and reason of readings left out.
     """
 
     belief: MapBelief
     state: GnssState
     terms: tuple[Term, ...] = ()
+    under_null: float = 0.0
     compared: bool = False
     unused: tuple[Unused, ...] = ()
 
@@ -165,7 +179,7 @@ class GnssGate:
             found = self._compare_ranges(found, epoch, travelled_m, particle_spacing_m)
         if found.state.probation_until_s > epoch.time_s:
             # Where fixes are rejected, pseudoranges are not used alone, and the other way around.
-            found = found._replace(terms=(FixedTerm(np.zeros(1)),))
+            found = found._replace(terms=(FixedTerm(np.zeros(1)),), under_null=0.0)
         return found
 
     def _gate(self, belief: MapBelief) -> float:
@@ -195,7 +209,8 @@ class GnssGate:
         state = replace(state, fix_used_at_m=travelled_m, rejected_since_s=nan)
         # The likelihood of the whole belief is judged here, so it does not count in the CUSUM.
         terms = (*found.terms, term, FixedTerm(np.array([-total])))
-        return found._replace(state=state, terms=terms, compared=True)
+        under_null = found.under_null + refutation(log_weight, gain)
+        return found._replace(state=state, terms=terms, under_null=under_null, compared=True)
 
     def _compare_ranges(
         self, found: GnssComparison, epoch: Epoch, travelled_m: float, particle_spacing_m: float
@@ -228,7 +243,10 @@ class GnssGate:
             names = tuple(name for name in sky.names if name not in kept.names)
             receiver = replace(receiver, covariance=result.covariance, used_at_m=travelled_m)
             rows, state = result.rows, replace(state, rejected_since_s=nan)
-            found = found._replace(terms=(*found.terms, FixedTerm(self._mixed(result.gain))))
+            gain, under_null = self._mixed(result.gain), found.under_null
+            if len(kept.names) >= _ENOUGH_SATELLITES:
+                under_null += refutation(belief.log_weight, gain)
+            found = found._replace(terms=(*found.terms, FixedTerm(gain)), under_null=under_null)
         receiver, carrying = centred(receiver, rows, belief.state)
         belief, state = replace(belief, state=carrying), replace(state, receiver=receiver)
         return found.without(kind, names, why, belief=belief, state=state, compared=True)

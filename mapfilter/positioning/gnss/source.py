@@ -130,13 +130,13 @@ class GnssSource(EvidenceSource):
             return EvidenceUpdate(own)
         spacing_m = context.particle_spacing_m
         main = self.gate.compare(belief, own, epoch, travelled_m, spacing_m)
-        alternative, terms = state.alternative, None
+        alternative, terms, under_null = state.alternative, None, None
         if alternative is not None:
             before: GnssState = alternative.sources[self.name]
             other = self.gate.compare(alternative.belief, before, epoch, travelled_m, spacing_m)
             sources = {**alternative.sources, self.name: other.state}
             alternative = replace(alternative, belief=other.belief, sources=sources)
-            terms = other.terms
+            terms, under_null = other.terms, other.under_null
             if main.compared or other.compared:
                 step = float(main.state.rejecting) - float(other.state.rejecting)
                 alternative = self._supported(alternative, step, epoch.time_s)
@@ -145,6 +145,8 @@ class GnssSource(EvidenceSource):
             main.state,
             main.terms,
             terms,
+            under_null=main.under_null,
+            alternative_under_null=under_null,
             unused=[UnusedReading(epoch.time_s, *one) for one in main.unused],
             belief=main.belief,
             alternative=alternative,

@@ -1,0 +1,131 @@
+"""Hypotheses beyond the area: where they start, what they cost, and who comes in from there."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import small_area
+from made_town import CRS, PIXEL_M, SIDE_M, SOUTH_M, WEST_M, Town, walk_log
+from small_area import BANDS, HEIGHT_M, OPTIONS, WIDTH_M, make_area
+
+from mapfilter.filters.contract import MotionStep, Status
+from mapfilter.filters.particle import Cloud
+from mapfilter.geodesy import Lattice
+from mapfilter.models.level_errors import LevelReport
+from mapfilter.models.street_motion import EAST, NORTH, OFF, STATES, MapWeights, MotionErrors
+from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.model import BayesModel, Start
+from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.epochs import Epoch
+from mapfilter.positioning.filter import locate
+
+STILL = MotionErrors(
+    step_sd_m=0.0, heading_sd_rad=0.0, bias_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0,
+    disturbances_per_m=0.0, rate_share=0.0, scale_sd=0.0, stretch_sd=0.0,
+)  # fmt: skip
+MODEL = BayesModel(make_area(), STILL, MapWeights(), OPTIONS)
+REPORT = LevelReport(
+    np.array([BANDS["A"], BANDS["B"]], dtype=np.int32), np.array([-75, -83], dtype=np.float32),
+    np.zeros(0, dtype=np.int32), -110.0, 0.0,
+)  # fmt: skip
+
+
+def cloud_at(*places):
+    state = np.zeros((STATES, len(places)), dtype=np.float32)
+    state[EAST], state[NORTH] = np.array(places).T
+    return Cloud(state, np.empty((0, len(places)), dtype=np.float32))
+
+
+def test_one_in_twenty_starts_within_300_m_of_the_area():
+    cloud, log_weight = MODEL.start(Start(None), 20_000, np.random.default_rng(1))
+    east, north = cloud.state[:2].astype(float)
+    beside_m = np.maximum(np.maximum(-east, east - WIDTH_M), np.maximum(-north, north - HEIGHT_M))
+    around = beside_m > 0
+    assert np.exp(log_weight[around]).sum() == pytest.approx(0.05)
+    assert 295 < beside_m.max() <= 300
+    # On all sides: a square of 600 m and the area's width or height.
+    assert np.all(np.abs(cloud.state[:2, around].mean(axis=1) - [WIDTH_M / 2, HEIGHT_M / 2]) < 20)
+    known, _ = MODEL.start(
+        Start(None, True, 5e5 + 40, 45e5 + 30, 5.0), 500, np.random.default_rng(1)
+    )
+    assert known.state[:2].min() > 0
+
+
+@pytest.mark.parametrize("serving", [BANDS["A"], -1])
+def test_there_predictions_of_the_edge_may_hold_or_not(serving):
+    """The mean of two likelihoods: that of the nearest pixel, and that of the null hypothesis."""
+    inside, outside = (WIDTH_M - small_area.PIXEL_M / 2, 25.0), (WIDTH_M + 80.0, 25.0)
+    reading = RadioReading(serving, 0.4, REPORT)
+    edge, found = np.zeros(1), np.zeros(2)
+    MODEL.weigh(cloud_at(inside), edge, reading)
+    cloud, _ = MODEL.weigh(cloud_at(inside, outside), found, reading)
+    null = cloud.shared.other_log_likelihood + (-0.7 if serving >= 0 else 0.5) * 0.4
+    assert found[0] == pytest.approx(edge[0], abs=1e-5)
+    assert found[1] == pytest.approx(np.log((np.exp(edge[0]) + np.exp(null)) / 2), abs=1e-5)
+    assert abs(found[1] - found[0]) > 0.01
+
+
+@pytest.mark.parametrize("off", [0.0, 0.3, 1.0])
+def test_a_metre_costs_the_same_on_and_off_ways_there(off):
+    state = cloud_at((-50.0, 20.0)).state
+    state[OFF] = off
+    moved, log_weight = MODEL.move(state, np.zeros(1), MotionStep(2.0, 0.5), np.uint64(7))
+    cost = 0.015 * 2.0
+    away = off * np.exp(-0.02) + (1 - off) * (1 - np.exp(-0.002))
+    likelihood = away * np.exp(-0.04 * 2.0) + (1 - away) * np.exp(-cost)
+    assert log_weight[0] == pytest.approx(np.log(likelihood), abs=1e-5)
+    assert moved[OFF, 0] == pytest.approx(away * np.exp(-0.08) / likelihood, abs=1e-5)
+
+
+def eastern_half(town):
+    """Return the map of a town without its western 300 m."""
+    area = town.area()
+    cut = round(300.0 / PIXEL_M)
+    lattice = area.lattice
+    east = Lattice(CRS, WEST_M + 300.0, SOUTH_M + SIDE_M, PIXEL_M, lattice.rows, lattice.cols - cut)
+    part = {name: np.ascontiguousarray(getattr(area, name)[:, cut:])
+            for name in ("level_dbm", "distance_m", "way_id", "on_way")}  # fmt: skip
+    return replace(area, lattice=east, **part)
+
+
+def walk_in(town, seed):
+    """Return a walk that starts more than 100 m west of the map, and ends 300 m in it."""
+    for number in range(seed, seed + 400):
+        log = walk_log(town, number, 1200.0, error_db=3.0)
+        east_m = log.truth["east_m"].to_numpy() - WEST_M - 300.0
+        inside = np.flatnonzero(east_m > 0)
+        stays = inside.size > 130 and (east_m[inside[0] :] > 0).all()
+        if east_m[0] < -100 and stays:
+            return log, inside[0]
+    raise AssertionError("no such walk")
+
+
+def test_who_comes_in_from_beyond_is_found():
+    town = Town.of(1)
+    few = BayesFilter(max_particles=6000, min_search_particles=4000, min_particles=800)
+    positioner = few.over_area(eastern_half(town))
+    right = 0
+    for seed in (0, 1000, 2000, 3000):
+        log, entered = walk_in(town, seed)
+        found = locate(log, positioner, np.random.default_rng(seed)).estimate
+        off_m = np.hypot(found.east_m - log.truth["east_m"], found.north_m - log.truth["north_m"])
+        claimed = np.array([one in (Status.CONVERGED, Status.TRACKING) for one in found.status])
+        wrong = claimed & (np.asarray(off_m) > 50)
+        assert wrong.mean() < 0.05, seed
+        right += bool(claimed[entered:].any()) and not wrong[-1]
+    assert right >= 2
+
+
+def test_who_walks_out_is_outside():
+    """Tracked from a known start to the edge and 200 m beyond it, by dead reckoning alone."""
+    positioner = BayesFilter(max_particles=2000, min_particles=500).over_area(
+        eastern_half(Town.of(1))
+    )
+    rng = np.random.default_rng(0)
+    state = positioner.begin_at(WEST_M + 400.0, SOUTH_M + 450.0, 3.0, rng)
+    for second in range(60):
+        state, _ = positioner.step(state, Epoch(float(second), (MotionStep(5.0, np.pi),)), rng)
+    belief = state.belief
+    assert float(belief.weight @ belief.state[EAST]) == pytest.approx(-200.0, abs=40.0)
+    assert not positioner.area.holds(belief.state[0], belief.state[1], belief.weight)
+    assert np.isfinite(belief.log_weight).all()
