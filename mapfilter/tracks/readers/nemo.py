@@ -15,10 +15,11 @@ What is read, by place of the parameter:
   identity, TAC; in UMTS system, band, state, carrier, cell identity, LAC.
 * ``SEI``: system, status, LAC, MCC, MNC.
 
-The format's description was published as open up to version 2.15 (Anite Finland, *Nemo File
-Format*). Places are those that open parsers of the format use, checked on published logs of Nemo
-Outdoor 7.8 and 8.0 (versions 2.27 and 2.31) for LTE, UMTS, Wi-Fi and GPS; those of GSM only follow
-the parsers. Distances covered and speeds in these logs agree in km/h. Not read: scanners
+Its maker calls the format open (Anite Finland, *Nemo File Format*, version 2.03); the lists of
+parameters of that description were not at hand. Places are those that open parsers of the format
+use, checked on published logs of Nemo Outdoor 7.8 and 8.0 (versions 2.27 and 2.31) for LTE (FDD),
+UMTS, Wi-Fi and GPS; those of GSM, and LTE (TDD) as FDD, only follow the parsers.
+Distances covered and speeds in these logs agree in km/h. Not read: scanners
 (``OFDMSCAN``, ``PILOTSCAN``, ``FREQSCAN``), NR, CDMA, timing advances, signalling, and version 1
 (``.dt1``).
 """
