@@ -18,10 +18,9 @@ What is read, by place of the parameter:
 Its maker calls the format open (Anite Finland, *Nemo File Format*, version 2.03); the lists of
 parameters of that description were not at hand. Places are those that open parsers of the format
 use, checked on published logs of Nemo Outdoor 7.8 and 8.0 (versions 2.27 and 2.31) for LTE (FDD),
-UMTS, Wi-Fi and GPS; those of GSM, and LTE (TDD) as FDD, only follow the parsers.
-Distances covered and speeds in these logs agree in km/h. Not read: scanners
-(``OFDMSCAN``, ``PILOTSCAN``, ``FREQSCAN``), NR, CDMA, timing advances, signalling, and version 1
-(``.dt1``).
+UMTS, Wi-Fi and GPS; those of GSM only follow the parsers, and LTE (TDD) is taken to be as FDD.
+Distances covered and speeds in these logs agree in km/h. Not read: scanners (``OFDMSCAN``,
+``PILOTSCAN``, ``FREQSCAN``), NR, CDMA, timing advances, signalling, and version 1 (``.dt1``).
 """
 
 from __future__ import annotations
