@@ -145,8 +145,8 @@ def test_options_reach_their_models():
         disturbances_per_m=motion.disturbances_per_m,
         bias_drift_rad_per_sqrt_m=radians(0.1), scale_sd=0.07,
     )  # fmt: skip
-    # Disturbances are a share of the variance: 0.002 a metre at 15°.
-    assert motion.disturbances_per_m == pytest.approx(0.002 * (20 / 15) ** 2)
+    # Disturbances are in proportion to the stated errors: 0.002 a metre at 15°.
+    assert motion.disturbances_per_m == pytest.approx(0.002 * 20 / 15)
     assert bound.model.weights == MapWeights(sd_m=6.0)
     assert (bound.model.evidence.use_levels, bound.options.min_particles) == (False, 700)
 

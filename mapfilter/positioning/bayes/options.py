@@ -192,9 +192,9 @@ class BayesFilter(Options):
             bias_drift_rad_per_sqrt_m=radians(self.drift_deg_per_sqrt_m),
             scale_sd=self.scale,
         )
-        # Disturbances are part of the headings' errors: small errors leave no room for large jumps.
+        # Disturbances are part of the headings' errors: with small ones large jumps are rarer.
         usual = MotionErrors()
-        share = (motion.heading_sd_rad / usual.heading_sd_rad) ** 2
+        share = motion.heading_sd_rad / usual.heading_sd_rad
         motion = replace(motion, disturbances_per_m=share * usual.disturbances_per_m)
         weights = MapWeights(self.map_sd_m, self.map_weight_per_m, self.off_cost_per_m)
         if self.vehicle:
