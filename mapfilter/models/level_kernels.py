@@ -78,20 +78,15 @@ def weigh_by_levels(
     """Add the log-likelihood of levels to weights and update what hypotheses keep, in place."""
     means = terms.gain.shape[1]
     slots = (means - 1) // 2
-    share, w = _F(0.01 * predicted.share), _F(weight)
+    w = _F(weight)
     innovation, more = np.empty(_BLOCK, np.float32), np.empty(_BLOCK, np.float32)
     total = np.empty(_BLOCK, np.float32)
-    width = np.uint32(predicted.bands)
     for first in range(0, pixel.size, _BLOCK):
         count = min(_BLOCK, pixel.size - first)
         total[:] = _ZERO
         for k in range(terms.cell.size):
-            s, cell = terms.slot[k], np.uint32(terms.cell[k])
-            for j in range(count):
-                at = np.uint32(np.uint32(pixel[first + j]) * width) + cell
-                rough = _F(predicted.rough_db[at])
-                innovation[j] = predicted.level_dbm[at]
-                more[j] = share * rough * rough
+            s, cell = terms.slot[k], terms.cell[k]
+            _look_up(predicted, pixel[first:], count, cell, innovation, more)
             slow, fast = kept[s, first:], kept[slots + s, first:]
             device, odds = kept[means - 1, first:], kept[means + s, first:]
             level, own, other = terms.level_dbm[k], terms.variance_db2[k], terms.other[k]
@@ -125,22 +120,17 @@ def weigh_by_absence(
     """
     means = terms.gain.shape[1]
     slots = (means - 1) // 2
-    share, w = _F(0.01 * predicted.share), _F(weight)
+    w = _F(weight)
     middle, last = _F(REACH_SD * STEPS_PER_SD) + _HALF, _F(2 * REACH_SD * STEPS_PER_SD)
     below, per_sd = np.empty(_BLOCK, np.float32), np.empty(_BLOCK, np.float32)
     right, total = np.empty(_BLOCK, np.float32), np.empty(_BLOCK, np.float32)
     place = np.empty(_BLOCK, np.int32)
-    width = np.uint32(predicted.bands)
     for first in range(0, pixel.size, _BLOCK):
         count = min(_BLOCK, pixel.size - first)
         total[:] = _ZERO
         for k in range(terms.cell.size):
-            s, cell = terms.slot[k], np.uint32(terms.cell[k])
-            for j in range(count):
-                at = np.uint32(np.uint32(pixel[first + j]) * width) + cell
-                rough = _F(predicted.rough_db[at])
-                below[j] = predicted.level_dbm[at]
-                per_sd[j] = share * rough * rough
+            s, cell = terms.slot[k], terms.cell[k]
+            _look_up(predicted, pixel[first:], count, cell, below, per_sd)
             slow, fast = kept[s, first:], kept[slots + s, first:]
             device, odds = kept[means - 1, first:], kept[means + s, first:]
             limit, own, other = terms.level_dbm[k], terms.variance_db2[k], terms.other[k]
@@ -164,6 +154,24 @@ def weigh_by_absence(
             _corrected(kept, first, count, terms.gain[k], below)
         for j in range(count):
             log_weight[first + j] += w * total[j]
+
+
+@njit(inline="always")
+def _look_up(
+    predicted: Prediction,
+    pixel: Ints32,
+    count: int,
+    cell: np.int32,
+    level_dbm: Floats32,
+    more_db2: Floats32,
+) -> None:
+    """Fill in a cell's levels at the pixels of a block, and what roughness adds to the variance."""
+    share, width, band = _F(0.01 * predicted.share), np.uint32(predicted.bands), np.uint32(cell)
+    for j in range(count):
+        at = np.uint32(np.uint32(pixel[j]) * width) + band
+        rough = _F(predicted.rough_db[at])
+        level_dbm[j] = predicted.level_dbm[at]
+        more_db2[j] = share * rough * rough
 
 
 @njit(inline="always")

@@ -195,6 +195,7 @@ def plot_worst_run(
     shown = _about(estimate, near, base, first, last)
     place = " " if near is not None else "the truth is outside the map"
     plot_track(estimate, near, shown, left, title=place, zoom=False)
+    left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=3, frameon=False)
     _mark_worst(left, local_frame(shown), estimate, near, worst)
     distance_m = truth.distance_at(estimate.time_s)
     errors_m = position_errors_m(estimate, truth)

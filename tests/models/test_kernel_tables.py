@@ -16,6 +16,7 @@ from mapfilter.models.fingerprint import (
     serving_table,
 )
 from mapfilter.models.level_errors import LevelErrors
+from mapfilter.models.street_ancestors import _squares, draw_ancestors
 from mapfilter.models.street_motion import (
     BIAS,
     EAST,
@@ -28,8 +29,6 @@ from mapfilter.models.street_motion import (
     TURN,
     MapWeights,
     MotionErrors,
-    _squares,
-    draw_ancestors,
     move,
 )
 from mapfilter.models.terms import atan2_lanes, log_lanes

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scalar_oracle as oracle
 
+from mapfilter.models.street_ancestors import draw_ancestors
 from mapfilter.models.street_motion import (
     BIAS,
     EAST,
@@ -19,7 +20,6 @@ from mapfilter.models.street_motion import (
     TURN,
     MapWeights,
     MotionErrors,
-    draw_ancestors,
     interpolate,
     map_log_likelihood,
     move,

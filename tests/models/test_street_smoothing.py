@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mapfilter.models.street_motion import draw_ancestors
+from mapfilter.models.street_ancestors import draw_ancestors
 
 PLACE, BIAS, SCALE = 4.0, 0.01, 0.0004
 

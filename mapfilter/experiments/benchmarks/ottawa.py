@@ -29,7 +29,7 @@ from mapfilter.models.fingerprint import ServingWeights
 from mapfilter.models.measured_map import MeasuredMapOptions, MeasuredRows, ServingStatistics
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.filter import BayesPositioner
-from mapfilter.positioning.bayes.model import MeasuredMapModel
+from mapfilter.positioning.bayes.measured_model import MeasuredMapModel
 from mapfilter.positioning.bayes.options import BayesFilter, open_area
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.filter import locate

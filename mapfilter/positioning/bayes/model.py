@@ -1,9 +1,7 @@
 """The map filter's model, which the filters of a single belief call.
 
 :class:`BayesModel` draws the first hypotheses, moves them by dead reckoning, and weighs them by the
-map of ways, by radio reports and by the terms of other sources. :class:`MeasuredMapModel` compares
-serving cells and timing advances with their statistics at each place, and levels with a map whose
-standard deviation varies.
+map of ways, by radio reports and by the terms of other sources.
 """
 
 from __future__ import annotations
@@ -24,7 +22,6 @@ from mapfilter.models import fingerprint
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.level_kernels import Prediction, decayed, weigh_by_absence, weigh_by_levels
 from mapfilter.models.level_memory import LevelMemory
-from mapfilter.models.measured_map import ServingStatistics
 from mapfilter.models.street_motion import (
     BIAS,
     EAST,
@@ -247,8 +244,9 @@ class BayesModel:
         found = interpolate(moved, self.log_map, step / 2, (rows - 0.5) * step, 1 / step)
         beyond = self.area.beyond(moved)
         if beyond.any() and self.weights.weight_per_m > 0:
-            # Beyond the area nobody knows the ways.
-            found[beyond] = -_BEYOND_COST_PER_M / self.weights.weight_per_m
+            # Beyond the area nobody knows the ways; if these are all there is, it is off the map.
+            cost = _BEYOND_COST_PER_M if self.area.cell_ids else self.weights.off_cost_per_m
+            found[beyond] = -cost / self.weights.weight_per_m
         weigh_by_map(found, moved[OFF], self.weights.over(length_m), weighed)
         return moved, weighed
 
@@ -372,50 +370,3 @@ def _sample(pixel: Ints32) -> Ints32:
 
 def _new(state: Floats32) -> Cloud:
     return Cloud(state, np.empty((0, state.shape[1]), dtype=np.float32))
-
-
-@dataclass(frozen=True)
-class MeasuredMapModel(BayesModel):
-    """Ways and measured radio maps of an area.
-
-    Parameters
-    ----------
-    serving_model : ServingStatistics
-        On the area's lattice.
-    level_sd_db : ndarray of float32, shape (C, P), optional
-        Standard deviation of a new reading from the map of levels, on the area's lattice; without
-        it that of the evidence options everywhere.
-    """
-
-    serving_model: ServingStatistics | None = None
-    level_sd_db: Floats32 | None = None
-
-    @property
-    def timed_by_sites(self) -> bool:
-        """Whether timing advances are compared with the distances of sites: not with maps."""
-        return self.serving_model is None
-
-    def rough_db(self) -> Bytes:
-        """Return by how much the map's deviation exceeds that of the options."""
-        return super().rough_db() if self.level_sd_db is None else self._rough_db
-
-    @cached_property
-    def _rough_db(self) -> Bytes:
-        sd_db = np.zeros((self.area.level_dbm[..., 0].size, self._bands))
-        if self.level_sd_db is not None:
-            sd_db[:, :-2] = self.level_sd_db.reshape(len(self.area.cell_ids), -1).T
-        more_db = np.sqrt(np.maximum(sd_db**2 - self.evidence.levels.total_db**2, 0.0))
-        tenths: Bytes = np.minimum(np.rint(10 * more_db), 255).astype(np.uint8).reshape(-1)
-        return tenths
-
-    def _weigh_serving(
-        self, cloud: Cloud, pixel: Ints32, log_weight: Floats, reading: RadioReading
-    ) -> None:
-        model = self.serving_model
-        if model is None:
-            super()._weigh_serving(cloud, pixel, log_weight, reading)
-            return
-        found = model.log_serving(reading.serving, pixel)
-        if isfinite(reading.timing_advance):
-            found = found + model.log_advance(reading.serving, pixel, reading.timing_advance)
-        log_weight += reading.serving_weight * found

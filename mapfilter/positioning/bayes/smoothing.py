@@ -18,6 +18,7 @@ from mapfilter._kernels import draw_key
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.hypotheses import Bins, summarise
 from mapfilter.filters.resampling import systematic
+from mapfilter.models.street_ancestors import draw_ancestors
 from mapfilter.models.street_motion import (
     BIAS,
     LOG_SCALE,
@@ -25,7 +26,6 @@ from mapfilter.models.street_motion import (
     STRETCH,
     TURN,
     MotionErrors,
-    draw_ancestors,
 )
 from mapfilter.positioning.bayes.alternative import MapBelief
 from mapfilter.positioning.bayes.area_map import AreaMap

@@ -1,0 +1,66 @@
+"""The map filter's model over measured maps.
+
+Serving cells and timing advances are compared with their statistics at each place, and levels with
+a map whose standard deviation varies.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import isfinite
+
+import numpy as np
+
+from mapfilter._types import Bytes, Floats, Floats32, Ints32
+from mapfilter.filters.particle import Cloud
+from mapfilter.models.measured_map import ServingStatistics
+from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.model import BayesModel
+
+
+@dataclass(frozen=True)
+class MeasuredMapModel(BayesModel):
+    """Ways and measured radio maps of an area.
+
+    Parameters
+    ----------
+    serving_model : ServingStatistics
+        On the area's lattice.
+    level_sd_db : ndarray of float32, shape (C, P), optional
+        Standard deviation of a new reading from the map of levels, on the area's lattice; without
+        it that of the evidence options everywhere.
+    """
+
+    serving_model: ServingStatistics | None = None
+    level_sd_db: Floats32 | None = None
+
+    @property
+    def timed_by_sites(self) -> bool:
+        """Whether timing advances are compared with the distances of sites: not with maps."""
+        return self.serving_model is None
+
+    def rough_db(self) -> Bytes:
+        """Return by how much the map's deviation exceeds that of the options."""
+        return super().rough_db() if self.level_sd_db is None else self._rough_db
+
+    @cached_property
+    def _rough_db(self) -> Bytes:
+        sd_db = np.zeros((self.area.level_dbm[..., 0].size, self._bands))
+        if self.level_sd_db is not None:
+            sd_db[:, :-2] = self.level_sd_db.reshape(len(self.area.cell_ids), -1).T
+        more_db = np.sqrt(np.maximum(sd_db**2 - self.evidence.levels.total_db**2, 0.0))
+        tenths: Bytes = np.minimum(np.rint(10 * more_db), 255).astype(np.uint8).reshape(-1)
+        return tenths
+
+    def _weigh_serving(
+        self, cloud: Cloud, pixel: Ints32, log_weight: Floats, reading: RadioReading
+    ) -> None:
+        model = self.serving_model
+        if model is None:
+            super()._weigh_serving(cloud, pixel, log_weight, reading)
+            return
+        found = model.log_serving(reading.serving, pixel)
+        if isfinite(reading.timing_advance):
+            found = found + model.log_advance(reading.serving, pixel, reading.timing_advance)
+        log_weight += reading.serving_weight * found
