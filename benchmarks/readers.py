@@ -1,4 +1,4 @@
-"""Speed and memory of reading a million rows of CSV recordings: python benchmarks/readers.py."""
+"""Speed and memory of reading a million rows of recordings: python benchmarks/readers.py."""
 
 import multiprocessing
 import resource
@@ -27,6 +27,22 @@ def rows_of(kind: str) -> str:
     if kind == "TotalAcceleration.csv":
         rows = [f"{t}000000,{i},9.81,0.1,0.2" for i, t in enumerate(ms)]
         return "\n".join(["time,seconds_elapsed,z,y,x", *rows])
+    if kind == "watch.gpx":
+        stamps = np.datetime_as_string(np.array(ms, dtype="datetime64[ms]")).tolist()
+        rows = [
+            f'<trkpt lat="{y}" lon="24.94">\n<ele>12.5</ele>\n<time>{t}Z</time>\n</trkpt>'
+            for t, y in zip(stamps, lat, strict=True)
+        ]
+        return "\n".join(["<gpx><trk><trkseg>", *rows, "</trkseg></trk></gpx>"])
+    if kind == "00.txt":
+        return "\n".join(f"1 0 0 {i}.5 0 1 0 0 0 0 1 {i}.25" for i in range(ROWS))
+    if kind == "drive.nmf":
+        days = (np.array(ms) // 20 + 36_000_000).astype("datetime64[ms]")
+        stamps = [text[11:23] for text in np.datetime_as_string(days).tolist()]
+        rows = [
+            f"CELLMEAS,{t},,7,0,1,9,0,70001,1300,435,-60.6,-89.1,-10.1,302060,118.0" for t in stamps
+        ]
+        return "\n".join(['#START,10:00:00.000,,"1.5.2026"', *rows])
     head = "time,lat,lon,rsrp,mcc,mnc,lac,ci,technology"
     rows = [f"{t},{y},24.94,-87,244,91,3021,1170251,LTE" for t, y in zip(ms, lat, strict=True)]
     return "\n".join([head, *rows])
@@ -49,7 +65,15 @@ def measure(path: Path) -> None:
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
-        for name in ("upload.csv", "TotalAcceleration.csv", "drive.csv"):
+        files = (
+            "upload.csv",
+            "TotalAcceleration.csv",
+            "drive.csv",
+            "watch.gpx",
+            "00.txt",
+            "drive.nmf",
+        )
+        for name in files:
             path = Path(folder) / name
             # A process begins with the peak of the one that started it.
             for task in (write, measure):

@@ -3,6 +3,7 @@
 # ruff: noqa: E501, SIM905
 
 import numpy as np
+from made_drive_tests import nemo, tems, tems_lte
 from made_satellites import (
     gnsslogger,
     nmea,
@@ -189,6 +190,9 @@ MADE: dict[str, tuple[str, str]] = {
     "antennas": ("antennas.log", antennas()),
     "kitti": ("00.txt", kitti()),
     "tum": ("trajectory.txt", tum()),
+    "nemo": ("drive.1.nmf", nemo()),
+    "tems": ("drive.txt", tems()),
+    "tems/lte": ("drive_lte.txt", tems_lte()),
     "csv": ("drive.csv", plain_csv()),
 }
 """File name and content by format; after a slash the dialect."""

@@ -51,6 +51,9 @@ ROWS = {
     "antennas": {"positions": COUNT, "radio": 2 * COUNT},
     "kitti": {"poses": COUNT},
     "tum": {"poses": COUNT},
+    "nemo": {"positions": COUNT, "radio": 2 * COUNT + 50},
+    "tems": {"positions": COUNT, "radio": 2 * COUNT},
+    "tems/lte": {"positions": COUNT, "radio": 2 * COUNT},
     "csv": {"positions": COUNT, "motion": COUNT, "radio": COUNT, "barometer": COUNT},
 }
 
@@ -91,7 +94,7 @@ def test_every_format_has_a_made_recording():
 def test_times_are_utc_where_the_clock_is_known(name, written):
     recording = read_recording(written(name), options=ReadOptions(zone="+03:00"))
     if not recording.clock.absolute:
-        assert name in ("smartloc", "phyphox", "kitti")
+        assert name in ("smartloc", "phyphox", "kitti", "tems/lte")
         return
     for table, rows in recording.tables.items():
         if "time_s" in rows:

@@ -1,11 +1,15 @@
 """Damaged recordings: every reader reads what is whole, or refuses with a message; none crashes."""
 
+import time
+
 import numpy as np
 import pytest
 from fuzz import MUTATIONS, fuzz
 from made_recordings import COUNT, MADE
 
 from mapfilter.errors import InputError, MapfilterError
+from mapfilter.tracks.readers import gnsslogger
+from mapfilter.tracks.readers import lines as lines_reader
 from mapfilter.tracks.readers import text as texts
 from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.readers.recording import Recording
@@ -118,6 +122,114 @@ def test_other_separators_and_decimal_commas_change_nothing(name, separator, rea
         assert commas[table]["lat_deg"].equals(plain.tables[table]["lat_deg"])
 
 
+@pytest.mark.parametrize("name", ["kitti", "tum"])
+@pytest.mark.parametrize("separator", [";", "\t", ",", "  "])
+def test_poses_with_other_separators_and_decimal_commas(name, separator, read):
+    text = MADE[name][1]
+    plain = read(name, text.encode()).tables["poses"]
+    head, body = text.split("\n", 1) if name == "tum" else ("", text)
+    other = body.replace(" ", separator)
+    assert read(name, f"{head}\n{other}".strip().encode()).tables["poses"].equals(plain)
+    if separator != ",":
+        commas = f"{head}\n{other}".strip().replace(".", ",")
+        assert read(name, commas.encode()).tables["poses"].equals(plain)
+
+
+@pytest.mark.parametrize(
+    ("name", "own", "other", "told"),
+    [
+        ("nmea", ",", ";", "NMEA 0183 with semicolons where commas should be"),
+        ("gnsslogger", ",", ";", "a GnssLogger text log with semicolons"),
+        ("indoor", "\t", ";", "with semicolons where tabs should be"),
+    ],
+)
+def test_wrong_separators_are_told(name, own, other, told, read):
+    with pytest.raises(InputError, match=told):
+        read(name, MADE[name][1].replace(own, other).encode())
+
+
+BY_LINES = [
+    *("gnettrack", "towercollector", "opencellid", "opencellid/mls", "nmea", "gnsslogger"),
+    *("smartloc", "smartloc-raw", "indoor", "phyphox", "sensorlogger", "tum", "csv"),
+    *("nemo", "tems", "tems/lte"),
+]
+
+
+@pytest.mark.parametrize("name", BY_LINES)
+def test_lines_that_are_repeated_change_nothing(name, read):
+    lines = MADE[name][1].splitlines()
+    third = len(lines) // 3
+    twice = lines[:third] + [line for line in lines[third:] for _ in range(2)]
+    plain = read(name, "\n".join(lines).encode())
+    recording = read(name, "\n".join(twice).encode())
+    for table, rows in plain.tables.items():
+        assert len(recording.tables[table]) == len(rows), table
+        assert recording.tables[table]["time_s"].equals(rows["time_s"]), table
+    assert recording.unusable == ()
+
+
+@pytest.mark.parametrize("name", [name for name in BY_LINES if name != "tems/lte"])
+def test_times_that_go_backwards_are_sorted(name, read):
+    lines = MADE[name][1].splitlines()
+    half, part = len(lines) // 2, len(lines) // 4
+    moved = lines[:half] + lines[half + part :] + lines[half : half + part]
+    plain = read(name, "\n".join(lines).encode())
+    recording = read(name, "\n".join(moved).encode())
+    for table, rows in plain.tables.items():
+        assert recording.tables[table]["time_s"].equals(rows["time_s"]), table
+    assert any("go backwards" in note for note in recording.notes) or name == "nmea"
+
+
+LEAP = {
+    "gnettrack": ("_13.00.58", "_13.00.60"),
+    "towercollector": ("10:00:58", "10:00:60"),
+    "gpx": ("10:00:58Z", "10:00:60Z"),
+    "csv": ("13:00:58+", "13:00:60+"),
+    "antennas": ("13:00:58:500", "13:00:60:500"),
+    "nemo": ("13:00:58.250", "13:00:60.250"),
+    "tems": ("13:00:58.500", "13:00:60.500"),
+    "tems/lte": ("13:00:58.500", "13:00:60.500"),
+}
+
+
+@pytest.mark.parametrize("name", LEAP)
+def test_a_leap_second_is_the_first_of_the_next_minute(name, read):
+    text = MADE[name][1]
+    assert LEAP[name][0] in text
+    plain = read(name, text.encode()).tables
+    leap = read(name, text.replace(*LEAP[name]).encode())
+    assert leap.unusable == ()
+    for table, rows in leap.tables.items():
+        late_s = rows["time_s"] - plain[table]["time_s"]
+        assert late_s.iloc[-1] == 2.0, table
+        assert set(late_s) == {0.0, 2.0}, table
+
+
+YEAR = {
+    "gpx": "2026-05-01T10:00:30",
+    "towercollector": "2026-05-01T10:00:30",
+    "csv": "2026-05-01T13:00:30",
+    "antennas": "2026-05-01 13:00:30",
+    "gnettrack": "2026.05.01_13.00.30",
+    "tems": "01/05/2026 13:00:30",
+}
+
+
+@pytest.mark.parametrize("name", YEAR)
+def test_a_time_that_jumps_years_is_refused_alone(name, read):
+    text = MADE[name][1]
+    assert YEAR[name] in text
+    plain = read(name, text.encode()).tables
+    jumped = read(name, text.replace(YEAR[name], YEAR[name].replace("2026", "2036")).encode())
+    assert [one.reason for one in jumped.unusable] == [
+        "time: more than a day away from all other rows"
+    ]
+    for table, rows in plain.items():
+        moment = rows["time_s"].iloc[0] + 30.0
+        left = rows["time_s"][(rows["time_s"] - moment).abs() > 0.6]
+        assert jumped.tables[table]["time_s"].tolist() == left.tolist(), table
+
+
 @pytest.mark.parametrize("name", COMMA)
 def test_swapped_columns_change_nothing(name, read):
     text = MADE[name][1]
@@ -162,7 +274,16 @@ def test_a_gpx_with_entities_is_not_expanded(read):
         read("gpx", data)
 
 
-BY_PARTS = ["towercollector", "opencellid", "opencellid-cells", "phyphox", "sensorlogger", "csv"]
+BY_PARTS = [
+    "tems",
+    "tems/lte",
+    "towercollector",
+    "opencellid",
+    "opencellid-cells",
+    "phyphox",
+    "sensorlogger",
+    "csv",
+]
 
 
 @pytest.mark.parametrize("name", BY_PARTS)
@@ -177,3 +298,37 @@ def test_a_large_file_is_read_part_by_part(name, read, monkeypatch):
     assert parts.rows == whole.rows
     for table, rows in whole.tables.items():
         assert parts.tables[table].equals(rows), table
+
+
+BY_BLOCKS = ["antennas", "kitti", "tum", "nmea", "gnsslogger", "rinex-obs", "indoor"]
+
+
+@pytest.mark.parametrize("name", BY_BLOCKS)
+def test_a_large_file_is_read_block_by_block(name, read, monkeypatch):
+    lines = MADE[name][1].splitlines()
+    lines[len(lines) // 2] = "bad"
+    data = "\n".join(lines).encode()
+    whole = read(name, data)
+    monkeypatch.setattr(lines_reader, "_BLOCK_BYTES", 300)
+    monkeypatch.setattr(gnsslogger, "_BLOCK_BYTES", 300)
+    blocks = read(name, data)
+    assert {one.reason: one.count for one in blocks.unusable} == {
+        one.reason: one.count for one in whole.unusable
+    }
+    assert blocks.rows == whole.rows
+    for table, rows in whole.tables.items():
+        keys = [key for key in ("time_s", "satellite", "cell") if key in rows]
+        mine, other = (
+            of.sort_values(keys, kind="stable").reset_index(drop=True)
+            for of in (blocks.tables[table], rows)
+        )
+        assert mine.equals(other), table
+
+
+def test_a_number_of_many_digits_takes_no_time(tmp_path):
+    path = tmp_path / "digits.txt"
+    path.write_text(f"{'9' * 50_000}x\n" * 20)
+    began_s = time.process_time()
+    with pytest.raises(InputError, match="none of them"):
+        read_recording(path)
+    assert time.process_time() - began_s < 2.0

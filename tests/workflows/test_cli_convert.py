@@ -68,8 +68,8 @@ def test_info_describes_a_recording(walk):
 
 
 def test_formats_that_are_not_read_are_named(walk):
-    for name, told in (("drive.nmf", "Nemo"), ("drive.trp", "TEMS"), ("walk.kml", "KML")):
-        (walk / name).write_text('#FF,,,"2.19"\nsomething\n')
+    for name, told in (("drive.dt1", "Nemo"), ("drive.trp", "TEMS"), ("walk.kml", "KML")):
+        (walk / name).write_text('FF,,,"1.86"\nsomething\n')
         done = mapfilter("convert", walk / name, "--out", walk / "log")
         assert done.code == 2
         assert told in done.err
@@ -77,19 +77,53 @@ def test_formats_that_are_not_read_are_named(walk):
 
 def test_a_tab_delimited_export_with_a_map_of_columns(tmp_path):
     head = ["Timestamp", "All-Latitude Decimal Degree", "All-Longitude Decimal Degree"]
-    head += ["All-Serving Cell RSRP (dBm)", "All-Serving Cell Identity"]
+    head += ["MS1-Serving Cell RSRP (dBm)", "MS1-Serving Cell Identity"]
     rows = [
-        ["2026-05-01 12:00:00.250", "60.17", "24.94", "-80.5", "9751830"],
+        ["2026-05-01 12:00:00.250", "60.17", "24.94", "-80.5", "435"],
         ["2026-05-01 12:00:00.750", "", "", "-81.5", ""],
-        ["2026-05-01 12:00:01.250", "60.171", "24.94", "", "9751830"],
+        ["2026-05-01 12:00:01.250", "60.171", "24.94", "", "435"],
     ]
     path = tmp_path / "tems.txt"
     path.write_text("\n".join("\t".join(row) for row in [head, *rows]))
-    names = zip(("time", "lat_deg", "lon_deg", "level_dbm", "ci"), head, strict=True)
+    names = zip(("time", "lat_deg", "lon_deg", "level_dbm", "bsic"), head, strict=True)
     columns = [f"--column={field}={name}" for field, name in names]
     args = ("--format", "csv", "--zone", "+02:00", "--out", tmp_path / "log", "--json")
     found = mapfilter("convert", path, *columns, *args).json
     assert found["rows"]["gnss"] == 2
     radio = read_log(tmp_path / "log").radio
-    assert radio["ci"].dropna().unique().tolist() == [9751830]
+    assert radio["bsic"].dropna().unique().tolist() == [435]
     assert radio["level_dbm"].dropna().tolist() == [-80.5, -81.5]
+
+
+@pytest.mark.parametrize(
+    ("name", "title", "rows"),
+    [
+        ("nemo", "Nemo Outdoor 7.8.0.8", {"radio": 110, "gnss": COUNT}),
+        ("tems", "TEMS Investigation", {"radio": 2 * COUNT, "gnss": COUNT}),
+    ],
+)
+def test_a_drive_test_becomes_a_log(name, title, rows, tmp_path):
+    file, text = MADE[name]
+    path = tmp_path / file
+    path.write_bytes(b"\xef\xbb\xbf" + text.replace("\n", "\r\n").encode())
+    done = mapfilter("convert", path, "--zone", "+03:00", "--out", tmp_path / "log")
+    assert done.code == 0
+    assert title in done.out
+    log = read_log(tmp_path / "log")
+    assert {table: len(getattr(log, table)) for table in rows} == rows
+    assert set(log.radio["role"]) == {"serving", "neighbour"}
+    assert log.start_utc_s == pytest.approx(START_UTC_S, abs=1.0)
+
+
+def test_a_drive_test_without_dates_takes_those_of_another_recording(tmp_path):
+    paths = []
+    for name in ("tems/lte", "gpx"):
+        file, text = MADE[name]
+        paths.append(tmp_path / file)
+        paths[-1].write_text(text)
+    done = mapfilter("convert", paths[0], "--truth", paths[1], "--out", tmp_path / "log")
+    assert done.code == 0
+    log = read_log(tmp_path / "log")
+    assert len(log.truth) == COUNT
+    apart_s = log.gnss["time_s"].to_numpy() - log.truth["time_s"].to_numpy()
+    assert abs(apart_s).max() < 1.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,12 @@ import pyarrow.compute as pc
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.tracks.readers.lines import LONGEST_LINE, blocks, good_lines, parsed
 from mapfilter.tracks.readers.recording import Reading
-from mapfilter.tracks.readers.times import parse_times, unix_seconds, utc_from_local_s
+from mapfilter.tracks.readers.times import (
+    parse_times,
+    seconds_of_day,
+    unix_seconds,
+    utc_from_local_s,
+)
 
 SEPARATORS = ",;\t|"
 _EARLIEST_S, _LATEST_S = -2_208_988_800.0, 4_102_444_800.0
@@ -106,6 +111,38 @@ class Columns:
         if column is not None and (found := _plain_times(column, zone, layout)) is not None:
             return found
         return parse_times(self.texts(*names), zone, layout)
+
+    def contains(self, part: str, *names: str) -> Bools:
+        """Return in which rows a column contains a text."""
+        column = self._raw(*names)
+        if column is None:
+            return np.zeros(len(self), dtype=bool)
+        return np.asarray(pc.match_substring(column, part).to_numpy(), dtype=bool)
+
+    def changes(self, *names: str) -> Bools:
+        """Return in which rows a column differs from the row before; the first one does not."""
+        changed = np.zeros(len(self), dtype=bool)
+        column = self._raw(*names)
+        if column is not None and len(self) > 1:
+            trimmed = pc.utf8_trim_whitespace(column)
+            changed[1:] = pc.not_equal(trimmed.slice(1), trimmed.slice(0, len(self) - 1)).to_numpy()
+        return changed
+
+    def seconds_of_day(self, *names: str) -> Floats:
+        """Return times of day of a column, NaN where it has none; see :func:`seconds_of_day`."""
+        column = self._raw(*names)
+        if column is None:
+            return np.full(len(self), np.nan)
+        return seconds_of_day(column.combine_chunks())
+
+    def rewritten(self, pattern: str, by: str, *names: str) -> Columns:
+        """Return columns in which the texts of one that match a pattern are rewritten."""
+        name = self.find(*names)
+        column = self._raw(*names)
+        if name is None or column is None:
+            return self
+        changed = pc.replace_substring_regex(column, pattern, by)
+        return replace(self, _columns={**self._columns, self.names.index(name): changed})
 
     def number(self, *names: str) -> Floats:
         """Return the first of these columns that is there as numbers, NaN where missing.
@@ -213,7 +250,7 @@ def header_names(header: str, separator: str) -> tuple[str, ...]:
 
 def line_columns(
     lines: Sequence[bytes],
-    numbers: Sequence[int],
+    numbers: Sequence[int] | Ints,
     reading: Reading,
     names: Sequence[str],
     separator: str,
@@ -256,6 +293,9 @@ def value_columns(
 
 def split_blanks(data: bytes) -> bytes:
     """Return a text in which runs of blanks and tabs are one blank, none at a line's ends."""
-    # Single blanks are no match: a list of every blank would be larger than the text.
-    single = re.sub(rb"[ \t]{2,}|\t", b" ", data)
-    return re.sub(rb"^ | $", b"", single, flags=re.MULTILINE)
+    if b"\t" in data or b"  " in data:
+        # Single blanks are no match: a list of every blank would be larger than the text.
+        data = re.sub(rb"[ \t]{2,}|\t", b" ", data)
+    if b"\n " in data or b" \n" in data or data[:1] == b" " or data[-1:] == b" ":
+        data = re.sub(rb"^ | $", b"", data, flags=re.MULTILINE)
+    return data

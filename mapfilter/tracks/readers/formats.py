@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from mapfilter.tracks.readers import (
     gnsslogger,
     gpx,
     indoor,
+    nemo,
     nmea,
     phone_sensors,
     plain_csv,
@@ -22,6 +24,7 @@ from mapfilter.tracks.readers import (
     rinex,
     rinex_navigation,
     smartloc,
+    tems,
 )
 from mapfilter.tracks.readers.columns import header_names, likely_separator
 from mapfilter.tracks.readers.format import Format, ReadOptions
@@ -46,14 +49,18 @@ FORMATS: tuple[Format, ...] = (
     antennas.FORMAT,
     poses.KITTI,
     poses.TUM,
+    nemo.FORMAT,
+    tems.FORMAT,
     plain_csv.FORMAT,
 )
 """All formats, in the order in which a file is compared with them."""
 
+_SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
 _PEEKED_BYTES = 1 << 18
 _NOT_READ = {
-    ".nmf": "a Nemo log; export measurements and positions as CSV, and map the columns",
-    ".trp": "a TEMS log; export it as tab-delimited text, and map the columns",
+    ".nmf": "a Nemo log that is no text of Nemo file format 2; export it as CSV, map the columns",
+    ".dt1": "a Nemo log of version 1; export it as CSV, and map the columns",
+    ".trp": "a binary TEMS log; export it as tab-delimited text",
     ".kml": "KML; export GPX, or a table as CSV",
     ".kmz": "KML; export GPX, or a table as CSV",
     ".geojson": "GeoJSON; export GPX, or a table as CSV",
@@ -112,7 +119,9 @@ def read_recording(
         raise InputError(tuple(replace(f, hint=hint or f.hint) for f in error.faults)) from error
     found = find_format(text)
     known = format_named(name) if name else found
-    if known is None and options is not None and options.columns:
+    own = options is not None and bool(options.columns)
+    if own and not name and (known is None or (known is tems.FORMAT and _named(text, options))):
+        # The columns of such an export are chosen, and may be named.
         known = plain_csv.FORMAT
     if known is None:
         raise _unknown(path, text)
@@ -136,6 +145,23 @@ def read_recording(
         raise InputError(named) from error
 
 
+def _named(text: Text, options: ReadOptions | None) -> bool:
+    """Return whether a file has every column of a column map."""
+    columns = {} if options is None else options.columns
+    names = header_names(text.first_line, likely_separator(text.first_line))
+    return all(column.lower() in names for column in columns.values())
+
+
+def _other_separators(path: Path, text: Text) -> str:
+    """Return the hint for a file that would be of a known format with other separators."""
+    head = "\n".join(text.head)
+    for own, other in itertools.permutations("\t;, ", 2):
+        found = find_format(Text(path, head.replace(own, other).encode()))
+        if own in head and found is not None:
+            return f"{found.title} with {_SEPARATORS[own]} where {_SEPARATORS[other]} should be"
+    return ""
+
+
 def _unknown(path: Path, text: Text) -> MapfilterError:
     """Return the error for a file of no known format."""
     names = set(header_names(text.first_line, likely_separator(text.first_line)))
@@ -143,6 +169,8 @@ def _unknown(path: Path, text: Text) -> MapfilterError:
     hint = _NOT_READ.get(path.suffix.lower(), "")
     if not hint and len(names) > 1 and names & fields:
         hint = "a CSV without a column of times, or with other names: --column FIELD=COLUMN"
+    if not hint:
+        hint = _other_separators(path, text)
     expected = f"a recording in a known format ({', '.join(f.name for f in FORMATS)})"
     got = f"none of them; it begins with {text.first_line[:60]!r}"
     return fail(InputError, str(path), expected, got, hint)

@@ -35,7 +35,7 @@ def _matches(text: Text) -> bool:
 
 def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     reading.program = "G-NetTrack"
-    rows = header_columns(text.data, reading, ragged=_LEAST_FIELDS)
+    rows = header_columns(text.data, reading, text.line, ragged=_LEAST_FIELDS)
     version = [word for word in rows.texts("version_name")[:1] if word]
     reading.program += f" {version[0]}" if version else ""
     time_s, zoned = rows.times("timestamp", zone=options.zone, layout=_LAYOUT)
@@ -108,14 +108,17 @@ def _hexadecimal(texts: np.ndarray) -> Floats:
 
 
 def _state(rows: Columns, serving: dict[str, Floats]) -> Ints:
-    """Return equal numbers for rows in which everything that was measured is equal."""
+    """Return numbers that change where anything that was measured does."""
     names = ["level", "rsrp", "qual", "rsrq", "psc", "arfcn", "ta"]
     for i in range(1, _MOST_NEIGHBOURS + 1):
         names += [f"ncell{i}", f"nrxlev{i}"]
-    columns = {name: rows.texts(name) for name in names if rows.has(name)}
-    table = pd.DataFrame({"ci": serving["ci"], **columns})
-    groups = table.groupby(list(table.columns), sort=False, dropna=False)
-    return np.asarray(groups.ngroup(), dtype=np.int64)
+    ci = np.nan_to_num(serving["ci"], nan=-1.0)
+    changed = np.zeros(len(rows), dtype=bool)
+    changed[1:] = ci[1:] != ci[:-1]
+    for name in names:
+        if rows.has(name):
+            changed |= rows.changes(name)
+    return np.cumsum(changed)
 
 
 def _add_serving(
@@ -144,7 +147,7 @@ def _add_neighbours(rows: Columns, reading: Reading, time_s: Floats, good: Bools
             continue
         names = rows.texts(f"ncell{i}")
         # Some versions list GSM neighbours that are no cells, with a dump of an object as name.
-        dump = there & np.array(["=null" in name or "=" in name for name in names], dtype=bool)
+        dump = there & rows.contains("=", f"ncell{i}")
         false += int(dump.sum())
         there &= ~dump
         columns = {
@@ -172,4 +175,6 @@ FORMAT = Format(
     "serving cell, neighbours by carrier and PCI, levels, timing advance, positions",
     _matches,
     _read,
+    # Of a part's first row it is not known whether it repeats the one before.
+    by_rows=True,
 )

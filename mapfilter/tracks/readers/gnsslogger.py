@@ -10,10 +10,12 @@ from mapfilter._types import Ints
 from mapfilter.gnss.orbits import WEEK_S
 from mapfilter.tracks.readers.columns import Columns, line_columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
+from mapfilter.tracks.readers.lines import blocks
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.text import Text
 from mapfilter.tracks.readers.times import unix_seconds, utc_from_gps_s
 
+_BLOCK_BYTES = 1 << 24
 _LIGHT_MPS = 299_792_458.0
 _DAY_NS, _WEEK_NS = 86_400 * 10**9, int(WEEK_S) * 10**9
 _BEIDOU_BEHIND_NS = 14 * 10**9
@@ -50,39 +52,51 @@ def _matches(text: Text) -> bool:
 
 def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
     reading.program, reading.clock = "GnssLogger", Clock("utc")
-    names, kinds = _grouped(text.data, reading)
-    tables: dict[str, Columns] = {}
+    sensors = {
+        sensor: next((kind for kind in some if _has(text.data, kind)), "")
+        for sensor, (some, _, _) in _SENSORS.items()
+    }
+    names: dict[str, tuple[str, ...]] = {}
+    unnamed: dict[str, int] = {}
     ignored: Counter[str] = Counter()
     used = {"Fix", "Raw", *(kind for some, _, _ in _SENSORS.values() for kind in some)}
-    for kind, (lines, numbers) in kinds.items():
-        if kind not in used or (kind not in names and kind not in _OLD):
-            ignored[kind] += len(lines)
-            reading.rows += len(lines)
-            continue
-        header = names.get(kind) or tuple(_OLD[kind].lower().split(","))
-        # Programs may write fields that no header names.
-        header += tuple(f"unnamed {i}" for i in range(_unnamed(lines, len(header))))
-        ragged = min(len(header), 21 if kind == "Raw" else 7)
-        tables[kind] = line_columns(lines, numbers, reading, ("kind", *header), ",", ragged=ragged)
+    for block, first_line in blocks(memoryview(text.data), 1, _BLOCK_BYTES):
+        tables: dict[str, Columns] = {}
+        for kind, (lines, numbers) in _grouped(block, first_line, names, reading).items():
+            if kind not in used or (kind not in names and kind not in _OLD):
+                ignored[kind] += len(lines)
+                reading.rows += len(lines)
+                continue
+            header = names.get(kind) or tuple(_OLD[kind].lower().split(","))
+            # Programs may write fields that no header names.
+            count = unnamed.setdefault(kind, _unnamed(lines, len(header)))
+            header += tuple(f"unnamed {i}" for i in range(count))
+            least = min(len(header), 21 if kind == "Raw" else 7)
+            own = ("kind", *header)
+            tables[kind] = line_columns(lines, numbers, reading, own, ",", ragged=least)
+        if "Fix" in tables:
+            _add_fixes(tables["Fix"], reading)
+        if "Raw" in tables:
+            _add_raw(tables["Raw"], reading)
+        for sensor, (_, unit, suffix) in _SENSORS.items():
+            known = sensors[sensor]
+            if known in tables:
+                _add_sensor(tables[known], reading, sensor, known.lower(), unit, suffix)
     for kind, count in sorted(ignored.items()):
         reading.note(f"{count} rows of {kind!r} are not used")
-    if "Fix" in tables:
-        _add_fixes(tables["Fix"], reading)
-    if "Raw" in tables:
-        _add_raw(tables["Raw"], reading)
-    for sensor, (some, unit, suffix) in _SENSORS.items():
-        known = next((kind for kind in some if kind in tables), None)
-        if known is not None:
-            _add_sensor(tables[known], reading, sensor, known.lower(), unit, suffix)
+
+
+def _has(data: bytes, kind: str) -> bool:
+    start = f"{kind},".encode()
+    return data.startswith(start) or b"\n" + start in data
 
 
 def _grouped(
-    data: bytes, reading: Reading
-) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[list[bytes], list[int]]]]:
-    """Return the columns that comments name for each kind of row, and the rows of each kind."""
-    names: dict[str, tuple[str, ...]] = {}
+    block: bytes, first_line: int, names: dict[str, tuple[str, ...]], reading: Reading
+) -> dict[str, tuple[list[bytes], list[int]]]:
+    """Return the rows of each kind; add the columns that comments name for each to ``names``."""
     kinds: dict[str, tuple[list[bytes], list[int]]] = {}
-    for number, line in enumerate(data.split(b"\n"), start=1):
+    for number, line in enumerate(block.split(b"\n"), start=first_line):
         if line.startswith(b"#"):
             words = line.decode("utf-8", "replace").strip("# ").split(",")
             if words[0].startswith("Version"):
@@ -101,7 +115,7 @@ def _grouped(
         lines, numbers = kinds.setdefault(kind, ([], []))
         lines.append(line)
         numbers.append(number)
-    return names, kinds
+    return kinds
 
 
 def _unnamed(lines: list[bytes], named: int) -> int:

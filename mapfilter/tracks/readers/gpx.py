@@ -1,66 +1,39 @@
-"""GPX 1.0 and 1.1: track points, or waypoints with times where there is no track."""
+"""GPX 1.0 and 1.1: track points, or waypoints with times where there is no track.
+
+Points are read one by one as texts, so that damage loses the points that it hits and no others.
+"""
 
 from __future__ import annotations
 
+import html
 import re
-from typing import Any
-from xml.parsers import expat
+from collections.abc import Iterator
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 
+from mapfilter._types import Ints
+from mapfilter.errors import InputError, fail
+from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.text import Text
-from mapfilter.tracks.readers.times import parse_times
 
 _POINTS = ("trkpt", "wpt", "rtept")
-_VALUES = ("time", "ele", "speed", "course", "hdop")
 _UERE_M = 4.0
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
-
-
-class _Points:
-    """Collects points while a file is parsed; a file cut off keeps those before its end."""
-
-    def __init__(self) -> None:
-        self.rows: dict[str, list[dict[str, Any]]] = {kind: [] for kind in _POINTS}
-        self.creator = ""
-        self._point: dict[str, Any] | None = None
-        self._value = ""
-        self._text: list[str] = []
-        self.parser = expat.ParserCreate()
-        self.parser.StartElementHandler = self._start
-        self.parser.EndElementHandler = self._end
-        self.parser.CharacterDataHandler = self._characters
-        # Entities could blow a file up; no GPX needs any.
-        self.parser.EntityDeclHandler = self._refuse_entities
-
-    def _refuse_entities(self, *_: object) -> None:
-        raise expat.ExpatError("entities are not read")
-
-    def _start(self, name: str, attributes: dict[str, str]) -> None:
-        tag = name.rpartition(":")[2]
-        if tag == "gpx":
-            self.creator = attributes.get("creator", "")
-        if tag in _POINTS:
-            self._point = {"line": self.parser.CurrentLineNumber, "kind": tag, **attributes}
-        elif self._point is not None and tag in _VALUES:
-            self._value, self._text = tag, []
-
-    def _characters(self, text: str) -> None:
-        if self._value:
-            self._text.append(text)
-
-    def _end(self, name: str) -> None:
-        tag = name.rpartition(":")[2]
-        if self._point is None:
-            return
-        if tag == self._value:
-            self._point.setdefault(tag, "".join(self._text).strip())
-            self._value = ""
-        elif tag == self._point["kind"]:
-            self.rows[tag].append(self._point)
-            self._point = None
+_PART_BYTES = 1 << 22
+_AFTER_NAME = np.frombuffer(b" \t\n\r>/", dtype=np.uint8)
+# As most programs write a point: first its place, then height and time.
+_USUAL = (
+    r'^\s+lat="(?P<lat>[^"<]*)"\s+lon="(?P<lon>[^"<]*)"\s*>'
+    r"\s*(?:<ele>(?P<ele>[^<]*)</ele>\s*)?(?:<time>(?P<time>[^<]*)</time>)?"
+)
+_ATTRIBUTE = r"^[^>]*?\sNAME\s*=\s*[\"'](?P<value>[^\"'<>]*)[\"']"
+_ELEMENT = r"<(?:[\w.-]+:)?NAME(?:\s[^>]*)?>(?P<value>[^<]*)<"
+_COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+_PREFIX = re.compile(rb"<(/?)[\w.-]+:")
+_CREATOR = re.compile(r"<gpx\b[^>]*?\bcreator\s*=\s*[\"']([^\"'<]*)")
 
 
 def _matches(text: Text) -> bool:
@@ -68,47 +41,111 @@ def _matches(text: Text) -> bool:
 
 
 def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
-    points = _Points()
-    start = text.data.find(b"<")
-    # The text is UTF-8 by now, whatever its declaration says.
-    data = re.sub(rb'^(<\?xml[^>]*?)\s+encoding=["\'][^"\']*["\']', rb"\1", text.data[start:])
-    lines_before = text.data[: max(start, 0)].count(b"\n")
-    try:
-        points.parser.Parse(data, True)
-    except expat.ExpatError as error:
-        reading.note(f"XML is damaged or cut off ({error}); points before that were read")
-    reading.program = points.creator or "GPX"
-    kind = next((kind for kind in _POINTS if points.rows[kind]), "trkpt")
-    rows = points.rows[kind]
+    data = text.data
+    if b"<!ENTITY" in data:
+        # Entities could blow a file up; no GPX needs any.
+        raise fail(InputError, str(reading.path), "GPX without entities", "<!ENTITY")
+    creator = _CREATOR.search("\n".join(text.head[:50]))
+    reading.program = html.unescape(creator[1]).strip() if creator else ""
+    reading.program = reading.program or "GPX"
+    if b"<!--" in data:
+        data = _COMMENT.sub(lambda found: b"\n" * found[0].count(b"\n"), data)
+    if any(b":" + kind.encode() in data for kind in _POINTS):
+        data = _PREFIX.sub(rb"<\1", data)
+    if not data.rstrip().endswith(b"</gpx>"):
+        reading.note("the file is cut off or damaged; whole points were read")
+    counts = {kind: len(re.findall(rb"<%b\b" % kind.encode(), data)) for kind in _POINTS}
+    kind = next((kind for kind in _POINTS if counts[kind]), "trkpt")
     for other in _POINTS:
-        if other != kind and points.rows[other]:
-            reading.note(f"{len(points.rows[other])} {other} not used")
-    reading.rows += len(rows)
-    time_s, zoned = parse_times(
-        np.array([row.get("time", "") for row in rows], dtype=object), options.zone
-    )
-    reading.clock = Clock("utc") if zoned else Clock("local", options.zone)
-    numbers = {
-        name: np.array([_number(row.get(name, "")) for row in rows])
-        for name in ("lat", "lon", "ele", "speed", "course", "hdop")
-    }
-    columns = {
-        "time_s": time_s,
-        "lat_deg": numbers["lat"],
-        "lon_deg": numbers["lon"],
-        "altitude_m": numbers["ele"],
-        "speed_mps": numbers["speed"],
-        "course_deg": numbers["course"],
-        "accuracy_m": _UERE_M * numbers["hdop"],
-    }
-    lines = np.array([row["line"] for row in rows], dtype=np.int64) + lines_before
-    if len(rows):
+        if other != kind and counts[other]:
+            reading.note(f"{counts[other]} {other} not used")
+    clocks: set[bool] = set()
+    for points, lines in _points(data, kind.encode(), reading):
+        rows = _columns(points, lines, reading)
+        time_s, zoned = rows.times("time", zone=options.zone)
+        if np.isfinite(time_s).any():
+            clocks.add(zoned)
+        reading.clock = Clock("local", options.zone) if False in clocks else Clock("utc")
+        columns = {
+            "time_s": time_s,
+            "lat_deg": rows.number("lat"),
+            "lon_deg": rows.number("lon"),
+            "altitude_m": rows.number("ele"),
+            "speed_mps": rows.number("speed"),
+            "course_deg": rows.number("course"),
+            "accuracy_m": _UERE_M * rows.number("hdop"),
+        }
+        reading.rows += len(lines)
         reading.add("positions", columns, lines)
 
 
-def _number(text: str) -> float:
-    text = text.strip()
-    return float(text) if _NUMBER.fullmatch(text) else float("nan")
+def _points(data: bytes, kind: bytes, reading: Reading) -> Iterator[tuple[pa.Array, Ints]]:
+    """Yield points, from their attributes on, and the line of each; refuse those without an end."""
+    opening = b"<" + kind
+    start = data.find(opening)
+    line = 1 + data.count(b"\n", 0, max(start, 0))
+    while start >= 0:
+        stop = data.find(opening, start + _PART_BYTES)
+        part = data[start:stop] if stop >= 0 else data[start:]
+        code = np.frombuffer(part, dtype=np.uint8)
+        begins = _places(code, opening) + len(opening)
+        # Of another tag only the name's beginning is the same.
+        begins = begins[np.isin(code[np.minimum(begins, len(code) - 1)], _AFTER_NAME)]
+        tags = _next(_places(code, b">"), begins, len(code))
+        closed = code[tags - 1] == ord("/")
+        ends = np.where(closed, tags, _next(_places(code, b"</" + kind), begins, len(code)))
+        whole = ends <= np.append(begins[1:], len(code) - 1)
+        lines = line + np.searchsorted(np.flatnonzero(code == ord("\n")), begins)
+        reading.refuse(lines[~whole], f"{kind.decode()}: no end (likely: damaged or cut off)")
+        begins, ends = begins[whole], ends[whole]
+        if begins.size:
+            edges = np.append(np.stack([begins, ends], axis=1).ravel(), len(code)).astype(np.int32)
+            pieces = pa.StringArray.from_buffers(
+                2 * len(begins), pa.py_buffer(edges), pa.py_buffer(code)
+            )
+            yield pieces.take(pa.array(2 * np.arange(len(begins)))), lines[whole]
+        line += part.count(b"\n")
+        start = stop
+
+
+def _places(code: np.ndarray, pattern: bytes) -> Ints:
+    """Return where a pattern begins."""
+    places = np.flatnonzero(code[: max(0, len(code) - len(pattern) + 1)] == pattern[0])
+    for at, value in enumerate(pattern[1:], start=1):
+        places = places[code[places + at] == value]
+    return places
+
+
+def _next(places: Ints, begins: Ints, end: int) -> Ints:
+    """Return the first of some places after each beginning, ``end`` where there is none."""
+    return np.append(places, end)[np.searchsorted(places, begins)]
+
+
+def _columns(points: pa.Array, lines: Ints, reading: Reading) -> Columns:
+    usual = pc.extract_regex(points, _USUAL)
+    found = {name: pc.fill_null(usual.field(name), "") for name in ("lat", "lon", "ele", "time")}
+    valid = usual.is_valid()
+    found = {name: pc.if_else(valid, values, "") for name, values in found.items()}
+    missing = pc.or_(pc.equal(found["time"], ""), pc.equal(found["ele"], ""))
+    other = pc.and_(missing, pc.match_substring_regex(points, r"ele>|time>"))
+    other = pc.or_(pc.invert(valid), other)
+    if pc.any(other).as_py():
+        some = points.filter(other)
+        for name in found:
+            pattern = _ATTRIBUTE if name in ("lat", "lon") else _ELEMENT
+            values = _extracted(some, pattern.replace("NAME", name))
+            found[name] = pc.replace_with_mask(found[name], other, values)
+    for name in ("speed", "course", "hdop"):
+        if pc.any(pc.match_substring(points, name)).as_py():
+            found[name] = _extracted(points, _ELEMENT.replace("NAME", name))
+    rows = Columns(reading, tuple(found), lines, decimal_comma=True)
+    rows._columns.update(enumerate(pa.chunked_array([one]) for one in found.values()))
+    return rows
+
+
+def _extracted(points: pa.Array, pattern: str) -> pa.Array:
+    found = pc.extract_regex(points, pattern)
+    return pc.if_else(found.is_valid(), pc.fill_null(found.field("value"), ""), "")
 
 
 FORMAT = Format(

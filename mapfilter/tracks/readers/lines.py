@@ -11,6 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
 from pyarrow import csv as arrow_csv
 
 from mapfilter._types import Bools, Ints
@@ -23,11 +25,12 @@ _BLOCK_BYTES = 1 << 21
 _LINE_FEED = 10
 
 
-def blocks(data: memoryview, first_line: int) -> Iterator[tuple[bytes, int]]:
+def blocks(data: memoryview, first_line: int, size_bytes: int = 0) -> Iterator[tuple[bytes, int]]:
     """Cut a text into blocks of whole lines; yield each with the number of its first line."""
+    size = size_bytes or _BLOCK_BYTES
     start = 0
     while start < len(data):
-        end = min(start + _BLOCK_BYTES, len(data))
+        end = min(start + size, len(data))
         while end < len(data):
             piece = bytes(data[end : end + _BLOCK_BYTES])
             cut = piece.find(b"\n")
@@ -40,10 +43,23 @@ def blocks(data: memoryview, first_line: int) -> Iterator[tuple[bytes, int]]:
         start = end
 
 
+def line_texts(code: NDArray[np.uint8]) -> pa.StringArray:
+    """Return the lines of a UTF-8 text, given as its bytes."""
+    ends = np.flatnonzero(code == _LINE_FEED)
+    if not len(code) or code[-1] != _LINE_FEED:
+        ends = np.append(ends, len(code))
+    # A line's feed belongs to it here, and is trimmed.
+    edges = np.concatenate([[0], ends[:-1] + 1, [min(int(ends[-1]) + 1, len(code))]])
+    buffers = pa.py_buffer(edges.astype(np.int32)), pa.py_buffer(np.ascontiguousarray(code))
+    return pc.utf8_rtrim(pa.StringArray.from_buffers(len(ends), *buffers), "\n")
+
+
 def good_lines(
     block: bytes, first_line: int, count: int, separator: str, reading: Reading, least: int
 ) -> tuple[bytes, Ints]:
     """Return the lines that have all fields, and their numbers; refuse the others."""
+    if least < count and b'"' not in block:
+        block = _padded(block, count, separator, least)
     code = np.frombuffer(block, dtype=np.uint8)
     ends = np.flatnonzero(code == _LINE_FEED)
     if not len(block) or block[-1] != _LINE_FEED:
@@ -72,6 +88,19 @@ def good_lines(
                 rows.append(first_line + at)
     reading.rows += int(right.sum())
     return b"\n".join(good), np.array(rows, dtype=np.int64)
+
+
+def _padded(block: bytes, count: int, separator: str, least: int) -> bytes:
+    """Return lines in which absent last fields are empty ones."""
+    code = np.frombuffer(block, dtype=np.uint8)
+    ends = np.append(np.flatnonzero(code == _LINE_FEED), len(code))
+    starts = np.concatenate([[0], ends[:-1] + 1])
+    places = np.flatnonzero(code == ord(separator))
+    fields = np.searchsorted(places, ends) - np.searchsorted(places, starts) + 1
+    absent = np.where((fields >= least) & (ends > starts), np.maximum(count - fields, 0), 0)
+    if not absent.any():
+        return block
+    return bytes(np.insert(code, np.repeat(ends, absent), ord(separator)).tobytes())
 
 
 def _runs(right: Bools) -> Iterator[tuple[tuple[int, int], bool]]:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from string import hexdigits
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from mapfilter._types import Floats
+from mapfilter._types import Bools, Floats, Ints
 from mapfilter.tracks.readers.columns import Columns, line_columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
+from mapfilter.tracks.readers.lines import blocks
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.text import Text
 
@@ -26,7 +29,13 @@ _KNOT_MPS = 1852.0 / 3600.0
 _UERE_M = 4.0
 _RADIUS_68 = 1.515
 _DAY_S = 86_400.0
+_LINE_FEED = 10
+_DIGITS = np.array([int(c, 16) if (c := chr(i)) in hexdigits else -1 for i in range(256)])
 _MANY, _NEARLY_ALL = 10, 0.95
+
+
+_Sentences = tuple[list[bytes], list[Ints]]
+"""Parts of several sentences, separated by line feeds, and the lines of each."""
 
 
 def _matches(text: Text) -> bool:
@@ -38,7 +47,7 @@ def _matches(text: Text) -> bool:
 def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
     reading.program, reading.clock = "NMEA 0183 receiver", Clock("utc")
     kinds = _sentences(text.data, reading)
-    tables = {kind: _table(kind, *kinds[kind], reading) for kind in _KINDS}
+    tables = {kind: _table(kind, *kinds.pop(kind), reading) for kind in _KINDS}
     dates = _dates(tables)
     if dates.empty:
         reading.note("no date in the file (neither RMC nor ZDA): times count from a midnight")
@@ -55,51 +64,84 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: 
     reading.add("positions", columns, columns["line"])
 
 
-def _sentences(data: bytes, reading: Reading) -> dict[bytes, tuple[list[bytes], list[int]]]:
+def _sentences(data: bytes, reading: Reading) -> dict[bytes, _Sentences]:
     """Return the sentences of each kind that is read, with right checksums, and their lines.
 
     Some programs write wrong checksums throughout: a kind of which nearly none is right is taken.
     """
-    found: dict[bytes, tuple[list[bytes], list[int]]] = {kind: ([], []) for kind in _KINDS}
-    wrong: dict[bytes, tuple[list[bytes], list[int]]] = {kind: ([], []) for kind in _KINDS}
-    for number, line in enumerate(data.split(b"\n"), start=1):
-        start = line.find(b"$")
-        kind = line[start + 3 : start + 6]
-        if start < 0 or kind not in _KINDS:
-            if line.strip():
-                reading.rows += 1
-                if start < 0 and b"!" not in line:
-                    reading.refuse(number, "no NMEA sentence")
-            continue
-        reading.rows += 1
-        body, star, given = line[start + 1 :].strip().rpartition(b"*")
-        lines, numbers = (wrong if star and not _checks(body, given) else found)[kind]
-        lines.append(body if star else given)
-        numbers.append(number)
+    found: dict[bytes, _Sentences] = {kind: ([], []) for kind in _KINDS}
+    wrong: dict[bytes, _Sentences] = {kind: ([], []) for kind in _KINDS}
+    for block, first_line in blocks(memoryview(data), 1):
+        code = np.frombuffer(block + b"\n   ", dtype=np.uint8)
+        ends = np.flatnonzero(code == _LINE_FEED)
+        starts = np.concatenate([[0], ends[:-1] + 1])
+        number = first_line + np.arange(len(starts))
+        dollar = _first(code == ord("$"), starts, ends)
+        other = _first(code == ord("!"), starts, ends) >= 0
+        blank = np.add.reduceat(code > ord(" "), np.minimum(starts, ends)) == 0
+        blank |= starts == ends
+        reading.rows += int((~blank).sum())
+        reading.refuse(number[~blank & (dollar < 0) & ~other], "no NMEA sentence")
+        # Of the talker and the kind, GNRMC, the last three letters.
+        at = np.minimum(dollar[:, None] + [3, 4, 5], len(code) - 1)
+        letters = np.where(dollar[:, None] >= 0, code[at], 0).astype(np.uint8)
+        star = _last(code == ord("*"), starts, ends)
+        star = np.where(star > dollar, star, -1)
+        good = (star < 0) | (_given(code, star) == _total(code, dollar, star))
+        stops = np.where(star < 0, ends, star)
+        for kind in _KINDS:
+            of = (letters == np.frombuffer(kind, dtype=np.uint8)).all(axis=1)
+            for mask, (lines, numbers) in ((of & good, found[kind]), (of & ~good, wrong[kind])):
+                if mask.any():
+                    spans = zip((dollar[mask] + 1).tolist(), stops[mask].tolist(), strict=True)
+                    lines.append(b"\n".join(block[first:last].strip() for first, last in spans))
+                    numbers.append(number[mask])
     for kind, (lines, numbers) in wrong.items():
-        if len(lines) >= _MANY and len(lines) > _NEARLY_ALL * (len(lines) + len(found[kind][0])):
-            reading.note(f"{kind.decode()}: nearly all {len(lines)} checksums are wrong; taken")
+        count = sum(map(len, numbers))
+        if count >= _MANY and count > _NEARLY_ALL * (count + sum(map(len, found[kind][1]))):
+            reading.note(f"{kind.decode()}: nearly all {count} checksums are wrong; taken")
             found[kind] = (lines, numbers)
         else:
-            reading.refuse(np.array(numbers, dtype=np.int64), "checksum is wrong")
+            reading.refuse(_joined(numbers), "checksum is wrong")
     return found
 
 
-def _checks(body: bytes, given: bytes) -> bool:
-    total = 0
-    for byte in body:
-        total ^= byte
-    try:
-        return total == int(given[:2], 16)
-    except ValueError:
-        return False
+def _first(mask: Bools, starts: Ints, ends: Ints) -> Ints:
+    """Return the first place of each line where a mask holds, -1 where there is none."""
+    places = np.append(np.flatnonzero(mask), len(mask))
+    found = places[np.searchsorted(places, starts)]
+    return np.where(found < ends, found, -1)
 
 
-def _table(kind: bytes, lines: list[bytes], numbers: list[int], reading: Reading) -> Columns:
+def _last(mask: Bools, starts: Ints, ends: Ints) -> Ints:
+    """Return the last place of each line where a mask holds, -1 where there is none."""
+    places = np.concatenate([[-1], np.flatnonzero(mask)])
+    found = places[np.searchsorted(places, ends) - 1]
+    return np.where(found >= starts, found, -1)
+
+
+def _given(code: NDArray[np.uint8], star: Ints) -> Ints:
+    """Return the checksum of one or two hexadecimal digits after a star, -1 without one."""
+    high, low = (_DIGITS[code[np.minimum(star + i, len(code) - 1)]] for i in (1, 2))
+    return np.where(high < 0, -1, np.where(low < 0, high, 16 * high + low))
+
+
+def _total(code: NDArray[np.uint8], dollar: Ints, star: Ints) -> Ints:
+    """Return the exclusive or of all bytes between two places."""
+    total = np.bitwise_xor.accumulate(code)
+    return np.asarray(total[np.maximum(star, 1) - 1] ^ total[np.maximum(dollar, 0)], dtype=np.int64)
+
+
+def _joined(numbers: list[Ints]) -> Ints:
+    return np.concatenate(numbers) if numbers else np.zeros(0, dtype=np.int64)
+
+
+def _table(kind: bytes, lines: list[bytes], numbers: list[Ints], reading: Reading) -> Columns:
     names = ["talker", *_KINDS[kind]]
     names += [f"field{i}" for i in range(len(names), _FIELDS)]
     rows = reading.rows
-    table = line_columns(lines, numbers, reading, names, ",", ragged=len(_KINDS[kind]) + 1)
+    places = _joined(numbers)
+    table = line_columns(lines, places, reading, names, ",", ragged=len(_KINDS[kind]) + 1)
     reading.rows = rows
     return table
 
@@ -109,21 +151,18 @@ def _dates(tables: dict[bytes, Columns]) -> pd.DataFrame:
     parts = []
     rmc, zda = tables[b"RMC"], tables[b"ZDA"]
     if len(rmc):
-        words = rmc.texts("date")
+        words, index = np.unique(rmc.texts("date").astype(str), return_inverse=True)
         years = np.array([_year(word) for word in words])
-        good = np.isfinite(years)
-        parts.append(
-            _days(rmc, [word[2:4] for word in words], [word[:2] for word in words], years, good)
-        )
+        months, days = ([word[i : i + 2] for word in words] for i in (2, 0))
+        parts.append(_days(rmc, months, days, years, index))
     if len(zda):
-        years = zda.number("year")
         parts.append(
             _days(
                 zda,
                 zda.texts("month").tolist(),
                 zda.texts("day").tolist(),
-                years,
-                np.isfinite(years),
+                zda.number("year"),
+                np.arange(len(zda)),
             )
         )
     rows = (
@@ -140,15 +179,20 @@ def _year(word: str) -> float:
 
 
 def _days(
-    rows: Columns, months: Sequence[str], days: Sequence[str], years: Floats, good: np.ndarray
+    rows: Columns, months: Sequence[str], days: Sequence[str], years: Floats, index: Ints
 ) -> pd.DataFrame:
+    """Return line, midnight and time of day of sentences; ``index`` is the date of each."""
     texts = [
-        f"{year:.0f}-{month:0>2}-{day:0>2}" if ok else ""
-        for year, month, day, ok in zip(years, months, days, good, strict=True)
+        f"{year:.0f}-{month:0>2}-{day:0>2}" if np.isfinite(year) else ""
+        for year, month, day in zip(years, months, days, strict=True)
     ]
     moments = pd.to_datetime(pd.Series(texts), format="%Y-%m-%d", errors="coerce", utc=True)
     midnight = (moments - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy()
-    columns = {"line": rows.line, "midnight_s": midnight, "of_day_s": _of_day(rows.texts("time"))}
+    columns = {
+        "line": rows.line,
+        "midnight_s": midnight[index],
+        "of_day_s": _of_day(rows.texts("time")),
+    }
     return pd.DataFrame(columns)
 
 

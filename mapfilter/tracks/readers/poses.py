@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import MapfilterError
-from mapfilter.tracks.readers.columns import split_blanks, value_columns
+from mapfilter.tracks.readers.columns import Columns, split_blanks, value_columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
+from mapfilter.tracks.readers.lines import blocks
 from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.text import Text, read_text
 
+_NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d{1,3})?|[-+]?(nan|inf)", re.IGNORECASE)
 _FRAME_S = 0.1
 _UNIX_S = 1e8
 _CROOKED = 0.05
@@ -22,14 +26,22 @@ _CROOKED = 0.05
 
 def _count(text: Text, count: int) -> bool:
     lines = [line for line in text.head[:30] if line.strip() and not line.startswith("#")][:20]
-    return bool(lines) and sum(_numbers(line) == count for line in lines) > 0.5 * len(lines)
+    right = sum(_numbers(line, count) for line in lines)
+    return bool(lines) and right > 0.5 * len(lines)
 
 
-def _numbers(line: str) -> int:
-    try:
-        return len([float(word) for word in line.replace(",", " ").split()])
-    except ValueError:
-        return 0
+def _numbers(line: str, count: int) -> bool:
+    """Return whether a line has so many numbers; commas separate, or are decimal ones."""
+    return any(
+        len(words) == count and all(map(_NUMBER.fullmatch, words))
+        for words in (line.replace(",", other).replace(";", " ").split() for other in " .")
+    )
+
+
+def _comma(text: Text, count: int) -> bytes:
+    """Return what a comma stands for: a blank, or a decimal point."""
+    lines = (line.replace(",", ".").replace(";", " ") for line in text.head[:30] if "," in line)
+    return b"." if any(_numbers(line, count) for line in lines) else b" "
 
 
 def _is_kitti(text: Text) -> bool:
@@ -40,60 +52,75 @@ def _is_tum(text: Text) -> bool:
     return _count(text, 8)
 
 
-def _plain(data: bytes) -> memoryview:
-    """Return lines separated by single blanks, comments blanked out."""
-    blanks = split_blanks(data.replace(b",", b" "))
-    return memoryview(re.sub(rb"^#.*$", b"", blanks, flags=re.MULTILINE))
+def _parts(
+    text: Text, reading: Reading, names: Sequence[str]
+) -> Iterator[tuple[Columns, dict[str, Floats]]]:
+    """Yield the columns of a text, part by part; blanks, commas or semicolons separate values."""
+    comma = _comma(text, len(names))
+    for block, first_line in blocks(memoryview(text.data), 1):
+        data = split_blanks(block.replace(b",", comma).replace(b";", b" "))
+        if b"#" in data:
+            data = re.sub(rb"^#.*$", b"", data, flags=re.MULTILINE)
+        rows = value_columns(memoryview(data), reading, names, " ", first_line)
+        if len(rows):
+            yield rows, {name: rows.number(name) for name in names}
 
 
 def _read_kitti(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
     reading.program, reading.clock = "KITTI poses", Clock("monotonic")
     names = [f"r{i}{j}" for i in range(3) for j in range(4)]
-    rows = value_columns(_plain(text.data), reading, names, " ")
-    matrix = np.stack([rows.number(name) for name in names], axis=1).reshape(-1, 3, 4)
-    turn, place = matrix[:, :, :3], matrix[:, :, 3]
-    with np.errstate(invalid="ignore"):
-        square = np.abs(turn @ turn.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
-        good = (square < _CROOKED) & (np.linalg.det(turn) > 0)
-    reading.refuse(rows.line[~good], "pose: no rotation matrix")
-    frame = rows.line - 1
-    time_s = _frame_times(frame, reading)
-    quaternion = np.full((len(rows), 4), np.nan)
-    if good.any():
-        quaternion[good] = Rotation.from_matrix(turn[good]).as_quat()
-    _add_poses(reading, time_s[good], place[good], quaternion[good], rows.line[good])
+    times = _frame_times(text, reading)
+    for rows, values in _parts(text, reading, names):
+        matrix = np.stack([values[name] for name in names], axis=1).reshape(-1, 3, 4)
+        turn = matrix[:, :, :3]
+        with np.errstate(invalid="ignore"):
+            product = np.einsum("nij,nkj->nik", turn, turn)
+            square = np.abs(product - np.eye(3)).max(axis=(1, 2), initial=0.0)
+            right = np.einsum("ni,ni->n", np.cross(turn[:, 0], turn[:, 1]), turn[:, 2]) > 0
+            good = (square < _CROOKED) & right
+        reading.refuse(rows.line[~good], "pose: no rotation matrix")
+        if good.any():
+            quaternion = Rotation.from_matrix(turn[good]).as_quat()
+            frame = rows.line[good] - 1
+            time_s = _FRAME_S * frame if times is None else times[frame]
+            _add_poses(reading, time_s, matrix[good][:, :, 3], quaternion, rows.line[good])
 
 
-def _frame_times(frame: Ints, reading: Reading) -> Floats:
-    """Return times by ``times.txt`` beside the file, as in KITTI's odometry, else 10 Hz."""
+def _frame_times(text: Text, reading: Reading) -> Floats | None:
+    """Return times by ``times.txt`` beside the file, as in KITTI's odometry; None without it."""
     path = Path(reading.path).parent / "times.txt"
     if path.is_file():
         try:
             aside = Reading(path)
             rows = value_columns(memoryview(split_blanks(read_text(path).data)), aside, ["t"], " ")
             times = rows.number("t")
-            if len(times) > frame.max(initial=-1):
+            if len(times) > text.data.rstrip().count(b"\n"):
                 reading.note("times by times.txt")
-                return np.asarray(times[frame])
+                return np.asarray(times)
         except MapfilterError:
             pass
     reading.note(f"no times.txt beside the file: a pose every {_FRAME_S:g} s is taken")
-    return np.asarray(_FRAME_S * frame, dtype=np.float64)
+    return None
 
 
 def _read_tum(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
     names = ["time", "x", "y", "z", "qx", "qy", "qz", "qw"]
-    rows = value_columns(_plain(text.data), reading, names, " ")
-    time_s = rows.number("time")
-    known = time_s[np.isfinite(time_s)]
-    unix = bool(len(known)) and float(np.median(known)) > _UNIX_S
-    reading.program, reading.clock = "TUM trajectory", Clock("utc" if unix else "monotonic")
-    quaternion = np.stack([rows.number(name) for name in names[4:]], axis=1)
-    norm = np.linalg.norm(quaternion, axis=1)
-    good = ~(np.abs(norm - 1.0) > _CROOKED)
-    reading.refuse(rows.line[~good], "pose: no unit quaternion")
-    place = np.stack([rows.number(name) for name in names[1:4]], axis=1)
-    _add_poses(reading, time_s[good], place[good], quaternion[good], rows.line[good])
+    reading.program, reading.clock = "TUM trajectory", Clock(_tum_clock(text))
+    for rows, values in _parts(text, reading, names):
+        quaternion = np.stack([values[name] for name in names[4:]], axis=1)
+        norm = np.linalg.norm(quaternion, axis=1)
+        good = ~(np.abs(norm - 1.0) > _CROOKED)
+        reading.refuse(rows.line[~good], "pose: no unit quaternion")
+        place = np.stack([values[name] for name in names[1:4]], axis=1)
+        _add_poses(reading, values["time"][good], place[good], quaternion[good], rows.line[good])
+
+
+def _tum_clock(text: Text) -> Literal["utc", "monotonic"]:
+    """Return the clock by the times at the file's beginning: Unix times are large."""
+    comma = _comma(text, 8).decode()
+    words = [line.replace(",", comma).replace(";", " ").split()[:1] for line in text.head]
+    known = [float(word[0]) for word in words if word and _NUMBER.fullmatch(word[0])]
+    return "utc" if known and float(np.median(known)) > _UNIX_S else "monotonic"
 
 
 def _add_poses(

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from pandas.api.types import union_categoricals
 
-from mapfilter._types import Bools
+from mapfilter._types import Bools, Ints
 from mapfilter.tracks.readers.tables import Field
 
 
@@ -27,6 +27,12 @@ def joined_parts(parts: list[pd.DataFrame]) -> pd.DataFrame:
         else:
             columns[name] = np.concatenate([values.to_numpy() for values in own])
     parts.clear()
+    return pd.DataFrame(columns, copy=False)
+
+
+def reordered(rows: pd.DataFrame, order: Ints) -> pd.DataFrame:
+    """Return rows in another order, column by column; ``rows`` is emptied."""
+    columns = {name: rows.pop(name).array[order] for name in list(rows.columns)}
     return pd.DataFrame(columns, copy=False)
 
 

@@ -13,7 +13,12 @@ from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import InputError, MapfilterError, fail
-from mapfilter.tracks.readers.recorded_values import checked_values, duplicates, joined_parts
+from mapfilter.tracks.readers.recorded_values import (
+    checked_values,
+    duplicates,
+    joined_parts,
+    reordered,
+)
 from mapfilter.tracks.readers.tables import RECORDED, Field
 
 ClockKind = Literal["utc", "gps", "local", "monotonic"]
@@ -253,7 +258,7 @@ class Reading:
             return rows
         time = rows["time_s"].to_numpy()
         if (np.diff(time) < 0).any():
-            rows = rows.sort_values("time_s", kind="stable", ignore_index=True)
+            rows = reordered(rows, np.argsort(time, kind="stable"))
             time = rows["time_s"].to_numpy()
         if (np.diff(time) == 0).any():
             duplicate = duplicates(rows)

@@ -1,24 +1,26 @@
 """RINEX 2 and 3: observations of code ranges.
 
-Lines of fixed columns are read one by one, so that a damaged one loses only itself.
+Lines have fixed columns, and are read each for itself, so that a damaged one loses only itself.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime, timedelta
-from typing import Any
 
 import numpy as np
 
 from mapfilter.gnss.broadcast import GPS_EPOCH_UTC_S
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recording import Clock, Reading
+from mapfilter.tracks.readers.rinex_epochs import Observations, read_epochs
 from mapfilter.tracks.readers.text import Text
 from mapfilter.tracks.readers.times import utc_from_gps_s
 
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eEdD][-+]?\d+)?")
+_NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eEdD][-+]?\d+)?")
+_NAME = re.compile(r"[GRECJIS]\d\d")
 _SYSTEMS = {"GPS": 0.0, "GAL": 0.0, "QZS": 0.0, "IRN": 0.0, "BDT": 14.0}
 _CODES = {
     **dict.fromkeys("GJS", ("C1C", "C1P", "C1W", "C1X", "C1")),
@@ -96,29 +98,31 @@ def read_header(lines: Lines, reading: Reading) -> dict[str, list[str]]:
 
 
 def _read_observation(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
-    lines = Lines(text.data)
+    at = text.data.find(b"END OF HEADER")
+    end = text.data.find(b"\n", at) if at >= 0 else -1
+    lines = Lines(text.data[: end + 1] if end >= 0 else text.data)
     header = read_header(lines, reading)
     version = fixed_number(header.get("RINEX VERSION / TYPE", [""])[0][:9])
     system = header.get("TIME OF FIRST OBS", [""])[0][48:51].strip() or "GPS"
     reading.clock = Clock("utc" if system in ("GLO", "UTC") else "gps")
-    rows: list[tuple[float, str, str, float, float, int]] = []
-    epochs = _epochs3 if version >= 3 else _epochs2
-    epochs(lines, header, reading, rows)
-    if not rows:
-        return
-    seconds, names, codes, ranges, levels, numbers = (
-        list(column) for column in zip(*rows, strict=True)
-    )
-    elapsed = np.array(seconds) - _SYSTEMS.get(system, 0.0)
-    utc = elapsed + GPS_EPOCH_UTC_S if reading.clock.kind == "utc" else utc_from_gps_s(elapsed)
-    columns: dict[str, Any] = {
-        "time_s": utc,
-        "satellite": names,
-        "signal": codes,
-        "pseudorange_m": ranges,
-        "cn0_dbhz": levels,
-    }
-    reading.add("satellites", columns, numbers)
+    if version >= 3:
+        body = memoryview(text.data)[end + 1 :] if end >= 0 else memoryview(b"")
+        found = read_epochs(body, lines.at + 1, _types3(header), _CODES, reading)
+    else:
+        lines = Lines(text.data)
+        read_header(lines, reading)
+        found = _epochs2(lines, header, reading)
+    for some in found:
+        elapsed = some.gps_s - _SYSTEMS.get(system, 0.0)
+        utc = elapsed + GPS_EPOCH_UTC_S if reading.clock.kind == "utc" else utc_from_gps_s(elapsed)
+        columns = {
+            "time_s": utc,
+            "satellite": some.satellite,
+            "signal": some.signal,
+            "pseudorange_m": some.pseudorange_m,
+            "cn0_dbhz": some.cn0_dbhz,
+        }
+        reading.add("satellites", columns, some.line)
 
 
 def _types3(header: dict[str, list[str]]) -> dict[str, list[str]]:
@@ -130,33 +134,24 @@ def _types3(header: dict[str, list[str]]) -> dict[str, list[str]]:
     return types
 
 
-def _epochs3(
-    lines: Lines,
-    header: dict[str, list[str]],
-    reading: Reading,
-    rows: list[tuple[float, str, str, float, float, int]],
-) -> None:
-    types = _types3(header)
-    second, good = float("nan"), False
-    for line in lines:
-        if not line.strip():
-            continue
-        reading.rows += 1
-        if line.startswith(">"):
-            second = gps_seconds(line[1:29].split())
-            # Flags from 2 on are events: header lines follow, no observations.
-            good = bool(np.isfinite(second)) and line[31:32] in ("0", "1", " ", "")
-            if not np.isfinite(second):
-                reading.refuse(lines.at, "epoch: no date and time")
-            continue
-        if good:
-            _observe(line[:3], line[3:], types.get(line[:1], []), second, lines.at, reading, rows)
+_Places = dict[str, list[tuple[str, int, int]]]
+"""Of each constellation its codes that are there, with their columns and those of their levels."""
+
+
+def _places(types: Sequence[str]) -> _Places:
+    places: _Places = {}
+    for letter, codes in _CODES.items():
+        for code in (code for code in codes if code in types):
+            level = next((t for t in types if t[0] == "S" and t[1:] == code[1:]), None)
+            at = -1 if level is None else 16 * types.index(level)
+            places.setdefault(letter, []).append((code, 16 * types.index(code), at))
+    return places
 
 
 def _observe(
     name: str,
     values: str,
-    types: Sequence[str],
+    places: _Places,
     second: float,
     number: int,
     reading: Reading,
@@ -164,18 +159,13 @@ def _observe(
 ) -> None:
     """Add the first code range that a line of observations has."""
     name = name.replace(" ", "0")
-    if not re.fullmatch(r"[GRECJIS]\d\d", name):
+    if not _NAME.fullmatch(name):
         reading.refuse(number, "no satellite such as G07")
         return
-    for code in _CODES[name[0]]:
-        if code not in types:
-            continue
-        at = 16 * types.index(code)
+    for code, at, level in places.get(name[0], ()):
         range_m = fixed_number(values[at : at + 14])
-        if np.isfinite(range_m) and range_m != 0:
-            level = next((t for t in types if t[0] == "S" and t[1:] == code[1:]), None)
-            place = 16 * types.index(level) if level else 0
-            cn0 = fixed_number(values[place : place + 14]) if level else float("nan")
+        if math.isfinite(range_m) and range_m != 0:
+            cn0 = fixed_number(values[level : level + 14]) if level >= 0 else math.nan
             rows.append((second, name, code, range_m, cn0, number))
             return
     reading.refuse(number, "no code range on L1 (E1, B1)")
@@ -185,10 +175,11 @@ def _epochs2(
     lines: Lines,
     header: dict[str, list[str]],
     reading: Reading,
-    rows: list[tuple[float, str, str, float, float, int]],
-) -> None:
+) -> list[Observations]:
+    rows: list[tuple[float, str, str, float, float, int]] = []
     words = " ".join(line[6:] for line in header.get("# / TYPES OF OBSERV", [])).split()
     per = max(1, -(-len(words) // 5))
+    places = _places(words)
     for line in lines:
         if not line.strip():
             continue
@@ -214,7 +205,11 @@ def _epochs2(
                 break
             reading.rows += 1
             name = f"G{name[1:]}" if name[:1] == " " else name
-            _observe(name, values, words, second, number, reading, rows)
+            _observe(name, values, places, second, number, reading, rows)
+    if not rows:
+        return []
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    return [Observations(*columns)]
 
 
 FORMAT = Format(

@@ -102,7 +102,7 @@ def _is_raw(text: Text) -> bool:
 
 def _read_raw(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
     reading.program, reading.clock = "smartLoc receiver (RXM-RAWX)", Clock("gps")
-    rows = header_columns(text.data, reading)
+    rows = header_columns(text.data, reading, text.line)
     rows = replace(rows, names=tuple(_short(name) for name in rows.names))
     time_s = utc_from_week_s(rows.number("week"), rows.number("rcvtow"))
     heading = rows.number("gt heading")
@@ -154,4 +154,5 @@ RAW = Format(
     "pseudoranges, truth",
     _is_raw,
     _read_raw,
+    by_rows=True,
 )

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 
 from mapfilter._types import Bools, Floats, Ints
 
 _LONG_S = 30.0
+_LEAST_ROWS = 3
 _FAR_M = 50.0
 _METRES_PER_DEGREE = 111_195.0
 
@@ -27,12 +26,13 @@ def repeated_readings(state: Ints, time_s: Floats, lat_deg: Floats, lon_deg: Flo
     repeated = np.zeros(len(state), dtype=bool)
     if not len(state):
         return repeated
-    edges = [0, *(np.flatnonzero(np.diff(state)) + 1).tolist(), len(state)]
-    for first, last in pairwise(edges):
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(state)) + 1, [len(state)]])
+    long = np.diff(edges) >= _LEAST_ROWS
+    for first, last in np.stack([edges[:-1], edges[1:]], axis=1)[long].tolist():
         rows = slice(first, last)
         lat, lon = lat_deg[rows], lon_deg[rows]
         known = np.isfinite(lat) & np.isfinite(lon)
-        if last - first < 3 or not known.any() or np.ptp(time_s[rows]) <= _LONG_S:
+        if not known.any() or np.ptp(time_s[rows]) <= _LONG_S:
             continue
         wide = np.cos(np.radians(np.mean(lat[known])))
         extent_m = _METRES_PER_DEGREE * np.hypot(np.ptp(lat[known]), np.ptp(lon[known]) * wide)

@@ -8,6 +8,8 @@ from zoneinfo import ZoneInfo
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats
@@ -15,9 +17,12 @@ from mapfilter.errors import ConfigError, fail
 from mapfilter.gnss.orbits import LEAPS_UTC_S, WEEK_S
 
 GPS_EPOCH_S = datetime(1980, 1, 6, tzinfo=UTC).timestamp()
+DAY_S = 86_400.0
 _UNITS = ((1e17, 1e9), (1e14, 1e6), (1e11, 1e3))
 _DOTTED = re.compile(r"^\s*(\d\d?)\.(\d\d?)\.((?:19|20)\d\d)(?!\d)")
 """Day, month and year with dots, which no one writes in another order."""
+_PLAIN_TIME = r"^(?:[01]\d|2[0-3]):[0-5]\d:[0-5]\d(?:\.\d{1,9})?$"
+_TIME = re.compile(r"([01]?\d|2[0-3]):([0-5]\d):([0-5]\d|60)(?:[.,](\d{1,9}))?")
 _OFFSET = re.compile(r"(?:UTC|GMT)?([+-])(\d{1,2})(?::?([0-5]\d))?")
 
 
@@ -151,3 +156,42 @@ def parse_zone(zone: str) -> tzinfo:
     except (ValueError, OSError, LookupError) as error:
         expected = "a zone such as Europe/Brussels or +01:00"
         raise fail(ConfigError, "--zone", expected, repr(zone)) from error
+
+
+def seconds_of_day(texts: pa.Array) -> Floats:
+    """Read times of day ``HH:MM:SS`` with or without a fraction, NaN for other texts.
+
+    Examples
+    --------
+    >>> seconds_of_day(pa.array(["15:42:01.744", "9:00:00,5", "23:59:60", "25:00:00", ""])).tolist()
+    [56521.744, 32400.5, 86400.0, nan, nan]
+    """
+    trimmed = pc.utf8_trim_whitespace(texts)
+    plain = pc.match_substring_regex(trimmed, _PLAIN_TIME)
+    dated = pc.binary_join_element_wise("1970-01-01 ", pc.if_else(plain, trimmed, None), "")
+    ns = pc.fill_null(pc.cast(pc.cast(dated, pa.timestamp("ns")), pa.int64()), -1)
+    elapsed = np.asarray(ns.to_numpy(zero_copy_only=False), dtype=np.float64)
+    time_s = np.where(elapsed < 0, np.nan, elapsed / 1e9)
+    for at in np.flatnonzero(elapsed < 0).tolist():
+        if found := _TIME.fullmatch(trimmed[at].as_py()):
+            hours, minutes, seconds, fraction = found.groups("0")
+            time_s[at] = 3600 * int(hours) + 60 * int(minutes) + float(f"{seconds}.{fraction}")
+    return time_s
+
+
+def without_midnights(seconds: Floats, before_s: float = np.nan) -> Floats:
+    """Count times of day on where they pass midnight, from the day of the first one.
+
+    A step of more than half a day is one over midnight. NaN stays NaN; ``before_s`` is the time
+    before the first one, such as the last one of a part read before, counted on.
+
+    Examples
+    --------
+    >>> without_midnights(np.array([86399.0, np.nan, 1.0])).tolist()
+    [86399.0, nan, 86401.0]
+    """
+    counted = seconds.copy()
+    known = np.isfinite(seconds)
+    start = [before_s] if np.isfinite(before_s) else []
+    counted[known] = np.unwrap(np.concatenate([start, seconds[known]]), period=DAY_S)[len(start) :]
+    return counted
