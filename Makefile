@@ -11,7 +11,7 @@ demo: $(VENV)/.demo
 	$(BIN)/mapfilter demo --out out/demo
 
 test: check docs
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 check: $(VENV)/.test
 	$(BIN)/ruff check .
