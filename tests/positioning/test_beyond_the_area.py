@@ -65,6 +65,13 @@ def test_there_predictions_of_the_edge_may_hold_or_not(serving):
     assert abs(found[1] - found[0]) > 0.01
 
 
+def test_a_cell_that_the_map_lacks_is_likelier_there():
+    """By half of what the null hypothesis gains from it: 0.5 nats at full weight."""
+    found = np.zeros(2)
+    MODEL.weigh(cloud_at((25.0, 25.0), (WIDTH_M + 80.0, 25.0)), found, RadioReading(-1, 0.4))
+    assert found == pytest.approx([0.0, np.log((1 + np.exp(0.2)) / 2)], abs=1e-6)
+
+
 @pytest.mark.parametrize("off", [0.0, 0.3, 1.0])
 def test_a_metre_costs_the_same_on_and_off_ways_there(off):
     state = cloud_at((-50.0, 20.0)).state

@@ -21,7 +21,7 @@ from mapfilter.positioning.bayes.model import BayesModel, Start
 from mapfilter.positioning.bayes.radio import name_of
 from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow, headed
-from mapfilter.positioning.gnss.gate import FixTerm, widened
+from mapfilter.positioning.gnss.gate import FixTerm, refutation, widened
 from mapfilter.positioning.kalman.belief import gaussian_radii_m, share_within
 from mapfilter.positioning.kalman.static_fix import (
     BAD_GEOMETRY,
@@ -328,3 +328,24 @@ class PressureEpoch(Epoch):
 )
 def test_whether_an_epoch_holds_a_measurement(measured, epoch):
     assert epoch.measured is measured
+
+
+@pytest.mark.parametrize("sd_m", [10.0, 30.0, 100.0, 2000.0])
+def test_a_fix_refutes_nothing_but_by_agreeing_with_a_narrow_belief(sd_m):
+    """A belief as wide as the area expects any fix; one of 20 m is right by no chance."""
+    side_m, middle_m = 1000.0, 500.0
+    axis = np.arange(2.5, side_m, 5.0)
+    wide = np.stack(np.meshgrid(axis, axis)).reshape(2, -1).astype(np.float32)
+    angle = np.linspace(0, 2 * np.pi, 40)
+    narrow = (middle_m + 20 * np.stack([np.cos(angle), np.sin(angle)])).astype(np.float32)
+    fix = GnssFix(middle_m, middle_m, sd_m**2, sd_m**2, 0.0)
+
+    def refuted(places):
+        gain = FixTerm(fix, (0.0, 0.0)).log_likelihood(places)
+        return refutation(fix, float(np.log(np.mean(np.exp(gain)))), side_m**2)
+
+    assert refuted(wide) == pytest.approx(0.0, abs=0.1)
+    # Uniform over the area, and Gaussian about the narrow belief; at most 5 nats.
+    expected = np.log(2 * np.pi * sd_m**2 / side_m**2) + 0.5 * (20 / sd_m) ** 2
+    assert refuted(narrow) == pytest.approx(min(max(expected, -5.0), 0.0), abs=0.01)
+    assert refuted(narrow) < -2.0 or sd_m >= 100.0

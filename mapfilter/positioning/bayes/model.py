@@ -254,9 +254,9 @@ class BayesModel:
         self, cloud: Cloud, log_weight: Floats, reading: RadioReading
     ) -> tuple[Cloud, Reason]:
         """Add the log-likelihood of a report, then of each further term, in place."""
-        # A serving cell that the map lacks weighs all hypotheses alike.
+        # A serving cell that the map lacks weighs all hypotheses in the area alike.
         used = reading.serving_weight > 0
-        if reading.serving >= 0 or reading.levels is not None or reading.bounds:
+        if used or reading.serving >= 0 or reading.levels is not None or reading.bounds:
             pixel = self._pixels(cloud.state)
             used = True
             cloud, before = self._aged(cloud, reading), log_weight.copy()

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from math import inf, isfinite, nan, sqrt
+from math import inf, isfinite, log, nan, pi, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,7 +47,7 @@ _RESET_GATE = 0.5
 _F = np.float32
 _FIX_SD_M = 10.0
 _FIX_CLIP = 5.0
-_ANYWHERE_NATS, _MOST_REFUTED_NATS, _ENOUGH_SATELLITES = -8.0, 5.0, 3
+_MOST_REFUTED_NATS = 5.0
 
 
 @dataclass(frozen=True)
@@ -73,15 +73,21 @@ class FixTerm:
         return np.asarray(-0.5 * np.minimum(square, _FIX_CLIP**2), dtype=np.float64)
 
 
-def refutation(log_weight: Floats, gain: Floats) -> float:
-    """Return the log-likelihood of a reading under the null hypothesis, less that of a belief.
+def refutation(fix: GnssFix, total: float, area_m2: float) -> float:
+    """Return the log-likelihood of a fix under the null hypothesis, less that of a belief.
 
-    Under the null hypothesis the reading may be of anywhere in the area: what a wide belief expects
-    refutes nothing, what agrees with a narrow one does, up to a bound, as readings may be faulty.
+    Under the null hypothesis the fix may be of any place in the area: what a wide belief expects
+    refutes nothing, what agrees with a narrow one does, up to a bound, as fixes may be faulty.
+
+    Parameters
+    ----------
+    total : float
+        Log-likelihood of the fix under the belief, relative to that at the fix.
     """
-    total = np.logaddexp.reduce(log_weight + gain) - np.logaddexp.reduce(log_weight)
-    less = _ANYWHERE_NATS - float(total - gain.max())
-    return min(max(less, -_MOST_REFUTED_NATS), 0.0)
+    cross = fix.cov_east_north_m2 if isfinite(fix.cov_east_north_m2) else 0.0
+    spread_m4 = max(fix.var_east_m2, 1.0) * max(fix.var_north_m2, 1.0) - cross**2
+    anywhere = log(2 * pi * sqrt(max(spread_m4, 1.0)) / area_m2)
+    return min(max(min(anywhere, 0.0) - total, -_MOST_REFUTED_NATS), 0.0)
 
 
 def widened(fix: GnssFix, times: float) -> GnssFix:
@@ -153,11 +159,15 @@ class GnssComparison(NamedTuple):
 
 @dataclass(frozen=True)
 class GnssGate:
-    """Compares fixes and pseudoranges with beliefs, in the map's CRS and the hypotheses' frame."""
+    """Compares fixes and pseudoranges with beliefs, in the map's CRS and the hypotheses' frame.
+
+    ``area_m2`` is the size of the map.
+    """
 
     options: GnssOptions
     crs: str
     origin_m: tuple[float, float]
+    area_m2: float
 
     def compare(
         self,
@@ -198,7 +208,8 @@ class GnssGate:
         if time_s < state.probation_until_s:
             return found.without("gnss", [""], Reason.ON_PROBATION, compared=True)
         gone_m = travelled_m - state.fix_used_at_m
-        wide = widened(fix, max(options.fix_memory_m / max(gone_m, MIN_MOVED_M), 1.0))
+        times = max(options.fix_memory_m / max(gone_m, MIN_MOVED_M), 1.0)
+        wide = widened(fix, times)
         term, log_weight = FixTerm(wide, self.origin_m), belief.log_weight
         gain = term.log_likelihood(belief.state)
         total = float(np.logaddexp.reduce(log_weight + gain) - np.logaddexp.reduce(log_weight))
@@ -209,7 +220,8 @@ class GnssGate:
         state = replace(state, fix_used_at_m=travelled_m, rejected_since_s=nan)
         # The likelihood of the whole belief is judged here, so it does not count in the CUSUM.
         terms = (*found.terms, term, FixedTerm(np.array([-total])))
-        under_null = found.under_null + refutation(log_weight, gain)
+        # Fixes in a row repeat the same error, and refute by the share that is new.
+        under_null = refutation(wide, total, self.area_m2) / times
         return found._replace(state=state, terms=terms, under_null=under_null, compared=True)
 
     def _compare_ranges(
@@ -243,10 +255,7 @@ class GnssGate:
             names = tuple(name for name in sky.names if name not in kept.names)
             receiver = replace(receiver, covariance=result.covariance, used_at_m=travelled_m)
             rows, state = result.rows, replace(state, rejected_since_s=nan)
-            gain, under_null = self._mixed(result.gain), found.under_null
-            if len(kept.names) >= _ENOUGH_SATELLITES:
-                under_null += refutation(belief.log_weight, gain)
-            found = found._replace(terms=(*found.terms, FixedTerm(gain)), under_null=under_null)
+            found = found._replace(terms=(*found.terms, FixedTerm(self._mixed(result.gain))))
         receiver, carrying = centred(receiver, rows, belief.state)
         belief, state = replace(belief, state=carrying), replace(state, receiver=receiver)
         return found.without(kind, names, why, belief=belief, state=state, compared=True)

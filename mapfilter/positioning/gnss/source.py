@@ -93,7 +93,9 @@ class GnssSource(EvidenceSource):
     @cached_property
     def gate(self) -> GnssGate:
         """Comparison with beliefs in the area's frame."""
-        return GnssGate(self.options, self.area.lattice.crs, self.area.origin_m)
+        width_m, height_m = self.area.size_m
+        crs, origin_m = self.area.lattice.crs, self.area.origin_m
+        return GnssGate(self.options, crs, origin_m, width_m * height_m)
 
     def begin(self) -> GnssState:
         """Return the state before the first comparison."""
