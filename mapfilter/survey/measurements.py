@@ -209,13 +209,15 @@ def _expanded(
 ) -> list[Path]:
     suffixes = _SUFFIXES if recorded is None else (*_SUFFIXES, *_RECORDED_SUFFIXES)
     found: list[Path] = []
+
+    def is_read(path: Path) -> bool:
+        if path.is_dir():
+            return recorded is not None and _is_log(path)
+        return path.suffix.lower() in suffixes
+
     for path in map(Path, files):
-        if path.is_dir() and not (recorded is not None and _is_log(path)):
-            inside = sorted(
-                inner
-                for inner in path.iterdir()
-                if (_is_log(inner) if inner.is_dir() else inner.suffix.lower() in suffixes)
-            )
+        if path.is_dir() and not is_read(path):
+            inside = sorted(filter(is_read, path.iterdir()))
             if not inside:
                 raise fail(InputError, str(path), f"files {', '.join(suffixes)}", "none")
             found += inside

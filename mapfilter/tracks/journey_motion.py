@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 
+import numpy as np
 import pandas as pd
 
+from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.frame import Frame
@@ -18,6 +21,7 @@ from mapfilter.tracks.pdr.walk import reckon_walk
 from mapfilter.tracks.readers.recording import Recording
 
 _PROVIDERS = ("gps", "fused", "flp", "network", "nlp")
+_LONGEST_GAP_S = 3600.0
 
 
 def measured_positions(recording: Recording) -> tuple[pd.DataFrame | None, str]:
@@ -70,6 +74,11 @@ def journey_motion(
         How steps are made of a phone's sensors, None for no steps.
     true : sequence of Recording
         Those of the truth: their speed and course, no positions, serve where no other has any.
+
+    Raises
+    ------
+    InputError
+        Odometry pauses for more than an hour, or there is no course where it is asked for.
     """
     for name in ("motion", "odometry", "poses"):
         having = [r for r in recordings if name in r.tables]
@@ -79,6 +88,7 @@ def journey_motion(
             notes.append(f"{other.path.name}: {name} not used, {having[0].path.name} has it, too")
         rows = having[0].tables[name]
         if name == "odometry":
+            _check_gaps(having[0], rows["time_s"].to_numpy(dtype=np.float64))
             moved, imu, words = reckon_odometry(rows)
             notes += words
             return Moved(moved, imu)
@@ -95,6 +105,27 @@ def journey_motion(
         notes += walked.notes
         return Moved(walked.motion, walked.imu, walked.reckoning)
     return Moved()
+
+
+def _check_gaps(recording: Recording, time_s: Floats) -> None:
+    """Raise InputError where odometry pauses for more than an hour, as between journeys."""
+    gaps = np.flatnonzero(np.diff(time_s) > _LONGEST_GAP_S)
+    if not gaps.size:
+        return
+    row = int(gaps[0]) + 1
+    before, after = (_shown_time(recording, float(time)) for time in time_s[row - 1 : row + 1])
+    hours = (time_s[row] - time_s[row - 1]) / 3600
+    more = f"; {gaps.size} such gaps" if gaps.size > 1 else ""
+    got = f"{hours:.1f} h from {before} (row {row}) to {after} (row {row + 1}){more}"
+    where, expected = f"{recording.path}, odometry", "rows at most 1 h apart"
+    hint = "a recording of several journeys: split it there, convert each alone"
+    raise fail(InputError, where, expected, got, hint)
+
+
+def _shown_time(recording: Recording, time_s: float) -> str:
+    if not recording.clock.absolute:
+        return f"{time_s:g} s"
+    return datetime.fromtimestamp(time_s, UTC).isoformat(" ", "seconds").removesuffix("+00:00")
 
 
 def _course(

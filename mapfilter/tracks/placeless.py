@@ -14,23 +14,22 @@ LOCAL_FRAME_HINT = "convert it with --crs EPSG:CODE, and --origin LAT,LON of its
 
 
 def is_local_frame(crs: str) -> bool:
-    """Return whether a CRS has no name: that of a log in metres of its own.
+    """Return whether a CRS is that of a log in metres of its own: nameless, and at 0, 0 (degrees).
 
     Examples
     --------
-    >>> is_local_frame("EPSG:32635"), is_local_frame("+proj=tmerc +lat_0=0 +lon_0=0 +type=crs")
-    (False, True)
+    >>> is_local_frame("+proj=tmerc +lat_0=0 +lon_0=0 +type=crs")
+    True
+    >>> is_local_frame("EPSG:32635"), is_local_frame("+proj=utm +zone=35 +datum=WGS84")
+    (False, False)
     """
-    return short_crs(crs) == "unknown" or crs.startswith("+proj")
-
-
-def is_placed(crs: str) -> bool:
-    """Return whether a CRS lies elsewhere than at 0, 0 (degrees), where unplaced frames lie."""
+    if not (short_crs(crs) == "unknown" or crs.startswith("+proj")):
+        return False
     operation = CRS.from_user_input(crs).coordinate_operation
-    if not is_local_frame(crs) or operation is None:
-        return True
     names = ("Latitude of natural origin", "Longitude of natural origin")
-    return any(one.value for one in operation.params if one.name in names)
+    params = [] if operation is None else operation.params
+    origin = [one.value for one in params if one.name in names]
+    return bool(origin) and not any(origin)
 
 
 def in_frame(log: TrackLog, crs: str) -> TrackLog:

@@ -62,6 +62,8 @@ def run_info(path: Path) -> dict[str, Any]:
         raise fail(InputError, str(path), "a database, raster file or log", "nothing there")
     if path.is_file():
         return _file_info(path)
+    if not path.is_dir():
+        raise fail(InputError, str(path), "a file or folder", "a device or pipe")
     if (path / MANIFEST).exists():
         return {"kind": "database", **info(open_database(path, verify="full"))}
     if is_log(path):
@@ -92,7 +94,7 @@ def _file_info(path: Path) -> dict[str, Any]:
     if name.endswith(_MAPS):
         box = dict(zip(("west", "south", "east", "north"), map_bounds_deg(path), strict=True))
         return {"kind": "map", "bounds_deg": box, "bytes": path.stat().st_size, "use": "area.map"}
-    if path.stem in TABLES or is_log(path.parent):
+    if is_log(path.parent):
         hint = "a part of a log; name the folder that it lies in"
         raise fail(InputError, str(path), _EXPECTED, "a file", hint)
     if suffix in _LAYERS or (suffix == ".json" and _is_geojson(path)):
@@ -208,10 +210,11 @@ def _is_classes(path: Path) -> bool:
 
 def _geotiff_info(path: Path) -> dict[str, Any]:
     with rasterio.open(path) as source:
+        unit = "deg" if source.crs and source.crs.is_geographic else "m"
         found = {
             "crs": short_crs(str(source.crs)) if source.crs else "none",
-            "bounds_m": [float(edge) for edge in source.bounds],
-            "resolution_m": float(source.res[0]),
+            f"bounds_{unit}": [float(edge) for edge in source.bounds],
+            f"resolution_{unit}": float(source.res[0]),
             "rows": source.height,
             "cols": source.width,
         }
@@ -220,23 +223,29 @@ def _geotiff_info(path: Path) -> dict[str, Any]:
 
 
 def _values_of(path: Path) -> list[int]:
-    """Return the values of a raster of few classes; of a large one those of a thinned copy."""
+    """Return the values of a raster of few classes, without that of no data.
+
+    Of a large one they are those of a thinned copy.
+    """
     with rasterio.open(path) as source:
         thin = max(1, int(np.ceil((source.height * source.width / _SAMPLED_PX) ** 0.5)))
         shape = (max(1, source.height // thin), max(1, source.width // thin))
-        values = np.unique(source.read(1, out_shape=shape))
+        values = np.unique(source.read(1, out_shape=shape, masked=True).compressed())
     return [int(value) for value in values] if values.size <= _MOST_VALUES else []
 
 
 def _is_geojson(path: Path) -> bool:
-    with path.open("rb") as stream:
-        return b'"FeatureCollection"' in stream.read(_LONGEST_LINE_BYTES)
+    return b'"FeatureCollection"' in _beginning(path)
 
 
 def _first_line(path: Path) -> bytes:
+    return _beginning(path).split(b"\n", 1)[0]
+
+
+def _beginning(path: Path) -> bytes:
     try:
         with path.open("rb") as stream:
-            return stream.readline(_LONGEST_LINE_BYTES)
+            return stream.read(_LONGEST_LINE_BYTES)
     except OSError as error:
         raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
 

@@ -11,7 +11,7 @@ from mapfilter._types import Bools, Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import unproject
 from mapfilter.survey.measurement_files import Rows
-from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_placed
+from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import format_of, read_recording
 from mapfilter.tracks.schema import TABLES
@@ -58,7 +58,7 @@ def recorded_rows(path: Path) -> Rows | None:
 def _log_rows(path: Path) -> Rows:
     """Return the levels of a track log, placed by its ground truth, else by its fixes."""
     log = read_log(path)
-    if not is_placed(log.crs):
+    if is_local_frame(log.crs):
         raise fail(InputError, f"{path}, crs", "a CRS", LOCAL_FRAME, LOCAL_FRAME_HINT)
     places = log.gnss if log.truth.empty else log.truth
     if log.radio.empty or places.empty:

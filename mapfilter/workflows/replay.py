@@ -272,15 +272,8 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
             return database.plan
         return planned_cells(config, crs) if config.cells.plan else CellPlan(crs, ())
 
-    filters: dict[tuple[str, ...], Filter[Any]] = {}
-
-    def over(crs: str, fitted: FilterOptions, *notes: str) -> Filter[Any]:
-        key = (crs, *notes)
-        if key not in filters:
-            filters[key] = bound(crs, fitted, cells=STREETS_ALONE not in notes)
-        return filters[key]
-
-    def bound(crs: str, fitted: FilterOptions, *, cells: bool = True) -> Filter[Any]:
+    @cache
+    def over(crs: str, fitted: FilterOptions, *, cells: bool) -> Filter[Any]:
         if database is not None and not isinstance(fitted, KalmanFilter):
             return fitted.over(database if cells else database.without_cells())
         plan = sites(crs)
@@ -290,7 +283,7 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         journeys.check_siteless()
     if database is not None:
         journeys.check(database.lattice)
-        over(database.lattice.crs, options)
+        over(database.lattice.crs, options, cells=True)
     ensure_writable_folder(out)
     clear_results(out)
     logs: list[ReplayedLog] = []
@@ -303,7 +296,7 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         fitted, notes = fitted_to_log(options, log)
         if database is not None and by_streets_alone(fitted, log, database):
             notes = (*notes, STREETS_ALONE)
-        filter_ = over(crs, fitted, *notes)
+        filter_ = over(crs, fitted, cells=STREETS_ALONE not in notes)
         log = replace(log, notes=(*log.notes, *notes))
         rng = named_rng(config.journeys.seed, "replay", name)
         drawn = wanted == "all" or (wanted == "first" and not index)

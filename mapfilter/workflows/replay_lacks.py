@@ -32,6 +32,8 @@ def check_log(path: Path, log: TrackLog, lattice: Lattice, faults: Faults) -> No
         expected = f"{short_crs(lattice.crs)}, the database's"
         local = is_local_frame(log.crs)
         hint = LOCAL_FRAME_HINT if local else "log of another area or zone"
+        if not local and short_crs(log.crs) == "unknown":
+            hint = f"convert it with --crs {short_crs(lattice.crs)}"
         faults.add(f"{path}, crs", expected, LOCAL_FRAME if local else log.crs, hint)
         return
     for table in ("truth", "gnss"):

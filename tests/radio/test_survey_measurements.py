@@ -195,6 +195,13 @@ def test_files_gaps_and_folders_make_sessions(tmp_path):
     assert joined.sessions == ("a", "b")
 
 
+def test_a_track_log_in_a_folder_is_passed_over(tmp_path):
+    write(tmp_path, PLAIN)
+    (tmp_path / "walk").mkdir()
+    write(tmp_path / "walk", "{}", "log.json")
+    assert len(read_measurements([tmp_path])) == 20
+
+
 def test_files_without_any_good_row_are_refused_together(tmp_path):
     asu = write(tmp_path, "cell,lat,lon,level_dbm\nA,60.1,24.9,20\nA,60.1,24.9,21\n", "asu.csv")
     nothing = write(tmp_path, "cell,lat,lon,level_dbm\n", "nothing.csv")

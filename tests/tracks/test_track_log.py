@@ -7,7 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapfilter.errors import InputError
+from mapfilter.geodesy import projected_crs
 from mapfilter.tracks.log import make_log
+from mapfilter.tracks.placeless import is_local_frame
 
 CRS = "EPSG:32629"
 
@@ -211,3 +213,10 @@ def test_order_of_the_rows_does_not_matter(time, random):
     pd.testing.assert_frame_equal(make_log(CRS, motion=shuffled).motion, once)
     pd.testing.assert_frame_equal(make_log(CRS, motion=once).motion, once)
     assert once["time_s"].is_monotonic_increasing
+
+
+def test_only_an_unplaced_frame_is_local():
+    assert is_local_frame(projected_crs("+proj=tmerc +lat_0=0 +lon_0=0 +type=crs"))
+    for placed in ("+proj=utm +zone=35 +datum=WGS84", "+proj=tmerc +lat_0=60 +lon_0=25"):
+        assert not is_local_frame(placed)
+        assert not is_local_frame(projected_crs(f"{placed} +type=crs"))

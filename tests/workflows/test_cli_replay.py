@@ -286,6 +286,29 @@ def test_a_logs_randomness_depends_on_its_name_not_on_its_neighbours(world, tmp_
     assert second[0] == second[1] != first[0]
 
 
+@pytest.mark.parametrize("same", ["options", "notes"])
+def test_logs_share_a_filter_where_their_options_are_equal(same, world, tmp_path, monkeypatch):
+    fits, filters = [], []
+
+    def fitted(options, _log):
+        fits.append(len(fits) + 1.0)
+        if same == "options":
+            return options, (f"at {fits[-1]} m/s",)
+        return replace(options, margin_db=fits[-1]), ("fitted",)
+
+    def drawing(log, filter_, rng, **options):
+        filters.append(filter_)
+        return locate(log, filter_, rng, **options)
+
+    monkeypatch.setattr("mapfilter.workflows.replay.fitted_to_log", fitted)
+    monkeypatch.setattr("mapfilter.workflows.replay.locate", drawing)
+    settings = ["output.pictures=none", f"database.path={world.database}"]
+    config = load_config(world.toml, [*settings, f"track.path={world.journeys}"])
+    run_replay(config, tmp_path / "out")
+    assert len(filters) > 1
+    assert len(set(map(id, filters))) == (1 if same == "options" else len(filters))
+
+
 def test_results_of_an_older_replay_do_not_stay_beside_new_ones(world, log, replay, tmp_path):
     out = tmp_path / "out"
     for keep in ("notes.txt", "other/notes.txt", "my-walk/figures.json", f"{ONE}-b/figures.json"):

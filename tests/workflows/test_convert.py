@@ -313,6 +313,17 @@ def test_a_speed_and_a_yaw_rate_are_odometry(speed, rate, tmp_path):
     assert read_log(tmp_path / "log").motion.empty
 
 
+def test_odometry_of_many_journeys_is_refused_at_the_first_gap(tmp_path):
+    """Sixty rows over eleven months."""
+    moments = pd.date_range("2026-01-01T00:00:00", "2026-11-30T00:00:00", 60)
+    rows = "".join(f"{moment.isoformat()}Z,9,1\n" for moment in moments)
+    (tmp_path / "year.csv").write_text(f"time,speed_mps,yaw_rate_degps\n{rows}")
+    told = r"year\.csv, odometry: expected rows at most 1 h apart, found 135\.5 h from 2026-01-01 "
+    with pytest.raises(InputError, match=rf"{told}00:00:00 \(row 1\) to .* \(row 2\); 59 such"):
+        run_convert([tmp_path / "year.csv"], tmp_path / "log")
+    assert not (tmp_path / "log").exists()
+
+
 def test_dates_of_a_plain_table(tmp_path):
     path = tmp_path / "drive.csv"
 

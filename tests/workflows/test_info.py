@@ -1,6 +1,7 @@
 """``info`` says what files and folders of all kinds are, and where to use them."""
 
 import gzip
+from pathlib import Path
 
 import geopandas
 import numpy as np
@@ -10,7 +11,9 @@ import shapely
 from command_line import assert_done, assert_refused, mapfilter
 from made_recordings import MADE
 
+from mapfilter.errors import InputError
 from mapfilter.roads.maps import resolve_map
+from mapfilter.workflows.info import run_info
 
 
 def info(path):
@@ -121,9 +124,44 @@ def test_an_output_folder_names_what_it_holds(world):
     [
         ("towers.json", b'{"a": 1}\n', "it begins with '{\"a\": 1}'"),
         ("graph.gz", gzip.compress(b"<graphml>"), "a binary file"),
-        ("motion.csv", b"time_s\n", "a part of a log; name the folder that it lies in"),
     ],
 )
 def test_files_of_other_kinds(name, content, told, tmp_path):
     (tmp_path / name).write_bytes(content)
     assert_refused(mapfilter("info", tmp_path / name), told)
+
+
+def test_a_part_of_a_log_is_told_by_its_folder(tmp_path):
+    (tmp_path / "gnss.csv").write_text("time,lat,lon\n0,60,24\n1,60.001,24\n")
+    assert info(tmp_path / "gnss.csv")["kind"] == "recording"
+    (tmp_path / "log.json").write_text("{}")
+    assert_refused(mapfilter("info", tmp_path / "gnss.csv"), "name the folder that it lies in")
+
+
+def test_a_raster_in_degrees_without_its_empty_cells(tmp_path):
+    values = np.array([[0, 1], [7, 255]], dtype=np.uint8)
+    with rasterio.open(
+        tmp_path / "use.tif", "w", driver="GTiff", height=2, width=2, count=1, dtype="uint8",
+        crs="EPSG:4326", transform=rasterio.Affine(0.5, 0, 24, 0, -0.5, 61), nodata=255,
+    ) as target:  # fmt: skip
+        target.write(values, 1)
+    found = info(tmp_path / "use.tif")
+    assert found["bounds_deg"] == [24.0, 60.0, 25.0, 61.0]
+    assert (found["resolution_deg"], found["values"]) == (0.5, [0, 1, 7])
+    assert "bounds_m" not in found
+
+
+def test_a_device_is_no_file():
+    with pytest.raises(InputError, match="/dev/null: expected a file or folder"):
+        run_info(Path("/dev/null"))
+
+
+def test_a_file_that_cannot_be_opened_is_refused(tmp_path, monkeypatch):
+    (tmp_path / "a.json").write_text("{}")
+
+    def refuse(*_args, **_kwargs):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(InputError, match="a readable file, found Permission denied"):
+        run_info(tmp_path / "a.json")
