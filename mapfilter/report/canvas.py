@@ -200,13 +200,13 @@ def distinct_colours(count: int) -> list[str]:
 
     The first seven are those of Okabe and Ito (2008) with a darker yellow, the next eight differ
     from them in lightness, the next 45 are lighter and darker ones of these; further ones go round
-    the hues by the golden angle. No two are equal, but not all can be told apart by eye, which is
-    why maps also name every group in its place.
+    the hues by the golden angle. Of the first 10 000 no two are equal, but not all can
+    be told apart by eye, which is why maps also name every group in its place.
 
     Examples
     --------
-    >>> len(set(distinct_colours(60))), len(set(distinct_colours(1000)))
-    (60, 1000)
+    >>> len(set(distinct_colours(60))), len(set(distinct_colours(10_000)))
+    (60, 10000)
     """
     colours = list(_DISTINCT)
     for grey, share in _TINTS:

@@ -92,6 +92,13 @@ def test_reports_without_position_or_reading_are_no_database():
     assert placed.notes == ("2 reports left out: no position, or nothing received",)
 
 
+def test_only_counts_of_what_was_left_out_are_added_up():
+    notes = ("3 dB steps", "2 readings left out: cell unknown")
+    one = make_reports(CRS, [0], ["a"], [-60.0], count=1, notes=notes)
+    joined = joined_reports([one, one])
+    assert joined.notes == ("3 dB steps", "4 readings left out: cell unknown")
+
+
 def test_logs_of_two_zones_are_not_joined():
     one = make_reports("EPSG:32635", [0], ["a"], [-60.0], count=1)
     other = make_reports("EPSG:32636", [0], ["a"], [-60.0], count=1)

@@ -309,8 +309,15 @@ def test_a_speed_and_a_yaw_rate_are_odometry(speed, rate, tmp_path):
     # Beside positions it is the speed of their receiver, and no motion unless asked for.
     rows = "".join(f"{k},{told},{turned},60.1{k},24.9\n" for k in range(11))
     (tmp_path / "drive.csv").write_text(f"time,{speed},{rate},lat,lon\n{rows}")
-    run_convert([tmp_path / "drive.csv"], tmp_path / "log")
+    result = run_convert([tmp_path / "drive.csv"], tmp_path / "log")
     assert read_log(tmp_path / "log").motion.empty
+    unused = "speed and yaw rate not used beside positions; name the column wheel_speed_mps"
+    assert unused in result.files[0].notes
+    rows = "".join(f"{k},{told},{turned},{9 * k},0\n" for k in range(11))
+    (tmp_path / "drive.csv").write_text(f"time,{speed},{rate},east_m,north_m\n{rows}")
+    result = run_convert([tmp_path / "drive.csv"], tmp_path / "log")
+    assert read_log(tmp_path / "log").motion.empty
+    assert unused in result.files[0].notes
 
 
 def test_odometry_of_many_journeys_is_refused_at_the_first_gap(tmp_path):

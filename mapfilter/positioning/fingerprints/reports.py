@@ -6,6 +6,7 @@ Cells, Wi-Fi access points, BLE beacons and LoRaWAN gateways are all transmitter
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -21,6 +22,7 @@ from mapfilter.tracks.schema import SERVING
 
 _LARGEST_GAP_S = 30.0
 """Between two true positions farther apart in time than this, none is interpolated."""
+_COUNTED = re.compile(r"(\d+) ((?:readings|reports|rows) left out: .*)", re.DOTALL)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -340,10 +342,10 @@ def joined_reports(parts: Sequence[Reports]) -> Reports:
 
 
 def _joined_notes(parts: Sequence[Reports]) -> tuple[str, ...]:
-    """Return the notes of all parts, each once; those that begin with a count are added up."""
+    """Return the notes of all parts, each once; counts of what was left out are added up."""
     counts: dict[str, int] = {}
     for note in (note for part in parts for note in part.notes):
-        number, _, rest = note.partition(" ")
-        text, count = (rest, int(number)) if number.isdigit() else (note, 0)
+        found = _COUNTED.fullmatch(note)
+        text, count = (found[2], int(found[1])) if found else (note, 0)
         counts[text] = counts.get(text, 0) + count
     return tuple(f"{count} {text}" if count else text for text, count in counts.items())

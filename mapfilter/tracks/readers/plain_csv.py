@@ -197,9 +197,15 @@ def _times(mapped: _Mapped, reading: Reading, options: ReadOptions) -> Floats:
 def _add_odometry(mapped: _Mapped, reading: Reading, time_s: Floats) -> None:
     wheels = mapped.has("wheel_speed_mps") or mapped.has("wheel_speed_kmh")
     turned = mapped.has("yaw_rate_radps") or mapped.has("yaw_rate_degps")
-    # Beside positions a speed is that of their receiver.
-    if not wheels and (not turned or mapped.has("lat_deg", "lon_deg")):
-        return
+    if not wheels:
+        if not turned or not any(map(mapped.has, _SPEEDS)):
+            return
+        # Beside positions a speed is that of their receiver.
+        if mapped.has("lat_deg", "lon_deg") or mapped.has("east_m", "north_m"):
+            reading.note(
+                "speed and yaw rate not used beside positions; name the column wheel_speed_mps"
+            )
+            return
     name = "wheel_speed" if wheels else "speed"
     speed = mapped.number(f"{name}_mps")
     if mapped.has(f"{name}_kmh"):
