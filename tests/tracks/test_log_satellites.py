@@ -143,7 +143,7 @@ def test_satellites_without_any_place_are_noted():
     log = make_log(CRS, pseudoranges=ranges(**dict.fromkeys(PLACE, np.nan)))
     (note,) = log.notes
     assert note.startswith("pseudoranges: 3 rows without the place")
-    assert "almanac" in note
+    assert "navigation file" in note
     placed = ranges(x_m=2.0e7, y_m=1.0e7, z_m=1.3e7)
     assert not make_log(CRS, pseudoranges=placed).notes
 

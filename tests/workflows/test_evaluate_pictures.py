@@ -24,7 +24,7 @@ SMALL = [
     "filter.bayes.switch_hold_m=5",
     "filter.bayes.min_search_particles=4000",
 ]
-CASES = ("levels-6", "cell-6")
+CASES = ("levels-6", "levels-bias10")
 
 
 def foreign(out, *settings, **more):
@@ -84,7 +84,7 @@ def test_the_alert_limit_and_the_risk_are_part_of_the_benchmark(tmp_path, usual)
     given = [arg for setting in SMALL for arg in ("--set", setting)]
     again = mapfilter(
         "evaluate", "global-positioning", "--world", "foreign", *given, "--runs", 2, "--seed", 1,
-        "--case", "levels-6", "--case", "cell-6", "--out", tmp_path, "--resume", "--workers", 1,
+        "--case", CASES[0], "--case", CASES[1], "--out", tmp_path, "--resume", "--workers", 1,
     )  # fmt: skip
     assert_refused(again, "benchmark.json", "integrity")
 
