@@ -56,7 +56,8 @@ if TYPE_CHECKING:
 MapBelief = ParticleBelief | GridBelief
 
 LEAST_LOG_ODDS = -12.0
-_MOST_LOG_ODDS, _BEYOND = 12.0, 3.0
+_MOST_LOG_ODDS, _MARGIN_NATS = 12.0, 3.0
+"""Bounds of the log odds; how far below the threshold of convergence that of a search is."""
 _PRIOR_LOG_ODDS = log(0.05 / 0.95)
 MAP_NATS_PER_M = 0.04
 """Negative log-likelihood of the map for each metre, under the null hypothesis."""
@@ -105,7 +106,7 @@ class AlternativeRules(Options):
 
     def least_log_odds(self, *, searching: bool) -> float:
         """Return the bound of the null hypothesis, lower while a belief has to refute it."""
-        return min(LEAST_LOG_ODDS, self.converge_log_odds - _BEYOND if searching else 0.0)
+        return min(LEAST_LOG_ODDS, self.converge_log_odds - _MARGIN_NATS if searching else 0.0)
 
 
 @dataclass(frozen=True, slots=True)

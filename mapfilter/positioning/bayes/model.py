@@ -52,6 +52,8 @@ _F = np.float32
 _OFF_SHARE, _TRIES = 0.2, 2
 _BEYOND_M, _BEYOND_SHARE, _BEYOND_AT_START = 300.0, 0.15, 0.05
 _BEYOND_COST_PER_M = 0.015
+"""Width of the belt around the area, its share of the first hypotheses and of the first belief, and
+the negative log-likelihood of each metre there, in a database with cells."""
 _AT_ONCE = 50_000
 _NEW_M = 50.0
 _LEAST_EXPECTED = 0.02

@@ -48,6 +48,7 @@ _F = np.float32
 _FIX_SD_M = 10.0
 _FIX_CLIP = 5.0
 _MOST_REFUTED_NATS = 5.0
+"""The most that one fix takes from the null hypothesis."""
 
 
 @dataclass(frozen=True)
@@ -81,8 +82,12 @@ def refutation(fix: GnssFix, total: float, area_m2: float) -> float:
 
     Parameters
     ----------
+    fix : GnssFix
+        With its variances.
     total : float
-        Log-likelihood of the fix under the belief, relative to that at the fix.
+        Log-likelihood of the fix under the belief, in nats; 0 for a belief at the fix.
+    area_m2 : float
+        Size of the area.
     """
     cross = fix.cov_east_north_m2 if isfinite(fix.cov_east_north_m2) else 0.0
     spread_m4 = max(fix.var_east_m2, 1.0) * max(fix.var_north_m2, 1.0) - cross**2
