@@ -35,6 +35,7 @@ _ASIDE = "old"
 _AT_FDCWD = -100
 _RENAME_EXCHANGE = 2
 _NO_PATH = (errno.ENAMETOOLONG, errno.ELOOP)
+_SEAL = "sha256"
 _SHOWN = 60
 _WRITE_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
@@ -152,7 +153,10 @@ def check_version(where: str, found: object, known: int) -> None:
     if found == known and not isinstance(found, bool):
         return
     newer = isinstance(found, int) and found > known
+    older = isinstance(found, int) and not isinstance(found, bool) and 0 < found < known
     hint = "written by a newer mapfilter; update it" if newer else "edited or damaged"
+    if older:
+        hint = "written by an older mapfilter; make it again"
     raise fail(StoreError, where, f"version {known}", found, hint)
 
 
@@ -166,13 +170,46 @@ def write_json(path: Path, value: Mapping[str, Any]) -> None:
 def read_json(path: Path) -> dict[str, Any]:
     """Read a JSON object; raise StoreError where it is missing, cut off or something else."""
     try:
-        value = json.loads(path.read_text(encoding="utf-8"))
+        data = path.read_bytes()
     except OSError as error:
         raise fail(StoreError, str(path), "a readable file", error.strerror or error) from error
+    return parse_json(data, str(path))
+
+
+def parse_json(data: bytes, where: str) -> dict[str, Any]:
+    """Return the JSON object that a file's bytes hold; raise StoreError for something else."""
+    try:
+        value = json.loads(data.decode("utf-8"))
     except (ValueError, RecursionError) as error:
-        raise fail(StoreError, str(path), "JSON", f"no JSON ({error})", "cut off") from error
+        raise fail(StoreError, where, "JSON", f"no JSON ({error})", "cut off") from error
     if not isinstance(value, dict):
-        raise fail(StoreError, str(path), "a JSON object", type(value).__name__)
+        raise fail(StoreError, where, "a JSON object", type(value).__name__)
+    return value
+
+
+def sealed(value: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a JSON object with the SHA-256 of all its other entries under ``sha256``."""
+    rest = {key: item for key, item in value.items() if key != _SEAL}
+    text = json.dumps(rest, sort_keys=True, separators=(",", ":"))
+    return {**rest, _SEAL: hashlib.sha256(text.encode()).hexdigest()}
+
+
+def check_seal(value: Mapping[str, Any], where: str) -> None:
+    """Raise StoreError where an object that :func:`sealed` made was changed, if only by a digit."""
+    if value.get(_SEAL) != sealed(value)[_SEAL]:
+        expected, got = "entries as they were written", "others, by their SHA-256"
+        raise fail(StoreError, where, expected, got, "edited or damaged")
+
+
+def write_sealed(path: Path, value: Mapping[str, Any]) -> None:
+    """Write a JSON object with its checksum, for :func:`read_sealed`."""
+    write_json(path, sealed(value))
+
+
+def read_sealed(path: Path) -> dict[str, Any]:
+    """Read a JSON object; raise StoreError where it is missing, cut off or changed."""
+    value = read_json(path)
+    check_seal(value, str(path))
     return value
 
 

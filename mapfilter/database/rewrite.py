@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mapfilter._io import atomic_dir, check_replaceable, sha256_file
+from mapfilter._io import atomic_dir, check_replaceable
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats32, Ints
 from mapfilter.database.manifest import FORMAT, MANIFEST, InputFile
@@ -86,7 +86,7 @@ def rewrite(
     check_replaceable(out, MANIFEST, FORMAT)
     parameters = database.manifest["parameters"]
     windows = tile_windows(database.lattice, parameters["tile_px"])
-    old = InputFile("database", database.path.name, sha256_file(database.path / MANIFEST))
+    old = InputFile("database", database.path.name, database.generation)
     with atomic_dir(out) as folder:
         tiles = _tiles(database.lattice, windows, routes, level_dbm, database.floor_dbm)
         crs, ids = database.lattice.crs, plan.ids

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mapfilter._io import ensure_writable_folder, sha256_file
+from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
-from mapfilter.database.manifest import MANIFEST, InputFile
+from mapfilter.database.manifest import InputFile
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, fail
 from mapfilter.learning.apply import apply_patch
@@ -69,7 +69,7 @@ def run_accept(
     patch = read_patch(patch_file)
     _check_apart(database, out)
     notes = []
-    if patch.database_sha256 != sha256_file(database / MANIFEST):
+    if patch.database_sha256 != opened.generation:
         notes.append("the patch was learned from another database, or an older state of this one")
     ensure_writable_folder(out.parent)
     changed = apply_patch(
