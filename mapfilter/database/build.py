@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from mapfilter._io import atomic_dir, check_replaceable
+from mapfilter._io import atomic_dir
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter._resume import FinishedParts
-from mapfilter.database.manifest import FORMAT, MANIFEST, InputFile
+from mapfilter.database.manifest import InputFile, check_database_replaceable
 from mapfilter.database.parquet import Window
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -124,7 +124,7 @@ def build(
     check_parameters(margin_db, floor_dbm, tile_px)
     job = BuildJob.of(rasters, plan, routes, floor_dbm, tile_px)
     out = Path(out)
-    check_replaceable(out, MANIFEST, FORMAT)
+    check_database_replaceable(out)
     parameters = {"margin_db": float(margin_db), "floor_dbm": float(floor_dbm), "tile_px": tile_px}
     with ExitStack() as stack:
         # The rasters are hashed while the first tiles are made.
@@ -175,7 +175,7 @@ def build_roads(
     source = LatticeRoutes(routes) if isinstance(routes, RouteLattice) else routes
     lattice, out = source.lattice, Path(out)
     windows = [w for w in tile_windows(lattice, tile_px) if source.holds(lattice.window(*w))]
-    check_replaceable(out, MANIFEST, FORMAT)
+    check_database_replaceable(out)
     parameters = {"margin_db": MARGIN_DB, "floor_dbm": FLOOR_DBM, "tile_px": tile_px}
     with atomic_dir(out) as folder:
         tiles = (roads_tile(source.part(lattice.window(*window)), lattice) for window in windows)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from pydantic import (
     model_validator,
 )
 
-from mapfilter._io import check_seal, check_version, parse_json, sha256_file
+from mapfilter._io import check_replaceable, check_seal, check_version, parse_json, sha256_file
 from mapfilter.database.checked import BLOCK_BYTES, checksums
 from mapfilter.database.checked import MANIFEST as MANIFEST
 from mapfilter.errors import Fault, Faults, StoreError, fail
@@ -34,6 +35,7 @@ _Layers = Literal["map", "roads", "tracks", "buildings", "water", "landuse", "la
 InputRole = _Layers | Literal["plan", "rasters", "database", "patch"]
 
 _LONGEST_NAME = 200
+_OWN = re.compile(r"cells\.parquet|points\.parquet|levels/[^/]+/part-[0-9]+\.parquet")
 _DAMAGED = "edited or damaged"
 _Count = Annotated[int, Field(ge=0)]
 _Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
@@ -178,6 +180,11 @@ def apart(names: Mapping[str, str]) -> dict[str, str]:
         key: name if times[name.casefold()] == 1 else f"{name}-{_digest(key)[:12]}"
         for key, name in names.items()
     }
+
+
+def check_database_replaceable(folder: Path) -> None:
+    """Raise OutputError where a folder, which may be absent, holds other files than a database."""
+    check_replaceable(folder, MANIFEST, FORMAT, lambda path: _OWN.fullmatch(path) is not None)
 
 
 def describe_part(folder: Path, file: Path, rows: int, cell: str | None = None) -> dict[str, Any]:

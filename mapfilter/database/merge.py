@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from mapfilter._io import atomic_dir, check_replaceable
+from mapfilter._io import atomic_dir
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats, Ints
-from mapfilter.database.manifest import FORMAT, MANIFEST, InputFile
+from mapfilter.database.manifest import InputFile, check_database_replaceable
 from mapfilter.database.parquet import Window, WindowReader, point_geometry
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -76,7 +76,7 @@ def merge(
         if any(overlap(lattice, database.lattice, window) for database in databases)
     ]
     out = Path(out)
-    check_replaceable(out, MANIFEST, FORMAT)
+    check_database_replaceable(out)
     inputs = tuple(
         InputFile("database", database.path.name, database.generation) for database in databases
     )
