@@ -7,14 +7,12 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
-from importlib.metadata import version
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from threading import Thread
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
 from mapfilter._io import atomic_dir
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
@@ -46,11 +44,12 @@ def work_key(
     parameters: Mapping[str, Any],
 ) -> str:
     """Return a checksum of everything that the tiles of a build depend on."""
-    read_as = (rasters.cell_ids, asdict(rasters.lattice), rasters.quantity, rasters.factor)
-    versions = version("mapfilter"), pa.__version__
+    # As they are read: values without data, headers and CRS may be declared, not in the files.
+    files = [repr(replace(one, path=Path(one.path.name), parts=())) for one in rasters.files]
+    read_as = (rasters.cell_ids, asdict(rasters.lattice), rasters.quantity, rasters.factor, files)
     cells = [asdict(cell) for cell in plan.cells]
     of_tiles = {name: value for name, value in parameters.items() if name != "margin_db"}
-    parts = (*versions, rasters_sha256, read_as, rasters.resampling, cells, routes_digest, of_tiles)
+    parts = (rasters_sha256, read_as, rasters.resampling, cells, routes_digest, of_tiles)
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 

@@ -200,13 +200,16 @@ def open_geotiff(path: Path, cell_id: str, declared: Declared) -> GeoTiff:
                 _check_bands(str(path), names, source.dtypes, faults)
                 lattice = _lattice(str(path), source, declared.crs, not caught, faults)
                 quantity, tagged = _quantity(source), QUANTITY_TAG in source.tags()
+                # Those beside it, such as .aux.xml, change what is read.
+                beside = sorted(path.with_name(Path(name).name) for name in source.files)
     except (RasterioError, UnicodeDecodeError) as error:
         got, hint = _reason(error), "cut off, or no raster"
         raise fail(InputError, str(path), "a raster that GDAL can read", got, hint) from error
     faults.raise_if_any(InputError)
     nodata = () if declared.nodata is None else (declared.nodata,)
     place = cast(Lattice, lattice)
-    return GeoTiff(path, names, place, nodata, (path,), quantity, tagged, described)
+    parts = tuple(dict.fromkeys((path, *(file for file in beside if file.is_file()))))
+    return GeoTiff(path, names, place, nodata, parts, quantity, tagged, described)
 
 
 def _masked(source: Any, bands: list[int], window: Any) -> Floats32:
