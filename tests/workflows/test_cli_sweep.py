@@ -217,10 +217,10 @@ def test_a_stopped_command_tells_how_to_go_on(own_world, monkeypatch):
     def stopped(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("mapfilter.workflows.sweep.sweep", stopped)
+    monkeypatch.setattr("mapfilter.experiments.sweep.run.run_batch", stopped)
     outcome = mapfilter("sweep", "-c", own_world.toml, *GRID)
     assert outcome.code == 3
-    assert "--resume" in outcome.err
+    assert "stopped by SIGINT: finished batches are kept: go on with --resume" in outcome.err
 
 
 VARIED = ("--vary", "imu.scale=0,0.1", "--vary", "filter.update_length_m=5,20")
