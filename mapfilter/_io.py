@@ -15,7 +15,7 @@ import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -107,6 +107,36 @@ def atomic_dir(path: Path) -> Iterator[Path]:
                 new.rename(target)
     finally:
         discard(partial, target)
+
+
+@contextlib.contextmanager
+def replaced_files(folder: Path, older: Callable[[], Iterable[Path]]) -> Iterator[Path]:
+    """Give a new folder; when the block succeeds, move the files in it into ``folder``.
+
+    Files of the same name there are replaced one by one, and those of ``older``, asked for then,
+    that have no successor are removed, with folders that they leave empty. All others stay, and if
+    the block fails, all. Raises OutputError where the folder cannot be written.
+    """
+    ensure_writable_folder(folder)
+    _, partial = _partial_folder(folder / "results")
+    new = partial / NEW
+    try:
+        with _writing(new, folder):
+            new.mkdir()
+            yield new
+        with _into_place(folder, folder):
+            stale = set(older())
+            for file in sorted(path for path in new.rglob("*") if not path.is_dir()):
+                target = folder / file.relative_to(new)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                file.replace(target)
+                stale.discard(target)
+            for path in sorted(stale):
+                path.unlink(missing_ok=True)
+                if path.parent != folder and not any(path.parent.iterdir()):
+                    path.parent.rmdir()
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
 
 
 def left_aside(path: Path) -> Path | None:

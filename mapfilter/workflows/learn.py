@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mapfilter._io import ensure_writable_folder
+from mapfilter._io import ensure_writable_folder, replaced_files
 from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
 from mapfilter.database.manifest import InputFile
@@ -16,7 +17,7 @@ from mapfilter.errors import ConfigError, fail
 from mapfilter.learning.apply import apply_patch
 from mapfilter.learning.patch import read_patch, write_patch
 from mapfilter.learning.phone import PhoneNoise
-from mapfilter.workflows.learn_report import PATCH, write_report
+from mapfilter.workflows.learn_report import PATCH, older_report, write_report
 from mapfilter.workflows.learn_study import study_logs
 
 
@@ -134,10 +135,11 @@ def run_learn(
     taught = study_logs(
         config, report, use_truth=use_truth, workers=workers, resume=resume, progress=progress
     )
-    findings = write_report(taught, report)
     proposed, changed = bool(taught.patch.changes), None
-    if proposed:
-        write_patch(taught.patch, report / PATCH)
+    with replaced_files(report, partial(older_report, report)) as new:
+        findings = write_report(taught, new)
+        if proposed:
+            write_patch(taught.patch, new / PATCH)
     if accept and proposed:
         inputs = (InputFile.of("patch", report / PATCH),)
         changed = apply_patch(taught.database, taught.patch, out, inputs=inputs).path
