@@ -36,6 +36,8 @@ from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog, leave_out
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import in_frame
+from mapfilter.tracks.store import is_log
+from mapfilter.workflows.apart import check_out_apart
 from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.pictures import ESTIMATES, FIGURES, SUMMARY, draw_track, older_results
 from mapfilter.workflows.replay_lacks import advice_of, check_log, lack_of
@@ -279,6 +281,8 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         plan = sites(crs)
         return cast(KalmanFilter, fitted).over_sites(plan, plan_antennas(config, plan))
 
+    own = [database.path] if database is not None else []
+    check_out_apart(out, [*own, *(path for path in journeys.paths if is_log(path))])
     if database is None and config.cells.plan is None:
         journeys.check_siteless()
     if database is not None:
