@@ -100,8 +100,9 @@ def job_of(name: str, work: Path) -> Job:
             return Job(out, lambda v: merge(parts, out, without=parts[0].cell_ids[:v]), database)
         rasters = open_rasters(work / "inputs" / "rxlev.tif")
         given = rasters, small_world.make_plan(), small_world.make_routes(), out
-        options = {"floor_dbm": small_world.FLOOR_DBM, "tile_px": 8, "resume": True}
-        return Job(out, lambda v: build(*given, margin_db=3.0 + v, **options), database)
+        options = {"tile_px": 8, "resume": True}
+        floor_dbm = small_world.FLOOR_DBM
+        return Job(out, lambda v: build(*given, floor_dbm=floor_dbm + v, **options), database)
     if name == "sweep":
         config = work / "inputs" / "world" / "world.toml"
         plans = [sweep_plans(load_config(config, [*_GRID, f"sweep.seed={v}"])) for v in (0, 1)]
@@ -250,7 +251,7 @@ def replace(work: Path, count: int) -> Counter[str]:
 
 def _read_all(folder: Path) -> str:
     database = open_database(folder)
-    digest = hashlib.sha256(repr(database.margin_db).encode())
+    digest = hashlib.sha256(repr(database.floor_dbm).encode())
     time.sleep(0.01)
     field, points = database.field(), database.points()
     arrays = [field.level_dbm, field.way_id, points.point, points.best_level_dbm]
@@ -277,11 +278,14 @@ def orphans(work: Path, count: int, seed: int = 1) -> Counter[str]:
     """Kill commands with workers at random moments; see who lives, and who holds their pipes."""
     make_inputs(work)
     toml = work / "inputs" / "world" / "world.toml"
-    settings = [f"--set={text}" for text in _GRID] + ["--set=sweep.draws=400"]
-    tiles = ["--set=database.tile_px=16"]
+    made = toml.with_name("out")
+    rasters = f"--set=rasters.path={json.dumps(str(made / 'rxlev.tif'))}"
+    grid = [f"--set={text}" for text in (*_GRID, "sweep.draws=400")]
+    grid += [rasters, f"--set=database.path={json.dumps(str(made / 'database'))}"]
+    tiles = [rasters, "--set=database.tile_px=16", '--set=output.pictures="none"']
     commands = {
         "build --workers 2": ["build", *tiles, "--workers", "2"],
-        "sweep --workers 2": ["sweep", *settings, "--workers", "2"],
+        "sweep --workers 2": ["sweep", *grid, "--workers", "2"],
         "build --cluster local:2": ["build", *tiles, "--cluster", "local:2"],
     }
     with _outcomes(work, "orphans") as outcomes:
@@ -290,7 +294,7 @@ def orphans(work: Path, count: int, seed: int = 1) -> Counter[str]:
             rng = np.random.default_rng((seed, number))
             out = ["--out", str(work / "killed" / name.split()[0])]
             given = [sys.executable, "-m", "mapfilter", *commands[name], "-c", str(toml), *out]
-            seconds = rng.uniform(0.5, 8.0)
+            seconds = rng.uniform(0.0, 4.0)
             signal_number = [signal.SIGKILL, signal.SIGTERM][number // len(commands) % 2]
             word = signal.Signals(signal_number).name
             outcomes[f"{name}, {word}: {_killed(given, seconds, signal_number)}"] += 1
@@ -301,8 +305,15 @@ def orphans(work: Path, count: int, seed: int = 1) -> Counter[str]:
 def _killed(command: list[str], seconds: float, number: signal.Signals) -> str:
     pipe = subprocess.PIPE
     with subprocess.Popen(command, stdout=pipe, stderr=pipe, start_new_session=True) as process:
+        # The moment counts from the first of the workers.
+        until_s = time.monotonic() + PATIENCE_S
+        while process.poll() is None and len(_session(process.pid)) < 2:
+            assert time.monotonic() < until_s, f"{command}: no worker"
+            time.sleep(0.02)
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(seconds)
+        ended = process.poll()
+        assert ended in (None, 0), f"{command}: {process.communicate()}"
         workers = len(_session(process.pid)) - 1
         process.send_signal(number)
         try:
@@ -315,6 +326,8 @@ def _killed(command: list[str], seconds: float, number: signal.Signals) -> str:
     while _session(process.pid):
         assert time.monotonic() < until_s, f"{command}: {_session(process.pid)} live on"
         time.sleep(0.05)
+    if ended == 0:
+        return "was done by then"
     return "with other processes, none left" if workers > 0 else "alone at that moment"
 
 
