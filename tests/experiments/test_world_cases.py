@@ -16,7 +16,7 @@ TIME_S = np.arange(1.0, 601.0)
 def test_the_cases_of_each_world():
     assert list(FOREIGN) == ["levels-6", "levels-bias10", "cell-6"]
     assert set(FAULTS) < set(HARSH)
-    assert set(CASES_OF) == {"foreign", "harsh"}
+    assert set(CASES_OF) == {"foreign", "harsh", "sensors"}
     for cases in CASES_OF.values():
         assert all(name == case.name for name, case in cases.items())
 

@@ -227,4 +227,4 @@ def test_the_world_is_known_by_its_checksum(made):
     assert world.sha256 == replace(world).sha256
     assert world.sha256 != replace(world, offsets_db=(1.0, 0.0)).sha256
     assert world.sha256 != replace(world, length_m=None).sha256
-    assert set(CASES_OF) == {"foreign", "harsh"}
+    assert set(CASES_OF) == {"foreign", "harsh", "sensors"}
