@@ -66,8 +66,13 @@ _MAIN = (
     "seconds_per_track",
 )
 _OF_FAULTS = (
+    "runs",
+    "wrong",
     "wrong_converged",
+    "error_mean_m",
+    "coverage_95",
     "claimed",
+    "off_50m",
     "fault_wrong",
     "fault_unnoticed",
     "fault_noticed_s",
@@ -154,7 +159,7 @@ def main_figures(case: CaseResult, names: Sequence[str] = _MAIN) -> dict[str, An
 def main_table(result: EvaluateResult) -> dict[str, Any]:
     """Return a result with the main figures of each case only."""
     faulty = any(isfinite(case.fault_wrong) for case in result.cases)
-    names = (*_MAIN, *_OF_FAULTS) if faulty else _MAIN
+    names = _OF_FAULTS if faulty else _MAIN
     return {**vars(result), "cases": [main_figures(case, names) for case in result.cases]}
 
 

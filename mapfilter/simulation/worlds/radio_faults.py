@@ -29,8 +29,8 @@ def radio_ends(log: TrackLog, window: Window, _rng: np.random.Generator) -> Trac
 def radio_frozen(log: TrackLog, window: Window, _rng: np.random.Generator) -> TrackLog:
     """Repeat the report at the begin at the usual rate, with cells and levels, as time goes on.
 
-    Phones answer from a cache while the screen is off: in a public recording of a train ride in
-    Belgium reports freeze within a minute, and are repeated for a kilometre.
+    Phones answer from a cache while the screen is off: in public recordings from Belgium reports
+    freeze within a minute or two, and are repeated for half a kilometre and more.
     """
     time_s, report = _reports(log)
     inside = np.flatnonzero(window.holds(time_s))
@@ -94,11 +94,10 @@ def cell_stale(log: TrackLog, window: Window, _rng: np.random.Generator) -> Trac
     last = np.searchsorted(time_s[rows], time_s[rows] - CACHE_S, side="right") - 1
     old = time_s[rows] - time_s[rows[np.maximum(last, 0)]]
     known = (last >= 0) & (old <= 2 * CACHE_S) & inside[rows]
-    level_dbm = radio["level_dbm"].to_numpy(dtype=np.float64).copy()
-    censored = radio["censored"].to_numpy(dtype=np.int64).copy()
-    level_dbm[rows[known]] = radio["level_dbm"].to_numpy()[rows[last[known]]]
-    censored[rows[known]] = radio["censored"].to_numpy()[rows[last[known]]]
-    return replace(log, radio=radio.assign(level_dbm=level_dbm, censored=censored))
+    source = np.arange(len(radio))
+    source[rows[known]] = rows[last[known]]
+    taken = {name: radio[name].array[source] for name in ("level_dbm", "censored")}
+    return replace(log, radio=radio.assign(**taken))
 
 
 def _reports(log: TrackLog) -> tuple[Floats, Ints]:
