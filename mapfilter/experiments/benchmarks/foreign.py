@@ -186,7 +186,7 @@ class RouteRuns:
             return Walk(truth), log
         rng = named_rng(world.seed, "sensor fault", case.sensor, number)
         log, window = faulty_log(case.sensor, log, rng)
-        return Walk(truth, fault_at_s=window.begin_s), log
+        return Walk(truth, fault_at_s=window.begin_s, fault_until_s=window.end_s), log
 
     def filter(self, choice: FilterOptions, case: WorldCase) -> Filter[Any]:
         """Return the filter over the database that a case is given."""
