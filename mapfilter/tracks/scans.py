@@ -16,7 +16,7 @@ def advertised(radio: pd.DataFrame) -> Bools:
     """Return which rows are advertisements of beacons: each is received by itself, at any time."""
     if "technology" not in radio:
         return np.zeros(len(radio), dtype=bool)
-    return (radio["technology"] == "BLE").fillna(False).to_numpy(dtype=bool)
+    return np.asarray((radio["technology"] == "BLE").fillna(False), dtype=bool)
 
 
 def scan_of_rows(radio: pd.DataFrame) -> Ints:

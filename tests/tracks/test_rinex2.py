@@ -1,7 +1,8 @@
-"""RINEX 2 observations: many satellites and types, events, and epochs that are damaged."""
+"""RINEX observations: years; of version 2 many satellites and types, events, and epochs that are damaged."""
 
 import numpy as np
 import pytest
+from made_recordings import MADE
 
 from mapfilter.tracks.readers import lines as line_reader
 from mapfilter.tracks.readers.formats import read_recording
@@ -115,3 +116,13 @@ def test_a_file_that_ends_within_an_epoch_keeps_what_it_has(read):
     last = recording.tables["satellites"].iloc[-1]
     assert (len(recording.tables["satellites"]), last["pseudorange_m"]) == (6, values[1, 1, 2])
     assert np.isnan(last["cn0_dbhz"])
+
+
+@pytest.mark.parametrize("year", ["6026", "2262", "0000"])
+def test_a_year_of_another_age_loses_its_epoch_alone(tmp_path, year):
+    path = tmp_path / "phone.26o"
+    text = MADE["rinex-obs"][1]
+    epochs = text.count("> 2026")
+    path.write_text(text.replace("> 2026", f"> {year}", 1))
+    rows = read_recording(path).tables["satellites"]
+    assert rows["time_s"].nunique() == epochs - 1
