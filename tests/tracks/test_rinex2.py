@@ -1,4 +1,4 @@
-"""RINEX observations: years; of version 2 many satellites and types, events, and epochs that are damaged."""
+"""RINEX observations: years; of version 2 many satellites and types, events, damaged epochs."""
 
 import numpy as np
 import pytest

@@ -126,8 +126,8 @@ def _seconds(texts: pa.Array) -> Floats:
         for name in ("year", "month", "day", "hour", "minute", "second")
     }
     part = {name: values.to_numpy(zero_copy_only=False) for name, values in part.items()}
-    # Nanoseconds since 1970 end in the year 2262.
-    whole = (part["minute"] < 60) & (part["year"] < 2262)
+    # GPS time begins in 1980, nanoseconds since 1970 end in 2262.
+    whole = (part["minute"] < 60) & (part["year"] >= 1980) & (part["year"] < 2262)
     for name, most in (("hour", 24), ("second", 61)):
         whole &= part[name] < most
     dates = pd.DataFrame({name: part[name] for name in ("year", "month", "day")})
