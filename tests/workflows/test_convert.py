@@ -359,7 +359,9 @@ def test_dates_of_a_plain_table(tmp_path):
     start_s = pd.Timestamp("2026-11-02T08:00:00.5Z").timestamp()
     assert (log.start_utc_s + log.gnss["time_s"] - start_s).tolist() == [0.0, 3.0, 6.0]
     for given, hint in (
-        ("11/02/2026 10:00:00", "day or month first? Years come first"),
+        ("11/02/2026 10:00:00", "day or month first? Write 2021-03-04, or 4.3.2021 with dots"),
+        ("04-03-2021 10:00:00", "day or month first? Write 2021-03-04, or 4.3.2021 with dots"),
+        ("4-3-21", "day or month first? Write 2021-03-04, or 4.3.2021 with dots"),
         ("yesterday", "found 'yesterday'"),
         ("32.13.2026 10:00", "found '32.13.2026 10:00'"),
     ):
