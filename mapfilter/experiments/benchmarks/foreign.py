@@ -235,5 +235,5 @@ def _city(streets: Path, ground: Path, sha256: str) -> City:  # noqa: ARG001
 
 
 @lru_cache(maxsize=32)
-def _filter(database: Path, choice: FilterOptions, sha256: str) -> Filter[Any]:  # noqa: ARG001
-    return choice.over(open_database(database), ways=False)
+def _filter(database: Path, choice: FilterOptions, sha256: str) -> Filter[Any]:
+    return choice.over(open_database(database, generation=sha256), ways=False)
