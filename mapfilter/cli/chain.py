@@ -309,7 +309,9 @@ def replay(
     ] = None,
     course_motion: Annotated[
         bool,
-        typer.Option("--course-motion", help="Make motion from speed and course of positions."),
+        typer.Option(
+            "--course-motion", help="Make motion from speed and course of GNSS, else its positions."
+        ),
     ] = False,
     filter_name: FilterOption = None,
     without: Annotated[

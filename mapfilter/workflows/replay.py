@@ -161,7 +161,7 @@ class ReplayResult:
     def warnings(self) -> tuple[str, ...]:
         """What was done in part only: cells unknown to the database, logs that lack something."""
         found = []
-        unknown = _sum(log.outcome.unknown_cells for log in self.logs)
+        unknown = _most_frequent(log.outcome.unknown_cells for log in self.logs)
         if unknown:
             verb = "cell is" if len(unknown) == 1 else "cells are"
             where = _named([log.name for log in self.logs if log.outcome.unknown_cells])
@@ -201,7 +201,7 @@ def summary_figures(result: ReplayResult) -> dict[str, Any]:
         "switched": sum(outcome.switched for outcome in outcomes),
         "final_statuses": _sum({o.final_status: 1} for o in outcomes if o.final_status),
         "unused": _sum(outcome.unused for outcome in outcomes),
-        "unknown_cells": _sum(outcome.unknown_cells for outcome in outcomes),
+        "unknown_cells": _most_frequent(outcome.unknown_cells for outcome in outcomes),
         "logs_with_unknown_cells": [log.name for log in result.logs if log.outcome.unknown_cells],
         "notes": _shared_notes(result.logs),
     }
@@ -227,6 +227,10 @@ def _sum(counts: Iterable[Mapping[str, int]]) -> dict[str, int]:
     for count in counts:
         total.update(count)
     return dict(sorted(total.items()))
+
+
+def _most_frequent(counts: Iterable[Mapping[str, int]]) -> dict[str, int]:
+    return dict(sorted(_sum(counts).items(), key=lambda one: -one[1]))
 
 
 def _named(names: Sequence[str]) -> str:

@@ -27,6 +27,7 @@ WRONG = 2
 """Exit code: the input or the command is wrong, or the machine too small for it."""
 
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_MOST_COUNTS = 12
 _MAX_TABLE_WIDTH = 200
 _STOPS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
@@ -198,7 +199,8 @@ def to_jsonable(value: Any) -> Any:
 def text_lines(found: Mapping[str, Any], indent: str = "") -> Iterator[str]:
     r"""Yield one line for each figure, nested ones indented; none for what is empty.
 
-    Rows of the same figures are a table, where it is not too wide.
+    Rows of the same figures are a table, where it is not too wide. Of many counts the largest are
+    shown, and what the others add up to.
 
     Examples
     --------
@@ -215,19 +217,32 @@ def text_lines(found: Mapping[str, Any], indent: str = "") -> Iterator[str]:
       name      runs
       levels-6    20
       cell-20      5
+    >>> counts = {f"cell-{i}": i for i in range(1, 20)}
+    >>> print(*list(text_lines({"unknown_cells": counts}))[-2:], sep="\n")
+      cell-8: 8
+      7 more: 28
     """
     for key, value in found.items():
         if isinstance(value, Mapping | list) and not value:
             continue
         if isinstance(value, Mapping):
             yield f"{indent}{key}:"
-            yield from text_lines(value, indent + "  ")
+            yield from text_lines(_largest(value), indent + "  ")
         elif isinstance(value, list):
             yield f"{indent}{key}:"
             for line in _table(value) or (_one_line(item, key) for item in value):
                 yield f"{indent}  {line}"
         else:
             yield f"{indent}{key}: {_short(value, key)}"
+
+
+def _largest(found: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the largest of many counts, and the sum of the others; anything else as it is."""
+    if len(found) <= _MOST_COUNTS or not all(type(value) is int for value in found.values()):
+        return found
+    rows = sorted(found.items(), key=lambda one: -one[1])
+    rest = rows[_MOST_COUNTS:]
+    return {**dict(rows[:_MOST_COUNTS]), f"{len(rest)} more": sum(count for _, count in rest)}
 
 
 def _table(rows: list[Any]) -> list[str]:
