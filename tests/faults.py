@@ -62,8 +62,12 @@ _RESUME = "is not finished: go on with --resume"
 
 
 def digest_of(folder: Path) -> dict[str, str]:
-    """Return the SHA-256 of each file in a folder."""
-    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    """Return the SHA-256 of each file in a folder; hidden ones are of writes cut short."""
+    files = sorted(
+        path
+        for path in folder.rglob("*")
+        if path.is_file() and not path.relative_to(folder).parts[0].startswith(".")
+    )
     return {
         path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
         for path in files
@@ -129,13 +133,22 @@ def job_of(name: str, work: Path) -> Job:
     return Job(out, lambda v: run_learn(configs[v], out, accept=True, resume=True), report)
 
 
-def make_inputs(work: Path) -> None:
-    """Make the inputs of all writers, once."""
+def make_inputs(work: Path, *jobs: str) -> None:
+    """Make the inputs of some writers, once."""
     inputs = work / "inputs"
-    if (inputs / "made").exists():
-        return
-    (inputs / "world").mkdir(parents=True)
-    world = small_world.make_world(inputs)
+    makers = {"build": _rasters, "merge": _parts, "sweep": _world, "learn": _journeys}
+    for job in jobs:
+        if not (inputs / f"made-{job}").exists():
+            inputs.mkdir(parents=True, exist_ok=True)
+            makers[job](inputs)
+            (inputs / f"made-{job}").touch()
+
+
+def _rasters(inputs: Path) -> None:
+    small_world.make_world(inputs)
+
+
+def _parts(inputs: Path) -> None:
     for name, ids in (("north", small_world.IDS[:2]), ("south", small_world.IDS[1:])):
         plan = small_world.make_plan()
         chosen = type(plan)(plan.crs, tuple(cell for cell in plan.cells if cell.id in ids))
@@ -143,9 +156,15 @@ def make_inputs(work: Path) -> None:
         small_world.write_rasters(inputs / f"{name}.tif", small_world.LATTICE, levels, chosen.ids)
         rasters = open_rasters(inputs / f"{name}.tif")
         options = {"floor_dbm": small_world.FLOOR_DBM, "tile_px": 8}
-        build(rasters, chosen, world.routes, inputs / name, **options)
-    commands = _module("workflows/conftest.py")
-    commands.make_world(inputs / "world")
+        build(rasters, chosen, small_world.make_routes(), inputs / name, **options)
+
+
+def _world(inputs: Path) -> None:
+    (inputs / "world").mkdir()
+    _module("workflows/conftest.py").make_world(inputs / "world")
+
+
+def _journeys(inputs: Path) -> None:
     plan = learning_world.plan_of()
     learning_world.database_of(plan, inputs / "taught")
     rng = np.random.default_rng(3)
@@ -154,7 +173,6 @@ def make_inputs(work: Path) -> None:
         for number in range(3 + variant):
             log = learning_world.log_of(true, rng, silent=("S1C",), blocks=16)
             write_log(log, inputs / f"logs-{variant}" / f"j{number}")
-    (inputs / "made").touch()
 
 
 def _module(name: str):  # type: ignore[no-untyped-def]
@@ -169,10 +187,11 @@ def _module(name: str):  # type: ignore[no-untyped-def]
 
 def kill(work: Path, count: int, seed: int = 1) -> Counter[str]:
     """Kill each of the writers in turn at random moments, and look at what it left."""
-    make_inputs(work)
+    turns = _TURNS if count >= len(_TURNS) else ("build", "merge")
+    make_inputs(work, *sorted(set(turns)))
     context = _forks()
     with _outcomes(work, "kill") as outcomes:
-        jobs = {name: job_of(name, work) for name in sorted(set(_TURNS[:count]))}
+        jobs = {name: job_of(name, work) for name in sorted(set(turns))}
         whole, longest_s = {}, {}
         for name, job in jobs.items():
             whole[name] = job.whole()
@@ -180,7 +199,7 @@ def kill(work: Path, count: int, seed: int = 1) -> Counter[str]:
             job.write(0)
             longest_s[name] = _BEYOND * (time.monotonic() - began_s)
         for number in range(outcomes.total(), count):
-            name = _TURNS[number % len(_TURNS)]
+            name = turns[number % len(turns)]
             ready, rng = context.Event(), np.random.default_rng((seed, number))
             writer = context.Process(target=_keep_writing, args=(name, work, number, ready))
             writer.start()
@@ -220,7 +239,7 @@ def _keep_writing(name: str, work: Path, number: int, ready) -> None:  # type: i
 
 def replace(work: Path, count: int) -> Counter[str]:
     """Replace a database while two readers open it and read all of it."""
-    make_inputs(work)
+    make_inputs(work, "build")
     context = _forks()
     with _outcomes(work, "replace") as outcomes:
         job = job_of("build", work)
@@ -276,7 +295,7 @@ def _keep_reading(folder: Path, whole: list[str], stop, found) -> None:  # type:
 
 def orphans(work: Path, count: int, seed: int = 1) -> Counter[str]:
     """Kill commands with workers at random moments; see who lives, and who holds their pipes."""
-    make_inputs(work)
+    make_inputs(work, "sweep")
     toml = work / "inputs" / "world" / "world.toml"
     made = toml.with_name("out")
     rasters = f"--set=rasters.path={json.dumps(str(made / 'rxlev.tif'))}"
