@@ -15,10 +15,12 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
 
+from mapfilter._inputs import read_input
 from mapfilter._io import ensure_writable_folder, read_json, write_json
 from mapfilter.errors import ConfigError, InputError, OutputError, fail
 
 _CHECKSUM_BYTES = 4
+_LARGEST_PART_BYTES = 1 << 30
 
 
 def start_or_resume(
@@ -109,8 +111,8 @@ class FinishedParts:
     def load(self, number: int) -> bytes | None:
         """Return a finished part, or None when there is none or its file is damaged."""
         try:
-            data = self._file(number).read_bytes()
-        except OSError:
+            data = read_input(self._file(number), _LARGEST_PART_BYTES, "a part")
+        except InputError:
             return None
         checksum, part = data[:_CHECKSUM_BYTES], data[_CHECKSUM_BYTES:]
         return part if _checksum(part) == checksum else None

@@ -20,7 +20,7 @@ from pydantic import (
     create_model,
 )
 
-from mapfilter._io import path_fault
+from mapfilter._inputs import path_fault
 from mapfilter.options import (
     Options,
     Positive,

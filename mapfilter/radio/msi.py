@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mapfilter._io import read_input
+from mapfilter._inputs import read_input
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio.antenna import MeasuredAntenna

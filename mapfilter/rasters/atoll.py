@@ -15,6 +15,7 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
+from mapfilter._inputs import open_input
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cell_rules import id_fault
@@ -140,9 +141,9 @@ def _is_index(path: Path) -> bool:
     if path.suffix.lower() not in INDEX_SUFFIXES or path.name.startswith(".") or not path.is_file():
         return False
     try:
-        with path.open("rb") as stream:
+        with open_input(path) as stream:
             head = stream.read(_LONGEST_HEAD_BYTES).upper()
-    except OSError:
+    except (OSError, InputError):
         return False
     first = next((line for line in head.splitlines() if line.strip()), b"")
     return all(name.encode() in first for name in INDEX_COLUMNS)

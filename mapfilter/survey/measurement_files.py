@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import difflib
+import io
 import math
 import re
 from array import array
@@ -20,6 +21,7 @@ from typing import NamedTuple, TextIO
 
 import numpy as np
 
+from mapfilter._inputs import open_input
 from mapfilter._types import Floats
 from mapfilter.errors import Fault, Faults, InputError, fail
 from mapfilter.geodesy import degree_fault
@@ -393,15 +395,12 @@ def _iso(time: str) -> str:
 
 def _open_text(path: Path) -> TextIO:
     """Open a file as text in which an invalid byte invalidates only its own row."""
-    try:
-        with path.open("rb") as stream:
-            head = stream.read(2)
-    except OSError as error:
-        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
+    with open_input(path) as stream:
+        head = stream.read(2)
     if not head:
         raise fail(InputError, str(path), "measurements", "an empty file")
     if head in (b"\xff\xfe", b"\xfe\xff"):
         raise fail(InputError, str(path), "text in UTF-8", "UTF-16", "saved as Unicode by Excel")
     if head == b"\x1f\x8b":
         raise fail(InputError, str(path), "text", "a gzip file", "unpack it first")
-    return path.open(encoding="utf-8-sig", errors="replace")
+    return io.TextIOWrapper(open_input(path), encoding="utf-8-sig", errors="replace")

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats, Ints
@@ -31,6 +33,7 @@ _SELDOM_S = 10.0
 _SOMEWHERE_M = 25.0
 _SLOW_MPS = 0.04
 _MOVING = ("motion", "gnss", "truth")
+_PLAIN_NUMBER = r"^-?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?$"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -149,12 +152,38 @@ def _column(column: Column, given: pd.DataFrame, door: _Door) -> Any:
 
 
 def _texts(column: Column, values: pd.Series, door: _Door) -> Any:
-    present = values.notna().to_numpy() & (values.astype(str) != "").to_numpy()
+    if isinstance(values.dtype, pd.StringDtype):
+        # Few texts repeat in many rows; each is kept once.
+        codes, words = pd.factorize(values)
+        known = [*(str(word) or None for word in words), None]
+    else:
+        codes = np.arange(len(values))
+        present = values.notna().to_numpy() & (values.astype(str) != "").to_numpy()
+        known = [str(v) if ok else None for v, ok in zip(values, present, strict=True)]
+    texts = np.array([*known, None], dtype=object)[:-1][codes]
     if column.required:
-        _add_rows(door, ~present, column, values)
-    texts = [str(v) if ok else None for v, ok in zip(values, present, strict=True)]
+        missing = np.array([*(text is None for text in known), True])[:-1]
+        _add_rows(door, missing[codes], column, values)
+    broken = np.array([*(text is not None and not _is_unicode(text) for text in known), True])[:-1]
+    if broken.any():
+        hint = "half of a surrogate pair: text cut off, or decoded twice"
+        door.add_rows(
+            broken[codes],
+            column.name,
+            column.expected,
+            lambda row: repr(texts[row]),
+            lambda _: hint,
+        )
     # Without the dtype pandas 3 makes these strings, and None becomes NaN.
     return pd.Series(texts, dtype=object)
+
+
+def _is_unicode(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _numbers(values: pd.Series) -> tuple[Floats, Bools]:
@@ -164,14 +193,38 @@ def _numbers(values: pd.Series) -> tuple[Floats, Bools]:
         return number, np.ones(len(number), dtype=bool)
     number = np.full(len(values), np.nan)
     readable = np.ones(len(values), dtype=bool)
-    for row, value in enumerate(values):
-        if _is_empty(value):
+    left: Any = range(len(values))
+    if isinstance(values.dtype, pd.StringDtype):
+        number, left = _plain_numbers(values)
+    given = values.to_numpy(dtype=object) if len(left) else values
+    for row in left:
+        if _is_empty(given[row]):
             continue
         try:
-            number[row] = float(value)
-        except (TypeError, ValueError):
+            number[row] = _number(given[row])
+        except (TypeError, ValueError, OverflowError):
             readable[row] = False
     return number, readable
+
+
+def _plain_numbers(values: pd.Series) -> tuple[Floats, Ints]:
+    """Return texts as floats, and the rows that hold anything but digits, point and exponent."""
+    texts = pa.array(values, type=pa.string(), from_pandas=True)
+    plain = pc.fill_null(pc.match_substring_regex(texts, _PLAIN_NUMBER), False)
+    try:
+        numbers = pc.cast(pc.if_else(plain, texts, None), pa.float64())
+    except pa.ArrowInvalid:
+        # Such as 1e400.
+        return np.full(len(values), np.nan), np.arange(len(values))
+    number = np.array(numbers.to_numpy(zero_copy_only=False), dtype=np.float64)
+    return number, np.flatnonzero(~plain.to_numpy(zero_copy_only=False))
+
+
+def _number(value: object) -> float:
+    """Return a number; ValueError for what only Python takes for one: 1_0, digits of others."""
+    if isinstance(value, str) and (not value.isascii() or "_" in value):
+        raise ValueError
+    return float(value)  # type: ignore[arg-type]
 
 
 def _add_rows(door: _Door, bad: Bools, column: Column, values: pd.Series) -> None:
@@ -180,8 +233,8 @@ def _add_rows(door: _Door, bad: Bools, column: Column, values: pd.Series) -> Non
 
     def hint(row: int) -> str:
         try:
-            number = float(values.iloc[row])
-        except (TypeError, ValueError):
+            number = _number(values.iloc[row])
+        except (TypeError, ValueError, OverflowError):
             return ""
         if number in MISSING_SIGNS:
             return "a sign for a missing value; leave the field empty"

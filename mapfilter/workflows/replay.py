@@ -12,7 +12,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from mapfilter._io import ensure_writable_folder, path_fault, shown, write_json
+from mapfilter._inputs import path_fault, shown
+from mapfilter._io import ensure_writable_folder, write_json
 from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
 from mapfilter.database.radioroutes import RadioRouteDatabase

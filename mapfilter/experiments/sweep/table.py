@@ -11,6 +11,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from mapfilter._inputs import check_file
 from mapfilter._io import atomic_file
 from mapfilter.errors import StoreError, fail
 from mapfilter.evaluation.accuracy import Accuracy
@@ -127,6 +128,7 @@ def read_runs(path: Path) -> pd.DataFrame:
     StoreError
         It is missing, cut off or no table of a sweep.
     """
+    check_file(path, StoreError)
     try:
         table = pq.read_table(path)
     except (OSError, pa.ArrowInvalid) as error:
