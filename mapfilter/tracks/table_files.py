@@ -7,7 +7,7 @@ import csv
 import io
 import warnings
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -54,7 +54,8 @@ def read_table(table: str, path: Path) -> ReadTable:
         if path.suffix == ".csv":
             return _read_csv(table, path)
         check_file(path)
-        rows = _as_frame(pq.read_table(path))
+        with pq.ParquetFile(path) as source:
+            rows = _as_frame(source.read(use_threads=False))
         return ReadTable(rows, np.arange(1, len(rows) + 1))
     except pd.errors.EmptyDataError as error:
         raise fail(InputError, str(path), "a header line", "an empty file", "cut off") from error
@@ -77,7 +78,9 @@ def _as_frame(table: pa.Table) -> pd.DataFrame:
     for i, column in enumerate(plain.schema):
         if pa.types.is_decimal(column.type):
             plain = plain.set_column(i, column.name, plain[i].cast(pa.float64()))
-    return plain.to_pandas(types_mapper={pa.int64(): pd.Int64Dtype()}.get, ignore_metadata=True)
+    settings: dict[str, Any] = {"split_blocks": True, "self_destruct": True}
+    mapper = {pa.int64(): pd.Int64Dtype()}.get
+    return plain.to_pandas(types_mapper=mapper, ignore_metadata=True, **settings)
 
 
 def _read_csv(table: str, path: Path) -> ReadTable:

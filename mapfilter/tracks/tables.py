@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -32,6 +33,7 @@ _LOWEST_M, _HIGHEST_M = 2.0e7, 5.5e7
 _SELDOM_S = 10.0
 _SOMEWHERE_M = 25.0
 _SLOW_MPS = 0.04
+_ROWS_AT_ONCE = 100_000
 _MOVING = ("motion", "gnss", "truth")
 _PLAIN_NUMBER = r"^-?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?$"
 
@@ -323,7 +325,7 @@ def _check_milliseconds(table: str, rows: pd.DataFrame, door: _Door) -> None:
 def _sorted_unique(
     table: pd.DataFrame, where: str, notes: tuple[str, ...]
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    duplicate = table.duplicated().to_numpy()
+    duplicate = _repeated(table)
     if duplicate.any():
         notes += (f"{where}: {int(duplicate.sum())} exact duplicate rows dropped",)
         table = table[~duplicate]
@@ -332,3 +334,15 @@ def _sorted_unique(
         notes += (f"{where}: out of order in {backwards} places, sorted by time",)
         table = table.sort_values("time_s", kind="stable")
     return table.reset_index(drop=True), notes
+
+
+def _repeated(table: pd.DataFrame) -> Bools:
+    """Return which rows equal an earlier one, part by part where that needs less memory."""
+    time_s = table["time_s"].to_numpy()
+    if not (np.diff(time_s) >= 0).all():
+        return np.asarray(table.duplicated())
+    # Equal rows have equal times, so no part ends between them.
+    cuts = np.searchsorted(time_s, time_s[_ROWS_AT_ONCE::_ROWS_AT_ONCE])
+    ends = [0, *np.unique(cuts).tolist(), len(table)]
+    parts = [table.iloc[a:b].duplicated() for a, b in itertools.pairwise(ends)]
+    return np.concatenate(parts) if parts else np.zeros(0, dtype=np.bool_)
