@@ -107,6 +107,29 @@ def path_fault(path: Path) -> str:
     return "" if usable else f"a file or a folder, not {_NO_FILE}"
 
 
+def is_unicode(value: object) -> bool:
+    r"""Return whether the texts in a value of JSON can be written; a lone surrogate cannot.
+
+    Examples
+    --------
+    >>> is_unicode({"notes": ["2\u00b0"]}), is_unicode({"notes": ["\ud800"]})
+    (True, False)
+    """
+    waiting = [value]
+    while waiting:
+        one = waiting.pop()
+        if isinstance(one, str):
+            try:
+                one.encode()
+            except UnicodeEncodeError:
+                return False
+        elif isinstance(one, dict):
+            waiting += [*one.keys(), *one.values()]
+        elif isinstance(one, list):
+            waiting += one
+    return True
+
+
 def shown(value: object) -> str:
     """Return a value as messages show it: printable, and not too long.
 

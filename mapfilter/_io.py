@@ -21,7 +21,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from mapfilter._inputs import open_input, read_input
+from mapfilter._inputs import is_unicode, open_input, read_input
 from mapfilter.errors import Faults, MapfilterError, OutputError, StoreError, fail
 
 _ASIDE = "old"
@@ -147,6 +147,9 @@ def read_json(path: Path) -> dict[str, Any]:
         value = json.loads(read_input(path, _LARGEST_JSON_BYTES, "JSON", StoreError).decode())
     except (ValueError, RecursionError) as error:
         raise fail(StoreError, str(path), "JSON", f"no JSON ({error})", "cut off") from error
+    if not is_unicode(value):
+        hint = "half of a surrogate pair: text cut off, or decoded twice"
+        raise fail(StoreError, str(path), "text in Unicode", "a lone surrogate", hint)
     if not isinstance(value, dict):
         raise fail(StoreError, str(path), "a JSON object", type(value).__name__)
     return value

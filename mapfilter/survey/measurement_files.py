@@ -35,7 +35,7 @@ _LATEST_S = 4_102_444_800.0
 _UNAVAILABLE = 2_000_000_000.0
 _LEVEL_DBM = (-170.0, -10.0)
 _GSM, _LTE = ("GSM", "GPRS", "EDGE"), ("LTE", "LTE+", "LTE_CA", "NR")
-_KEY = re.compile(r'(\w[\w ]*)=\s*("[^"]*"|[^,]*)')
+_KEY = re.compile(r'(\w[\w ]{0,31}+)=\s{0,9}("[^"]{0,4000}"|[^,]{0,4000})')
 _LEVEL = re.compile(r"^(>?)\s*(-?\d+)\s*dBm$")
 _IDENTITY = ("mcc", "mnc", "lac", "ci")
 _REQUIRED = ("lat", "lon", "level_dbm")

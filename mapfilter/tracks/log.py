@@ -20,6 +20,7 @@ from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import projected_crs, short_crs
 from mapfilter.gnss.orbits import Almanac
+from mapfilter.tracks.headings import heading_fault
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.satellites import place_satellites
 from mapfilter.tracks.schema import NEIGHBOUR, PLACE, TABLES, Kind, Without
@@ -355,6 +356,9 @@ def make_log(
         _check_clocks(tables, called, faults)
         every_note += _check_steps(tables, called.get("motion", "motion"), faults)
         every_note += _early_ends(tables)
+        places = next((tables[name] for name in ("truth", "gnss") if len(tables[name]) > 1), None)
+        if places is not None and (wrong := heading_fault(tables["motion"], places)):
+            every_note += (f"{called.get('motion', 'motion')}, heading_rad: {wrong}",)
     faults.raise_if_any(InputError)
     placeless = int(tables["pseudoranges"][list(PLACE)].isna().any(axis=1).sum())
     if almanac is None and placeless:

@@ -18,6 +18,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from mapfilter._inputs import shown
 from mapfilter._io import (
     atomic_dir,
     check_part,
@@ -54,10 +55,10 @@ def _checked_parts(folder: Path, head: dict[str, Any]) -> dict[str, Path]:
     for part in listed:
         if isinstance(part, dict) and str(part.get("path")).startswith(f"{FOLDER}/"):
             continue
-        if not isinstance(part, dict) or part.get("path") not in allowed:
-            faults.add(f"{folder / HEAD}, parts", "tables of a log", repr(part))
+        if not isinstance(part, dict) or str(part.get("path")) not in allowed:
+            faults.add(f"{folder / HEAD}, parts", "tables of a log", shown(part))
             continue
-        paths[allowed[part["path"]]] = path = folder / part["path"]
+        paths[allowed[str(part["path"])]] = path = folder / str(part["path"])
         check_part(path, part, faults)
     faults.raise_if_any(StoreError)
     return paths
@@ -241,10 +242,10 @@ def _check_head(head: dict[str, Any], where: str) -> float:
             faults.add(f"{where}, {key}", f"one of {', '.join(_KEYS)}", "an unknown key")
     start = head.get("start_utc_s")
     if start is not None and (isinstance(start, bool) or not isinstance(start, int | float)):
-        faults.add(f"{where}, start_utc_s", "UTC seconds, or null", repr(start))
+        faults.add(f"{where}, start_utc_s", "UTC seconds, or null", shown(start))
     notes = head.get("notes", [])
     if not (isinstance(notes, list) and all(isinstance(note, str) for note in notes)):
-        faults.add(f"{where}, notes", "a list of texts", repr(notes))
+        faults.add(f"{where}, notes", "a list of texts", shown(notes))
     faults.raise_if_any(InputError)
     try:
         return nan if start is None else float(start)

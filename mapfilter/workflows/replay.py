@@ -295,6 +295,8 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         name, crs = opened.name, opened.log.crs if database is None else database.lattice.crs
         log = leave_out(name_by_plan(opened.log, sites(crs)), config.track.without)
         fitted, notes = fitted_to_log(options, log)
+        if database is None:
+            notes = (*notes, *sites(crs).notes)
         if database is not None and by_streets_alone(fitted, log, database):
             notes = (*notes, STREETS_ALONE)
         filter_ = over(crs, fitted, cells=STREETS_ALONE not in notes)
