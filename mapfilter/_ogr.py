@@ -27,6 +27,7 @@ _HEAD_BYTES = 1 << 16
 _LARGEST_RATIO = 60
 _ALWAYS_ALLOWED_BYTES = 64 << 20
 _MOST_ENTRIES = 100_000
+_LARGEST_SHEET_BYTES = 16 << 20
 _SHP_LENGTH = slice(24, 28)
 # Marks of files that only refer to data elsewhere, and of XML that brings other files in.
 _POINTERS = b"<OGRVRTDataSource <OGRWFSDataSource <OGRCSWDataSource gdal_streamed_alg".split()
@@ -50,7 +51,6 @@ _MAINS = frozenset(
     ]
 )
 _ELSEWHERE = "a vector file that holds its data itself"
-# GML is the one format beside which GDAL writes, and that states where its schema lies.
 _OPEN_OPTIONS = {"GML": {"WRITE_GFS": "NO", "DOWNLOAD_SCHEMA": "NO"}}
 
 
@@ -91,6 +91,14 @@ def vector_source(path: Path) -> VectorSource:
     if head.startswith(b"PK"):
         return _in_zip(path, size_bytes)
     kind = _format(path, path.name, head, size_bytes)
+    if kind == "GML":
+        # GDAL writes what it found out beside GML that comes without its schema.
+        schema = path.with_suffix(".xsd")
+        if not schema.exists():
+            hint = "left out in copying; ogr2ogr OUT.gpkg IN.gml converts it without"
+            raise fail(InputError, str(path), f"its schema {schema.name} beside it", "none", hint)
+        with open_input(schema) as stream:
+            _check_sheet(schema, stream.read(_LARGEST_SHEET_BYTES))
     return VectorSource(path.absolute(), _OPEN_OPTIONS.get(kind, {}))
 
 
@@ -99,9 +107,6 @@ def _check_beside(path: Path) -> None:
     for beside in sorted(path.parent.iterdir()):
         if beside.stem == path.stem and not beside.is_dir() and beside.exists():
             check_file(beside)
-            if beside.suffix.lower() == ".xsd":
-                with open_input(beside) as stream:
-                    _check_sheet(beside, stream.read())
 
 
 def _check_sheet(path: Path, schema: bytes) -> None:

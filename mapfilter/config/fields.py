@@ -38,7 +38,7 @@ MANHATTAN_MAP = "manhattan"
 SYNTHETIC_MAPS = (SYNTHETIC_MAP, MANHATTAN_MAP)
 MAP_NAMES = (EMBEDDED_MAP, NO_MAP, *SYNTHETIC_MAPS)
 _NAME = r"[^\W\d]\w{0,63}+(?:\.[^\W\d]\w{0,63}+){0,15}"
-_CUSTOM_FILTER = re.compile(f"{_NAME}:{_NAME}")
+_CUSTOM_FILTER = re.compile(rf"\A{_NAME}:{_NAME}")
 
 
 def resolve_path(value: Any, info: ValidationInfo) -> Any:
