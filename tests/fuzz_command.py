@@ -39,6 +39,8 @@ def main(arguments: list[str] | None = None) -> int:
     counts: dict[str, Any] = json.loads(given.out.read_text()) if given.out.exists() else {}
     with tempfile.TemporaryDirectory(prefix="mapfilter-fuzz-") as folder:
         every = [one for one in targets(Path(folder)) if given.only in one.name]
+        for one in every:
+            one.read(one.path)
         samples = {one.name: one.path.read_bytes() for one in every}
         batches = -(-given.mutations // (given.batch * len(every)))
         for number in range(batches):
@@ -56,8 +58,7 @@ def report(counts: dict[str, Any]) -> int:
     faults = 0
     for name, known in sorted(counts.items()):
         faults += len(known["faults"])
-        of = ", ".join(f"{known[key]:.3g} s at most" if key.endswith("_s") else f"{known[key]} {key}"
-                       for key in _KEYS)  # fmt: skip
+        of = f"{known['read']} read, {known['refused']} refused, {known['longest_s']:.3g} s at most"
         say(f"{name:32s} {of}, {len(known['faults'])} faults")
         for fault in known["faults"]:
             say(f"    batch {fault['batch']}: {fault['what'].splitlines()[-1]}")

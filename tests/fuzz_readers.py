@@ -10,6 +10,7 @@ from typing import NamedTuple
 import geopandas
 import numpy as np
 import pandas as pd
+import rasterio
 import shapely
 from made_maps import AREA, write_pbf, write_xml
 from made_maps import CRS as MAP_CRS
@@ -84,7 +85,10 @@ def _rasters(folder: Path) -> Iterator[Target]:
     own = _new(folder, "land use")
     table = own / "table.csv"
     table.write_text("class,walkable,value\nroad,1,1\nwater,0,2\n")
-    write_rasters(own / "x.tif", LATTICE, [("A", level)], ["A"])
+    profile = {"driver": "GTiff", "width": 9, "height": 12, "count": 1, "dtype": "uint8"}
+    place = rasterio.Affine(5, 0, 385000, 0, -5, 6673000)
+    with rasterio.open(own / "x.tif", "w", crs=CRS, transform=place, **profile) as target:
+        target.write(np.arange(108, dtype=np.uint8).reshape(1, 12, 9) % 2 + 1)
     yield Target("land use", table, lambda path: read_landuse(own / "x.tif", path, LATTICE))
 
 
@@ -146,7 +150,7 @@ def _tables(folder: Path) -> Iterator[Target]:
     reports = "".join(f"-6{i},-7{i},100,{10 * i},{5 * i}\n" for i in range(9))
     table = made("reports.csv", f"WAP001,WAP002,WAP003,x,y\n{reports}")
     yield Target("fingerprints", table, lambda path: read_fingerprint_table(path, CRS))
-    toml = '[area]\nmap = "helsinki"\ncenter = [60.17, 24.94]\nsize_m = 500\n[cells]\nsites = 5\n'
+    toml = '[area]\nmap = "helsinki"\nresolution_m = 5.0\n[database]\nmargin_db = 6.0\n'
     yield Target("configuration", made("area.toml", toml), lambda path: load_config(path, []))
     block = (
         "******** Week 300 almanac for PRN-01 ********\nID: 01\nHealth: 000\n"
