@@ -160,7 +160,9 @@ def _texts(column: Column, values: pd.Series, door: _Door) -> Any:
         known = [*(str(word) or None for word in words), None]
     else:
         codes = np.arange(len(values))
-        present = values.notna().to_numpy() & (values.astype(str) != "").to_numpy()
+        # Not as text of pandas, which cannot hold half of a surrogate pair.
+        filled = np.array([str(value) != "" for value in values], dtype=np.bool_)
+        present = values.notna().to_numpy() & filled
         known = [str(v) if ok else None for v, ok in zip(values, present, strict=True)]
     texts = np.array([*known, None], dtype=object)[:-1][codes]
     if column.required:
