@@ -155,8 +155,18 @@ def _by_time(log: TrackLog, table: str, row: Callable[..., Any]) -> dict[float, 
             values = [None if value is pd.NA or value != value else value for value in values]
         columns.append(values)
     found: dict[float, list[Any]] = {}
+    # Reports repeat themselves; equal rows are one object.
+    made: dict[tuple[Any, ...], Any] = {}
     for time_s, *values in zip(rows["time_s"].tolist(), *columns, strict=True):
-        found.setdefault(time_s, []).append(row(*values))
+        key = tuple(values)
+        one = made.get(key)
+        if one is None:
+            one = made[key] = row(*values)
+        at = found.get(time_s)
+        if at is None:
+            found[time_s] = [one]
+        else:
+            at.append(one)
     return found
 
 

@@ -169,7 +169,7 @@ class BayesPositioner(Filter[BayesState]):
         if reason not in (Reason.USED, Reason.NOT_MOVED_ENOUGH, Reason.NO_READING):
             cell = next((str(row.cell) for row in epoch.radio if row.cell is not None), "")
             unused.append(UnusedReading(epoch.time_s, "serving", cell, reason))
-        return state, step_output(self.area, state, epoch.time_s, reason, tuple(unused))
+        return step_output(self.area, state, epoch.time_s, reason, tuple(unused))
 
     def warm_up(self, merged: Sequence[Epoch]) -> None:  # noqa: ARG002
         """Load the compiled kernels, and prepare the area."""
@@ -225,6 +225,11 @@ class BayesPositioner(Filter[BayesState]):
                     alternative = replace(alternative, belief=other)
             if why is not Reason.USED:
                 unused.append(UnusedReading(epoch.time_s, "motion", "", why))
+            still = step.step_m == 0 and belief is state.belief
+            same = path is state.path and compass == state.compass and alternative is None
+            if still and same and heading_rad == state.heading_rad:
+                # Standing still changes nothing, and takes most epochs of a long log.
+                continue
             state = replace(
                 state,
                 belief=belief,
@@ -256,7 +261,9 @@ class BayesPositioner(Filter[BayesState]):
                     belief=update.belief or state.belief,
                     alternative=update.alternative or state.alternative,
                 )
-        return replace(state, sources=states), updates
+        if any(own is not state.sources[name] for name, own in states.items()):
+            state = replace(state, sources=states)
+        return state, updates
 
     def _started(
         self,
