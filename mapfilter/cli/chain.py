@@ -230,6 +230,9 @@ def simulate(
     with progress_bar("simulate") as progress:
         result = run_simulate(load_config(config, settings, out=out), progress)
     print_result(result, as_json)
+    if result.partial:
+        print_message("no journey receives a cell: the rasters hold no level along the streets")
+        raise typer.Exit(PARTIAL)
 
 
 def locate(

@@ -8,13 +8,15 @@ import dataclasses
 import errno
 import json
 import math
+import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mapfilter.errors import MapfilterError
+from mapfilter.errors import MapfilterError, Stopped
 
 if TYPE_CHECKING:
     from mapfilter._parallel import Progress
@@ -27,6 +29,9 @@ WRONG = 2
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _MOST_COUNTS = 12
 _MAX_TABLE_WIDTH = 200
+_STOPS = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+)
 
 
 def print_message(text: str, kind: str = "") -> None:
@@ -111,10 +116,52 @@ def rate_bar(label: str, unit: str, every_s: float = 30.0) -> Iterator[Progress]
         yield show
 
 
-def guarded(run: Callable[[], int | None]) -> int:
-    """Run a command and return its exit code, 0 for none; errors of input go to stderr."""
+@contextlib.contextmanager
+def stop_signals() -> Iterator[None]:
+    """Raise Stopped within the block when a signal asks the process to end; a second one ends it.
+
+    So what is half-written is removed, and workers are ended.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def stop(number: int, _: object) -> None:
+        for one in _STOPS:
+            signal.signal(one, signal.SIG_DFL)
+        raise Stopped(number)
+
+    before = {one: signal.getsignal(one) for one in _STOPS}
+    for one, handler in before.items():
+        if handler is not signal.SIG_IGN:
+            signal.signal(one, stop)
     try:
-        return run() or 0
+        yield
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+
+
+def stopped_text(error: BaseException) -> str:
+    """Return what is kept when a command was stopped, and how to go on."""
+    number = error.signal_number if isinstance(error, Stopped) else signal.SIGINT
+    kept = getattr(error, "__notes__", None) or [
+        "nothing half-written is left, older results are as they were; run the command again"
+    ]
+    return f"stopped by {signal.Signals(number).name}: {'; '.join(dict.fromkeys(kept))}"
+
+
+def guarded(run: Callable[[], int | None]) -> int:
+    """Run a command and return its exit code, 0 for none; errors of input go to stderr.
+
+    When a signal stops it, stderr gets what is kept, and the code is 128 and the signal's number.
+    """
+    try:
+        with stop_signals():
+            return run() or 0
+    except Stopped as error:
+        print_message(stopped_text(error))
+        return 128 + error.signal_number
     except MapfilterError as error:
         print_message(str(error), "error: ")
     except MemoryError:
