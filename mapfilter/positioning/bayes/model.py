@@ -237,10 +237,10 @@ class BayesModel:
         if isfinite(motion.heading_rad):
             moved = move(state, motion.step_m, motion.heading_rad, self.motion, key)
         else:
-            # To all sides; the mean square of the distance is that of the step.
+            # To all sides.
             moved = move(state, 0.0, 0.0, self.motion, key)
             noise = np.random.default_rng(int(key)).standard_normal((2, state.shape[1]))
-            moved[: NORTH + 1] += (length_m / sqrt(2.0) * noise).astype(np.float32)
+            moved[: NORTH + 1] += (motion.all_sides_m / sqrt(2.0) * noise).astype(np.float32)
         weighed = log_weight.copy()
         rows, step = self.area.lattice.rows, self.area.lattice.resolution_m
         found = interpolate(moved, self.log_map, step / 2, (rows - 0.5) * step, 1 / step)

@@ -36,6 +36,7 @@ VEHICLE: Mapping[str, float] = {
 """Defaults of vehicles, where they differ."""
 _VEHICLE_MOTION: Mapping[str, float] = {
     "disturbances_per_m": 0.0,
+    "remounts_per_m": 0.0,
     "rate_rad_per_m": radians(0.01),
     "stretch_sd": 0.02,
 }

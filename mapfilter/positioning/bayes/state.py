@@ -14,6 +14,7 @@ from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBe
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.path import DeadReckoning as DeadReckoning
 from mapfilter.positioning.bayes.path import RecentPath
+from mapfilter.positioning.bayes.sensors import SensorWatch
 from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
 from mapfilter.positioning.integrity import sample_tail
 
@@ -50,6 +51,8 @@ class BayesState:
         Number of alternatives that have replaced the belief.
     path : RecentPath
         The last metres, where the map alone may start a belief.
+    watch : SensorWatch
+        Whether sensors still measure.
     """
 
     belief: MapBelief | None = None
@@ -62,6 +65,7 @@ class BayesState:
     alternative: AlternativeHypothesis | None = None
     takeovers: int = 0
     path: RecentPath = field(default_factory=RecentPath)
+    watch: SensorWatch = field(default_factory=SensorWatch)
 
     @property
     def particle_spacing_m(self) -> float:
