@@ -73,12 +73,18 @@ class Rest:
     carried_nats: float = 0.0
 
     def heard(self, time_s: float, rows: tuple[ReportRow, ...]) -> Rest:
-        """Add a report."""
+        """Add a report; a phone that was carried on stays so until a step is measured."""
+        if self.is_carried:
+            return self
         cells = {row.cell for row in rows if row.role == SERVING and row.cell is not None}
         new = cells - self.served
-        more = _NATS_PER_CELL * max(len(self.served | new) - max(len(self.served), _CELLS_AT_REST), 0)
+        more = _NATS_PER_CELL * max(
+            len(self.served | new) - max(len(self.served), _CELLS_AT_REST), 0
+        )
         rest = replace(
-            self, served=self.served | new, carried_nats=min(self.carried_nats + more, _CARRIED_NATS)
+            self,
+            served=self.served | new,
+            carried_nats=min(self.carried_nats + more, _CARRIED_NATS),
         )
         if not isfinite(rest.block_s):
             rest = replace(rest, block_s=time_s)
@@ -278,9 +284,7 @@ def _levels(rows: tuple[ReportRow, ...]) -> list[tuple[str, float]]:
     ]
 
 
-def _carried(
-    first: Mapping[str, tuple[float, int]], now: Mapping[str, tuple[float, int]]
-) -> float:
+def _carried(first: Mapping[str, tuple[float, int]], now: Mapping[str, tuple[float, int]]) -> float:
     """Return the log-likelihood ratio of "elsewhere" to "still there", by the levels of both."""
     changes = [
         now[name][0] / now[name][1] - first[name][0] / first[name][1]
