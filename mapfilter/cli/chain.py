@@ -230,6 +230,9 @@ def simulate(
     with progress_bar("simulate") as progress:
         result = run_simulate(load_config(config, settings, out=out), progress)
     print_result(result, as_json)
+    if result.partial:
+        print_message("no journey receives a cell: the rasters hold no level along the streets")
+        raise typer.Exit(PARTIAL)
 
 
 def locate(
@@ -306,7 +309,9 @@ def replay(
     ] = None,
     course_motion: Annotated[
         bool,
-        typer.Option("--course-motion", help="Make motion from speed and course of positions."),
+        typer.Option(
+            "--course-motion", help="Make motion from speed and course of GNSS, else its positions."
+        ),
     ] = False,
     filter_name: FilterOption = None,
     without: Annotated[

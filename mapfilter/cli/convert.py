@@ -58,7 +58,9 @@ def convert(
     ] = None,
     course_motion: Annotated[
         bool,
-        typer.Option("--course-motion", help="Make motion from speed and course of positions."),
+        typer.Option(
+            "--course-motion", help="Make motion from speed and course of GNSS, else its positions."
+        ),
     ] = False,
     no_steps: Annotated[
         bool, typer.Option("--no-steps", help="Make no motion from the sensors of a phone.")

@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from mapfilter._io import write_json
+from mapfilter._io import write_sealed
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats
 from mapfilter.database.manifest import (
@@ -180,7 +180,7 @@ class Head:
         """Write cell table and manifest into a folder that holds the parts."""
         write_cells(self.plan, folder / CELLS)
         cells = describe_part(folder, folder / CELLS, len(self.plan.ids))
-        write_json(
+        write_sealed(
             folder / MANIFEST,
             {
                 "format": FORMAT,

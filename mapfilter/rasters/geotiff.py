@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import warnings
 from collections import Counter
@@ -27,6 +28,7 @@ from mapfilter.geodesy import Lattice, projected_crs, same_crs
 from mapfilter.radio.cell_rules import id_fault
 from mapfilter.rasters.files import Declared, Quantity, RasterFile, Window, without_nodata
 
+_PIXELS_TAG = "PIXELS_SHA256"
 QUANTITY_TAG = "MAPFILTER_QUANTITY"
 """Tag of a file that states which quantity its bands hold."""
 _UNITS: dict[str, Quantity] = {"dbm": "level", "db": "loss"}
@@ -148,7 +150,7 @@ def write_rasters(
     """
     bands = [(cell_id, "dBm" if quantity == "level" else "dB") for cell_id in cell_ids]
     tags = {**(tags or {}), QUANTITY_TAG: quantity}
-    count = 0
+    count, pixels = 0, hashlib.sha256()
     with new_geotiff(Path(path), lattice, bands, tags, overviews="average") as target:
         for count, (cell_id, values) in enumerate(items, start=1):
             expected = cell_ids[count - 1] if count <= len(cell_ids) else "no more cells"
@@ -160,8 +162,25 @@ def write_rasters(
             rounded = np.round(np.asarray(values, dtype=np.float64), 2).astype(np.float32)
             rounded[~np.isfinite(rounded)] = np.nan
             target.write(rounded, count)
+            pixels.update(rounded.tobytes())
         if count < len(cell_ids):
             raise fail(InputError, "bands", f"{len(cell_ids)} cells", f"{count}")
+        target.update_tags(**{_PIXELS_TAG: pixels.hexdigest()})
+
+
+def is_as_written(path: Path) -> bool:
+    """Return whether a file is a raster set that :func:`write_rasters` wrote, pixels unchanged."""
+    pixels = hashlib.sha256()
+    try:
+        with rasterio.open(path, driver="GTiff") as source:
+            expected = source.tags().get(_PIXELS_TAG)
+            for band in source.indexes if expected else ():
+                values = source.read(band)
+                values[~np.isfinite(values)] = np.nan
+                pixels.update(values.tobytes())
+    except (RasterioError, UnicodeDecodeError):
+        return False
+    return bool(expected == pixels.hexdigest())
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,13 +219,16 @@ def open_geotiff(path: Path, cell_id: str, declared: Declared) -> GeoTiff:
                 _check_bands(str(path), names, source.dtypes, faults)
                 lattice = _lattice(str(path), source, declared.crs, not caught, faults)
                 quantity, tagged = _quantity(source), QUANTITY_TAG in source.tags()
+                # Those beside it, such as .aux.xml, change what is read.
+                beside = sorted(path.with_name(Path(name).name) for name in source.files)
     except (RasterioError, UnicodeDecodeError) as error:
         got, hint = _reason(error), "cut off, or no raster"
         raise fail(InputError, str(path), "a raster that GDAL can read", got, hint) from error
     faults.raise_if_any(InputError)
     nodata = () if declared.nodata is None else (declared.nodata,)
     place = cast(Lattice, lattice)
-    return GeoTiff(path, names, place, nodata, (path,), quantity, tagged, described)
+    parts = tuple(dict.fromkeys((path, *(file for file in beside if file.is_file()))))
+    return GeoTiff(path, names, place, nodata, parts, quantity, tagged, described)
 
 
 def _masked(source: Any, bands: list[int], window: Any) -> Floats32:

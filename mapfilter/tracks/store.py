@@ -35,7 +35,7 @@ from mapfilter.gnss.orbits import read_yuma
 from mapfilter.tracks.imu_noise import parse_imu_noise
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.schema import OPTIONAL, SCHEMA, TABLES
-from mapfilter.tracks.sensors import FOLDER, write_sensors
+from mapfilter.tracks.sensors import FOLDER, SENSOR_COLUMNS, write_sensors
 
 HEAD = "log.json"
 ALMANAC = "almanac.txt"
@@ -47,6 +47,11 @@ _DECIMAL_COMMA = r"^\s*([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)\s*$"
 FORMAT = "mapfilter track log"
 VERSION = 1
 _KEYS = ("format", "version", "crs", "start_utc_s", "notes", "imu", "parts")
+_WRITTEN = {
+    f"{name}{suffix}"
+    for name in (*TABLES, *(f"{FOLDER}/{sensor}" for sensor in SENSOR_COLUMNS))
+    for suffix in _SUFFIXES
+}
 _ARROW = {"number": pa.float64(), "integer": pa.int64(), "text": pa.string()}
 
 
@@ -276,7 +281,7 @@ def is_log(path: str | Path) -> bool:
 
 def check_log_replaceable(folder: Path) -> None:
     """Raise OutputError where a folder holds other files than a log that mapfilter wrote."""
-    check_replaceable(folder, HEAD, FORMAT)
+    check_replaceable(folder, HEAD, FORMAT, _WRITTEN.__contains__)
 
 
 def list_logs(path: str | Path) -> list[Path]:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from mapfilter.check.findings import Findings, Severity
 from mapfilter.config.sections import Config
 from mapfilter.errors import MapfilterError, listed
@@ -92,7 +90,8 @@ def _check_cells(path: Path, log: TrackLog, plan: CellPlan, findings: Findings) 
         return
     unknown = ~serving.isin(plan.ids).to_numpy()
     if unknown.any():
-        ids = np.unique(serving.to_numpy(dtype=str)[unknown]).tolist()
+        # The most frequent first.
+        ids = serving[unknown].value_counts().index.astype(str).tolist()
         evidence = f"{int(unknown.sum())} of {len(serving)} reports are of {len(ids)} serving "
         evidence += f"cells that the plan lacks: {listed(ids)}."
         severity: Severity = "error" if unknown.all() else "warning"

@@ -64,23 +64,16 @@ _IF_NONE_DBM = (-110.0, -50.0)
 _SQUARE_M = 5.0
 
 
-def clear_results(out: Path) -> None:
-    """Remove the files of an older replay from a folder, so that no figures of two replays mix.
+def older_results(out: Path) -> list[Path]:
+    """Return the files of an older replay in a folder, so that no figures of two replays mix.
 
-    A folder in it is removed where it is named as the log of its figures and holds nothing else.
-    All other files stay.
-
-    Raises
-    ------
-    OutputError
-        A file cannot be removed.
+    Those of a folder in it are among them where it is named as the log of its figures and holds
+    nothing else.
     """
-    clear_pictures(out, (*_OF_ONE_LOG, SUMMARY))
-    with _removal(out):
-        for inner in filter(_is_result, sorted(out.iterdir())):
-            for file in inner.iterdir():
-                file.unlink()
-            inner.rmdir()
+    found = [path for name in (*_OF_ONE_LOG, SUMMARY) if (path := out / name).is_file()]
+    for inner in filter(_is_result, sorted(out.iterdir())):
+        found += inner.iterdir()
+    return found
 
 
 def clear_pictures(folder: Path, names: Iterable[str]) -> None:

@@ -77,8 +77,8 @@ def lack_of(
         return f"the filter {name} needs cells to start, the database has none"
     if "no motion" not in lack:
         return lack
-    if _has_course(opened):
-        return f"{lack} (--course-motion, track.course_motion, makes it from speed and course)"
+    if source := _receiver_motion(opened):
+        return f"{lack} (--course-motion, track.course_motion, makes it from {source})"
     if has_cells and len(log.radio):
         return f"{lack} (mapfilter locate needs none)"
     return lack
@@ -107,15 +107,14 @@ def advice_of(log: TrackLog, options: Any, estimate: TrackEstimate) -> tuple[str
     return tuple(notes)
 
 
-def _has_course(opened: OpenedLog) -> bool:
-    """Return whether positions of the log, or of its truth, state speed and course."""
-    if "velocity" in opened.sensors:
-        return True
-    for recording in opened.recordings:
-        rows = recording.tables.get("positions")
-        if rows is not None and "course_deg" in rows and rows["course_deg"].notna().any():
-            return True
-    return False
+def _receiver_motion(opened: OpenedLog) -> str:
+    """Return what positions of the log, or of its truth, make motion of; "" without them."""
+    every = [r.tables.get("positions", r.tables.get("places")) for r in opened.recordings]
+    placed = [rows for rows in every if rows is not None and rows["time_s"].nunique() > 1]
+    courses = (rows["course_deg"] for rows in placed if "course_deg" in rows)
+    if any(course.notna().any() for course in courses):
+        return "speed and course"
+    return "positions" if placed else ""
 
 
 def lacking(
