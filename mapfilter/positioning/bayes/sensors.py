@@ -6,9 +6,9 @@ epoch before any evidence is taken from it. For motion that was not measured it 
 sides into the epoch, as long as one goes in that time, so the belief grows as it must; a report
 that stands still while the phone moves is taken out.
 
-Rows that are missing, or lengths of zero, can also be those of a phone that rests, so levels decide:
-at rest they change by fading alone. Each block of a rest is compared with its first one, by the
-likelihoods of "still there" and "carried elsewhere", and their ratio is added up from zero (a
+Rows that are missing, or lengths of zero, can also be those of a phone that rests, so levels
+decide: at rest they change by fading alone. Each block of a rest is compared with its first one, by
+the likelihoods of "still there" and "carried elsewhere", and their ratio is added up from zero (a
 CUSUM; Page, 1954).
 """
 
