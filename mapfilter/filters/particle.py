@@ -72,7 +72,7 @@ class ParticleOptions(Options):
     searching_jitter: tuple[NotNegative, ...] = (1.5, 1.5, 0.01, 0.006, 0.0, 0.01, 0.01, 1e-4)
     switch_mass: Probability = 0.99
     switch_hold_m: NotNegative = 14.0
-    split_mass: Share = 0.8
+    split_mass: Share = 0.5
 
     def check(self, faults: Faults) -> None:
         """Add a lower limit above the upper one."""

@@ -50,7 +50,7 @@ from mapfilter.positioning.bayes.radio import EvidenceOptions
 
 _F = np.float32
 _OFF_SHARE, _TRIES = 0.2, 2
-_BEYOND_M, _BEYOND_SHARE, _BEYOND_AT_START = 300.0, 0.15, 0.01
+_BEYOND_M, _BEYOND_SHARE, _BEYOND_AT_START = 300.0, 0.15, 0.02
 _BEYOND_COST_PER_M = 0.015
 """Width of the belt around the area, its share of the first hypotheses and of the first belief, and
 the negative log-likelihood of each metre there, in a database with cells."""

@@ -169,8 +169,8 @@ def watched(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, Epoch, tuple
     epoch : Epoch
         With a step to all sides for motion that was not measured, without a report that is stale.
     reasons : tuple of Reason
-        Of motion and of the report: ``USED``, or ``MOTION_MISSING`` or ``MOTION_STUCK``, and
-        ``STALE_RADIO``.
+        Of motion and of the report: ``USED``, or ``NO_STEP``, ``MOTION_MISSING`` or
+        ``MOTION_STUCK``, and ``STALE_RADIO``.
     """
     watch, epoch, why = _moved(watch, epoch)
     watch, is_stale = _repeated(watch, epoch)
@@ -200,7 +200,7 @@ def _moved(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, Epoch, Reason
     rest = (watch.rest or Rest(watch.moving_s)).heard(time_s, epoch.radio)
     unmeasured_s = time_s - watch.moving_s
     if steps and not measured:
-        why = Reason.MOTION_MISSING
+        why = Reason.NO_STEP
     elif not steps and watch.reports_always:
         longest_s = max(_GAP_S, _GAP_INTERVALS * watch.interval_s)
         why = Reason.MOTION_MISSING if time_s - watch.motion_s > longest_s else Reason.USED
