@@ -151,7 +151,7 @@ def check_replaceable(folder: Path, head: str, what: str, own: Callable[[str], b
 def _as_listed(folder: Path, part: Mapping[str, Any]) -> bool:
     try:
         return sha256_file(folder / str(part["path"])) == part.get("sha256")
-    except OSError:
+    except (OSError, StoreError):
         return False
 
 

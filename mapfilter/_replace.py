@@ -14,6 +14,7 @@ import json
 import os
 import shutil
 from pathlib import Path
+from typing import Any
 
 ASIDE = "old"
 NEW = "new"
@@ -24,10 +25,11 @@ _LISTING = "old.json"
 
 
 def note_old(partial: Path, target: Path) -> None:
-    """Note which files a folder holds that is going to be replaced, if it is there."""
+    """Note which files a folder holds that is going to be replaced; none if it is not there."""
+    noted: dict[str, Any] = {"inode": None, "files": {}, "new": (partial / NEW).stat().st_ino}
     if target.is_dir():
-        noted = {"inode": target.stat().st_ino, "files": _files(target)}
-        (partial / _LISTING).write_text(json.dumps(noted), encoding="utf-8")
+        noted |= {"inode": target.stat().st_ino, "files": _files(target)}
+    (partial / _LISTING).write_text(json.dumps(noted), encoding="utf-8")
 
 
 def discard(partial: Path, target: Path) -> None:
@@ -37,17 +39,24 @@ def discard(partial: Path, target: Path) -> None:
     """
     try:
         noted = json.loads((partial / _LISTING).read_text(encoding="utf-8"))
-        inode, files = noted["inode"], noted["files"]
+        inode, files, new = noted["inode"], noted["files"], noted["new"]
     except (OSError, ValueError, KeyError, TypeError):
-        inode, files = None, {}
+        inode, files, new = None, {}, None
     for name in (NEW, ASIDE):
         old = partial / name
-        if inode is None or not old.is_dir() or old.stat().st_ino != inode:
+        if new is None or not old.is_dir():
+            continue
+        found = old.stat().st_ino
+        # Where nothing was there at first, whatever was replaced came meanwhile.
+        if found == new or inode not in (None, found):
             continue
         others = [path for path, stamp in _files(old).items() if files.get(path) != stamp]
         if others:
-            with contextlib.suppress(OSError):
+            try:
                 _keep(old, others, target)
+            except OSError:
+                # What cannot be kept is not removed; the next write of this name tries again.
+                return
     shutil.rmtree(partial, ignore_errors=True)
 
 

@@ -24,7 +24,7 @@ from rasterio.windows import Window as RasterioWindow
 from mapfilter._gdal import open_raster
 from mapfilter._io import atomic_file
 from mapfilter._types import Floats32
-from mapfilter.errors import Faults, InputError, OutputError, fail
+from mapfilter.errors import Faults, InputError, MapfilterError, OutputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
 from mapfilter.radio.cell_rules import id_fault
 from mapfilter.rasters.files import Declared, Quantity, RasterFile, Window, without_nodata
@@ -173,13 +173,13 @@ def is_as_written(path: Path) -> bool:
     """Return whether a file is a raster set that :func:`write_rasters` wrote, pixels unchanged."""
     pixels = hashlib.sha256()
     try:
-        with rasterio.open(path, driver="GTiff") as source:
+        with open_raster(path) as source:
             expected = source.tags().get(_PIXELS_TAG)
             for band in source.indexes if expected else ():
                 values = source.read(band)
                 values[~np.isfinite(values)] = np.nan
                 pixels.update(values.tobytes())
-    except (RasterioError, UnicodeDecodeError):
+    except (MapfilterError, RasterioError, UnicodeDecodeError):
         return False
     return bool(expected == pixels.hexdigest())
 

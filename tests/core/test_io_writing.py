@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from mapfilter import _io, _replace
 from mapfilter._io import atomic_dir, atomic_file, check_replaceable, check_version, sealed
 from mapfilter.errors import OutputError, StoreError
 
@@ -199,6 +200,16 @@ def test_a_link_in_a_folder_is_somebody_elses(tmp_path):
     told(tmp_path / "folder", lambda: check(tmp_path / "folder"))
 
 
+def test_a_listed_part_that_is_a_link_to_nothing_is_no_part(tmp_path):
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    head = {"format": "x", "parts": [{"path": "part", "sha256": "0" * 64}]}
+    (folder / "head.json").write_text(json.dumps(head))
+    (folder / "part").symlink_to("nowhere")
+    with pytest.raises(OutputError, match="other files"):
+        check_replaceable(folder, "head.json", "x", lambda _: True)
+
+
 def test_what_is_put_into_a_folder_or_changed_there_while_it_is_replaced_is_kept(tmp_path):
     folder = tmp_path / "folder"
     write_folder(folder, "old")
@@ -214,6 +225,36 @@ def test_what_is_put_into_a_folder_or_changed_there_while_it_is_replaced_is_kept
         (folder / "mine too").write_text("of the user")
     assert read_folder(tmp_path / "folder.kept2") == {"mine too": "of the user"}
     assert names(tmp_path) == ["folder", "folder.kept", "folder.kept2"]
+
+
+def test_a_folder_that_somebody_makes_while_the_first_result_is_written_is_kept(tmp_path):
+    folder = tmp_path / "folder"
+    with atomic_dir(folder) as new:
+        (new / "part").write_text("new")
+        (folder / "deep").mkdir(parents=True)
+        (folder / "deep" / "mine").write_text("of the user")
+    assert read_folder(folder) == {"part": "new"}
+    assert read_folder(tmp_path / "folder.kept") == {"deep/mine": "of the user"}
+    assert names(tmp_path) == ["folder", "folder.kept"]
+
+
+def test_what_cannot_be_kept_is_not_removed_and_kept_by_the_next_write(tmp_path, monkeypatch):
+    folder = tmp_path / "folder"
+    write_folder(folder, "old")
+
+    def refused(*_):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(_replace, "_keep", refused)
+        with atomic_dir(folder) as new:
+            (new / "part").write_text("new")
+            (folder / "mine").write_text("of the user")
+    assert read_folder(folder) == {"part": "new"}
+    monkeypatch.setattr(_io, "_is_alive", lambda _: False)
+    write_folder(folder, "newer")
+    assert read_folder(tmp_path / "folder.kept") == {"mine": "of the user"}
+    assert names(tmp_path) == ["folder", "folder.kept"]
 
 
 def test_so_it_is_when_the_writer_is_killed_after_the_exchange(tmp_path):
