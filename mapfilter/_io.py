@@ -13,7 +13,6 @@ import hashlib
 import json
 import os
 import shutil
-import stat
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -21,42 +20,21 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from mapfilter._inputs import is_unicode, open_input, read_input
 from mapfilter._replace import ASIDE, NEW, discard, exchange, note_old
-from mapfilter.errors import (
-    Faults,
-    InputError,
-    MapfilterError,
-    OutputError,
-    StoreError,
-    fail,
-)
+from mapfilter.errors import Faults, MapfilterError, OutputError, StoreError, fail
 
-_NO_PATH = (errno.ENAMETOOLONG, errno.ELOOP)
+_LARGEST_JSON_BYTES = 256 << 20
 _SEAL = "sha256"
-_SHOWN = 60
 _WRITE_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
 VERSION = version("mapfilter")
 """Of the program, for the record in what it writes."""
 
 
-def read_input(path: Path, largest_bytes: int, what: str) -> bytes:
-    """Return the bytes of an input file; raise InputError for one that is missing or too large."""
-    try:
-        with path.open("rb") as stream:
-            data = stream.read(largest_bytes + 1)
-    except OSError as error:
-        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
-    if len(data) > largest_bytes:
-        kib = largest_bytes >> 10
-        size = f"{kib >> 10} MiB" if kib >= 1024 else f"{kib} KiB"
-        raise fail(InputError, str(path), f"{what} of at most {size}", "a larger file")
-    return data
-
-
 def sha256_file(path: Path) -> str:
     """Return the SHA-256 of a file's bytes as hexadecimal digits."""
-    with path.open("rb") as stream:
+    with open_input(path, StoreError) as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
@@ -211,10 +189,7 @@ def write_json(path: Path, value: Mapping[str, Any]) -> None:
 
 def read_json(path: Path) -> dict[str, Any]:
     """Read a JSON object; raise StoreError where it is missing, cut off or something else."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise fail(StoreError, str(path), "a readable file", error.strerror or error) from error
+    data = read_input(path, _LARGEST_JSON_BYTES, "JSON", StoreError)
     return parse_json(data, str(path))
 
 
@@ -224,6 +199,9 @@ def parse_json(data: bytes, where: str) -> dict[str, Any]:
         value = json.loads(data.decode("utf-8"))
     except (ValueError, RecursionError) as error:
         raise fail(StoreError, where, "JSON", f"no JSON ({error})", "cut off") from error
+    if not is_unicode(value):
+        hint = "half of a surrogate pair: text cut off, or decoded twice"
+        raise fail(StoreError, where, "text in Unicode", "a lone surrogate", hint)
     if not isinstance(value, dict):
         raise fail(StoreError, where, "a JSON object", type(value).__name__)
     return value
@@ -334,42 +312,3 @@ def _sync(path: Path) -> None:
 
 def _not_writable(path: Path, error: OSError) -> MapfilterError:
     return fail(OutputError, str(path), "a place that can be written", error.strerror or error)
-
-
-def path_fault(path: Path) -> str:
-    """Return the expected kind of path for messages, or an empty text when nothing is wrong.
-
-    A path may name a file, a folder or nothing yet; whether it can be read or written is found
-    later. Pipes are refused because reading would block, and cannot be repeated.
-
-    Examples
-    --------
-    >>> path_fault(Path("not-yet"))
-    ''
-    >>> path_fault(Path("a" * 5000))
-    'a path that the system takes (File name too long)'
-    """
-    try:
-        str(path).encode()
-        mode = path.stat().st_mode
-    except UnicodeEncodeError:
-        return "a path in UTF-8"
-    except ValueError:
-        return "a path without a zero byte"
-    except OSError as error:
-        refused = error.errno in _NO_PATH
-        return f"a path that the system takes ({error.strerror})" if refused else ""
-    usable = stat.S_ISREG(mode) or stat.S_ISDIR(mode)
-    return "" if usable else "a file or a folder, not a pipe, socket or device"
-
-
-def shown(value: object) -> str:
-    """Return a value as messages show it: printable, and not too long.
-
-    Examples
-    --------
-    >>> shown("a" * 5000)[-4:]
-    'aaa…'
-    """
-    text = repr(value)
-    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"

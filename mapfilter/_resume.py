@@ -16,11 +16,13 @@ from functools import cached_property
 from pathlib import Path
 
 from mapfilter._code import code_digest
+from mapfilter._inputs import read_input
 from mapfilter._io import ensure_writable_folder, read_json, write_json
 from mapfilter.errors import ConfigError, InputError, OutputError, Stopped, fail
 
 _CODE = "code_sha256"
 _CHECKSUM_BYTES = 32
+_LARGEST_PART_BYTES = 1 << 30
 
 
 def start_or_resume(
@@ -104,8 +106,8 @@ def kept_when_stopped(what: str) -> Iterator[None]:
 def load_part(file: Path) -> bytes | None:
     """Return what :func:`save_part` wrote; None where there is none, or it is damaged."""
     try:
-        data = file.read_bytes()
-    except OSError:
+        data = read_input(file, _LARGEST_PART_BYTES, "a part")
+    except InputError:
         return None
     checksum, part = data[:_CHECKSUM_BYTES], data[_CHECKSUM_BYTES:]
     return part if _checksum(file.name, part) == checksum else None

@@ -18,6 +18,8 @@ from typing import Any, BinaryIO
 
 import pyarrow as pa
 
+from mapfilter._inputs import open_input
+from mapfilter._io import sha256_file
 from mapfilter.errors import MapfilterError, StoreError, fail
 
 BLOCK_BYTES = 1 << 18
@@ -77,10 +79,10 @@ class Part:
             The part is missing or damaged, or the database was replaced since it was opened.
         """
         try:
-            stream = self.file.open("rb")
-        except OSError as error:
-            got = "no such file" if isinstance(error, FileNotFoundError) else error.strerror
-            raise self.unlike("a part of the database", got or error) from error
+            stream = open_input(self.file, StoreError)
+        except StoreError as error:
+            got = error.faults[0].got if self.file.exists() else "no such file"
+            raise self.unlike("a part of the database", got) from error
         with stream:
             size = stream.seek(0, io.SEEK_END)
             if size != self.size:
@@ -156,7 +158,7 @@ class _CheckedFile(io.RawIOBase):
 def checksums(path: Path) -> tuple[str, tuple[str, ...]]:
     """Return the SHA-256 of a file, and of its blocks where it has several."""
     whole, blocks = hashlib.sha256(), []
-    with path.open("rb") as stream:
+    with open_input(path, StoreError) as stream:
         while block := stream.read(BLOCK_BYTES):
             whole.update(block)
             blocks.append(hashlib.sha256(block).hexdigest())
@@ -166,6 +168,6 @@ def checksums(path: Path) -> tuple[str, tuple[str, ...]]:
 def generation_of(folder: Path) -> str:
     """Return the SHA-256 of a database's manifest; an empty text where there is none."""
     try:
-        return hashlib.sha256((folder / MANIFEST).read_bytes()).hexdigest()
-    except OSError:
+        return sha256_file(folder / MANIFEST)
+    except StoreError:
         return ""

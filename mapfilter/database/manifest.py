@@ -21,11 +21,13 @@ from pydantic import (
     model_validator,
 )
 
+from mapfilter._inputs import read_input
 from mapfilter._io import check_replaceable, check_seal, check_version, parse_json, sha256_file
 from mapfilter.database.checked import BLOCK_BYTES, checksums
 from mapfilter.database.checked import MANIFEST as MANIFEST
 from mapfilter.errors import Fault, Faults, StoreError, fail
 
+_LARGEST_BYTES = 1 << 30
 FORMAT = "mapfilter radio-route database"
 VERSION = 2
 CELLS = "cells.parquet"
@@ -131,10 +133,7 @@ def read_manifest(folder: Path) -> tuple[dict[str, Any], str]:
         with every fault, its fields are not what a build writes or contradict each other.
     """
     file = folder / MANIFEST
-    try:
-        data = file.read_bytes()
-    except OSError as error:
-        raise fail(StoreError, str(file), "a readable file", error.strerror or error) from error
+    data = read_input(file, _LARGEST_BYTES, "a manifest", StoreError)
     manifest = parse_json(data, str(file))
     if manifest.get("format") != FORMAT:
         raise fail(StoreError, str(file), f"format {FORMAT!r}", manifest.get("format"))

@@ -21,6 +21,7 @@ from rasterio.io import DatasetWriter
 from rasterio.shutil import copy as copy_raster
 from rasterio.windows import Window as RasterioWindow
 
+from mapfilter._gdal import open_raster
 from mapfilter._io import atomic_file
 from mapfilter._types import Floats32
 from mapfilter.errors import Faults, InputError, OutputError, fail
@@ -34,7 +35,7 @@ QUANTITY_TAG = "MAPFILTER_QUANTITY"
 _UNITS: dict[str, Quantity] = {"dbm": "level", "db": "loss"}
 _KINDS: tuple[Quantity, ...] = ("level", "loss", "deviation")
 _BLOCK_PX = 256
-_LEAST_BLOCK_BYTES = 1 << 26
+_MOST_BAND_BYTES = 1 << 26
 _BY_BAND = ("driver", "interleave", "tiled", "blockxsize", "blockysize", "sparse_ok")
 _INDEX_ENTRY_BYTES = 4
 _MOST_BLOCKS_LOOKED_AT = 20_000
@@ -99,7 +100,7 @@ def new_geotiff(
     }
     form: dict[str, Any] = {"driver": "COG", "blocksize": _BLOCK_PX, "predictor": "YES"}
     form |= {"overview_resampling": overviews}
-    if _BLOCK_PX**2 * 4 * len(bands) > _LEAST_BLOCK_BYTES:
+    if _BLOCK_PX**2 * 4 * len(bands) > _MOST_BAND_BYTES:
         # There all bands of a block lie together: hundreds of them are more than is read again.
         form = {key: profile[key] for key in _BY_BAND} | {"predictor": 3}
     with atomic_file(path) as temporary:
@@ -192,7 +193,7 @@ class GeoTiff(RasterFile):
         row, col, rows, cols = window
         numbers = [band + 1 for band in bands]
         try:
-            with rasterio.open(self.path, driver="GTiff") as source:
+            with open_raster(self.path, quiet=False) as source:
                 values = _masked(source, numbers, RasterioWindow(col, row, cols, rows))
                 scales, offsets = np.array(source.scales)[bands], np.array(source.offsets)[bands]
         except (RasterioError, UnicodeDecodeError) as error:
@@ -211,7 +212,7 @@ def open_geotiff(path: Path, cell_id: str, declared: Declared) -> GeoTiff:
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", NotGeoreferencedWarning)
-            with rasterio.open(path, driver="GTiff") as source:
+            with open_raster(path, quiet=False) as source:
                 _check_extent_of_file(path, source)
                 names = tuple(str(name or "") for name in source.descriptions)
                 described = names != ("",)
@@ -302,12 +303,6 @@ def _check_extent_of_file(path: Path, source: Any) -> None:
     by_band = str(source.interleaving).lower().endswith("band")
     planes = source.count if by_band else 1
     hint = "the file is cut off, or its header is damaged"
-    pixel_bytes = max(np.dtype(kind).itemsize for kind in source.dtypes)
-    block_bytes = rows_px * cols_px * pixel_bytes * (1 if by_band else source.count)
-    if block_bytes > max(size_bytes, _LEAST_BLOCK_BYTES):
-        got = f"{rows_px} x {cols_px} pixels of {pixel_bytes} bytes"
-        hint = "not tiled, or a damaged header"
-        raise fail(InputError, f"{path}, blocks", "blocks under 64 MiB", got, hint)
     if down * across * planes * _INDEX_ENTRY_BYTES > size_bytes:
         got = f"{size_bytes} bytes for {source.height} x {source.width} x {source.count} pixels"
         raise fail(InputError, str(path), "as many bytes as its header needs", got, hint)

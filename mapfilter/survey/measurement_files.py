@@ -8,19 +8,21 @@ from __future__ import annotations
 
 import csv
 import difflib
+import io
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
+from mapfilter._inputs import open_input
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio.tables import number
 from mapfilter.survey.measurement_rows import FIELDS, IDENTITY, REQUIRED, Rows
 
 _LONGEST_LINE = 1 << 16
 _GSM, _LTE = ("GSM", "GPRS", "EDGE"), ("LTE", "LTE+", "LTE_CA", "NR")
-_KEY = re.compile(r'(\w[\w ]*)=\s*("[^"]*"|[^,]*)')
+_KEY = re.compile(r'(\w[\w ]{0,31}+)=\s{0,9}("[^"]{0,4000}"|[^,]{0,4000})')
 _LEVEL = re.compile(r"^(>?)\s*(-?\d+)\s*dBm$")
 
 
@@ -228,15 +230,12 @@ def _iso(time: str) -> str:
 
 def _open_text(path: Path) -> TextIO:
     """Open a file as text in which an invalid byte invalidates only its own row."""
-    try:
-        with path.open("rb") as stream:
-            head = stream.read(2)
-    except OSError as error:
-        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
+    with open_input(path) as stream:
+        head = stream.read(2)
     if not head:
         raise fail(InputError, str(path), "measurements", "an empty file")
     if head in (b"\xff\xfe", b"\xfe\xff"):
         raise fail(InputError, str(path), "text in UTF-8", "UTF-16", "saved as Unicode by Excel")
     if head == b"\x1f\x8b":
         raise fail(InputError, str(path), "text", "a gzip file", "unpack it first")
-    return path.open(encoding="utf-8-sig", errors="replace")
+    return io.TextIOWrapper(open_input(path), encoding="utf-8-sig", errors="replace")

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import projected_crs, short_crs
 from mapfilter.gnss.orbits import Almanac
+from mapfilter.tracks.headings import heading_fault
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.log_checks import check_clocks, check_start, check_steps, early_ends
 from mapfilter.tracks.satellites import place_satellites
@@ -224,6 +225,9 @@ def make_log(
         check_clocks(tables, called, faults)
         every_note += check_steps(tables, called.get("motion", "motion"), faults)
         every_note += early_ends(tables)
+        places = next((tables[name] for name in ("truth", "gnss") if len(tables[name]) > 1), None)
+        if places is not None and (wrong := heading_fault(tables["motion"], places)):
+            every_note += (f"{called.get('motion', 'motion')}, heading_rad: {wrong}",)
     faults.raise_if_any(InputError)
     placeless = int(tables["pseudoranges"][list(PLACE)].isna().any(axis=1).sum())
     if almanac is None and placeless:

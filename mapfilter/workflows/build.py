@@ -103,7 +103,7 @@ def run_build(
         routable_points=sum(map(int, counts.values())),
         database=target,
         seconds=time.perf_counter() - began_s,
-        notes=(*rasters.notes, *cover, *world.streets.notes),
+        notes=(*rasters.notes, *plan.notes, *cover, *world.streets.notes),
         pictures=_draw(config, rasters, database, world),
     )
 

@@ -8,15 +8,15 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
-import rasterio
 from rasterio.errors import RasterioError
 
+from mapfilter._gdal import open_raster
 from mapfilter._parallel import Progress
 from mapfilter.check.findings import CheckResult, Findings, Severity
 from mapfilter.check.raster_checks import check_ids, is_surveyed, sampled
 from mapfilter.check.site_checks import check_against_sites, check_power
 from mapfilter.config.sections import Config
-from mapfilter.errors import MapfilterError, listed
+from mapfilter.errors import InputError, MapfilterError, listed
 from mapfilter.geodesy import Lattice
 from mapfilter.propagation.predict import off_frequency
 from mapfilter.radio.cell_rules import ANTENNAS
@@ -237,6 +237,6 @@ class _Checks:
         with self._reported("landuse-invalid"):
             _ = world.landuse
             if rasters is not None:
-                with suppress(RasterioError), rasterio.open(landuse) as source:
+                with suppress(RasterioError, InputError), open_raster(landuse) as source:
                     grid = source.transform.c, source.transform.a, source.transform.f
                     check_same_pixels(str(landuse), grid, rasters, self.findings)

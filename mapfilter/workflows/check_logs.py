@@ -39,6 +39,9 @@ def check_logs(
             findings.add_faults(error, "log-invalid")
             continue
         _check_recordings(opened, findings)
+        for note in opened.log.notes:
+            if ", heading_rad: " in note:
+                findings.add("log-headings", str(path), f"{note}.", "warning")
         log = opened.log if lattice is None else in_frame(opened.log, lattice.crs)
         near = lattice is not None and _is_near(path, log, lattice, findings)
         # Motion without any reports is located by the streets alone.

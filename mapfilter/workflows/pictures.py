@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -11,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mapfilter._io import ensure_writable_folder
+from mapfilter._io import ensure_writable_folder, read_json
 from mapfilter._types import Floats32
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.errors import OutputError, fail
+from mapfilter.errors import OutputError, StoreError, fail
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.geodesy import Lattice
 from mapfilter.positioning.estimate import PositionedTrack, Snapshot
@@ -103,8 +102,8 @@ def _is_result(folder: Path) -> bool:
     if folder.is_symlink() or not figures.is_file():
         return False
     try:
-        of = json.loads(figures.read_text(encoding="utf-8")).get("log")
-    except (ValueError, AttributeError, RecursionError):
+        of = read_json(figures).get("log")
+    except StoreError:
         return False
     return of == folder.name and {file.name for file in folder.iterdir()} <= _OF_ONE_LOG
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import rasterio
 from rasterio.errors import RasterioError
 
+from mapfilter._gdal import open_raster
 from mapfilter._io import VERSION, ensure_writable_folder, sha256_file
 from mapfilter._parallel import Progress, part_of
 from mapfilter.config.sections import Config
@@ -59,7 +59,7 @@ def open_ground_truth(config: Config) -> RxLevRasters:
     rasters = open_rasters(path)
     if named or not prediction.is_file():
         return rasters
-    with rasterio.open(path) as source:
+    with open_raster(path) as source:
         belongs_to = source.tags().get(_PREDICTION_TAG)
     if belongs_to not in (None, sha256_file(prediction)):
         raise fail(
@@ -86,9 +86,9 @@ def check_only_own_replaced(*paths: Path) -> None:
         if not path.exists():
             continue
         try:
-            with rasterio.open(path) as source:
+            with open_raster(path) as source:
                 software = str(source.tags().get("SOFTWARE", ""))
-        except RasterioError:
+        except (RasterioError, InputError):
             software = ""
         if not (software.startswith("mapfilter") and is_as_written(path)):
             expected = "nothing yet, or rasters that mapfilter predicted"

@@ -12,7 +12,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from mapfilter._io import path_fault, replaced_files, shown, write_json
+from mapfilter._inputs import path_fault, shown
+from mapfilter._io import replaced_files, write_json
 from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -300,6 +301,8 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         name, crs = opened.name, opened.log.crs if database is None else database.lattice.crs
         log = leave_out(name_by_plan(opened.log, sites(crs)), config.track.without)
         fitted, notes = fitted_to_log(options, log)
+        if database is None:
+            notes = (*notes, *sites(crs).notes)
         if database is not None and by_streets_alone(fitted, log, database):
             notes = (*notes, STREETS_ALONE)
         filter_ = over(crs, fitted, cells=STREETS_ALONE not in notes)

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mapfilter._printing import printable, printable_json, write
 from mapfilter.errors import MapfilterError, Stopped
 
 if TYPE_CHECKING:
@@ -36,18 +37,25 @@ _STOPS = tuple(
 
 def print_message(text: str, kind: str = "") -> None:
     """Write lines to stderr, each with the program's name and ``kind`` before it."""
-    for line in text.splitlines():
-        sys.stderr.write(f"mapfilter: {kind}{line}\n")
+    for line in text.split("\n"):
+        write(sys.stderr, f"mapfilter: {kind}{printable(line)}\n")
+
+
+def print_text(text: str) -> None:
+    """Write lines to stdout."""
+    write(sys.stdout, printable(text) + "\n")
 
 
 def print_result(result: Any, as_json: bool) -> None:
     """Print a result on stdout: one JSON line, or one line for each figure."""
     found = to_jsonable(result)
-    lines = (
-        [json.dumps(found, ensure_ascii=False, allow_nan=False)] if as_json else text_lines(found)
-    )
-    for line in lines:
-        sys.stdout.write(line + "\n")
+    if as_json:
+        ascii_only = not (sys.stdout.encoding or "utf-8").lower().startswith("utf")
+        text = json.dumps(found, ensure_ascii=ascii_only, allow_nan=False)
+        write(sys.stdout, printable_json(text) + "\n")
+        return
+    for line in text_lines(found):
+        print_text(line)
 
 
 @contextlib.contextmanager

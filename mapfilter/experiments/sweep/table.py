@@ -11,6 +11,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from mapfilter._inputs import check_file
 from mapfilter._io import atomic_file, read_json, sha256_file, write_json
 from mapfilter._resume import load_part, save_part
 from mapfilter.errors import StoreError, fail
@@ -142,7 +143,8 @@ def read_runs(path: Path) -> pd.DataFrame:
     StoreError
         It is missing, changed, cut off or no table of a sweep.
     """
-    if path.is_file() and path.with_name(HEAD).is_file() and not is_whole(path):
+    check_file(path, StoreError)
+    if path.with_name(HEAD).is_file() and not is_whole(path):
         hint = "changed after it was written, or a sweep that is not finished: go on with --resume"
         raise fail(StoreError, str(path), f"the table of {HEAD}", "another", hint)
     try:

@@ -23,7 +23,7 @@ from mapfilter.tracks.schema import SERVING
 
 _LARGEST_GAP_S = 30.0
 """Between two true positions farther apart in time than this, none is interpolated."""
-_COUNTED = re.compile(r"(\d+) ((?:readings|reports|rows) left out: .*)", re.DOTALL)
+_COUNTED = re.compile(r"(\d{1,18}) ((?:readings|reports|rows) left out: .*)", re.DOTALL)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
