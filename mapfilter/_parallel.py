@@ -21,6 +21,7 @@ from mapfilter._workers import LARGE_BLOCK_BYTES, LocalWorkers
 from mapfilter.errors import Faults, MapfilterError, fail
 
 _CONNECT_S = 10
+_LOOK_S = 1.0
 _MOST_WORKERS = 256
 
 # By default workers are watched a hundred times a second, and give freed memory back at once.
@@ -109,11 +110,31 @@ def cluster_executor(address: str) -> Iterator[tuple[Executor, int]]:
         _check_hosts(client)
         stack.enter_context(_quiet("distributed.utils", "distributed.client"))
         try:
-            yield client.get_executor(), max(workers, 1)
+            yield _ClusterExecutor(client, place), max(workers, 1)
         except KilledWorker as error:
             raise _died("one that died several times (out of memory?)") from error
         except _lost_errors() as error:
             raise _scheduler_lost(place) from error
+
+
+class _ClusterExecutor(Executor):
+    """Hands tasks to a cluster, as long as its scheduler is there."""
+
+    def __init__(self, client: Any, place: Any) -> None:
+        self._client, self._place = client, place
+        self._inner = client.get_executor()
+
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """Hand in a task; MapfilterError where the connection is lost."""
+        # What is handed in while the client connects again would never be done.
+        self.check()
+        future: Future[T] = self._inner.submit(fn, *args, **kwargs)
+        return future
+
+    def check(self) -> None:
+        """Raise MapfilterError where the connection to the scheduler is lost."""
+        if self._client.status != "running":
+            raise _scheduler_lost(self._place)
 
 
 def _check_hosts(client: Any) -> None:
@@ -198,7 +219,7 @@ def ordered_results(
                 waiting.append(executor.submit(call, task))
             if not waiting:
                 return
-            result = waiting.popleft().result()
+            result = _result_of(waiting.popleft(), executor)
         except BrokenExecutor as error:
             reason = executor.reason() if isinstance(executor, LocalWorkers) else ""
             raise _died(reason or "one that died (out of memory?)") from error
@@ -210,6 +231,18 @@ def ordered_results(
         if progress is not None:
             progress(done, total)
         yield result
+
+
+def _result_of(future: Future[T], executor: Executor) -> T:
+    if not isinstance(executor, _ClusterExecutor):
+        return future.result()
+    while True:
+        try:
+            return future.result(timeout=_LOOK_S)
+        except TimeoutError:
+            if future.done():
+                raise
+            executor.check()
 
 
 def _on_worker(function: Callable[[Any], T], code: str, task: Any) -> T:

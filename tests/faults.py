@@ -62,8 +62,12 @@ _RESUME = "is not finished: go on with --resume"
 
 
 def digest_of(folder: Path) -> dict[str, str]:
-    """Return the SHA-256 of each file in a folder."""
-    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    """Return the SHA-256 of each file in a folder; hidden ones are of writes cut short."""
+    files = sorted(
+        path
+        for path in folder.rglob("*")
+        if path.is_file() and not path.relative_to(folder).parts[0].startswith(".")
+    )
     return {
         path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
         for path in files
@@ -100,8 +104,9 @@ def job_of(name: str, work: Path) -> Job:
             return Job(out, lambda v: merge(parts, out, without=parts[0].cell_ids[:v]), database)
         rasters = open_rasters(work / "inputs" / "rxlev.tif")
         given = rasters, small_world.make_plan(), small_world.make_routes(), out
-        options = {"floor_dbm": small_world.FLOOR_DBM, "tile_px": 8, "resume": True}
-        return Job(out, lambda v: build(*given, margin_db=3.0 + v, **options), database)
+        options = {"tile_px": 8, "resume": True}
+        floor_dbm = small_world.FLOOR_DBM
+        return Job(out, lambda v: build(*given, floor_dbm=floor_dbm + v, **options), database)
     if name == "sweep":
         config = work / "inputs" / "world" / "world.toml"
         plans = [sweep_plans(load_config(config, [*_GRID, f"sweep.seed={v}"])) for v in (0, 1)]
@@ -128,13 +133,22 @@ def job_of(name: str, work: Path) -> Job:
     return Job(out, lambda v: run_learn(configs[v], out, accept=True, resume=True), report)
 
 
-def make_inputs(work: Path) -> None:
-    """Make the inputs of all writers, once."""
+def make_inputs(work: Path, *jobs: str) -> None:
+    """Make the inputs of some writers, once."""
     inputs = work / "inputs"
-    if (inputs / "made").exists():
-        return
-    (inputs / "world").mkdir(parents=True)
-    world = small_world.make_world(inputs)
+    makers = {"build": _rasters, "merge": _parts, "sweep": _world, "learn": _journeys}
+    for job in jobs:
+        if not (inputs / f"made-{job}").exists():
+            inputs.mkdir(parents=True, exist_ok=True)
+            makers[job](inputs)
+            (inputs / f"made-{job}").touch()
+
+
+def _rasters(inputs: Path) -> None:
+    small_world.make_world(inputs)
+
+
+def _parts(inputs: Path) -> None:
     for name, ids in (("north", small_world.IDS[:2]), ("south", small_world.IDS[1:])):
         plan = small_world.make_plan()
         chosen = type(plan)(plan.crs, tuple(cell for cell in plan.cells if cell.id in ids))
@@ -142,9 +156,15 @@ def make_inputs(work: Path) -> None:
         small_world.write_rasters(inputs / f"{name}.tif", small_world.LATTICE, levels, chosen.ids)
         rasters = open_rasters(inputs / f"{name}.tif")
         options = {"floor_dbm": small_world.FLOOR_DBM, "tile_px": 8}
-        build(rasters, chosen, world.routes, inputs / name, **options)
-    commands = _module("workflows/conftest.py")
-    commands.make_world(inputs / "world")
+        build(rasters, chosen, small_world.make_routes(), inputs / name, **options)
+
+
+def _world(inputs: Path) -> None:
+    (inputs / "world").mkdir()
+    _module("workflows/conftest.py").make_world(inputs / "world")
+
+
+def _journeys(inputs: Path) -> None:
     plan = learning_world.plan_of()
     learning_world.database_of(plan, inputs / "taught")
     rng = np.random.default_rng(3)
@@ -153,7 +173,6 @@ def make_inputs(work: Path) -> None:
         for number in range(3 + variant):
             log = learning_world.log_of(true, rng, silent=("S1C",), blocks=16)
             write_log(log, inputs / f"logs-{variant}" / f"j{number}")
-    (inputs / "made").touch()
 
 
 def _module(name: str):  # type: ignore[no-untyped-def]
@@ -168,10 +187,11 @@ def _module(name: str):  # type: ignore[no-untyped-def]
 
 def kill(work: Path, count: int, seed: int = 1) -> Counter[str]:
     """Kill each of the writers in turn at random moments, and look at what it left."""
-    make_inputs(work)
+    turns = _TURNS if count >= len(_TURNS) else ("build", "merge")
+    make_inputs(work, *sorted(set(turns)))
     context = _forks()
     with _outcomes(work, "kill") as outcomes:
-        jobs = {name: job_of(name, work) for name in sorted(set(_TURNS[:count]))}
+        jobs = {name: job_of(name, work) for name in sorted(set(turns))}
         whole, longest_s = {}, {}
         for name, job in jobs.items():
             whole[name] = job.whole()
@@ -179,7 +199,7 @@ def kill(work: Path, count: int, seed: int = 1) -> Counter[str]:
             job.write(0)
             longest_s[name] = _BEYOND * (time.monotonic() - began_s)
         for number in range(outcomes.total(), count):
-            name = _TURNS[number % len(_TURNS)]
+            name = turns[number % len(turns)]
             ready, rng = context.Event(), np.random.default_rng((seed, number))
             writer = context.Process(target=_keep_writing, args=(name, work, number, ready))
             writer.start()
@@ -219,7 +239,7 @@ def _keep_writing(name: str, work: Path, number: int, ready) -> None:  # type: i
 
 def replace(work: Path, count: int) -> Counter[str]:
     """Replace a database while two readers open it and read all of it."""
-    make_inputs(work)
+    make_inputs(work, "build")
     context = _forks()
     with _outcomes(work, "replace") as outcomes:
         job = job_of("build", work)
@@ -250,7 +270,7 @@ def replace(work: Path, count: int) -> Counter[str]:
 
 def _read_all(folder: Path) -> str:
     database = open_database(folder)
-    digest = hashlib.sha256(repr(database.margin_db).encode())
+    digest = hashlib.sha256(repr(database.floor_dbm).encode())
     time.sleep(0.01)
     field, points = database.field(), database.points()
     arrays = [field.level_dbm, field.way_id, points.point, points.best_level_dbm]
@@ -275,13 +295,16 @@ def _keep_reading(folder: Path, whole: list[str], stop, found) -> None:  # type:
 
 def orphans(work: Path, count: int, seed: int = 1) -> Counter[str]:
     """Kill commands with workers at random moments; see who lives, and who holds their pipes."""
-    make_inputs(work)
+    make_inputs(work, "sweep")
     toml = work / "inputs" / "world" / "world.toml"
-    settings = [f"--set={text}" for text in _GRID] + ["--set=sweep.draws=400"]
-    tiles = ["--set=database.tile_px=16"]
+    made = toml.with_name("out")
+    rasters = f"--set=rasters.path={json.dumps(str(made / 'rxlev.tif'))}"
+    grid = [f"--set={text}" for text in (*_GRID, "sweep.draws=400")]
+    grid += [rasters, f"--set=database.path={json.dumps(str(made / 'database'))}"]
+    tiles = [rasters, "--set=database.tile_px=16", '--set=output.pictures="none"']
     commands = {
         "build --workers 2": ["build", *tiles, "--workers", "2"],
-        "sweep --workers 2": ["sweep", *settings, "--workers", "2"],
+        "sweep --workers 2": ["sweep", *grid, "--workers", "2"],
         "build --cluster local:2": ["build", *tiles, "--cluster", "local:2"],
     }
     with _outcomes(work, "orphans") as outcomes:
@@ -290,7 +313,7 @@ def orphans(work: Path, count: int, seed: int = 1) -> Counter[str]:
             rng = np.random.default_rng((seed, number))
             out = ["--out", str(work / "killed" / name.split()[0])]
             given = [sys.executable, "-m", "mapfilter", *commands[name], "-c", str(toml), *out]
-            seconds = rng.uniform(0.5, 8.0)
+            seconds = rng.uniform(0.0, 4.0)
             signal_number = [signal.SIGKILL, signal.SIGTERM][number // len(commands) % 2]
             word = signal.Signals(signal_number).name
             outcomes[f"{name}, {word}: {_killed(given, seconds, signal_number)}"] += 1
@@ -301,8 +324,15 @@ def orphans(work: Path, count: int, seed: int = 1) -> Counter[str]:
 def _killed(command: list[str], seconds: float, number: signal.Signals) -> str:
     pipe = subprocess.PIPE
     with subprocess.Popen(command, stdout=pipe, stderr=pipe, start_new_session=True) as process:
+        # The moment counts from the first of the workers.
+        until_s = time.monotonic() + PATIENCE_S
+        while process.poll() is None and len(_session(process.pid)) < 2:
+            assert time.monotonic() < until_s, f"{command}: no worker"
+            time.sleep(0.02)
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(seconds)
+        ended = process.poll()
+        assert ended in (None, 0), f"{command}: {process.communicate()}"
         workers = len(_session(process.pid)) - 1
         process.send_signal(number)
         try:
@@ -315,6 +345,8 @@ def _killed(command: list[str], seconds: float, number: signal.Signals) -> str:
     while _session(process.pid):
         assert time.monotonic() < until_s, f"{command}: {_session(process.pid)} live on"
         time.sleep(0.05)
+    if ended == 0:
+        return "was done by then"
     return "with other processes, none left" if workers > 0 else "alone at that moment"
 
 

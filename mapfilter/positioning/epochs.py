@@ -221,6 +221,8 @@ def headed(step: MotionStep, heading_rad: float) -> tuple[MotionStep, float]:
     """
     if isfinite(step.heading_rad):
         return step, step.heading_rad
+    if isfinite(step.spread_m):
+        return step, heading_rad
     if isfinite(step.turn_rad):
         heading_rad = (heading_rad if isfinite(heading_rad) else 0.0) + step.turn_rad
     elif not isfinite(heading_rad):

@@ -15,6 +15,7 @@ _GAIN_S, _GAIN_MPS, _GAINS = 3.0, 4.0, 3
 _SWAY_S, _SWAY_MPS, _MAD_TO_SD = 0.5, 3.0, 1.4826
 _STEADY_RADPS = np.radians(1.5)
 _MOVING_MPS = 0.5
+_MOST_SPANS = 1_000_000
 _SHARP_M, _SHARP_RAD = 5.0, np.pi / 2
 
 
@@ -86,10 +87,10 @@ def vehicle_signs(log: TrackLog) -> VehicleSigns | None:
 
 
 def _mean_rates(time_s: Floats, total: Floats, span_s: float) -> Floats:
-    """Return mean rates of a growing sum over spans of time, one after the other."""
+    """Return mean rates of a sum over spans of time, one after the other; of a million at most."""
     if not time_s.size:
         return np.zeros(0)
-    at_s = np.arange(time_s[0], time_s[-1], span_s)
+    at_s = np.arange(time_s[0], min(time_s[-1], time_s[0] + _MOST_SPANS * span_s), span_s)
     return np.asarray(np.diff(np.interp(at_s, time_s, total)) / span_s)
 
 

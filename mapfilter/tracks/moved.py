@@ -214,8 +214,7 @@ def motion_from_positions(
 
     The errors of positions are their scatter about the straight line between the one before and
     the one after, which holds turns and changes of speed, too. A step of less than two of its
-    standard deviations has no heading. Intervals of more than 5 s and of three usual ones have
-    no step.
+    standard deviations has no heading. A step over a gap goes straight from its begin to its end.
 
     Parameters
     ----------
@@ -240,11 +239,10 @@ def motion_from_positions(
     step_sd_m = max(np.sqrt(2) * sd_m, _LEAST_STEP_SD_M)
     moving = step_m > _MOVING_SD * step_sd_m
     usual_m = float(np.median(step_m[moving])) if moving.any() else step_sd_m
-    step = np.where(_long(np.diff(time_s)), np.nan, step_m)
     motion = pd.DataFrame(
         {
             "time_s": time_s,
-            "step_m": np.concatenate([[0.0], step]),
+            "step_m": np.concatenate([[0.0], step_m]),
             "heading_rad": np.concatenate([[np.nan], np.where(moving, heading, np.nan)]),
             "turn_rad": np.nan,
         }

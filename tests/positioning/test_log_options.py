@@ -9,6 +9,7 @@ from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.filter import locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.log_options import fitted_to_log
+from mapfilter.positioning.vehicle_signs import vehicle_signs
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.log import make_log
@@ -210,6 +211,15 @@ def test_cyclists_are_no_vehicles(given, vehicle):
     assert (fitted.vehicle is True) == vehicle
     whose = "a vehicle's" if vehicle else "a cyclist's, no vehicle's"
     assert any(f"taken for {whose} (filter.bayes.vehicle)" in note for note in notes)
+
+
+def test_signs_of_a_log_of_centuries_or_of_one_moment():
+    time_s = np.r_[np.arange(60.0), 1e10]
+    rows = pd.DataFrame({"time_s": time_s, "step_m": 9.0, "turn_rad": 0.01})
+    signs = vehicle_signs(make_log(CRS, motion=rows))
+    assert signs.top_mps < 1
+    once = pd.DataFrame({"time_s": [5.0, 5.0, 5.0], "step_m": [1.0, 2.0, 3.0], "turn_rad": 0.1})
+    assert not vehicle_signs(make_log(CRS, motion=once)).fast
 
 
 def test_whose_motion_it_is_can_be_stated():

@@ -226,7 +226,7 @@ def test_nemo_times_are_utc_where_the_log_states_its_offset(read):
     assert recording.clock.kind == "utc"
     moment = pd.Timestamp("2026-05-01T20:59:59.5Z").timestamp()
     assert recording.tables["radio"]["time_s"].tolist() == [moment]
-    assert "times are +3 h ahead of UTC by #UT" in recording.notes
+    assert "local times are those of UTC+3, by #UT" in recording.notes
     # Of an offset of more than 14 hours nothing is known.
     assert read(ahead.replace("180", "1440") + LTE.format(at="13:00:00.0")).clock.kind == "local"
 

@@ -28,7 +28,7 @@ def test_the_errors_stated_are_those_of_steps_and_headings(sd_m):
     assert errors.bias_sd_deg == 0
 
 
-def test_standing_has_no_heading_and_gaps_have_no_step():
+def test_standing_has_no_heading_and_a_gap_is_one_straight_step():
     time_s, east_m, north_m, _ = drive(0.5, count=300)
     east_m[100:160], north_m[100:160] = east_m[100], north_m[100]
     rng = np.random.default_rng(1)
@@ -37,7 +37,8 @@ def test_standing_has_no_heading_and_gaps_have_no_step():
     motion, _ = motion_from_positions(time_s[kept], east_m[kept], north_m[kept])
     assert motion["heading_rad"].iloc[101:160].isna().mean() > 0.8
     assert motion["heading_rad"].iloc[1:100].notna().all()
-    assert np.flatnonzero(motion["step_m"].isna()).tolist() == [200]
+    over_m = np.hypot(east_m[240] - east_m[199], north_m[240] - north_m[199])
+    assert motion["step_m"].iloc[200] == pytest.approx(over_m)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])

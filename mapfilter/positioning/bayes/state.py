@@ -14,6 +14,7 @@ from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBe
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.path import DeadReckoning as DeadReckoning
 from mapfilter.positioning.bayes.path import RecentPath
+from mapfilter.positioning.bayes.sensors import SensorWatch
 from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
 from mapfilter.positioning.integrity import sample_tail
 
@@ -52,6 +53,8 @@ class BayesState:
         The last metres, where the map alone may start a belief.
     reported : Reported or None
         The last output, which stays as it is as long as the belief does.
+    watch : SensorWatch
+        Whether sensors still measure.
     """
 
     belief: MapBelief | None = None
@@ -65,6 +68,7 @@ class BayesState:
     takeovers: int = 0
     path: RecentPath = field(default_factory=RecentPath)
     reported: Reported | None = None
+    watch: SensorWatch = field(default_factory=SensorWatch)
 
     @property
     def particle_spacing_m(self) -> float:

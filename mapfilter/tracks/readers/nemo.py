@@ -108,7 +108,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
         reading.clock = Clock("local", zone)
     else:
         reading.clock = Clock("utc")
-        reading.note(f"times are {ahead_s / 3600:+g} h ahead of UTC by #UT")
+        reading.note(f"local times are those of UTC{ahead_s / 3600:+g}, by #UT")
         midnight_s -= ahead_s
     systems = {
         family: [number for number, one in _SYSTEMS.items() if one.family == family]
