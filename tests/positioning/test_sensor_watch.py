@@ -91,6 +91,46 @@ def test_rows_that_come_with_steps_only_are_missing_at_rest(always):
     }
 
 
+def test_a_rest_that_was_measured_is_none_of_the_way():
+    """After 20 minutes at rest one row lacks a length: a second's way, not one of 20 minutes."""
+    rest = [Epoch(float(second), STILL) for second in range(20, 1200)]
+    watch, _ = told(walked() + rest)
+    _, ((epoch, why, _),) = told([Epoch(1200.0, NO_STEP)], watch)
+    assert why is Reason.NO_STEP
+    assert epoch.motion[-1].step_m == pytest.approx(1.4)
+    _, ((epoch, why, _),) = told([Epoch(1206.0, (), report([-70.0]))], watch)
+    assert why is Reason.MOTION_MISSING
+    assert epoch.motion[-1].step_m == pytest.approx(7 * 1.4)
+
+
+def test_turns_without_a_length_are_kept():
+    turn = MotionStep(float("nan"), float("nan"), 1.5)
+    _, found = told([*walked(), Epoch(20.0, (turn,))])
+    kept, way = found[20][0].motion
+    assert kept is turn
+    assert way.step_m == pytest.approx(1.4)
+
+
+def test_a_step_after_a_rest_without_rows_is_no_rest():
+    """A pedometer's first row after a minute covers a step, not the minute."""
+    times = np.cumsum(np.random.default_rng(3).uniform(0.4, 0.7, 30))
+    rows = []
+    for start_s in (0.0, 80.0):
+        rows += [Epoch(start_s + float(time_s), STEP) for time_s in times]
+        end_s = rows[-1].time_s
+        rows += [Epoch(end_s + k, (), report([-70.0, -80.0])) for k in range(1, 55)]
+    watch, found = told(rows)
+    assert not watch.reports_always
+    assert {why for _, why, _ in found} == {Reason.USED}
+
+
+def test_the_speed_is_that_of_all_the_time():
+    """Two rows a millisecond apart, of 0.7 m each, every second."""
+    times = sorted([*range(60), *(second + 0.001 for second in range(60))])
+    watch, _ = told([Epoch(float(time_s), (MotionStep(0.7, 0.0),)) for time_s in times])
+    assert 1.0 < watch.speed_mps < 2.1
+
+
 def at_rest(rng, seconds, elsewhere_db_per_s=0.0):
     """Levels of seven cells, as they fade at rest, or wander as one is carried on."""
     lasting, levels = rng.normal(0, 2.0, 7), rng.uniform(-100, -70, 7)
@@ -176,6 +216,12 @@ def test_another_level_makes_it_fresh_again_and_rest_never_makes_it_stale():
     assert {why for _, _, why in found} == {Reason.USED}
 
 
+def test_levels_beyond_the_scale_are_never_stale():
+    rows = tuple(replace(row, censored=-1) for row in report([-110.0] * 7))
+    _, found = told([Epoch(float(k), STEP, rows) for k in range(300)])
+    assert {why for _, _, why in found} == {Reason.USED}
+
+
 def test_a_log_that_begins_without_motion_is_left_alone():
     rows = [Epoch(float(k), (), report([-70 - k, -80])) for k in range(20)]
     assert told(rows)[1] == [(epoch, Reason.USED, Reason.USED) for epoch in rows]
@@ -217,6 +263,18 @@ def tracked(log, seed, positioner):
         rows.append((fix.time_s, off_m, fix.radii_m[-1], claimed))
         reasons.update(one.reason for one in output.unused if one.kind == "motion")
     return np.array(rows), reasons
+
+
+def test_an_unmeasured_way_before_the_start_leaves_the_compass():
+    rng, log = np.random.default_rng(1), walk_log(TOWN, 1, error_db=3.0)
+    state = AREA.begin()
+    rows = [epoch for epoch in epochs(log) if epoch.motion]
+    for epoch in rows[:2]:
+        state, _ = AREA.step(state, replace(epoch, radio=(), motion=NO_STEP), rng)
+    heard = next(epoch for epoch in rows[2:] if epoch.radio)
+    state, _ = AREA.step(state, replace(heard, motion=NO_STEP), rng)
+    assert state.belief is not None
+    assert state.compass
 
 
 def test_the_walks_are_tracked_while_all_sensors_work():

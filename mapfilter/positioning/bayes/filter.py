@@ -222,7 +222,8 @@ class BayesPositioner(Filter[BayesState]):
                 path = (path if known else RecentPath()).moved(step)
                 why = Reason.USED if isfinite(step.step_m) else Reason.NO_STEP
             if belief is None:
-                compass = isfinite(raw.heading_rad)
+                # An unmeasured way says nothing of the compass.
+                compass = compass if isfinite(raw.spread_m) else isfinite(raw.heading_rad)
             else:
                 turned = isfinite(raw.heading_rad) or isfinite(raw.spread_m)
                 if compass and not turned and reckoning.travelled_m == 0:

@@ -127,6 +127,8 @@ class SensorWatch:
         Mean speed while it moves.
     moving_s : float
         Time of the last measured step.
+    known_s : float
+        Time until which the way is measured, or in the belief as an unmeasured one.
     rest : Rest or None
         Reports since then, while no motion is reported; None while it moves.
     unmeasured_s : float
@@ -146,6 +148,7 @@ class SensorWatch:
     rests: bool = False
     speed_mps: float = _WALK_MPS
     moving_s: float = nan
+    known_s: float = nan
     rest: Rest | None = None
     unmeasured_s: float = 0.0
     report: tuple[ReportRow, ...] = ()
@@ -185,7 +188,7 @@ def _moved(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, Epoch, Reason
     steps = [abs(step.step_m) for step in epoch.motion]
     measured = [step_m for step_m in steps if isfinite(step_m)]
     dt_s = time_s - watch.motion_s
-    moves = sum(measured) > _REST_MPS * (dt_s if isfinite(dt_s) else 0.0)
+    moves = sum(measured) > _REST_MPS * (_usual_s(watch, dt_s) if isfinite(dt_s) else 0.0)
     if steps:
         watch = _timed(watch, time_s, dt_s, sum(measured), moves=moves, rests=bool(measured))
     if not isfinite(watch.moving_s):
@@ -193,12 +196,22 @@ def _moved(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, Epoch, Reason
     if moves:
         moved_m = watch.moved_m + sum(measured)
         return (
-            replace(watch, moving_s=time_s, rest=None, unmeasured_s=0.0, moved_m=moved_m),
+            replace(
+                watch,
+                moving_s=time_s,
+                known_s=time_s,
+                rest=None,
+                unmeasured_s=0.0,
+                moved_m=moved_m,
+            ),
             epoch,
             why,
         )
     rest = (watch.rest or Rest(watch.moving_s)).heard(time_s, epoch.radio)
-    unmeasured_s = time_s - watch.moving_s
+    # A measured rest is none of the way, unless it was a counter that stood still.
+    unmeasured_s = watch.unmeasured_s + time_s - watch.known_s
+    if rest.is_carried:
+        unmeasured_s = time_s - watch.moving_s
     if steps and not measured:
         why = Reason.NO_STEP
     elif not steps and watch.reports_always:
@@ -208,12 +221,19 @@ def _moved(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, Epoch, Reason
         why = Reason.MOTION_STUCK if steps else Reason.MOTION_MISSING
     watch = replace(watch, rest=rest)
     if why is Reason.USED:
-        return watch, epoch, why
+        return replace(watch, known_s=time_s) if measured else watch, epoch, why
     way = _unmeasured(watch.speed_mps, watch.unmeasured_s, unmeasured_s)
-    motion = (*(step for step in epoch.motion if isfinite(step.step_m)), way)
+    # Turns count though the length of their step is unknown.
+    turned = (step for step in epoch.motion if isfinite(step.step_m) or isfinite(step.turn_rad))
+    motion = (*turned, way)
     moved_m = watch.moved_m + way.step_m
-    watch = replace(watch, unmeasured_s=unmeasured_s, moved_m=moved_m)
+    watch = replace(watch, known_s=time_s, unmeasured_s=unmeasured_s, moved_m=moved_m)
     return watch, replace(epoch, motion=motion), why
+
+
+def _usual_s(watch: SensorWatch, dt_s: float) -> float:
+    """Return the time that a row covers: after a rest without rows only the usual interval."""
+    return min(dt_s, _GAP_INTERVALS * watch.interval_s) if watch.rows > 1 else dt_s
 
 
 def _timed(
@@ -228,7 +248,8 @@ def _timed(
         interval_s += new * (dt_s - interval_s)
         irregular_s += new * (abs(dt_s - interval_s) - irregular_s)
         if moves:
-            speed_mps += 0.05 * (moved_m / dt_s - speed_mps)
+            # By time: of two rows at almost the same one, the speed would be any.
+            speed_mps += 0.05 * (moved_m - speed_mps * dt_s) / interval_s
     return replace(
         watch,
         motion_s=time_s,
@@ -238,6 +259,7 @@ def _timed(
         rests=watch.rests or (rests and not moves),
         speed_mps=speed_mps,
         moving_s=time_s if not isfinite(watch.moving_s) else watch.moving_s,
+        known_s=time_s if not isfinite(watch.known_s) else watch.known_s,
     )
 
 
@@ -257,7 +279,8 @@ def _repeated(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, bool]:
     """Return whether the report repeats what was heard elsewhere."""
     if not epoch.radio:
         return watch, False
-    levels = min(sum(isfinite(row.level_dbm) for row in epoch.radio), _MOST_ROWS)
+    # Beyond the end of its scale a level stays the same anywhere.
+    levels = min(len(_levels(epoch.radio)), _MOST_ROWS)
     nats = 0.0
     # Rows without a level compare as NaN, which equals nothing: their cells are compared.
     if levels and _keys(epoch.radio) == _keys(watch.report):
