@@ -232,7 +232,8 @@ def _judged(found: str, whole: list[str], number: int) -> str:
 def _keep_writing(name: str, work: Path, number: int, ready) -> None:  # type: ignore[no-untyped-def]
     job = job_of(name, work)
     ready.set()
-    while True:
+    # Whoever is stopped leaves no writer behind.
+    while multiprocessing.parent_process().is_alive():
         number += 1
         job.write(number % 2)
 
@@ -284,7 +285,7 @@ def _read_all(folder: Path) -> str:
 def _keep_reading(folder: Path, whole: list[str], stop, found) -> None:  # type: ignore[no-untyped-def]
     outcomes: Counter[str] = Counter()
     found.put("ready")
-    while not stop.is_set():
+    while not stop.is_set() and multiprocessing.parent_process().is_alive():
         try:
             outcomes["whole" if _read_all(folder) in whole else "a mix, silently"] += 1
         except StoreError as error:

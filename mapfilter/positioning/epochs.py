@@ -153,6 +153,9 @@ def _by_time(log: TrackLog, table: str, row: Callable[..., Any]) -> dict[float, 
         values = column.tolist()
         if str(column.dtype) in ("Int64", "Int8", "object", "str", "string"):
             values = [None if value is pd.NA or value != value else value for value in values]
+        else:
+            # One NaN for all, so that rows without a value are equal.
+            values = [nan if value != value else value for value in values]
         columns.append(values)
     found: dict[float, list[Any]] = {}
     # Reports repeat themselves; equal rows are one object.

@@ -18,6 +18,7 @@ from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults
 from mapfilter.geodesy import wrap_rad
 from mapfilter.radio.identities import LIMITS
+from mapfilter.tracks.clock_steps import told_clock_steps
 from mapfilter.tracks.schema import (
     MISSING_SIGNS,
     NEIGHBOUR,
@@ -331,9 +332,11 @@ def _sorted_unique(
     if duplicate.any():
         notes += (f"{where}: {int(duplicate.sum())} exact duplicate rows dropped",)
         table = table[~duplicate]
-    backwards = int(np.sum(np.diff(table["time_s"].to_numpy()) < 0))
+    time_s = table["time_s"].to_numpy()
+    backwards = int(np.sum(np.diff(time_s) < 0))
     if backwards:
-        notes += (f"{where}: out of order in {backwards} places, sorted by time",)
+        step = told_clock_steps(time_s)
+        notes += (f"{where}: {step or f'out of order in {backwards} places, sorted by time'}",)
         table = table.sort_values("time_s", kind="stable")
     return table.reset_index(drop=True), notes
 

@@ -220,3 +220,28 @@ def test_only_an_unplaced_frame_is_local():
     for placed in ("+proj=utm +zone=35 +datum=WGS84", "+proj=tmerc +lat_0=60 +lon_0=25"):
         assert not is_local_frame(placed)
         assert not is_local_frame(projected_crs(f"{placed} +type=crs"))
+
+
+@pytest.mark.parametrize(("back_s", "rows"), [(20.0, 50), (4.5, 50), (30.0, 97)])
+def test_a_clock_that_was_set_back_is_named(back_s, rows):
+    """Sorted rows would hide it: for so long they are those of two moments, in turns."""
+    time_s = np.arange(100.0)
+    time_s[rows:] -= back_s
+    log = make_log(CRS, motion=pd.DataFrame({"time_s": time_s, "step_m": np.arange(100) / 50}))
+    said = f"motion: time goes back by {back_s - 1:g} s after {rows - 1} s, as when a clock"
+    assert [note.startswith(said) for note in log.notes] == [True]
+    assert log.motion["time_s"].is_monotonic_increasing
+    assert len(log.motion) == 100
+
+
+def test_rows_out_of_order_are_no_clock():
+    time_s = np.arange(100.0)
+    time_s[[40, 41]] = time_s[[41, 40]]
+    swapped = make_log(CRS, motion=pd.DataFrame({"time_s": time_s, "step_m": 1.0}))
+    assert swapped.notes == ("motion: out of order in 1 places, sorted by time",)
+    shuffled = np.random.default_rng(0).permutation(100).astype(float)
+    log = make_log(CRS, motion=pd.DataFrame({"time_s": shuffled, "step_m": 1.0}))
+    assert "out of order" in log.notes[0]
+    two = np.concatenate([np.arange(50.0, 100.0), np.arange(50.0)])
+    log = make_log(CRS, motion=pd.DataFrame({"time_s": two, "step_m": 1.0}))
+    assert "out of order" in log.notes[0]

@@ -131,5 +131,7 @@ def test_journeys_without_any_cell_are_told(own_world, export):
     for path in folder.glob("*.tif"):
         with rasterio.open(path, "r+") as target:
             target.write(np.full((target.height, target.width), np.nan, np.float32), 1)
-    done = assert_done(mapfilter("simulate", "-c", own_world.toml, "--json")).json
+    outcome = mapfilter("simulate", "-c", own_world.toml, "--json")
+    assert outcome.code == 3
+    done = outcome.json
     assert done["notes"][-1].startswith("no cell is received in 2 of 2 journeys (journey-")

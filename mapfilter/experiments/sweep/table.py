@@ -143,7 +143,8 @@ def read_runs(path: Path) -> pd.DataFrame:
     StoreError
         It is missing, changed, cut off or no table of a sweep.
     """
-    check_file(path, StoreError)
+    if path.exists():
+        check_file(path, StoreError)
     if path.with_name(HEAD).is_file() and not is_whole(path):
         hint = "changed after it was written, or a sweep that is not finished: go on with --resume"
         raise fail(StoreError, str(path), f"the table of {HEAD}", "another", hint)
