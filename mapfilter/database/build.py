@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from threading import Thread
@@ -20,6 +20,7 @@ from mapfilter._io import atomic_dir, check_replaceable
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter._resume import FinishedParts
 from mapfilter.database.manifest import FORMAT, MANIFEST, InputFile
+from mapfilter.database.measured import MeasuredParts, ServedRows, deviations_at_points
 from mapfilter.database.parquet import Window
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -65,6 +66,7 @@ def build(
     tile_px: int = TILE_PX,
     inputs: Sequence[InputFile] = (),
     attribution: str = "",
+    measured: tuple[ServedRows, RxLevRasters] | None = None,
     executor: Executor | None = None,
     in_flight: int = 8,
     tiles_a_task: int = 1,
@@ -100,6 +102,9 @@ def build(
         Files that roads and rasters were made from, for the record; the rasters are added.
     attribution : str
         Attribution that the licence of the map demands.
+    measured : (ServedRows, RxLevRasters), optional
+        Of rasters that a survey made: its reports of serving cells, and the rasters of its
+        deviations.
     executor : Executor, optional
         Where tiles are read; the result does not depend on it.
     in_flight : int
@@ -152,7 +157,12 @@ def build(
             "points_off_rasters": job.off_rasters(written.points),
         }
         inputs = (*inputs, InputFile("rasters", rasters.path.name, digest.result()))
-        head = Head(rasters.lattice, job.plan, parameters, attribution, inputs, counts)
+        parts = None
+        if measured is not None:
+            served, deviation = measured
+            deviation = replace(deviation, lattice=rasters.lattice)
+            parts = MeasuredParts(served, deviations_at_points(folder, deviation, ids))
+        head = Head(rasters.lattice, job.plan, parameters, attribution, inputs, counts, parts)
         head.write(folder, written.parts)
     return open_database(out)
 

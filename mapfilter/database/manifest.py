@@ -16,10 +16,14 @@ from mapfilter._io import check_version, read_json, sha256_file
 from mapfilter.errors import Fault, Faults, StoreError, fail
 
 FORMAT = "mapfilter radio-route database"
-VERSION = 1
+VERSION = 2
+"""Of databases with parts of a survey; those without are of version 1."""
 MANIFEST = "manifest.json"
 CELLS = "cells.parquet"
 POINTS = "points.parquet"
+SERVED = "served.parquet"
+DEVIATIONS = "deviations.parquet"
+_SURVEYED = (SERVED, DEVIATIONS)
 
 _Layers = Literal["map", "roads", "tracks", "buildings", "water", "landuse", "landuse_table"]
 InputRole = _Layers | Literal["plan", "rasters", "database", "patch"]
@@ -115,7 +119,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     manifest = read_json(file)
     if manifest.get("format") != FORMAT:
         raise fail(StoreError, str(file), f"format {FORMAT!r}", manifest.get("format"))
-    check_version(str(file), manifest.get("version"), VERSION)
+    if manifest.get("version") != 1:
+        check_version(str(file), manifest.get("version"), VERSION)
     try:
         whole = _Manifest.model_validate(manifest)
     except ValidationError as error:
@@ -198,8 +203,12 @@ def _check_together(manifest: _Manifest, where: str, faults: Faults) -> None:
     for path, times in paths.items():
         if times > 1:
             faults.add(where, f"part {path} once", f"{times} times", _DAMAGED)
+    if len(some := [name for name in _SURVEYED if name in paths]) == 1:
+        faults.add(where, f"parts {' and '.join(_SURVEYED)}", f"{some[0]} alone", _DAMAGED)
     for part in manifest.parts:
         if part.cell is None:
+            if part.path in _SURVEYED:
+                continue
             if part.path not in named:
                 faults.add(f"{where}, {part.path}", "the cell whose part it is", "none", _DAMAGED)
             elif part.rows != named[part.path]:

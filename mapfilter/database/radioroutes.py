@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from mapfilter._types import Bools, Floats32, Ints, Ints32
-from mapfilter.database.manifest import POINTS
+from mapfilter.database.manifest import DEVIATIONS, POINTS
+from mapfilter.database.measured import MeasuredParts, read_measured
 from mapfilter.database.parquet import WindowReader, check_places, read_columns
 from mapfilter.errors import InputError, StoreError, fail
 from mapfilter.geodesy import Lattice
@@ -210,6 +211,19 @@ class RadioRouteDatabase:
             best_server=rank[server[order]],
             way_class=(way_class[order], classes),
         )
+
+    def measured(self) -> MeasuredParts | None:
+        """Return what its survey measured; None where levels were predicted.
+
+        Raises
+        ------
+        StoreError
+            A part is damaged.
+        """
+        parts = {part["path"] for part in self.manifest["parts"]}
+        if DEVIATIONS not in parts or not self.cell_ids:
+            return None
+        return read_measured(self.path, self.lattice.rows, self.lattice.cols)
 
     def without_cells(self) -> RadioRouteDatabase:
         """Return the same points as a database of roads alone."""

@@ -37,7 +37,14 @@ _KEY = re.compile(r'(\w[\w ]*)=\s*("[^"]*"|[^,]*)')
 _LEVEL = re.compile(r"^(>?)\s*(-?\d+)\s*dBm$")
 _IDENTITY = ("mcc", "mnc", "lac", "ci")
 _REQUIRED = ("lat", "lon", "level_dbm")
-FIELDS = ("cell", *_IDENTITY, *_REQUIRED, "time", "accuracy_m", "session")
+_MOST_STEPS = 3846.0
+"""Timing advances: of NR 0 to 3846, fewer of older technologies."""
+_YES = ("1", "true", "yes", "neighbour", "neighbor")
+_NO = ("0", "false", "no", "serving")
+FIELDS = (
+    *("cell", *_IDENTITY, *_REQUIRED, "time", "accuracy_m", "session"),
+    *("timing_advance", "neighbour"),
+)
 """Fields that a column map may name."""
 
 NO_TIME = "times not understood (levels kept)"
@@ -71,11 +78,12 @@ class Rows:
 
     @property
     def columns(self) -> Floats:
-        """Unix seconds, latitude, longitude (WGS 84), level (dBm) and accuracy (m), shape (5, N).
+        """Return all rows as columns, shape (7, N); what is unknown is NaN.
 
-        Unknown times and accuracies are NaN.
+        Unix seconds, latitude, longitude (WGS 84), level (dBm), accuracy (m), timing advance
+        (steps), and 1 for a serving cell, 0 for a neighbour.
         """
-        return np.array(self.values).reshape(-1, 5).T
+        return np.array(self.values).reshape(-1, 7).T
 
     def refuse(self, line: int, name: str, expected: str, got: object, hint: str = "") -> None:
         """Count a bad row and keep the faults of the first ones."""
@@ -146,7 +154,12 @@ class Rows:
             accuracy_m = math.nan
         self.cell.append(self.cells.setdefault(cell, len(self.cells)))
         self.session.append(self.sessions.setdefault(given["session"], len(self.sessions)))
-        self.values.extend((time_s, lat_deg, lon_deg, level_dbm, accuracy_m))
+        steps = number(given["timing_advance"])
+        if steps is None or not 0 <= steps <= _MOST_STEPS:
+            steps = math.nan
+        said = given["neighbour"].lower()
+        serving = 0.0 if said in _YES else 1.0 if said in _NO else math.nan
+        self.values.extend((time_s, lat_deg, lon_deg, level_dbm, accuracy_m, steps, serving))
 
     def notes(self) -> list[str]:
         """Return remarks on how many rows were refused or set aside, and where the first are."""
@@ -221,9 +234,21 @@ def _upload(**columns: str) -> Dialect:
 DIALECTS: Mapping[str, Dialect] = {
     "csv": mapped({}),
     "opencellid": _upload(
-        lac="lac tac", ci="cellid", level_dbm="signal", accuracy_m="rating", technology="act"
+        lac="lac tac",
+        ci="cellid",
+        level_dbm="signal",
+        accuracy_m="rating",
+        technology="act",
+        timing_advance="ta",
     ),
-    "towercollector": _upload(lac="lac", ci="cell_id", level_dbm="dbm", accuracy_m="accuracy"),
+    "towercollector": _upload(
+        lac="lac",
+        ci="cell_id",
+        level_dbm="dbm",
+        accuracy_m="accuracy",
+        timing_advance="ta",
+        neighbour="neighboring",
+    ),
 }
 """Columns named as the fields are; uploads to OpenCellID; exports of Tower Collector."""
 
@@ -357,7 +382,7 @@ def read_antennas_log(path: Path) -> Rows:
             time, operator = values.get("Time", ""), values.get("Operator", "")
         elif kind in ("ACTIVE GSM", "GSM"):
             rows.read += 1
-            received.append((line, values))
+            received.append((line, values | {"neighbour": "0" if kind == "ACTIVE GSM" else "1"}))
         elif kind == "Best Location":
             found = dict.fromkeys(FIELDS, "") | {"time": _iso(time)}
             found |= {"lat": values.get("Lat", ""), "lon": values.get("Lon", "")}
@@ -379,7 +404,8 @@ def _add_logged(
     elif name and level is not None and level[1]:
         rows.aside["levels that are only bounds (>)"] += 1
     elif name and level is not None:
-        rows.add(line, name, {**found, "level_dbm": level[2]})
+        neighbour = cell["neighbour"]
+        rows.add(line, name, {**found, "level_dbm": level[2], "neighbour": neighbour})
 
 
 def _iso(time: str) -> str:

@@ -13,11 +13,12 @@ from mapfilter.config.sections import Config
 from mapfilter.database.build import build, build_roads
 from mapfilter.database.estimate import BuildEstimate, dry_run
 from mapfilter.database.manifest import InputFile
+from mapfilter.database.measured import ServedRows, read_served
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.names import named_by_plan
-from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.workflows.pictures import NETWORK_PICTURES, clear_pictures, draw_network
 from mapfilter.workflows.streets import pixels_on
 from mapfilter.workflows.world import (
@@ -94,6 +95,7 @@ def run_build(
             tile_px=section.tile_px,
             inputs=_inputs(world),
             attribution=world.streets.attribution,
+            measured=_measured(config),
             executor=executor,
             in_flight=_TASKS_A_WORKER * at_once,
             tiles_a_task=tiles_a_task,
@@ -182,6 +184,15 @@ def _raster_world(config: Config) -> tuple[RxLevRasters, CellPlan, World]:
             rasters, world = replace(rasters, lattice=cut), World(config, cut)
     check_cells_near(whole.plan, world.lattice, str(config.cells.plan or "cells"))
     return rasters, whole.plan, world
+
+
+def _measured(config: Config) -> tuple[ServedRows, RxLevRasters] | None:
+    """Return what the survey that made the rasters measured; None where it was not kept."""
+    if config.surveyed_plan is None or not config.served_path.exists():
+        return None
+    if not config.deviation_path.exists():
+        return None
+    return read_served(config.served_path), open_rasters(config.deviation_path)
 
 
 def _draw(

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mapfilter._io import VERSION, ensure_writable_folder
+from mapfilter._io import VERSION, atomic_file, ensure_writable_folder
 from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
+from mapfilter.database.measured import ServedRows, write_served
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs
 from mapfilter.radio.cells import CellPlan, write_cell_plan
@@ -185,6 +186,9 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         tags={"SOFTWARE": f"mapfilter {VERSION}", "MODEL": f"survey {options.method}"},
         progress=progress,
     )
+    served = served_rows(measurements)
+    with atomic_file(config.served_path) as temporary:
+        write_served(served, temporary)
     plan_path = config.output.dir / "cells.csv"
     cells = surveyed_plan(
         survey,
@@ -215,6 +219,22 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         validation=validation,
         notes=(*measurements.notes, *survey.notes, *_advice(config, survey, factor)),
         pictures=pictures,
+    )
+
+
+def served_rows(measurements: Measurements) -> ServedRows:
+    """Return the reports of serving cells of a survey, in its CRS."""
+    cell_ids = measurements.cell_ids
+    if measurements.serving is None or measurements.timing_advance is None:
+        nothing = np.empty(0)
+        return ServedRows(cell_ids, np.empty(0, np.int32), nothing, nothing, nothing)
+    own = measurements.serving
+    return ServedRows(
+        cell_ids,
+        measurements.cell[own],
+        measurements.east_m[own],
+        measurements.north_m[own],
+        measurements.timing_advance[own],
     )
 
 

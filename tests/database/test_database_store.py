@@ -96,9 +96,9 @@ def test_a_missing_database(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"version": 2}, "newer"),
-        ({"version": 0}, "version 1, found 0 .likely: edited"),
-        ({"version": None}, "version 1, found None .likely: edited"),
+        ({"version": 3}, "newer"),
+        ({"version": 0}, "version 2, found 0 .likely: edited"),
+        ({"version": None}, "version 2, found None .likely: edited"),
         ({"format": "something else"}, "format"),
         ({"parts": []}, "points.parquet"),
         ({"parts": [{"path": "../../x", "bytes": 1}]}, "within the folder"),

@@ -51,11 +51,11 @@ def manifest(own_world):
 
 
 @pytest.mark.parametrize(
-    ("version", "why"), [(2, "newer"), (99, "newer"), ("2", "edited"), (None, "edited")]
+    ("version", "why"), [(3, "newer"), (99, "newer"), ("2", "edited"), (None, "edited")]
 )
 def test_another_version(version, why, own_world, manifest):
     manifest(version=version)
-    assert_all_refuse(own_world, f"manifest.json: expected version 1, found {version}", why)
+    assert_all_refuse(own_world, f"manifest.json: expected version 2, found {version}", why)
 
 
 def test_another_format(own_world, manifest):

@@ -1,0 +1,244 @@
+"""What a survey adds to a database: where each cell served, and how well its levels are known.
+
+``served.parquet`` has a row for each report of a serving cell, ``deviations.parquet`` the standard
+deviation of a new reading at each point where a cell was measured. Filters over measured maps need
+both: a cell that was not measured at a place may be received there, and which cell serves is
+counted (:mod:`mapfilter.models.measured_map`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from scipy.ndimage import distance_transform_edt
+
+from mapfilter._types import Bools, Floats, Floats32, Ints32
+from mapfilter.database.manifest import DEVIATIONS, POINTS, SERVED, describe_part
+from mapfilter.database.parquet import dictionary, read_columns, write_columns
+from mapfilter.errors import InputError, StoreError, fail
+from mapfilter.rasters.raster_set import RxLevRasters
+
+_SERVED = ("cell", "east_m", "north_m", "timing_advance")
+_DEVIATIONS = ("cell", "row", "col", "deviation_db")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ServedRows:
+    """Reports of serving cells, N rows.
+
+    Parameters
+    ----------
+    cell_ids : tuple of str
+    cell : ndarray of int32, shape (N,)
+        Index into ``cell_ids``.
+    east_m, north_m : ndarray, shape (N,)
+        Where the cell served.
+    timing_advance : ndarray, shape (N,)
+        Steps; NaN where it was not reported.
+    """
+
+    cell_ids: tuple[str, ...]
+    cell: Ints32
+    east_m: Floats
+    north_m: Floats
+    timing_advance: Floats
+
+    def __len__(self) -> int:
+        return len(self.cell)
+
+    def some(self, kept: Bools) -> ServedRows:
+        """Return some of the rows."""
+        columns = self.cell[kept], self.east_m[kept], self.north_m[kept], self.timing_advance[kept]
+        return ServedRows(self.cell_ids, *columns)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Deviations:
+    """Standard deviations of a new reading at points where a cell was measured, M rows.
+
+    ``cell`` is an index into ``cell_ids``, ``row`` and ``col`` are the place on the lattice.
+    """
+
+    cell_ids: tuple[str, ...]
+    cell: Ints32
+    row: Ints32
+    col: Ints32
+    deviation_db: Floats32
+
+    def __len__(self) -> int:
+        return len(self.cell)
+
+    def spread(self, cell_ids: Sequence[str], on_way: Bools) -> Floats32:
+        """Return the deviation at every pixel, shape (C, P), NaN where a cell was not measured.
+
+        Parameters
+        ----------
+        cell_ids : sequence of str
+            The C cells that are wanted.
+        on_way : ndarray of bool, shape (rows, cols)
+            Points of the database; pixels beside them have the value of the nearest one.
+        """
+        rows, cols = on_way.shape
+        near = distance_transform_edt(~on_way, return_distances=False, return_indices=True)
+        found = np.full((len(cell_ids), rows * cols), np.nan, dtype=np.float32)
+        of = {cell_id: number for number, cell_id in enumerate(self.cell_ids)}
+        order = np.argsort(self.cell, kind="stable")
+        edges = np.searchsorted(self.cell[order], np.arange(len(self.cell_ids) + 1))
+        for band, cell_id in enumerate(cell_ids):
+            if cell_id not in of:
+                continue
+            own = order[edges[of[cell_id]] : edges[of[cell_id] + 1]]
+            layer = np.full((rows, cols), np.nan, dtype=np.float32)
+            layer[self.row[own], self.col[own]] = self.deviation_db[own]
+            found[band] = layer[near[0], near[1]].ravel()
+        return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredParts:
+    """What the survey of a database measured."""
+
+    served: ServedRows
+    deviations: Deviations
+
+
+def merged_parts(
+    parts: Sequence[MeasuredParts], shifts: Sequence[tuple[int, int]], cell_ids: Sequence[str]
+) -> MeasuredParts:
+    """Return the parts of several surveys together, of some cells.
+
+    ``shifts`` are the rows and columns that each survey's lattice lies below and right of the new
+    one's corner. Of a deviation given twice the last counts.
+    """
+    numbers = {cell_id: number for number, cell_id in enumerate(cell_ids)}
+
+    def renamed(names: Sequence[str], cell: Ints32) -> Ints32:
+        own = np.array([numbers.get(name, -1) for name in names] or [-1], dtype=np.int32)
+        return np.asarray(own[cell], dtype=np.int32)
+
+    served = [replace(p.served, cell=renamed(p.served.cell_ids, p.served.cell)) for p in parts]
+    found = [p.deviations for p in parts]
+    cell = _joined([renamed(f.cell_ids, f.cell) for f in found], np.int32)
+    row = _joined([f.row + down for f, (down, _) in zip(found, shifts, strict=True)], np.int32)
+    col = _joined([f.col + right for f, (_, right) in zip(found, shifts, strict=True)], np.int32)
+    value = _joined([f.deviation_db for f in found], np.float32)
+    table = np.column_stack([cell, row, col])[::-1]
+    _, last = np.unique(table, axis=0, return_index=True)
+    kept = len(cell) - 1 - last
+    kept = kept[cell[kept] >= 0]
+    rows = ServedRows(
+        tuple(cell_ids),
+        _joined([s.cell for s in served], np.int32),
+        *(
+            _joined([getattr(s, name) for s in served], np.float64)
+            for name in ("east_m", "north_m", "timing_advance")
+        ),
+    )
+    deviations = Deviations(tuple(cell_ids), cell[kept], row[kept], col[kept], value[kept])
+    return MeasuredParts(rows.some(rows.cell >= 0), deviations)
+
+
+def deviations_at_points(
+    folder: Path, rasters: RxLevRasters, cell_ids: Sequence[str]
+) -> Deviations:
+    """Return the deviations of a survey's rasters at the points of a database folder.
+
+    Raises
+    ------
+    InputError
+        A raster is damaged, or on another lattice than the points.
+    """
+    points = read_columns(folder / POINTS, ("row", "col"))
+    row, col = (points[name].to_numpy() for name in ("row", "col"))
+    if row.size and not rasters.lattice.contains(row, col).all():
+        hint = "deviations of another survey"
+        raise fail(InputError, str(rasters.path), "the lattice of the levels", "another", hint)
+    known = set(rasters.cell_ids)
+    cells, rows, cols, values = [], [], [], []
+    for number, cell_id in enumerate(cell_ids):
+        if cell_id not in known:
+            continue
+        deviation_db = rasters.read(cells=(cell_id,))[0][row, col]
+        kept = np.flatnonzero(np.isfinite(deviation_db))
+        cells.append(np.full(kept.size, number, dtype=np.int32))
+        rows.append(row[kept])
+        cols.append(col[kept])
+        values.append(deviation_db[kept])
+    return Deviations(
+        tuple(cell_ids),
+        _joined(cells, np.int32),
+        _joined(rows, np.int32),
+        _joined(cols, np.int32),
+        _joined(values, np.float32),
+    )
+
+
+def write_served(served: ServedRows, path: Path) -> None:
+    """Write reports of serving cells as Parquet."""
+    values = (served.east_m, served.north_m, served.timing_advance)
+    columns = [dictionary(served.cell, served.cell_ids or ("",)), *map(pa.array, values)]
+    write_columns(pa.table(dict(zip(_SERVED, columns, strict=True))), path)
+
+
+def read_served(path: Path) -> ServedRows:
+    """Read what :func:`write_served` wrote; StoreError where it is damaged."""
+    table = read_columns(path, _SERVED)
+    cell, cell_ids = _codes(path, table["cell"])
+    columns = (table[name].to_numpy().astype(np.float64) for name in _SERVED[1:])
+    return ServedRows(cell_ids, cell, *columns)
+
+
+def write_measured(folder: Path, parts: MeasuredParts) -> list[dict[str, Any]]:
+    """Write both parts into a database folder; return their entries in the manifest."""
+    write_served(parts.served, folder / SERVED)
+    found = parts.deviations
+    values = (found.row, found.col, found.deviation_db)
+    columns = [dictionary(found.cell, found.cell_ids or ("",)), *map(pa.array, values)]
+    write_columns(pa.table(dict(zip(_DEVIATIONS, columns, strict=True))), folder / DEVIATIONS)
+    return [
+        describe_part(folder, folder / SERVED, len(parts.served)),
+        describe_part(folder, folder / DEVIATIONS, len(found)),
+    ]
+
+
+def read_measured(folder: Path, rows: int, cols: int) -> MeasuredParts:
+    """Read both parts of a database whose lattice has so many rows and columns.
+
+    Raises
+    ------
+    StoreError
+        A part is damaged, or not of this database.
+    """
+    path = folder / DEVIATIONS
+    table = read_columns(path, _DEVIATIONS)
+    cell, cell_ids = _codes(path, table["cell"])
+    row, col = (table[name].to_numpy().astype(np.int32) for name in ("row", "col"))
+    if row.size and not (
+        row.min() >= 0 and row.max() < rows and col.min() >= 0 and col.max() < cols
+    ):
+        expected = "points on the database's lattice"
+        raise fail(StoreError, str(path), expected, "others", "parts mixed up")
+    deviation_db = table["deviation_db"].to_numpy().astype(np.float32)
+    deviations = Deviations(cell_ids, cell, row, col, deviation_db)
+    return MeasuredParts(read_served(folder / SERVED), deviations)
+
+
+def _codes(path: Path, column: Any) -> tuple[Ints32, tuple[str, ...]]:
+    if column.null_count or not len(column):
+        if not len(column):
+            return np.empty(0, dtype=np.int32), ()
+        raise fail(StoreError, str(path), "a cell in each row", "none", "damaged")
+    joined = column.dictionary_encode().unify_dictionaries().combine_chunks()
+    if hasattr(joined, "chunks"):
+        joined = joined.chunk(0)
+    names = tuple(str(name) for name in joined.dictionary.to_pylist())
+    return joined.indices.to_numpy().astype(np.int32), names
+
+
+def _joined(parts: Sequence[Any], kind: type) -> Any:
+    return np.concatenate([np.empty(0, dtype=kind), *parts]).astype(kind)
