@@ -45,8 +45,9 @@ def merge(
 
     Within its area a later database overrides earlier ones for all cells in its cell table. So new
     cells or areas are added, and rebuilt ones replace the older ones, without building the rest
-    again. What surveys measured is kept where all of them have it. Databases of the same inputs but for cells or area give, merged, the parts that one
-    build of all would have given. Of a cell in several cell tables the last entry is kept.
+    again. Databases of the same inputs but for cells or area give, merged, the parts that one
+    build of all would have given. Of a cell in several cell tables the last entry is kept. What
+    surveys measured is kept where all of the databases have it.
 
     Parameters
     ----------

@@ -38,6 +38,7 @@ from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import in_frame
 from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.pictures import ESTIMATES, FIGURES, SUMMARY, clear_results, draw_track
+from mapfilter.workflows.replay_baseline import Baselines, SingleReports, together
 from mapfilter.workflows.replay_lacks import advice_of, check_log, lack_of
 from mapfilter.workflows.terminal import to_jsonable
 from mapfilter.workflows.world import filter_choice, plan_antennas, planned_cells
@@ -111,6 +112,8 @@ class ReplayedLog:
         Files written.
     route : str
         Equal for logs with the same true path; empty without a truth.
+    baseline : SingleReports or None
+        Errors of the reports, each located by itself; None without truth, reports or cells.
     """
 
     name: str
@@ -121,12 +124,13 @@ class ReplayedLog:
     filter_s: float
     outputs: tuple[Path, ...]
     route: str = ""
+    baseline: SingleReports | None = None
 
     @property
     def figures(self) -> dict[str, Any]:
-        """Outcome, notes and, with ground truth, the score."""
+        """Outcome, notes and, with ground truth, the score beside that of single reports."""
         score = asdict(self.accuracy) if self.accuracy is not None else {}
-        return {**asdict(self.outcome), "notes": self.notes, **score}
+        return {**asdict(self.outcome), "notes": self.notes, **score, **_beside(self.baseline)}
 
 
 @dataclass(frozen=True)
@@ -202,6 +206,7 @@ def summary_figures(result: ReplayResult) -> dict[str, Any]:
         "unknown_cells": _sum(outcome.unknown_cells for outcome in outcomes),
         "logs_with_unknown_cells": [log.name for log in result.logs if log.outcome.unknown_cells],
         "notes": _shared_notes(result.logs),
+        **_beside(together([log.baseline for log in result.logs])),
     }
 
 
@@ -218,6 +223,10 @@ def replay_figures(result: ReplayResult) -> dict[str, Any]:
     filter_s = sorted(log.filter_s for log in result.logs)
     shown["partial"] = result.partial
     return {**shown, "filter_s": filter_s[len(filter_s) // 2], "out": result.out}
+
+
+def _beside(baseline: SingleReports | None) -> dict[str, Any]:
+    return {} if baseline is None else {"baseline": baseline.figures}
 
 
 def _sum(counts: Iterable[Mapping[str, int]]) -> dict[str, int]:
@@ -287,6 +296,7 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
     ensure_writable_folder(out)
     clear_results(out)
     logs: list[ReplayedLog] = []
+    baselines = Baselines(database, config.journeys.seed)
     wanted, count = config.output.pictures, len(journeys.paths)
     risk = config.integrity.of(IntegrityOptions).risk
     for index, path in enumerate(journeys.paths):
@@ -302,14 +312,16 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         drawn = wanted == "all" or (wanted == "first" and not index)
         track = locate(log, filter_, rng, snapshots=drawn, risk=risk)
         into = out if count == 1 else out / name
+        baseline = baselines.of(log)
         if database is None:
             pictures = _draw_errors(log, track, into) if drawn else ()
         else:
-            pictures = draw_track(database, log, track, into) if drawn else ()
+            beside_m = baseline.error_m if baseline is not None else None
+            pictures = draw_track(database, log, track, into, beside_m) if drawn else ()
         if database is not None and (STREETS_ALONE in notes or not database.cell_ids):
             log = replace(log, notes=(*log.notes, *advice_of(log, fitted, track.estimate)))
         lack = lack_of(opened, log, options, track.estimate, database)
-        logs.append(_write(name, log, track, into, pictures, lack))
+        logs.append(_write(name, log, track, into, pictures, lack, baseline))
         if progress is not None:
             progress(index + 1, count)
     result = ReplayResult(config.filter.name, tuple(logs), summary_of(logs), out)
@@ -347,6 +359,7 @@ def _write(
     out: Path,
     pictures: tuple[Path, ...],
     lack: str,
+    baseline: SingleReports | None,
 ) -> ReplayedLog:
     files = tuple(out / file for file in ESTIMATES)
     write_estimate(track.estimate, files[0])
@@ -362,6 +375,7 @@ def _write(
         track.filter_s,
         (*files, out / FIGURES, *pictures),
         route_of(log),
+        baseline,
     )
     head = {"log": name, "filter": track.estimate.filter}
     write_json(out / FIGURES, {**head, **to_jsonable(replayed.figures)})

@@ -159,6 +159,7 @@ def fit_locator(
     rng: np.random.Generator | None = None,
     *,
     strongest: int = STRONGEST,
+    drawn: int = MOST_VALIDATED,
     progress: Progress | None = None,
 ) -> ReportLocator:
     """Cross-validate a method on a database, calibrate its regions, and prepare it.
@@ -177,6 +178,8 @@ def fit_locator(
         Draws reports from predicted levels; seeded with 0 when left out.
     strongest : int
         Number of cells in such a report.
+    drawn : int
+        Number of such reports.
     progress : callable, optional
         Called with folds done and folds in all.
 
@@ -200,10 +203,8 @@ def fit_locator(
     found = []
     if placed.predicted:
         blocks = "reports drawn with the stated errors"
-        drawn = rng if rng is not None else np.random.default_rng(0)
-        some = simulated_reports(
-            placed, MOST_VALIDATED, strongest, Probabilistic().shared_db, drawn
-        )
+        rng = rng if rng is not None else np.random.default_rng(0)
+        some = simulated_reports(placed, drawn, strongest, Probabilistic().shared_db, rng)
         found = [(one, _simulated(placed, one, some)) for one in tried]
     else:
         fold, blocks = folds_of(placed)
