@@ -314,9 +314,9 @@ class Config(Section):
         return self.rasters_path.with_name(f"{self.rasters_path.stem}-deviation.tif")
 
     @property
-    def served_path(self) -> Path:
-        """Where a survey's reports of serving cells are: beside its rasters."""
-        return self.rasters_path.with_name(f"{self.rasters_path.stem}-served.parquet")
+    def readings_path(self) -> Path:
+        """Where a survey's readings are: beside its rasters."""
+        return self.rasters_path.with_name(f"{self.rasters_path.stem}-readings.parquet")
 
     @property
     def database_path(self) -> Path:

@@ -21,9 +21,9 @@ VERSION = 2
 MANIFEST = "manifest.json"
 CELLS = "cells.parquet"
 POINTS = "points.parquet"
-SERVED = "served.parquet"
+READINGS = "readings.parquet"
 DEVIATIONS = "deviations.parquet"
-_SURVEYED = (SERVED, DEVIATIONS)
+_SURVEYED = (READINGS, DEVIATIONS)
 
 _Layers = Literal["map", "roads", "tracks", "buildings", "water", "landuse", "landuse_table"]
 InputRole = _Layers | Literal["plan", "rasters", "database", "patch"]

@@ -1,9 +1,9 @@
-"""What a survey adds to a database: where each cell served, and how well its levels are known.
+"""What a survey adds to a database: its readings, and how well its levels are known.
 
-``served.parquet`` has a row for each report of a serving cell, ``deviations.parquet`` the standard
-deviation of a new reading at each point where a cell was measured. Filters over measured maps need
-both: a cell that was not measured at a place may be received there, and which cell serves is
-counted (:mod:`mapfilter.models.measured_map`).
+``readings.parquet`` has a row for each reading, ``deviations.parquet`` the standard deviation of a
+new reading at each point where a cell was measured. Filters over measured maps need both: a cell
+that was not measured at a place may be received there, and which cell serves is counted
+(:mod:`mapfilter.models.measured_map`). Single reports are compared with the readings.
 """
 
 from __future__ import annotations
@@ -18,43 +18,58 @@ import pyarrow as pa
 from scipy.ndimage import distance_transform_edt
 
 from mapfilter._types import Bools, Floats, Floats32, Ints32
-from mapfilter.database.manifest import DEVIATIONS, POINTS, SERVED, describe_part
+from mapfilter.database.manifest import DEVIATIONS, POINTS, READINGS, describe_part
 from mapfilter.database.parquet import dictionary, read_columns, write_columns
 from mapfilter.errors import InputError, StoreError, fail
 from mapfilter.rasters.raster_set import RxLevRasters
 
-_SERVED = ("cell", "east_m", "north_m", "timing_advance")
+_READINGS = {
+    "cell": np.int32,
+    "report": np.int32,
+    "session": np.int32,
+    "east_m": np.float64,
+    "north_m": np.float64,
+    "level_dbm": np.float64,
+    "timing_advance": np.float64,
+    "serving": np.bool_,
+}
 _DEVIATIONS = ("cell", "row", "col", "deviation_db")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ServedRows:
-    """Reports of serving cells, N rows.
+class Readings:
+    """Readings that a survey was made of, N rows.
 
     Parameters
     ----------
     cell_ids : tuple of str
-    cell : ndarray of int32, shape (N,)
-        Index into ``cell_ids``.
+    cell, report, session : ndarray of int32, shape (N,)
+        Index into ``cell_ids``; numbers of what was received at one time, and of the drive or walk.
     east_m, north_m : ndarray, shape (N,)
-        Where the cell served.
+        Where the cell was received.
+    level_dbm : ndarray, shape (N,)
     timing_advance : ndarray, shape (N,)
         Steps; NaN where it was not reported.
+    serving : ndarray of bool, shape (N,)
+        Whether it was the serving cell.
     """
 
     cell_ids: tuple[str, ...]
     cell: Ints32
+    report: Ints32
+    session: Ints32
     east_m: Floats
     north_m: Floats
+    level_dbm: Floats
     timing_advance: Floats
+    serving: Bools
 
     def __len__(self) -> int:
         return len(self.cell)
 
-    def some(self, kept: Bools) -> ServedRows:
+    def some(self, kept: Bools) -> Readings:
         """Return some of the rows."""
-        columns = self.cell[kept], self.east_m[kept], self.north_m[kept], self.timing_advance[kept]
-        return ServedRows(self.cell_ids, *columns)
+        return Readings(self.cell_ids, *(getattr(self, name)[kept] for name in _READINGS))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,7 +118,7 @@ class Deviations:
 class MeasuredParts:
     """What the survey of a database measured."""
 
-    served: ServedRows
+    readings: Readings
     deviations: Deviations
 
 
@@ -121,7 +136,8 @@ def merged_parts(
         own = np.array([numbers.get(name, -1) for name in names] or [-1], dtype=np.int32)
         return np.asarray(own[cell], dtype=np.int32)
 
-    served = [replace(p.served, cell=renamed(p.served.cell_ids, p.served.cell)) for p in parts]
+    given = [p.readings for p in parts]
+    readings = [replace(one, cell=renamed(one.cell_ids, one.cell)) for one in given]
     found = [p.deviations for p in parts]
     cell = _joined([renamed(f.cell_ids, f.cell) for f in found], np.int32)
     row = _joined([f.row + down for f, (down, _) in zip(found, shifts, strict=True)], np.int32)
@@ -131,14 +147,16 @@ def merged_parts(
     _, last = np.unique(table, axis=0, return_index=True)
     kept = len(cell) - 1 - last
     kept = kept[cell[kept] >= 0]
-    rows = ServedRows(
-        tuple(cell_ids),
-        _joined([s.cell for s in served], np.int32),
-        *(
-            _joined([getattr(s, name) for s in served], np.float64)
-            for name in ("east_m", "north_m", "timing_advance")
-        ),
-    )
+    columns = {
+        name: _joined([getattr(one, name) for one in readings], kind)
+        for name, kind in _READINGS.items()
+    }
+    for name in ("report", "session"):
+        # Numbers of different surveys differ.
+        counts = [int(getattr(one, name).max(initial=-1)) + 1 for one in readings]
+        sizes = [len(one) for one in readings]
+        columns[name] += np.repeat(np.cumsum([0, *counts[:-1]]), sizes).astype(np.int32)
+    rows = Readings(tuple(cell_ids), **columns)
     deviations = Deviations(tuple(cell_ids), cell[kept], row[kept], col[kept], value[kept])
     return MeasuredParts(rows.some(rows.cell >= 0), deviations)
 
@@ -178,30 +196,34 @@ def deviations_at_points(
     )
 
 
-def write_served(served: ServedRows, path: Path) -> None:
-    """Write reports of serving cells as Parquet."""
-    values = (served.east_m, served.north_m, served.timing_advance)
-    columns = [dictionary(served.cell, served.cell_ids or ("",)), *map(pa.array, values)]
-    write_columns(pa.table(dict(zip(_SERVED, columns, strict=True))), path)
+def write_readings(readings: Readings, path: Path) -> None:
+    """Write the readings of a survey as Parquet."""
+    columns = {name: pa.array(getattr(readings, name)) for name in _READINGS}
+    columns["cell"] = dictionary(readings.cell, readings.cell_ids or ("",))
+    write_columns(pa.table(columns), path)
 
 
-def read_served(path: Path) -> ServedRows:
-    """Read what :func:`write_served` wrote; StoreError where it is damaged."""
-    table = read_columns(path, _SERVED)
+def read_readings(path: Path) -> Readings:
+    """Read what :func:`write_readings` wrote; StoreError where it is damaged."""
+    table = read_columns(path, tuple(_READINGS))
     cell, cell_ids = _codes(path, table["cell"])
-    columns = (table[name].to_numpy().astype(np.float64) for name in _SERVED[1:])
-    return ServedRows(cell_ids, cell, *columns)
+    columns = {
+        name: table[name].to_numpy().astype(kind)
+        for name, kind in _READINGS.items()
+        if name != "cell"
+    }
+    return Readings(cell_ids, cell, **columns)
 
 
 def write_measured(folder: Path, parts: MeasuredParts) -> list[dict[str, Any]]:
     """Write both parts into a database folder; return their entries in the manifest."""
-    write_served(parts.served, folder / SERVED)
+    write_readings(parts.readings, folder / READINGS)
     found = parts.deviations
     values = (found.row, found.col, found.deviation_db)
     columns = [dictionary(found.cell, found.cell_ids or ("",)), *map(pa.array, values)]
     write_columns(pa.table(dict(zip(_DEVIATIONS, columns, strict=True))), folder / DEVIATIONS)
     return [
-        describe_part(folder, folder / SERVED, len(parts.served)),
+        describe_part(folder, folder / READINGS, len(parts.readings)),
         describe_part(folder, folder / DEVIATIONS, len(found)),
     ]
 
@@ -225,7 +247,7 @@ def read_measured(folder: Path, rows: int, cols: int) -> MeasuredParts:
         raise fail(StoreError, str(path), expected, "others", "parts mixed up")
     deviation_db = table["deviation_db"].to_numpy().astype(np.float32)
     deviations = Deviations(cell_ids, cell, row, col, deviation_db)
-    return MeasuredParts(read_served(folder / SERVED), deviations)
+    return MeasuredParts(read_readings(folder / READINGS), deviations)
 
 
 def _codes(path: Path, column: Any) -> tuple[Ints32, tuple[str, ...]]:

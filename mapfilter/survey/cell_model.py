@@ -205,6 +205,8 @@ def learn_shadowing(
     """
     processes = []
     for some, trend in zip(points, trends, strict=True):
+        if len(some) < 2:
+            continue
         thin = some.thinned(_LEARNT_FROM)
         residual_db = thin.level_dbm - trend.level_dbm(thin.east_m, thin.north_m)
         process = GaussianProcessRegressor(start.kernel, optimizer=None)

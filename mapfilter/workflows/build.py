@@ -13,7 +13,7 @@ from mapfilter.config.sections import Config
 from mapfilter.database.build import build, build_roads
 from mapfilter.database.estimate import BuildEstimate, dry_run
 from mapfilter.database.manifest import InputFile
-from mapfilter.database.measured import ServedRows, read_served
+from mapfilter.database.measured import Readings, read_readings
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.radio.cells import CellPlan
@@ -186,13 +186,13 @@ def _raster_world(config: Config) -> tuple[RxLevRasters, CellPlan, World]:
     return rasters, whole.plan, world
 
 
-def _measured(config: Config) -> tuple[ServedRows, RxLevRasters] | None:
+def _measured(config: Config) -> tuple[Readings, RxLevRasters] | None:
     """Return what the survey that made the rasters measured; None where it was not kept."""
-    if config.surveyed_plan is None or not config.served_path.exists():
+    if config.surveyed_plan is None or not config.readings_path.exists():
         return None
     if not config.deviation_path.exists():
         return None
-    return read_served(config.served_path), open_rasters(config.deviation_path)
+    return read_readings(config.readings_path), open_rasters(config.deviation_path)
 
 
 def _draw(

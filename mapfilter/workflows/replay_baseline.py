@@ -28,7 +28,7 @@ from mapfilter.tracks.log import TrackLog
 MOST_REPORTS = 300
 """Reports of a log that are located, evenly taken."""
 CALIBRATED_WITH = 200
-"""Reports that are drawn to calibrate their regions."""
+"""Reports by which regions are calibrated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +125,6 @@ class Baselines:
             assert self._known is not None
             rng = named_rng(self._seed, "replay", "single reports")
             self._fitted[strongest] = fit_locator(
-                self._known, Probabilistic(), rng, strongest=strongest, drawn=CALIBRATED_WITH
+                self._known, Probabilistic(), rng, strongest=strongest, validated=CALIBRATED_WITH
             )
         return self._fitted[strongest]

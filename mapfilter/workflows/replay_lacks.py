@@ -21,6 +21,7 @@ from mapfilter.workflows.world import outside_m
 
 _AWAY_M = 5000.0
 _BY_CELLS = ("candidate", "grid")
+_BY_STREETS = "--filter bayes starts by the streets alone"
 
 
 def check_log(path: Path, log: TrackLog, lattice: Lattice, faults: Faults) -> None:
@@ -74,7 +75,10 @@ def lack_of(
     lack = lacking(log, estimate, cells=has_cells, turns=isinstance(options, BayesFilter))
     name = str(getattr(options, "name", ""))
     if lack and not has_cells and name in _BY_CELLS:
-        return f"the filter {name} needs cells to start, the database has none"
+        return f"the filter {name} needs cells to start, the database has none ({_BY_STREETS})"
+    alone = database is not None and by_streets_alone(BayesFilter(), log, database)
+    if lack and name in _BY_CELLS and alone:
+        return f"the filter {name} needs cells to start, the log has none ({_BY_STREETS})"
     if "no motion" not in lack:
         return lack
     if _has_course(opened):

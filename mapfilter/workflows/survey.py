@@ -12,7 +12,7 @@ import numpy as np
 from mapfilter._io import VERSION, atomic_file, ensure_writable_folder
 from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
-from mapfilter.database.measured import ServedRows, write_served
+from mapfilter.database.measured import Readings, write_readings
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs
 from mapfilter.radio.cells import CellPlan, write_cell_plan
@@ -186,9 +186,8 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         tags={"SOFTWARE": f"mapfilter {VERSION}", "MODEL": f"survey {options.method}"},
         progress=progress,
     )
-    served = served_rows(measurements)
-    with atomic_file(config.served_path) as temporary:
-        write_served(served, temporary)
+    with atomic_file(config.readings_path) as temporary:
+        write_readings(readings_of(measurements), temporary)
     plan_path = config.output.dir / "cells.csv"
     cells = surveyed_plan(
         survey,
@@ -222,19 +221,24 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
     )
 
 
-def served_rows(measurements: Measurements) -> ServedRows:
-    """Return the reports of serving cells of a survey, in its CRS."""
-    cell_ids = measurements.cell_ids
-    if measurements.serving is None or measurements.timing_advance is None:
-        nothing = np.empty(0)
-        return ServedRows(cell_ids, np.empty(0, np.int32), nothing, nothing, nothing)
-    own = measurements.serving
-    return ServedRows(
-        cell_ids,
-        measurements.cell[own],
-        measurements.east_m[own],
-        measurements.north_m[own],
-        measurements.timing_advance[own],
+def readings_of(measurements: Measurements) -> Readings:
+    """Return the readings of a survey, in its CRS; those of one session and time are one report."""
+    count = len(measurements)
+    # A row without a time is a report of its own.
+    number = np.where(np.isfinite(measurements.time_s), -1, np.arange(count))
+    keys = np.column_stack([measurements.session, np.nan_to_num(measurements.time_s), number])
+    report = np.unique(keys, axis=0, return_inverse=True)[1]
+    serving, advance = measurements.serving, measurements.timing_advance
+    return Readings(
+        measurements.cell_ids,
+        measurements.cell,
+        report.astype(np.int32),
+        measurements.session,
+        measurements.east_m,
+        measurements.north_m,
+        measurements.level_dbm,
+        advance if advance is not None else np.full(count, np.nan),
+        serving if serving is not None else np.zeros(count, dtype=np.bool_),
     )
 
 

@@ -9,9 +9,9 @@ from mapfilter.database.build import build
 from mapfilter.database.measured import (
     Deviations,
     MeasuredParts,
-    ServedRows,
-    read_served,
-    write_served,
+    Readings,
+    read_readings,
+    write_readings,
 )
 from mapfilter.database.merge import merge
 from mapfilter.database.store import open_database
@@ -21,6 +21,8 @@ from mapfilter.models.measured_map import MeasuredMapOptions
 from mapfilter.positioning.bayes.measured_model import MeasuredMapModel
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.bayes.over_survey import filled_field, site_of
+from mapfilter.positioning.fingerprints.locating import fit_locator
+from mapfilter.positioning.fingerprints.sources import reports_of_database
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import open_rasters
@@ -55,7 +57,11 @@ def served(count=40):
     east_m = WEST + np.linspace(5, 115, count)
     which = np.where(np.arange(count) < count // 2, 0, 2).astype(np.int32)
     advance = np.where(which == 0, 2.0, np.nan)
-    return ServedRows(CELLS, which, east_m, np.full(count, SOUTH + 75.0), advance)
+    number = np.arange(count, dtype=np.int32)
+    return Readings(
+        CELLS, which, number, number % 2, east_m, np.full(count, SOUTH + 75.0),
+        -60.0 - number % 20, advance, np.ones(count, np.bool_),
+    )  # fmt: skip
 
 
 def rasters(folder, *, filled):
@@ -87,8 +93,10 @@ def test_a_database_keeps_what_its_survey_measured(surveyed):
     database, deviation, _ = surveyed
     parts = open_database(database.path, verify="full").measured()
     given = served()
-    for name in ("cell", "east_m", "north_m", "timing_advance"):
-        np.testing.assert_array_equal(getattr(parts.served, name), getattr(given, name))
+    for name in ("report", "session", "east_m", "level_dbm", "timing_advance", "serving"):
+        np.testing.assert_array_equal(getattr(parts.readings, name), getattr(given, name))
+    names = np.array(parts.readings.cell_ids)[parts.readings.cell]
+    assert names.tolist() == np.array(given.cell_ids)[given.cell].tolist()
     points = database.points()
     want = deviation.read()[:, points.row, points.col]
     found = parts.deviations
@@ -181,7 +189,7 @@ def test_merged_surveys_keep_what_was_measured(tmp_path):
     whole = build(levels, plan, routes(), tmp_path / "db", measured=(served(), deviation))
     again = merge([whole, whole], tmp_path / "merged", without=[CELLS[1]])
     parts, before = again.measured(), whole.measured()
-    assert len(parts.served) == 2 * len(before.served)
+    assert len(parts.readings) == 2 * len(before.readings)
     field = again.field().on_way
     np.testing.assert_array_equal(
         parts.deviations.spread(CELLS, field), before.deviations.spread(CELLS, field)
@@ -196,12 +204,12 @@ def test_damaged_parts_are_refused(surveyed, tmp_path):
     part.write_bytes(part.read_bytes()[:-20])
     with pytest.raises(StoreError, match="deviations"):
         open_database(database.path)
-    path = tmp_path / "served.parquet"
-    write_served(served(), path)
-    assert len(read_served(path)) == 40
+    path = tmp_path / "readings.parquet"
+    write_readings(served(), path)
+    assert len(read_readings(path)) == 40
     path.write_bytes(b"nothing")
-    with pytest.raises(StoreError, match="served"):
-        read_served(path)
+    with pytest.raises(StoreError, match="readings"):
+        read_readings(path)
 
 
 def test_fields_without_gaps_are_the_same(surveyed):
@@ -221,3 +229,19 @@ def test_sites_are_those_of_identities():
     assert site_of(cell(CELLS[0], technology="UMTS")) == CELLS[0]
     assert site_of(replace(cell(CELLS[0]), ci=1 << 30)) == CELLS[0]
     assert MeasuredMapOptions().site_part == 0.1
+
+
+def test_single_reports_are_compared_with_the_readings(surveyed):
+    database, _, _ = surveyed
+    reports, given = reports_of_database(database), served()
+    assert not reports.predicted
+    assert len(reports) == len(given)
+    assert reports.block.tolist() == given.session.tolist()
+    np.testing.assert_allclose(reports.places, np.column_stack([given.east_m, given.north_m]))
+    np.testing.assert_array_equal(reports.level_dbm, given.level_dbm)
+    np.testing.assert_array_equal(reports.timing_advance, given.timing_advance)
+    names = [reports.cell_ids[n] for n in reports.serving]
+    assert names == [CELLS[n] for n in given.cell]
+    fitted = fit_locator(reports, "probabilistic", validated=30)
+    assert fitted.validations[0].blocks == "logs"
+    assert fitted.validations[0].reports <= 30

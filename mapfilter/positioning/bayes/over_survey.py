@@ -132,7 +132,7 @@ def _statistics(
     options: MeasuredMapOptions | None,
 ) -> ServingStatistics | None:
     """Return how often each cell served where; None where too few reports tell."""
-    served = measured.served
+    served = measured.readings.some(measured.readings.serving)
     if len(served) < _LEAST_SERVED:
         return None
     band = np.array([area.band_of.get(cell_id, -1) for cell_id in served.cell_ids], dtype=np.int64)
