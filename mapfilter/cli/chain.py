@@ -265,7 +265,7 @@ def locate(
     seed: SeedOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Locate each report of a log by itself, with a calibrated region."""
+    """Locate each report of a log by itself; exit code 3 if none has a position."""
     from mapfilter.workflows.locate import run_locate
 
     if not 0 < level_error_db <= 60:
@@ -283,6 +283,10 @@ def locate(
             progress=progress,
         )
     print_result(result.shown, as_json)
+    if not result.figures["located"]:
+        reasons = ", ".join(result.figures["not_located"])
+        print_message(f"nothing is located: {reasons}")
+        raise typer.Exit(PARTIAL)
 
 
 def replay(
@@ -306,7 +310,7 @@ def replay(
     ] = None,
     course_motion: Annotated[
         bool,
-        typer.Option("--course-motion", help="Make motion from speed and course of positions."),
+        typer.Option("--course-motion", help="Make motion from positions and their course."),
     ] = False,
     filter_name: FilterOption = None,
     without: Annotated[

@@ -58,7 +58,7 @@ def convert(
     ] = None,
     course_motion: Annotated[
         bool,
-        typer.Option("--course-motion", help="Make motion from speed and course of positions."),
+        typer.Option("--course-motion", help="Make motion from positions and their course."),
     ] = False,
     no_steps: Annotated[
         bool, typer.Option("--no-steps", help="Make no motion from the sensors of a phone.")

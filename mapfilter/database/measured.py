@@ -33,6 +33,7 @@ _READINGS = {
     "timing_advance": np.float64,
     "serving": np.bool_,
 }
+_LARGEST_READ_PX = 1 << 25
 _DEVIATIONS = ("cell", "row", "col", "deviation_db")
 
 
@@ -177,16 +178,17 @@ def deviations_at_points(
         hint = "deviations of another survey"
         raise fail(InputError, str(rasters.path), "the lattice of the levels", "another", hint)
     known = set(rasters.cell_ids)
+    wanted = [number for number, cell_id in enumerate(cell_ids) if cell_id in known]
+    at_once = max(_LARGEST_READ_PX // (rasters.lattice.rows * rasters.lattice.cols), 1)
     cells, rows, cols, values = [], [], [], []
-    for number, cell_id in enumerate(cell_ids):
-        if cell_id not in known:
-            continue
-        deviation_db = rasters.read(cells=(cell_id,))[0][row, col]
-        kept = np.flatnonzero(np.isfinite(deviation_db))
-        cells.append(np.full(kept.size, number, dtype=np.int32))
+    for start in range(0, len(wanted), at_once):
+        some = np.array(wanted[start : start + at_once], dtype=np.int32)
+        deviation_db = rasters.read(cells=tuple(cell_ids[n] for n in some))[:, row, col]
+        which, kept = np.nonzero(np.isfinite(deviation_db))
+        cells.append(some[which])
         rows.append(row[kept])
         cols.append(col[kept])
-        values.append(deviation_db[kept])
+        values.append(deviation_db[which, kept])
     return Deviations(
         tuple(cell_ids),
         _joined(cells, np.int32),

@@ -14,7 +14,12 @@ from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.moved import by_compass, motion_from_course, motion_from_poses
+from mapfilter.tracks.moved import (
+    by_compass,
+    motion_from_course,
+    motion_from_places,
+    motion_from_poses,
+)
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.pdr.vehicle import reckon_odometry, reckon_velocity
 from mapfilter.tracks.pdr.walk import reckon_walk
@@ -148,6 +153,19 @@ def _course(
         if rows is not None and "course_deg" in rows and rows["course_deg"].notna().any():
             notes.append(f"{recording.path.name}: motion from speed and course of its fixes")
             return Moved(motion_from_course(rows, frame.convergence_rad), COURSE_ERRORS)
+    for recording in recordings:
+        rows, _ = measured_positions(recording)
+        if rows is not None and len(rows) > 1:
+            rows = rows.drop_duplicates("time_s")
+            place_m = np.column_stack(frame.east_north(rows, recording.crs))
+            accuracy_m = np.full(len(rows), np.nan)
+            if "accuracy_m" in rows:
+                accuracy_m = rows["accuracy_m"].to_numpy(dtype=np.float64)
+            time_s = rows["time_s"].to_numpy(dtype=np.float64)
+            notes.append(
+                f"{recording.path.name}: no course; motion from the ways between its fixes"
+            )
+            return Moved(motion_from_places(time_s, place_m, accuracy_m), COURSE_ERRORS)
     names = ", ".join(r.path.name for r in recordings)
-    expected = "positions with speed and course"
+    expected = "positions"
     raise fail(InputError, names, expected, "none", "leave out --course-motion")

@@ -9,6 +9,7 @@ from mapfilter._types import Floats
 from mapfilter.geodesy import heading_from_azimuth_rad, wrap_rad
 
 _LONGEST_S = 5.0
+_LEAST_APART_M = 10.0
 
 
 def by_compass(rows: pd.DataFrame, convergence_rad: float) -> pd.DataFrame:
@@ -134,6 +135,39 @@ def rotation_matrices(quaternions: Floats) -> Floats:
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
     return np.moveaxis(np.array(rows), 2, 0)
+
+
+def motion_from_places(time_s: Floats, place_m: Floats, accuracy_m: Floats) -> pd.DataFrame:
+    """Return the ways between positions that are farther apart than their errors.
+
+    A position counts if it lies at least 10 m, and its accuracy, from the last one that did; so
+    errors of a receiver that stands still are no way.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (N,)
+    place_m : ndarray, shape (N, 2)
+        East and north.
+    accuracy_m : ndarray, shape (N,)
+        NaN where unknown.
+
+    Examples
+    --------
+    >>> place_m = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 12.0]])
+    >>> moved = motion_from_places(np.array([0.0, 1.0, 9.0]), place_m, np.full(3, 5.0))
+    >>> moved[["time_s", "step_m", "heading_rad"]].iloc[1].round(3).tolist()
+    [9.0, 12.0, 1.571]
+    """
+    least_m = np.fmax(accuracy_m, _LEAST_APART_M)
+    kept = [0]
+    for row in range(1, len(time_s)):
+        if np.hypot(*(place_m[row] - place_m[kept[-1]])) >= least_m[row]:
+            kept.append(row)
+    moved = np.diff(place_m[kept], axis=0)
+    step_m = np.concatenate([[0.0], np.hypot(*moved.T)])
+    heading = np.concatenate([[np.nan], np.arctan2(moved[:, 1], moved[:, 0])])
+    columns = {"time_s": time_s[kept], "step_m": step_m, "heading_rad": heading}
+    return pd.DataFrame({**columns, "turn_rad": np.nan})
 
 
 def motion_from_course(rows: pd.DataFrame, convergence_rad: float) -> pd.DataFrame:

@@ -81,8 +81,8 @@ def lack_of(
         return f"the filter {name} needs cells to start, the log has none ({_BY_STREETS})"
     if "no motion" not in lack:
         return lack
-    if _has_course(opened):
-        return f"{lack} (--course-motion, track.course_motion, makes it from speed and course)"
+    if _has_positions(opened):
+        return f"{lack} (--course-motion, track.course_motion, makes it from the positions)"
     if has_cells and len(log.radio):
         return f"{lack} (mapfilter locate needs none)"
     return lack
@@ -111,15 +111,10 @@ def advice_of(log: TrackLog, options: Any, estimate: TrackEstimate) -> tuple[str
     return tuple(notes)
 
 
-def _has_course(opened: OpenedLog) -> bool:
-    """Return whether positions of the log, or of its truth, state speed and course."""
-    if "velocity" in opened.sensors:
-        return True
-    for recording in opened.recordings:
-        rows = recording.tables.get("positions")
-        if rows is not None and "course_deg" in rows and rows["course_deg"].notna().any():
-            return True
-    return False
+def _has_positions(opened: OpenedLog) -> bool:
+    """Return whether recordings of the log, or of its truth, have positions to make motion of."""
+    tables = [recording.tables.get("positions") for recording in opened.recordings]
+    return any(rows is not None and len(rows) > 1 for rows in tables)
 
 
 def lacking(

@@ -237,3 +237,13 @@ def test_a_quoted_separator_in_a_file_of_blanks(written):
     found = read_recording(written("smartloc", "\n".join(lines))).tables
     for name, rows in whole.items():
         assert len(found[name]) >= len(rows) - 5, name
+
+
+def test_an_older_log_of_gnettrack_has_no_raw_identity(written):
+    lines = [line.split("\t") for line in gnettrack().splitlines()]
+    at = lines[0].index("RAWCELLID")
+    text = "\n".join("\t".join(line[:at] + line[at + 1 :]) for line in lines)
+    rows = read_recording(written("gnettrack", text)).tables["radio"]
+    serving = rows[rows["role"] == "serving"]
+    # Base station 401, its cell 141; the network is LTE.
+    assert set(serving["ci"]) == {401 * 256 + 141}

@@ -172,8 +172,17 @@ def test_course_and_speed_make_motion_on_request(made, tmp_path):
     assert log.motion["step_m"].iloc[1:].to_numpy() == pytest.approx(4.4, abs=0.01)
     # 30.1 degrees clockwise from north, and the convergence of the grid.
     assert np.degrees(log.motion["heading_rad"]).to_numpy() == pytest.approx(59.9 - 1.78, abs=0.2)
-    with pytest.raises(InputError, match="speed and course"):
-        converted(made("gpx"), tmp_path / "none", course_motion=True)
+    # Without a course the ways between positions are motion, where they exceed 10 m.
+    converted(made("gpx"), tmp_path / "ways", course_motion=True)
+    log = read_log(tmp_path / "ways")
+    place_m = log.gnss[["east_m", "north_m"]].to_numpy()
+    assert any("no course; motion from the ways" in note for note in log.notes)
+    step_m, heading = log.motion["step_m"].to_numpy(), log.motion["heading_rad"].to_numpy()
+    assert (step_m[1:] >= 10.0).all()
+    gone_m = np.nansum(step_m * [np.cos(heading), np.sin(heading)], axis=1)
+    last = np.searchsorted(log.gnss["time_s"], log.motion["time_s"].iloc[-1])
+    np.testing.assert_allclose(gone_m, place_m[last] - place_m[0], atol=0.01)
+    assert log.imu.scale == 0.1
 
 
 @pytest.mark.parametrize("name", ["kitti", "tum"])
