@@ -24,7 +24,9 @@ _UNIX_S = 1e8
 _CROOKED = 0.05
 
 
-_NAMES = frozenset("x y z tx ty tz qx qy qz qw x_m y_m z_m r11 r00".split())
+_NAMES = frozenset(
+    ["x", "y", "z", "tx", "ty", "tz", "qx", "qy", "qz", "qw", "x_m", "y_m", "z_m", "r11", "r00"]
+)
 
 
 def _count(text: Text, count: int) -> bool:
