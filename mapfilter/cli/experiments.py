@@ -153,7 +153,8 @@ def evaluate(
         typer.Option(
             "--world",
             metavar="NAME",
-            help="Simulated world: plain (default), foreign, harsh, or easy (optimistic figures).",
+            help="Simulated world: plain (default), foreign, harsh, sensors (faults of phones), or "
+            "easy (optimistic figures).",
         ),
     ] = None,
     data: Annotated[

@@ -6,6 +6,7 @@ import time
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,19 @@ _MAIN = (
     "exceeded",
     "false_lost_per_km",
     "seconds_per_track",
+)
+_OF_FAULTS = (
+    "runs",
+    "wrong",
+    "wrong_converged",
+    "error_mean_m",
+    "coverage_95",
+    "claimed",
+    "off_50m",
+    "fault_wrong",
+    "fault_unnoticed",
+    "fault_noticed_s",
+    "fault_noticed_max_s",
 )
 WORLDS = ("easy", "plain")
 
@@ -137,14 +151,16 @@ class EvaluateResult:
     out: Path
 
 
-def main_figures(case: CaseResult) -> dict[str, Any]:
+def main_figures(case: CaseResult, names: Sequence[str] = _MAIN) -> dict[str, Any]:
     """Return the figures of a case that the table on the terminal shows."""
-    return {"case": case.name, **{name: getattr(case, name) for name in _MAIN}}
+    return {"case": case.name, **{name: getattr(case, name) for name in names}}
 
 
 def main_table(result: EvaluateResult) -> dict[str, Any]:
     """Return a result with the main figures of each case only."""
-    return {**vars(result), "cases": [main_figures(case) for case in result.cases]}
+    faulty = any(isfinite(case.fault_wrong) for case in result.cases)
+    names = _OF_FAULTS if faulty else _MAIN
+    return {**vars(result), "cases": [main_figures(case, names) for case in result.cases]}
 
 
 def check_benchmark(name: str, data: Path | None = None) -> None:
@@ -295,7 +311,7 @@ def load_benchmark(
         There is no such world, or a setting is wrong or has no meaning here.
     """
     if world not in WORLDS:
-        expected = ", ".join((*WORLDS, "foreign or harsh"))
+        expected = ", ".join((*WORLDS, "foreign, harsh or sensors"))
         raise fail(ConfigError, "--world", expected, repr(world))
     with as_file(files("mapfilter.data")) as data:
         config = load_config(file, settings, out=out, base=data / f"world-{world}.toml")

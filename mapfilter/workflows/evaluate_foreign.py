@@ -1,4 +1,4 @@
-"""``mapfilter evaluate global-positioning --world foreign|harsh``."""
+"""``mapfilter evaluate global-positioning --world foreign|harsh|sensors``."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from mapfilter.experiments.benchmarks.foreign import (
 )
 from mapfilter.experiments.benchmarks.global_positioning import Batch
 from mapfilter.experiments.benchmarks.world import ways_gone, without_ways
-from mapfilter.experiments.benchmarks.world_cases import CASES_OF, OtherWorld
+from mapfilter.experiments.benchmarks.world_cases import CASES_OF, SENSORS, OtherWorld
 from mapfilter.experiments.sweep.world import SweepWorld, write_world
 from mapfilter.propagation.models import PredictionModel
 from mapfilter.propagation.predict import predict
@@ -43,6 +43,7 @@ from mapfilter.simulation.reports import array_sampler
 from mapfilter.simulation.worlds.faults import GivenInputs, given_inputs
 from mapfilter.simulation.worlds.open_ground import OpenGround
 from mapfilter.simulation.worlds.radio import planners_offsets_db
+from mapfilter.simulation.worlds.sensor_faults import NO_FAULT
 from mapfilter.simulation.worlds.street_lines import StreetLines
 from mapfilter.tracks.store import write_log
 from mapfilter.workflows.evaluate import TABLE, EvaluateResult, load_benchmark
@@ -117,7 +118,7 @@ def run_foreign(
     ----------
     config, fixed
         From :func:`load_foreign`.
-    world : {"foreign", "harsh"}
+    world : {"foreign", "harsh", "sensors"}
     out, runs, seed, workers, resume, progress
         As for :func:`mapfilter.workflows.evaluate.run_global_positioning`.
     cases : sequence of str
@@ -145,6 +146,7 @@ def run_foreign(
         resume=resume,
         progress=progress,
         base=street_base(made.streets, area.streets.attribution) if drawn else None,
+        pooled=frozenset(SENSORS) - {NO_FAULT},
     )
     name = Path(config.area.map).name
     seconds = time.perf_counter() - began_s

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +13,7 @@ import numpy as np
 from mapfilter._parallel import Progress, SerialExecutor, local_executor, ordered_results
 from mapfilter.evaluation.accuracy import RADII, Truth
 from mapfilter.evaluation.stanford import REGIONS, StanfordCounts
+from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.benchmarks.global_positioning import (
     Batch,
     located_run,
@@ -28,6 +29,8 @@ from mapfilter.report.canvas import save
 from mapfilter.report.integrity import plot_coverage, plot_stanford, plot_worst_run
 
 PICTURES = "pictures"
+POOLED = "pooled"
+"""Name of the row of several cases together."""
 
 
 def run_cases(
@@ -38,6 +41,7 @@ def run_cases(
     resume: bool = False,
     progress: Progress | None = None,
     base: BaseMap | None = None,
+    pooled: Collection[str] = (),
 ) -> list[CaseResult]:
     """Do all runs of a benchmark and return one row of the table for each case.
 
@@ -54,6 +58,8 @@ def run_cases(
         As for :func:`mapfilter.experiments.benchmarks.global_positioning.run_benchmark`.
     base : BaseMap, optional
         From :func:`street_base`; without it nothing is drawn.
+    pooled : collection of str
+        Cases that get one more row together, ``pooled``, if two or more of them were run.
     """
     with local_executor(workers) as executor:
         rows = run_benchmark(
@@ -71,6 +77,10 @@ def run_cases(
         ]
         if base is not None:
             draw_cases(whole, by_case, results, base, out / PICTURES, executor)
+    together = [name for name in whole.cases if name in pooled]
+    if len(together) > 1:
+        every = [row for name in together for row in by_case[name]]
+        results.append(summarise(Case(POOLED), whole.choice.name, every))
     return results
 
 

@@ -256,6 +256,10 @@ def test_every_figure_of_a_case_depends_on_its_rows():
             change["converged"] = int(rng.integers(9, 90))
             change["wrong_converged"] = int(rng.integers(1, 9))
             change |= {"success": i % (2 + seed_shift) == 0, "wrong": i % (3 + seed_shift) == 1}
+            change |= {
+                "fault_noticed_s": float(rng.uniform(1, 9)) if i % (2 + seed_shift) else None,
+                "fault_unnoticed": i % (3 + seed_shift) == 1,
+            }
             made.append(run(**change, window_median_m=float(rng.uniform(1, 9))))
         return made
 

@@ -1,4 +1,4 @@
-"""The cases of the foreign and the harsh world: definitions, truthful data sheets, one change."""
+"""The cases of the foreign worlds: definitions, truthful data sheets, one change."""
 
 from dataclasses import fields
 
@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from mapfilter.experiments.benchmarks.cases import CASES
-from mapfilter.experiments.benchmarks.world_cases import CASES_OF, FOREIGN, HARSH, PHONE_UNIT
+from mapfilter.experiments.benchmarks.world_cases import (
+    CASES_OF,
+    FOREIGN,
+    HARSH,
+    PHONE_UNIT,
+    SENSORS,
+)
 from mapfilter.simulation.worlds.faults import FAULTS
 from mapfilter.simulation.worlds.inertial import compass_error_rad
 
@@ -16,7 +22,7 @@ TIME_S = np.arange(1.0, 601.0)
 def test_the_cases_of_each_world():
     assert list(FOREIGN) == ["levels-6", "levels-bias10", "cell-6"]
     assert set(FAULTS) < set(HARSH)
-    assert set(CASES_OF) == {"foreign", "harsh"}
+    assert set(CASES_OF) == {"foreign", "harsh", "sensors"}
     for cases in CASES_OF.values():
         assert all(name == case.name for name, case in cases.items())
 
@@ -33,6 +39,13 @@ def test_a_harsh_case_differs_from_the_usual_one_in_one_respect(name):
         assert len(changed) == 1
         (respect,) = changed
         assert respect in {"pedestrian", "phone", "fault", "other_city"}
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_a_case_of_faulty_sensors_differs_from_the_usual_one_in_its_fault_only(name):
+    usual, case = FOREIGN["levels-6"], SENSORS[name]
+    changed = {f.name for f in fields(case) if getattr(case, f.name) != getattr(usual, f.name)}
+    assert changed == {"name", "sensor"}
 
 
 @pytest.mark.parametrize("name", FOREIGN)

@@ -1,4 +1,4 @@
-"""``evaluate global-positioning --world foreign|harsh`` on a few blocks."""
+"""``evaluate global-positioning --world foreign|harsh|sensors`` on a few blocks."""
 
 import json
 from dataclasses import replace
@@ -12,8 +12,9 @@ from mapfilter.errors import ConfigError
 from mapfilter.experiments.benchmarks.foreign import RouteRuns
 from mapfilter.experiments.benchmarks.global_positioning import Batch, run_benchmark
 from mapfilter.experiments.benchmarks.results import summarise
-from mapfilter.experiments.benchmarks.world_cases import CASES_OF, FOREIGN, HARSH
+from mapfilter.experiments.benchmarks.world_cases import CASES_OF, FOREIGN, HARSH, SENSORS
 from mapfilter.tracks.store import read_log
+from mapfilter.workflows.evaluate import main_table
 from mapfilter.workflows.evaluate_foreign import (
     load_foreign,
     missing_ways_file,
@@ -222,9 +223,41 @@ def test_every_case_runs(made, tmp_path, name):
     assert sum(regions) + unavailable == rows[0]["claimed"]
 
 
+def test_faulty_sensors_have_rows_of_their_own_and_one_together(tmp_path):
+    """The run of a case without a fault stays out of it."""
+    config, fixed = load_foreign(None, SMALL)
+    names = ("no-fault", "motion-ends", "radio-frozen")
+    result = run_foreign(
+        config, "sensors", tmp_path, runs=2, seed=3, cases=names, workers=1, fixed=fixed
+    )
+    *each, pooled = result.cases
+    assert [case.name for case in each] == list(names)
+    assert (pooled.name, pooled.runs) == ("pooled", 4)
+    rows = {case["case"]: case for case in main_table(result)["cases"]}
+    assert {"claimed", "wrong_converged", "fault_wrong", "fault_noticed_s"} <= set(rows["pooled"])
+    files = sorted((tmp_path / "batches").glob("*.json"))
+    found = [row for file in files for row in json.loads(file.read_text())["rows"]]
+    claimed = sum(row["claimed"] for row in found if row["case"] != "no-fault")
+    epochs = sum(row["epochs"] for row in found if row["case"] != "no-fault")
+    assert pooled.claimed == pytest.approx(claimed / epochs)
+
+
+def test_cases_of_a_walk_share_it_and_faults_change_the_log_only(made):
+    world, _ = made
+    runs = RouteRuns(replace(world, name="sensors"), 0)
+    usual_walk, usual = RouteRuns(world, 0).run(FOREIGN["levels-6"])
+    assert usual_walk.fault_at_s == np.inf
+    for name in SENSORS:
+        walked, log = runs.run(SENSORS[name])
+        assert same(walked.truth, usual_walk.truth)
+        assert 0.0 <= walked.fault_at_s < usual_walk.truth["time_s"].max()
+        untouched = same(log.motion, usual.motion) and same(log.radio, usual.radio)
+        assert untouched is (name == "no-fault"), name
+
+
 def test_the_world_is_known_by_its_checksum(made):
     world, _ = made
     assert world.sha256 == replace(world).sha256
     assert world.sha256 != replace(world, offsets_db=(1.0, 0.0)).sha256
     assert world.sha256 != replace(world, length_m=None).sha256
-    assert set(CASES_OF) == {"foreign", "harsh"}
+    assert set(CASES_OF) == {"foreign", "harsh", "sensors"}

@@ -9,7 +9,7 @@ from mapfilter.workflows.terminal import text_lines
 
 
 def case(name, **figures):
-    every = {field.name: 0.0 for field in fields(CaseResult)}
+    every = {field.name: 0.0 for field in fields(CaseResult) if "fault" not in field.name}
     return CaseResult(**{**every, "name": name, "filter": "bayes", "runs": 3, **figures})
 
 
@@ -22,3 +22,12 @@ def test_figures_stand_in_the_row_of_their_case():
     assert table["levels-6"]["wrong"] == "0.25"
     assert table["cell-6"]["error_mean_m"] == "12.5"
     assert "success_low" not in head
+
+
+def test_faults_of_sensors_have_figures_of_their_own():
+    cases = case("motion-ends", fault_noticed_s=12.5), case("pooled", fault_wrong=0.25)
+    cases += (case("radio-ends", fault_wrong=0.5, fault_noticed_max_s=99.0),)
+    shown = main_table(EvaluateResult("city", 1, 100, cases, 2.0, Path("out")))
+    lines = [line for line in text_lines(shown) if line.startswith("  ")]
+    assert {"fault_wrong", "fault_noticed_s", "claimed"} <= set(lines[0].split())
+    assert lines[-1].split()[-1] == "99"

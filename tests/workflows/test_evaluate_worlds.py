@@ -124,11 +124,11 @@ def test_what_is_given_goes_before_the_world(tmp_path):
 
 
 def test_a_world_that_is_not_there_is_refused(tmp_path):
-    with pytest.raises(ConfigError, match="easy, plain, foreign or harsh"):
+    with pytest.raises(ConfigError, match="easy, plain, foreign, harsh or sensors"):
         load_benchmark("nice", None, [])
     out = tmp_path / "out"
     told = mapfilter("evaluate", "global-positioning", "--world", "nice", "--out", out)
-    assert_refused(told, "--world", "easy, plain, foreign or harsh", "nice")
+    assert_refused(told, "--world", "easy, plain, foreign, harsh or sensors", "nice")
     told = mapfilter("evaluate", "audit", "--world", "easy", "--out", out)
     assert_refused(told, "--world", "audit takes none")
     told = mapfilter("evaluate", "ottawa", "--data", tmp_path, "--world", "easy")

@@ -1,4 +1,4 @@
-"""Runs in the foreign and the harsh world: walks, logs, and the databases that are given."""
+"""Runs in the foreign, harsh and sensors worlds: walks, logs, and the databases given."""
 
 from __future__ import annotations
 
@@ -30,6 +30,7 @@ from mapfilter.simulation.worlds.other_city import (
 )
 from mapfilter.simulation.worlds.phone import report_table
 from mapfilter.simulation.worlds.radio import Radio, RadioModel
+from mapfilter.simulation.worlds.sensor_faults import faulty_log
 from mapfilter.simulation.worlds.street_lines import StreetLines
 from mapfilter.simulation.worlds.walkers import PedestrianModel, PedestrianWalk, pedestrian_walk
 from mapfilter.tracks.log import TrackLog, make_log
@@ -50,7 +51,7 @@ class ForeignWorld:
 
     Parameters
     ----------
-    name : {"foreign", "harsh"}
+    name : {"foreign", "harsh", "sensors"}
     folder : Path
         Holds streets, open ground, and one database for each fault and variant.
     seed : int
@@ -180,7 +181,12 @@ class RouteRuns:
         log = make_log(city.streets.network.crs, motion=motion, radio=radio)
         if case.other_city:
             truth = truth.assign(east_m=truth["east_m"] + AWAY_M)
-        return Walk(truth), replace(log, truth=truth)
+        log = replace(log, truth=truth)
+        if case.sensor is None:
+            return Walk(truth), log
+        rng = named_rng(world.seed, "sensor fault", case.sensor, number)
+        log, window = faulty_log(case.sensor, log, rng)
+        return Walk(truth, fault_at_s=window.begin_s), log
 
     def filter(self, choice: FilterOptions, case: WorldCase) -> Filter[Any]:
         """Return the filter over the database that a case is given."""

@@ -41,10 +41,21 @@ TOWN_HEIGHT: Mapping[str, float] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """A journey's truth, with the time of the last row before a displacement; infinite without."""
+    """A journey's truth, and what happened on it.
+
+    Parameters
+    ----------
+    truth : pandas.DataFrame
+        time_s, east_m, north_m, way_id.
+    displaced_at_s : float
+        Time of the last row before a displacement; infinite without.
+    fault_at_s : float
+        When a fault of the sensors began; infinite without.
+    """
 
     truth: pd.DataFrame
     displaced_at_s: float = float("inf")
+    fault_at_s: float = float("inf")
 
     @property
     def arrived_at_s(self) -> float:

@@ -75,6 +75,12 @@ epochs_unavailable_misleading : int
     exceeded : float
         Share of the claimed epochs whose error exceeded the protection level: the risk, where it
         is kept.
+    fault_wrong, fault_unnoticed : float
+        With faults of the sensors: shares of the runs in which a position more than 50 m off was
+        claimed after the fault had begun, and in which the first such claim lasted to the end.
+    fault_noticed_s, fault_noticed_max_s : float
+        Over the runs with such a claim, seconds from the fault's begin to the first epoch after it
+        at which nothing more than 50 m off is claimed, or to the last epoch: median and largest.
     """
 
     name: str
@@ -151,6 +157,10 @@ epochs_unavailable_misleading : int
     exceeded_low: float
     exceeded_high: float
     window_median_m: float = _NAN
+    fault_wrong: float = _NAN
+    fault_unnoticed: float = _NAN
+    fault_noticed_s: float = _NAN
+    fault_noticed_max_s: float = _NAN
 
 
 def summarise(case: Case, filter_name: str, rows: Sequence[Mapping[str, Any]]) -> CaseResult:
@@ -179,7 +189,7 @@ def summarise(case: Case, filter_name: str, rows: Sequence[Mapping[str, Any]]) -
         figures |= _share(f"coverage_{share}", held, [int(row["claimed"]) for row in known])
     converged = [int(row["converged"]) for row in rows]
     figures |= _share("wrong_converged", [int(row["wrong_converged"]) for row in rows], converged)
-    figures |= _regions(rows)
+    figures |= _regions(rows) | _of_faults(rows)
     for name in _ERRORS:
         figures[name] = _mean(_known(good, name))
     figures["switch_mean_m"] = _mean(switch_m)
@@ -208,6 +218,18 @@ def summarise(case: Case, filter_name: str, rows: Sequence[Mapping[str, Any]]) -
         window_median_m=_mean(_known(rows, "window_median_m")),
         **figures,
     )
+
+
+def _of_faults(rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    """Return the figures of faults of the sensors, over the runs that have one."""
+    known = [row for row in rows if "fault_unnoticed" in row]
+    noticed_s = _known(known, "fault_noticed_s")
+    return {
+        "fault_wrong": _ratio(noticed_s.size, len(known)),
+        "fault_unnoticed": _ratio(_total(known, "fault_unnoticed"), len(known)),
+        "fault_noticed_s": float(np.median(noticed_s)) if noticed_s.size else _NAN,
+        "fault_noticed_max_s": float(noticed_s.max()) if noticed_s.size else _NAN,
+    }
 
 
 def _regions(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -67,6 +67,8 @@ def score(
         "worst_100m_m": _finite(claims.worst_100m_m),
     }
     row |= _integrity(estimate, errors_m, walked, integrity or IntegrityOptions())
+    if np.isfinite(walked.fault_at_s):
+        row |= _since_fault(estimate, errors_m, walked.fault_at_s)
     if case.recovery_within_m > 0:
         return row | _recovered(case, walked, truth, estimate.time_s, errors_m)
     scored = accuracy(estimate, truth)
@@ -109,6 +111,29 @@ def _integrity(
     if not np.isfinite(estimate.radius_99_m[claimed]).any():
         row["covered_99"] = None
     return row
+
+
+def _since_fault(estimate: TrackEstimate, errors_m: Floats, fault_at_s: float) -> Row:
+    """Score what is claimed more than 50 m off since a fault of the sensors began.
+
+    ``fault_wrong_s`` is the time from the fault's begin to the first such claim, and
+    ``fault_noticed_s`` that to the first epoch after it at which nothing wrong is claimed: LOST,
+    OUTSIDE, or within 50 m again. Where there is none, it is the time to the last epoch, and
+    ``fault_unnoticed`` is true. Both are None where nothing wrong is claimed.
+    """
+    since = (estimate.time_s >= fault_at_s) & np.isfinite(errors_m)
+    wrong = (claims_of(estimate) & (errors_m > SUCCESS_RADIUS_M))[since]
+    after_s = estimate.time_s[since] - fault_at_s
+    if not wrong.any():
+        return {"fault_wrong_s": None, "fault_noticed_s": None, "fault_unnoticed": False}
+    first = int(np.argmax(wrong))
+    honest = np.flatnonzero(~wrong[first:])
+    end = first + int(honest[0]) if honest.size else -1
+    return {
+        "fault_wrong_s": float(after_s[first]),
+        "fault_noticed_s": float(after_s[end]),
+        "fault_unnoticed": not honest.size,
+    }
 
 
 def _recovered(case: Case, walked: Walk, truth: Truth, time_s: Floats, errors_m: Floats) -> Row:

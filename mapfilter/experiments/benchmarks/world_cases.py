@@ -1,7 +1,8 @@
-"""The cases of the foreign and the harsh world; each has one definition.
+"""The cases of the foreign, the harsh and the sensors world; each has one definition.
 
 All cases share the radio of :class:`mapfilter.simulation.worlds.radio.RadioModel`. A case of the
-harsh world differs from ``levels-6`` of the foreign one in the one respect after which it is named.
+harsh world, or of that of faulty sensors, differs from ``levels-6`` of the foreign one in the one
+respect after which it is named.
 """
 
 from __future__ import annotations
@@ -16,9 +17,10 @@ from mapfilter.simulation.worlds.faults import FAULTS
 from mapfilter.simulation.worlds.handover import HandoverModel
 from mapfilter.simulation.worlds.inertial import InertialModel
 from mapfilter.simulation.worlds.phone import PhoneModel
+from mapfilter.simulation.worlds.sensor_faults import SENSOR_FAULTS
 from mapfilter.simulation.worlds.walkers import PedestrianModel
 
-OtherWorld = Literal["foreign", "harsh"]
+OtherWorld = Literal["foreign", "harsh", "sensors"]
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,9 @@ class WorldCase(Case):
         Fault of the inputs, out of :data:`mapfilter.simulation.worlds.faults.FAULTS`.
     other_city : bool
         Whether the log is of another city.
+    sensor : str or None
+        Fault of the phone's sensors during the walk, out of
+        :data:`mapfilter.simulation.worlds.sensor_faults.SENSOR_FAULTS`.
     """
 
     pedestrian: PedestrianModel = field(default_factory=PedestrianModel)
@@ -44,6 +49,7 @@ class WorldCase(Case):
     inertial: InertialModel = field(default_factory=InertialModel)
     fault: str | None = None
     other_city: bool = False
+    sensor: str | None = None
 
 
 _SHEET: Mapping[str, float] = MappingProxyType({"heading_sd_deg": 6.0})
@@ -114,7 +120,12 @@ HARSH: Mapping[str, WorldCase] = MappingProxyType(
 )
 """The cases of the harsh world."""
 
+SENSORS: Mapping[str, WorldCase] = MappingProxyType(
+    {name: WorldCase(name, data_sheet=_SHEET, sensor=name) for name in SENSOR_FAULTS}
+)
+"""The cases of faulty sensors."""
+
 CASES_OF: Mapping[str, Mapping[str, WorldCase]] = MappingProxyType(
-    {"foreign": FOREIGN, "harsh": HARSH}
+    {"foreign": FOREIGN, "harsh": HARSH, "sensors": SENSORS}
 )
 """The cases of each world by name, in the order of the table."""
