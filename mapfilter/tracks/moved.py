@@ -141,7 +141,7 @@ def motion_from_places(time_s: Floats, place_m: Floats, accuracy_m: Floats) -> p
     """Return the ways between positions that are farther apart than their errors.
 
     A position counts if it lies at least 10 m, and its accuracy, from the last one that did; so
-    errors of a receiver that stands still are no way.
+    errors of a receiver that stands still are no way. Ways are parted into steps of at most 1 s.
 
     Parameters
     ----------
@@ -154,20 +154,30 @@ def motion_from_places(time_s: Floats, place_m: Floats, accuracy_m: Floats) -> p
     Examples
     --------
     >>> place_m = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 12.0]])
-    >>> moved = motion_from_places(np.array([0.0, 1.0, 9.0]), place_m, np.full(3, 5.0))
-    >>> moved[["time_s", "step_m", "heading_rad"]].iloc[1].round(3).tolist()
-    [9.0, 12.0, 1.571]
+    >>> moved = motion_from_places(np.array([0.0, 1.0, 3.0]), place_m, np.full(3, 5.0))
+    >>> moved["time_s"].tolist(), moved["step_m"].tolist()
+    ([0.0, 1.0, 2.0, 3.0], [0.0, 4.0, 4.0, 4.0])
     """
     least_m = np.fmax(accuracy_m, _LEAST_APART_M)
     kept = [0]
     for row in range(1, len(time_s)):
         if np.hypot(*(place_m[row] - place_m[kept[-1]])) >= least_m[row]:
             kept.append(row)
-    moved = np.diff(place_m[kept], axis=0)
-    step_m = np.concatenate([[0.0], np.hypot(*moved.T)])
-    heading = np.concatenate([[np.nan], np.arctan2(moved[:, 1], moved[:, 0])])
-    columns = {"time_s": time_s[kept], "step_m": step_m, "heading_rad": heading}
-    return pd.DataFrame({**columns, "turn_rad": np.nan})
+    moved, lasted_s = np.diff(place_m[kept], axis=0), np.diff(time_s[kept])
+    parts = np.maximum(np.ceil(lasted_s), 1).astype(np.int64)
+    first = np.repeat(np.cumsum(parts) - parts, parts)
+    share = (np.arange(parts.sum()) - first + 1) / np.repeat(parts, parts)
+    at_s = np.repeat(time_s[kept][:-1], parts) + share * np.repeat(lasted_s, parts)
+    step_m = np.repeat(np.hypot(*moved.T) / parts, parts)
+    heading = np.repeat(np.arctan2(moved[:, 1], moved[:, 0]), parts)
+    return pd.DataFrame(
+        {
+            "time_s": np.concatenate([time_s[:1], at_s]),
+            "step_m": np.concatenate([[0.0], step_m]),
+            "heading_rad": np.concatenate([[np.nan], heading]),
+            "turn_rad": np.nan,
+        }
+    )
 
 
 def motion_from_course(rows: pd.DataFrame, convergence_rad: float) -> pd.DataFrame:

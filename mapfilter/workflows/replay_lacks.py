@@ -9,7 +9,7 @@ from mapfilter._types import Floats
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults
 from mapfilter.geodesy import Lattice, same_crs, short_crs
-from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.log_options import by_streets_alone
@@ -96,7 +96,8 @@ def advice_of(log: TrackLog, options: Any, estimate: TrackEstimate) -> tuple[str
     options
         Of the filter, as fitted to the log.
     """
-    if estimate.converged_at is not None or not isinstance(options, BayesFilter):
+    by_streets = isinstance(options, BayesFilter) and not isinstance(options, GridFilter)
+    if estimate.converged_at is not None or not by_streets:
         return ()
     along_m = float(log.motion["step_m"].abs().sum())
     notes = [
