@@ -78,7 +78,7 @@ def lack_of(
         return f"the filter {name} needs cells to start, the database has none ({_BY_STREETS})"
     alone = database is not None and by_streets_alone(BayesFilter(), log, database)
     if lack and name in _BY_CELLS and alone:
-        return f"the filter {name} needs cells to start, the log has none ({_BY_STREETS})"
+        return f"{lack} ({_BY_STREETS})"
     if "no motion" not in lack:
         return lack
     if _has_positions(opened):
