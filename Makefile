@@ -4,6 +4,9 @@ PYTHON ?= python3
 MUTANTS ?= --sample 40 --seed 1
 VENV := .venv
 BIN := $(VENV)/bin
+# Also for the build backend, which pip installs apart.
+export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
+export PIP_BUILD_CONSTRAINT := $(CURDIR)/constraints.txt
 
 .PHONY: demo test check docs mutants clean
 

@@ -7,58 +7,34 @@ old result intact, and a hidden ``.NAME.partial-*`` that the next write of that 
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import errno
 import glob
 import hashlib
 import json
 import os
 import shutil
-import stat
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from mapfilter.errors import (
-    Faults,
-    InputError,
-    MapfilterError,
-    OutputError,
-    StoreError,
-    fail,
-)
+from mapfilter._inputs import is_unicode, open_input, read_input
+from mapfilter._replace import ASIDE, NEW, discard, exchange, note_old
+from mapfilter.errors import Faults, MapfilterError, OutputError, StoreError, fail
 
-_ASIDE = "old"
-_AT_FDCWD = -100
-_RENAME_EXCHANGE = 2
-_NO_PATH = (errno.ENAMETOOLONG, errno.ELOOP)
-_SHOWN = 60
+_LARGEST_JSON_BYTES = 256 << 20
+_SEAL = "sha256"
 _WRITE_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO)
 
 VERSION = version("mapfilter")
 """Of the program, for the record in what it writes."""
 
 
-def read_input(path: Path, largest_bytes: int, what: str) -> bytes:
-    """Return the bytes of an input file; raise InputError for one that is missing or too large."""
-    try:
-        with path.open("rb") as stream:
-            data = stream.read(largest_bytes + 1)
-    except OSError as error:
-        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
-    if len(data) > largest_bytes:
-        kib = largest_bytes >> 10
-        size = f"{kib >> 10} MiB" if kib >= 1024 else f"{kib} KiB"
-        raise fail(InputError, str(path), f"{what} of at most {size}", "a larger file")
-    return data
-
-
 def sha256_file(path: Path) -> str:
     """Return the SHA-256 of a file's bytes as hexadecimal digits."""
-    with path.open("rb") as stream:
+    with open_input(path, StoreError) as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
@@ -86,52 +62,97 @@ def atomic_file(path: Path) -> Iterator[Path]:
 def atomic_dir(path: Path) -> Iterator[Path]:
     """Give a temporary folder beside ``path``; exchange it with ``path`` when the block succeeds.
 
-    Where ``path`` is a link, its target is replaced. Raises OutputError where ``path`` is a file,
-    or the folder cannot be written.
+    Where ``path`` is a link, its target is replaced. Of the older folder only what it held at the
+    beginning is removed; the rest is kept beside it as ``NAME.kept``. Raises OutputError where
+    ``path`` is a file, or the folder cannot be written.
     """
     if path.exists() and not path.is_dir():
         raise fail(OutputError, str(path), "a folder, or nothing yet", "a file")
     target, partial = _partial_folder(path)
-    new = partial / "new"
-    new.mkdir()
+    new = partial / NEW
     try:
         with _writing(new, path):
+            new.mkdir()
+            note_old(partial, target)
             yield new
             for inner in sorted(new.rglob("*")):
                 _sync(inner)
             _sync(new)
         with _into_place(path, target):
             if target.exists():
-                _exchange(new, target)
+                exchange(new, target)
             else:
                 new.rename(target)
+    finally:
+        discard(partial, target)
+
+
+@contextlib.contextmanager
+def replaced_files(folder: Path, older: Callable[[], Iterable[Path]]) -> Iterator[Path]:
+    """Give a new folder; when the block succeeds, move the files in it into ``folder``.
+
+    Files of the same name there are replaced one by one, and those of ``older``, asked for then,
+    that have no successor are removed, with folders that they leave empty. All others stay, and if
+    the block fails, all. Raises OutputError where the folder cannot be written.
+    """
+    ensure_writable_folder(folder)
+    _, partial = _partial_folder(folder / "results")
+    new = partial / NEW
+    try:
+        with _writing(new, folder):
+            new.mkdir()
+            yield new
+        with _into_place(folder, folder):
+            stale = set(older())
+            for file in sorted(path for path in new.rglob("*") if not path.is_dir()):
+                target = folder / file.relative_to(new)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                file.replace(target)
+                stale.discard(target)
+            for path in sorted(stale):
+                path.unlink(missing_ok=True)
+                if path.parent != folder and not any(path.parent.iterdir()):
+                    path.parent.rmdir()
     finally:
         shutil.rmtree(partial, ignore_errors=True)
 
 
 def left_aside(path: Path) -> Path | None:
     """Return the folder moved aside by a replacement that was cut short, if there is one."""
-    found = path.parent.glob(f"{glob.escape(f'.{path.name}.partial-')}*/{_ASIDE}")
+    found = path.parent.glob(f"{glob.escape(f'.{path.name}.partial-')}*/{ASIDE}")
     return next((aside for aside in sorted(found) if aside.is_dir()), None)
 
 
-def check_replaceable(folder: Path, head: str, what: str) -> None:
+def check_replaceable(folder: Path, head: str, what: str, own: Callable[[str], bool]) -> None:
     """Raise OutputError where a folder, which may be absent, holds files of others.
 
-    Those of mapfilter are listed as ``parts`` in the JSON file ``head``, with ``what`` as format.
+    Those of mapfilter are listed as ``parts`` in the JSON file ``head``, with ``what`` as format,
+    and are as they were written: their names are ``own``, and their checksums those of the list.
+    A list that was edited is not believed.
     """
     inner = folder.rglob("*") if folder.is_dir() else ()
     found = {p.relative_to(folder).as_posix() for p in inner if p.is_symlink() or not p.is_dir()}
     try:
         value = read_json(folder / head)
+        if _SEAL in value:
+            check_seal(value, head)
     except StoreError:
         value = {}
     if value.get("format") == what and isinstance(parts := value.get("parts"), list):
-        found -= {head, *(str(part.get("path")) for part in parts if isinstance(part, dict))}
+        listed = {str(one.get("path")): one for one in parts if isinstance(one, dict)}
+        names = filter(own, found & set(listed))
+        found -= {head, *(name for name in names if _as_listed(folder, listed[name]))}
     if foreign := sorted(found):
         got = f"other files ({', '.join(foreign[:3])}{', …' if len(foreign) > 3 else ''})"
-        hint = "a mistyped path; choose another, or move the files away"
+        hint = "a mistyped path, or files edited since; choose another, or move the files away"
         raise fail(OutputError, str(folder), f"a {what}, or nothing yet", got, hint)
+
+
+def _as_listed(folder: Path, part: Mapping[str, Any]) -> bool:
+    try:
+        return sha256_file(folder / str(part["path"])) == part.get("sha256")
+    except OSError:
+        return False
 
 
 def check_part(file: Path, part: Mapping[str, Any], faults: Faults, *, full: bool = True) -> bool:
@@ -152,7 +173,10 @@ def check_version(where: str, found: object, known: int) -> None:
     if found == known and not isinstance(found, bool):
         return
     newer = isinstance(found, int) and found > known
+    older = isinstance(found, int) and not isinstance(found, bool) and 0 < found < known
     hint = "written by a newer mapfilter; update it" if newer else "edited or damaged"
+    if older:
+        hint = "written by an older mapfilter; make it again"
     raise fail(StoreError, where, f"version {known}", found, hint)
 
 
@@ -165,14 +189,47 @@ def write_json(path: Path, value: Mapping[str, Any]) -> None:
 
 def read_json(path: Path) -> dict[str, Any]:
     """Read a JSON object; raise StoreError where it is missing, cut off or something else."""
+    data = read_input(path, _LARGEST_JSON_BYTES, "JSON", StoreError)
+    return parse_json(data, str(path))
+
+
+def parse_json(data: bytes, where: str) -> dict[str, Any]:
+    """Return the JSON object that a file's bytes hold; raise StoreError for something else."""
     try:
-        value = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise fail(StoreError, str(path), "a readable file", error.strerror or error) from error
+        value = json.loads(data.decode("utf-8"))
     except (ValueError, RecursionError) as error:
-        raise fail(StoreError, str(path), "JSON", f"no JSON ({error})", "cut off") from error
+        raise fail(StoreError, where, "JSON", f"no JSON ({error})", "cut off") from error
+    if not is_unicode(value):
+        hint = "half of a surrogate pair: text cut off, or decoded twice"
+        raise fail(StoreError, where, "text in Unicode", "a lone surrogate", hint)
     if not isinstance(value, dict):
-        raise fail(StoreError, str(path), "a JSON object", type(value).__name__)
+        raise fail(StoreError, where, "a JSON object", type(value).__name__)
+    return value
+
+
+def sealed(value: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a JSON object with the SHA-256 of all its other entries under ``sha256``."""
+    rest = {key: item for key, item in value.items() if key != _SEAL}
+    text = json.dumps(rest, sort_keys=True, separators=(",", ":"))
+    return {**rest, _SEAL: hashlib.sha256(text.encode()).hexdigest()}
+
+
+def check_seal(value: Mapping[str, Any], where: str) -> None:
+    """Raise StoreError where an object that :func:`sealed` made was changed, if only by a digit."""
+    if value.get(_SEAL) != sealed(value)[_SEAL]:
+        expected, got = "entries as they were written", "others, by their SHA-256"
+        raise fail(StoreError, where, expected, got, "edited or damaged")
+
+
+def write_sealed(path: Path, value: Mapping[str, Any]) -> None:
+    """Write a JSON object with its checksum, for :func:`read_sealed`."""
+    write_json(path, sealed(value))
+
+
+def read_sealed(path: Path) -> dict[str, Any]:
+    """Read a JSON object; raise StoreError where it is missing, cut off or changed."""
+    value = read_json(path)
+    check_seal(value, str(path))
     return value
 
 
@@ -220,10 +277,10 @@ def _partial_folder(path: Path) -> tuple[Path, Path]:
     prefix = f".{path.name}.partial-"
     for stale in path.parent.glob(f"{glob.escape(prefix)}*"):
         if not _is_alive(stale.name.removeprefix(prefix).split("-")[0]):
-            if (stale / _ASIDE).is_dir() and not path.exists():
+            if (stale / ASIDE).is_dir() and not path.exists():
                 # Its process died between the two renames of an exchange.
-                (stale / _ASIDE).rename(path)
-            shutil.rmtree(stale, ignore_errors=True)
+                (stale / ASIDE).rename(path)
+            discard(stale, path)
     try:
         folder = tempfile.mkdtemp(prefix=f"{prefix}{os.getpid()}-", dir=path.parent)
     except OSError as error:
@@ -238,25 +295,6 @@ def _is_alive(pid: str) -> bool:
     except (ValueError, OverflowError, ProcessLookupError):
         return False
     return True
-
-
-def _exchange(new: Path, old: Path) -> None:
-    """Swap two folders in one step where the system can, else by two renames."""
-    renameat2 = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
-    if renameat2 is not None:
-        ends = os.fsencode(new), os.fsencode(old)
-        if renameat2(_AT_FDCWD, ends[0], _AT_FDCWD, ends[1], _RENAME_EXCHANGE) == 0:
-            return
-        if ctypes.get_errno() not in (errno.EINVAL, errno.ENOSYS):
-            number = ctypes.get_errno()
-            raise OSError(number, os.strerror(number), str(old))
-    aside = new.with_name(_ASIDE)
-    old.rename(aside)
-    try:
-        new.rename(old)
-    except BaseException:
-        aside.rename(old)
-        raise
 
 
 def _sync(path: Path) -> None:
@@ -274,42 +312,3 @@ def _sync(path: Path) -> None:
 
 def _not_writable(path: Path, error: OSError) -> MapfilterError:
     return fail(OutputError, str(path), "a place that can be written", error.strerror or error)
-
-
-def path_fault(path: Path) -> str:
-    """Return the expected kind of path for messages, or an empty text when nothing is wrong.
-
-    A path may name a file, a folder or nothing yet; whether it can be read or written is found
-    later. Pipes are refused because reading would block, and cannot be repeated.
-
-    Examples
-    --------
-    >>> path_fault(Path("not-yet"))
-    ''
-    >>> path_fault(Path("a" * 5000))
-    'a path that the system takes (File name too long)'
-    """
-    try:
-        str(path).encode()
-        mode = path.stat().st_mode
-    except UnicodeEncodeError:
-        return "a path in UTF-8"
-    except ValueError:
-        return "a path without a zero byte"
-    except OSError as error:
-        refused = error.errno in _NO_PATH
-        return f"a path that the system takes ({error.strerror})" if refused else ""
-    usable = stat.S_ISREG(mode) or stat.S_ISDIR(mode)
-    return "" if usable else "a file or a folder, not a pipe, socket or device"
-
-
-def shown(value: object) -> str:
-    """Return a value as messages show it: printable, and not too long.
-
-    Examples
-    --------
-    >>> shown("a" * 5000)[-4:]
-    'aaa…'
-    """
-    text = repr(value)
-    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"

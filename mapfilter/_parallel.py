@@ -8,26 +8,26 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import multiprocessing
-import signal
+import logging
+import platform
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sized
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from functools import partial
 from typing import Any, ParamSpec, TypeVar
 
-import numpy as np
-
-from mapfilter.errors import MapfilterError, fail
+from mapfilter._code import code_digest
+from mapfilter._workers import LARGE_BLOCK_BYTES, LocalWorkers
+from mapfilter.errors import Faults, MapfilterError, fail
 
 _CONNECT_S = 10
+_LOOK_S = 1.0
 _MOST_WORKERS = 256
-# Just under the size from which on glibc adapts no more.
-_LARGE_BLOCK_BYTES = 31 << 20
 
 # By default workers are watched a hundred times a second, and give freed memory back at once.
 _QUICK_WORKERS = {
     "distributed.worker.profile.enabled": False,
-    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2 * _LARGE_BLOCK_BYTES,
+    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2 * LARGE_BLOCK_BYTES,
 }
 
 P = ParamSpec("P")
@@ -52,15 +52,19 @@ class SerialExecutor(Executor):
 
 @contextlib.contextmanager
 def local_executor(workers: int) -> Iterator[Executor]:
-    """Give an executor of ``workers`` local processes, or of this one when ``workers`` is 1."""
+    """Give an executor of ``workers`` local processes, or of this one when ``workers`` is 1.
+
+    The workers end with the block, or with this process, whatever ends it.
+    """
     if workers <= 1:
         yield SerialExecutor()
         return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context, initializer=_start_worker) as pool:
+    with LocalWorkers(workers) as pool:
         try:
             yield pool
         except BaseException:
+            # Nobody waits for tasks in the midst of which this one is left.
+            pool.end_workers()
             pool.shutdown(wait=False, cancel_futures=True)
             raise
 
@@ -103,10 +107,73 @@ def cluster_executor(address: str) -> Iterator[tuple[Executor, int]]:
             hint = "the scheduler is not running, or another port"
             raise fail(MapfilterError, "cluster", expected, address, hint) from error
         workers = sum(client.nthreads().values())
+        _check_hosts(client)
+        stack.enter_context(_quiet("distributed.utils", "distributed.client"))
         try:
-            yield client.get_executor(), max(workers, 1)
+            yield _ClusterExecutor(client, place), max(workers, 1)
         except KilledWorker as error:
-            raise _died() from error
+            raise _died("one that died several times (out of memory?)") from error
+        except _lost_errors() as error:
+            raise _scheduler_lost(place) from error
+
+
+class _ClusterExecutor(Executor):
+    """Hands tasks to a cluster, as long as its scheduler is there."""
+
+    def __init__(self, client: Any, place: Any) -> None:
+        self._client, self._place = client, place
+        self._inner = client.get_executor()
+
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """Hand in a task; MapfilterError where the connection is lost."""
+        # What is handed in while the client connects again would never be done.
+        self.check()
+        future: Future[T] = self._inner.submit(fn, *args, **kwargs)
+        return future
+
+    def check(self) -> None:
+        """Raise MapfilterError where the connection to the scheduler is lost."""
+        if self._client.status != "running":
+            raise _scheduler_lost(self._place)
+
+
+def _check_hosts(client: Any) -> None:
+    """Check that the workers of a cluster have the same code as this process."""
+    digests = client.run(code_digest, on_error="return")
+    expected = "the mapfilter, Python and libraries of this host"
+    faults = Faults()
+    for worker, found in sorted(digests.items()):
+        if found != code_digest():
+            got = "other versions" if isinstance(found, str) else f"no mapfilter ({found})"
+            faults.add(f"worker {worker}", expected, got, "install the same on all hosts")
+    faults.raise_if_any(MapfilterError)
+
+
+def _lost_errors() -> tuple[type[BaseException], ...]:
+    from distributed.client import FutureCancelledError
+    from distributed.comm.core import CommClosedError
+
+    return (CancelledError, FutureCancelledError, CommClosedError)
+
+
+@contextlib.contextmanager
+def _quiet(*names: str) -> Iterator[None]:
+    """Leave it to the errors that are raised to say what happened."""
+    loggers = {name: logging.getLogger(name) for name in names}
+    levels = {name: logger.level for name, logger in loggers.items()}
+    for logger in loggers.values():
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for name, logger in loggers.items():
+            logger.setLevel(levels[name])
+
+
+def _scheduler_lost(place: Any) -> MapfilterError:
+    hint = "it ended, or the network failed; finished work is kept for --resume"
+    where = place if isinstance(place, str) else "local"
+    return fail(MapfilterError, f"cluster {where}", "a running Dask scheduler", "none", hint)
 
 
 @contextlib.contextmanager
@@ -137,37 +204,57 @@ def ordered_results(
     if progress is not None and not isinstance(tasks, Sized):
         tasks = list(tasks)
     total = len(tasks) if isinstance(tasks, Sized) else 0
+    call: Callable[[Any], T] = function
     if isinstance(executor, SerialExecutor):
         # A task is done as it is handed in: none ahead of its turn.
         in_flight = 1
+    else:
+        call = partial(_on_worker, function, code_digest())
     todo = iter(tasks)
     waiting: deque[Future[T]] = deque()
     done = 0
     while True:
         try:
             for task in itertools.islice(todo, in_flight - len(waiting)):
-                waiting.append(executor.submit(function, task))
+                waiting.append(executor.submit(call, task))
             if not waiting:
                 return
-            result = waiting.popleft().result()
+            result = _result_of(waiting.popleft(), executor)
         except BrokenExecutor as error:
-            raise _died() from error
+            reason = executor.reason() if isinstance(executor, LocalWorkers) else ""
+            raise _died(reason or "one that died (out of memory?)") from error
+        except MemoryError as error:
+            if isinstance(executor, SerialExecutor):
+                raise
+            raise _died("one that ran out of memory") from error
         done += 1
         if progress is not None:
             progress(done, total)
         yield result
 
 
-def _start_worker() -> None:
-    # The main process ends its workers on Ctrl-C.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # After a large freed block glibc keeps twice its size. Otherwise a worker returns the arrays of
-    # each task to the system, and spends a third of its time on new pages.
-    np.empty(_LARGE_BLOCK_BYTES, np.uint8)
+def _result_of(future: Future[T], executor: Executor) -> T:
+    if not isinstance(executor, _ClusterExecutor):
+        return future.result()
+    while True:
+        try:
+            return future.result(timeout=_LOOK_S)
+        except TimeoutError:
+            if future.done():
+                raise
+            executor.check()
 
 
-def _died() -> MapfilterError:
-    got = "one that died (out of memory?)"
+def _on_worker(function: Callable[[Any], T], code: str, task: Any) -> T:
+    """Run a task, unless this worker has other code than who sent it."""
+    if code_digest() != code:
+        where, hint = f"worker on {platform.node()}", "install the same on all hosts"
+        expected = "the mapfilter, Python and libraries of the one that sends the work"
+        raise fail(MapfilterError, where, expected, "other versions", hint)
+    return function(task)
+
+
+def _died(got: str) -> MapfilterError:
     hint = "too many workers or too large a tile_px; finished work is kept for --resume"
     return fail(MapfilterError, "worker processes", "all of them running", got, hint)
 

@@ -1,24 +1,28 @@
 """Resume long computations: finished parts stay on disk, with what determines them.
 
-A part is taken over only where the inputs are the same. Either a head of digests lies beside the
-parts and is compared (:func:`start_or_resume`: other inputs are refused), or the digest is part of
-the folder's name (:class:`FinishedParts`: parts of other inputs are not found).
+A part is taken over only where inputs and code are the same. Either a head of digests lies beside
+the parts and is compared (:func:`start_or_resume`: other inputs are refused), or the digest is part
+of the folder's name (:class:`FinishedParts`: parts of other inputs are not found).
 """
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import os
 import shutil
-import zlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 
+from mapfilter._code import code_digest
+from mapfilter._inputs import read_input
 from mapfilter._io import ensure_writable_folder, read_json, write_json
-from mapfilter.errors import ConfigError, InputError, OutputError, fail
+from mapfilter.errors import ConfigError, InputError, OutputError, Stopped, fail
 
-_CHECKSUM_BYTES = 4
+_CODE = "code_sha256"
+_CHECKSUM_BYTES = 32
+_LARGEST_PART_BYTES = 1 << 30
 
 
 def start_or_resume(
@@ -53,13 +57,7 @@ def start_or_resume(
     """
     known = resume and head_file.is_file()
     if known:
-        found, names = read_json(head_file), names or {key: key for key in head}
-        changed = [name for key, name in names.items() if found.get(key) != head[key]]
-        if changed:
-            expected = f"the same {', '.join(names.values())} to resume"
-            hint = "settings changed since; start without --resume, or in another folder"
-            got = f"another {', another '.join(changed)}"
-            raise fail(ConfigError, str(head_file), expected, got, hint)
+        check_same(head_file, head, names)
     else:
         try:
             for part in parts:
@@ -67,8 +65,66 @@ def start_or_resume(
         except OSError as error:
             expected = "older results that can be removed"
             raise fail(OutputError, str(head_file), expected, error.strerror or error) from error
-    write_json(head_file, head)
+    write_json(head_file, with_code(head))
     return known
+
+
+def with_code(head: Mapping[str, object]) -> dict[str, object]:
+    """Return the head of a computation with the checksum of the code that does it."""
+    return {**head, _CODE: code_digest()}
+
+
+def check_same(
+    head_file: Path, head: Mapping[str, object], names: Mapping[str, str] | None = None
+) -> dict[str, object]:
+    """Return the head that lies in a file; ConfigError where the parts are of something else.
+
+    Parameters and errors are those of :func:`start_or_resume`.
+    """
+    found, head = read_json(head_file), with_code(head)
+    names = {**(names or {key: key for key in head}), _CODE: "version of mapfilter and libraries"}
+    changed = [name for key, name in names.items() if found.get(key) != head[key]]
+    if changed:
+        expected = f"the same {', '.join(names.values())} to resume"
+        hint = "settings changed since; start without --resume, or in another folder"
+        raise fail(
+            ConfigError, str(head_file), expected, f"another {', another '.join(changed)}", hint
+        )
+    return found
+
+
+@contextlib.contextmanager
+def kept_when_stopped(what: str) -> Iterator[None]:
+    """Note on an interrupt that passes through what is kept, and how to go on."""
+    try:
+        yield
+    except (KeyboardInterrupt, Stopped) as error:
+        error.add_note(f"finished {what} are kept: go on with --resume")
+        raise
+
+
+def load_part(file: Path) -> bytes | None:
+    """Return what :func:`save_part` wrote; None where there is none, or it is damaged."""
+    try:
+        data = read_input(file, _LARGEST_PART_BYTES, "a part")
+    except InputError:
+        return None
+    checksum, part = data[:_CHECKSUM_BYTES], data[_CHECKSUM_BYTES:]
+    return part if _checksum(file.name, part) == checksum else None
+
+
+def save_part(file: Path, part: bytes) -> None:
+    """Write a finished part with a checksum of it and its name; OutputError where that fails."""
+    temporary = file.with_name(f"{file.name}.{os.getpid()}")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        temporary.write_bytes(_checksum(file.name, part) + part)
+        temporary.replace(file)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        got = error.strerror or error
+        raise fail(OutputError, str(file), "a place that can be written", got) from error
 
 
 class FinishedParts:
@@ -91,7 +147,8 @@ class FinishedParts:
     @cached_property
     def folder(self) -> Path:
         """Folder of the parts; emptied on first use, unless they are kept."""
-        folder = self._result.with_name(f".{self._result.name}.{self._name}s-{self._digest()[:16]}")
+        digest = hashlib.sha256(f"{self._digest()} {code_digest()}".encode()).hexdigest()
+        folder = self._result.with_name(f".{self._result.name}.{self._name}s-{digest[:16]}")
         if not self.keep:
             shutil.rmtree(folder, ignore_errors=True)
         return folder
@@ -100,38 +157,27 @@ class FinishedParts:
         ensure_writable_folder(self._result.parent)
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, *_: object
+    ) -> None:
         # Without a use there is no folder, and the digest may take long.
         used = "folder" in vars(self)
         if used and (kind is None or issubclass(kind, InputError | OutputError)):
             shutil.rmtree(self.folder, ignore_errors=True)
+        if used and isinstance(error, KeyboardInterrupt | Stopped) and self.folder.is_dir():
+            error.add_note(f"finished {self._name}s are kept: go on with --resume")
 
     def load(self, number: int) -> bytes | None:
         """Return a finished part, or None when there is none or its file is damaged."""
-        try:
-            data = self._file(number).read_bytes()
-        except OSError:
-            return None
-        checksum, part = data[:_CHECKSUM_BYTES], data[_CHECKSUM_BYTES:]
-        return part if _checksum(part) == checksum else None
+        return load_part(self._file(number))
 
     def save(self, number: int, part: bytes) -> None:
         """Write a finished part; raise OutputError where that fails."""
-        file = self._file(number)
-        temporary = file.with_name(f"{file.name}.{os.getpid()}")
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            temporary.write_bytes(_checksum(part) + part)
-            temporary.replace(file)
-        except OSError as error:
-            with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
-            got = error.strerror or error
-            raise fail(OutputError, str(file), "a place that can be written", got) from error
+        save_part(self._file(number), part)
 
     def _file(self, number: int) -> Path:
         return self.folder / f"{self._name}-{number}.arrow"
 
 
-def _checksum(part: bytes) -> bytes:
-    return zlib.crc32(part).to_bytes(_CHECKSUM_BYTES, "big")
+def _checksum(name: str, part: bytes) -> bytes:
+    return hashlib.sha256(name.encode() + b"\0" + part).digest()

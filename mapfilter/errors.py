@@ -85,6 +85,14 @@ class OutputError(MapfilterError):
     """The output cannot be written."""
 
 
+class Stopped(BaseException):
+    """The process was asked by a signal to end; its notes say what is kept."""
+
+    def __init__(self, signal_number: int) -> None:
+        self.signal_number = signal_number
+        super().__init__(signal_number)
+
+
 @dataclass(slots=True)
 class Faults:
     """Collects faults, so that all of them are reported together."""

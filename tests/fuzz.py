@@ -180,3 +180,14 @@ def _swap_lines(data: bytearray, rng: np.random.Generator) -> None:
     a, b = rng.integers(len(lines), size=2)
     lines[a], lines[b] = lines[b], lines[a]
     data[:] = b"\n".join(lines)
+
+
+if __name__ == "__main__":
+    import sys
+    from pathlib import Path
+
+    _OWN = Path(__file__).parent
+    sys.path[:0] = [str(_OWN), str(_OWN / "roads")]
+    from fuzz_command import main
+
+    sys.exit(main())

@@ -40,7 +40,8 @@ def read_log(
     columns : mapping of str to str, optional
         For plain CSV: column of each field, such as ``{"time": "Zeit"}``.
     course_motion : bool
-        Make motion from the speed and course of positions where nothing else gives it.
+        Make motion from the speed and course of a receiver, else from its positions, where nothing
+        else gives it.
     walk : WalkOptions or None
         How steps and headings are made of the raw sensors of a phone where nothing else gives
         motion; None for no steps.

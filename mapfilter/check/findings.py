@@ -51,6 +51,8 @@ REMEDIES = {
     "levels-above-eirp": "Check the EIRP, or what the rasters hold.",
     "log-cells-unknown": "Take the plan of the network that was received, with mcc, mnc, lac and "
     "ci, or name the cells in the log by the plan's ids.",
+    "log-headings": "Give headings in radians counter-clockwise from grid east: pi/2 minus a "
+    "compass azimuth in radians; mapfilter convert reads a column of degrees as compass_deg.",
     "log-invalid": "Correct the log or recording, or its settings in [track].",
     "log-outside-area": "Take a log of this area, or the area of this log.",
     "log-rows-unused": "Look at the lines named; mapfilter convert lists all reasons.",

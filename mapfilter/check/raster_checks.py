@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-import rasterio
 from rasterio.errors import RasterioError
 
+from mapfilter._gdal import open_raster
 from mapfilter._types import Floats, Floats32
 from mapfilter.check.findings import Findings
 from mapfilter.errors import InputError, listed
@@ -218,9 +218,9 @@ def is_surveyed(rasters: RxLevRasters) -> bool:
     if not rasters.path.is_file():
         return False
     try:
-        with rasterio.open(rasters.path) as source:
+        with open_raster(rasters.path) as source:
             return str(source.tags().get("MODEL", "")).startswith("survey")
-    except RasterioError:
+    except (RasterioError, InputError):
         return False
 
 

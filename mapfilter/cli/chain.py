@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated, get_args
 
@@ -31,7 +30,7 @@ from mapfilter.cli.options import (
 )
 from mapfilter.errors import ConfigError, fail
 from mapfilter.tracks.schema import Without
-from mapfilter.workflows.terminal import print_message, print_result, progress_bar
+from mapfilter.workflows.terminal import print_message, print_result, print_text, progress_bar
 
 
 def check(
@@ -69,7 +68,7 @@ def check(
     if as_json:
         print_result(result, as_json)
     else:
-        sys.stdout.write("\n\n".join(paragraphs(result)) + "\n")
+        print_text("\n\n".join(paragraphs(result)))
     if not result.ok:
         raise typer.Exit(WRONG)
 
@@ -230,6 +229,9 @@ def simulate(
     with progress_bar("simulate") as progress:
         result = run_simulate(load_config(config, settings, out=out), progress)
     print_result(result, as_json)
+    if result.partial:
+        print_message("no journey receives a cell: the rasters hold no level along the streets")
+        raise typer.Exit(PARTIAL)
 
 
 def locate(
@@ -310,7 +312,9 @@ def replay(
     ] = None,
     course_motion: Annotated[
         bool,
-        typer.Option("--course-motion", help="Make motion from positions and their course."),
+        typer.Option(
+            "--course-motion", help="Make motion from speed and course of GNSS, else its positions."
+        ),
     ] = False,
     filter_name: FilterOption = None,
     without: Annotated[

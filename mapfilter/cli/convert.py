@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -10,7 +9,7 @@ import typer
 
 from mapfilter.cli.options import JsonOption, given_path, numbers
 from mapfilter.errors import ConfigError, fail
-from mapfilter.workflows.terminal import print_result
+from mapfilter.workflows.terminal import print_result, print_text
 
 if TYPE_CHECKING:
     from mapfilter.tracks.pdr.options import WalkOptions
@@ -58,7 +57,9 @@ def convert(
     ] = None,
     course_motion: Annotated[
         bool,
-        typer.Option("--course-motion", help="Make motion from positions and their course."),
+        typer.Option(
+            "--course-motion", help="Make motion from speed and course of GNSS, else its positions."
+        ),
     ] = False,
     no_steps: Annotated[
         bool, typer.Option("--no-steps", help="Make no motion from the sensors of a phone.")
@@ -100,7 +101,7 @@ def convert(
     if as_json:
         print_result(result, as_json)
     else:
-        sys.stdout.write("\n".join(report_lines(result)) + "\n")
+        print_text("\n".join(report_lines(result)))
 
 
 def _walk(pose: Literal["auto", "device", "any"], declination_deg: float | None) -> WalkOptions:

@@ -28,8 +28,9 @@ from mapfilter.cli.options import (
     seeded,
     toml,
 )
+from mapfilter.errors import Stopped
 from mapfilter.experiments.papers import PAPERS
-from mapfilter.workflows.terminal import print_message, print_result, rate_bar
+from mapfilter.workflows.terminal import print_message, print_result, rate_bar, stopped_text
 
 *_FIRST, _LAST = PAPERS
 
@@ -67,8 +68,8 @@ def sweep(
             result = run_sweep(
                 loaded, axes, workers=workers, cluster=cluster, resume=resume, progress=progress
             )
-    except KeyboardInterrupt:
-        print_message("stopped; finished batches are kept: go on with --resume")
+    except (KeyboardInterrupt, Stopped) as error:
+        print_message(stopped_text(error))
         raise typer.Exit(PARTIAL) from None
     shown = asdict(result) | ({} if as_json else {"cells": brief(result.cells)})
     print_result(shown, as_json)

@@ -22,7 +22,7 @@ DONE, WRONG, PARTIAL = 0, 2, 3
 
 def given_path(path: Path | None) -> Path | None:
     """Refuse what cannot be a path, before anything is opened."""
-    from mapfilter._io import path_fault, shown
+    from mapfilter._inputs import path_fault, shown
 
     if path is not None and (wrong := path_fault(path)):
         raise fail(ConfigError, "command line", wrong, shown(str(path)))

@@ -20,7 +20,7 @@ from pydantic import (
     create_model,
 )
 
-from mapfilter._io import path_fault
+from mapfilter._inputs import path_fault
 from mapfilter.options import (
     Options,
     Positive,
@@ -37,8 +37,8 @@ SYNTHETIC_MAP = "synthetic"
 MANHATTAN_MAP = "manhattan"
 SYNTHETIC_MAPS = (SYNTHETIC_MAP, MANHATTAN_MAP)
 MAP_NAMES = (EMBEDDED_MAP, NO_MAP, *SYNTHETIC_MAPS)
-_NAME = r"[^\W\d]\w*(\.[^\W\d]\w*)*"
-_CUSTOM_FILTER = re.compile(f"{_NAME}:{_NAME}")
+_NAME = r"[^\W\d]\w{0,63}+(?:\.[^\W\d]\w{0,63}+){0,15}"
+_CUSTOM_FILTER = re.compile(rf"\A{_NAME}:{_NAME}")
 
 
 def resolve_path(value: Any, info: ValidationInfo) -> Any:

@@ -29,7 +29,7 @@ from mapfilter.radio.cell_layouts import COLUMNS as PLAN_COLUMNS
 from mapfilter.roads.buildings import DEFAULT_HEIGHT_M, STOREY_HEIGHT_M
 from mapfilter.roads.corridors import MAX_ACCURACY_M, MAX_GAP_M
 from mapfilter.survey.measured_map import SurveyOptions
-from mapfilter.survey.measurement_files import FIELDS as MEASUREMENT_COLUMNS
+from mapfilter.survey.measurement_rows import FIELDS as MEASUREMENT_COLUMNS
 from mapfilter.survey.measurements import SESSION_GAP_S
 
 _PLACE_OF_A_MADE_CITY = {"southwest": (3.0, 0.0), "size_m": (3000.0, 3000.0)}

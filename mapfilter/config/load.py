@@ -10,12 +10,13 @@ from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ValidationError
 
-from mapfilter._io import path_fault, shown
+from mapfilter._inputs import path_fault, read_input, shown
 from mapfilter.config.fields import MAP_NAMES, field_annotation, resolve_map, resolve_path
 from mapfilter.config.sections import Config
 from mapfilter.errors import ConfigError, Fault, Faults, fail
 from mapfilter.options import expected, likely, without_none
 
+_LARGEST_BYTES = 16 << 20
 _RESOLVERS = (resolve_path, resolve_map)
 
 
@@ -154,10 +155,8 @@ def _read_toml(file: Path) -> dict[str, Any]:
     if wrong := path_fault(file):
         raise fail(ConfigError, "--config", wrong, shown(str(file)))
     try:
-        text = file.read_bytes().decode("utf-8-sig")
+        text = read_input(file, _LARGEST_BYTES, "a TOML file", ConfigError).decode("utf-8-sig")
         values = tomllib.loads(text.replace("\r\n", "\n"))
-    except OSError as error:
-        raise fail(ConfigError, str(file), "a TOML file", error.strerror or error) from error
     except ValueError as error:
         raise fail(ConfigError, str(file), "TOML", error) from error
     except RecursionError as error:

@@ -216,7 +216,7 @@ class Track(Section):
     origin : (float, float), optional
         Longitude and latitude at which a local frame of metres has its origin.
     course_motion : bool
-        Make motion from the speed and course of positions, or the ways between them, where nothing
+        Make motion from the speed and course of a receiver, else from its positions, where nothing
         else gives it.
     steps : bool
         Make steps and headings of the raw sensors of a phone where nothing else gives motion.

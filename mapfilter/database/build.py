@@ -8,18 +8,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
-from importlib.metadata import version
 from pathlib import Path
 from threading import Thread
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
-from mapfilter._io import atomic_dir, check_replaceable
+from mapfilter._io import atomic_dir
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter._resume import FinishedParts
-from mapfilter.database.manifest import FORMAT, MANIFEST, InputFile
+from mapfilter.database.manifest import InputFile, check_database_replaceable
 from mapfilter.database.measured import MeasuredParts, Readings, deviations_at_points
 from mapfilter.database.parquet import Window
 from mapfilter.database.parts import Head, write_parts
@@ -47,11 +45,12 @@ def work_key(
     parameters: Mapping[str, Any],
 ) -> str:
     """Return a checksum of everything that the tiles of a build depend on."""
-    read_as = (rasters.cell_ids, asdict(rasters.lattice), rasters.quantity, rasters.factor)
-    versions = version("mapfilter"), pa.__version__
+    # As they are read: values without data, headers and CRS may be declared, not in the files.
+    files = [repr(replace(one, path=Path(one.path.name), parts=())) for one in rasters.files]
+    read_as = (rasters.cell_ids, asdict(rasters.lattice), rasters.quantity, rasters.factor, files)
     cells = [asdict(cell) for cell in plan.cells]
     of_tiles = {name: value for name, value in parameters.items() if name != "margin_db"}
-    parts = (*versions, rasters_sha256, read_as, rasters.resampling, cells, routes_digest, of_tiles)
+    parts = (rasters_sha256, read_as, rasters.resampling, cells, routes_digest, of_tiles)
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
@@ -128,7 +127,7 @@ def build(
     check_parameters(margin_db, floor_dbm, tile_px)
     job = BuildJob.of(rasters, plan, routes, floor_dbm, tile_px)
     out = Path(out)
-    check_replaceable(out, MANIFEST, FORMAT)
+    check_database_replaceable(out)
     parameters = {"margin_db": float(margin_db), "floor_dbm": float(floor_dbm), "tile_px": tile_px}
     with ExitStack() as stack:
         # The rasters are hashed while the first tiles are made.
@@ -184,7 +183,7 @@ def build_roads(
     source = LatticeRoutes(routes) if isinstance(routes, RouteLattice) else routes
     lattice, out = source.lattice, Path(out)
     windows = [w for w in tile_windows(lattice, tile_px) if source.holds(lattice.window(*w))]
-    check_replaceable(out, MANIFEST, FORMAT)
+    check_database_replaceable(out)
     parameters = {"margin_db": MARGIN_DB, "floor_dbm": FLOOR_DBM, "tile_px": tile_px}
     with atomic_dir(out) as folder:
         tiles = (roads_tile(source.part(lattice.window(*window)), lattice) for window in windows)

@@ -16,7 +16,7 @@ from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, Geomet
 from rasterio.windows import Window as RasterWindow
 
 from mapfilter._io import atomic_file
-from mapfilter.database.manifest import POINTS, apart
+from mapfilter.database.manifest import apart
 from mapfilter.database.parquet import WindowReader, read_columns
 from mapfilter.database.radioroutes import Points, RadioRouteDatabase
 from mapfilter.database.tiles import tile_windows
@@ -50,7 +50,7 @@ def export_cog(database: RadioRouteDatabase, path: Path | str) -> None:
         raise fail(InputError, str(database.path), "cells", "none", hint)
     lattice = database.lattice
     columns = ("row", "col", *(name for name, _ in BANDS))
-    reader = WindowReader([database.path / POINTS], columns, lattice)
+    reader = WindowReader([database.points_part], columns, lattice)
     rank = {cell_id: number for number, cell_id in enumerate(database.cell_ids)}
     tags = {CELLS_TAG: json.dumps(database.cell_ids, ensure_ascii=False)}
     if database.attribution:
@@ -124,7 +124,7 @@ def write_layers(layers: Mapping[str, gpd.GeoDataFrame], path: Path) -> None:
 
 def _points(database: RadioRouteDatabase) -> gpd.GeoDataFrame:
     columns = [*Points.__dataclass_fields__, "geometry"]
-    table = read_columns(database.path / POINTS, columns).to_pandas()
+    table = read_columns(database.points_part, columns).to_pandas()
     for name in ("way_class", "best_server"):
         table[name] = table[name].astype(str)
     place = gpd.GeoSeries.from_wkb(table["geometry"])

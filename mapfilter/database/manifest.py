@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -10,15 +11,26 @@ from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal
 from urllib.parse import quote
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    ValidationError,
+    model_validator,
+)
 
-from mapfilter._io import check_version, read_json, sha256_file
+from mapfilter._inputs import read_input
+from mapfilter._io import check_replaceable, check_seal, check_version, parse_json, sha256_file
+from mapfilter.database.checked import BLOCK_BYTES, checksums
+from mapfilter.database.checked import MANIFEST as MANIFEST
 from mapfilter.errors import Fault, Faults, StoreError, fail
 
+_LARGEST_BYTES = 1 << 30
 FORMAT = "mapfilter radio-route database"
 VERSION = 2
-"""Of databases with parts of a survey; those without are of version 1."""
-MANIFEST = "manifest.json"
+VERSION = 2
 CELLS = "cells.parquet"
 POINTS = "points.parquet"
 READINGS = "readings.parquet"
@@ -29,6 +41,7 @@ _Layers = Literal["map", "roads", "tracks", "buildings", "water", "landuse", "la
 InputRole = _Layers | Literal["plan", "rasters", "database", "patch"]
 
 _LONGEST_NAME = 200
+_OWN = re.compile(r"(cells|points|readings|deviations)\.parquet|levels/[^/]+/part-[0-9]+\.parquet")
 _DAMAGED = "edited or damaged"
 _Count = Annotated[int, Field(ge=0)]
 _Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
@@ -91,7 +104,15 @@ class _Part(_Strict):
     rows: _Count
     bytes: _Count
     sha256: _Sha256
+    blocks: list[_Sha256] = []
     cell: str | None = None
+
+    @model_validator(mode="after")
+    def _blocks_of_all_bytes(self) -> _Part:
+        count = -(-self.bytes // BLOCK_BYTES)
+        if len(self.blocks) != (count if count > 1 else 0):
+            raise ValueError(f"a checksum for each of {count} blocks")
+        return self
 
 
 class _Manifest(_Strict):
@@ -106,21 +127,22 @@ class _Manifest(_Strict):
     parts: list[_Part]
 
 
-def read_manifest(folder: Path) -> dict[str, Any]:
-    """Read the manifest of a database folder and check all of it.
+def read_manifest(folder: Path) -> tuple[dict[str, Any], str]:
+    """Read the manifest of a database folder, check all of it, and return it with its SHA-256.
 
     Raises
     ------
     StoreError
-        It is missing, cut off, of a newer version or another format, or, with every fault, its
-        fields are not what a build writes or contradict each other.
+        It is missing, cut off, changed after it was written, of another version or format, or,
+        with every fault, its fields are not what a build writes or contradict each other.
     """
     file = folder / MANIFEST
-    manifest = read_json(file)
+    data = read_input(file, _LARGEST_BYTES, "a manifest", StoreError)
+    manifest = parse_json(data, str(file))
     if manifest.get("format") != FORMAT:
         raise fail(StoreError, str(file), f"format {FORMAT!r}", manifest.get("format"))
-    if manifest.get("version") != 1:
-        check_version(str(file), manifest.get("version"), VERSION)
+    check_version(str(file), manifest.get("version"), VERSION)
+    check_seal(manifest, str(file))
     try:
         whole = _Manifest.model_validate(manifest)
     except ValidationError as error:
@@ -128,7 +150,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     faults = Faults()
     _check_together(whole, str(file), faults)
     faults.raise_if_any(StoreError)
-    return manifest
+    return manifest, hashlib.sha256(data).hexdigest()
 
 
 def levels_folders(cell_ids: Iterable[str]) -> dict[str, str]:
@@ -163,12 +185,19 @@ def apart(names: Mapping[str, str]) -> dict[str, str]:
     }
 
 
+def check_database_replaceable(folder: Path) -> None:
+    """Raise OutputError where a folder, which may be absent, holds other files than a database."""
+    check_replaceable(folder, MANIFEST, FORMAT, lambda path: _OWN.fullmatch(path) is not None)
+
+
 def describe_part(folder: Path, file: Path, rows: int, cell: str | None = None) -> dict[str, Any]:
     """Return a part's entry for the manifest."""
     entry: dict[str, Any] = {"path": file.relative_to(folder).as_posix(), "rows": rows}
     if cell is not None:
         entry["cell"] = cell
-    return {**entry, "bytes": file.stat().st_size, "sha256": sha256_file(file)}
+    digest, blocks = checksums(file)
+    entry |= {"bytes": file.stat().st_size, "sha256": digest}
+    return {**entry, "blocks": list(blocks)} if blocks else entry
 
 
 def _escaped(cell_id: str) -> str:

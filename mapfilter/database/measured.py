@@ -19,8 +19,9 @@ from scipy.ndimage import distance_transform_edt
 
 from mapfilter._types import Bools, Floats, Floats32, Ints32
 from mapfilter.database.manifest import DEVIATIONS, POINTS, READINGS, describe_part
-from mapfilter.database.parquet import dictionary, read_columns, write_columns
+from mapfilter.database.parquet import Source, dictionary, read_columns, write_columns
 from mapfilter.errors import InputError, StoreError, fail
+from mapfilter.geodesy import Lattice
 from mapfilter.rasters.raster_set import RxLevRasters
 
 _READINGS = {
@@ -205,10 +206,10 @@ def write_readings(readings: Readings, path: Path) -> None:
     write_columns(pa.table(columns), path)
 
 
-def read_readings(path: Path) -> Readings:
+def read_readings(source: Source) -> Readings:
     """Read what :func:`write_readings` wrote; StoreError where it is damaged."""
-    table = read_columns(path, tuple(_READINGS))
-    cell, cell_ids = _codes(path, table["cell"])
+    table = read_columns(source, tuple(_READINGS))
+    cell, cell_ids = _codes(source, table["cell"])
     columns = {
         name: table[name].to_numpy().astype(kind)
         for name, kind in _READINGS.items()
@@ -230,33 +231,35 @@ def write_measured(folder: Path, parts: MeasuredParts) -> list[dict[str, Any]]:
     ]
 
 
-def read_measured(folder: Path, rows: int, cols: int) -> MeasuredParts:
-    """Read both parts of a database whose lattice has so many rows and columns.
+def read_measured(
+    readings: Source, deviations: Source, lattice: Lattice, cell_ids: Sequence[str]
+) -> MeasuredParts:
+    """Read both parts of a database of a lattice and cells.
 
     Raises
     ------
     StoreError
         A part is damaged, or not of this database.
     """
-    path = folder / DEVIATIONS
-    table = read_columns(path, _DEVIATIONS)
-    cell, cell_ids = _codes(path, table["cell"])
+    table = read_columns(deviations, _DEVIATIONS)
+    cell, names = _codes(deviations, table["cell"])
     row, col = (table[name].to_numpy().astype(np.int32) for name in ("row", "col"))
-    if row.size and not (
-        row.min() >= 0 and row.max() < rows and col.min() >= 0 and col.max() < cols
-    ):
+    if row.size and not lattice.contains(row, col).all():
         expected = "points on the database's lattice"
-        raise fail(StoreError, str(path), expected, "others", "parts mixed up")
+        raise fail(StoreError, str(deviations), expected, "others", "parts mixed up")
     deviation_db = table["deviation_db"].to_numpy().astype(np.float32)
-    deviations = Deviations(cell_ids, cell, row, col, deviation_db)
-    return MeasuredParts(read_readings(folder / READINGS), deviations)
+    read = read_readings(readings)
+    for source, some in ((readings, read.cell_ids), (deviations, names)):
+        if not set(some) <= {*cell_ids, ""}:
+            raise fail(StoreError, str(source), "cells of the database", "others", "parts mixed up")
+    return MeasuredParts(read, Deviations(names, cell, row, col, deviation_db))
 
 
-def _codes(path: Path, column: Any) -> tuple[Ints32, tuple[str, ...]]:
+def _codes(source: Source, column: Any) -> tuple[Ints32, tuple[str, ...]]:
     if column.null_count or not len(column):
         if not len(column):
             return np.empty(0, dtype=np.int32), ()
-        raise fail(StoreError, str(path), "a cell in each row", "none", "damaged")
+        raise fail(StoreError, str(source), "a cell in each row", "none", "damaged")
     joined = column.dictionary_encode().unify_dictionaries().combine_chunks()
     if hasattr(joined, "chunks"):
         joined = joined.chunk(0)

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from mapfilter._io import atomic_dir, check_replaceable, sha256_file
+from mapfilter._io import atomic_dir
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats, Ints
-from mapfilter.database.manifest import FORMAT, MANIFEST, POINTS, InputFile
+from mapfilter.database.manifest import InputFile, check_database_replaceable
 from mapfilter.database.measured import MeasuredParts, merged_parts
 from mapfilter.database.parquet import Window, WindowReader, point_geometry
 from mapfilter.database.parts import Head, write_parts
@@ -78,10 +78,9 @@ def merge(
         if any(overlap(lattice, database.lattice, window) for database in databases)
     ]
     out = Path(out)
-    check_replaceable(out, MANIFEST, FORMAT)
+    check_database_replaceable(out)
     inputs = tuple(
-        InputFile("database", database.path.name, sha256_file(database.path / MANIFEST))
-        for database in databases
+        InputFile("database", database.path.name, database.generation) for database in databases
     )
     attribution = "; ".join(dict.fromkeys(filter(None, (d.attribution for d in databases))))
     with atomic_dir(out) as folder:
@@ -118,7 +117,7 @@ class _Source:
 
     @cached_property
     def _points(self) -> WindowReader:
-        return WindowReader([self.database.path / POINTS], _PLACE, self.database.lattice)
+        return WindowReader([self.database.points_part], _PLACE, self.database.lattice)
 
     @cached_property
     def _cells(self) -> dict[str, WindowReader]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,9 @@ from numpy.typing import NDArray
 from pyproj import CRS
 
 from mapfilter._types import Floats
+from mapfilter.database.checked import Part
 from mapfilter.errors import MapfilterError, StoreError, fail
-from mapfilter.geodesy import Lattice
+from mapfilter.geodesy import Lattice, same_crs
 
 # A damaged footer or page header can ask for absurd amounts of memory or name other columns.
 DAMAGE = (OSError, pa.ArrowException, ValueError, KeyError, MemoryError)
@@ -23,7 +25,11 @@ _WKB_POINT = np.dtype([("order", "u1"), ("kind", "<u4"), ("east", "<f8"), ("nort
 Window = tuple[int, int, int, int]
 """Row, column, rows and columns on a lattice."""
 
+Source = Part | Path
+"""A part with its checksums, or a file without."""
+
 _EVERYWHERE = (-(2**62), 2**62)
+_NEAR_M = 1e-3
 
 
 def write_columns(
@@ -52,47 +58,83 @@ def open_writer(schema: pa.Schema, where: Path | pa.NativeFile) -> pq.ParquetWri
     )
 
 
-def read_columns(path: Path, columns: Sequence[str], optional: Sequence[str] = ()) -> pa.Table:
+@contextmanager
+def opened(source: Source, footer: pq.FileMetaData | None = None) -> Iterator[pq.ParquetFile]:
+    """Open a part; errors within the block become StoreErrors, as of a damaged part.
+
+    ``footer`` is that of the part, where it was read before.
+    """
+    try:
+        with ExitStack() as stack:
+            given = stack.enter_context(source.open()) if isinstance(source, Part) else source
+            file = pq.ParquetFile(given, metadata=footer, page_checksum_verification=True)
+            stack.enter_context(file)
+            if isinstance(source, Part) and file.metadata.num_rows != source.rows:
+                got = file.metadata.num_rows
+                raise fail(StoreError, str(source), f"{source.rows} rows", got, "parts mixed up")
+            yield file
+    except DAMAGE as error:
+        raise damaged(source, error) from error
+
+
+def read_columns(source: Source, columns: Sequence[str], optional: Sequence[str] = ()) -> pa.Table:
     """Read some columns of a part and compare their checksums; StoreError where damaged.
 
     Columns that are ``optional`` may be absent.
     """
-    try:
-        with pq.ParquetFile(path, page_checksum_verification=True) as source:
-            there = source.schema_arrow.names
-            columns = [name for name in columns if name in there or name not in optional]
-            table = source.read(columns)
+    with opened(source) as file:
+        there = file.schema_arrow.names
+        columns = [name for name in columns if name in there or name not in optional]
+        table = file.read(columns)
         table.validate(full=True)
-    except DAMAGE as error:
-        raise damaged(path, error) from error
     if missing := [name for name in columns if name not in table.column_names]:
-        raise fail(StoreError, str(path), f"column {missing[0]}", "none", "damaged")
+        raise fail(StoreError, str(source), f"column {missing[0]}", "none", "damaged")
     return table.select(list(columns))
 
 
-def check_places(path: Path, table: pa.Table, lattice: Lattice) -> None:
+def check_places(source: Source, table: pa.Table, lattice: Lattice) -> None:
     """Check that the points of a part lie on the lattice, and are numbered by it."""
     point, row, col = (table[name].to_numpy() for name in ("point", "row", "col"))
     numbers = row.astype(np.int64) * lattice.cols + col
     if not (np.array_equal(point, numbers) and lattice.contains(row, col).all()):
         expected = "points on the database's lattice"
-        raise fail(StoreError, str(path), expected, "others", "parts mixed up")
+        raise fail(StoreError, str(source), expected, "others", "parts mixed up")
 
 
-def count_rows(path: Path) -> int:
+def check_extent(source: Source, lattice: Lattice) -> None:
+    """Check that CRS and extent of the points' geometry are those of their rows and columns."""
+    with opened(source) as file:
+        found = file.metadata
+        names = {found.schema.column(i).name: i for i in range(found.num_columns)}
+        groups = [found.row_group(i) for i in range(found.num_row_groups)]
+        ends = np.array([[_ends(one, names[axis]) for axis in ("row", "col")] for one in groups])
+        column = json.loads(found.metadata[b"geo"])["columns"]["geometry"]
+        crs, box = CRS.from_json_dict(column["crs"]).to_wkt(), np.array(column["bbox"], float)
+        (top, left), (bottom, right) = ends[:, :, 0].min(axis=0), ends[:, :, 1].max(axis=0)
+    if not same_crs(crs, lattice.crs):
+        hint = "manifest and parts of different databases"
+        raise fail(StoreError, f"{source}, CRS", lattice.crs, CRS.from_wkt(crs).name, hint)
+    west_m, north_m = lattice.east_north(top, left)
+    east_m, south_m = lattice.east_north(bottom, right)
+    wanted = np.array([west_m, south_m, east_m, north_m], dtype=float)
+    if box.shape != (4,) or not np.abs(box - wanted).max() <= _NEAR_M:
+        expected, got = (", ".join(f"{value:.1f}" for value in one) for one in (wanted, box))
+        hint = "the lattice was edited, or manifest and parts are of different databases"
+        raise fail(StoreError, f"{source}, extent", expected, got, hint)
+
+
+def count_rows(source: Source) -> int:
     """Return the number of rows in a part's footer; raise StoreError where it is damaged."""
-    try:
-        return int(pq.read_metadata(path).num_rows)
-    except DAMAGE as error:
-        raise damaged(path, error) from error
+    with opened(source) as file:
+        return int(file.metadata.num_rows)
 
 
-def damaged(path: Path, error: Exception) -> MapfilterError:
+def damaged(source: Source, error: Exception) -> MapfilterError:
     """Return the error for a part that cannot be read."""
     if isinstance(error, FileNotFoundError):
-        return fail(StoreError, str(path), "a part of the database", "no such file")
+        return fail(StoreError, str(source), "a part of the database", "no such file")
     reason = (str(error).splitlines() or [type(error).__name__])[0]
-    return fail(StoreError, str(path), "a whole Parquet file", reason, "damaged")
+    return fail(StoreError, str(source), "a whole Parquet file", reason, "damaged")
 
 
 def point_geometry(east_m: Floats, north_m: Floats) -> pa.Array:
@@ -154,21 +196,19 @@ class WindowReader:
     that was read last are kept, as its neighbour needs most of them again.
     """
 
-    def __init__(self, parts: Sequence[Path], columns: Sequence[str], lattice: Lattice) -> None:
-        self._parts, self._columns, self._lattice = parts, list(columns), lattice
-        self._groups: list[tuple[Path, int]] = []
+    def __init__(self, parts: Sequence[Source], columns: Sequence[str], lattice: Lattice) -> None:
+        self._columns, self._lattice = list(columns), lattice
+        self._groups: list[tuple[Source, pq.FileMetaData, int]] = []
         self._held: dict[int, pa.Table] = {}
         boxes: list[tuple[int, int, int, int]] = []
         for part in parts:
-            try:
-                footer = pq.read_metadata(part)
+            with opened(part) as file:
+                footer = file.metadata
                 names = {footer.schema.column(i).name: i for i in range(footer.num_columns)}
                 for group in range(footer.num_row_groups):
                     ends = [_ends(footer.row_group(group), names[axis]) for axis in ("row", "col")]
-                    self._groups.append((part, group))
+                    self._groups.append((part, footer, group))
                     boxes.append((*ends[0], *ends[1]))
-            except DAMAGE as error:
-                raise damaged(part, error) from error
         self._boxes = np.array(boxes, dtype=np.int64).reshape(-1, 4)
 
     def read(self, window: Window) -> dict[str, Any]:
@@ -192,13 +232,10 @@ class WindowReader:
         return {name: c if pa.types.is_dictionary(c.type) else c.to_numpy() for name, c in columns}
 
     def _group(self, number: int) -> pa.Table:
-        part, group = self._groups[number]
-        try:
-            with pq.ParquetFile(part, page_checksum_verification=True) as source:
-                table = source.read_row_group(group, columns=["point", *self._columns])
+        part, footer, group = self._groups[number]
+        with opened(part, footer) as file:
+            table = file.read_row_group(group, columns=["point", *self._columns])
             table.validate(full=True)
-        except DAMAGE as error:
-            raise damaged(part, error) from error
         check_places(part, table, self._lattice)
         return table
 

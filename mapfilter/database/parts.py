@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from mapfilter._io import write_json
+from mapfilter._io import write_sealed
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats
 from mapfilter.database.manifest import (
@@ -183,11 +183,11 @@ class Head:
         write_cells(self.plan, folder / CELLS)
         cells = describe_part(folder, folder / CELLS, len(self.plan.ids))
         surveyed = [] if self.measured is None else write_measured(folder, self.measured)
-        write_json(
+        write_sealed(
             folder / MANIFEST,
             {
                 "format": FORMAT,
-                "version": VERSION if surveyed else 1,
+                "version": VERSION,
                 "software": f"mapfilter {version('mapfilter')}",
                 "crs": self.lattice.crs,
                 "lattice": asdict(self.lattice),

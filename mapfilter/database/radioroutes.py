@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from mapfilter._types import Bools, Floats32, Ints, Ints32
-from mapfilter.database.manifest import DEVIATIONS, POINTS
+from mapfilter.database.checked import Part
+from mapfilter.database.manifest import DEVIATIONS, POINTS, READINGS
 from mapfilter.database.measured import MeasuredParts, read_measured
 from mapfilter.database.parquet import WindowReader, check_places, read_columns
 from mapfilter.errors import InputError, StoreError, fail
@@ -139,6 +140,9 @@ class Points:
 class RadioRouteDatabase:
     """A database folder, read on demand and only as far as needed.
 
+    It is a snapshot: what is read is compared with the checksums of the manifest that was opened.
+    When the folder was replaced since, reading raises a StoreError that says so.
+
     Open one with :func:`mapfilter.database.store.open_database`.
 
     Parameters
@@ -155,6 +159,8 @@ class RadioRouteDatabase:
         Weakest level that is kept.
     manifest : mapping
         Everything that ``manifest.json`` holds: inputs, parameters, parts, counts, versions.
+    generation : str
+        SHA-256 of ``manifest.json``: equal for databases whose contents are.
     """
 
     path: Path
@@ -163,6 +169,7 @@ class RadioRouteDatabase:
     margin_db: float
     floor_dbm: float
     manifest: Mapping[str, Any]
+    generation: str
 
     def __repr__(self) -> str:
         points = self.manifest.get("counts", {}).get("points", "unknown number of")
@@ -182,18 +189,23 @@ class RadioRouteDatabase:
         return str(self.manifest.get("attribution", ""))
 
     @cached_property
-    def level_parts(self) -> Mapping[str, tuple[Path, ...]]:
-        """The files with each cell's levels; cells without a level have none."""
-        parts: dict[str, tuple[Path, ...]] = {}
-        for part in self.manifest["parts"]:
-            if part.get("cell") is not None:
-                cell = str(part["cell"])
-                parts[cell] = (*parts.get(cell, ()), self.path / part["path"])
+    def level_parts(self) -> Mapping[str, tuple[Part, ...]]:
+        """The parts with each cell's levels; cells without a level have none."""
+        parts: dict[str, tuple[Part, ...]] = {}
+        for entry in self.manifest["parts"]:
+            if entry.get("cell") is not None:
+                cell, part = str(entry["cell"]), Part.of(self.path, entry, self.generation)
+                parts[cell] = (*parts.get(cell, ()), part)
         return MappingProxyType(parts)
+
+    @property
+    def points_part(self) -> Part:
+        """The part with the points."""
+        return part_named(POINTS, self.path, self.manifest, self.generation)
 
     @cached_property
     def _points(self) -> Points:
-        file = self.path / POINTS
+        file = self.points_part
         table = read_columns(file, tuple(Points.__dataclass_fields__))
         check_places(file, table, self.lattice)
         order = np.argsort(table["point"].to_numpy())
@@ -218,12 +230,16 @@ class RadioRouteDatabase:
         Raises
         ------
         StoreError
-            A part is damaged.
+            A part is damaged, or the database was replaced since it was opened.
         """
         parts = {part["path"] for part in self.manifest["parts"]}
         if DEVIATIONS not in parts or not self.cell_ids:
             return None
-        return read_measured(self.path, self.lattice.rows, self.lattice.cols)
+        readings, deviations = (
+            part_named(name, self.path, self.manifest, self.generation)
+            for name in (READINGS, DEVIATIONS)
+        )
+        return read_measured(readings, deviations, self.lattice, self.cell_ids)
 
     def without_cells(self) -> RadioRouteDatabase:
         """Return the same points as a database of roads alone."""
@@ -302,7 +318,7 @@ class RadioRouteDatabase:
         top, left, window = self._window(bounds_m)
         area = (top, left, window.rows, window.cols)
         columns = ("row", "col", "way_id", "way_class", "on_square", "distance_to_way_m")
-        points = WindowReader([self.path / POINTS], columns, self.lattice).read(area)
+        points = WindowReader([self.points_part], columns, self.lattice).read(area)
         if not points or not points["row"].size:
             where = "whole lattice" if bounds_m is None else f"area {bounds_m}"
             raise fail(InputError, where, "points of the database", "none", "another area or CRS")
@@ -336,6 +352,12 @@ class RadioRouteDatabase:
             hint = "degrees given for metres, or another CRS"
             raise fail(InputError, "area", f"an area within {covered}", bounds_m, hint)
         return top, left, self.lattice.window(top, left, rows, cols)
+
+
+def part_named(name: str, folder: Path, manifest: Mapping[str, Any], generation: str) -> Part:
+    """Return a part of a database that belongs to no cell."""
+    (entry,) = (part for part in manifest["parts"] if part["path"] == name)
+    return Part.of(folder, entry, generation)
 
 
 def _codes(column: Any) -> tuple[Rows, tuple[str, ...]]:

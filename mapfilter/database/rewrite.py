@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mapfilter._io import atomic_dir, check_replaceable, sha256_file
+from mapfilter._io import atomic_dir
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats32, Ints
-from mapfilter.database.manifest import FORMAT, MANIFEST, InputFile
+from mapfilter.database.manifest import InputFile, check_database_replaceable
 from mapfilter.database.measured import merged_parts
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -84,10 +84,10 @@ def rewrite(
         The folder cannot be written, or holds other files than a database.
     """
     out = Path(out)
-    check_replaceable(out, MANIFEST, FORMAT)
+    check_database_replaceable(out)
     parameters = database.manifest["parameters"]
     windows = tile_windows(database.lattice, parameters["tile_px"])
-    old = InputFile("database", database.path.name, sha256_file(database.path / MANIFEST))
+    old = InputFile("database", database.path.name, database.generation)
     with atomic_dir(out) as folder:
         tiles = _tiles(database.lattice, windows, routes, level_dbm, database.floor_dbm)
         crs, ids = database.lattice.crs, plan.ids

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 import shapely
@@ -123,8 +124,12 @@ class LayerRoutes:
             shapely.to_wkb(area.geometries).tolist() if area is not None else None
             for area in (layers.squares, layers.buildings, layers.water)
         ]
+        parts: tuple[NDArray[Any], ...]
         parts = (ways.ends_m, ways.half_width_m, ways.ways.way_id[ways.way])
         names = (repr(self.lattice), repr(ways.ways.class_names), repr(areas))
+        over = layers.bridges
+        # Ways over water stay as points, which the water itself does not tell.
+        parts += (over.ends_m, over.half_width_m, over.ways.way_id[over.way]) if over else ()
         return _digest(*names, *parts, ways.ways.way_class[ways.way])
 
 

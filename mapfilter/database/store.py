@@ -15,9 +15,16 @@ from typing import Any, Literal
 import pyarrow as pa
 
 from mapfilter._io import check_part, left_aside
-from mapfilter.database.manifest import CELLS, MANIFEST, read_manifest
-from mapfilter.database.parquet import count_rows, read_columns, write_columns
-from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.database.checked import Part, generation_of
+from mapfilter.database.manifest import CELLS, MANIFEST, POINTS, read_manifest
+from mapfilter.database.parquet import (
+    Source,
+    check_extent,
+    count_rows,
+    read_columns,
+    write_columns,
+)
+from mapfilter.database.radioroutes import RadioRouteDatabase, part_named
 from mapfilter.errors import Faults, MapfilterError, StoreError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
@@ -34,6 +41,8 @@ _ARROW_TYPES = {
 _OPTIONAL = ("technology",)
 """Columns that older databases, and those whose plan does not state them, lack."""
 
+_MOST_REPLACED = 50
+
 
 def write_cells(plan: CellPlan, path: Path) -> None:
     """Write the cell table, one column per field of :class:`mapfilter.radio.cells.Cell`."""
@@ -49,35 +58,55 @@ def cells_table(plan: CellPlan) -> pa.Table:
     return pa.Table.from_pylist(rows, schema)
 
 
-def read_cells(path: Path, crs: str) -> CellPlan:
+def read_cells(source: Source, crs: str) -> CellPlan:
     """Read a cell table; raise StoreError where it is damaged."""
     names = [one.name for one in fields(Cell)]
-    rows = read_columns(path, names, optional=_OPTIONAL).to_pylist()
+    rows = read_columns(source, names, optional=_OPTIONAL).to_pylist()
     try:
         return CellPlan(crs, tuple(Cell(**row) for row in rows))
     except (TypeError, MapfilterError) as error:
-        raise fail(StoreError, str(path), "a cell table", error, "damaged") from error
+        raise fail(StoreError, str(source), "a cell table", error, "damaged") from error
 
 
 def open_database(
-    path: Path | str, verify: Literal["sizes", "full"] = "sizes"
+    path: Path | str,
+    verify: Literal["sizes", "full"] = "sizes",
+    *,
+    generation: str | None = None,
 ) -> RadioRouteDatabase:
     """Open a database folder and check that all its parts are there.
 
-    What is read later is checked against the checksums within the parts as it is read.
+    Manifest, cell table, the extent of the points, and of each part the number of rows are always
+    checked, with the checksum of its last 256 KiB. What is read later is compared with its checksum
+    before it is used. A database that is replaced meanwhile is opened
+    as it was before, or as it is afterwards.
 
     Parameters
     ----------
     verify : {"sizes", "full"}
-        Compare the parts' sizes and numbers of rows; or read them all and compare SHA-256, too.
+        Compare the parts' sizes; or read them all and compare SHA-256, too.
+    generation : str, optional
+        Of the database that it has to be, as :attr:`RadioRouteDatabase.generation` gives it.
 
     Raises
     ------
     StoreError
-        No database, one of a newer version, its manifest is damaged, or a part is missing, cut
-        off, of another length or has another checksum.
+        No database, one of another version, its manifest is damaged, a part is missing, cut off,
+        of another length or has another checksum; or it is not the one of ``generation``.
     """
     path = Path(path)
+    for _ in range(_MOST_REPLACED):
+        before = generation_of(path)
+        try:
+            return _open(path, verify, generation)
+        except StoreError:
+            if before == generation_of(path):
+                raise
+    hint = "another process writes it without pause"
+    raise fail(StoreError, str(path), "a database that stays", "ever another", hint)
+
+
+def _open(path: Path, verify: str, generation: str | None) -> RadioRouteDatabase:
     if not path.is_dir():
         found = "a file" if path.exists() else "nothing"
         aside = left_aside(path)
@@ -87,19 +116,23 @@ def open_database(
         raise fail(StoreError, str(path), "a database folder", found, hint)
     if not (path / MANIFEST).is_file():
         raise fail(StoreError, str(path), MANIFEST, "no such file", "not a database folder")
-    manifest = read_manifest(path)
-    _check_parts(path, manifest["parts"], verify)
+    manifest, found = read_manifest(path)
+    if generation not in (None, found):
+        hint = "it was replaced while in use; start again"
+        raise fail(StoreError, str(path), "the database that was opened before", "another", hint)
     where = str(path / MANIFEST)
     try:
         lattice = Lattice(**manifest["lattice"])
     except (MapfilterError, TypeError) as error:
         raise fail(StoreError, where, "a lattice", error, "edited or damaged") from error
-    plan = read_cells(path / CELLS, lattice.crs)
+    _check_parts(path, manifest["parts"], verify, found)
+    plan = read_cells(part_named(CELLS, path, manifest, found), lattice.crs)
     if manifest["cells"] != list(plan.ids):
         raise fail(StoreError, where, f"the cells of {CELLS}", "other cells", "parts mixed up")
+    check_extent(part_named(POINTS, path, manifest, found), lattice)
     parameters = manifest["parameters"]
     margin_db, floor_dbm = float(parameters["margin_db"]), float(parameters["floor_dbm"])
-    return RadioRouteDatabase(path, lattice, plan, margin_db, floor_dbm, manifest)
+    return RadioRouteDatabase(path, lattice, plan, margin_db, floor_dbm, manifest, found)
 
 
 def info(database: RadioRouteDatabase) -> dict[str, Any]:
@@ -122,17 +155,14 @@ def info(database: RadioRouteDatabase) -> dict[str, Any]:
     }
 
 
-def _check_parts(path: Path, parts: Sequence[Mapping[str, Any]], verify: str) -> None:
+def _check_parts(
+    path: Path, parts: Sequence[Mapping[str, Any]], verify: str, generation: str
+) -> None:
     faults = Faults()
     for part in parts:
-        file = path / part["path"]
-        if not check_part(file, part, faults, full=verify == "full"):
-            continue
-        try:
-            rows = count_rows(file)
-        except StoreError as error:
-            faults.found.extend(error.faults)
-            continue
-        if rows != part["rows"]:
-            faults.add(str(file), f"{part['rows']} rows", rows, "parts mixed up")
+        if check_part(path / part["path"], part, faults, full=verify == "full"):
+            try:
+                count_rows(Part.of(path, part, generation))
+            except StoreError as error:
+                faults.found.extend(error.faults)
     faults.raise_if_any(StoreError)

@@ -159,7 +159,7 @@ class Outcome:
     unused : dict
         How many readings were not used, by reason.
     unknown_cells : dict
-        How many readings name each cell that is not in the database.
+        How many readings name each cell that is not in the database, the most frequent first.
     """
 
     final_status: str
@@ -180,7 +180,12 @@ def outcome(estimate: TrackEstimate) -> Outcome:
     statuses = Counter(estimate.status)
     located = np.flatnonzero(np.isfinite(estimate.east_m) & np.isfinite(estimate.north_m))[-1:]
     lon, lat = unproject(estimate.crs, estimate.east_m[located], estimate.north_m[located])
-    unknown = (u.what for u in estimate.unused if u.reason is Reason.UNKNOWN_CELL)
+    unused: Counter[str] = Counter()
+    unknown: Counter[str] = Counter()
+    for reading in estimate.unused:
+        unused[str(reading.reason)] += reading.readings
+        if reading.reason is Reason.UNKNOWN_CELL:
+            unknown[reading.what] += reading.readings
     return Outcome(
         str(estimate.status[-1]) if len(estimate) else "",
         switch is not None,
@@ -190,8 +195,8 @@ def outcome(estimate: TrackEstimate) -> Outcome:
         float(lon[0]) if located.size else nan,
         float(lat[0]) if located.size else nan,
         float(estimate.time_s[located[0]]) if located.size else nan,
-        dict(sorted(Counter(str(reading.reason) for reading in estimate.unused).items())),
-        dict(sorted(Counter(unknown).items())),
+        dict(sorted(unused.items())),
+        dict(sorted(unknown.items(), key=lambda one: (-one[1], one[0]))),
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from math import isfinite
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -48,6 +49,9 @@ class Reason(StrEnum):
     NO_HEADING = "no_heading"
     NO_STEP = "no_step"
     NO_READING = "no_reading"
+    MOTION_MISSING = "motion_missing"
+    MOTION_STUCK = "motion_stuck"
+    STALE_RADIO = "stale_radio"
     NOT_STARTED = "not_started"
     NOT_USED_BY_FILTER = "not_used_by_filter"
     AMBIGUOUS_CELL = "ambiguous_cell"
@@ -71,11 +75,20 @@ class MotionStep:
         Direction moved, counter-clockwise from grid east; NaN when there is no compass.
     turn_rad : float
         Change of heading over the interval; NaN when there is no gyroscope.
+    spread_m : float
+        Root mean square of the displacement, to all sides, of a step without heading; NaN for the
+        distance itself.
     """
 
     step_m: float
     heading_rad: float
     turn_rad: float = float("nan")
+    spread_m: float = float("nan")
+
+    @property
+    def all_sides_m(self) -> float:
+        """Root mean square of the displacement where there is no heading."""
+        return self.spread_m if isfinite(self.spread_m) else abs(self.step_m)
 
 
 @dataclass(frozen=True, slots=True)

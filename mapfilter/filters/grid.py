@@ -263,7 +263,7 @@ class GridFilter(Generic[PriorT, ReadingT]):
             east_m += motion.step_m * cos(motion.heading_rad)
             north_m += motion.step_m * sin(motion.heading_rad)
         else:
-            spread_m2 += motion.step_m**2 / 2
+            spread_m2 += motion.all_sides_m**2 / 2
         waiting = (east_m, north_m, length_m + abs(motion.step_m), spread_m2)
         travelled_m = belief.travelled_m + abs(motion.step_m)
         return replace(belief, waiting=waiting, travelled_m=travelled_m), reason

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mapfilter._inputs import read_input
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError, fail
 
@@ -187,12 +188,7 @@ def read_yuma(path: str | Path) -> Almanac:
         twice, or values that no satellite has.
     """
     path = Path(path)
-    try:
-        if path.stat().st_size > _LARGEST_BYTES:
-            raise fail(InputError, str(path), "a YUMA almanac", "more than 4 MiB", _HINT)
-        text = path.read_text(encoding="ascii", errors="replace")
-    except OSError as error:
-        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
+    text = read_input(path, _LARGEST_BYTES, "a YUMA almanac").decode("ascii", "replace")
     faults = Faults()
     blocks = _blocks(text, path, faults)
     if not blocks and not faults.found:

@@ -12,7 +12,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
-from mapfilter._io import atomic_file, read_input
+from mapfilter._inputs import read_input
+from mapfilter._io import atomic_file
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Fault, Faults, InputError, fail
 from mapfilter.geodesy import same_crs

@@ -21,7 +21,7 @@ for each hypothesis and summed out exactly, so that no hypotheses are spent on i
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import exp, radians, sqrt
+from math import exp, pi, radians, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -60,6 +60,8 @@ class MotionErrors(Options):
         Distance after which the correlation of the deviation is 1/e.
     disturbances_per_m, disturbed_rad : float
         How often the deviation jumps, and the standard deviation of where to.
+    remounts_per_m : float
+        How often the lasting heading error becomes any other, as a phone is turned in its pocket.
     bias_sd_rad : float
         Standard deviation of the lasting heading error at the start.
     bias_drift_rad_per_sqrt_m : float
@@ -83,6 +85,7 @@ class MotionErrors(Options):
     heading_m: Positive = 28.0
     disturbances_per_m: NotNegative = 0.002
     disturbed_rad: NotNegative = _DISTURBED_RAD
+    remounts_per_m: NotNegative = 1e-4
     bias_sd_rad: NotNegative = _BIAS_SD_RAD
     bias_drift_rad_per_sqrt_m: NotNegative = _BIAS_DRIFT_RAD
     rate_rad_per_m: NotNegative = _RATE_RAD
@@ -186,6 +189,7 @@ def move(
         _F(errors.stretch_sd * (1 - stretched**2) ** 0.5),
         _F(1 - exp(-errors.disturbances_per_m * length)),
         _F(errors.disturbed_rad),
+        _F(1 - exp(-errors.remounts_per_m * length)),
     )
     length_m = _F(length)
     long_m = _F(step_m * exp(0.5 * white_rad**2))
@@ -205,6 +209,7 @@ class _Noise(NamedTuple):
     stretch: np.float32
     jump: np.float32
     jump_rad: np.float32
+    remount: np.float32
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True)
@@ -227,8 +232,9 @@ def _move(
         a, b = normals(hashed(key, np.uint64(4 * i)))
         c, d = normals(hashed(key, np.uint64(4 * i + 1)))
         e, f = normals(hashed(key, np.uint64(4 * i + 2)))
-        u, _ = uniforms(hashed(key, np.uint64(4 * i + 3)))
+        u, v = uniforms(hashed(key, np.uint64(4 * i + 3)))
         lasting = wrap32(bias[i] + rate[i] * length_m + noise.bias_rad * c)
+        lasting = _F(2 * pi) * _F(v) - _F(pi) if _F(u) > _F(1) - noise.remount else lasting
         steady = scale[i] + noise.scale * d
         beside = noise.turn_keep * turn[i] + noise.turn_rad * e
         beside = noise.jump_rad * e if _F(u) < noise.jump else beside

@@ -155,8 +155,18 @@ def _by_time(log: TrackLog, table: str, row: Callable[..., Any]) -> dict[float, 
             values = [None if value is pd.NA or value != value else value for value in values]
         columns.append(values)
     found: dict[float, list[Any]] = {}
+    # Reports repeat themselves; equal rows are one object.
+    made: dict[tuple[Any, ...], Any] = {}
     for time_s, *values in zip(rows["time_s"].tolist(), *columns, strict=True):
-        found.setdefault(time_s, []).append(row(*values))
+        key = tuple(values)
+        one = made.get(key)
+        if one is None:
+            one = made[key] = row(*values)
+        at = found.get(time_s)
+        if at is None:
+            found[time_s] = [one]
+        else:
+            at.append(one)
     return found
 
 
@@ -208,6 +218,8 @@ def headed(step: MotionStep, heading_rad: float) -> tuple[MotionStep, float]:
     """
     if isfinite(step.heading_rad):
         return step, step.heading_rad
+    if isfinite(step.spread_m):
+        return step, heading_rad
     if isfinite(step.turn_rad):
         heading_rad = (heading_rad if isfinite(heading_rad) else 0.0) + step.turn_rad
     elif not isfinite(heading_rad):

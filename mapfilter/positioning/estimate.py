@@ -77,7 +77,7 @@ class Fix:
 
 @dataclass(frozen=True, slots=True)
 class UnusedReading:
-    """A reading that was not used.
+    """A reading that was not used, or all readings of a kind.
 
     Parameters
     ----------
@@ -89,12 +89,15 @@ class UnusedReading:
         The cell or satellite, or an empty string.
     reason : Reason
         Why.
+    readings : int
+        How many there are; the time is that of the first.
     """
 
     time_s: float
     kind: str
     what: str
     reason: Reason
+    readings: int = 1
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 import shapely
 from pyarrow.lib import ArrowException
 
+from mapfilter._inputs import check_file
 from mapfilter._io import atomic_file
 from mapfilter.errors import Faults, InputError, StoreError, fail
 from mapfilter.filters.contract import Reason, Status
@@ -68,7 +69,8 @@ def read_estimate(path: str | Path) -> TrackEstimate:
     path = Path(path)
     try:
         # The message of pyarrow for a missing file is only its name.
-        with path.open("rb"), pq.ParquetFile(path, page_checksum_verification=True) as source:
+        check_file(path, StoreError)
+        with pq.ParquetFile(path, page_checksum_verification=True) as source:
             table = source.read()
     except OSError as error:
         raise fail(StoreError, str(path), "an estimate", error.strerror or error) from error

@@ -213,7 +213,7 @@ def usable_part(log: TrackLog, filter_: Filter[Any]) -> tuple[TrackLog, list[Unu
     rows, uses = rows_by_kind(log), set(filter_.uses)
     unused = [
         UnusedReading(
-            float(found["time_s"].iloc[0]), kind, f"{len(found)} rows", Reason.NOT_USED_BY_FILTER
+            float(found["time_s"].iloc[0]), kind, "", Reason.NOT_USED_BY_FILTER, len(found)
         )
         for kind, found in rows.items()
         if kind not in uses and len(found)

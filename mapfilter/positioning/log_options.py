@@ -10,6 +10,7 @@ import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
+from mapfilter.positioning.vehicle_signs import vehicle_signs
 from mapfilter.radio.identities import TIMING_STEP_M
 from mapfilter.tracks.log import TrackLog
 
@@ -20,8 +21,6 @@ OptionsT = TypeVar("OptionsT")
 _LEAST_STEP_SD_M, _LEAST_HEADING_SD_DEG = 0.05, 0.5
 """Least errors that a filter assumes: particles need some spread."""
 _STANDING_MPS = 0.2
-_VEHICLE_S, _VEHICLE_MPS, _VEHICLE_SHARE = 10.0, 5.0, 0.9
-"""Motion is a vehicle's where its mean speed over 10 s is more than 5 m/s in a tenth of them."""
 
 
 def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str, ...]]:
@@ -30,7 +29,8 @@ def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str
     Errors of motion that were measured (``log.imu``) are those that the filter assumes; the step of
     timing advance is that of the technology of all reports that have one; a step of levels (the
     column ``level_step_db``) adds its rounding error, ``step / √12``, to the error of levels. Turns
-    without headings at the speed of a vehicle are taken for its odometry.
+    without headings are taken for a vehicle's odometry by several signs
+    (:class:`mapfilter.positioning.vehicle_signs.VehicleSigns`).
     Options that are no dataclass, lack these fields, or have other values than the defaults, are
     not changed.
     """
@@ -48,11 +48,13 @@ def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str
         error_db = hypot(default["level_error_db"], step_db / 12**0.5)
         changes["level_error_db"] = error_db
         notes.append(f"levels in steps of {step_db:g} dB: level_error_db = {error_db:.2f}")
-    if _is_default(options, default, "vehicle") and turns_of_vehicle(log):
-        changes["vehicle"] = True
+    signs = vehicle_signs(log) if _is_default(options, default, "vehicle") else None
+    if signs is not None and signs.fast:
+        if signs.vehicle:
+            changes["vehicle"] = True
+        whose = "a vehicle's" if signs.vehicle else "a cyclist's, no vehicle's"
         notes.append(
-            f"motion: turns without headings at up to {usual_top_mps(log):.0f} m/s: taken for a "
-            "vehicle's (filter.bayes.vehicle)"
+            f"motion: turns without headings, {signs}: taken for {whose} (filter.bayes.vehicle)"
         )
     measured = {
         name: value
@@ -64,7 +66,7 @@ def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str
         notes.append(f"errors of motion as the log states them: {shown}")
         changes |= measured
     if not changes:
-        return options, ()
+        return options, tuple(notes)
     return replace(options, **changes), tuple(notes)  # type: ignore[type-var]
 
 
@@ -104,31 +106,6 @@ def _motion_errors(log: TrackLog) -> dict[str, float]:
     if walk_deg > 0 and moving.size:
         found["drift_deg_per_sqrt_m"] = walk_deg / float(np.median(moving)) ** 0.5
     return found
-
-
-def turns_of_vehicle(log: TrackLog) -> bool:
-    """Return whether motion has turns, no headings, and the speed of a vehicle."""
-    motion = log.motion
-    # The first row turns by nothing.
-    turns_alone = motion["turn_rad"].notna().sum() > 1 and motion["heading_rad"].isna().all()
-    return bool(turns_alone) and usual_top_mps(log) > _VEHICLE_MPS
-
-
-def usual_top_mps(log: TrackLog) -> float:
-    """Return the speed, as a mean over 10 s, that motion exceeds a tenth of the time.
-
-    0 where it lasts less than 10 s.
-    """
-    rows = log.motion[log.motion["step_m"].notna()]
-    if rows.empty:
-        return 0.0
-    time_s = rows["time_s"].to_numpy(dtype=np.float64)
-    along_m = np.cumsum(np.abs(rows["step_m"].to_numpy(dtype=np.float64)))
-    at_s = np.arange(time_s[0], time_s[-1], _VEHICLE_S)
-    if at_s.size < 2:
-        return 0.0
-    speed_mps = np.diff(np.interp(at_s, time_s, along_m)) / _VEHICLE_S
-    return float(np.quantile(speed_mps, _VEHICLE_SHARE))
 
 
 def timing_step_m(log: TrackLog) -> float | None:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mapfilter._io import read_input
+from mapfilter._inputs import read_input
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio.antenna import MeasuredAntenna
@@ -32,9 +32,10 @@ _FEWEST_POINTS, _MOST_POINTS = 36, 7200
 _LARGEST_GAP_DEG = 15.0
 _LARGEST_LOSS_DB = 200.0
 _SECTIONS = ("HORIZONTAL", "VERTICAL")
-_GAIN = re.compile(r"\s*([+-]?\d+(?:\.\d+)?)\s*\(?\s*(dbd|dbi)?\s*\)?\s*", re.I)
-_FREQUENCY = re.compile(r"\s*(\d+(?:\.\d+)?)(?:\s*-\s*(\d+(?:\.\d+)?))?\s*(mhz|ghz)?\s*", re.I)
-_TILT = re.compile(r"\s*([+-]?\d+(?:\.\d+)?)\b.*")
+_REAL = r"\d{1,15}+(?:\.\d{1,30}+)?"
+_GAIN = re.compile(rf"([+-]?{_REAL})\s{{0,9}}\(?\s{{0,9}}(dbd|dbi)?\s{{0,9}}\)?", re.I)
+_FREQUENCY = re.compile(rf"({_REAL})(?:\s{{0,9}}-\s{{0,9}}({_REAL}))?\s{{0,9}}(mhz|ghz)?", re.I)
+_TILT = re.compile(rf"([+-]?{_REAL})\b.*")
 
 
 def read_antennas(folder: Path | str, names: Iterable[str]) -> dict[str, MeasuredAntenna]:
@@ -201,7 +202,7 @@ def _gain_dbi(path: Path, header: dict[str, str], faults: Faults) -> float | Non
     text = header.get("GAIN", "")
     if not text:
         return None
-    match = _GAIN.fullmatch(text)
+    match = _GAIN.fullmatch(text.strip())
     if match is None or not -20 <= (gain := float(match[1])) <= 60:
         faults.add(f"{path}, GAIN", "a gain in -20..60 with dBd or dBi", repr(text[:40]))
         return None
@@ -213,7 +214,7 @@ def _frequency_mhz(path: Path, header: dict[str, str], faults: Faults) -> float 
     text = header.get("FREQUENCY", "")
     if not text:
         return None
-    match, value = _FREQUENCY.fullmatch(text), math.nan
+    match, value = _FREQUENCY.fullmatch(text.strip()), math.nan
     if match is not None:
         scale = 1000.0 if (match[3] or "").lower() == "ghz" else 1.0
         value = (scale * float(match[1]) + scale * float(match[2] or match[1])) / 2
@@ -226,7 +227,7 @@ def _frequency_mhz(path: Path, header: dict[str, str], faults: Faults) -> float 
 
 def _downtilt_deg(header: dict[str, str], vertical: tuple[Floats, Floats]) -> float:
     for key in ("ELECTRICAL_TILT", "TILT"):
-        match = _TILT.fullmatch(header.get(key, ""))
+        match = _TILT.fullmatch(header.get(key, "").strip())
         if match is not None and abs(float(match[1])) <= 90:
             return float(match[1])
     if header.get("TILT", "").upper().startswith("ELECTRICAL"):

@@ -13,7 +13,7 @@ from typing import Any
 
 from python_calamine import CalamineError, CalamineWorkbook
 
-from mapfilter._io import read_input
+from mapfilter._inputs import read_input
 from mapfilter.errors import Faults, InputError, MapfilterError, fail
 
 _LARGEST_BYTES = 1 << 26

@@ -15,6 +15,7 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
+from mapfilter._inputs import open_input
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice
 from mapfilter.radio.cell_rules import id_fault
@@ -140,9 +141,9 @@ def _is_index(path: Path) -> bool:
     if path.suffix.lower() not in INDEX_SUFFIXES or path.name.startswith(".") or not path.is_file():
         return False
     try:
-        with path.open("rb") as stream:
+        with open_input(path) as stream:
             head = stream.read(_LONGEST_HEAD_BYTES).upper()
-    except OSError:
+    except (OSError, InputError):
         return False
     first = next((line for line in head.splitlines() if line.strip()), b"")
     return all(name.encode() in first for name in INDEX_COLUMNS)
@@ -158,7 +159,7 @@ def _rows(
             faults.add(f"{where}, TX_NAME", *wrong)
             continue
         path = _within(table.path.parent, given["FILE_NAME"], names)
-        if path is None or not path.is_file():
+        if path is None:
             expected = f"the name of a file in {table.path.parent}"
             hint = "rasters moved elsewhere, or exported to another folder"
             faults.add(f"{where}, FILE_NAME", expected, repr(given["FILE_NAME"][:80]), hint)
@@ -183,14 +184,15 @@ def _rows(
 
 
 def _within(folder: Path, name: str, names: dict[str, str]) -> Path | None:
-    """Return a file of the folder or below it; None for names that lead out of it."""
+    """Return a file of the folder or below it; None for none, and for names that lead out of it."""
     place = PurePosixPath(name.replace("\\", "/"))
     if not place.parts or place.is_absolute() or ".." in place.parts or ":" in name or "\0" in name:
         return None
     # Names from Windows ignore the case.
     path = folder / (names.get(name.lower(), name) if len(place.parts) == 1 else place)
     try:
-        inside = path.resolve().is_relative_to(folder.resolve())
+        # A name may be longer than the file system allows.
+        held = path.is_file() and path.resolve().is_relative_to(folder.resolve())
     except (OSError, ValueError):
         return None
-    return path if inside and len(str(path)) < 4096 else None
+    return path if held else None

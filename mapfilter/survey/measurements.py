@@ -16,13 +16,12 @@ from mapfilter.geodesy import project, projected_crs, utm_crs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.survey.measurement_files import (
     DIALECTS,
-    Identity,
-    Rows,
     header_of,
     mapped,
     read_antennas_log,
     read_csv,
 )
+from mapfilter.survey.measurement_rows import Identity, Rows
 
 Format = Literal["auto", "csv", "opencellid", "towercollector", "antennas"]
 
@@ -144,7 +143,7 @@ def read_measurements(
     format : {"auto", "csv", "opencellid", "towercollector", "antennas"}
         ``auto`` recognises each file by its first line.
     columns : mapping of str to str, optional
-        For "csv": which column holds which of :data:`~mapfilter.survey.measurement_files.FIELDS`.
+        For "csv": which column holds which of :data:`~mapfilter.survey.measurement_rows.FIELDS`.
     session_gap_s : float
         A longer silence begins a new session.
     recorded : callable, optional

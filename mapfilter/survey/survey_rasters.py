@@ -21,7 +21,7 @@ from mapfilter.rasters.geotiff import write_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.survey.cell_model import Covariate
 from mapfilter.survey.measured_map import Survey, SurveyedCell
-from mapfilter.survey.measurement_files import Identity
+from mapfilter.survey.measurement_rows import Identity
 
 _FIELD_LENGTHS = 4.0
 _LARGEST_WINDOW_PX = 1_000_000

@@ -46,7 +46,8 @@ class CombineOptions:
     offsets_s : mapping of Path to float
         Seconds to add to the times of a recording.
     course_motion : bool
-        Whether steps are made from the speed and course of positions where nothing else gives them.
+        Whether steps are made from the speed and course of a receiver, else from its positions,
+        where nothing else gives them.
     walk : WalkOptions or None
         How steps are made of a phone's sensors where nothing else gives them; None for no steps.
     """

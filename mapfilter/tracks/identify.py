@@ -101,7 +101,8 @@ class _Counts:
             rows, cells = sum(self.named.values()), len(self.named)
             yield f"radio: {rows} rows of {cells} cells named by the plan's identities"
         if self.lost:
-            rows, some = sum(self.lost.values()), listed(sorted(self.lost))
+            often = sorted(self.lost, key=lambda name: (-self.lost[name], name))
+            rows, some = sum(self.lost.values()), listed(often)
             yield f"radio: {rows} rows of {len(self.lost)} cells that the plan lacks ({some})"
 
 

@@ -16,9 +16,10 @@ from mapfilter.tracks.frame import Frame
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.moved import (
     by_compass,
+    course_errors,
     motion_from_course,
-    motion_from_places,
     motion_from_poses,
+    motion_from_positions,
 )
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.pdr.vehicle import reckon_odometry, reckon_velocity
@@ -27,10 +28,6 @@ from mapfilter.tracks.readers.recording import Recording
 
 _PROVIDERS = ("gps", "fused", "flp", "network", "nlp")
 _LONGEST_GAP_S = 3600.0
-
-COURSE_ERRORS = ImuNoise(sigma_trans_m=0.3, sigma_orient_deg=15.0, bias_sd_deg=10.0, scale=0.1)
-"""Of motion by the speed and course of fixes: receivers smooth them, so that corners are cut and
-ways too short, by 6 to 20 % on eight walks in Ottawa. The other errors are a phone's."""
 
 
 def measured_positions(recording: Recording) -> tuple[pd.DataFrame | None, str]:
@@ -78,7 +75,8 @@ def journey_motion(
     notes : list of str
         Grows by what was found.
     course_motion : bool
-        Whether speed and course of positions make motion where nothing better does.
+        Whether speed and course of a receiver, else its positions, make motion where nothing
+        better does.
     walk : WalkOptions or None
         How steps are made of a phone's sensors, None for no steps.
     true : sequence of Recording
@@ -87,7 +85,8 @@ def journey_motion(
     Raises
     ------
     InputError
-        Odometry pauses for more than an hour, or there is no course where it is asked for.
+        Odometry pauses for more than an hour, or there are no positions where motion is to come
+        from them.
     """
     for name in ("motion", "odometry", "poses"):
         having = [r for r in recordings if name in r.tables]
@@ -143,29 +142,46 @@ def _course(
     frame: Frame,
     notes: list[str],
 ) -> Moved:
-    """Return motion by speed and course of positions, and by a gyroscope where there is one."""
+    """Return motion by speed and course of positions, and by a gyroscope where there is one.
+
+    Where no positions have a course, motion is that from each position to the next.
+    """
     turned = reckon_velocity(sensors) if "gyroscope" in sensors else None
     if turned is not None:
         notes += ["motion from the speed of positions and the gyroscope", *turned[2]]
         return Moved(turned[0], turned[1])
-    for recording in recordings:
-        rows, _ = measured_positions(recording)
-        if rows is not None and "course_deg" in rows and rows["course_deg"].notna().any():
-            notes.append(f"{recording.path.name}: motion from speed and course of its fixes")
-            return Moved(motion_from_course(rows, frame.convergence_rad), COURSE_ERRORS)
-    for recording in recordings:
-        rows, _ = measured_positions(recording)
-        if rows is not None and len(rows) > 1:
-            rows = rows.drop_duplicates("time_s")
-            place_m = np.column_stack(frame.east_north(rows, recording.crs))
-            accuracy_m = np.full(len(rows), np.nan)
-            if "accuracy_m" in rows:
-                accuracy_m = rows["accuracy_m"].to_numpy(dtype=np.float64)
-            time_s = rows["time_s"].to_numpy(dtype=np.float64)
-            notes.append(
-                f"{recording.path.name}: no course; motion from the ways between its fixes"
-            )
-            return Moved(motion_from_places(time_s, place_m, accuracy_m), COURSE_ERRORS)
+    placed = [(r, rows) for r in recordings if (rows := _placed(r)) is not None]
+    for recording, rows in placed:
+        if "course_deg" in rows and rows["course_deg"].notna().any():
+            motion = motion_from_course(rows, frame.convergence_rad)
+            imu = course_errors(motion, *frame.east_north(rows, recording.crs))
+            told = "speed and course of its fixes", "as they differ from its positions"
+            notes.append(_receiver_note(recording, imu, *told))
+            return Moved(motion, imu)
+    for recording, rows in placed:
+        time_s = rows["time_s"].to_numpy(dtype=np.float64)
+        motion, imu = motion_from_positions(time_s, *frame.east_north(rows, recording.crs))
+        told = "its positions, one to the next", "by their scatter about straight lines, with turns"
+        notes.append(_receiver_note(recording, imu, *told))
+        return Moved(motion, imu)
     names = ", ".join(r.path.name for r in recordings)
-    expected = "positions"
+    expected = "positions, with speed and course or without"
     raise fail(InputError, names, expected, "none", "leave out --course-motion")
+
+
+def _placed(recording: Recording) -> pd.DataFrame | None:
+    """Return measured positions of different times; None where there are not two."""
+    rows, _ = measured_positions(recording)
+    if rows is None:
+        return None
+    rows = rows.drop_duplicates("time_s")
+    return rows if len(rows) > 1 else None
+
+
+def _receiver_note(recording: Recording, imu: ImuNoise | None, source: str, how: str) -> str:
+    """Return what motion by a receiver is made of, and its errors."""
+    text = f"{recording.path.name}: motion comes from GNSS: {source}"
+    if imu is not None:
+        text += f"; steps ± {imu.sigma_trans_m:.2g} m, headings ± {imu.sigma_orient_deg:.0f} deg, "
+        text += f"{how}"
+    return f"{text}; it fails where GNSS does, and shares errors with the positions"

@@ -16,148 +16,18 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import projected_crs, short_crs
 from mapfilter.gnss.orbits import Almanac
+from mapfilter.tracks.headings import heading_fault
 from mapfilter.tracks.imu_noise import ImuNoise
+from mapfilter.tracks.log_checks import check_clocks, check_start, check_steps, early_ends
 from mapfilter.tracks.satellites import place_satellites
 from mapfilter.tracks.schema import NEIGHBOUR, PLACE, TABLES, Kind, Without
 from mapfilter.tracks.tables import tidy_table
 
 _PART_OF: dict[Without, str] = {"fixes": "gnss", "ta": "radio", "neighbours": "radio"}
 """Tables of those parts that are not left out by the name of their table."""
-
-
-# Tables may begin this long after another ends.
-_APART_S = 600.0
-# Between these, one duration is taken for milliseconds of another.
-_TIMES_MS = (300.0, 3000.0)
-_EARLY_S = 30.0
-_EARLY_SHARE = 0.1
-_EARLIEST_UTC_S = datetime(1, 1, 1, tzinfo=UTC).timestamp()
-_MOST_S = 1e11
-_FEW_ROWS = 10
-_MANY_ROWS = 20
-_FASTEST_MPS = 100.0
-_SLOWEST_MPS = 0.02
-_LONG_S = 60.0
-_MOSTLY = 2 / 3
-_SOMEWHERE_M = 100.0
-# Between these, positions lie apart by the kilometres of the steps, or a part of them.
-_KILO = (100.0, 1200.0)
-_FASTEST_KMPS = 0.1
-_EXPECTED = "metres moved in each interval"
-
-
-def _check_clocks(
-    tables: Mapping[str, pd.DataFrame], names: Mapping[str, str], faults: Faults
-) -> None:
-    """Note tables that do not overlap in time, or last about 1000 times as long as another.
-
-    At most one fault is added, since it takes two tables to disagree.
-    """
-    filled = {names.get(table, table): rows for table, rows in tables.items() if len(rows)}
-    times = {name: np.unique(rows["time_s"].to_numpy()) for name, rows in filled.items()}
-    if len(times) < 2:
-        return
-    gap_s = max(time[0] for time in times.values()) - min(time[-1] for time in times.values())
-    hint = _milliseconds(times)
-    if gap_s > _APART_S and not hint:
-        hint = "seconds of the day, or Unix time, in one of them, or milliseconds for s"
-    if hint:
-        spans = "; ".join(f"{name} {time[0]:.10g}..{time[-1]:.10g}" for name, time in times.items())
-        whole = names.get("log", "log")
-        faults.add(f"{whole}, time_s", "tables that overlap in time", spans, hint)
-
-
-def _early_ends(tables: Mapping[str, pd.DataFrame]) -> tuple[str, ...]:
-    """Return a note where motion or radio ends long before the other one, as if cut off."""
-    filled = [table for table in ("motion", "radio") if len(tables[table])]
-    ends_s = {table: float(tables[table]["time_s"].iloc[-1]) for table in filled}
-    if len(ends_s) < 2:
-        return ()
-    (first, first_s), (last, last_s) = sorted(ends_s.items(), key=lambda end: end[1])
-    begin_s = min(float(rows["time_s"].iloc[0]) for rows in tables.values() if len(rows))
-    if last_s - first_s <= max(_EARLY_S, _EARLY_SHARE * (last_s - begin_s)):
-        return ()
-    return (f"{first}: ends {last_s - first_s:.0f} s before {last}, as if cut off",)
-
-
-def _check_start(
-    start_utc_s: float, tables: Mapping[str, pd.DataFrame], faults: Faults, whole: str
-) -> None:
-    """Note a start or times that are no dates within the years 1 to 9999."""
-    if np.isnan(start_utc_s):
-        return
-    where = f"{whole}, start_utc_s"
-    if not abs(start_utc_s) <= _MOST_S:
-        hint = "milliseconds for s" if np.isfinite(start_utc_s) else ""
-        faults.add(where, "UTC seconds", start_utc_s, hint)
-        return
-    # Times are at most 1e11 s, too: none comes near the year 9999.
-    first_s = min((float(rows["time_s"].min()) for rows in tables.values() if len(rows)), default=0)
-    if start_utc_s + min(first_s, 0.0) < _EARLIEST_UTC_S:
-        got = f"{start_utc_s:.15g}, and times from {first_s:g} s on"
-        faults.add(where, "UTC seconds, not before the year 1", got)
-
-
-def _milliseconds(times: Mapping[str, Floats]) -> str:
-    # A burst of a second in a long log, or a table with rare rows, fulfils one of two conditions.
-    paced = {name: time for name, time in times.items() if len(time) >= 3}
-    low, high = _TIMES_MS
-    for name, time in paced.items():
-        for other in paced.values():
-            with np.errstate(over="ignore"):
-                longer = np.ptp(time) / np.ptp(other)
-                seldomer = np.median(np.diff(time)) / np.median(np.diff(other))
-            if low <= longer <= high and low <= seldomer <= high:
-                return f"milliseconds for s in {name}"
-    return ""
-
-
-def _check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) -> tuple[str, ...]:
-    """Note steps that are cumulative, backwards or in another unit; return notes on odd ones."""
-    motion = tables["motion"]
-    motion = motion[np.isfinite(motion["step_m"].to_numpy())]
-    time_s, step_m = motion["time_s"].to_numpy(), motion["step_m"].to_numpy()
-    if len(step_m) < _FEW_ROWS:
-        return ()
-    lasted_s, moved_m = float(np.ptp(time_s)), float(np.abs(step_m).sum())
-    between_s = np.diff(time_s)
-    speed_mps = np.abs(step_m[1:])[between_s > 0] / between_s[between_s > 0]
-    typical_mps = float(np.median(speed_mps)) if speed_mps.size else 0.0
-    is_slow, moving = typical_mps < _FASTEST_KMPS, step_m[step_m != 0]
-    extent_m = _extent_m(tables, float(time_s[0]), float(time_s[-1]))
-    column = f"{where}, step_m"
-    growth_m = np.diff(step_m)
-    long = len(step_m) >= _MANY_ROWS and lasted_s >= _LONG_S / 3
-    low, high = _KILO
-    if long and np.all(growth_m >= 0) and np.mean(growth_m > 0) > 0.5:
-        # A car that speeds up does not do so for long.
-        got = f"steps that only grow, from {step_m[0]:g} to {step_m[-1]:g}"
-        faults.add(column, _EXPECTED, got, "distance since the start; give its differences")
-    elif typical_mps > _FASTEST_MPS:
-        hint = "centimetres or millimetres given for metres, or distance since the start"
-        faults.add(column, _EXPECTED, f"{typical_mps:.0f} m/s in the median", hint)
-    elif moving.size >= _FEW_ROWS and np.mean(moving < 0) > _MOSTLY:
-        got = f"{int(np.sum(moving < 0))} negative steps of {moving.size}"
-        faults.add(column, f"{_EXPECTED} along its heading", got, "a sign the other way round")
-    elif is_slow and extent_m > _SOMEWHERE_M and low * moved_m < extent_m <= high * moved_m:
-        got = f"{moved_m:.3g} m in all, while positions lie {extent_m:.0f} m apart"
-        faults.add(column, _EXPECTED, got, "kilometres given for metres")
-    elif lasted_s >= _LONG_S and 0 < moved_m < _SLOWEST_MPS * lasted_s:
-        note = f"motion, step_m: only {moved_m:.3g} m in {lasted_s:.0f} s; kilometres for metres?"
-        return (note,)
-    return ()
-
-
-def _extent_m(tables: Mapping[str, pd.DataFrame], first_s: float, last_s: float) -> float:
-    """Return how far apart true positions or fixes lie within some time."""
-    every = (tables[table] for table in ("truth", "gnss"))
-    within = (places[places["time_s"].between(first_s, last_s)] for places in every)
-    extents = (np.hypot(np.ptp(p["east_m"]), np.ptp(p["north_m"])) for p in within if len(p))
-    return float(max(extents, default=0.0))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -350,11 +220,14 @@ def make_log(
         name, number = called.get(table, table), numbers.get(table)
         tables[table], more = tidy_table(table, given.get(table), name, faults, number)
         every_note += more
-    _check_start(start_utc_s, tables, faults, whole)
+    check_start(start_utc_s, tables, faults, whole)
     if not any(fault.where.endswith("time_s") for fault in faults.found):
-        _check_clocks(tables, called, faults)
-        every_note += _check_steps(tables, called.get("motion", "motion"), faults)
-        every_note += _early_ends(tables)
+        check_clocks(tables, called, faults)
+        every_note += check_steps(tables, called.get("motion", "motion"), faults)
+        every_note += early_ends(tables)
+        places = next((tables[name] for name in ("truth", "gnss") if len(tables[name]) > 1), None)
+        if places is not None and (wrong := heading_fault(tables["motion"], places)):
+            every_note += (f"{called.get('motion', 'motion')}, heading_rad: {wrong}",)
     faults.raise_if_any(InputError)
     placeless = int(tables["pseudoranges"][list(PLACE)].isna().any(axis=1).sum())
     if almanac is None and placeless:

@@ -1,15 +1,20 @@
-"""Steps and turns of a log from odometry, poses, or the speed and course of a receiver."""
+"""Steps and turns of a log from odometry, poses, or the velocity or positions of a receiver."""
 
 from __future__ import annotations
 
 import numpy as np
 import pandas as pd
 
-from mapfilter._types import Floats
+from mapfilter._types import Bools, Floats
 from mapfilter.geodesy import heading_from_azimuth_rad, wrap_rad
+from mapfilter.tracks.imu_noise import ImuNoise
 
 _LONGEST_S = 5.0
-_LEAST_APART_M = 10.0
+_USUAL_INTERVALS = 3
+_MAD_TO_SD = 1.4826
+_LEAST_STEP_SD_M, _LEAST_HEADING_SD_DEG, _MOST_HEADING_SD_DEG = 0.05, 1.0, 90.0
+_COURSE_BIAS_DEG = 1.0
+_MOVING_SD = 2.0
 
 
 def by_compass(rows: pd.DataFrame, convergence_rad: float) -> pd.DataFrame:
@@ -137,49 +142,6 @@ def rotation_matrices(quaternions: Floats) -> Floats:
     return np.moveaxis(np.array(rows), 2, 0)
 
 
-def motion_from_places(time_s: Floats, place_m: Floats, accuracy_m: Floats) -> pd.DataFrame:
-    """Return the ways between positions that are farther apart than their errors.
-
-    A position counts if it lies at least 10 m, and its accuracy, from the last one that did; so
-    errors of a receiver that stands still are no way. Ways are parted into steps of at most 1 s.
-
-    Parameters
-    ----------
-    time_s : ndarray, shape (N,)
-    place_m : ndarray, shape (N, 2)
-        East and north.
-    accuracy_m : ndarray, shape (N,)
-        NaN where unknown.
-
-    Examples
-    --------
-    >>> place_m = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 12.0]])
-    >>> moved = motion_from_places(np.array([0.0, 1.0, 3.0]), place_m, np.full(3, 5.0))
-    >>> moved["time_s"].tolist(), moved["step_m"].tolist()
-    ([0.0, 1.0, 2.0, 3.0], [0.0, 4.0, 4.0, 4.0])
-    """
-    least_m = np.fmax(accuracy_m, _LEAST_APART_M)
-    kept = [0]
-    for row in range(1, len(time_s)):
-        if np.hypot(*(place_m[row] - place_m[kept[-1]])) >= least_m[row]:
-            kept.append(row)
-    moved, lasted_s = np.diff(place_m[kept], axis=0), np.diff(time_s[kept])
-    parts = np.maximum(np.ceil(lasted_s), 1).astype(np.int64)
-    first = np.repeat(np.cumsum(parts) - parts, parts)
-    share = (np.arange(parts.sum()) - first + 1) / np.repeat(parts, parts)
-    at_s = np.repeat(time_s[kept][:-1], parts) + share * np.repeat(lasted_s, parts)
-    step_m = np.repeat(np.hypot(*moved.T) / parts, parts)
-    heading = np.repeat(np.arctan2(moved[:, 1], moved[:, 0]), parts)
-    return pd.DataFrame(
-        {
-            "time_s": np.concatenate([time_s[:1], at_s]),
-            "step_m": np.concatenate([[0.0], step_m]),
-            "heading_rad": np.concatenate([[np.nan], heading]),
-            "turn_rad": np.nan,
-        }
-    )
-
-
 def motion_from_course(rows: pd.DataFrame, convergence_rad: float) -> pd.DataFrame:
     """Integrate the velocity of a receiver over each interval, by the mean of its ends.
 
@@ -211,10 +173,107 @@ def motion_from_course(rows: pd.DataFrame, convergence_rad: float) -> pd.DataFra
     lasted_s = np.diff(time)
     known = np.isfinite(east)
     step = lasted_s * np.where(known, np.hypot(east, north), (speed[:-1] + speed[1:]) / 2)
-    longest_s = max(_LONGEST_S, 3 * float(np.median(lasted_s))) if lasted_s.size else _LONGEST_S
-    step[lasted_s > longest_s] = np.nan
+    step[_long(lasted_s)] = np.nan
     moved = np.where(known & (step > 0), np.arctan2(north, east), np.nan)
     columns = {"step_m": np.concatenate([[0.0], step]), "turn_rad": np.nan}
     columns["heading_rad"] = np.concatenate([heading[:1], moved])
     table = pd.DataFrame({"time_s": time, **columns})
     return table[["time_s", "step_m", "heading_rad", "turn_rad"]]
+
+
+def course_errors(motion: pd.DataFrame, east_m: Floats, north_m: Floats) -> ImuNoise | None:
+    """Return the errors of motion by speed and course, as it differs from positions of its rows.
+
+    Errors of the positions count, too; those that both share do not show.
+
+    Parameters
+    ----------
+    motion : pandas.DataFrame
+        As of :func:`motion_from_course`.
+    east_m, north_m : (N,) array
+        Positions at its times.
+    """
+    step_m, heading = _chords(east_m, north_m)
+    more_m = motion["step_m"].to_numpy()[1:] - step_m
+    turned = wrap_rad(motion["heading_rad"].to_numpy()[1:] - heading)
+    known = np.isfinite(more_m) & np.isfinite(turned)
+    if not known.any():
+        return None
+    step_sd_m = max(_MAD_TO_SD * float(np.median(np.abs(more_m[known]))), _LEAST_STEP_SD_M)
+    moving = known & (step_m > _MOVING_SD * step_sd_m)
+    if not moving.any():
+        return None
+    heading_sd = _MAD_TO_SD * float(np.degrees(np.median(np.abs(turned[moving]))))
+    return _receiver_noise(motion["time_s"].to_numpy(), step_sd_m, heading_sd, _COURSE_BIAS_DEG)
+
+
+def motion_from_positions(
+    time_s: Floats, east_m: Floats, north_m: Floats
+) -> tuple[pd.DataFrame, ImuNoise]:
+    """Return steps and headings from each position to the next, and their errors.
+
+    The errors of positions are their scatter about the straight line between the one before and
+    the one after, which holds turns and changes of speed, too. A step of less than two of its
+    standard deviations has no heading. A step over a gap goes straight from its begin to its end.
+
+    Parameters
+    ----------
+    time_s : (N,) array
+        In order, each once.
+    east_m, north_m : (N,) array
+
+    Examples
+    --------
+    >>> time_s = np.arange(5.0)
+    >>> motion, errors = motion_from_positions(time_s, 3 * time_s, 4 * time_s)
+    >>> motion.iloc[1].round(4).tolist(), errors.sigma_trans_m
+    ([1.0, 5.0, 0.9273, nan], 0.05)
+    """
+    step_m, heading = _chords(east_m, north_m)
+    sd_m = 0.0
+    if len(time_s) > 2:
+        part = (time_s[1:-1] - time_s[:-2]) / (time_s[2:] - time_s[:-2])
+        off = [p[1:-1] - (1 - part) * p[:-2] - part * p[2:] for p in (east_m, north_m)]
+        scaled = np.abs(off) / np.sqrt(1 + part**2 + (1 - part) ** 2)
+        sd_m = _MAD_TO_SD * float(np.median(scaled))
+    step_sd_m = max(np.sqrt(2) * sd_m, _LEAST_STEP_SD_M)
+    moving = step_m > _MOVING_SD * step_sd_m
+    usual_m = float(np.median(step_m[moving])) if moving.any() else step_sd_m
+    motion = pd.DataFrame(
+        {
+            "time_s": time_s,
+            "step_m": np.concatenate([[0.0], step_m]),
+            "heading_rad": np.concatenate([[np.nan], np.where(moving, heading, np.nan)]),
+            "turn_rad": np.nan,
+        }
+    )
+    heading_sd = float(np.degrees(np.arctan2(step_sd_m, usual_m)))
+    return motion, _receiver_noise(time_s, step_sd_m, heading_sd, 0.0)
+
+
+def _chords(east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
+    """Return lengths and headings from each position to the next."""
+    east, north = np.diff(east_m), np.diff(north_m)
+    return np.hypot(east, north), np.arctan2(north, east)
+
+
+def _long(lasted_s: Floats) -> Bools:
+    """Return which intervals are too long for the mean of their ends."""
+    if not lasted_s.size:
+        return np.zeros(0, dtype=bool)
+    usual_s = float(np.median(lasted_s))
+    return np.asarray(lasted_s > max(_LONGEST_S, _USUAL_INTERVALS * usual_s))
+
+
+def _receiver_noise(
+    time_s: Floats, step_sd_m: float, heading_sd_deg: float, bias_sd_deg: float
+) -> ImuNoise:
+    period_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
+    return ImuNoise(
+        period_s=period_s,
+        sigma_trans_m=float(step_sd_m),
+        sigma_orient_deg=float(
+            np.clip(heading_sd_deg, _LEAST_HEADING_SD_DEG, _MOST_HEADING_SD_DEG)
+        ),
+        bias_sd_deg=bias_sd_deg,
+    )

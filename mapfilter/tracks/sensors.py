@@ -13,6 +13,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from mapfilter._inputs import check_file
 from mapfilter._io import read_json, sha256_file
 from mapfilter.errors import Faults, InputError, StoreError, fail
 
@@ -88,6 +89,7 @@ def read_sensors(log: str | Path) -> dict[str, pd.DataFrame]:
         if known is not None and known != sha256_file(path):
             raise fail(StoreError, str(path), f"SHA-256 {known}", "another", "changed or cut off")
         try:
+            check_file(path)
             rows = pd.read_csv(path) if path.suffix == ".csv" else pq.read_table(path).to_pandas()
         except (pa.ArrowException, ValueError, OSError) as error:
             got = (str(error).splitlines() or ["nothing"])[0]

@@ -7,19 +7,18 @@ almanac beside it (``almanac.txt``, YUMA) gives the places of satellites whose r
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Collection, Mapping
 from dataclasses import asdict
 from difflib import get_close_matches
 from math import inf, isnan, nan
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
-import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from mapfilter._inputs import shown
 from mapfilter._io import (
     atomic_dir,
     check_part,
@@ -29,24 +28,26 @@ from mapfilter._io import (
     sha256_file,
     write_json,
 )
-from mapfilter._types import Ints
 from mapfilter.errors import Faults, InputError, MapfilterError, StoreError, fail
 from mapfilter.gnss.orbits import read_yuma
 from mapfilter.tracks.imu_noise import parse_imu_noise
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.schema import OPTIONAL, SCHEMA, TABLES
-from mapfilter.tracks.sensors import FOLDER, write_sensors
+from mapfilter.tracks.sensors import FOLDER, SENSOR_COLUMNS, write_sensors
+from mapfilter.tracks.table_files import read_table
 
 HEAD = "log.json"
 ALMANAC = "almanac.txt"
 
 _SUFFIXES = (".parquet", ".csv")
-_SEPARATORS = (",", ";", "\t")
-_LONGEST_ROW_BYTES = 1 << 16
-_DECIMAL_COMMA = r"^\s*([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)\s*$"
 FORMAT = "mapfilter track log"
 VERSION = 1
 _KEYS = ("format", "version", "crs", "start_utc_s", "notes", "imu", "parts")
+_WRITTEN = {
+    f"{name}{suffix}"
+    for name in (*TABLES, *(f"{FOLDER}/{sensor}" for sensor in SENSOR_COLUMNS))
+    for suffix in _SUFFIXES
+}
 _ARROW = {"number": pa.float64(), "integer": pa.int64(), "text": pa.string()}
 
 
@@ -59,10 +60,10 @@ def _checked_parts(folder: Path, head: dict[str, Any]) -> dict[str, Path]:
     for part in listed:
         if isinstance(part, dict) and str(part.get("path")).startswith(f"{FOLDER}/"):
             continue
-        if not isinstance(part, dict) or part.get("path") not in allowed:
-            faults.add(f"{folder / HEAD}, parts", "tables of a log", repr(part))
+        if not isinstance(part, dict) or str(part.get("path")) not in allowed:
+            faults.add(f"{folder / HEAD}, parts", "tables of a log", shown(part))
             continue
-        paths[allowed[part["path"]]] = path = folder / part["path"]
+        paths[allowed[str(part["path"])]] = path = folder / str(part["path"])
         check_part(path, part, faults)
     faults.raise_if_any(StoreError)
     return paths
@@ -102,83 +103,6 @@ def _others(folder: Path, used: Collection[Path]) -> list[Path]:
         for path in sorted(folder.iterdir())
         if path.name not in known and not path.name.startswith(".") and path.is_file()
     ]
-
-
-class ReadTable(NamedTuple):
-    """A table of a log as it was read.
-
-    ``rows`` are texts where they come from CSV. ``row_numbers`` are for messages: the line of a CSV
-    file, in which the header is line 1 as in editors; the row of a Parquet file, counted from 1.
-    """
-
-    rows: pd.DataFrame
-    row_numbers: Ints
-    notes: tuple[str, ...] = ()
-
-
-def read_table(table: str, path: Path) -> ReadTable:
-    """Read one of :data:`mapfilter.tracks.schema.TABLES` from CSV or Parquet.
-
-    CSV is UTF-8 with commas, semicolons or tabs; decimal commas where commas separate nothing.
-
-    Raises
-    ------
-    InputError
-        The file is empty, damaged or no such table.
-    """
-    try:
-        if path.suffix == ".csv":
-            return _read_csv(table, path)
-        rows = pq.read_table(path).to_pandas(types_mapper={pa.int64(): pd.Int64Dtype()}.get)
-        return ReadTable(rows, np.arange(1, len(rows) + 1))
-    except pd.errors.EmptyDataError as error:
-        raise fail(InputError, str(path), "a header line", "an empty file", "cut off") from error
-    except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
-        got = str(error).splitlines()[0]
-        hint = "decimal commas between commas (separate fields by semicolons), or cut off"
-        raise fail(InputError, str(path), "a readable table", got, hint) from error
-    except (pa.ArrowException, UnicodeDecodeError, OSError) as error:
-        got = str(error).splitlines()[0]
-        raise fail(InputError, str(path), "a readable table", got, "cut off") from error
-
-
-def _read_csv(table: str, path: Path) -> ReadTable:
-    with path.open(encoding="utf-8-sig") as stream:
-        every = enumerate(stream)
-        blank_lines, header = next(((n, line) for n, line in every if line.strip()), (0, ""))
-    separator = max(_SEPARATORS, key=header.count)
-    with warnings.catch_warnings():
-        # pandas only warns when rows have more fields than the header, and drops the rest.
-        warnings.simplefilter("error", pd.errors.ParserWarning)
-        rows = pd.read_csv(
-            path,
-            dtype=str,
-            sep=separator,
-            header=blank_lines,
-            keep_default_na=False,
-            index_col=False,
-            encoding="utf-8-sig",
-            skip_blank_lines=False,
-        )
-    rows.columns = [str(name).strip() for name in rows.columns]
-    lines = np.arange(len(rows)) + blank_lines + 2
-    blank = (rows == "").all(axis=1).to_numpy()
-    rows, lines = rows[~blank].reset_index(drop=True), lines[~blank]
-    if separator != ",":
-        numbers = [column.name for column in SCHEMA[table] if column.kind != "text"]
-        for name in rows.columns.intersection(numbers):
-            rows[name] = rows[name].str.replace(_DECIMAL_COMMA, r"\1.\2", regex=True)
-    return ReadTable(rows, lines, _cut_off(path, separator, header))
-
-
-def _cut_off(path: Path, separator: str, header: str) -> tuple[str, ...]:
-    """Return a note where a file ends without a line's end before the last row has all fields."""
-    with path.open("rb") as stream:
-        stream.seek(max(0, path.stat().st_size - _LONGEST_ROW_BYTES))
-        last = stream.read().splitlines(keepends=True)[-1].decode(errors="replace")
-    if last.endswith(("\n", "\r")) or last.count(separator) >= header.count(separator):
-        return ()
-    return (f"{path}: ends within a row, as if cut off",)
 
 
 def write_log(
@@ -276,7 +200,7 @@ def is_log(path: str | Path) -> bool:
 
 def check_log_replaceable(folder: Path) -> None:
     """Raise OutputError where a folder holds other files than a log that mapfilter wrote."""
-    check_replaceable(folder, HEAD, FORMAT)
+    check_replaceable(folder, HEAD, FORMAT, _WRITTEN.__contains__)
 
 
 def list_logs(path: str | Path) -> list[Path]:
@@ -323,10 +247,10 @@ def _check_head(head: dict[str, Any], where: str) -> float:
             faults.add(f"{where}, {key}", f"one of {', '.join(_KEYS)}", "an unknown key")
     start = head.get("start_utc_s")
     if start is not None and (isinstance(start, bool) or not isinstance(start, int | float)):
-        faults.add(f"{where}, start_utc_s", "UTC seconds, or null", repr(start))
+        faults.add(f"{where}, start_utc_s", "UTC seconds, or null", shown(start))
     notes = head.get("notes", [])
     if not (isinstance(notes, list) and all(isinstance(note, str) for note in notes)):
-        faults.add(f"{where}, notes", "a list of texts", repr(notes))
+        faults.add(f"{where}, notes", "a list of texts", shown(notes))
     faults.raise_if_any(InputError)
     try:
         return nan if start is None else float(start)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -9,6 +10,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats, Ints
@@ -30,7 +33,9 @@ _LOWEST_M, _HIGHEST_M = 2.0e7, 5.5e7
 _SELDOM_S = 10.0
 _SOMEWHERE_M = 25.0
 _SLOW_MPS = 0.04
+_ROWS_AT_ONCE = 100_000
 _MOVING = ("motion", "gnss", "truth")
+_PLAIN_NUMBER = r"^-?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?$"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -149,12 +154,40 @@ def _column(column: Column, given: pd.DataFrame, door: _Door) -> Any:
 
 
 def _texts(column: Column, values: pd.Series, door: _Door) -> Any:
-    present = values.notna().to_numpy() & (values.astype(str) != "").to_numpy()
+    if isinstance(values.dtype, pd.StringDtype):
+        # Few texts repeat in many rows; each is kept once.
+        codes, words = pd.factorize(values)
+        known = [*(str(word) or None for word in words), None]
+    else:
+        codes = np.arange(len(values))
+        # Not as text of pandas, which cannot hold half of a surrogate pair.
+        filled = np.array([str(value) != "" for value in values], dtype=np.bool_)
+        present = values.notna().to_numpy() & filled
+        known = [str(v) if ok else None for v, ok in zip(values, present, strict=True)]
+    texts = np.array([*known, None], dtype=object)[:-1][codes]
     if column.required:
-        _add_rows(door, ~present, column, values)
-    texts = [str(v) if ok else None for v, ok in zip(values, present, strict=True)]
+        missing = np.array([*(text is None for text in known), True])[:-1]
+        _add_rows(door, missing[codes], column, values)
+    broken = np.array([*(text is not None and not _is_unicode(text) for text in known), True])[:-1]
+    if broken.any():
+        hint = "half of a surrogate pair: text cut off, or decoded twice"
+        door.add_rows(
+            broken[codes],
+            column.name,
+            column.expected,
+            lambda row: repr(texts[row]),
+            lambda _: hint,
+        )
     # Without the dtype pandas 3 makes these strings, and None becomes NaN.
     return pd.Series(texts, dtype=object)
+
+
+def _is_unicode(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _numbers(values: pd.Series) -> tuple[Floats, Bools]:
@@ -164,14 +197,38 @@ def _numbers(values: pd.Series) -> tuple[Floats, Bools]:
         return number, np.ones(len(number), dtype=bool)
     number = np.full(len(values), np.nan)
     readable = np.ones(len(values), dtype=bool)
-    for row, value in enumerate(values):
-        if _is_empty(value):
+    left: Any = range(len(values))
+    if isinstance(values.dtype, pd.StringDtype):
+        number, left = _plain_numbers(values)
+    given = values.to_numpy(dtype=object) if len(left) else values
+    for row in left:
+        if _is_empty(given[row]):
             continue
         try:
-            number[row] = float(value)
-        except (TypeError, ValueError):
+            number[row] = _number(given[row])
+        except (TypeError, ValueError, OverflowError):
             readable[row] = False
     return number, readable
+
+
+def _plain_numbers(values: pd.Series) -> tuple[Floats, Ints]:
+    """Return texts as floats, and the rows that hold anything but digits, point and exponent."""
+    texts = pa.array(values, type=pa.string(), from_pandas=True)
+    plain = pc.fill_null(pc.match_substring_regex(texts, _PLAIN_NUMBER), False)
+    try:
+        numbers = pc.cast(pc.if_else(plain, texts, None), pa.float64())
+    except pa.ArrowInvalid:
+        # Such as 1e400.
+        return np.full(len(values), np.nan), np.arange(len(values))
+    number = np.array(numbers.to_numpy(zero_copy_only=False), dtype=np.float64)
+    return number, np.flatnonzero(~plain.to_numpy(zero_copy_only=False))
+
+
+def _number(value: object) -> float:
+    """Return a number; ValueError for what only Python takes for one: 1_0, digits of others."""
+    if isinstance(value, str) and (not value.isascii() or "_" in value):
+        raise ValueError
+    return float(value)  # type: ignore[arg-type]
 
 
 def _add_rows(door: _Door, bad: Bools, column: Column, values: pd.Series) -> None:
@@ -180,8 +237,8 @@ def _add_rows(door: _Door, bad: Bools, column: Column, values: pd.Series) -> Non
 
     def hint(row: int) -> str:
         try:
-            number = float(values.iloc[row])
-        except (TypeError, ValueError):
+            number = _number(values.iloc[row])
+        except (TypeError, ValueError, OverflowError):
             return ""
         if number in MISSING_SIGNS:
             return "a sign for a missing value; leave the field empty"
@@ -270,7 +327,7 @@ def _check_milliseconds(table: str, rows: pd.DataFrame, door: _Door) -> None:
 def _sorted_unique(
     table: pd.DataFrame, where: str, notes: tuple[str, ...]
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
-    duplicate = table.duplicated().to_numpy()
+    duplicate = _repeated(table)
     if duplicate.any():
         notes += (f"{where}: {int(duplicate.sum())} exact duplicate rows dropped",)
         table = table[~duplicate]
@@ -279,3 +336,15 @@ def _sorted_unique(
         notes += (f"{where}: out of order in {backwards} places, sorted by time",)
         table = table.sort_values("time_s", kind="stable")
     return table.reset_index(drop=True), notes
+
+
+def _repeated(table: pd.DataFrame) -> Bools:
+    """Return which rows equal an earlier one, part by part where that needs less memory."""
+    time_s = table["time_s"].to_numpy()
+    if not (np.diff(time_s) >= 0).all():
+        return np.asarray(table.duplicated())
+    # Equal rows have equal times, so no part ends between them.
+    cuts = np.searchsorted(time_s, time_s[_ROWS_AT_ONCE::_ROWS_AT_ONCE])
+    ends = [0, *np.unique(cuts).tolist(), len(table)]
+    parts = [table.iloc[a:b].duplicated() for a, b in itertools.pairwise(ends)]
+    return np.concatenate(parts) if parts else np.zeros(0, dtype=np.bool_)

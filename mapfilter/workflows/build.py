@@ -15,21 +15,15 @@ from mapfilter.database.estimate import BuildEstimate, dry_run
 from mapfilter.database.manifest import InputFile
 from mapfilter.database.measured import Readings, read_readings
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.errors import ConfigError, InputError, fail
-from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.names import named_by_plan
+from mapfilter.errors import ConfigError, fail
 from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.workflows.pictures import NETWORK_PICTURES, clear_pictures, draw_network
-from mapfilter.workflows.streets import pixels_on
 from mapfilter.workflows.world import (
     World,
-    area_lattice,
-    check_cells_near,
-    check_crs_of_area,
-    check_scale,
     map_cover,
     planned_rasters,
     raster_cover,
+    raster_world,
 )
 
 PIXELS_A_TASK = 10_000_000
@@ -78,7 +72,7 @@ def run_build(
     target, section = config.database_path, config.database
     if not section.cells:
         return _build_roads(config, progress)
-    rasters, plan, world = _raster_world(config)
+    rasters, plan, world = raster_world(config, planned_rasters(config))
     ensure_writable_folder(target.parent)
     tiles_a_task = 1
     if cluster is not None:
@@ -111,7 +105,7 @@ def run_build(
         routable_points=sum(map(int, counts.values())),
         database=target,
         seconds=time.perf_counter() - began_s,
-        notes=(*rasters.notes, *cover, *world.streets.notes),
+        notes=(*rasters.notes, *plan.notes, *cover, *world.streets.notes),
         pictures=_draw(config, rasters, database, world),
     )
 
@@ -147,7 +141,7 @@ def run_dry_build(config: Config) -> BuildEstimate:
         hint = "a database of roads alone is built in little more time than they are read in"
         raise fail(ConfigError, "database.cells", "true for --dry-run", "false", hint)
     began_s = time.perf_counter()
-    rasters, plan, world = _raster_world(config)
+    rasters, plan, world = raster_world(config, planned_rasters(config))
     section, routes = config.database, world.route_tiles
     _inputs(world)
     reading_s = time.perf_counter() - began_s
@@ -155,35 +149,6 @@ def run_dry_build(config: Config) -> BuildEstimate:
     estimate = dry_run(rasters, plan, routes, **limits, tile_px=section.tile_px)
     # A build reads the same map, plan and headers first.
     return replace(estimate, seconds=estimate.seconds + reading_s)
-
-
-def _raster_world(config: Config) -> tuple[RxLevRasters, CellPlan, World]:
-    """Return rasters, plan, and the world on the rasters' lattice, cut to the area if one is given.
-
-    The rasters are then read as if they held no more than that: a database covers the area that it
-    was built for, and replaces nothing beyond it when merged. A plan by rule is laid out over the
-    whole rasters, as when they were predicted.
-    """
-    rasters = planned_rasters(config)
-    lattice, area = rasters.lattice, config.area
-    check_crs_of_area(area, rasters)
-    check_scale(lattice.crs, lattice.bounds_m, f"{rasters.path}, CRS")
-    whole = world = World(config, lattice)
-    rasters = named_by_plan(rasters, whole.plan)
-    if area.has_box:
-        wanted = area_lattice(area.model_copy(update={"crs": lattice.crs}))
-        found = pixels_on(lattice, wanted.bounds_m)
-        if found is None:
-            covered, asked = (
-                ", ".join(f"{value:.0f}" for value in one.bounds_m) for one in (lattice, wanted)
-            )
-            expected = f"an area that overlaps the rasters {rasters.path} ({covered})"
-            raise fail(InputError, "area", expected, asked, "rasters and roads of different places")
-        cut = lattice.window(*found)
-        if cut != lattice:
-            rasters, world = replace(rasters, lattice=cut), World(config, cut)
-    check_cells_near(whole.plan, world.lattice, str(config.cells.plan or "cells"))
-    return rasters, whole.plan, world
 
 
 def _measured(config: Config) -> tuple[Readings, RxLevRasters] | None:

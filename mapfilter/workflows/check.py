@@ -8,22 +8,22 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
-import rasterio
 from rasterio.errors import RasterioError
 
+from mapfilter._gdal import open_raster
 from mapfilter._parallel import Progress
 from mapfilter.check.findings import CheckResult, Findings, Severity
 from mapfilter.check.raster_checks import check_ids, is_surveyed, sampled
 from mapfilter.check.site_checks import check_against_sites, check_power
 from mapfilter.config.sections import Config
-from mapfilter.errors import MapfilterError, listed
+from mapfilter.errors import InputError, MapfilterError, listed
 from mapfilter.geodesy import Lattice
 from mapfilter.propagation.predict import off_frequency
 from mapfilter.radio.cell_rules import ANTENNAS
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
-from mapfilter.survey.measurement_files import NO_TIME
+from mapfilter.survey.measurement_rows import NO_TIME
 from mapfilter.survey.measurements import Measurements
 from mapfilter.workflows.check_logs import check_logs
 from mapfilter.workflows.check_places import (
@@ -237,6 +237,6 @@ class _Checks:
         with self._reported("landuse-invalid"):
             _ = world.landuse
             if rasters is not None:
-                with suppress(RasterioError), rasterio.open(landuse) as source:
+                with suppress(RasterioError, InputError), open_raster(landuse) as source:
                     grid = source.transform.c, source.transform.a, source.transform.f
                     check_same_pixels(str(landuse), grid, rasters, self.findings)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from mapfilter.check.findings import Findings, Severity
 from mapfilter.config.sections import Config
 from mapfilter.errors import MapfilterError, listed
@@ -41,6 +39,9 @@ def check_logs(
             findings.add_faults(error, "log-invalid")
             continue
         _check_recordings(opened, findings)
+        for note in opened.log.notes:
+            if ", heading_rad: " in note:
+                findings.add("log-headings", str(path), f"{note}.", "warning")
         log = opened.log if lattice is None else in_frame(opened.log, lattice.crs)
         near = lattice is not None and _is_near(path, log, lattice, findings)
         # Motion without any reports is located by the streets alone.
@@ -92,7 +93,8 @@ def _check_cells(path: Path, log: TrackLog, plan: CellPlan, findings: Findings) 
         return
     unknown = ~serving.isin(plan.ids).to_numpy()
     if unknown.any():
-        ids = np.unique(serving.to_numpy(dtype=str)[unknown]).tolist()
+        # The most frequent first.
+        ids = serving[unknown].value_counts().index.astype(str).tolist()
         evidence = f"{int(unknown.sum())} of {len(serving)} reports are of {len(ids)} serving "
         evidence += f"cells that the plan lacks: {listed(ids)}."
         severity: Severity = "error" if unknown.all() else "warning"

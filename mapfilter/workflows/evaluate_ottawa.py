@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from mapfilter._io import ensure_writable_folder, write_json
+from mapfilter._io import ensure_writable_folder, sha256_file, write_json
 from mapfilter._parallel import Progress, local_executor, ordered_results
-from mapfilter._resume import start_or_resume
+from mapfilter._resume import kept_when_stopped, start_or_resume
 from mapfilter.config.sections import Config
 from mapfilter.database.store import open_database
-from mapfilter.errors import InputError, fail
+from mapfilter.errors import InputError, StoreError, fail
 from mapfilter.experiments.benchmarks.ottawa import (
     FOLDER,
     LEFT_OUT,
@@ -138,9 +139,16 @@ def run_ottawa(
         for file in every
     ]
     ensure_writable_folder(out)
-    head = {"version": _VERSION, "seed": seed, "runs": runs, "options": repr(chosen)}
+    data_sha256 = {part: [sha256_file(file) for file in every] for part, every in files.items()}
+    head = {
+        "version": _VERSION,
+        "seed": seed,
+        "runs": runs,
+        "options": repr(chosen),
+        "data": data_sha256,
+    }
     start_or_resume(out / HEAD, head, [task.result for task in tasks], resume=resume)
-    todo = [task for task in tasks if not (resume and task.result.is_file())]
+    todo = [task for task in tasks if not (resume and _is_whole(task.result))]
     before = len(tasks) - len(todo)
 
     def report(done: int, _: int) -> None:
@@ -149,7 +157,11 @@ def run_ottawa(
 
     report(0, 0)
     with local_executor(workers) as executor:
-        list(ordered_results(executor, find_left_out, todo, in_flight=2 * workers, progress=report))
+        results = ordered_results(
+            executor, find_left_out, todo, in_flight=2 * workers, progress=report
+        )
+        with kept_when_stopped("sessions"):
+            deque(results, maxlen=0)
     rows: list[PartRow] = []
     sessions: list[SessionRow] = []
     for part in parts:
@@ -193,6 +205,14 @@ def session_files(data: Path, part: str) -> list[Path]:
         hint = f"--data is the folder that holds {FOLDER}"
         raise fail(InputError, str(folder), expected, len(files), hint)
     return [file.absolute() for file in files]
+
+
+def _is_whole(result: Path) -> bool:
+    try:
+        read_left_out(result)
+    except StoreError:
+        return False
+    return True
 
 
 def _map_of(others: Sequence[Session], folder: Path) -> Path:

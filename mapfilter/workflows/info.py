@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyogrio
-import rasterio
 from pyogrio.errors import DataSourceError
-from rasterio.errors import NotGeoreferencedWarning, RasterioError
+from rasterio.errors import RasterioError
 
+from mapfilter._gdal import open_raster
+from mapfilter._inputs import open_input
+from mapfilter._ogr import vector_source
 from mapfilter.config.load import load_config
 from mapfilter.database.export import BANDS, CELLS_TAG
 from mapfilter.database.manifest import MANIFEST
@@ -135,6 +136,7 @@ def _recordings_in(folder: Path) -> list[str]:
 
 def _layers_info(path: Path) -> dict[str, Any]:
     """Describe the layers of a vector file."""
+    place = vector_source(path)
     try:
         layers = [
             {
@@ -144,8 +146,12 @@ def _layers_info(path: Path) -> dict[str, Any]:
                 "crs": str(about["crs"] or ""),
                 "columns": ", ".join(map(str, about["fields"])),
             }
-            for layer, kind in pyogrio.list_layers(path)
-            for about in [pyogrio.read_info(path, layer=layer, force_feature_count=True)]
+            for layer, kind in pyogrio.list_layers(place.path)
+            for about in [
+                pyogrio.read_info(
+                    place.path, layer=layer, force_feature_count=True, **place.options
+                )
+            ]
         ]
     except (DataSourceError, OSError, ValueError) as error:
         raise fail(InputError, str(path), "a layer that GDAL can read", str(error)) from error
@@ -185,11 +191,8 @@ def _tiff_info(path: Path) -> dict[str, Any]:
 def _described(path: Path) -> tuple[tuple[str | None, ...], bool]:
     """Return the descriptions of a raster's bands, and whether a tag lists cells."""
     try:
-        with warnings.catch_warnings():
-            # A file that is cut off may have lost its place; its own reader reports that.
-            warnings.simplefilter("ignore", NotGeoreferencedWarning)
-            source = rasterio.open(path)
-        with source:
+        # A file that is cut off may have lost its place; its own reader reports that.
+        with open_raster(path) as source:
             return source.descriptions, CELLS_TAG in source.tags()
     except RasterioError:
         return (), False
@@ -198,10 +201,7 @@ def _described(path: Path) -> tuple[tuple[str | None, ...], bool]:
 def _is_classes(path: Path) -> bool:
     """Return whether a raster is a single band of bytes without the tags of levels."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", NotGeoreferencedWarning)
-            source = rasterio.open(path)
-        with source:
+        with open_raster(path) as source:
             is_plain = "quantity" not in {name.casefold() for name in source.tags()}
             return bool(source.count == 1 and source.dtypes[0] == "uint8" and is_plain)
     except RasterioError:
@@ -209,7 +209,7 @@ def _is_classes(path: Path) -> bool:
 
 
 def _geotiff_info(path: Path) -> dict[str, Any]:
-    with rasterio.open(path) as source:
+    with open_raster(path, quiet=False) as source:
         unit = "deg" if source.crs and source.crs.is_geographic else "m"
         found = {
             "crs": short_crs(str(source.crs)) if source.crs else "none",
@@ -227,7 +227,7 @@ def _values_of(path: Path) -> list[int]:
 
     Of a large one they are those of a thinned copy.
     """
-    with rasterio.open(path) as source:
+    with open_raster(path, quiet=False) as source:
         thin = max(1, int(np.ceil((source.height * source.width / _SAMPLED_PX) ** 0.5)))
         shape = (max(1, source.height // thin), max(1, source.width // thin))
         values = np.unique(source.read(1, out_shape=shape, masked=True).compressed())
@@ -243,11 +243,8 @@ def _first_line(path: Path) -> bytes:
 
 
 def _beginning(path: Path) -> bytes:
-    try:
-        with path.open("rb") as stream:
-            return stream.read(_LONGEST_LINE_BYTES)
-    except OSError as error:
-        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
+    with open_input(path) as stream:
+        return stream.read(_LONGEST_LINE_BYTES)
 
 
 def _raster_info(path: Path) -> dict[str, Any]:

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mapfilter._io import ensure_writable_folder, sha256_file
+from mapfilter._io import ensure_writable_folder, replaced_files
 from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
-from mapfilter.database.manifest import MANIFEST, InputFile
+from mapfilter.database.manifest import InputFile
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, fail
 from mapfilter.learning.apply import apply_patch
 from mapfilter.learning.patch import read_patch, write_patch
 from mapfilter.learning.phone import PhoneNoise
-from mapfilter.workflows.learn_report import PATCH, write_report
+from mapfilter.tracks.store import is_log
+from mapfilter.workflows.apart import check_out_apart
+from mapfilter.workflows.learn_report import PATCH, older_report, write_report
 from mapfilter.workflows.learn_study import study_logs
+from mapfilter.workflows.logs import journeys_of
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,7 @@ def run_accept(
     patch = read_patch(patch_file)
     _check_apart(database, out)
     notes = []
-    if patch.database_sha256 != sha256_file(database / MANIFEST):
+    if patch.database_sha256 != opened.generation:
         notes.append("the patch was learned from another database, or an older state of this one")
     ensure_writable_folder(out.parent)
     changed = apply_patch(
@@ -129,15 +133,17 @@ def run_learn(
     """
     began_s = time.perf_counter()
     _check_apart(config.database_path, out)
+    check_out_apart(out, [config.database_path, *filter(is_log, journeys_of(config))])
     report = out.with_name(f"{out.name}-report") if accept else out
     ensure_writable_folder(report)
     taught = study_logs(
         config, report, use_truth=use_truth, workers=workers, resume=resume, progress=progress
     )
-    findings = write_report(taught, report)
     proposed, changed = bool(taught.patch.changes), None
-    if proposed:
-        write_patch(taught.patch, report / PATCH)
+    with replaced_files(report, partial(older_report, report)) as new:
+        findings = write_report(taught, new)
+        if proposed:
+            write_patch(taught.patch, new / PATCH)
     if accept and proposed:
         inputs = (InputFile.of("patch", report / PATCH),)
         changed = apply_patch(taught.database, taught.patch, out, inputs=inputs).path

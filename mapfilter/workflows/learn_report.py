@@ -17,7 +17,6 @@ from mapfilter.learning.patch import Change
 from mapfilter.report.canvas import save
 from mapfilter.report.learned import plot_learned
 from mapfilter.workflows.learn_study import Taught
-from mapfilter.workflows.pictures import clear_pictures
 from mapfilter.workflows.served import served_points, street_map
 
 PATCH, FINDINGS, CELLS, JOURNEYS, MAP = (
@@ -42,10 +41,15 @@ _COLUMNS = (
 _UNITS = {"offset": "dB", "turned": "deg", "rotated": "deg", "moved": "m", "way": "m"}
 
 
+def older_report(out: Path) -> list[Path]:
+    """Return the files of an older report in a folder."""
+    names = PATCH, FINDINGS, CELLS, JOURNEYS, MAP
+    return [path for name in names if (path := out / name).is_file()]
+
+
 def write_report(taught: Taught, out: Path) -> tuple[dict[str, Any], ...]:
     """Write tables and map into a folder, and return the findings."""
     database, lesson, patch = taught.database, taught.lesson, taught.patch
-    clear_pictures(out, (PATCH, FINDINGS, CELLS, JOURNEYS, MAP))
     findings = findings_of(taught)
     _write(pd.DataFrame(findings, columns=_COLUMNS), out / FINDINGS)
     _write(_cells(database, lesson), out / CELLS)

@@ -17,7 +17,6 @@ from mapfilter._io import VERSION, sha256_file
 from mapfilter._parallel import Progress, local_executor, ordered_results
 from mapfilter._resume import FinishedParts
 from mapfilter.config.sections import Config
-from mapfilter.database.manifest import MANIFEST
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
@@ -148,7 +147,7 @@ def study_logs(
         tuple(names),
         lesson,
         tuple(tracks),
-        Patch(database.lattice.crs, sha256_file(path / MANIFEST), len(logs), changes),
+        Patch(database.lattice.crs, database.generation, len(logs), changes),
         unlisted_cells(journeys, database.plan),
         phone_noise(good, lesson.learned.phone_db[lesson.trusted], lesson.learned.sd_db),
         notes,
@@ -210,7 +209,7 @@ class _Study:
         self, database: RadioRouteDatabase, number: int, *, is_blank: bool
     ) -> list[JourneyTrack]:
         """Return the tracks of all journeys over a database; finished ones from disk."""
-        sha256, count = sha256_file(database.path / MANIFEST), len(self.logs)
+        sha256, count = database.generation, len(self.logs)
         found: dict[int, JourneyTrack] = {}
         tasks: dict[int, _Task] = {}
         for i, (name, log) in enumerate(zip(self.names, self.logs, strict=True)):
@@ -243,8 +242,8 @@ def _located(task: _Task) -> bytes:
 
 
 @lru_cache(maxsize=2)
-def _filter(database: Path, choice: FilterOptions, sha256: str) -> Filter[Any]:  # noqa: ARG001
-    return choice.over(open_database(database), ways=False)
+def _filter(database: Path, choice: FilterOptions, sha256: str) -> Filter[Any]:
+    return choice.over(open_database(database, generation=sha256), ways=False)
 
 
 def _smoothing(choice: FilterOptions) -> FilterOptions:
@@ -262,7 +261,7 @@ def _key(
     use_truth: bool,
 ) -> str:
     """Return a checksum of everything that the tracks depend on."""
-    parts = [VERSION, sha256_file(database.path / MANIFEST), repr(choice), seed, use_truth]
+    parts = [VERSION, database.generation, repr(choice), seed, use_truth]
     digest = hashlib.sha256(repr(parts).encode())
     for file in _files(paths):
         digest.update(f"{file.parent.name}/{file.name} {sha256_file(file)}".encode())

@@ -10,7 +10,7 @@ import pandas as pd
 from mapfilter._types import Bools, Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import unproject
-from mapfilter.survey.measurement_files import Rows
+from mapfilter.survey.measurement_rows import Rows
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import format_of, read_recording

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -11,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mapfilter._io import ensure_writable_folder
+from mapfilter._io import ensure_writable_folder, read_json
 from mapfilter._types import Floats, Floats32
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.errors import OutputError, fail
+from mapfilter.errors import OutputError, StoreError, fail
 from mapfilter.evaluation.accuracy import Truth
 from mapfilter.geodesy import Lattice
 from mapfilter.positioning.estimate import PositionedTrack, Snapshot
@@ -64,23 +63,16 @@ _IF_NONE_DBM = (-110.0, -50.0)
 _SQUARE_M = 5.0
 
 
-def clear_results(out: Path) -> None:
-    """Remove the files of an older replay from a folder, so that no figures of two replays mix.
+def older_results(out: Path) -> list[Path]:
+    """Return the files of an older replay in a folder, so that no figures of two replays mix.
 
-    A folder in it is removed where it is named as the log of its figures and holds nothing else.
-    All other files stay.
-
-    Raises
-    ------
-    OutputError
-        A file cannot be removed.
+    Those of a folder in it are among them where it is named as the log of its figures and holds
+    nothing else.
     """
-    clear_pictures(out, (*_OF_ONE_LOG, SUMMARY))
-    with _removal(out):
-        for inner in filter(_is_result, sorted(out.iterdir())):
-            for file in inner.iterdir():
-                file.unlink()
-            inner.rmdir()
+    found = [path for name in (*_OF_ONE_LOG, SUMMARY) if (path := out / name).is_file()]
+    for inner in filter(_is_result, sorted(out.iterdir())):
+        found += inner.iterdir()
+    return found
 
 
 def clear_pictures(folder: Path, names: Iterable[str]) -> None:
@@ -110,8 +102,8 @@ def _is_result(folder: Path) -> bool:
     if folder.is_symlink() or not figures.is_file():
         return False
     try:
-        of = json.loads(figures.read_text(encoding="utf-8")).get("log")
-    except (ValueError, AttributeError, RecursionError):
+        of = read_json(figures).get("log")
+    except StoreError:
         return False
     return of == folder.name and {file.name for file in folder.iterdir()} <= _OF_ONE_LOG
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import rasterio
 from rasterio.errors import RasterioError
 
+from mapfilter._gdal import open_raster
 from mapfilter._io import VERSION, ensure_writable_folder, sha256_file
 from mapfilter._parallel import Progress, part_of
 from mapfilter.config.sections import Config
@@ -21,8 +21,9 @@ from mapfilter.propagation.predict import (
     simulate_ground_truth,
 )
 from mapfilter.radio.cells import write_cell_plan
-from mapfilter.rasters.geotiff import write_rasters
+from mapfilter.rasters.geotiff import is_as_written, write_rasters
 from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
+from mapfilter.workflows.apart import check_no_input_replaced
 from mapfilter.workflows.world import World, check_cells_near, map_cover
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def open_ground_truth(config: Config) -> RxLevRasters:
     rasters = open_rasters(path)
     if named or not prediction.is_file():
         return rasters
-    with rasterio.open(path) as source:
+    with open_raster(path) as source:
         belongs_to = source.tags().get(_PREDICTION_TAG)
     if belongs_to not in (None, sha256_file(prediction)):
         raise fail(
@@ -73,25 +74,26 @@ def open_ground_truth(config: Config) -> RxLevRasters:
 
 
 def check_only_own_replaced(*paths: Path) -> None:
-    """Check that no rasters are replaced that another program made.
+    """Check that no rasters are replaced that another program made, or changed.
 
     Raises
     ------
     OutputError
-        With every path at which there is something else than rasters that mapfilter predicted.
+        With every path at which there is something else than rasters as mapfilter predicted them.
     """
     faults = Faults()
     for path in paths:
         if not path.exists():
             continue
         try:
-            with rasterio.open(path) as source:
+            with open_raster(path) as source:
                 software = str(source.tags().get("SOFTWARE", ""))
-        except RasterioError:
+        except (RasterioError, InputError):
             software = ""
-        if not software.startswith("mapfilter"):
+        if not (software.startswith("mapfilter") and is_as_written(path)):
             expected = "nothing yet, or rasters that mapfilter predicted"
             got = "a folder" if path.is_dir() else f"a file of {software or 'another program'}"
+            got += ", changed since" if software.startswith("mapfilter") else ""
             hint = "[rasters] names your own export; give the prediction another path, or none"
             faults.add(str(path), expected, got, hint)
     faults.raise_if_any(OutputError)
@@ -123,6 +125,8 @@ def run_predict(config: Config, progress: Progress | None = None) -> PredictResu
     check_only_own_replaced(
         target, *([config.deviation_path] if surveyed else [ground_truth] if both else [])
     )
+    outputs = target, ground_truth, config.deviation_path, config.output.dir / "cells.csv"
+    check_no_input_replaced(config, *outputs)
     if surveyed:
         from mapfilter.workflows.survey import run_survey
 

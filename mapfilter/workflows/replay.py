@@ -6,13 +6,14 @@ import hashlib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
-from mapfilter._io import ensure_writable_folder, path_fault, shown, write_json
+from mapfilter._inputs import path_fault, shown
+from mapfilter._io import replaced_files, write_json
 from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -36,8 +37,10 @@ from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog, leave_out
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import in_frame
+from mapfilter.tracks.store import is_log
+from mapfilter.workflows.apart import check_out_apart
 from mapfilter.workflows.logs import journeys_of, open_journey
-from mapfilter.workflows.pictures import ESTIMATES, FIGURES, SUMMARY, clear_results, draw_track
+from mapfilter.workflows.pictures import ESTIMATES, FIGURES, SUMMARY, draw_track, older_results
 from mapfilter.workflows.replay_baseline import Baselines, SingleReports, together
 from mapfilter.workflows.replay_lacks import advice_of, check_log, lack_of
 from mapfilter.workflows.terminal import to_jsonable
@@ -163,7 +166,7 @@ class ReplayResult:
     def warnings(self) -> tuple[str, ...]:
         """What was done in part only: cells unknown to the database, logs that lack something."""
         found = []
-        unknown = _sum(log.outcome.unknown_cells for log in self.logs)
+        unknown = _most_frequent(log.outcome.unknown_cells for log in self.logs)
         if unknown:
             verb = "cell is" if len(unknown) == 1 else "cells are"
             where = _named([log.name for log in self.logs if log.outcome.unknown_cells])
@@ -203,7 +206,7 @@ def summary_figures(result: ReplayResult) -> dict[str, Any]:
         "switched": sum(outcome.switched for outcome in outcomes),
         "final_statuses": _sum({o.final_status: 1} for o in outcomes if o.final_status),
         "unused": _sum(outcome.unused for outcome in outcomes),
-        "unknown_cells": _sum(outcome.unknown_cells for outcome in outcomes),
+        "unknown_cells": _most_frequent(outcome.unknown_cells for outcome in outcomes),
         "logs_with_unknown_cells": [log.name for log in result.logs if log.outcome.unknown_cells],
         "notes": _shared_notes(result.logs),
         **_beside(together([log.baseline for log in result.logs])),
@@ -234,6 +237,10 @@ def _sum(counts: Iterable[Mapping[str, int]]) -> dict[str, int]:
     for count in counts:
         total.update(count)
     return dict(sorted(total.items()))
+
+
+def _most_frequent(counts: Iterable[Mapping[str, int]]) -> dict[str, int]:
+    return dict(sorted(_sum(counts).items(), key=lambda one: -one[1]))
 
 
 def _named(names: Sequence[str]) -> str:
@@ -288,22 +295,24 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         plan = sites(crs)
         return cast(KalmanFilter, fitted).over_sites(plan, plan_antennas(config, plan))
 
+    own = [database.path] if database is not None else []
+    check_out_apart(out, [*own, *(path for path in journeys.paths if is_log(path))])
     if database is None and config.cells.plan is None:
         journeys.check_siteless()
     if database is not None:
         journeys.check(database.lattice)
         over(database.lattice.crs, options, cells=True)
-    ensure_writable_folder(out)
-    clear_results(out)
-    logs: list[ReplayedLog] = []
     baselines = Baselines(database, config.journeys.seed)
     wanted, count = config.output.pictures, len(journeys.paths)
     risk = config.integrity.of(IntegrityOptions).risk
-    for index, path in enumerate(journeys.paths):
+
+    def located(index: int, path: Path, new: Path) -> ReplayedLog:
         opened = journeys.open(path)
         name, crs = opened.name, opened.log.crs if database is None else database.lattice.crs
         log = leave_out(name_by_plan(opened.log, sites(crs)), config.track.without)
         fitted, notes = fitted_to_log(options, log)
+        if database is None:
+            notes = (*notes, *sites(crs).notes)
         if database is not None and by_streets_alone(fitted, log, database):
             notes = (*notes, STREETS_ALONE)
         filter_ = over(crs, fitted, cells=STREETS_ALONE not in notes)
@@ -311,7 +320,7 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         rng = named_rng(config.journeys.seed, "replay", name)
         drawn = wanted == "all" or (wanted == "first" and not index)
         track = locate(log, filter_, rng, snapshots=drawn, risk=risk)
-        into = out if count == 1 else out / name
+        into = new if count == 1 else new / name
         baseline = baselines.of(log)
         if database is None:
             pictures = _draw_errors(log, track, into) if drawn else ()
@@ -321,12 +330,20 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         if database is not None and (STREETS_ALONE in notes or not database.cell_ids):
             log = replace(log, notes=(*log.notes, *advice_of(log, fitted, track.estimate)))
         lack = lack_of(opened, log, options, track.estimate, database)
-        logs.append(_write(name, log, track, into, pictures, lack, baseline))
-        if progress is not None:
-            progress(index + 1, count)
-    result = ReplayResult(config.filter.name, tuple(logs), summary_of(logs), out)
-    if count > 1:
-        write_json(out / SUMMARY, to_jsonable(summary_figures(result)))
+        written = _write(name, log, track, into, pictures, lack, baseline)
+        files = tuple(out / file.relative_to(new) for file in written.outputs)
+        return replace(written, outputs=files)
+
+    # Older results stay until all of these are whole.
+    with replaced_files(out, partial(older_results, out)) as new:
+        logs = []
+        for index, path in enumerate(journeys.paths):
+            logs.append(located(index, path, new))
+            if progress is not None:
+                progress(index + 1, count)
+        result = ReplayResult(config.filter.name, tuple(logs), summary_of(logs), out)
+        if count > 1:
+            write_json(new / SUMMARY, to_jsonable(summary_figures(result)))
     return result
 
 

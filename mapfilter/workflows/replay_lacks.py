@@ -81,8 +81,8 @@ def lack_of(
         return f"{lack} ({_BY_STREETS})"
     if "no motion" not in lack:
         return lack
-    if _has_positions(opened):
-        return f"{lack} (--course-motion, track.course_motion, makes it from the positions)"
+    if source := _receiver_motion(opened):
+        return f"{lack} (--course-motion, track.course_motion, makes it from {source})"
     if has_cells and len(log.radio):
         return f"{lack} (mapfilter locate needs none)"
     return lack
@@ -112,10 +112,14 @@ def advice_of(log: TrackLog, options: Any, estimate: TrackEstimate) -> tuple[str
     return tuple(notes)
 
 
-def _has_positions(opened: OpenedLog) -> bool:
-    """Return whether recordings of the log, or of its truth, have positions to make motion of."""
-    tables = [recording.tables.get("positions") for recording in opened.recordings]
-    return any(rows is not None and len(rows) > 1 for rows in tables)
+def _receiver_motion(opened: OpenedLog) -> str:
+    """Return what positions of the log, or of its truth, make motion of; "" without them."""
+    every = [r.tables.get("positions", r.tables.get("places")) for r in opened.recordings]
+    placed = [rows for rows in every if rows is not None and rows["time_s"].nunique() > 1]
+    courses = (rows["course_deg"] for rows in placed if "course_deg" in rows)
+    if any(course.notna().any() for course in courses):
+        return "speed and course"
+    return "positions" if placed else ""
 
 
 def lacking(

@@ -10,7 +10,6 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from mapfilter._types import Bools, Floats, Floats32, Ints, Ints32
-from mapfilter.database.manifest import POINTS
 from mapfilter.database.parquet import WindowReader
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
@@ -179,7 +178,7 @@ def served_points(database: RadioRouteDatabase, window: Window | None = None) ->
     on_square = np.zeros(best.server.shape, dtype=np.bool_)
     counts = np.zeros(len(database.cell_ids), dtype=np.int64)
     ids = pa.array(database.cell_ids, type=pa.string())
-    reader = WindowReader([database.path / POINTS], _COLUMNS, database.lattice)
+    reader = WindowReader([database.points_part], _COLUMNS, database.lattice)
     for row, col, height, width in database.lattice.window(top, left, rows, cols).tiles(_BLOCK_PX):
         read = reader.read((top + row, left + col, height, width))
         if not read or not len(read["row"]):

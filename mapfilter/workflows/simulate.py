@@ -9,7 +9,6 @@ from mapfilter._io import atomic_dir
 from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
 from mapfilter.errors import OutputError, fail, listed
-from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import check_against_plan
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.journeys import JourneyPlan
@@ -19,7 +18,7 @@ from mapfilter.simulation.walking import WalkerModel, inside_buildings
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.store import check_log_replaceable, is_log, write_log
 from mapfilter.workflows.predict import open_ground_truth
-from mapfilter.workflows.world import World, check_cells_near, lattice_on, planned_rasters
+from mapfilter.workflows.world import planned_rasters, raster_cover, raster_world
 
 
 @dataclass(frozen=True)
@@ -34,6 +33,8 @@ class SimulateResult:
     """Folder that holds one log folder for each."""
     notes: tuple[str, ...] = ()
     """Which journeys receive nothing, and how rasters were read."""
+    partial: bool = False
+    """Whether none of the journeys receives anything."""
 
 
 def run_simulate(config: Config, progress: Progress | None = None) -> SimulateResult:
@@ -41,20 +42,18 @@ def run_simulate(config: Config, progress: Progress | None = None) -> SimulateRe
     settings = simulation_settings(config)
     as_predicted = settings.reports.radio == "as_predicted"
     rasters = planned_rasters(config) if as_predicted else open_ground_truth(config)
-    world = World(config, lattice_on(config.area, rasters))
-    rasters = named_by_plan(rasters, world.plan)
-    check_against_plan(rasters, world.plan)
-    check_cells_near(world.plan, world.lattice, str(config.cells.plan or "cells"))
+    rasters, plan, world = raster_world(config, rasters)
+    check_against_plan(rasters, plan)
     _check_replaceable(config.track_path)
     network = street_network(world.ways, world.routes)
-    levels = level_sampler(rasters, world.plan.ids, world.lattice.bounds_m, plan=world.plan)
+    levels = level_sampler(rasters, plan.ids, world.lattice.bounds_m, plan=plan)
     total, silent = settings.journeys * settings.draws, []
     with atomic_dir(config.track_path) as folder:
         track_m = 0.0
         centred = settings.journey.walker.beside == "centre"
         inside = None if centred else inside_buildings(world.heights_m, world.lattice)
         seed = config.journeys.seed
-        journeys = simulate_journeys(network, levels, world.plan, settings, seed, inside)
+        journeys = simulate_journeys(network, levels, plan, settings, seed, inside)
         for done, (name, log) in enumerate(journeys, start=1):
             write_log(log, folder / name)
             track_m = log.truth_length_m
@@ -62,10 +61,10 @@ def run_simulate(config: Config, progress: Progress | None = None) -> SimulateRe
                 silent.append(name)
             if progress is not None:
                 progress(done, total)
-    notes = list(rasters.notes)
+    notes = [*rasters.notes, *raster_cover(config.area, world.lattice)]
     if silent:
         notes.append(f"no cell is received in {len(silent)} of {total} journeys ({listed(silent)})")
-    return SimulateResult(total, track_m, config.track_path, tuple(notes))
+    return SimulateResult(total, track_m, config.track_path, tuple(notes), len(silent) == total)
 
 
 def _check_replaceable(folder: Path) -> None:

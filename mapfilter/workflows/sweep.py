@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from mapfilter._io import ensure_writable_folder
+from mapfilter._io import ensure_writable_folder, replaced_files
 from mapfilter._parallel import Progress, executor_of
 from mapfilter.config.axes import parse_axis
 from mapfilter.config.load import load_config, load_keys
@@ -41,6 +43,7 @@ from mapfilter.workflows.sweep_plan import sweep_databases, sweep_plans, sweep_w
 
 _WHITE = {f"{section}{name}" for section in ("", "imu.") for name in NOISE_AXES[:2]}
 _MOST_CURVES, _MOST_GROUPS = 8, 16
+_OWN = re.compile(r"table\.(csv|tex)|(success|success-map|distributions)(-[0-9]+)?\.png")
 _PLACES = ("sweep.databases", "database.path", "output.dir")
 
 
@@ -213,14 +216,22 @@ def run_sweep(
     runs = read_runs(table)
     cells = success_cells(runs)
     shown = cell_table(cells)
+    # Pictures of an older sweep do not stay beside the table of this one.
+    with replaced_files(out, partial(_older, out)) as new:
+        tables = [write_table(shown, new / f"table{suffix}") for suffix in (".csv", ".tex")]
+        pictures = () if config.output.pictures == "none" else draw_sweep(runs, new)
     return SweepResult(
         len(runs),
         cells,
         table,
-        tuple(write_table(shown, out / f"table{suffix}") for suffix in (".csv", ".tex")),
-        () if config.output.pictures == "none" else draw_sweep(runs, out),
+        tuple(out / file.name for file in tables),
+        tuple(out / file.name for file in pictures),
         time.perf_counter() - began_s,
     )
+
+
+def _older(out: Path) -> list[Path]:
+    return [path for path in out.iterdir() if _OWN.fullmatch(path.name) and path.is_file()]
 
 
 @contextlib.contextmanager

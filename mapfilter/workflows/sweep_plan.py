@@ -31,7 +31,6 @@ from mapfilter.geodesy import Lattice
 from mapfilter.propagation.models import GroundTruthErrors
 from mapfilter.propagation.shadowing import site_shadowing
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import check_against_plan
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.network import street_network
@@ -40,11 +39,9 @@ from mapfilter.simulation.walking import WalkerModel
 from mapfilter.workflows.predict import open_ground_truth
 from mapfilter.workflows.simulate import simulation_settings
 from mapfilter.workflows.world import (
-    World,
-    check_cells_near,
     filter_choice,
-    lattice_on,
     planned_rasters,
+    raster_world,
 )
 
 GROUND_TRUTH = "ground truth"
@@ -199,26 +196,23 @@ def sweep_world(config: Config, radios: Sequence[Radio]) -> SweepWorld:
         real: open_ground_truth(config) if real else planned_rasters(config)
         for real in sorted({name == GROUND_TRUTH for name in names})
     }
-    world = World(config, lattice_on(config.area, next(iter(opened.values()))))
-    for real in opened:
-        rasters = opened[real] = named_by_plan(opened[real], world.plan)
-        check_against_plan(rasters, world.plan)
     lattices = [rasters.lattice for rasters in opened.values()]
     if len(set(lattices)) > 1:
         expected = "ground truth rasters on the lattice of the predicted ones"
         raise fail(InputError, str(config.ground_truth_path), expected, "another")
-    check_cells_near(world.plan, world.lattice, str(config.cells.plan or "cells"))
-    levels_dbm = {real: all_levels_dbm(rasters, world.plan) for real, rasters in opened.items()}
+    for real in opened:
+        opened[real], plan, world = raster_world(config, opened[real])
+        check_against_plan(opened[real], plan)
+    lattice = world.lattice
+    levels_dbm = {real: all_levels_dbm(rasters, plan) for real, rasters in opened.items()}
     received = {
-        radio.name: _predicted(
-            config, radio, levels_dbm[radio.name == GROUND_TRUTH], lattices[0], world.plan
-        )
+        radio.name: _predicted(config, radio, levels_dbm[radio.name == GROUND_TRUTH], lattice, plan)
         for radio in radios
     }
     on_pavement = config.journeys.of(WalkerModel).beside != "centre"
-    heights_m = rasterise_heights(world.buildings, lattices[0]) if on_pavement else None
+    heights_m = rasterise_heights(world.buildings, lattice) if on_pavement else None
     network = street_network(world.ways, world.routes)
-    return SweepWorld(network, world.plan, lattices[0], received, heights_m)
+    return SweepWorld(network, plan, lattice, received, heights_m)
 
 
 def _predicted(

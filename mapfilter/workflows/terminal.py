@@ -8,13 +8,16 @@ import dataclasses
 import errno
 import json
 import math
+import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mapfilter.errors import MapfilterError
+from mapfilter._printing import printable, printable_json, write
+from mapfilter.errors import MapfilterError, Stopped
 
 if TYPE_CHECKING:
     from mapfilter._parallel import Progress
@@ -25,23 +28,34 @@ WRONG = 2
 """Exit code: the input or the command is wrong, or the machine too small for it."""
 
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_MOST_COUNTS = 12
 _MAX_TABLE_WIDTH = 200
+_STOPS = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+)
 
 
 def print_message(text: str, kind: str = "") -> None:
     """Write lines to stderr, each with the program's name and ``kind`` before it."""
-    for line in text.splitlines():
-        sys.stderr.write(f"mapfilter: {kind}{line}\n")
+    for line in text.split("\n"):
+        write(sys.stderr, f"mapfilter: {kind}{printable(line)}\n")
+
+
+def print_text(text: str) -> None:
+    """Write lines to stdout."""
+    write(sys.stdout, printable(text) + "\n")
 
 
 def print_result(result: Any, as_json: bool) -> None:
     """Print a result on stdout: one JSON line, or one line for each figure."""
     found = to_jsonable(result)
-    lines = (
-        [json.dumps(found, ensure_ascii=False, allow_nan=False)] if as_json else text_lines(found)
-    )
-    for line in lines:
-        sys.stdout.write(line + "\n")
+    if as_json:
+        ascii_only = not (sys.stdout.encoding or "utf-8").lower().startswith("utf")
+        text = json.dumps(found, ensure_ascii=ascii_only, allow_nan=False)
+        write(sys.stdout, printable_json(text) + "\n")
+        return
+    for line in text_lines(found):
+        print_text(line)
 
 
 @contextlib.contextmanager
@@ -110,10 +124,52 @@ def rate_bar(label: str, unit: str, every_s: float = 30.0) -> Iterator[Progress]
         yield show
 
 
-def guarded(run: Callable[[], int | None]) -> int:
-    """Run a command and return its exit code, 0 for none; errors of input go to stderr."""
+@contextlib.contextmanager
+def stop_signals() -> Iterator[None]:
+    """Raise Stopped within the block when a signal asks the process to end; a second one ends it.
+
+    So what is half-written is removed, and workers are ended.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def stop(number: int, _: object) -> None:
+        for one in _STOPS:
+            signal.signal(one, signal.SIG_DFL)
+        raise Stopped(number)
+
+    before = {one: signal.getsignal(one) for one in _STOPS}
+    for one, handler in before.items():
+        if handler is not signal.SIG_IGN:
+            signal.signal(one, stop)
     try:
-        return run() or 0
+        yield
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+
+
+def stopped_text(error: BaseException) -> str:
+    """Return what is kept when a command was stopped, and how to go on."""
+    number = error.signal_number if isinstance(error, Stopped) else signal.SIGINT
+    kept = getattr(error, "__notes__", None) or [
+        "nothing half-written is left, older results are as they were; run the command again"
+    ]
+    return f"stopped by {signal.Signals(number).name}: {'; '.join(dict.fromkeys(kept))}"
+
+
+def guarded(run: Callable[[], int | None]) -> int:
+    """Run a command and return its exit code, 0 for none; errors of input go to stderr.
+
+    When a signal stops it, stderr gets what is kept, and the code is 128 and the signal's number.
+    """
+    try:
+        with stop_signals():
+            return run() or 0
+    except Stopped as error:
+        print_message(stopped_text(error))
+        return 128 + error.signal_number
     except MapfilterError as error:
         print_message(str(error), "error: ")
     except MemoryError:
@@ -151,7 +207,8 @@ def to_jsonable(value: Any) -> Any:
 def text_lines(found: Mapping[str, Any], indent: str = "") -> Iterator[str]:
     r"""Yield one line for each figure, nested ones indented; none for what is empty.
 
-    Rows of the same figures are a table, where it is not too wide.
+    Rows of the same figures are a table, where it is not too wide. Of many counts the largest are
+    shown, and what the others add up to.
 
     Examples
     --------
@@ -168,19 +225,32 @@ def text_lines(found: Mapping[str, Any], indent: str = "") -> Iterator[str]:
       name      runs
       levels-6    20
       cell-20      5
+    >>> counts = {f"cell-{i}": i for i in range(1, 20)}
+    >>> print(*list(text_lines({"unknown_cells": counts}))[-2:], sep="\n")
+      cell-8: 8
+      7 more: 28
     """
     for key, value in found.items():
         if isinstance(value, Mapping | list) and not value:
             continue
         if isinstance(value, Mapping):
             yield f"{indent}{key}:"
-            yield from text_lines(value, indent + "  ")
+            yield from text_lines(_largest(value), indent + "  ")
         elif isinstance(value, list):
             yield f"{indent}{key}:"
             for line in _table(value) or (_one_line(item, key) for item in value):
                 yield f"{indent}  {line}"
         else:
             yield f"{indent}{key}: {_short(value, key)}"
+
+
+def _largest(found: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the largest of many counts, and the sum of the others; anything else as it is."""
+    if len(found) <= _MOST_COUNTS or not all(type(value) is int for value in found.values()):
+        return found
+    rows = sorted(found.items(), key=lambda one: -one[1])
+    rest = rows[_MOST_COUNTS:]
+    return {**dict(rows[:_MOST_COUNTS]), f"{len(rest)} more": sum(count for _, count in rest)}
 
 
 def _table(rows: list[Any]) -> list[str]:

@@ -22,6 +22,7 @@ from mapfilter.positioning.locators import BUILT_IN, filter_options
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan, read_cell_plan
 from mapfilter.radio.msi import read_antennas
+from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
@@ -31,7 +32,7 @@ from mapfilter.roads.routes import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings, Ways
 from mapfilter.simulation.layout import lay_out_plan
 from mapfilter.workflows.streets import LARGEST_AREA_PX as LARGEST_AREA_PX
-from mapfilter.workflows.streets import Streets
+from mapfilter.workflows.streets import Streets, pixels_on
 from mapfilter.workflows.streets import area_lattice as area_lattice
 from mapfilter.workflows.streets import check_scale as check_scale
 from mapfilter.workflows.streets import roads_lattice as roads_lattice
@@ -95,21 +96,46 @@ def check_crs_of_area(area: Area, rasters: RxLevRasters) -> None:
         raise fail(InputError, f"{rasters.path}, CRS", expected, found, hint)
 
 
-def lattice_on(area: Area, rasters: RxLevRasters) -> Lattice:
-    """Return the lattice of the area's box, in the CRS of the rasters; else that of the rasters.
+def covered_lattice(area: Area, rasters: RxLevRasters) -> Lattice:
+    """Return the lattice of the rasters, cut to the area's box if it has one.
 
-    Journeys beyond the rasters would receive nothing.
+    This is the area that a database covers and in which journeys go: beyond it nothing is received.
 
     Raises
     ------
     InputError
-        The area states another CRS than the rasters.
+        The area states another CRS than the rasters, or does not overlap them.
     """
     lattice = rasters.lattice
     check_crs_of_area(area, rasters)
     if not area.has_box:
         return lattice
-    return area_lattice(area.model_copy(update={"crs": lattice.crs}))
+    wanted = area_lattice(area.model_copy(update={"crs": lattice.crs}))
+    found = pixels_on(lattice, wanted.bounds_m)
+    if found is None:
+        covered, asked = (
+            ", ".join(f"{value:.0f}" for value in one.bounds_m) for one in (lattice, wanted)
+        )
+        expected = f"an area that overlaps the rasters {rasters.path} ({covered})"
+        raise fail(InputError, "area", expected, asked, "rasters and roads of different places")
+    return lattice.window(*found)
+
+
+def raster_world(config: Config, rasters: RxLevRasters) -> tuple[RxLevRasters, CellPlan, World]:
+    """Return rasters, plan, and the world on the rasters' lattice, cut to the area if one is given.
+
+    The rasters are then read as if they held no more than that: a database covers the area that it
+    was built for, and replaces nothing beyond it when merged. A plan by rule is laid out over the
+    whole rasters, as when they were predicted.
+    """
+    lattice = covered_lattice(config.area, rasters)
+    check_scale(rasters.lattice.crs, rasters.lattice.bounds_m, f"{rasters.path}, CRS")
+    whole = world = World(config, rasters.lattice)
+    rasters = named_by_plan(rasters, whole.plan)
+    if lattice != rasters.lattice:
+        rasters, world = replace(rasters, lattice=lattice), World(config, lattice)
+    check_cells_near(whole.plan, world.lattice, str(config.cells.plan or "cells"))
+    return rasters, whole.plan, world
 
 
 def planned_cells(config: Config, crs: str, area: Lattice | None = None) -> CellPlan:

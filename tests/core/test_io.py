@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from mapfilter import _io
+from mapfilter import _replace
 from mapfilter._io import (
     atomic_dir,
     atomic_file,
@@ -195,7 +195,7 @@ class Failing(Refusing):
 
 @pytest.mark.parametrize("library", [NoSystemCalls, Refusing])
 def test_two_renames_where_the_system_cannot_exchange(tmp_path, monkeypatch, library):
-    monkeypatch.setattr(_io.ctypes, "CDLL", library)
+    monkeypatch.setattr(_replace.ctypes, "CDLL", library)
     write_folder(tmp_path / "folder", "first")
     write_folder(tmp_path / "folder", "second")
     assert read_folder(tmp_path / "folder") == {"deep/part": "second"}
@@ -203,7 +203,7 @@ def test_two_renames_where_the_system_cannot_exchange(tmp_path, monkeypatch, lib
 
 
 def test_an_exchange_that_is_forbidden_is_told_and_keeps_the_old(tmp_path, monkeypatch):
-    monkeypatch.setattr(_io.ctypes, "CDLL", Failing)
+    monkeypatch.setattr(_replace.ctypes, "CDLL", Failing)
     write_folder(tmp_path / "folder", "first")
     fault = told(tmp_path / "folder", lambda: write_folder(tmp_path / "folder", "second"))
     assert fault.got == "Permission denied"
@@ -212,7 +212,7 @@ def test_an_exchange_that_is_forbidden_is_told_and_keeps_the_old(tmp_path, monke
 
 
 def test_a_second_rename_that_fails_is_undone(tmp_path, monkeypatch):
-    monkeypatch.setattr(_io.ctypes, "CDLL", NoSystemCalls)
+    monkeypatch.setattr(_replace.ctypes, "CDLL", NoSystemCalls)
     write_folder(tmp_path / "folder", "first")
     rename = type(tmp_path).rename
 

@@ -1,6 +1,8 @@
 """Errors of writing are told as such, links are followed, and nothing of others is replaced."""
 
 import errno
+import hashlib
+import json
 import os
 import subprocess
 import sys
@@ -8,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from mapfilter._io import atomic_dir, atomic_file, check_replaceable, check_version
+from mapfilter._io import atomic_dir, atomic_file, check_replaceable, check_version, sealed
 from mapfilter.errors import OutputError, StoreError
 
 
@@ -148,7 +150,13 @@ def test_folders_that_cannot_be_synced_are_let_go(tmp_path, monkeypatch):
     assert read_folder(tmp_path / "folder") == {"deep/part": "text"}
 
 
-HEAD = '{"format": "a thing", "parts": [{"path": "one"}, {"path": "deep/two"}, 3, {}]}'
+EMPTY = hashlib.sha256(b"").hexdigest()
+LISTED = [{"path": path, "sha256": EMPTY} for path in ("one", "deep/two", "notes.txt", "../x")]
+HEAD = json.dumps({"format": "a thing", "parts": [*LISTED, 3, {}]})
+
+
+def check(folder):
+    check_replaceable(folder, "head.json", "a thing", {"one", "deep/two", "../x"}.__contains__)
 
 
 @pytest.mark.parametrize(
@@ -158,29 +166,77 @@ HEAD = '{"format": "a thing", "parts": [{"path": "one"}, {"path": "deep/two"}, 3
         ({"head.json": HEAD, "one": "", "deep/two": ""}, None),
         ({"head.json": HEAD, "one": "", "deep/three": ""}, "deep/three"),
         ({"head.json": HEAD, ".hidden": ""}, ".hidden"),
+        ({"head.json": HEAD, "one": "changed by hand"}, "one"),
+        ({"head.json": HEAD, "notes.txt": ""}, "notes.txt"),
+        ({"head.json": json.dumps(sealed(json.loads(HEAD))), "one": ""}, None),
+        (
+            {"head.json": json.dumps({**sealed(json.loads(HEAD)), "more": 1}), "one": ""},
+            "head.json, one",
+        ),
         ({"head.json": '{"format": "other", "parts": []}'}, "head.json"),
         ({"head.json": '{"format": "a thing"}'}, "head.json"),
         ({"head.json": HEAD[:20], "one": ""}, "head.json, one"),
         ({"a": "", "b": "", "c": "", "d": ""}, "a, b, c, …"),
     ],
 )
-def test_only_what_a_head_lists_may_be_replaced(tmp_path, files, foreign):
+def test_only_what_a_head_lists_and_is_as_it_was_may_be_replaced(tmp_path, files, foreign):
     folder = tmp_path / "folder"
-    check_replaceable(folder, "head.json", "a thing")
+    (tmp_path / "x").touch()
+    check(folder)
     (folder / "deep").mkdir(parents=True)
     for name, text in files.items():
         (folder / name).write_text(text)
     if foreign is None:
-        check_replaceable(folder, "head.json", "a thing")
+        check(folder)
     else:
-        fault = told(folder, lambda: check_replaceable(folder, "head.json", "a thing"))
+        fault = told(folder, lambda: check(folder))
         assert fault.got == f"other files ({foreign})"
 
 
 def test_a_link_in_a_folder_is_somebody_elses(tmp_path):
     (tmp_path / "folder").mkdir()
     (tmp_path / "folder" / "link").symlink_to(tmp_path)
-    told(tmp_path / "folder", lambda: check_replaceable(tmp_path / "folder", "head.json", "x"))
+    told(tmp_path / "folder", lambda: check(tmp_path / "folder"))
+
+
+def test_what_is_put_into_a_folder_or_changed_there_while_it_is_replaced_is_kept(tmp_path):
+    folder = tmp_path / "folder"
+    write_folder(folder, "old")
+    (folder / "plain").write_text("old")
+    with atomic_dir(folder) as new:
+        (new / "part").write_text("new")
+        (folder / "deep" / "mine").write_text("of the user")
+        (folder / "plain").write_text("edited")
+    assert read_folder(folder) == {"part": "new"}
+    assert read_folder(tmp_path / "folder.kept") == {"deep/mine": "of the user", "plain": "edited"}
+    with atomic_dir(folder) as new:
+        (new / "part").write_text("newer")
+        (folder / "mine too").write_text("of the user")
+    assert read_folder(tmp_path / "folder.kept2") == {"mine too": "of the user"}
+    assert names(tmp_path) == ["folder", "folder.kept", "folder.kept2"]
+
+
+def test_so_it_is_when_the_writer_is_killed_after_the_exchange(tmp_path):
+    code = """
+import os, sys
+from pathlib import Path
+from mapfilter import _io
+folder = Path(sys.argv[1])
+_io.discard = lambda *_: os._exit(9)
+with _io.atomic_dir(folder) as new:
+    (new / "part").write_text("new")
+    (folder / "mine").write_text("of the user")
+"""
+    folder = tmp_path / "folder"
+    write_folder(folder, "old")
+    run = subprocess.run([sys.executable, "-c", code, str(folder)], check=False)
+    assert run.returncode == 9
+    assert read_folder(folder) == {"part": "new"}
+    with atomic_dir(folder) as new:
+        (new / "part").write_text("newer")
+    assert read_folder(folder) == {"part": "newer"}
+    assert read_folder(tmp_path / "folder.kept") == {"mine": "of the user"}
+    assert names(tmp_path) == ["folder", "folder.kept"]
 
 
 def test_versions():

@@ -49,7 +49,7 @@ def dies(number):
 @pytest.mark.parametrize("tasks", [4, 40])
 def test_a_worker_that_dies_is_told(tasks):
     with (
-        pytest.raises(MapfilterError, match=r"worker processes.*one that died.*memory"),
+        pytest.raises(MapfilterError, match=r"worker processes.*ended with exit code 9 .*memory"),
         local_executor(2) as executor,
     ):
         list(ordered_results(executor, dies, range(tasks), in_flight=4))

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_database, make_plan, make_world
 
+from mapfilter._io import sealed
 from mapfilter.database.export import export_geopackage
 from mapfilter.database.manifest import apart, levels_folders
 from mapfilter.database.store import info, open_database, read_cells, write_cells
@@ -35,7 +36,7 @@ def copy(database, tmp_path):
 
 def change_manifest(folder, **changes):
     manifest = json.loads((folder / "manifest.json").read_text())
-    (folder / "manifest.json").write_text(json.dumps({**manifest, **changes}))
+    (folder / "manifest.json").write_text(json.dumps(sealed({**manifest, **changes})))
 
 
 def test_what_was_built_is_what_is_opened(database, world):
@@ -97,6 +98,7 @@ def test_a_missing_database(tmp_path):
     ("changes", "message"),
     [
         ({"version": 3}, "newer"),
+        ({"version": 1}, "older mapfilter; make it again"),
         ({"version": 0}, "version 2, found 0 .likely: edited"),
         ({"version": None}, "version 2, found None .likely: edited"),
         ({"format": "something else"}, "format"),
@@ -122,7 +124,7 @@ def test_manifests_that_are_refused(copy, changes, message):
 def test_a_manifest_that_lacks_a_field(copy, key):
     manifest = json.loads((copy / "manifest.json").read_text())
     del manifest[key]
-    (copy / "manifest.json").write_text(json.dumps(manifest))
+    (copy / "manifest.json").write_text(json.dumps(sealed(manifest)))
     with pytest.raises(StoreError, match=f"{key}: expected a value, found none"):
         open_database(copy)
 
@@ -155,7 +157,7 @@ def test_a_manifest_with_a_wrong_value(copy, place, value, message):
     for key in place[:-1]:
         within = within[key]
     within[place[-1]] = value
-    (copy / "manifest.json").write_text(json.dumps(manifest))
+    (copy / "manifest.json").write_text(json.dumps(sealed(manifest)))
     with pytest.raises(StoreError) as caught:
         open_database(copy)
     assert message in str(caught.value)

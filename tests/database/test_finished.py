@@ -1,7 +1,9 @@
 """What a finished tile depends on: with any of it changed, resuming makes the tile again."""
 
 import contextlib
+import re
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,9 +11,9 @@ import pytest
 import shapely
 from small_world import CRS, FLOOR_DBM, LATTICE, levels_of, make_plan, make_routes
 
+from mapfilter import _resume
 from mapfilter._parallel import SerialExecutor
 from mapfilter._resume import FinishedParts
-from mapfilter.database import build as finished
 from mapfilter.database.build import build, work_key
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes
 from mapfilter.errors import InputError, OutputError
@@ -146,13 +148,54 @@ def test_the_key_tells_every_input_apart(inputs):
     assert key(inputs, parameters=PARAMETERS | {"margin_db": 3.0}) == keys[0]
 
 
-def test_the_key_tells_versions_apart(inputs, monkeypatch):
-    keys = {key(inputs)}
-    monkeypatch.setattr(finished, "version", lambda _: "99.0")
-    keys.add(key(inputs))
-    monkeypatch.setattr(finished, "pa", SimpleNamespace(__version__="99.0"))
-    keys.add(key(inputs))
+def test_the_key_tells_apart_what_is_declared_of_the_files(inputs):
+    (file,) = inputs["rasters"].files
+    keys = {
+        key(inputs),
+        key(inputs, rasters={"files": (replace(file, nodata=(-80.0,)),)}),
+        key(inputs, rasters={"files": (replace(file, cell_ids=file.cell_ids[::-1]),)}),
+    }
     assert len(keys) == 3
+    elsewhere = replace(file, path=Path("/elsewhere") / file.path.name, parts=())
+    assert key(inputs, rasters={"files": (elsewhere,)}) == key(inputs)
+
+
+def test_tiles_of_rasters_whose_side_car_changed_are_made_again(tmp_path):
+    def rasters():
+        return open_rasters(tmp_path / "rxlev.tif")
+
+    plan = make_plan()
+    write_rasters(tmp_path / "rxlev.tif", LATTICE, levels_of(plan, seed=3), plan.ids)
+    given = {"plan": plan, "routes": make_routes(), "floor_dbm": FLOOR_DBM, "tile_px": 8}
+    with pytest.raises(KeyboardInterrupt):
+        build(rasters(), **given, out=tmp_path / "db", executor=Counting(FINISHED), in_flight=1)
+    bands = "".join(
+        f'<PAMRasterBand band="{n}"><Offset>-3</Offset><Scale>1</Scale></PAMRasterBand>'
+        for n in (1, 2, 3)
+    )
+    (tmp_path / "rxlev.tif.aux.xml").write_text(f"<PAMDataset>{bands}</PAMDataset>")
+    anew = build(rasters(), **given, out=tmp_path / "anew")
+    resumed = build(rasters(), **given, out=tmp_path / "db", resume=True)
+    assert contents(resumed.path) == contents(anew.path)
+
+
+def test_no_tile_of_other_code_is_taken_over(inputs, tmp_path, monkeypatch):
+    with pytest.raises(KeyboardInterrupt):
+        build(**inputs, out=tmp_path / "db", executor=Counting(FINISHED), in_flight=1)
+    monkeypatch.setattr(_resume, "code_digest", lambda: "of other code")
+    everything, anew = Counting(), Counting()
+    build(**inputs, out=tmp_path / "db", executor=everything, resume=True)
+    build(**inputs, out=tmp_path / "anew", executor=anew)
+    assert everything.tasks == anew.tasks
+
+
+def test_a_tile_under_the_name_of_another_is_none(tmp_path):
+    tiles = FinishedParts(tmp_path / "db", lambda: "k", keep=True, name="tile")
+    tiles.save(0, b"rows of 0")
+    tiles.save(1, b"rows of 1")
+    (tiles.folder / "tile-1.arrow").write_bytes((tiles.folder / "tile-0.arrow").read_bytes())
+    assert tiles.load(0) == b"rows of 0"
+    assert tiles.load(1) is None
 
 
 LAID_CHANGES = ["row", "col", "way_id", "way_class", "distance_to_way_m"]
@@ -217,8 +260,12 @@ def test_the_digest_of_layers_tells_every_layer_apart():
 
 
 def test_tiles_lie_beside_the_database_in_a_folder_named_after_the_key(tmp_path):
-    tiles = FinishedParts(tmp_path / "db", lambda: "0123456789abcdef" + "f" * 48, name="tile")
-    assert tiles.folder == tmp_path / ".db.tiles-0123456789abcdef"
+    folders = {
+        FinishedParts(tmp_path / "db", lambda key=key: key, name="tile").folder for key in "aab"
+    }
+    assert len(folders) == 2
+    assert {folder.parent for folder in folders} == {tmp_path}
+    assert all(re.fullmatch(r"\.db\.tiles-[0-9a-f]{16}", folder.name) for folder in folders)
 
 
 @pytest.mark.parametrize(

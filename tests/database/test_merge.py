@@ -139,7 +139,7 @@ def test_databases_that_do_not_fit(world, database, tmp_path):
 
 def test_a_damaged_part_is_told(world, tmp_path):
     database = make_database(world, tmp_path)
-    (part,) = database.level_parts[IDS[0]]
+    (part,) = (one.file for one in database.level_parts[IDS[0]])
     content = bytearray(part.read_bytes())
     chunk = pyarrow.parquet.read_metadata(part).row_group(0).column(1)
     start = chunk.dictionary_page_offset or chunk.data_page_offset

@@ -33,6 +33,7 @@ def test_a_track_that_is_found_and_lost():
         UnusedReading(1.0, "serving", "Y", Reason.UNKNOWN_CELL),
         UnusedReading(2.0, "serving", "X", Reason.UNKNOWN_CELL),
         UnusedReading(2.0, "motion", "", Reason.NO_STEP),
+        UnusedReading(0.0, "pseudorange", "", Reason.NOT_USED_BY_FILTER, 20_038),
     ]
     found = outcome(
         estimate(
@@ -48,7 +49,7 @@ def test_a_track_that_is_found_and_lost():
     assert found.epochs_by_status == {"SEARCHING": 1, "CONVERGED": 1, "TRACKING": 1, "LOST": 1}
     assert (found.last_lon_deg, found.last_lat_deg) == pytest.approx((24.95, 60.18), abs=1e-9)
     assert found.last_time_s == 2.0
-    assert found.unused == {"no_step": 1, "unknown_cell": 3}
+    assert found.unused == {"no_step": 1, "not_used_by_filter": 20_038, "unknown_cell": 3}
     assert found.unknown_cells == {"X": 2, "Y": 1}
 
 

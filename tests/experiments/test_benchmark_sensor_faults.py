@@ -54,6 +54,14 @@ def test_wrong_claims_before_the_fault_do_not_count():
     assert since_fault("SCTTTTT", [0, 90, 90, 10, 10, 10, 10], fault_at_s=0.0)[0] == 1.0
 
 
+def test_when_the_fault_held_stands_in_the_row():
+    table = line(3)
+    found = located(estimate(table, "SCTT", 10.0))
+    scored = score(CASE, Walk(table, fault_at_s=1.5, fault_until_s=2.5), found)
+    assert (scored["fault_at_s"], scored["fault_until_s"]) == (1.5, 2.5)
+    assert row("SCTT", 10.0)["fault_until_s"] is None
+
+
 def test_without_a_fault_there_is_no_such_score():
     table = line(3)
     scored = score(CASE, Walk(table), located(estimate(table, "SCTT", 10.0)))

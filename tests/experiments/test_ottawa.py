@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from mapfilter._io import sealed
 from mapfilter.database.store import open_database
-from mapfilter.errors import ConfigError, InputError, StoreError
+from mapfilter.errors import ConfigError, InputError
 from mapfilter.experiments.benchmarks.ottawa import (
     FOLDER,
     OttawaOptions,
@@ -115,7 +116,7 @@ def test_what_is_finished_is_kept_and_another_benchmark_not_resumed(found, made,
     told = json.loads(written.read_text())
     told["found"][0]["error_m"] = [7.0, 7.0]
     told["found"][0]["covered"] = [True, False]
-    written.write_text(json.dumps(told))
+    written.write_text(json.dumps(sealed(told)))
     seen = []
     again = run_ottawa(made, tmp_path / "out", progress=lambda *at: seen.append(at), **options)
     assert seen == [(3, 3)]
@@ -125,9 +126,19 @@ def test_what_is_finished_is_kept_and_another_benchmark_not_resumed(found, made,
     assert (tmp_path / "out" / "carling" / "errors.png").stat().st_size > 10_000
     with pytest.raises(ConfigError, match="another seed"):
         run_ottawa(made, tmp_path / "out", seed=5, **options)
-    written.write_text('{"found": 3}')
-    with pytest.raises(StoreError, match=r"found\.json"):
+    written.write_text(json.dumps({**sealed(told), "session": "edited"}))
+
+    def first_two_are_kept(*at):
+        raise ZeroDivisionError(at)
+
+    with pytest.raises(ZeroDivisionError, match=r"2, 3"):
+        run_ottawa(made, tmp_path / "out", progress=first_two_are_kept, **options)
+    data = next((made / FOLDER / "carling").glob("*.csv"))
+    before = data.read_bytes()
+    data.write_bytes(before + before.splitlines(keepends=True)[-1])
+    with pytest.raises(ConfigError, match="another data"):
         run_ottawa(made, tmp_path / "out", **options)
+    data.write_bytes(before)
     anew = options | {"resume": False, "progress": lambda *_: 1 / 0}
     with pytest.raises(ZeroDivisionError):
         run_ottawa(made, tmp_path / "out", seed=5, **anew)

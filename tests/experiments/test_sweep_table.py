@@ -11,8 +11,8 @@ from mapfilter.evaluation.accuracy import Accuracy
 from mapfilter.experiments.sweep.plan import LONGEST_BATCH, Reading, SweepPlan
 from mapfilter.experiments.sweep.table import (
     SCHEMA,
-    is_part,
     join_parts,
+    read_part,
     read_runs,
     row,
     to_table,
@@ -44,9 +44,10 @@ def test_parts_join_to_the_whole(tmp_path):
     for number, (first, end) in enumerate(PLAN.batches()):
         parts.append(tmp_path / f"{number}.parquet")
         write_part(rows(first, end), parts[-1])
-        assert is_part(parts[-1], end - first)
-        assert not is_part(parts[-1], end - first + 1)
-    join_parts(parts, tmp_path / "runs.parquet")
+        assert read_part(parts[-1], end - first).equals(rows(first, end))
+        assert read_part(parts[-1], end - first + 1) is None
+    sizes = [end - first for first, end in PLAN.batches()]
+    join_parts(map(read_part, parts, sizes), tmp_path / "runs.parquet")
     found = read_runs(tmp_path / "runs.parquet")
     assert found["draw"].tolist() == list(range(25))
     assert found["success"].all()
@@ -54,12 +55,19 @@ def test_parts_join_to_the_whole(tmp_path):
 
 def test_a_part_that_is_cut_off_is_none(tmp_path):
     part = tmp_path / "part.parquet"
-    assert not is_part(part, 5)
+    assert read_part(part, 5) is None
     write_part(rows(0, 5), part)
-    part.write_bytes(part.read_bytes()[:-20])
-    assert not is_part(part, 5)
-    pq.write_table(rows(0, 5).drop_columns(["draw"]), part)
-    assert not is_part(part, 5)
+    whole = part.read_bytes()
+    part.write_bytes(whole[:-20])
+    assert read_part(part, 5) is None
+    for place in range(0, len(whole), 7):
+        part.write_bytes(whole[:place] + bytes([whole[place] ^ 4]) + whole[place + 1 :])
+        assert read_part(part, 5) is None
+    other = tmp_path / "other.parquet"
+    other.write_bytes(whole)
+    assert read_part(other, 5) is None, "a part under another's name"
+    write_part(rows(0, 5).drop_columns(["draw"]), part)
+    assert read_part(part, 5) is None
 
 
 def test_another_table_is_refused(tmp_path):

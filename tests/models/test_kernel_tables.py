@@ -5,6 +5,7 @@ from math import atan2, erfc, exp, log, pi, radians, sqrt
 
 import numpy as np
 import pytest
+from scipy.stats import kstest
 
 from mapfilter.models import fingerprint
 from mapfilter.models.fingerprint import (
@@ -68,6 +69,7 @@ def test_the_usual_options():
         "heading_m": 28.0,
         "disturbances_per_m": 0.002,
         "disturbed_rad": radians(40),
+        "remounts_per_m": 1e-4,
         "bias_sd_rad": radians(10),
         "bias_drift_rad_per_sqrt_m": radians(0.3),
         "rate_rad_per_m": radians(0.15),
@@ -178,7 +180,7 @@ def test_angles_all_around():
 
 STILL = MotionErrors(
     step_sd_m=0.0, heading_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0, stretch_sd=0.0,
-    disturbances_per_m=0.0,
+    disturbances_per_m=0.0, remounts_per_m=0.0,
 )  # fmt: skip
 
 
@@ -208,6 +210,21 @@ def test_no_two_numbers_of_a_step_are_drawn_alike():
         assert np.abs(off).max() < 5 / sqrt(count)
     spread = np.vstack([drawn[:, : count // 2], drawn[:, : 2 * (count // 2) : 2]])
     assert np.abs(np.corrcoef(spread) - np.eye(14)).max() < 0.5
+
+
+def test_a_phone_that_is_turned_may_point_anywhere():
+    """So many are, by the metre; all others keep their lasting error."""
+    count = 40_000
+    state = np.full((8, count), 0.25, dtype=np.float32)
+    errors = MotionErrors(step_sd_m=0.0, heading_sd_rad=0.0, bias_drift_rad_per_sqrt_m=0.0,
+                          disturbances_per_m=0.0, remounts_per_m=0.3)  # fmt: skip
+    state[RATE] = 0.0
+    bias = move(state, 1.4, 0.0, errors, np.uint64(3))[BIAS].astype(float)
+    turned = bias != np.float32(0.25)
+    assert turned.mean() == pytest.approx(1 - np.exp(-0.42), abs=5 * np.sqrt(0.25 / count))
+    assert kstest(bias[turned], "uniform", (-np.pi, 2 * np.pi)).pvalue > 1e-3
+    never = move(state, 1.4, 0.0, replace(errors, remounts_per_m=0.0), np.uint64(3))
+    np.testing.assert_array_equal(never[BIAS], np.float32(0.25))
 
 
 def test_a_step_of_nothing_changes_nothing():

@@ -67,7 +67,7 @@ def test_measurements_that_no_source_uses_are_labelled(positioner):
     given = {field.name: getattr(positioner, field.name) for field in fields(positioner)}
     unused = locate(log, WithoutTiming(**given), np.random.default_rng(0)).estimate.unused
     labelled = [one for one in unused if one.reason is Reason.NOT_USED_BY_FILTER]
-    assert labelled == [UnusedReading(3.0, "tdoa", "2 rows", Reason.NOT_USED_BY_FILTER)]
+    assert labelled == [UnusedReading(3.0, "tdoa", "", Reason.NOT_USED_BY_FILTER, 2)]
     assert {"motion", "serving", "neighbour", "gnss", "pseudorange", "tdoa"} <= positioner.uses
 
 

@@ -21,7 +21,7 @@ from mapfilter.tracks.log import make_log
 ERRORS = MotionErrors(
     step_sd_m=4.0, typical_step_m=5.0, heading_sd_rad=0.7, bias_sd_rad=0.08,
     bias_drift_rad_per_sqrt_m=0.004, scale_sd=0.0, white_share=1.0, stretch_sd=0.0,
-    disturbances_per_m=0.0, rate_share=0.0,
+    disturbances_per_m=0.0, remounts_per_m=0.0, rate_share=0.0,
 )  # fmt: skip
 COARSE_M, FINE_M = 50.0, 25.0
 

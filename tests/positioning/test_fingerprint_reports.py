@@ -14,6 +14,7 @@ from mapfilter.positioning.fingerprints.reports import (
     reports_of_log,
 )
 from mapfilter.tracks.log import make_log
+from mapfilter.tracks.scans import SCAN_S, scan_of_rows
 
 
 def as_sets(reports):
@@ -74,6 +75,80 @@ def test_a_log_becomes_a_report_for_each_time():
     np.testing.assert_allclose(reports.east_m, [500_000, 500_010, np.nan])
     assert (reports.block == 4).all()
     assert "1 readings left out: cell unknown" in reports.notes
+
+
+def radio_rows(*rows, technology=None):
+    names = ["time_s", "cell", "level_dbm", "role"]
+    found = pd.DataFrame([(*row, "neighbour")[:4] for row in rows], columns=names)
+    return found if technology is None else found.assign(technology=technology)
+
+
+def test_readings_a_few_milliseconds_apart_are_one_report():
+    rows = [(10.0, "a", -70.0), (10.004, "b", -75.0), (10.3, "c", -80.0), (12.0, "a", -71.0)]
+    truth = pd.DataFrame({"time_s": [10.0, 20.0], "east_m": [5e5, 5e5 + 100], "north_m": 1e6})
+    reports = reports_of_log(make_log(CRS, radio=radio_rows(*rows), truth=truth))
+    assert as_sets(reports) == [{("a", -70.0), ("b", -75.0), ("c", -80.0)}, {("a", -71.0)}]
+    np.testing.assert_allclose(reports.time_s, [10 + 0.304 / 3, 12.0])
+    np.testing.assert_allclose(reports.east_m, [5e5 + 3.04 / 3, 5e5 + 20])
+    assert "readings of one scan, less than 1 s apart, are one report" in reports.notes
+
+
+def test_a_cell_that_is_reported_again_begins_a_report():
+    rows = [(0.48 * i, name, -70.0 - i) for i in range(4) for name in "ab"]
+    reports = reports_of_log(make_log(CRS, radio=radio_rows(*rows)))
+    assert as_sets(reports) == [{("a", -70.0 - i), ("b", -70.0 - i)} for i in range(4)]
+    assert reports.notes == ()
+
+
+def test_another_serving_cell_begins_a_report_unless_of_another_technology():
+    rows = [(0.0, "a", -70.0, "serving"), (0.4, "b", -70.0, "serving"), (0.5, "c", -9.0)]
+    reports = reports_of_log(make_log(CRS, radio=radio_rows(*rows)))
+    assert [len(one) for one in as_sets(reports)] == [1, 2]
+    families = ["LTE", "NR", "LTE"]
+    reports = reports_of_log(make_log(CRS, radio=radio_rows(*rows, technology=families)))
+    assert [len(one) for one in as_sets(reports)] == [3]
+
+
+def test_of_advertisements_the_mean_level_counts():
+    rows = [(0.0, "a", -70.0), (0.1, "b", -60.0), (0.3, "a", -74.0), (0.9, "a", -72.0)]
+    rows += [(1.0, "a", -80.0), (1.1, "a", np.nan), (1.2, "c", np.nan)]
+    reports = reports_of_log(make_log(CRS, radio=radio_rows(*rows, technology="BLE")))
+    assert as_sets(reports)[0] == {("a", -72.0), ("b", -60.0)}
+    cells, levels = reports.readings(1)
+    assert [reports.cell_ids[i] for i in cells] == ["a", "c"]
+    np.testing.assert_array_equal(levels, [-80.0, np.nan])
+    assert not any("twice" in note for note in reports.notes)
+
+
+@settings(max_examples=60)
+@given(
+    st.lists(
+        st.tuples(st.integers(0, 60), st.sampled_from("abcd"), st.sampled_from(["LTE", "BLE"])),
+        min_size=1,
+        max_size=40,
+    )
+)
+def test_scans_keep_order_length_and_cells(rows):
+    rows = sorted((i / 10, cell, family) for i, cell, family in rows)
+    radio = pd.DataFrame(rows, columns=["time_s", "cell", "technology"])
+    radio = radio.assign(role="neighbour", arfcn=None, bsic=None)
+    scan = scan_of_rows(radio)
+    assert scan[0] == 0
+    assert set(np.diff(scan)) <= {0, 1}
+    for number in range(scan.max() + 1):
+        own = radio[scan == number]
+        assert np.ptp(own["time_s"]) < SCAN_S
+        once = own[own["technology"] == "LTE"].groupby("cell")["time_s"].nunique()
+        assert (once <= 1).all()
+        if number:
+            # It had to begin: too late for the scan before, or a cell of it was there.
+            before = radio[scan == number - 1]
+            began_s = own["time_s"].iloc[0]
+            at_once = own[(own["time_s"] == began_s) & (own["technology"] == "LTE")]
+            late = began_s - before["time_s"].iloc[0] >= SCAN_S
+            cells = set(before[before["technology"] == "LTE"]["cell"])
+            assert late or cells & set(at_once["cell"])
+            assert before["time_s"].iloc[-1] < began_s
 
 
 def test_no_position_is_interpolated_over_a_long_gap():

@@ -380,8 +380,8 @@ def test_what_is_not_used_comes_by_time_with_neighbours_and_fixes_told_once(loca
     fixes = pd.DataFrame({"time_s": [20.0], "east_m": 531_100.0, "north_m": 4_555_900.0})
     unused = locate(walk_log(radio=pd.concat([radio, more]), gnss=fixes)).estimate.unused
     assert unused == (
-        UnusedReading(0.0, "neighbour", "2 rows", Reason.NOT_USED_BY_FILTER),
-        UnusedReading(20.0, "gnss", "1 rows", Reason.NOT_USED_BY_FILTER),
+        UnusedReading(0.0, "neighbour", "", Reason.NOT_USED_BY_FILTER, 2),
+        UnusedReading(20.0, "gnss", "", Reason.NOT_USED_BY_FILTER, 1),
         UnusedReading(30.0, "serving", "E", Reason.SECOND_SERVING_CELL),
     )
 

@@ -9,6 +9,7 @@ from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.filter import locate
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.log_options import fitted_to_log
+from mapfilter.positioning.vehicle_signs import vehicle_signs
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.log import make_log
@@ -148,8 +149,8 @@ def test_turns_without_headings_at_a_vehicles_speed_are_a_vehicles(options):
     assert fitted.vehicle is True
     assert fitted.resolved.heading_sd_deg == VEHICLE["heading_sd_deg"]
     assert notes == (
-        "motion: turns without headings at up to 9 m/s: taken for a vehicle's "
-        "(filter.bayes.vehicle)",
+        "motion: turns without headings, up to 9 m/s, gains of 4 m/s in 3 s: 0, turns of up to "
+        "0 deg in 5 m: taken for a vehicle's (filter.bayes.vehicle)",
     )
     # Waiting at lights for most of the time does not make a walker of a car.
     in_traffic = np.where(np.arange(120) % 60 < 20, 9.0, 0.0)
@@ -170,6 +171,57 @@ def test_turns_without_headings_at_a_vehicles_speed_are_a_vehicles(options):
 )
 def test_other_motion_is_not_taken_for_a_vehicles(given):
     assert fitted_to_log(BayesFilter(), given) == (BayesFilter(), ())
+
+
+def riding(sway_dps, speed_mps=7.0, frequency_hz=0.8, lasts_s=300, launches=0, gains_mps=9.0):
+    """Return motion at 10 Hz with a steady speed, a swaying yaw rate, and starts from rest."""
+    time_s = np.arange(0, lasts_s, 0.1)
+    speed = np.full(len(time_s), speed_mps)
+    for k in range(launches):
+        begin = (k + 1) * lasts_s / (launches + 1)
+        since_s = time_s - begin
+        speed = np.where((since_s >= 0) & (since_s < 20), np.clip(since_s * 2, 0, gains_mps), speed)
+    rate = np.radians(sway_dps) * np.sin(2 * np.pi * frequency_hz * time_s)
+    rows = {"time_s": time_s, "step_m": 0.1 * speed, "turn_rad": 0.1 * rate}
+    return make_log(CRS, motion=pd.DataFrame(rows))
+
+
+@pytest.mark.parametrize(
+    ("given", "vehicle"),
+    [
+        (riding(0.5), True),
+        (riding(5.0), False),
+        # A cyclist is no faster than 12 m/s, nor gains 4 m/s in 3 s again and again.
+        (riding(5.0, speed_mps=14.0), True),
+        (riding(5.0, launches=2), False),
+        (riding(5.0, launches=5), True),
+        # A car does not turn about in 5 m.
+        (turning(np.where(np.arange(120) % 60 < 50, 9.0, 1.5), turn_rad=0.0), True),
+        (
+            turning(
+                np.where(np.arange(120) % 60 < 50, 9.0, 1.5),
+                turn_rad=np.where(np.arange(120) % 60 > 55, 0.8, 0.0),
+            ),
+            False,
+        ),
+        # A gyroscope that drifts at rest turns nothing.
+        (turning(np.where(np.arange(120) % 60 < 20, 9.0, 0.0), turn_rad=0.1), True),
+    ],
+)
+def test_cyclists_are_no_vehicles(given, vehicle):
+    fitted, notes = fitted_to_log(BayesFilter(), given)
+    assert (fitted.vehicle is True) == vehicle
+    whose = "a vehicle's" if vehicle else "a cyclist's, no vehicle's"
+    assert any(f"taken for {whose} (filter.bayes.vehicle)" in note for note in notes)
+
+
+def test_signs_of_a_log_of_centuries_or_of_one_moment():
+    time_s = np.r_[np.arange(60.0), 1e10]
+    rows = pd.DataFrame({"time_s": time_s, "step_m": 9.0, "turn_rad": 0.01})
+    signs = vehicle_signs(make_log(CRS, motion=rows))
+    assert signs.top_mps < 1
+    once = pd.DataFrame({"time_s": [5.0, 5.0, 5.0], "step_m": [1.0, 2.0, 3.0], "turn_rad": 0.1})
+    assert not vehicle_signs(make_log(CRS, motion=once)).fast
 
 
 def test_whose_motion_it_is_can_be_stated():

@@ -203,7 +203,7 @@ def test_rows_of_one_time_count_alike_in_any_order(positioner):
     told = replace(log, pseudoranges=turned.reset_index(drop=True))
     one, other = found(positioner, log), found(positioner, told)
     assert one.converged_at == other.converged_at
-    np.testing.assert_allclose(one.east_m[-50:], other.east_m[-50:], atol=1.0)
+    np.testing.assert_allclose(one.east_m[-50:], other.east_m[-50:], atol=2.0)
 
 
 def test_hindsight_and_turns_alone_take_satellites_too(positioner):

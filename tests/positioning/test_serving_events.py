@@ -147,8 +147,8 @@ def test_neighbours_and_fixes_are_labelled_once_with_their_number():
     assert found.events == ["A", "A"]
     assert estimate.time_s.tolist() == [1.0, 2.0]
     assert estimate.unused == (
-        UnusedReading(1.0, "neighbour", "2 rows", Reason.NOT_USED_BY_FILTER),
-        UnusedReading(4.0, "gnss", "3 rows", Reason.NOT_USED_BY_FILTER),
+        UnusedReading(1.0, "neighbour", "", Reason.NOT_USED_BY_FILTER, 2),
+        UnusedReading(4.0, "gnss", "", Reason.NOT_USED_BY_FILTER, 3),
     )
 
 

@@ -116,4 +116,4 @@ def test_times_of_arrival_shorten_the_search(area):
         for one in (log, with_them)
     ]
     assert switch[1] is not None
-    assert switch[1] < 0.7 * (switch[0] or len(log.truth))
+    assert switch[1] < 0.8 * (switch[0] or len(log.truth))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from rasterio import Affine
 
+from mapfilter._gdal import check_blocks
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import Lattice
 from mapfilter.rasters import geotiff
@@ -97,6 +98,11 @@ def of_size(folder, size):
 WHOLE = {(1, 0, 0): (100, 50), (1, 1, 0): (150, 50), (1, 0, 1): (200, 50), (1, 1, 1): (250, 50)}
 
 
+def _check_size(path, header):
+    check_blocks(path, header)
+    _check_extent_of_file(path, header)
+
+
 @pytest.mark.parametrize(
     ("header", "size", "said"),
     [
@@ -149,7 +155,7 @@ WHOLE = {(1, 0, 0): (100, 50), (1, 1, 0): (150, 50), (1, 0, 1): (200, 50), (1, 1
     ],
 )
 def test_bytes_that_a_header_promises(tmp_path, header, size, said):
-    found = complaints(_check_extent_of_file, of_size(tmp_path, size), header)
+    found = complaints(_check_size, of_size(tmp_path, size), header)
     assert len(found) == len(said)
     assert all(one.startswith(other) for one, other in zip(found, said, strict=True))
 

@@ -8,12 +8,8 @@ from fuzz import fuzz
 
 from mapfilter.errors import InputError
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.survey.measurement_files import (
-    DIALECTS,
-    read_antennas_log,
-    read_csv,
-    unix_seconds,
-)
+from mapfilter.survey.measurement_files import DIALECTS, read_antennas_log, read_csv
+from mapfilter.survey.measurement_rows import unix_seconds
 from mapfilter.survey.measurements import named_after, read_measurements
 
 OPENCELLID = """\

@@ -232,7 +232,7 @@ def test_what_is_no_vector_file(tmp_path):
             archive.writestr(f"{number}.shp", b" " * (1 << 20))
     for name, message in (
         ("none.shp", "no such file"),
-        ("points.csv", "a layer with geometry"),
+        ("points.csv", "a vector file that GDAL reads"),
         ("a.vrt", "leads to other places"),
         ("folder", "a folder"),
         ("bomb.zip", "decompression bomb"),

@@ -115,7 +115,7 @@ def test_missing_damaged_and_classless_rasters_are_refused(tmp_path):
     with pytest.raises(InputError, match="no such file"):
         read_raster_ways(tmp_path / "none.tif", {"road": 1}, CRS, box(5, 5))
     (tmp_path / "text.tif").write_text("roads")
-    with pytest.raises(InputError, match="a readable raster"):
+    with pytest.raises(InputError, match="a raster that GDAL can read"):
         raster_lattice(tmp_path / "text.tif", 5.0)
     whole = write(tmp_path / "whole.tif", np.ones((400, 400), np.uint8))
     data = whole.read_bytes()

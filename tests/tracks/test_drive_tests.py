@@ -218,3 +218,43 @@ def test_a_column_map_goes_before_the_names_of_tems(tmp_path):
     assert read_recording(path, options=ReadOptions(columns=own)).format == "csv"
     other = {"time": "Zeit", "lat_deg": "Breite"}
     assert read_recording(path, options=ReadOptions(columns=other)).format == "tems"
+
+
+def test_nemo_times_are_utc_where_the_log_states_its_offset(read):
+    ahead = '#UT,,,180,180\n#START,23:59:58.000,,"1.5.2026"\n'
+    recording = read(ahead + LTE.format(at="23:59:59.500"), zone="Asia/Tokyo")
+    assert recording.clock.kind == "utc"
+    moment = pd.Timestamp("2026-05-01T20:59:59.5Z").timestamp()
+    assert recording.tables["radio"]["time_s"].tolist() == [moment]
+    assert "local times are those of UTC+3, by #UT" in recording.notes
+    # Of an offset of more than 14 hours nothing is known.
+    assert read(ahead.replace("180", "1440") + LTE.format(at="13:00:00.0")).clock.kind == "local"
+
+
+def test_a_nemo_position_without_fix_is_left_out(read):
+    lines = [
+        f"GPS,13:00:0{i}.000,,24.94,60.17,13,0,{fix},{satellites},1\n"
+        for i, (fix, satellites) in enumerate([(1, 9), (0, 0), (0, ""), (0, 5), ("", "")])
+    ]
+    recording = read(START + "".join(lines))
+    assert (recording.tables["positions"]["time_s"] % 60).tolist() == [0, 3, 4]
+    assert [(one.reason, one.lines) for one in recording.unusable] == [
+        ("positions: no fix and no satellites", (3, 4))
+    ]
+
+
+def test_tems_rows_that_repeat_the_row_before_are_read_once_a_second(read):
+    head, first, *_ = MADE["tems"][1].splitlines()
+    clock = first.split("\t")[0]
+    day = clock.split(" ")[0]
+
+    def row(at, level):
+        return first.replace(clock, f"{day} 13:00:{at}").replace("\t-", f"\t-{level}", 1)
+
+    levels = [("00.0", 7), ("00.2", 7), ("00.9", 7), ("01.1", 7), ("01.2", 8), ("01.3", 7)]
+    recording = read("\n".join([head, *(row(*one) for one in levels)]))
+    radio = recording.tables["radio"]
+    serving = radio[radio["role"] == "serving"]
+    assert (serving["time_s"] % 60).round(1).tolist() == [0.0, 1.1, 1.2, 1.3]
+    assert len(radio) == 2 * len(serving)
+    assert recording.unusable[0].lines == (3, 4)

@@ -148,3 +148,16 @@ def test_naming_is_row_by_row_and_naming_again_changes_nothing(rows):
         alone = make_log(CRS, radio=table.iloc[[i]])
         one = name_by_plan(alone, PLAN).radio["cell"].tolist()
         assert one == once.radio["cell"].iloc[[i]].tolist()
+
+
+def test_lost_cells_are_named_by_how_often_they_occur():
+    often = {f"244-91-1-{i}": i + 1 for i in range(20)}
+    cells = [cell for cell, count in often.items() for _ in range(count)] + [
+        "alone",
+        "244-91-9751830",
+    ]
+    rows = pd.DataFrame({"time_s": np.arange(len(cells)), "role": "serving", "cell": cells})
+    log = make_log(CRS, radio=rows.assign(level_dbm=-80.0))
+    (note,) = [note for note in name_by_plan(log, PLAN).notes if "lacks" in note]
+    named_cells = ", ".join(f"244-91-1-{i}" for i in range(19, 11, -1))
+    assert note == f"radio: 210 rows of 20 cells that the plan lacks ({named_cells} and 12 more)"

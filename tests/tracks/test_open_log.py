@@ -144,7 +144,9 @@ def test_speed_and_course_of_the_truth_make_motion_on_request(made):
     log = open_log(path, options=OpenOptions(combine=combine)).log
     assert (len(log.truth), len(log.gnss)) == (COUNT, 0)
     assert log.motion["step_m"].sum() == pytest.approx(2.2 * 2 * (COUNT - 1), rel=0.01)
+    # Positions without a course are motion from each to the next.
     (alone,) = made("gpx")
     combine = CombineOptions(truth=[alone], course_motion=True)
     log = open_log(alone, options=OpenOptions(combine=combine)).log
-    assert log.motion["step_m"].sum() > 10.0
+    assert log.motion["step_m"].sum() == pytest.approx(log.truth_length_m)
+    assert any("motion comes from GNSS: its positions" in note for note in log.notes)

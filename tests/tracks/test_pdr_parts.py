@@ -1,5 +1,7 @@
 """Parts of dead reckoning: attitude, compass, heights, vehicles; against sums and circles."""
 
+import time
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -7,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from mapfilter.tracks.pdr import vehicle
 from mapfilter.tracks.pdr.attitude import attitude
 from mapfilter.tracks.pdr.heading import compass_samples, yaw_offset
 from mapfilter.tracks.pdr.height import climbs, height_m
@@ -219,6 +222,23 @@ def test_a_vehicles_bias_is_learnt_while_it_stands():
     assert abs(unlearnt["turn_rad"].sum() - drive(0.0, stands=False)[1]) > 0.9 * 0.004 * 239
     assert loose.gyro_bias_deg_per_s > imu.gyro_bias_deg_per_s
     assert "never stands" in notes[0]
+
+
+def test_odometry_of_months_takes_no_longer_than_its_rows():
+    rows, _ = drive(0.004)
+    rows = rows.iloc[::2].assign(time_s=lambda r: np.arange(len(r)) * 3000.0)
+    began_s = time.process_time()
+    motion, _, _ = reckon_odometry(rows)
+    assert time.process_time() - began_s < 5.0
+    assert len(motion) == len(rows)
+
+
+def test_longer_spans_of_a_long_recording_learn_the_same_bias(monkeypatch):
+    rows, true_rad = drive(0.004)
+    monkeypatch.setattr(vehicle, "_MOST_SPANS", 60)
+    motion, _, notes = reckon_odometry(rows)
+    assert abs(motion["turn_rad"].sum() - true_rad) < 0.15 * 0.004 * np.ptp(rows["time_s"])
+    assert "bias +0.2" in notes[0]
 
 
 def test_a_stand_after_driving_teaches_the_bias_once_the_body_has_settled():

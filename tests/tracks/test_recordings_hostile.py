@@ -300,7 +300,7 @@ def test_a_large_file_is_read_part_by_part(name, read, monkeypatch):
         assert parts.tables[table].equals(rows), table
 
 
-BY_BLOCKS = ["antennas", "kitti", "tum", "nmea", "gnsslogger", "rinex-obs", "indoor"]
+BY_BLOCKS = ["antennas", "kitti", "tum", "nmea", "gnsslogger", "rinex-obs", "indoor", "rinex-obs/2"]
 
 
 @pytest.mark.parametrize("name", BY_BLOCKS)

@@ -4,6 +4,8 @@ import json
 
 from command_line import assert_done, assert_refused, mapfilter, settings
 
+from mapfilter._io import sealed
+
 GIVEN = ["--filter", "candidate", "--case", "cell-6", "--runs", 1, "--workers", 1, "--json"]
 
 
@@ -18,8 +20,12 @@ def test_a_benchmark_is_resumed_on_its_own_map_only(world, tmp_path):
     (batch,) = (out / "batches").glob("*.json")
     told = json.loads(batch.read_text())
     told["rows"][0] |= {"success": True, "error_mean_m": 77.0}
-    batch.write_text(json.dumps(told))
+    edited = json.dumps(told)
+    batch.write_text(json.dumps(sealed(told)))
     assert assert_done(evaluate("--resume")).json["cases"][0]["error_mean_m"] == 77.0
+    batch.write_text(edited)
+    again = assert_done(evaluate("--resume")).json["cases"][0]["error_mean_m"]
+    assert again != 77.0, "a batch that was changed is done again"
     narrower = settings(area__bbox="24.9420,60.1660,24.9490,60.1697")
     assert_refused(evaluate("--resume", *narrower), "benchmark.json", "another world")
     assert_refused(evaluate("--resume", "--seed", 4), "another seed")

@@ -21,7 +21,7 @@ def write(tmp_path):
 @pytest.mark.parametrize("command", ["predict", "build", "simulate", "replay"])
 def test_missing_file(command, tmp_path):
     refused = mapfilter(command, "-c", tmp_path / "none.toml")
-    assert_refused(refused, "none.toml: expected a TOML file, found No such file")
+    assert_refused(refused, "none.toml: expected a readable file, found No such file")
     assert not contents(tmp_path)
 
 

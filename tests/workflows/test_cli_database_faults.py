@@ -10,6 +10,8 @@ import sys
 import pytest
 from command_line import assert_done, assert_refused, contents, mapfilter, settings
 
+from mapfilter._io import sealed
+
 KILLED_WHILE_WRITING = """
 import os, signal, sys
 import mapfilter.database.parts as assemble
@@ -45,13 +47,14 @@ def manifest(own_world):
     file = own_world.database / "manifest.json"
 
     def change(**values):
-        file.write_text(json.dumps({**json.loads(file.read_text()), **values}))
+        file.write_text(json.dumps(sealed({**json.loads(file.read_text()), **values})))
 
     return change
 
 
 @pytest.mark.parametrize(
-    ("version", "why"), [(3, "newer"), (99, "newer"), ("2", "edited"), (None, "edited")]
+    ("version", "why"),
+    [(1, "older"), (3, "newer"), (99, "newer"), ("2", "edited"), (None, "edited")],
 )
 def test_another_version(version, why, own_world, manifest):
     manifest(version=version)

@@ -1,12 +1,24 @@
 """What replay writes and tells: of good logs, of logs that lack something, over older results."""
 
 import json
+import os
+import signal
+import time
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
-from command_line import ONE, assert_done, assert_refused, change, contents, mapfilter, put
+from command_line import (
+    ONE,
+    assert_done,
+    assert_refused,
+    change,
+    contents,
+    mapfilter,
+    put,
+    settings,
+)
 
 import mapfilter as mf
 from mapfilter.config.load import load_config
@@ -15,6 +27,7 @@ from mapfilter.geodesy import unproject
 from mapfilter.positioning.estimate_store import read_estimate
 from mapfilter.positioning.filter import locate
 from mapfilter.tracks.store import read_log, write_log
+from mapfilter.workflows import replay as workflow
 from mapfilter.workflows.replay import run_replay
 
 
@@ -309,6 +322,34 @@ def test_logs_share_a_filter_where_their_options_are_equal(same, world, tmp_path
     run_replay(config, tmp_path / "out")
     assert len(filters) > 1
     assert len(set(map(id, filters))) == (1 if same == "options" else len(filters))
+
+
+def test_older_results_stay_when_a_replay_is_stopped(world, tmp_path, monkeypatch):
+    """Of two logs the second is never located: nothing of the first replaces anything."""
+    given = ["--db", world.database, "--log", world.journeys, "--out", tmp_path / "out"]
+    assert_done(mapfilter("replay", "-c", world.toml, *given))
+    (tmp_path / "out" / "mine.txt").write_text("of the user")
+    before = contents(tmp_path / "out")
+    located, calls = workflow.locate, []
+
+    def stopped(*args, **named):
+        calls.append(args)
+        if len(calls) == 2:
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(30)
+        return located(*args, **named)
+
+    monkeypatch.setattr(workflow, "locate", stopped)
+    outcome = mapfilter("replay", "-c", world.toml, *given, *settings(filter__margin_db=3.0))
+    assert (outcome.code, outcome.out) == (128 + signal.SIGTERM, "")
+    assert "stopped by SIGTERM" in outcome.err
+    assert "older results are as they were" in outcome.err
+    assert contents(tmp_path / "out") == before
+    monkeypatch.undo()
+    assert_done(mapfilter("replay", "-c", world.toml, *given, *settings(filter__margin_db=3.0)))
+    after = contents(tmp_path / "out")
+    assert after != before
+    assert after.keys() == before.keys()
 
 
 def test_results_of_an_older_replay_do_not_stay_beside_new_ones(world, log, replay, tmp_path):

@@ -132,6 +132,13 @@ def test_speed_and_course_become_motion_on_request(database, recordings, tmp_pat
     given = ("--log", path, "--course-motion", "--without", "gnss")
     done = replayed(database, tmp_path / "out", *given)
     assert done.code == 0, done.err
+    # Without speed and course it is made from positions.
+    drive.drop(columns=["speed_mps", "bearing"]).to_csv(path, index=False)
+    done = replayed(database, tmp_path / "out", *given[:2], *given[3:])
+    assert "track.course_motion, makes it from positions)" in done.err
+    done = replayed(database, tmp_path / "out", *given)
+    assert done.code == 0, done.err
+    assert "motion comes from GNSS" in done.out
 
 
 def test_refusals(database, recordings, tmp_path):

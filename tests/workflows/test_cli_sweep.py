@@ -1,5 +1,6 @@
 """Sweeps by the command: the same table however it is done, cut short, gone on with, refused."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -8,9 +9,10 @@ import pytest
 from command_line import assert_done, assert_refused, mapfilter, settings
 from killed_worker import KillsOneWorker
 
+from mapfilter._io import sealed
 from mapfilter._parallel import SerialExecutor, cluster_executor, local_executor
 from mapfilter.config.load import load_config
-from mapfilter.errors import ConfigError, MapfilterError
+from mapfilter.errors import ConfigError, MapfilterError, StoreError
 from mapfilter.experiments.sweep.run import sweep
 from mapfilter.experiments.sweep.table import read_runs
 from mapfilter.workflows.simulate import run_simulate
@@ -148,6 +150,58 @@ def test_a_batch_that_was_cut_off_is_done_again(parts, whole, tmp_path):
     assert sweep(*parts, tmp_path, resume=True).read_bytes() == whole
 
 
+def test_a_batch_with_a_flipped_bit_is_done_again(parts, whole, tmp_path):
+    with pytest.raises(KeyboardInterrupt):
+        sweep(*parts, tmp_path, executor=StopsAfter(3), in_flight=1)
+    for number, batch in enumerate(sorted((tmp_path / "unfinished" / "batches").iterdir())):
+        data = bytearray(batch.read_bytes())
+        data[len(data) * (number + 1) // 4] ^= 1
+        batch.write_bytes(bytes(data))
+    assert sweep(*parts, tmp_path, resume=True).read_bytes() == whole
+
+
+def test_an_older_table_stays_until_the_new_one_is_whole(parts, whole, world, tmp_path):
+    sweep(*parts, tmp_path)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    config = load_config(world.toml, [*GIVEN, "sweep.seed=5"])
+    (plan,), _ = sweep_plans(config)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        sweep(plan, *parts[1:], tmp_path, executor=StopsAfter(1), in_flight=1)
+    assert caught.value.__notes__ == ["finished batches are kept: go on with --resume"]
+    assert {name: (tmp_path / name).read_bytes() for name in before} == before
+    assert (tmp_path / "runs.parquet").read_bytes() == whole
+    assert sweep(plan, *parts[1:], tmp_path, resume=True).read_bytes() != whole
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["runs.parquet", "sweep.json"]
+
+
+def test_a_table_that_was_changed_is_neither_read_nor_resumed_with(parts, whole, tmp_path):
+    table = sweep(*parts, tmp_path)
+    table.write_bytes(whole[:500] + bytes([whole[500] ^ 1]) + whole[501:])
+    with pytest.raises(StoreError, match=r"runs\.parquet.*changed after it was written"):
+        read_runs(table)
+    assert sweep(*parts, tmp_path, resume=True).read_bytes() == whole
+
+
+def test_a_sweep_over_a_database_that_is_replaced_meanwhile_stops(parts, tmp_path):
+    plan, streets, databases = parts
+    folders = {}
+    for name, path in databases.items():
+        shutil.copytree(path, tmp_path / name)
+        folders[name] = tmp_path / name
+
+    class Replaces(StopsAfter):
+        def submit(self, fn, /, *args, **kwargs):
+            if self.done == 0:
+                for path in folders.values():
+                    manifest = json.loads((path / "manifest.json").read_text())
+                    changed = json.dumps(sealed({**manifest, "attribution": "another"}))
+                    (path / "manifest.json").write_text(changed)
+            return super().submit(fn, *args, **kwargs)
+
+    with pytest.raises(StoreError, match="replaced while in use"):
+        sweep(plan, streets, folders, tmp_path / "out", executor=Replaces(9), in_flight=1)
+
+
 def test_another_sweep_is_not_resumed(parts, world, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         sweep(*parts, tmp_path, executor=StopsAfter(1), in_flight=1)
@@ -163,10 +217,10 @@ def test_a_stopped_command_tells_how_to_go_on(own_world, monkeypatch):
     def stopped(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("mapfilter.workflows.sweep.sweep", stopped)
+    monkeypatch.setattr("mapfilter.experiments.sweep.run.run_batch", stopped)
     outcome = mapfilter("sweep", "-c", own_world.toml, *GRID)
     assert outcome.code == 3
-    assert "--resume" in outcome.err
+    assert "stopped by SIGINT: finished batches are kept: go on with --resume" in outcome.err
 
 
 VARIED = ("--vary", "imu.scale=0,0.1", "--vary", "filter.update_length_m=5,20")

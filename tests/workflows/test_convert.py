@@ -172,18 +172,22 @@ def test_course_and_speed_make_motion_on_request(made, tmp_path):
     assert log.motion["step_m"].iloc[1:].to_numpy() == pytest.approx(4.4, abs=0.01)
     # 30.1 degrees clockwise from north, and the convergence of the grid.
     assert np.degrees(log.motion["heading_rad"]).to_numpy() == pytest.approx(59.9 - 1.78, abs=0.2)
-    # Without a course the ways between positions are motion, where they exceed 10 m.
-    converted(made("gpx"), tmp_path / "ways", course_motion=True)
-    log = read_log(tmp_path / "ways")
-    place_m = log.gnss[["east_m", "north_m"]].to_numpy()
-    assert any("no course; motion from the ways" in note for note in log.notes)
-    step_m, heading = log.motion["step_m"].to_numpy(), log.motion["heading_rad"].to_numpy()
-    assert np.diff(log.motion["time_s"]).max() <= 1.0
-    gone_m = np.nansum(step_m * [np.cos(heading), np.sin(heading)], axis=1)
-    ends = np.abs(log.gnss["time_s"] - log.motion["time_s"].iloc[-1])
-    last = int(np.argmin(ends))
-    np.testing.assert_allclose(gone_m, place_m[last] - place_m[0], atol=0.01)
-    assert log.imu.scale == 0.1
+    assert any("motion comes from GNSS: speed and course" in note for note in result.notes)
+    # Positions have but four decimals of a minute.
+    assert log.imu.sigma_orient_deg < 10
+    with pytest.raises(InputError, match="expected positions"):
+        converted(made("sensorlogger"), tmp_path / "none", course_motion=True)
+
+
+def test_positions_make_motion_where_there_is_no_course(made, tmp_path):
+    result = converted(made("gnettrack"), tmp_path / "log", course_motion=True)
+    log = read_log(tmp_path / "log")
+    assert any("motion comes from GNSS: its positions" in note for note in result.notes)
+    moved = log.motion.iloc[1:]
+    east, north = (np.diff(log.gnss[name]) for name in ("east_m", "north_m"))
+    assert moved["step_m"].to_numpy() == pytest.approx(np.hypot(east, north))
+    assert moved["heading_rad"].to_numpy() == pytest.approx(np.arctan2(north, east))
+    assert log.imu.sigma_trans_m < 0.5
 
 
 @pytest.mark.parametrize("name", ["kitti", "tum"])
@@ -355,7 +359,9 @@ def test_dates_of_a_plain_table(tmp_path):
     start_s = pd.Timestamp("2026-11-02T08:00:00.5Z").timestamp()
     assert (log.start_utc_s + log.gnss["time_s"] - start_s).tolist() == [0.0, 3.0, 6.0]
     for given, hint in (
-        ("11/02/2026 10:00:00", "day or month first? Years come first"),
+        ("11/02/2026 10:00:00", "day or month first? Write 2021-03-04, or 4.3.2021 with dots"),
+        ("04-03-2021 10:00:00", "day or month first? Write 2021-03-04, or 4.3.2021 with dots"),
+        ("4-3-21", "day or month first? Write 2021-03-04, or 4.3.2021 with dots"),
         ("yesterday", "found 'yesterday'"),
         ("32.13.2026 10:00", "found '32.13.2026 10:00'"),
     ):

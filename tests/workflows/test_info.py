@@ -162,6 +162,6 @@ def test_a_file_that_cannot_be_opened_is_refused(tmp_path, monkeypatch):
     def refuse(*_args, **_kwargs):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "open", refuse)
+    monkeypatch.setattr("mapfilter._inputs.os.open", refuse)
     with pytest.raises(InputError, match="a readable file, found Permission denied"):
         run_info(tmp_path / "a.json")

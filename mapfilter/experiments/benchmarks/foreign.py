@@ -186,7 +186,7 @@ class RouteRuns:
             return Walk(truth), log
         rng = named_rng(world.seed, "sensor fault", case.sensor, number)
         log, window = faulty_log(case.sensor, log, rng)
-        return Walk(truth, fault_at_s=window.begin_s), log
+        return Walk(truth, fault_at_s=window.begin_s, fault_until_s=window.end_s), log
 
     def filter(self, choice: FilterOptions, case: WorldCase) -> Filter[Any]:
         """Return the filter over the database that a case is given."""
@@ -235,5 +235,5 @@ def _city(streets: Path, ground: Path, sha256: str) -> City:  # noqa: ARG001
 
 
 @lru_cache(maxsize=32)
-def _filter(database: Path, choice: FilterOptions, sha256: str) -> Filter[Any]:  # noqa: ARG001
-    return choice.over(open_database(database), ways=False)
+def _filter(database: Path, choice: FilterOptions, sha256: str) -> Filter[Any]:
+    return choice.over(open_database(database, generation=sha256), ways=False)

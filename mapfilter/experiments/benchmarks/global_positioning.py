@@ -11,9 +11,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from mapfilter._io import read_json, write_json
+from mapfilter._io import read_sealed, write_sealed
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
-from mapfilter._resume import start_or_resume
+from mapfilter._resume import kept_when_stopped, start_or_resume
+from mapfilter.errors import StoreError
 from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.experiments.benchmarks.cases import Case
 from mapfilter.experiments.benchmarks.journeys import TOWN_HEIGHT, Walk
@@ -188,11 +189,16 @@ def run_benchmark(
         in_flight=in_flight,
         progress=progress,
     )
-    for (part, _), rows in zip(tasks, results, strict=True):
-        write_json(part, {"rows": rows})
+    with kept_when_stopped("batches"):
+        for (part, _), rows in zip(tasks, results, strict=True):
+            write_sealed(part, {"rows": rows})
     return [row for part in parts for row in _rows(part)]
 
 
 def _rows(part: Path) -> list[Any]:
-    found = read_json(part).get("rows") if part.is_file() else None
+    try:
+        found = read_sealed(part).get("rows")
+    except StoreError:
+        # Missing, cut off or changed: done again.
+        return []
     return found if isinstance(found, list) else []

@@ -49,13 +49,14 @@ class Walk:
         time_s, east_m, north_m, way_id.
     displaced_at_s : float
         Time of the last row before a displacement; infinite without.
-    fault_at_s : float
-        When a fault of the sensors began; infinite without.
+    fault_at_s, fault_until_s : float
+        When a fault of the sensors began and ended; infinite without, or without an end.
     """
 
     truth: pd.DataFrame
     displaced_at_s: float = float("inf")
     fault_at_s: float = float("inf")
+    fault_until_s: float = float("inf")
 
     @property
     def arrived_at_s(self) -> float:

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from mapfilter._inputs import open_input
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import grid_convergence_rad, heading_from_azimuth_rad, project
@@ -97,7 +98,8 @@ def read_session(path: Path) -> Session:
         The file cannot be read, a column is missing, or there are not two rows.
     """
     try:
-        table = pd.read_csv(path, usecols=list(_COLUMNS))
+        with open_input(path) as stream:
+            table = pd.read_csv(stream, usecols=list(_COLUMNS))
     except (OSError, ValueError) as error:
         expected = f"CSV with the columns {', '.join(_COLUMNS)}"
         raise fail(InputError, str(path), expected, error) from error

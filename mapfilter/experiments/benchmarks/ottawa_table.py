@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mapfilter._io import read_json, write_json
+from mapfilter._io import read_sealed, write_sealed
 from mapfilter._types import Bools, Floats
 from mapfilter.errors import StoreError, fail
 from mapfilter.evaluation.success import wilson_interval, wilson_interval_of_routes
@@ -203,12 +203,12 @@ def write_left_out(left_out: LeftOut, file: Path) -> None:
         for found in left_out.found
     ]
     centroid_m = left_out.centroid_m.tolist()
-    write_json(file, {"session": left_out.session, "centroid_m": centroid_m, "found": rows})
+    write_sealed(file, {"session": left_out.session, "centroid_m": centroid_m, "found": rows})
 
 
 def read_left_out(file: Path) -> LeftOut:
-    """Read the results of a session; a missing or damaged file is a StoreError."""
-    read = read_json(file)
+    """Read the results of a session; a missing, damaged or edited file is a StoreError."""
+    read = read_sealed(file)
     try:
         found = tuple(
             FoundSession(**{name: _read(name, value) for name, value in row.items()})

@@ -69,6 +69,7 @@ def score(
     row |= _integrity(estimate, errors_m, walked, integrity or IntegrityOptions())
     if np.isfinite(walked.fault_at_s):
         row |= _since_fault(estimate, errors_m, walked.fault_at_s)
+        row |= {"fault_at_s": walked.fault_at_s, "fault_until_s": _finite(walked.fault_until_s)}
     if case.recovery_within_m > 0:
         return row | _recovered(case, walked, truth, estimate.time_s, errors_m)
     scored = accuracy(estimate, truth)

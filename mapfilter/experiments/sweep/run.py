@@ -7,6 +7,7 @@ import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import groupby
@@ -17,7 +18,7 @@ import pyarrow as pa
 
 from mapfilter._io import ensure_writable_folder, sha256_file
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
-from mapfilter._resume import start_or_resume
+from mapfilter._resume import check_same, kept_when_stopped, start_or_resume, with_code
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.evaluation.accuracy import accuracy
 from mapfilter.experiments.sweep import table
@@ -28,7 +29,6 @@ from mapfilter.positioning.filter import locate
 from mapfilter.tracks.log import TrackLog
 
 RUNS = "runs.parquet"
-HEAD = "sweep.json"
 UNFINISHED = "unfinished"
 
 _VERSION = 1
@@ -36,7 +36,7 @@ _DETERMINED_BY = {
     "plan_sha256": "plan",
     "world_sha256": "world (streets, cells or levels)",
     "databases_sha256": "database",
-    "version": "version of mapfilter",
+    "version": "version of the sweep",
 }
 _PATHS = 2
 _TRIAL_RUNS = 8
@@ -130,6 +130,12 @@ def sweep(
         "databases_sha256": manifests,
         "plan": [plan.as_json for plan in grid],
     }
+    finished, begun = out / table.HEAD, unfinished / table.HEAD
+    if resume and finished.is_file() and not begun.is_file():
+        check_same(finished, head, _DETERMINED_BY)
+        if table.is_whole(out / RUNS):
+            _remove(unfinished)
+            return out / RUNS
     batches = unfinished / "batches"
     opened = tuple((databases[name], digest) for name, digest in manifests.items())
     tasks = [
@@ -137,32 +143,43 @@ def sweep(
         for plan in grid
         for first, end in plan.batches()
     ]
-    parts = [batches / f"{number:06d}.parquet" for number in range(len(tasks))]
-    older = [out / RUNS, *(batches.glob("*") if batches.is_dir() else ())]
-    resumed = start_or_resume(out / HEAD, head, older, resume=resume, names=_DETERMINED_BY)
-    if resumed and table.is_part(out / RUNS, total, schema):
-        shutil.rmtree(unfinished, ignore_errors=True)
-        return out / RUNS
+    parts = [batches / f"{number:06d}.part" for number in range(len(tasks))]
+    # Results of an older sweep stay until these are whole.
+    start_or_resume(begun, head, batches.glob("*"), resume=resume, names=_DETERMINED_BY)
     ensure_writable_folder(batches)
-    todo = [
-        (part, task)
-        for part, task in zip(parts, tasks, strict=True)
-        if not table.is_part(part, task.end - task.first, schema)
-    ]
+
+    def rows_of(part: Path, task: Batch) -> pa.Table | None:
+        return table.read_part(part, task.end - task.first, schema)
+
+    every = list(zip(parts, tasks, strict=True))
+    todo = [(part, task) for part, task in every if rows_of(part, task) is None]
     done = total - sum(task.end - task.first for _, task in todo)
     if progress is not None:
         progress(done, total)
     found = ordered_results(
         executor or SerialExecutor(), run_batch, [task for _, task in todo], in_flight=in_flight
     )
-    for (part, task), rows in zip(todo, found, strict=True):
-        table.write_part(rows, part)
-        done += task.end - task.first
-        if progress is not None:
-            progress(done, total)
-    table.join_parts(parts, out / RUNS, schema)
-    shutil.rmtree(unfinished, ignore_errors=True)
+    with kept_when_stopped("batches"):
+        for (part, task), rows in zip(todo, found, strict=True):
+            table.write_part(rows, part)
+            done += task.end - task.first
+            if progress is not None:
+                progress(done, total)
+    # A batch that was damaged meanwhile is done again.
+    whole = (rows_of(part, task) or run_batch(task) for part, task in every)
+    table.join_parts(whole, out / RUNS, schema)
+    table.note_whole(out / RUNS, with_code(head))
+    _remove(unfinished)
     return out / RUNS
+
+
+def _remove(unfinished: Path) -> None:
+    """Remove the unfinished parts of a sweep, and the folder unless it holds something else."""
+    for part in ("world", "batches"):
+        shutil.rmtree(unfinished / part, ignore_errors=True)
+    with suppress(OSError):
+        (unfinished / table.HEAD).unlink(missing_ok=True)
+        unfinished.rmdir()
 
 
 def sweep_runs(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,9 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from mapfilter._io import atomic_file
+from mapfilter._inputs import check_file
+from mapfilter._io import atomic_file, read_json, sha256_file, write_json
+from mapfilter._resume import load_part, save_part
 from mapfilter.errors import StoreError, fail
 from mapfilter.evaluation.accuracy import Accuracy
 from mapfilter.evaluation.success import COORDINATES, SuccessCell
@@ -42,6 +44,8 @@ by their dotted keys, before ``route``.
 """
 
 _GROUP_ROWS = 100_000
+_SHA256 = "runs_sha256"
+HEAD = "sweep.json"
 _VARIED_AT = SCHEMA.get_field_index("route")
 
 
@@ -87,31 +91,30 @@ def to_table(rows: Sequence[tuple[Any, ...]], schema: pa.Schema = SCHEMA) -> pa.
 
 
 def write_part(table: pa.Table, path: Path) -> None:
-    """Write the rows of a batch; the file is there whole or not at all."""
-    with atomic_file(path) as temporary:
-        pq.write_table(table, temporary, compression="zstd")
+    """Write the rows of a batch with a checksum; the file is there whole or not at all."""
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, compression="zstd")
+    save_part(path, sink.getvalue().to_pybytes())
 
 
-def is_part(path: Path, rows: int, schema: pa.Schema = SCHEMA) -> bool:
-    """Return whether a batch's rows lie there, whole."""
-    if not path.is_file():
-        return False
-    try:
-        found = pq.read_metadata(path)
-    except (OSError, pa.ArrowInvalid):
-        return False
-    return bool(found.num_rows == rows and found.schema.to_arrow_schema().equals(schema))
+def read_part(path: Path, rows: int, schema: pa.Schema = SCHEMA) -> pa.Table | None:
+    """Return a batch's rows, or None where they do not lie there, whole and unchanged."""
+    data = load_part(path)
+    if data is None:
+        return None
+    table = pq.read_table(pa.BufferReader(data))
+    return table if table.num_rows == rows and table.schema.equals(schema) else None
 
 
-def join_parts(parts: Iterable[Path], path: Path, schema: pa.Schema = SCHEMA) -> None:
-    """Put the parts together, in their order, holding only some of them in memory."""
+def join_parts(tables: Iterable[pa.Table], path: Path, schema: pa.Schema = SCHEMA) -> None:
+    """Put the rows of batches together, in their order, holding only some of them in memory."""
     waiting: list[pa.Table] = []
     with (
         atomic_file(path) as temporary,
         pq.ParquetWriter(temporary, schema, compression="zstd") as writer,
     ):
-        for part in parts:
-            waiting.append(pq.read_table(part, schema=schema))
+        for table in tables:
+            waiting.append(table)
             if sum(map(len, waiting)) >= _GROUP_ROWS:
                 writer.write_table(pa.concat_tables(waiting).combine_chunks())
                 waiting = []
@@ -119,14 +122,31 @@ def join_parts(parts: Iterable[Path], path: Path, schema: pa.Schema = SCHEMA) ->
             writer.write_table(pa.concat_tables(waiting).combine_chunks())
 
 
+def note_whole(path: Path, head: Mapping[str, object]) -> None:
+    """Write the head of a sweep beside its table, with the table's checksum."""
+    write_json(path.with_name(HEAD), {**head, _SHA256: sha256_file(path)})
+
+
+def is_whole(path: Path) -> bool:
+    """Return whether the table of a sweep is the one of the head beside it, unchanged."""
+    head = path.with_name(HEAD)
+    if not (path.is_file() and head.is_file()):
+        return False
+    return read_json(head).get(_SHA256) == sha256_file(path)
+
+
 def read_runs(path: Path) -> pd.DataFrame:
-    """Read the table of a sweep.
+    """Read the table of a sweep; with the head of the sweep beside it, its checksum is compared.
 
     Raises
     ------
     StoreError
-        It is missing, cut off or no table of a sweep.
+        It is missing, changed, cut off or no table of a sweep.
     """
+    check_file(path, StoreError)
+    if path.with_name(HEAD).is_file() and not is_whole(path):
+        hint = "changed after it was written, or a sweep that is not finished: go on with --resume"
+        raise fail(StoreError, str(path), f"the table of {HEAD}", "another", hint)
     try:
         table = pq.read_table(path)
     except (OSError, pa.ArrowInvalid) as error:

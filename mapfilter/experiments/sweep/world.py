@@ -118,6 +118,11 @@ def open_world(folder: Path) -> SweepWorld:
             int(head["rows"]),
             int(head["cols"]),
         )
+        for part, digest in head["sha256"].items():
+            if sha256_file(folder / part) != digest:
+                raise fail(
+                    StoreError, str(folder / part), "the world of this sweep", "a changed file"
+                )
         with np.load(folder / _STREETS, allow_pickle=False) as arrays:
             streets = {name: arrays[name] for name in _ARRAYS}
         network = StreetNetwork(crs=lattice.crs, class_names=tuple(head["class_names"]), **streets)
@@ -143,9 +148,9 @@ def opened_world(folder: Path, sha256: str) -> SweepWorld:
 
 
 @lru_cache(maxsize=32)
-def opened_filter(database: Path, sha256: str, choice: FilterOptions) -> Filter[Any]:  # noqa: ARG001
+def opened_filter(database: Path, sha256: str, choice: FilterOptions) -> Filter[Any]:
     """Return a filter over a database, by the SHA-256 of its manifest, once in each process."""
-    return choice.over(open_database(database), ways=False)
+    return choice.over(open_database(database, generation=sha256), ways=False)
 
 
 def _levels(number: int) -> str:

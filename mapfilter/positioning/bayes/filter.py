@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import isfinite
+from math import isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -41,7 +41,8 @@ from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.map_source import MapSource
 from mapfilter.positioning.bayes.model import BayesModel, Start
 from mapfilter.positioning.bayes.path import RecentPath
-from mapfilter.positioning.bayes.radio import RadioSource
+from mapfilter.positioning.bayes.radio import RadioSource, name_of
+from mapfilter.positioning.bayes.sensors import watched
 from mapfilter.positioning.bayes.smoothing import BayesSmoother
 from mapfilter.positioning.bayes.state import BayesState, step_output
 from mapfilter.positioning.bayes.timing import TimingSource
@@ -51,6 +52,7 @@ from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.source import FirstFix, GnssSource
 
+_TOLD_ELSEWHERE = (Reason.USED, Reason.NOT_MOVED_ENOUGH, Reason.NO_READING, Reason.STALE_RADIO)
 _MORE_PARTICLES, _MORE_SEARCHING = 6, 3
 """Factors of the numbers of particles where headings are unknown."""
 
@@ -150,11 +152,19 @@ class BayesPositioner(Filter[BayesState]):
         if epoch.fix and not (isfinite(epoch.fix.east_m) and isfinite(epoch.fix.north_m)):
             epoch = replace(epoch, fix=None)
         before, spacing_m = state.status, state.particle_spacing_m
-        state, unused = self._moved(state, epoch, rng)
+        heard = epoch.radio
+        watch, epoch, (motion, radio) = watched(state.watch, epoch)
+        state, unused = self._moved(replace(state, watch=watch), epoch, rng)
+        if motion is not Reason.USED:
+            unused = [UnusedReading(epoch.time_s, "motion", "", motion)]
+        if radio is not Reason.USED:
+            unused += [UnusedReading(epoch.time_s, row.role, name_of(row), radio) for row in heard]
         state, updates = self._collected(state, epoch, spacing_m)
         unused += [reading for update in updates for reading in update.unused]
         reasons = (update.reason for update in updates if update.reason is not None)
         reason = next(reasons, Reason.NO_READING)
+        if radio is not Reason.USED:
+            reason = radio
         if state.belief is None:
             started = self._started(updates, state, epoch, rng)
             if started is not None:
@@ -165,11 +175,11 @@ class BayesPositioner(Filter[BayesState]):
             reason = reason if why is Reason.USED else why
             if state.belief is not None:
                 belief, status = report(before, state.belief, state.status)
-                state = replace(state, belief=belief, status=status)
-        if reason not in (Reason.USED, Reason.NOT_MOVED_ENOUGH, Reason.NO_READING):
+                state = self._split(replace(state, belief=belief, status=status))
+        if reason not in _TOLD_ELSEWHERE:
             cell = next((str(row.cell) for row in epoch.radio if row.cell is not None), "")
             unused.append(UnusedReading(epoch.time_s, "serving", cell, reason))
-        return state, step_output(self.area, state, epoch.time_s, reason, tuple(unused))
+        return step_output(self.area, state, epoch.time_s, reason, tuple(unused))
 
     def warm_up(self, merged: Sequence[Epoch]) -> None:  # noqa: ARG002
         """Load the compiled kernels, and prepare the area."""
@@ -214,7 +224,8 @@ class BayesPositioner(Filter[BayesState]):
             if belief is None:
                 compass = isfinite(raw.heading_rad)
             else:
-                if compass and not isfinite(raw.heading_rad) and reckoning.travelled_m == 0:
+                turned = isfinite(raw.heading_rad) or isfinite(raw.spread_m)
+                if compass and not turned and reckoning.travelled_m == 0:
                     # Nothing has moved yet, so headings can still be relative to the first one.
                     compass, belief = False, self._without_compass(belief, rng)
                 predict = self.filters[compass].predict
@@ -225,6 +236,11 @@ class BayesPositioner(Filter[BayesState]):
                     alternative = replace(alternative, belief=other)
             if why is not Reason.USED:
                 unused.append(UnusedReading(epoch.time_s, "motion", "", why))
+            still = step.step_m == 0 and belief is state.belief
+            same = path is state.path and compass == state.compass and alternative is None
+            if still and same and heading_rad == state.heading_rad:
+                # Standing still changes nothing, and takes most epochs of a long log.
+                continue
             state = replace(
                 state,
                 belief=belief,
@@ -256,7 +272,9 @@ class BayesPositioner(Filter[BayesState]):
                     belief=update.belief or state.belief,
                     alternative=update.alternative or state.alternative,
                 )
-        return replace(state, sources=states), updates
+        if any(own is not state.sources[name] for name, own in states.items()):
+            state = replace(state, sources=states)
+        return state, updates
 
     def _started(
         self,
@@ -340,6 +358,19 @@ class BayesPositioner(Filter[BayesState]):
             takeovers=state.takeovers + now.taken_over,
         )
         return after, Reason.USED
+
+    def _split(self, state: BayesState) -> BayesState:
+        """Return a state that is LOST if its belief has spread over more than one place.
+
+        Readings apply this rule, too, but motion may go on without any.
+        """
+        belief = state.belief
+        if belief is None or state.status not in (Status.CONVERGED, Status.TRACKING):
+            return state
+        if belief.summary.mass_50m >= self.options.split_mass:
+            return state
+        belief = replace(belief, status=Status.SEARCHING, agreement_start_m=nan)
+        return replace(state, belief=belief, status=Status.LOST)
 
     def _alternative(
         self, state: BayesState, main: MapBelief, epoch: Epoch, rng: np.random.Generator

@@ -50,7 +50,7 @@ from mapfilter.positioning.bayes.radio import EvidenceOptions
 
 _F = np.float32
 _OFF_SHARE, _TRIES = 0.2, 2
-_BEYOND_M, _BEYOND_SHARE, _BEYOND_AT_START = 300.0, 0.15, 0.05
+_BEYOND_M, _BEYOND_SHARE, _BEYOND_AT_START = 300.0, 0.15, 0.02
 _BEYOND_COST_PER_M = 0.015
 """Width of the belt around the area, its share of the first hypotheses and of the first belief, and
 the negative log-likelihood of each metre there, in a database with cells."""
@@ -237,10 +237,10 @@ class BayesModel:
         if isfinite(motion.heading_rad):
             moved = move(state, motion.step_m, motion.heading_rad, self.motion, key)
         else:
-            # To all sides; the mean square of the distance is that of the step.
+            # To all sides.
             moved = move(state, 0.0, 0.0, self.motion, key)
             noise = np.random.default_rng(int(key)).standard_normal((2, state.shape[1]))
-            moved[: NORTH + 1] += (length_m / sqrt(2.0) * noise).astype(np.float32)
+            moved[: NORTH + 1] += (motion.all_sides_m / sqrt(2.0) * noise).astype(np.float32)
         weighed = log_weight.copy()
         rows, step = self.area.lattice.rows, self.area.lattice.resolution_m
         found = interpolate(moved, self.log_map, step / 2, (rows - 0.5) * step, 1 / step)

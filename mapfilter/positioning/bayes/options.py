@@ -42,10 +42,14 @@ VEHICLE: Mapping[str, float] = {
 """Defaults of vehicles, where they differ."""
 _VEHICLE_MOTION: Mapping[str, float] = {
     "disturbances_per_m": 0.0,
+    "remounts_per_m": 0.0,
     "rate_rad_per_m": radians(0.01),
     "stretch_sd": 0.02,
 }
 _VEHICLE_LEAVES_PER_M = 3e-4
+
+_SPLIT_MASS = 0.8
+"""Share of the belief within 50 m of the leading hypothesis below which the filter is lost."""
 
 _MORE_BY_MAP = 3
 _LEAST_MASS_BY_MAP, _LEAST_HOLD_BY_MAP_M = 0.998, 200.0
@@ -241,6 +245,7 @@ class BayesFilter(Options):
             min_particles=self.min_particles,
             switch_mass=self.switch_mass,
             switch_hold_m=self.switch_hold_m,
+            split_mass=min(_SPLIT_MASS, self.switch_mass),
         )
         rules = AlternativeRules()
         if not area.cell_ids:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import isfinite, nan, sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import empty_summary
@@ -14,6 +14,7 @@ from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBe
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.path import DeadReckoning as DeadReckoning
 from mapfilter.positioning.bayes.path import RecentPath
+from mapfilter.positioning.bayes.sensors import SensorWatch
 from mapfilter.positioning.estimate import Fix, StepOutput, UnusedReading
 from mapfilter.positioning.integrity import sample_tail
 
@@ -50,6 +51,10 @@ class BayesState:
         Number of alternatives that have replaced the belief.
     path : RecentPath
         The last metres, where the map alone may start a belief.
+    reported : Reported or None
+        The last output, which stays as it is as long as the belief does.
+    watch : SensorWatch
+        Whether sensors still measure.
     """
 
     belief: MapBelief | None = None
@@ -62,6 +67,8 @@ class BayesState:
     alternative: AlternativeHypothesis | None = None
     takeovers: int = 0
     path: RecentPath = field(default_factory=RecentPath)
+    reported: Reported | None = None
+    watch: SensorWatch = field(default_factory=SensorWatch)
 
     @property
     def particle_spacing_m(self) -> float:
@@ -73,14 +80,42 @@ class BayesState:
         return max(sqrt(area_m2 / belief.log_weight.size), _MIN_SPACING_M)
 
 
+class Reported(NamedTuple):
+    """An output, and the belief, the status and the probability of no hypothesis it was made of."""
+
+    belief: MapBelief | None
+    status: Status
+    p_none: float
+    output: StepOutput
+
+
 def step_output(
     area: AreaMap,
     state: BayesState,
     time_s: float,
     reason: Reason,
     unused: tuple[UnusedReading, ...],
+) -> tuple[BayesState, StepOutput]:
+    """Summarise the belief; ``reason`` is whether the epoch's report was used.
+
+    A phone that stands still has the same belief for hours, which is not summarised again.
+    """
+    made_of = state.belief, state.status, state.null.probability
+    known = state.reported
+    if known is not None and known.belief is made_of[0] and known[1:3] == made_of[1:]:
+        fix = replace(known.output.fix, time_s=time_s, reason=reason)
+        return state, StepOutput(fix, known.output.evidence, unused, known.output.tail)
+    output = _output(area, state, time_s, reason, unused)
+    return replace(state, reported=Reported(*made_of, output)), output
+
+
+def _output(
+    area: AreaMap,
+    state: BayesState,
+    time_s: float,
+    reason: Reason,
+    unused: tuple[UnusedReading, ...],
 ) -> StepOutput:
-    """Summarise the belief; ``reason`` is whether the epoch's report was used."""
     belief, (west, south) = state.belief, area.origin_m
     if belief is None or state.status is Status.OUTSIDE:
         summary, count, way = empty_summary(STATES), 0, (0, nan)

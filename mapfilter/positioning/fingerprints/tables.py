@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from mapfilter._inputs import read_input
 from mapfilter._types import Bools, Floats
 from mapfilter.errors import InputError, fail, listed
 from mapfilter.geodesy import project, projected_crs, utm_crs
@@ -33,6 +34,7 @@ _OTHER = frozenset(
 )
 _LEVEL_DBM = (-200.0, 0.0)
 _LONGEST = 40
+_LARGEST_BYTES = 1 << 30
 _MERCATOR = "EPSG:3857"
 _SEPARATORS = (",", ";", "\t")
 
@@ -93,10 +95,7 @@ def read_fingerprint_table(path: Path | str, crs: str | None = None) -> Reports:
 
 def _read(path: Path) -> tuple[pd.DataFrame, list[str]]:
     expected = "a table with a header line"
-    try:
-        text = path.read_text(encoding="utf-8-sig", errors="replace")
-    except OSError as error:
-        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
+    text = read_input(path, _LARGEST_BYTES, "a table").decode("utf-8-sig", "replace")
     lines = [line for line in text.splitlines() if line.strip()]
     if not lines:
         raise fail(InputError, str(path), expected, "an empty file", "cut off")

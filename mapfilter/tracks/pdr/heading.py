@@ -140,7 +140,8 @@ def yaw_offset(
     base = _COMPASS_SD_RAD**2 * 2 * _CORRELATION_S
     weight = np.where(good, 1.0, 0.0)
     offset = np.full(len(measured), start)
-    for _ in range(_ROUNDS):
+    # Without a compass there are no weights to be found.
+    for _ in range(_ROUNDS if good.any() else 1):
         variance = np.where(weight > 0, base / np.maximum(weight, 1e-12), np.inf)
         offset, sd, rate, rate_sd = _smooth(
             compass.time_s, measured, variance, rates, rate_sds, start

@@ -23,6 +23,7 @@ _COURSE_MPS = 2.0
 _SPEED_SD_MPS = 0.05
 _SCALE = 0.02
 _COURSE_BIAS_DEG = 2.0
+_MOST_SPANS = 50_000
 _UNSEEN_BIAS_DEG_PER_S = 0.05
 """Error of the bias that standing does not show: of 0.02 deg/s a count, and of warming up."""
 
@@ -125,23 +126,23 @@ def _settled(time_s: Floats, standing: Bools) -> Bools:
 
 def _bias(time_s: Floats, rate: Floats, standing: Bools, course_offset: Floats | None) -> YawOffset:
     """Smooth the gyroscope's bias, and the offset between its yaw and the course."""
-    second = np.floor(time_s - time_s[0]).astype(np.int64)
-    count = int(second[-1]) + 1
-    rates, sds = np.full(count, np.nan), np.full(count, np.nan)
+    # Seconds with rows only, and longer spans of a long recording, bound the smoother's steps.
+    elapsed_s = time_s - time_s[0]
+    span_s = max(1.0, float(np.ceil(len(np.unique(np.floor(elapsed_s))) / _MOST_SPANS)))
+    number, span = np.unique(np.floor(elapsed_s / span_s), return_inverse=True)
+    rates, sds, north = (np.full(len(number), np.nan) for _ in range(3))
     usable = standing & np.isfinite(rate) & (np.abs(rate) < _MOST_BIAS_RADPS)
     if usable.any():
         spread = 1.4826 * float(np.median(np.abs(rate[usable] - np.median(rate[usable]))))
-        for k in np.unique(second[usable]):
-            inside = rate[usable & (second == k)]
-            rates[k] = float(np.median(inside))
-            sds[k] = max(spread / np.sqrt(len(inside)), _LEAST_RATE_SD_RADPS)
-    north = np.full(count, np.nan)
+        still = pd.Series(rate[usable]).groupby(span[usable]).agg(["median", "size"])
+        rates[still.index] = still["median"]
+        sds[still.index] = np.maximum(spread / np.sqrt(still["size"]), _LEAST_RATE_SD_RADPS)
     if course_offset is not None:
         known = np.isfinite(course_offset)
-        north[second[known]] = np.pi / 2 - course_offset[known]
+        north[span[known]] = np.pi / 2 - course_offset[known]
     missing = np.isnan(north)
-    none = np.full(count, np.nan)
-    centre_s = time_s[0] + np.arange(count) + 0.5
+    none = np.full(len(number), np.nan)
+    centre_s = time_s[0] + (number + 0.5) * span_s
     compass = Compass(centre_s, np.nan_to_num(north), none, none, missing)
     return yaw_offset(compass, rates, sds, use_compass=not missing.all())
 

@@ -1,10 +1,12 @@
 """Nemo logs (``.nmf``, Nemo file format 2): positions, serving and neighbour cells, Wi-Fi.
 
 Each line is an event, ``ID,HH:MM:SS.mmm,n,…``, with n ids of its context before its parameters;
-events with ``#`` describe the measurement, of which ``#START`` has the date (``"26.8.2018"``).
-What is read, by place of the parameter:
+events with ``#`` describe the measurement, of which ``#START`` has the date (``"26.8.2018"``) and
+``#UT`` how many minutes its clock is ahead of UTC (420 in Bangkok). What is read, by place of the
+parameter:
 
-* ``GPS``: longitude, latitude, height (m), distance, fix, satellites, speed (km/h).
+* ``GPS``: longitude, latitude, height (m), distance, fix, satellites, speed (km/h). A position
+  without a fix and without satellites is left out.
 * ``CELLMEAS``: system, number of header parameters and these, number of cells, number of
   parameters of a cell, and as many parameters for each cell. In UMTS channels come before the
   cells, by their number likewise. Parameters of a cell begin with its kind, band, carrier and
@@ -19,8 +21,9 @@ Its maker calls the format open (Anite Finland, *Nemo File Format*, version 2.03
 parameters of that description were not at hand. Places are those that open parsers of the format
 use, checked on published logs of Nemo Outdoor 7.8 and 8.0 (versions 2.27 and 2.31) for LTE (FDD),
 UMTS, Wi-Fi and GPS; those of GSM only follow the parsers, and LTE (TDD) is taken to be as FDD.
-Distances covered and speeds in these logs agree in km/h. Not read: scanners (``OFDMSCAN``,
-``PILOTSCAN``, ``FREQSCAN``), NR, CDMA, timing advances, signalling, and version 1 (``.dt1``).
+Distances covered and speeds in these logs agree in km/h. BSIC are taken to be decimal (0 to 63).
+Not read: scanners (``OFDMSCAN``, ``PILOTSCAN``, ``FREQSCAN``), NR, CDMA, timing advances (``TAD``;
+its unit in LTE is not known), signalling, and version 1 (``.dt1``).
 """
 
 from __future__ import annotations
@@ -32,6 +35,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from mapfilter._types import Ints
+from mapfilter.tracks.readers.columns import only
 from mapfilter.tracks.readers.events import Events, read_events
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.identities import add_radio, available
@@ -50,10 +54,12 @@ from mapfilter.tracks.readers.times import utc_from_local_s
 _BEGIN = re.compile(r"#(?:PRODUCT|FF|ID|START)[,;\t]")
 _EVENT = re.compile(r"(?:GPS|CELLMEAS|CHI|SEI|RRCSM|L3SM)([,;\t])\d{1,2}:\d\d:\d\d[.,]\d{1,3}\1")
 _START = re.compile(r'#START([,;\t])[^;\t\n]*?\1\d*\1"?(\d{1,2})\.(\d{1,2})\.(\d{4})')
+_AHEAD_MIN = re.compile(r'#UT([,;\t])[^;\t\n]*?\1\d*\1"?([-+]?\d{1,3})(?!\d)')
 _PRODUCT = re.compile(r'#PRODUCT[,;\t]+"?([^",;\t]*)"?[,;\t]"?([\d.]*)')
 _KINDS = ("GPS", "CELLMEAS", "CHI", "SEI")
 _SCANNERS = ("OFDMSCAN", "PILOTSCAN", "FREQSCAN")
 _KMH = 1 / 3.6
+_MOST_AHEAD_MIN = 14 * 60
 _MOST = {"headers": 64, "channels": 64, "channel_size": 32, "cells": 500, "size": 64}
 _NO_MAC = "00:00:00:00:00:00"
 
@@ -93,11 +99,17 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     product = _PRODUCT.search(head)
     reading.program = " ".join(filter(None, product.groups())).title() if product else "Nemo"
     midnight_s = _midnight_s(head)
+    ahead_s = _ahead_s(head)
+    zone = options.zone if ahead_s is None else ""
     reading.clock = Clock("monotonic")
     if midnight_s is None:
         reading.note("no date in #START: times count from an unknown day")
+    elif ahead_s is None:
+        reading.clock = Clock("local", zone)
     else:
-        reading.clock = Clock("local", options.zone)
+        reading.clock = Clock("utc")
+        reading.note(f"local times are those of UTC{ahead_s / 3600:+g}, by #UT")
+        midnight_s -= ahead_s
     systems = {
         family: [number for number, one in _SYSTEMS.items() if one.family == family]
         for family in ("GSM", "UMTS", "LTE")
@@ -107,8 +119,8 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     for events in read_events(text.data, _separator(text), _KINDS, reading, others):
         if midnight_s is not None:
             events.time_s[:] += midnight_s
-            if options.zone:
-                events.time_s[:] = utc_from_local_s(events.time_s, options.zone)
+            if zone:
+                events.time_s[:] = utc_from_local_s(events.time_s, zone)
         _add_positions(events, reading)
         known = {
             family: followed(events, family, numbers, known[family])
@@ -135,13 +147,24 @@ def _midnight_s(head: str) -> float | None:
         return None
 
 
+def _ahead_s(head: str) -> float | None:
+    """Return how far the clock is ahead of UTC, in seconds; None where it is not written."""
+    if (found := _AHEAD_MIN.search(head)) is None:
+        return None
+    minutes = int(found[2])
+    return 60.0 * minutes if abs(minutes) <= _MOST_AHEAD_MIN else None
+
+
 def _add_positions(events: Events, reading: Reading) -> None:
     at = np.flatnonzero(events.kind == "GPS")
     if not at.size:
         return
     shift = context_size(events, at)
-    places = {"lon": 3, "lat": 4, "height": 5, "speed": 9}
+    places = {"lon": 3, "lat": 4, "height": 5, "fix": 7, "satellites": 8, "speed": 9}
     rows = events.columns(at, **{name: shift + place for name, place in places.items()})
+    fix, told = rows.whole("fix")
+    nowhere = told & (fix == 0) & (rows.whole("satellites")[0] <= 0)
+    reading.refuse(rows.line[nowhere], "positions: no fix and no satellites")
     columns = {
         "time_s": events.time_s[at],
         "lat_deg": rows.number("lat"),
@@ -149,7 +172,7 @@ def _add_positions(events: Events, reading: Reading) -> None:
         "altitude_m": rows.number("height"),
         "speed_mps": _KMH * rows.number("speed"),
     }
-    reading.add("positions", columns, rows.line)
+    reading.add("positions", *only(columns, rows.line, ~nowhere))
 
 
 def _add_cells(events: Events, reading: Reading, known: dict[str, Identities]) -> int:

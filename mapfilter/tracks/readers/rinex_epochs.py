@@ -1,4 +1,4 @@
-"""Epochs of RINEX 3 observations: fixed columns of all lines of a block at once."""
+"""Epochs of RINEX 3 observations: a line of the time, then a line of each satellite."""
 
 from __future__ import annotations
 
@@ -22,6 +22,57 @@ _DATE = (
 _NUMBER = r"^[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?$"
 _NAME = r"^[GRECJIS]\d\d$"
 _WIDTH, _DIGITS = 16, 14
+_NAME_CHARACTERS = 3
+_ALL_IN_A_LINE = 1 << 30
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Types of observations in the order of their columns, and codes of interest.
+
+    Parameters
+    ----------
+    types : mapping of str to sequence of str
+        Of each constellation.
+    codes : mapping of str to sequence of str
+        Of each constellation, the best first.
+    """
+
+    types: Mapping[str, Sequence[str]]
+    codes: Mapping[str, Sequence[str]]
+
+
+@dataclass(frozen=True, eq=False)
+class Records:
+    """Lines of satellites, in fixed columns.
+
+    Parameters
+    ----------
+    texts : pa.StringArray
+        All lines of a block.
+    first : (N,) array of int
+        The first line of each satellite.
+    lead : int
+        Characters before the values of a line.
+    values_of_line : int
+        A satellite's values go on in the next line after as many.
+    """
+
+    texts: pa.StringArray
+    first: Ints
+    lead: int
+    values_of_line: int
+
+    def numbers(self, rows: Ints, place: int) -> Floats:
+        """Return the numbers of one column of some satellites, NaN where there is none."""
+        line = self.first[rows] + place // self.values_of_line
+        there = line < len(self.texts)
+        start = self.lead + _WIDTH * (place % self.values_of_line)
+        texts = self.texts.take(pa.array(np.where(there, line, 0)))
+        words = pc.utf8_trim_whitespace(pc.utf8_slice_codeunits(texts, start, start + _DIGITS))
+        good = pc.and_(pa.array(there), pc.match_substring_regex(words, _NUMBER))
+        value = pc.cast(pc.if_else(good, words, None), pa.float64())
+        return np.asarray(value.to_numpy(zero_copy_only=False), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,21 +88,9 @@ class Observations:
 
 
 def read_epochs(
-    data: memoryview,
-    first_line: int,
-    types: Mapping[str, Sequence[str]],
-    codes: Mapping[str, Sequence[str]],
-    reading: Reading,
+    data: memoryview, first_line: int, wanted: Wanted, reading: Reading
 ) -> list[Observations]:
-    """Read the lines below a header: of each satellite the first of its codes that is there.
-
-    Parameters
-    ----------
-    types : mapping of str to sequence of str
-        Columns of each constellation.
-    codes : mapping of str to sequence of str
-        Codes of each constellation, the best first.
-    """
+    """Read the lines below a header: of each satellite the first of its codes that is there."""
     found: list[Observations] = []
     last_s = np.nan
     for block, line in blocks(data, first_line):
@@ -69,8 +108,9 @@ def read_epochs(
         time_s = np.concatenate([[last_s], seconds])[np.cumsum(epoch)]
         last_s = float(time_s[-1]) if len(time_s) else last_s
         rows = np.flatnonzero(~epoch & ~blank & np.isfinite(time_s))
-        some = texts.take(pa.array(rows))
-        found += _observed(some, time_s[rows], number[rows], types, codes, reading)
+        records = Records(texts, rows, _NAME_CHARACTERS, _ALL_IN_A_LINE)
+        names = pc.utf8_slice_codeunits(texts.take(pa.array(rows)), 0, _NAME_CHARACTERS)
+        found += observed(records, names, time_s[rows], number[rows], wanted, reading)
     return found
 
 
@@ -86,7 +126,8 @@ def _seconds(texts: pa.Array) -> Floats:
         for name in ("year", "month", "day", "hour", "minute", "second")
     }
     part = {name: values.to_numpy(zero_copy_only=False) for name, values in part.items()}
-    whole = part["minute"] < 60
+    # GPS time begins in 1980, nanoseconds since 1970 end in 2262.
+    whole = (part["minute"] < 60) & (part["year"] >= 1980) & (part["year"] < 2262)
     for name, most in (("hour", 24), ("second", 61)):
         whole &= part[name] < most
     dates = pd.DataFrame({name: part[name] for name in ("year", "month", "day")})
@@ -97,34 +138,46 @@ def _seconds(texts: pa.Array) -> Floats:
     return np.where(whole, midnight_s + of_day_s - GPS_EPOCH_UTC_S, np.nan)
 
 
-def _observed(
-    texts: pa.Array,
+def observed(
+    records: Records,
+    names: pa.Array,
     time_s: Floats,
     number: Ints,
-    types: Mapping[str, Sequence[str]],
-    codes: Mapping[str, Sequence[str]],
+    wanted: Wanted,
     reading: Reading,
 ) -> list[Observations]:
-    names = pc.replace_substring(pc.utf8_slice_codeunits(texts, 0, 3), " ", "0")
+    """Return the code range of each satellite, with the level of its signal.
+
+    Parameters
+    ----------
+    names : (N,) array of str
+        Such as ``G07`` or ``G 7``.
+    time_s : (N,) array
+        Seconds since 6 January 1980.
+    number : (N,) array of int
+        The file's line of each satellite.
+    """
+    names = pc.replace_substring(names, " ", "0")
     named = _bools(pc.match_substring_regex(names, _NAME))
     reading.refuse(number[~named], "no satellite such as G07")
     letters = pc.utf8_slice_codeunits(names, 0, 1)
     found: list[Observations] = []
-    for letter, wanted in codes.items():
+    for letter, best_first in wanted.codes.items():
         of = np.flatnonzero(named & _bools(pc.equal(letters, letter)))
         if not of.size:
             continue
-        columns = list(types.get(letter, []))
-        some = texts.take(pa.array(of))
+        types = list(wanted.types.get(letter, []))
         range_m, cn0 = np.full(len(of), np.nan), np.full(len(of), np.nan)
         signal = np.full(len(of), "", dtype=object)
-        for code in (code for code in wanted if code in columns):
-            value = _fixed(some, columns.index(code))
-            new = np.isnan(range_m) & np.isfinite(value) & (value != 0)
-            level = next((c for c in columns if c[0] == "S" and c[1:] == code[1:]), None)
-            levels = np.nan if level is None else _fixed(some, columns.index(level))
-            range_m = np.where(new, value, range_m)
-            cn0 = np.where(new, levels, cn0)
+        for code in (code for code in best_first if code in types):
+            missing = np.flatnonzero(np.isnan(range_m))
+            value = records.numbers(of[missing], types.index(code))
+            there = np.isfinite(value) & (value != 0)
+            new = missing[there]
+            range_m[new] = value[there]
+            level = next((c for c in types if c[0] == "S" and c[1:] == code[1:]), None)
+            if level is not None:
+                cn0[new] = records.numbers(of[new], types.index(level))
             signal[new] = code
         good = np.isfinite(range_m)
         reading.refuse(number[of[~good]], "no code range on L1 (E1, B1)")
@@ -136,12 +189,3 @@ def _observed(
             )
         )
     return found
-
-
-def _fixed(texts: pa.Array, place: int) -> Floats:
-    """Return the numbers of one column, NaN where there is none."""
-    start = 3 + _WIDTH * place
-    words = pc.utf8_trim_whitespace(pc.utf8_slice_codeunits(texts, start, start + _DIGITS))
-    numbers = pc.if_else(pc.match_substring_regex(words, _NUMBER), words, None)
-    value = pc.cast(numbers, pa.float64()).to_numpy(zero_copy_only=False)
-    return np.asarray(value, dtype=np.float64)

@@ -12,21 +12,25 @@ place ``[1]``. Elements that are not in a message are empty. Those read:
   (dBm)``, the same of ``Neighbor Cell``, and the cell's identity ``Cell Identity (eNB Part)`` and
   ``Cell Identity (Cell Part)``.
 
+An export may write the last values again in every message: rows that repeat all elements of cells
+of the row before are read once a second.
+
 Names are those of open programs that read such exports; there is no public description of the
-export itself, and none with elements of UMTS, NR or scanners was found: those are not read, nor
-are elements of single devices (``MS1-…``), levels without a unit, and timing advances. Name such
-columns yourself, as those of a plain CSV.
+export itself. Not read are elements of UMTS and NR, of which no names were found, of scanners
+(``Scanned ARFCN``, ``Scanned RxLev (dBm)``), which have no codes, those of single devices
+(``MS1-…``), levels without a unit, and timing advances. Name such columns yourself, as those of a
+plain CSV.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 
-from mapfilter._types import Floats
+from mapfilter._types import Bools, Floats
 from mapfilter.tracks.readers.columns import (
     Columns,
     header_columns,
@@ -73,9 +77,21 @@ _LTE_NEIGHBOUR = {
 _LTE_AGGREGATED = {field: _LTE[field] for field in ("arfcn", "bsic", "level")}
 _MARKS = {"ms", "eq", "message type"}
 _ELEMENTS = {*_LAT, *_LON, *_GSM.values(), *_GSM_NEIGHBOUR.values(), *_LTE.values()}
+_ELEMENTS_OF_CELLS = _ELEMENTS - {*_LAT, *_LON} | set(_LTE_NEIGHBOUR.values())
 _MOST_LISTED = 32
 _CELLS_OF_ENB = 256
+_RENEWED_S = 1.0
 _DAY_FIRST = r"^\s*(\d{2})[./](\d{2})[./](\d{4})\s+(\S.*)$"
+
+
+@dataclass(frozen=True, eq=False)
+class _Messages:
+    """Rows with their times, and which of them are read for cells."""
+
+    rows: Columns
+    reading: Reading
+    time_s: Floats
+    renewed: Bools
 
 
 def _plain(name: str) -> str:
@@ -104,14 +120,15 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     rows = replace(rows, names=tuple(_plain(name) for name in rows.names))
     time_s = _times(rows, reading, options)
     _add_positions(rows, reading, time_s)
-    _add_serving_gsm(rows, reading, time_s)
-    _add_serving_lte(rows, reading, time_s)
+    messages = _Messages(rows, reading, time_s, _renewed(rows, reading, time_s))
+    _add_serving_gsm(messages)
+    _add_serving_lte(messages)
     for place in range(_MOST_LISTED):
         listed = f"[{place}]"
-        _add_listed(rows, reading, time_s, "GSM", _GSM_NEIGHBOUR, listed)
-        _add_listed(rows, reading, time_s, "LTE", _LTE_NEIGHBOUR, listed)
+        _add_listed(messages, "GSM", _GSM_NEIGHBOUR, listed)
+        _add_listed(messages, "LTE", _LTE_NEIGHBOUR, listed)
         # Carriers of an aggregation after the first.
-        _add_listed(rows, reading, time_s, "LTE", _LTE_AGGREGATED, listed)
+        _add_listed(messages, "LTE", _LTE_AGGREGATED, listed)
 
 
 def _times(rows: Columns, reading: Reading, options: ReadOptions) -> Floats:
@@ -132,6 +149,22 @@ def _times(rows: Columns, reading: Reading, options: ReadOptions) -> Floats:
     return time_s
 
 
+def _renewed(rows: Columns, reading: Reading, time_s: Floats) -> Bools:
+    """Return the rows with another element of cells than the row before, or a second later."""
+    names = [name for name in rows.names if name.partition("[")[0] in _ELEMENTS_OF_CELLS]
+    changed = np.ones(len(rows), dtype=bool)
+    if names and len(rows):
+        changed[1:] = np.logical_or.reduce([rows.changes(name) for name in names])[1:]
+    first = np.flatnonzero(changed)[np.cumsum(changed) - 1]
+    second = np.floor((time_s - time_s[first]) / _RENEWED_S)
+    repeated = ~changed
+    repeated[1:] &= (second[1:] == second[:-1]) & (time_s[1:] > time_s[:-1])
+    if repeated.any():
+        some = np.logical_or.reduce([~rows.flags(name, true=("",)) for name in names])
+        reading.refuse(rows.line[repeated & some], "radio: repeats the row before within a second")
+    return ~repeated
+
+
 def _add_positions(rows: Columns, reading: Reading, time_s: Floats) -> None:
     """Add the positions that differ from the one before."""
     lat, lon = rows.number(*_LAT), rows.number(*_LON)
@@ -150,14 +183,15 @@ def _add_positions(rows: Columns, reading: Reading, time_s: Floats) -> None:
         reading.add("positions", *only(columns, rows.line, kept))
 
 
-def _add_serving_gsm(rows: Columns, reading: Reading, time_s: Floats) -> None:
-    columns = _cells(rows, _GSM)
-    full = rows.number(_GSM["full"])
+def _add_serving_gsm(messages: _Messages) -> None:
+    columns = _cells(messages.rows, _GSM)
+    full = messages.rows.number(_GSM["full"])
     columns["level_dbm"] = np.where(np.isnan(columns["level_dbm"]), full, columns["level_dbm"])
-    _add_cells(rows, reading, {**columns, "time_s": time_s}, "GSM", "serving")
+    _add_cells(messages, columns, "GSM", "serving")
 
 
-def _add_serving_lte(rows: Columns, reading: Reading, time_s: Floats) -> None:
+def _add_serving_lte(messages: _Messages) -> None:
+    rows, reading = messages.rows, messages.reading
     columns = _cells(rows, _LTE)
     enb, part = (available(*rows.whole(_LTE[name])) for name in ("enb", "part"))
     known = (enb >= 0) & (part >= 0) & (part < _CELLS_OF_ENB)
@@ -168,7 +202,7 @@ def _add_serving_lte(rows: Columns, reading: Reading, time_s: Floats) -> None:
     shown = cell[["arfcn", "bsic"]].ffill().fillna(-1)
     run = (shown != shown.shift()).any(axis=1).cumsum().to_numpy()
     columns["ci"] = cell["ci"].groupby(run).ffill().to_numpy()[len(cell) - len(rows) :]
-    _add_cells(rows, reading, {**columns, "time_s": time_s}, "LTE", "serving")
+    _add_cells(messages, columns, "LTE", "serving")
 
 
 def _last_serving(reading: Reading) -> pd.DataFrame:
@@ -181,19 +215,11 @@ def _last_serving(reading: Reading) -> pd.DataFrame:
     return pd.DataFrame({name: np.zeros(0) for name in names})
 
 
-def _add_listed(
-    rows: Columns,
-    reading: Reading,
-    time_s: Floats,
-    family: str,
-    names: Mapping[str, str],
-    listed: str,
-) -> None:
+def _add_listed(messages: _Messages, family: str, names: Mapping[str, str], listed: str) -> None:
     """Add the cells of one place of a list."""
     names = {field: name + listed for field, name in names.items()}
-    if rows.has(names["level"]):
-        columns = {**_cells(rows, names), "time_s": time_s}
-        _add_cells(rows, reading, columns, family, "neighbour")
+    if messages.rows.has(names["level"]):
+        _add_cells(messages, _cells(messages.rows, names), family, "neighbour")
 
 
 def _cells(rows: Columns, names: Mapping[str, str]) -> dict[str, np.ndarray]:
@@ -203,19 +229,16 @@ def _cells(rows: Columns, names: Mapping[str, str]) -> dict[str, np.ndarray]:
 
 
 def _add_cells(
-    rows: Columns,
-    reading: Reading,
-    columns: Mapping[str, np.ndarray],
-    family: str,
-    role: str,
+    messages: _Messages, columns: Mapping[str, np.ndarray], family: str, role: str
 ) -> None:
     """Add the rows with a level and something that names its cell."""
     named = [~np.isnan(columns[name]) for name in ("arfcn", "bsic", "ci") if name in columns]
-    kept = np.logical_or.reduce(named) & ~np.isnan(columns["level_dbm"])
+    kept = np.logical_or.reduce(named) & ~np.isnan(columns["level_dbm"]) & messages.renewed
     if kept.any():
-        some, lines = only(columns, rows.line, kept)
+        timed = {**columns, "time_s": messages.time_s}
+        some, lines = only(timed, messages.rows.line, kept)
         some["technology"] = np.full(len(lines), family, dtype=object)
-        add_radio(reading, {**some, "role": role}, lines)
+        add_radio(messages.reading, {**some, "role": role}, lines)
 
 
 FORMAT = Format(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import zlib
 from collections.abc import Iterator
@@ -9,6 +10,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
+from mapfilter._inputs import open_input
 from mapfilter.errors import InputError, fail
 
 _HINTS = {
@@ -110,10 +112,10 @@ def read_text(path: Path, most_bytes: int = -1) -> Text:
     b'a,b\n1,2'
     """
     try:
-        size = path.stat().st_size
-        if size > _LARGEST_BYTES and most_bytes < 0:
-            raise fail(InputError, str(path), "a recording of at most 2 GiB", f"{size} bytes")
-        with path.open("rb") as stream:
+        with open_input(path) as stream:
+            size = os.fstat(stream.fileno()).st_size
+            if size > _LARGEST_BYTES and most_bytes < 0:
+                raise fail(InputError, str(path), "a recording of at most 2 GiB", f"{size} bytes")
             data = stream.read(most_bytes)
     except OSError as error:
         raise fail(InputError, str(path), "a readable file", error.strerror or error) from error

@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from annotated_types import Ge, Gt, Le
 
+from mapfilter._inputs import read_input
 from mapfilter._types import Floats
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.experiments.papers.paper import true_states
@@ -34,6 +35,7 @@ Combination = Literal["gsm", "hybrid1", "hybrid2"]
 COMBINATIONS: tuple[Combination, ...] = ("gsm", "hybrid1", "hybrid2")
 
 INTERVAL_S = 0.48
+_LARGEST_BYTES = 1 << 20
 START = (-200.0, 8.84, -200.0, 8.84, 0.0, 0.0)
 """x(0): east, its rate, north, its rate, bias, drift."""
 
@@ -112,9 +114,7 @@ def read_layout(path: Path) -> Layout:
         The file cannot be read, is no TOML, or holds what is no layout.
     """
     try:
-        given: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise fail(InputError, str(path), "a readable file", error.strerror or error) from error
+        given: dict[str, Any] = tomllib.loads(read_input(path, _LARGEST_BYTES, "TOML").decode())
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise fail(InputError, str(path), "TOML", error) from error
     known = [field.name for field in fields(Layout)]

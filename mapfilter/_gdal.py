@@ -1,0 +1,128 @@
+"""The door for rasters: GDAL opens GeoTIFFs only, and these lead to no other file.
+
+Not only virtual rasters name files elsewhere, or addresses in the network: a GeoTIFF does so by its
+metadata, and GDAL opens the overviews and the mask beside it whatever they are.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rasterio
+from rasterio.errors import NotGeoreferencedWarning, RasterioError
+
+from mapfilter._inputs import check_file, open_input
+from mapfilter.errors import InputError, MapfilterError, fail
+
+# Little and big endian, each also as BigTIFF.
+_TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+_BESIDE = (".ovr", ".msk")
+"""Files beside a raster that GDAL opens as rasters."""
+_READ_BESIDE = (".tfw", ".tifw", ".tiffw", ".wld", ".tab", ".prj", ".aux", ".rrd", ".imd", ".rpb")
+_OVERVIEWS = "OVERVIEWS"
+"""Domain of metadata by which GDAL finds overviews, wherever they are."""
+_LARGEST_SIDECAR_BYTES = 16 << 20
+_LEAST_BLOCK_BYTES = 64 << 20
+_ELSEWHERE = "a raster that holds its data itself"
+
+
+@contextmanager
+def open_raster(path: Path, *, quiet: bool = True) -> Iterator[Any]:
+    """Open a GeoTIFF for reading; ``quiet`` ignores that it lacks a place.
+
+    Yields
+    ------
+    rasterio.io.DatasetReader
+
+    Raises
+    ------
+    InputError
+        There is no such file, it is a pipe or a device, no TIFF, leads to other files, or its
+        blocks are larger than the file can fill.
+    rasterio.errors.RasterioError
+        It is damaged; while it is open, too.
+    """
+    _check_sidecars(path)
+    with warnings.catch_warnings():
+        if quiet:
+            warnings.simplefilter("ignore", NotGeoreferencedWarning)
+        # The absolute path, because GDAL takes a name such as "GTIFF_DIR:1:a.tif" for a command.
+        source = rasterio.open(path.absolute(), driver="GTiff")
+    with source:
+        _check_inside(path, source)
+        check_blocks(path, source)
+        yield source
+
+
+def _check_sidecars(path: Path) -> None:
+    """Check a raster and what GDAL would read beside it."""
+    name, stem = str(path), str(path.with_suffix(""))
+    _check_is_tiff(path)
+    for suffix in _READ_BESIDE:
+        for base in {stem, name}:
+            for sidecar in (Path(f"{base}{suffix}"), Path(f"{base}{suffix.upper()}")):
+                if sidecar.exists():
+                    check_file(sidecar)
+    settings = Path(f"{name}.aux.xml")
+    if settings.exists():
+        size = check_file(settings)
+        if size > _LARGEST_SIDECAR_BYTES:
+            raise fail(InputError, str(settings), "at most 16 MiB", f"{size >> 20} MiB")
+    for suffix in _BESIDE:
+        beside = Path(f"{name}{suffix}")
+        if beside.exists():
+            try:
+                with open_raster(beside):
+                    pass
+            except (MapfilterError, RasterioError, UnicodeDecodeError) as error:
+                if not isinstance(error, MapfilterError):
+                    got = str(error).splitlines()[0]
+                    raise fail(InputError, str(beside), "a TIFF", got, "damaged") from error
+                raise
+
+
+def _check_is_tiff(path: Path) -> None:
+    if not path.exists():
+        raise fail(InputError, str(path), "a raster file", "no such file", "a mistyped path")
+    with open_input(path) as stream:
+        head = stream.read(64)
+    if head.startswith(_TIFF):
+        return
+    if head.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
+        hint = "a virtual raster or an address; gdal_translate FROM TO.tif copies its pixels"
+        raise fail(InputError, str(path), _ELSEWHERE, "text that may lead to other places", hint)
+    got = "an empty file" if not head else "no TIFF"
+    hint = "cut off, or no raster"
+    raise fail(InputError, str(path), "a raster that GDAL can read (GeoTIFF)", got, hint)
+
+
+def _check_inside(path: Path, source: Any) -> None:
+    """Check what an open raster refers to, before any of it is followed."""
+    if tags := source.tags(ns=_OVERVIEWS):
+        named = ", ".join(map(str, tags.values()))
+        got = f"overviews elsewhere: {named}"
+        hint = "gdal_translate FROM TO.tif makes a copy without them"
+        raise fail(InputError, str(path), _ELSEWHERE, got, hint)
+
+
+def check_blocks(path: Path, source: Any) -> None:
+    """Refuse a raster whose blocks need far more memory than the file holds bytes.
+
+    Raises
+    ------
+    InputError
+        A block is larger than 64 MiB and than the file.
+    """
+    rows_px, cols_px = source.block_shapes[0]
+    by_band = str(source.interleaving).lower().endswith("band")
+    pixel_bytes = max(np.dtype(kind).itemsize for kind in source.dtypes)
+    block_bytes = rows_px * cols_px * pixel_bytes * (1 if by_band else source.count)
+    if block_bytes > max(path.stat().st_size, _LEAST_BLOCK_BYTES):
+        got = f"{rows_px} x {cols_px} pixels of {pixel_bytes} bytes"
+        hint = "not tiled, or a damaged header"
+        raise fail(InputError, f"{path}, blocks", "blocks under 64 MiB", got, hint)

@@ -1,0 +1,305 @@
+"""Sensors that no longer measure what they seem to: dead, stuck or stale.
+
+A log goes on after a sensor has died. Motion rows end, steps lack a length, or a counter stands
+still while the phone is carried on; a modem repeats its last report. :func:`watched` looks at an
+epoch before any evidence is taken from it. For motion that was not measured it puts a step to all
+sides into the epoch, as long as one goes in that time, so the belief grows as it must; a report
+that stands still while the phone moves is taken out.
+
+Rows that are missing, or lengths of zero, can also be those of a phone that rests, so levels
+decide: at rest they change by fading alone. Each block of a rest is compared with its first one, by
+the likelihoods of "still there" and "carried elsewhere", and their ratio is added up from zero (a
+CUSUM; Page, 1954).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from math import exp, isfinite, log, nan, sqrt
+
+from mapfilter.filters.contract import MotionStep, Reason
+from mapfilter.positioning.epochs import Epoch, ReportRow
+from mapfilter.tracks.schema import SERVING
+
+_GAP_S, _GAP_INTERVALS, _REGULAR = 5.0, 3.0, 0.02
+"""After so long, in seconds and in intervals of the log, motion rows are missing; intervals of rows
+at fixed times differ by less than this share."""
+_KNOWN_ROWS = 10
+_REST_MPS = 0.1
+_WALK_MPS = 1.4
+"""Speed that is assumed before one is measured."""
+_STRAIGHT_S = 60.0
+"""Time after which the direction of an unmeasured way is forgotten by 1/e."""
+
+_BLOCK_S = 10.0
+_AT_REST_DB, _ELSEWHERE_DB, _ALL_DB = 4.0, 9.0, 6.0
+"""Deviations of a level from an earlier one at rest, and elsewhere; of all levels together, as a
+phone is put into a pocket."""
+_BLOCK_SHARE = 0.5
+"""Power of a block's likelihoods: blocks near each other repeat the same deviation."""
+_CELLS_AT_REST, _NATS_PER_CELL = 3, 2.0
+_CARRIED_NATS = 6.0
+
+_NATS_PER_M, _NATS_PER_REPEAT, _MOST_ROWS = 0.12, 0.9, 3
+"""Gain, for each level of at most three, from a report that repeats the last one: by the metres
+between them, and at most."""
+_STALE_NATS = 8.0
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """Reports since motion stands still.
+
+    Parameters
+    ----------
+    since_s : float
+        Time of the last step.
+    block_s : float
+        When the present block began.
+    first, present : mapping of str to tuple of float
+        Sum and number of each cell's levels, in the first and the present block.
+    served : frozenset of str
+        Serving cells.
+    carried_nats : float
+        How much the levels speak for being carried on.
+    """
+
+    since_s: float
+    block_s: float = nan
+    first: Mapping[str, tuple[float, int]] = field(default_factory=dict)
+    present: Mapping[str, tuple[float, int]] = field(default_factory=dict)
+    served: frozenset[str] = frozenset()
+    carried_nats: float = 0.0
+
+    def heard(self, time_s: float, rows: tuple[ReportRow, ...]) -> Rest:
+        """Add a report; a phone that was carried on stays so until a step is measured."""
+        if self.is_carried:
+            return self
+        cells = {row.cell for row in rows if row.role == SERVING and row.cell is not None}
+        new = cells - self.served
+        more = _NATS_PER_CELL * max(
+            len(self.served | new) - max(len(self.served), _CELLS_AT_REST), 0
+        )
+        rest = replace(
+            self,
+            served=self.served | new,
+            carried_nats=min(self.carried_nats + more, _CARRIED_NATS),
+        )
+        if not isfinite(rest.block_s):
+            rest = replace(rest, block_s=time_s)
+        elif time_s - rest.block_s >= _BLOCK_S:
+            nats = rest.carried_nats + _BLOCK_SHARE * _carried(rest.first, rest.present)
+            rest = replace(
+                rest,
+                block_s=time_s,
+                first={**rest.present, **rest.first},
+                present={},
+                carried_nats=min(max(nats, 0.0), _CARRIED_NATS),
+            )
+        present = dict(rest.present)
+        for name, level_dbm in _levels(rows):
+            total, count = present.get(name, (0.0, 0))
+            present[name] = (total + level_dbm, count + 1)
+        return replace(rest, present=present)
+
+    @property
+    def is_carried(self) -> bool:
+        """Whether the phone is carried on though no motion is reported."""
+        return self.carried_nats >= _CARRIED_NATS
+
+
+@dataclass(frozen=True, slots=True)
+class SensorWatch:
+    """What is known of the sensors after an epoch.
+
+    Parameters
+    ----------
+    motion_s : float
+        Time of the last motion row; NaN before the first.
+    rows : int
+        Number of motion rows.
+    interval_s, irregular_s : float
+        Mean interval of motion rows, and the mean deviation from it.
+    rests : bool
+        Whether a row has reported that the phone stands.
+    speed_mps : float
+        Mean speed while it moves.
+    moving_s : float
+        Time of the last measured step.
+    rest : Rest or None
+        Reports since then, while no motion is reported; None while it moves.
+    unmeasured_s : float
+        Time for which an unmeasured way is in the belief already.
+    report : tuple of ReportRow
+        The last report.
+    moved_m : float
+        Distance since then.
+    repeated_nats : float
+        How much repeated reports speak for a radio that stands still.
+    """
+
+    motion_s: float = nan
+    rows: int = 0
+    interval_s: float = 0.0
+    irregular_s: float = 0.0
+    rests: bool = False
+    speed_mps: float = _WALK_MPS
+    moving_s: float = nan
+    rest: Rest | None = None
+    unmeasured_s: float = 0.0
+    report: tuple[ReportRow, ...] = ()
+    moved_m: float = 0.0
+    repeated_nats: float = 0.0
+
+    @property
+    def reports_always(self) -> bool:
+        """Whether rows come at rest, too, so that missing ones are no rest."""
+        if self.rows < _KNOWN_ROWS:
+            return False
+        return self.rests or self.irregular_s < _REGULAR * self.interval_s
+
+
+def watched(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, Epoch, tuple[Reason, Reason]]:
+    """Look at the sensors of an epoch.
+
+    Returns
+    -------
+    watch : SensorWatch
+    epoch : Epoch
+        With a step to all sides for motion that was not measured, without a report that is stale.
+    reasons : tuple of Reason
+        Of motion and of the report: ``USED``, or ``NO_STEP``, ``MOTION_MISSING`` or
+        ``MOTION_STUCK``, and ``STALE_RADIO``.
+    """
+    watch, epoch, why = _moved(watch, epoch)
+    watch, is_stale = _repeated(watch, epoch)
+    if is_stale:
+        epoch = replace(epoch, radio=())
+    return watch, epoch, (why, Reason.STALE_RADIO if is_stale else Reason.USED)
+
+
+def _moved(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, Epoch, Reason]:
+    """Follow the motion rows; add the way that they lack."""
+    time_s, why = epoch.time_s, Reason.USED
+    steps = [abs(step.step_m) for step in epoch.motion]
+    measured = [step_m for step_m in steps if isfinite(step_m)]
+    dt_s = time_s - watch.motion_s
+    moves = sum(measured) > _REST_MPS * (dt_s if isfinite(dt_s) else 0.0)
+    if steps:
+        watch = _timed(watch, time_s, dt_s, sum(measured), moves=moves, rests=bool(measured))
+    if not isfinite(watch.moving_s):
+        return watch, epoch, why
+    if moves:
+        moved_m = watch.moved_m + sum(measured)
+        return (
+            replace(watch, moving_s=time_s, rest=None, unmeasured_s=0.0, moved_m=moved_m),
+            epoch,
+            why,
+        )
+    rest = (watch.rest or Rest(watch.moving_s)).heard(time_s, epoch.radio)
+    unmeasured_s = time_s - watch.moving_s
+    if steps and not measured:
+        why = Reason.NO_STEP
+    elif not steps and watch.reports_always:
+        longest_s = max(_GAP_S, _GAP_INTERVALS * watch.interval_s)
+        why = Reason.MOTION_MISSING if time_s - watch.motion_s > longest_s else Reason.USED
+    if why is Reason.USED and rest.is_carried:
+        why = Reason.MOTION_STUCK if steps else Reason.MOTION_MISSING
+    watch = replace(watch, rest=rest)
+    if why is Reason.USED:
+        return watch, epoch, why
+    way = _unmeasured(watch.speed_mps, watch.unmeasured_s, unmeasured_s)
+    motion = (*(step for step in epoch.motion if isfinite(step.step_m)), way)
+    moved_m = watch.moved_m + way.step_m
+    watch = replace(watch, unmeasured_s=unmeasured_s, moved_m=moved_m)
+    return watch, replace(epoch, motion=motion), why
+
+
+def _timed(
+    watch: SensorWatch, time_s: float, dt_s: float, moved_m: float, *, moves: bool, rests: bool
+) -> SensorWatch:
+    """Learn from an epoch's motion rows how often they come, and how fast one moves."""
+    interval_s, irregular_s, speed_mps = watch.interval_s, watch.irregular_s, watch.speed_mps
+    if isfinite(dt_s) and dt_s > 0:
+        new = 1 / min(watch.rows, 20)
+        # What a gap says of the usual interval is bounded.
+        dt_s = min(dt_s, 5 * interval_s) if watch.rows > _KNOWN_ROWS else dt_s
+        interval_s += new * (dt_s - interval_s)
+        irregular_s += new * (abs(dt_s - interval_s) - irregular_s)
+        if moves:
+            speed_mps += 0.05 * (moved_m / dt_s - speed_mps)
+    return replace(
+        watch,
+        motion_s=time_s,
+        rows=watch.rows + 1,
+        interval_s=interval_s,
+        irregular_s=irregular_s,
+        rests=watch.rests or (rests and not moves),
+        speed_mps=speed_mps,
+        moving_s=time_s if not isfinite(watch.moving_s) else watch.moving_s,
+    )
+
+
+def _unmeasured(speed_mps: float, from_s: float, to_s: float) -> MotionStep:
+    """Return the step to all sides between two times since the last measured one."""
+    spread_m2 = _spread_m2(speed_mps, to_s) - _spread_m2(speed_mps, from_s)
+    return MotionStep(speed_mps * (to_s - from_s), nan, nan, sqrt(max(spread_m2, 0.0)))
+
+
+def _spread_m2(speed_mps: float, time_s: float) -> float:
+    """Return the mean square of the distance of a way that forgets its direction."""
+    lasts_s = _STRAIGHT_S
+    return 2 * speed_mps**2 * lasts_s * (time_s - lasts_s * (1 - exp(-time_s / lasts_s)))
+
+
+def _repeated(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, bool]:
+    """Return whether the report repeats what was heard elsewhere."""
+    if not epoch.radio:
+        return watch, False
+    levels = min(sum(isfinite(row.level_dbm) for row in epoch.radio), _MOST_ROWS)
+    nats = 0.0
+    # Rows without a level compare as NaN, which equals nothing: their cells are compared.
+    if levels and _keys(epoch.radio) == _keys(watch.report):
+        each = min(_NATS_PER_M * watch.moved_m, _NATS_PER_REPEAT)
+        nats = watch.repeated_nats + levels * each
+    watch = replace(watch, report=epoch.radio, moved_m=0.0, repeated_nats=nats)
+    return watch, nats >= _STALE_NATS
+
+
+def _keys(rows: tuple[ReportRow, ...]) -> list[tuple[object, ...]]:
+    return [
+        (row.role, row.cell, row.arfcn, row.bsic, row.censored)
+        + ((row.level_dbm,) if isfinite(row.level_dbm) else ())
+        for row in rows
+    ]
+
+
+def _levels(rows: tuple[ReportRow, ...]) -> list[tuple[str, float]]:
+    """Return the levels of a report by their cells."""
+    return [
+        (row.cell if row.cell is not None else f"{row.arfcn}/{row.bsic}", row.level_dbm)
+        for row in rows
+        if isfinite(row.level_dbm) and row.censored == 0
+    ]
+
+
+def _carried(first: Mapping[str, tuple[float, int]], now: Mapping[str, tuple[float, int]]) -> float:
+    """Return the log-likelihood ratio of "elsewhere" to "still there", by the levels of both."""
+    changes = [
+        now[name][0] / now[name][1] - first[name][0] / first[name][1]
+        for name in now
+        if name in first
+    ]
+    if not changes:
+        return 0.0
+    return _log_density(changes, _ELSEWHERE_DB) - _log_density(changes, _AT_REST_DB)
+
+
+def _log_density(changes_db: list[float], sd_db: float) -> float:
+    """Return the log density of changes that share an error, up to a constant."""
+    count, mean = len(changes_db), sum(changes_db) / len(changes_db)
+    apart = sum((change - mean) ** 2 for change in changes_db)
+    shared_db2 = sd_db**2 + count * _ALL_DB**2
+    exponent = apart / sd_db**2 + count * mean**2 / shared_db2
+    return -0.5 * exponent - (count - 1) * log(sd_db) - 0.5 * log(shared_db2)

@@ -1,0 +1,89 @@
+"""Headings of a log compared with the course of its positions: sense of rotation and reference."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from mapfilter._types import Floats
+
+_LEAST_M = 2.0
+_FEWEST = 20
+_CONSTANT = 0.9
+_LEAST_GAIN = 0.3
+_OFF_RAD = np.deg2rad(45.0)
+
+
+def heading_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
+    """Return what is wrong with a log's headings, by its positions; an empty text for nothing.
+
+    The course of the positions minus the heading is 0 where headings are as they should be. Where
+    headings run clockwise, it is the sum of both that stays the same: π/2 if they count from north.
+
+    Parameters
+    ----------
+    motion : pandas.DataFrame
+        time_s, step_m and heading_rad.
+    places : pandas.DataFrame
+        time_s, east_m and north_m: ground truth, or fixes by GNSS.
+
+    Examples
+    --------
+    >>> time_s = np.arange(101.0)
+    >>> course = np.deg2rad(3.6) * np.arange(1, 101)
+    >>> east, north = (np.cumsum(np.append(0.0, 3 * f(course))) for f in (np.cos, np.sin))
+    >>> truth = pd.DataFrame({"time_s": time_s, "east_m": east, "north_m": north})
+    >>> wrong = np.pi / 2 - course
+    >>> steps = pd.DataFrame({"time_s": time_s[1:], "step_m": 3.0, "heading_rad": wrong})
+    >>> heading_fault(steps, truth)
+    'headings run clockwise from north (compass degrees?); expected counter-clockwise from east'
+    >>> heading_fault(steps.assign(heading_rad=course), truth)
+    ''
+    """
+    heading, course = _both(motion, places)
+    if heading.size < _FEWEST:
+        return ""
+    same, other = (np.mean(np.exp(1j * (course + sign * heading))) for sign in (-1, 1))
+    if abs(other) >= _CONSTANT and abs(other) - abs(same) >= _LEAST_GAIN:
+        reference_deg = np.rad2deg(np.angle(other))
+        origin = "north (compass degrees?)" if abs(reference_deg - 90) <= 45 else "another axis"
+        return f"headings run clockwise from {origin}; expected counter-clockwise from east"
+    off_rad = float(np.angle(same))
+    # A straight way has one course, which any sense of rotation fits.
+    varied = abs(np.mean(np.exp(1j * course))) < _CONSTANT
+    if varied and abs(same) >= _CONSTANT and abs(off_rad) >= _OFF_RAD:
+        off_deg = np.rad2deg(off_rad)
+        origin = "; counted from north?" if abs(off_deg - 90) <= 20 else ""
+        return f"headings are {off_deg:.0f} degrees off the course of the positions{origin}"
+    return ""
+
+
+def _both(motion: pd.DataFrame, places: pd.DataFrame) -> tuple[Floats, Floats]:
+    """Return headings, and the courses of the positions within the same intervals."""
+    nothing = np.empty(0)
+    if len(motion) < _FEWEST or len(places) < 2:
+        return nothing, nothing
+    end_s = motion["time_s"].to_numpy(dtype=np.float64)
+    heading = motion["heading_rad"].to_numpy(dtype=np.float64)
+    step_m = motion["step_m"].to_numpy(dtype=np.float64)
+    time_s, first = np.unique(places["time_s"].to_numpy(dtype=np.float64), return_index=True)
+    begin_s = np.concatenate([[np.nan], end_s[:-1]])
+    with np.errstate(invalid="ignore"):
+        known = (step_m > 0) & np.isfinite(heading) & (begin_s >= time_s[0]) & (end_s <= time_s[-1])
+    begin_s, end_s, heading = begin_s[known], end_s[known], heading[known]
+    moved = []
+    for name in ("east_m", "north_m"):
+        along = places[name].to_numpy(dtype=np.float64)[first]
+        moved.append(np.interp(end_s, time_s, along) - np.interp(begin_s, time_s, along))
+    # Of short steps only a few together have a course.
+    group = np.floor(np.cumsum(np.hypot(*moved)) / _LEAST_M).astype(np.int64)
+    if not group.size:
+        return nothing, nothing
+    _, at = np.unique(group, return_inverse=True)
+    count = int(at.max()) + 1
+    east, north, cos, sin = (
+        np.bincount(at, values, minlength=count)
+        for values in (*moved, np.cos(heading), np.sin(heading))
+    )
+    far = np.hypot(east, north) >= _LEAST_M / 2
+    return np.arctan2(sin, cos)[far], np.arctan2(north, east)[far]

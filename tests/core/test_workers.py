@@ -1,0 +1,150 @@
+"""Worker processes: none outlives its parent or holds its pipes, and what ended one is named."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from mapfilter._parallel import local_executor, ordered_results
+from mapfilter.errors import MapfilterError
+
+LONG_S = 60.0
+PATIENCE_S = 40.0
+
+PARENT = """
+import os, sys, time
+from pathlib import Path
+import mapfilter._workers as workers
+from mapfilter._parallel import local_executor, ordered_results
+
+if sys.argv[2] == "without prctl":
+    workers._PR_SET_PDEATHSIG = 0
+
+def sleep(folder):
+    (folder / str(os.getpid())).touch()
+    print("a worker writes to nobody", flush=True)
+    time.sleep(60)
+
+if __name__ == "__main__":
+    with local_executor(2) as executor:
+        list(ordered_results(executor, sleep, [Path(sys.argv[1])] * 4))
+"""
+
+
+def is_alive(pid):
+    with contextlib.suppress(OSError):
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    return False
+
+
+def wait_for(condition, message):
+    until_s = time.monotonic() + PATIENCE_S
+    while time.monotonic() < until_s:
+        if condition():
+            return
+        time.sleep(0.05)
+    pytest.fail(message)
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks processes up in /proc")
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM], ids=["SIGKILL", "SIGTERM"])
+@pytest.mark.parametrize("watch", ["as it is", "without prctl"])
+def test_workers_end_with_their_parent_whatever_ends_it(tmp_path, number, watch):
+    script, pids = tmp_path / "parent.py", tmp_path / "pids"
+    script.write_text(PARENT)
+    pids.mkdir()
+    given = [sys.executable, str(script), str(pids), watch]
+    with subprocess.Popen(given, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as parent:
+        try:
+            wait_for(lambda: len(list(pids.iterdir())) == 2, "two workers began")
+            workers = [int(path.name) for path in pids.iterdir()]
+            parent.send_signal(number)
+            # Returns at the end of the pipes, which nobody holds any more.
+            out, _ = parent.communicate(timeout=PATIENCE_S)
+        finally:
+            parent.kill()
+    assert parent.returncode == -number
+    assert out == b""
+    wait_for(lambda: not any(map(is_alive, workers)), "no worker outlives its parent")
+
+
+def sleep(_):
+    time.sleep(LONG_S)
+
+
+def test_a_block_that_is_left_waits_for_no_task():
+    began_s = time.monotonic()
+
+    def leave(executor):
+        executor.submit(os.getpid).result()
+        for _ in range(4):
+            executor.submit(sleep, None)
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError), local_executor(2) as executor:
+        leave(executor)
+    assert time.monotonic() - began_s < LONG_S / 2
+
+
+def killed(number):
+    if number == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+def crashes(number):
+    if number == 1:
+        os.kill(os.getpid(), signal.SIGSEGV)
+    return number
+
+
+def out_of_memory(number):
+    if number == 1:
+        raise MemoryError
+    return number
+
+
+@pytest.mark.parametrize(
+    ("function", "named"),
+    [
+        (killed, r"killed \(signal 9\), as the system does when memory runs out"),
+        (crashes, r"crashed \(SIGSEGV"),
+        (out_of_memory, "ran out of memory"),
+    ],
+)
+def test_what_ended_a_worker_is_named(function, named):
+    told = rf"worker processes: .*one that .*{named}.*too many workers.*--resume"
+    with pytest.raises(MapfilterError, match=told), local_executor(2) as executor:
+        list(ordered_results(executor, function, range(4)))
+
+
+OTHER_CODE = """
+import sys
+import mapfilter._parallel as parallel
+from mapfilter.errors import MapfilterError
+
+if __name__ == "__mp_main__":
+    parallel.code_digest = lambda: "another"
+
+if __name__ == "__main__":
+    try:
+        with parallel.local_executor(2) as executor:
+            list(parallel.ordered_results(executor, abs, range(4)))
+    except MapfilterError as error:
+        print(error)
+"""
+
+
+def test_a_worker_with_other_code_does_nothing(tmp_path):
+    script = tmp_path / "other.py"
+    script.write_text(OTHER_CODE)
+    run = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, check=True, timeout=120
+    )
+    assert "worker on" in run.stdout
+    assert "found other versions (likely: install the same on all hosts)" in run.stdout

@@ -1,0 +1,283 @@
+"""Sensors that died while the log goes on: what notices them, and how fast the belief grows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_town import CRS, Town, walk_log
+from scipy.stats import multivariate_normal
+
+from mapfilter.filters.contract import MotionStep, Reason, Status
+from mapfilter.positioning.bayes import sensors
+from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.sensors import Rest, SensorWatch, watched
+from mapfilter.positioning.epochs import Epoch, ReportRow, epochs
+from mapfilter.positioning.filter import locate
+from mapfilter.tracks.log import make_log
+
+STEP = (MotionStep(1.4, 0.0),)
+NO_STEP = (MotionStep(float("nan"), 0.0),)
+STILL = (MotionStep(0.0, 0.0),)
+CELLS = tuple("ABCDEFG")
+
+
+def report(levels_dbm, serving="A"):
+    return tuple(
+        ReportRow("serving" if cell == serving else "neighbour", cell, None, None, float(level), 0)
+        for cell, level in zip(CELLS, levels_dbm, strict=False)
+    )
+
+
+def told(sequence, watch=None):
+    """Watch epochs; return the watch, the epochs as they come out, and the reasons."""
+    watch, found = watch or SensorWatch(), []
+    for epoch in sequence:
+        watch, seen, reasons = watched(watch, epoch)
+        found.append((seen, *reasons))
+    return watch, found
+
+
+def walked(seconds=20, motion=STEP):
+    return [Epoch(float(second), motion) for second in range(seconds)]
+
+
+def unmeasured(found):
+    """Distance and mean square of all unmeasured ways."""
+    steps = [step for epoch, *_ in found for step in epoch.motion if np.isfinite(step.spread_m)]
+    return sum(step.step_m for step in steps), sum(step.spread_m**2 for step in steps)
+
+
+def test_rows_that_end_are_missing_and_the_way_is_that_of_a_walker():
+    """Its mean square is that of a velocity that forgets its direction after a minute."""
+    end_s = 320.0
+    radio = [Epoch(second, (), report([-70.0])) for second in np.arange(20.0, end_s + 1, 5.0)]
+    _, found = told(walked() + radio)
+    reasons = [why for _, why, _ in found]
+    assert set(reasons[:20]) == {Reason.USED}
+    # Rows came every second: after five without any they are missing, from the last one on.
+    assert [reasons[20], reasons[21]] == [Reason.USED, Reason.MOTION_MISSING]
+    assert set(reasons[21:]) == {Reason.MOTION_MISSING}
+    rng, seconds = np.random.default_rng(1), round(end_s - 19.0)
+    angle = np.cumsum(rng.normal(0, np.sqrt(2 / 60.0), (4000, seconds)), axis=1)
+    speed = 1.4 * np.exp(1j * angle)
+    distance_m, mean_square_m2 = unmeasured(found)
+    assert distance_m == pytest.approx(1.4 * seconds)
+    assert mean_square_m2 == pytest.approx((np.abs(speed.sum(axis=1)) ** 2).mean(), rel=0.08)
+
+
+def test_the_way_of_steps_without_a_length_is_made_up_at_once():
+    _, found = told([*walked(), Epoch(20.0, NO_STEP), Epoch(21.0, STEP), Epoch(22.0, STILL)])
+    assert [why for _, why, _ in found[20:]] == [Reason.NO_STEP, Reason.USED, Reason.USED]
+    (way,) = found[20][0].motion
+    assert way.step_m == pytest.approx(1.4)
+    assert way.spread_m == pytest.approx(1.4, rel=0.02)
+    assert not np.isfinite(way.heading_rad)
+    assert found[21][0].motion == STEP
+
+
+@pytest.mark.parametrize("always", [True, False])
+def test_rows_that_come_with_steps_only_are_missing_at_rest(always):
+    """A pedometer has no rows at rest: then levels must tell."""
+    rng = np.random.default_rng(3)
+    times = np.cumsum(rng.uniform(0.4, 0.7, 30))
+    rows = [Epoch(float(time_s), STEP) for time_s in times]
+    if always:
+        rows.append(Epoch(float(times[-1]) + 1, STILL))
+    later = [Epoch(100.0 + second, (), report([-70.0, -80.0])) for second in range(60)]
+    _, found = told(rows + later)
+    assert {why for _, why, _ in found[len(rows) :]} == {
+        Reason.MOTION_MISSING if always else Reason.USED
+    }
+
+
+def at_rest(rng, seconds, elsewhere_db_per_s=0.0):
+    """Levels of seven cells, as they fade at rest, or wander as one is carried on."""
+    lasting, levels = rng.normal(0, 2.0, 7), rng.uniform(-100, -70, 7)
+    for second in range(seconds):
+        lasting = 0.98 * lasting + 0.4 * rng.normal(size=7)
+        levels = levels + elsewhere_db_per_s**0.5 * rng.normal(size=7)
+        heard = np.round(levels + lasting + rng.normal(0, 3.3, 7))
+        yield Epoch(20.0 + second, STILL, report(heard))
+
+
+def test_a_phone_at_rest_for_20_minutes_is_at_rest():
+    for seed in range(20):
+        _, found = told([*walked(), *at_rest(np.random.default_rng(seed), 1200)])
+        assert {why for _, why, _ in found} == {Reason.USED}, seed
+        assert unmeasured(found) == (0.0, 0.0)
+
+
+def test_steps_of_zero_while_levels_wander_are_stuck():
+    """A variance of 1.2 dB² a second, as 49 dB² over 60 m of a walk, is found within minutes."""
+    after_s = []
+    for seed in range(20):
+        _, found = told([*walked(), *at_rest(np.random.default_rng(seed), 300, 1.2)])
+        stuck = [k for k, (_, why, _) in enumerate(found) if why is Reason.MOTION_STUCK]
+        assert stuck, seed
+        after_s.append(stuck[0] - 20)
+        assert stuck == list(range(stuck[0], len(found)))
+        # The whole way since the last step is made up for.
+        assert unmeasured(found)[0] == pytest.approx(1.4 * (len(found) - 20), rel=0.02)
+    assert np.median(after_s) < 90
+
+
+def test_serving_cells_one_after_another_are_stuck_too():
+    rows = [Epoch(20.0 + 30 * k, STILL, report([np.nan] * 7, cell)) for k, cell in enumerate(CELLS)]
+    _, found = told([*walked(), *rows])
+    assert [why is Reason.MOTION_STUCK for _, why, _ in found[20:]] == [False] * 5 + [True] * 2
+    pair = [Epoch(20.0 + 30 * k, STILL, report([np.nan] * 7, CELLS[k % 3])) for k in range(40)]
+    assert {why for _, why, _ in told([*walked(), *pair])[1]} == {Reason.USED}
+
+
+def test_a_measured_step_ends_the_doubt():
+    watch, _ = told([*walked(), *at_rest(np.random.default_rng(0), 300, 1.2)])
+    assert watch.rest.is_carried
+    watch, ((epoch, why, _),) = told([Epoch(330.0, STEP)], watch)
+    assert (why, watch.rest, watch.unmeasured_s, epoch.motion) == (Reason.USED, None, 0.0, STEP)
+
+
+@pytest.mark.parametrize("changes", [(3.0,), (2.0, -9.0), (8.0, 7.5, 9.0), (-12.0, 3.0, 0.0, 9.5)])
+def test_likelihoods_of_changes_are_those_of_normal_vectors(changes):
+    first = dict.fromkeys(CELLS[: len(changes)], (-160.0, 2))
+    now = {cell: (3 * (-80.0 + x), 3) for cell, x in zip(CELLS, changes, strict=False)}
+    count = len(changes)
+
+    def log_density(sd_db):
+        return multivariate_normal.logpdf(
+            changes, np.zeros(count), sd_db**2 * np.eye(count) + 36.0 * np.ones((count, count))
+        )
+
+    expected = log_density(9.0) - log_density(4.0)
+    assert sensors._carried(first, now) == pytest.approx(expected)
+    assert sensors._carried(first, {"Z": (-80.0, 1)}) == 0.0
+
+
+@pytest.mark.parametrize(("levels", "least_m", "most_m"), [(1, 60, 70), (3, 20, 26), (7, 20, 26)])
+def test_a_report_that_repeats_itself_on_the_way_is_stale(levels, least_m, most_m):
+    rows = report(range(-90, -90 + levels))
+    _, found = told([Epoch(float(k), STEP, rows) for k in range(80)])
+    stale = [k for k, (_, _, why) in enumerate(found) if why is Reason.STALE_RADIO]
+    assert least_m < 1.4 * stale[0] < most_m
+    assert stale == list(range(stale[0], 80))
+    assert all(not found[k][0].radio for k in stale)
+    assert found[stale[0] - 1][0].radio == rows
+
+
+def test_another_level_makes_it_fresh_again_and_rest_never_makes_it_stale():
+    rows, other = report([-80, -85, -90]), report([-80, -85, -91])
+    moving = [Epoch(float(k), STEP, rows) for k in range(40)]
+    _, found = told([*moving, Epoch(40.0, STEP, other), Epoch(41.0, STEP, rows)])
+    assert [why for _, _, why in found[39:]] == [Reason.STALE_RADIO, Reason.USED, Reason.USED]
+    _, found = told([*walked(), *(Epoch(20.0 + k, STILL, rows) for k in range(600))])
+    assert {why for _, _, why in found} == {Reason.USED}
+    cells_only = report([np.nan] * 3)
+    _, found = told([Epoch(float(k), STEP, cells_only) for k in range(300)])
+    assert {why for _, _, why in found} == {Reason.USED}
+
+
+def test_a_log_that_begins_without_motion_is_left_alone():
+    rows = [Epoch(float(k), (), report([-70 - k, -80])) for k in range(20)]
+    assert told(rows)[1] == [(epoch, Reason.USED, Reason.USED) for epoch in rows]
+
+
+TOWN = Town.of(1)
+AREA = BayesFilter().over_area(TOWN.area())
+
+
+def faulty(log, fault):
+    """Return a log whose sensors fail after 120 of 240 s."""
+    motion, radio, half_s = log.motion.copy(), log.radio, 120.0
+    late = motion["time_s"] > half_s
+    if fault == "ended":
+        motion = motion[~late]
+    elif fault == "stuck":
+        motion.loc[late, "step_m"] = 0.0
+    elif fault == "no length":
+        motion.loc[late, "step_m"] = np.nan
+    elif fault == "reversed":
+        motion.loc[late, "heading_rad"] += np.pi
+    motion = motion.reset_index(drop=True)
+    return make_log(log.crs, motion=motion, radio=radio, truth=log.truth)
+
+
+def tracked(log, seed, positioner):
+    """Track a log from its known start; return how far off each epoch is, its radius and status."""
+    rng, truth = np.random.default_rng(seed), log.truth
+    state = positioner.begin_at(truth["east_m"][0], truth["north_m"][0], 5.0, rng)
+    rows, reasons = [], set()
+    for epoch in epochs(log):
+        state, output = positioner.step(state, epoch, rng)
+        fix = output.fix
+        off_m = np.hypot(
+            fix.east_m - np.interp(fix.time_s, truth["time_s"], truth["east_m"]),
+            fix.north_m - np.interp(fix.time_s, truth["time_s"], truth["north_m"]),
+        )
+        claimed = fix.status in (Status.CONVERGED, Status.TRACKING)
+        rows.append((fix.time_s, off_m, fix.radii_m[-1], claimed))
+        reasons.update(one.reason for one in output.unused if one.kind == "motion")
+    return np.array(rows), reasons
+
+
+def test_the_walks_are_tracked_while_all_sensors_work():
+    for seed in (1, 2, 3):
+        found, reasons = tracked(walk_log(TOWN, seed, error_db=3.0), seed, AREA)
+        assert found[:, 3].mean() > 0.9
+        assert np.median(found[:, 1]) < 15
+        assert not reasons
+
+
+@pytest.mark.parametrize(
+    ("fault", "reason"),
+    [("ended", "motion_missing"), ("stuck", "motion_stuck"), ("no length", "no_step")],
+)
+def test_without_motion_a_position_is_not_claimed_for_long(fault, reason):
+    """One goes on at 5 m/s; only levels tell that steps of zero are wrong, which takes longer."""
+    noticed_s = 210.0 if fault == "stuck" else 160.0
+    for seed in (1, 3):
+        found, reasons = tracked(faulty(walk_log(TOWN, seed, error_db=3.0), fault), seed, AREA)
+        late = found[:, 0] > noticed_s
+        assert found[~late, 3].mean() > 0.6
+        assert not (found[late, 3].astype(bool) & (found[late, 1] > found[late, 2])).any()
+        assert found[late, 3].mean() < 0.1
+        assert Reason(reason) in reasons
+
+
+def test_a_phone_that_is_turned_in_its_pocket_is_found_again():
+    """Headings are off by half a circle from the middle on; without the remedy it stays lost."""
+    share = {}
+    for remounts_per_m in (1e-3, 0.0):
+        motion = replace(AREA.model.motion, remounts_per_m=remounts_per_m)
+        positioner = replace(AREA, model=replace(AREA.model, motion=motion))
+        logs = [
+            (seed, faulty(walk_log(TOWN, seed, error_db=3.0), "reversed")) for seed in (1, 2, 3)
+        ]
+        ends = [tracked(log, seed, positioner)[0][-60:] for seed, log in logs]
+        share[remounts_per_m] = np.mean([(end[:, 1] < 30).mean() for end in ends])
+    assert share[1e-3] > 0.6
+    assert share[0.0] < 0.3
+
+
+def test_radio_that_stands_still_leaves_dead_reckoning_alone():
+    """The radius grows, instead of the belief being held where the radio stood still."""
+    log = walk_log(TOWN, 2, error_db=3.0)
+    radio = log.radio
+    last = radio[radio["time_s"] == 120.0]
+    frozen = [last.assign(time_s=float(k)) for k in range(121, 240)]
+    radio = pd.concat([radio[radio["time_s"] <= 120.0], *frozen], ignore_index=True)
+    log = make_log(CRS, motion=log.motion, radio=radio, truth=log.truth)
+    found = locate(log, AREA, np.random.default_rng(2)).estimate
+    stale = [one for one in found.unused if one.reason is Reason.STALE_RADIO]
+    # 5 m a second, three levels: 0.6 nats each and repeat, so that the fifth repeat is stale.
+    assert min(one.time_s for one in stale) == 125.0
+    assert {one.kind for one in stale} == {"serving", "neighbour"}
+    assert found.reason[-1] is Reason.STALE_RADIO
+
+
+def test_a_rest_remembers_the_first_levels_of_each_cell():
+    rest = Rest(0.0)
+    for second in range(25):
+        rows = report([-70.0] if second < 10 else [-75.0, -90.0])
+        rest = rest.heard(float(second), rows)
+    assert rest.first == {"A": (-700.0, 10), "B": (-900.0, 10)}
+    assert rest.present == {"A": (-375.0, 5), "B": (-450.0, 5)}

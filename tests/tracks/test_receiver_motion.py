@@ -1,0 +1,64 @@
+"""Motion by a receiver: steps and headings of positions, and the errors stated for them."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mapfilter.tracks.moved import course_errors, motion_from_course, motion_from_positions
+
+
+def drive(sd_m, seed=0, count=2000, speed_mps=8.0):
+    """Return times and positions of a car on long straight roads, with white errors."""
+    rng = np.random.default_rng(seed)
+    time_s = np.arange(count, dtype=np.float64)
+    heading = np.repeat(rng.uniform(-np.pi, np.pi, count // 100 + 1), 100)[:count]
+    east_m = np.cumsum(speed_mps * np.cos(heading)) + rng.normal(0, sd_m, count)
+    north_m = np.cumsum(speed_mps * np.sin(heading)) + rng.normal(0, sd_m, count)
+    return time_s, east_m, north_m, heading
+
+
+@pytest.mark.parametrize("sd_m", [0.3, 1.0, 2.0])
+def test_the_errors_stated_are_those_of_steps_and_headings(sd_m):
+    time_s, east_m, north_m, heading = drive(sd_m)
+    motion, errors = motion_from_positions(time_s, east_m, north_m)
+    assert errors.sigma_trans_m == pytest.approx(np.sqrt(2) * sd_m, rel=0.1)
+    # An interval's own heading is that of its end.
+    turned = np.angle(np.exp(1j * (motion["heading_rad"].to_numpy()[1:] - heading[1:])))
+    assert errors.sigma_orient_deg == pytest.approx(np.degrees(np.nanstd(turned)), rel=0.2)
+    assert errors.bias_sd_deg == 0
+
+
+def test_standing_has_no_heading_and_a_gap_is_one_straight_step():
+    time_s, east_m, north_m, _ = drive(0.5, count=300)
+    east_m[100:160], north_m[100:160] = east_m[100], north_m[100]
+    rng = np.random.default_rng(1)
+    east_m[100:160] += rng.normal(0, 0.5, 60)
+    kept = np.r_[0:200, 240:300]
+    motion, _ = motion_from_positions(time_s[kept], east_m[kept], north_m[kept])
+    assert motion["heading_rad"].iloc[101:160].isna().mean() > 0.8
+    assert motion["heading_rad"].iloc[1:100].notna().all()
+    over_m = np.hypot(east_m[240] - east_m[199], north_m[240] - north_m[199])
+    assert motion["step_m"].iloc[200] == pytest.approx(over_m)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_few_positions(count):
+    time_s, east_m, north_m, _ = drive(0.0, count=count)
+    motion, errors = motion_from_positions(time_s, east_m, north_m)
+    assert len(motion) == count
+    assert errors.sigma_trans_m > 0
+
+
+def test_errors_of_speed_and_course_are_how_they_differ_from_positions():
+    time_s, east_m, north_m, heading = drive(0.05)
+    rng = np.random.default_rng(2)
+    course_deg = 90 - np.degrees(heading) + rng.normal(0, 4.0, len(heading))
+    rows = pd.DataFrame({"time_s": time_s, "course_deg": course_deg % 360})
+    rows["speed_mps"] = 8.0 + rng.normal(0, 0.6, len(rows))
+    motion = motion_from_course(rows, 0.0)
+    errors = course_errors(motion, east_m, north_m)
+    # The mean of two ends, of which the first is another road's at one in a hundred.
+    assert errors.sigma_orient_deg == pytest.approx(4.0 / np.sqrt(2), rel=0.15)
+    assert errors.sigma_trans_m == pytest.approx(0.6 / np.sqrt(2), rel=0.25)
+    still = np.zeros(len(time_s))
+    assert course_errors(motion, still, still) is None

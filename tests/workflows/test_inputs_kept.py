@@ -1,0 +1,161 @@
+"""Inputs are never written to, and one area means one area for all commands."""
+
+import ctypes
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import rasterio
+from command_line import ONE, assert_done, assert_refused, contents, mapfilter, settings
+
+from mapfilter.rasters.raster_set import open_rasters
+from mapfilter.tracks.store import list_logs, read_log
+
+
+def test_own_rasters_that_were_edited_are_not_predicted_anew(own_world):
+    """As a planner does with a prediction: it keeps the tags of the program that made it."""
+    assert_done(mapfilter("predict", "-c", own_world.toml))
+    with rasterio.open(own_world.rasters, "r+", IGNORE_COG_LAYOUT_BREAK="YES") as source:
+        values = source.read(1)
+        values[values.shape[0] // 2, values.shape[1] // 2] += 1
+        source.write(values, 1)
+    before = contents(own_world.folder)
+    refused = mapfilter("predict", "-c", own_world.toml)
+    assert_refused(refused, "rxlev.tif: expected nothing yet, or rasters that", "changed since")
+    assert contents(own_world.folder) == before
+
+
+def test_a_plan_in_the_output_folder_is_not_replaced(own_world):
+    shutil.copy(own_world.plan, own_world.out / "cells.csv")
+    before = contents(own_world.folder)
+    plan = settings(cells__plan=own_world.out / "cells.csv")
+    refused = mapfilter("predict", "-c", own_world.toml, *plan)
+    assert_refused(refused, "cells.csv: expected another place than an input", "cells.plan")
+    assert contents(own_world.folder) == before
+
+
+@pytest.mark.parametrize("place", ["out/database", "out/database/mine", f"out/journeys/{ONE}"])
+def test_results_are_not_written_into_inputs(own_world, place):
+    before = contents(own_world.folder)
+    log = own_world.journeys / ONE
+    given = ["--db", own_world.database, "--log", log, "--out", own_world.folder / place]
+    assert_refused(mapfilter("replay", "-c", own_world.toml, *given), "--out", "which is an input")
+    assert contents(own_world.folder) == before
+
+
+def test_journeys_go_where_the_database_is(own_world):
+    """In an area that is wider than the rasters, as when a planner's export is smaller."""
+    wider = settings(area__bbox="24.9390,60.1645,24.9530,60.1710", rasters__path=own_world.rasters)
+    done = assert_done(mapfilter("simulate", "-c", own_world.toml, *wider, "--json")).json
+    assert any("the set of rasters covers" in note for note in done["notes"])
+    west, south, east, north = open_rasters(own_world.rasters).lattice.bounds_m
+    for path in list_logs(own_world.journeys):
+        log = read_log(path)
+        east_m, north_m = (log.truth[name].to_numpy() for name in ("east_m", "north_m"))
+        assert np.all((east_m >= west) & (east_m <= east))
+        assert np.all((north_m >= south) & (north_m <= north))
+        assert not log.radio.empty
+    beyond = settings(area__bbox="24.9380,60.1720,24.9450,60.1760", rasters__path=own_world.rasters)
+    before = contents(own_world.folder)
+    refused = mapfilter("simulate", "-c", own_world.toml, *beyond)
+    assert_refused(refused, "area: expected an area that overlaps the rasters")
+    assert contents(own_world.folder) == before
+
+
+def test_journeys_that_receive_nothing_are_done_in_part(own_world):
+    with rasterio.open(own_world.rasters, "r+", IGNORE_COG_LAYOUT_BREAK="YES") as source:
+        for band in source.indexes:
+            source.write(np.full(source.shape, np.nan, np.float32), band)
+    outcome = mapfilter("simulate", "-c", own_world.toml)
+    assert outcome.code == 3
+    assert "no journey receives a cell" in outcome.err
+
+
+SLOW = """
+import time
+from mapfilter._resume import FinishedParts
+from mapfilter.cli import main
+save = FinishedParts.save
+def slowly(self, number, part):
+    save(self, number, part)
+    time.sleep(0.3)
+FinishedParts.save = slowly
+main()
+"""
+
+
+def slow(world, *args):
+    """Run a command that rests after each part."""
+    given = [sys.executable, "-c", SLOW, *map(str, args), "-c", str(world.toml)]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(given, stdout=pipe, stderr=pipe, text=True, start_new_session=True)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+def test_a_build_that_is_stopped_says_what_is_kept_and_goes_on(own_world, number):
+    """With two workers, which end with it; the older database is as it was until the end."""
+    before = contents(own_world.database)
+    tiles = settings(database__tile_px=16, database__margin_db=2.0)
+    with slow(own_world, "build", "--workers", 2, *tiles) as build:
+        until_s = time.monotonic() + 60
+        while not list(own_world.out.glob(".database.tiles-*/*")):
+            assert build.poll() is None, build.stderr.read()
+            assert time.monotonic() < until_s
+            time.sleep(0.02)
+        build.send_signal(number)
+        out, err = build.communicate(timeout=60)
+    assert (build.returncode, out) == (128 + number, "")
+    assert err.endswith(f"stopped by {number.name}: finished tiles are kept: go on with --resume\n")
+    assert "Traceback" not in err
+    assert contents(own_world.database) == before
+    assert not list(own_world.out.glob(".database.partial-*"))
+    (kept,) = own_world.out.glob(".database.tiles-*")
+    assert list(kept.iterdir())
+    assert_done(mapfilter("build", "-c", own_world.toml, "--resume", *tiles))
+    resumed = contents(own_world.database)
+    assert not kept.exists()
+    assert_done(mapfilter("build", "-c", own_world.toml, *tiles))
+    assert contents(own_world.database) == resumed != before
+
+
+OVERRIDES = (1, 2)
+"""CAP_DAC_OVERRIDE and CAP_DAC_READ_SEARCH, by which root writes and reads everywhere."""
+
+
+def as_anybody():
+    """Give up what root may more than others, at the next exec."""
+    for capability in OVERRIDES if os.geteuid() == 0 else ():
+        if ctypes.CDLL(None).prctl(24, capability, 0, 0, 0) != 0:
+            raise OSError("PR_CAPBSET_DROP")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="gives up capabilities")
+def test_folders_that_nobody_may_write_to_are_read_and_refused_as_outputs(own_world):
+    places = [own_world.folder, *own_world.folder.rglob("*")]
+    for path in places:
+        path.chmod(path.stat().st_mode & ~0o222)
+
+    def run(*args):
+        given = [sys.executable, "-m", "mapfilter", *map(str, args)]
+        return subprocess.run(
+            given, capture_output=True, text=True, check=False, preexec_fn=as_anybody
+        )
+
+    try:
+        before = contents(own_world.folder)
+        assert run("info", own_world.database).returncode == 0
+        given = ["--db", own_world.database, "--log", own_world.journeys / ONE]
+        for words in (["build", "--resume"], ["simulate"], ["sweep"], ["replay", *given]):
+            refused = run(*words, "-c", own_world.toml)
+            assert refused.returncode == 2, (words, refused.stderr)
+            assert "a place that can be written, found Permission denied" in refused.stderr
+            assert "Traceback" not in refused.stderr
+        assert contents(own_world.folder) == before
+    finally:
+        for path in places:
+            path.chmod(path.stat().st_mode | 0o200)
