@@ -1,15 +1,18 @@
 """The Bayes map filter over what a survey measured: a few cells by hand."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from mapfilter._io import sealed
 from mapfilter.database.build import build
 from mapfilter.database.measured import (
     Deviations,
     MeasuredParts,
     Readings,
+    read_measured,
     read_readings,
     write_readings,
 )
@@ -110,6 +113,56 @@ def test_a_database_keeps_what_its_survey_measured(surveyed):
     assert database.without_cells().measured() is None
 
 
+@pytest.mark.parametrize("name", ["readings.parquet", "deviations.parquet"])
+def test_parts_of_a_survey_are_compared_with_their_checksums(surveyed, name):
+    database, _, _ = surveyed
+    part = database.path / name
+    content = bytearray(part.read_bytes())
+    content[len(content) // 2] ^= 1
+    part.write_bytes(bytes(content))
+    with pytest.raises(StoreError, match=rf"{name}.*SHA-256"):
+        database.measured()
+    with pytest.raises(StoreError, match=rf"{name}.*SHA-256"):
+        open_database(database.path, verify="full")
+
+
+def test_a_database_that_replaced_the_opened_one_does_not_lend_its_survey(surveyed, tmp_path):
+    database, deviation, filled = surveyed
+    levels, _ = rasters(tmp_path, filled=filled)
+    plan = CellPlan(CRS, tuple(map(cell, CELLS)))
+    # A folder with parts of a survey is a database, so it may be replaced.
+    build(levels, plan, routes(), database.path, measured=(served(30), deviation))
+    with pytest.raises(StoreError, match="replaced while in use"):
+        database.measured()
+    assert len(open_database(database.path).measured().readings) == 30
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (lambda part: part["path"] != "readings.parquet", r"deviations\.parquet alone"),
+        (lambda part: part["path"] != "deviations.parquet", r"readings\.parquet alone"),
+    ],
+)
+def test_one_part_of_a_survey_without_the_other(surveyed, change, why):
+    database, _, _ = surveyed
+    file = database.path / "manifest.json"
+    manifest = json.loads(file.read_text())
+    manifest["parts"] = list(filter(change, manifest["parts"]))
+    file.write_text(json.dumps(sealed(manifest)))
+    with pytest.raises(StoreError, match=why):
+        open_database(database.path)
+
+
+def test_readings_of_cells_of_another_database(surveyed, tmp_path):
+    database, _, _ = surveyed
+    others = tuple(f"1-1-8-{number}" for number in range(3))
+    write_readings(replace(served(), cell_ids=others), tmp_path / "others.parquet")
+    parts = (tmp_path / "others.parquet", database.path / "deviations.parquet")
+    with pytest.raises(StoreError, match="cells of the database, found others"):
+        read_measured(*parts, LATTICE, CELLS)
+
+
 def test_a_pixel_beside_the_points_has_the_deviation_of_the_nearest(surveyed):
     database, _, _ = surveyed
     spread = database.measured().deviations.spread(CELLS, database.field().on_way)
@@ -177,7 +230,7 @@ def test_predicted_levels_stay_as_they_were(tmp_path):
     plan = CellPlan(CRS, tuple(map(cell, CELLS)))
     database = build(levels, plan, routes(), tmp_path / "db")
     assert database.measured() is None
-    assert database.manifest["version"] == 1
+    assert not (database.path / "readings.parquet").exists()
     model = BayesFilter().over(database).model
     assert not isinstance(model, MeasuredMapModel)
     assert model.evidence.levels.weight == BayesFilter().level_weight
