@@ -267,7 +267,7 @@ def locate(
     seed: SeedOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Locate each report of a log by itself, with a calibrated region."""
+    """Locate each report of a log by itself; exit code 3 if none has a position."""
     from mapfilter.workflows.locate import run_locate
 
     if not 0 < level_error_db <= 60:
@@ -285,6 +285,10 @@ def locate(
             progress=progress,
         )
     print_result(result.shown, as_json)
+    if not result.figures["located"]:
+        reasons = ", ".join(result.figures["not_located"])
+        print_message(f"nothing is located: {reasons}")
+        raise typer.Exit(PARTIAL)
 
 
 def replay(

@@ -315,6 +315,11 @@ class Config(Section):
         return self.rasters_path.with_name(f"{self.rasters_path.stem}-deviation.tif")
 
     @property
+    def readings_path(self) -> Path:
+        """Where a survey's readings are: beside its rasters."""
+        return self.rasters_path.with_name(f"{self.rasters_path.stem}-readings.parquet")
+
+    @property
     def database_path(self) -> Path:
         """Where the radio-route database is."""
         return self.database.path or self.output.dir / "database"

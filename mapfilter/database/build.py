@@ -18,6 +18,7 @@ from mapfilter._io import atomic_dir
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter._resume import FinishedParts
 from mapfilter.database.manifest import InputFile, check_database_replaceable
+from mapfilter.database.measured import MeasuredParts, Readings, deviations_at_points
 from mapfilter.database.parquet import Window
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -64,6 +65,7 @@ def build(
     tile_px: int = TILE_PX,
     inputs: Sequence[InputFile] = (),
     attribution: str = "",
+    measured: tuple[Readings, RxLevRasters] | None = None,
     executor: Executor | None = None,
     in_flight: int = 8,
     tiles_a_task: int = 1,
@@ -99,6 +101,8 @@ def build(
         Files that roads and rasters were made from, for the record; the rasters are added.
     attribution : str
         Attribution that the licence of the map demands.
+    measured : (Readings, RxLevRasters), optional
+        Of rasters that a survey made: its readings, and the rasters of its deviations.
     executor : Executor, optional
         Where tiles are read; the result does not depend on it.
     in_flight : int
@@ -151,7 +155,12 @@ def build(
             "points_off_rasters": job.off_rasters(written.points),
         }
         inputs = (*inputs, InputFile("rasters", rasters.path.name, digest.result()))
-        head = Head(rasters.lattice, job.plan, parameters, attribution, inputs, counts)
+        parts = None
+        if measured is not None:
+            readings, deviation = measured
+            deviation = replace(deviation, lattice=rasters.lattice)
+            parts = MeasuredParts(readings, deviations_at_points(folder, deviation, ids))
+        head = Head(rasters.lattice, job.plan, parameters, attribution, inputs, counts, parts)
         head.write(folder, written.parts)
     return open_database(out)
 

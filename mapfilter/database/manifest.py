@@ -30,14 +30,18 @@ from mapfilter.errors import Fault, Faults, StoreError, fail
 _LARGEST_BYTES = 1 << 30
 FORMAT = "mapfilter radio-route database"
 VERSION = 2
+VERSION = 2
 CELLS = "cells.parquet"
 POINTS = "points.parquet"
+READINGS = "readings.parquet"
+DEVIATIONS = "deviations.parquet"
+_SURVEYED = (READINGS, DEVIATIONS)
 
 _Layers = Literal["map", "roads", "tracks", "buildings", "water", "landuse", "landuse_table"]
 InputRole = _Layers | Literal["plan", "rasters", "database", "patch"]
 
 _LONGEST_NAME = 200
-_OWN = re.compile(r"cells\.parquet|points\.parquet|levels/[^/]+/part-[0-9]+\.parquet")
+_OWN = re.compile(r"(cells|points|readings|deviations)\.parquet|levels/[^/]+/part-[0-9]+\.parquet")
 _DAMAGED = "edited or damaged"
 _Count = Annotated[int, Field(ge=0)]
 _Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
@@ -228,8 +232,12 @@ def _check_together(manifest: _Manifest, where: str, faults: Faults) -> None:
     for path, times in paths.items():
         if times > 1:
             faults.add(where, f"part {path} once", f"{times} times", _DAMAGED)
+    if len(some := [name for name in _SURVEYED if name in paths]) == 1:
+        faults.add(where, f"parts {' and '.join(_SURVEYED)}", f"{some[0]} alone", _DAMAGED)
     for part in manifest.parts:
         if part.cell is None:
+            if part.path in _SURVEYED:
+                continue
             if part.path not in named:
                 faults.add(f"{where}, {part.path}", "the cell whose part it is", "none", _DAMAGED)
             elif part.rows != named[part.path]:

@@ -15,6 +15,7 @@ from mapfilter._io import atomic_dir
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats, Ints
 from mapfilter.database.manifest import InputFile, check_database_replaceable
+from mapfilter.database.measured import MeasuredParts, merged_parts
 from mapfilter.database.parquet import Window, WindowReader, point_geometry
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -45,7 +46,8 @@ def merge(
     Within its area a later database overrides earlier ones for all cells in its cell table. So new
     cells or areas are added, and rebuilt ones replace the older ones, without building the rest
     again. Databases of the same inputs but for cells or area give, merged, the parts that one
-    build of all would have given. Of a cell in several cell tables the last entry is kept.
+    build of all would have given. Of a cell in several cell tables the last entry is kept. What
+    surveys measured is kept where all of the databases have it.
 
     Parameters
     ----------
@@ -89,8 +91,21 @@ def merge(
         # No database holds points without a level, so they cannot be counted.
         counts = dict.fromkeys(("points", "points_below_floor", "points_off_rasters"))
         counts["points"] = written.received
-        Head(lattice, plan, parameters, attribution, inputs, counts).write(folder, written.parts)
+        measured = _measured(databases, lattice, plan)
+        head = Head(lattice, plan, parameters, attribution, inputs, counts, measured)
+        head.write(folder, written.parts)
     return open_database(out)
+
+
+def _measured(
+    databases: Sequence[RadioRouteDatabase], lattice: Lattice, plan: CellPlan
+) -> MeasuredParts | None:
+    """Return what the surveys measured; None where one of the databases has no survey."""
+    parts = [found for database in databases if (found := database.measured()) is not None]
+    if len(parts) < len(databases):
+        return None
+    shifts = [pixels_between(lattice, database.lattice) for database in databases]
+    return merged_parts(parts, shifts, plan.ids)
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ from mapfilter.database.manifest import (
     describe_part,
     levels_folders,
 )
+from mapfilter.database.measured import MeasuredParts, write_measured
 from mapfilter.database.parquet import (
     dictionary,
     geo_metadata,
@@ -175,11 +176,13 @@ class Head:
     attribution: str
     inputs: tuple[InputFile, ...]
     counts: Mapping[str, int | None]
+    measured: MeasuredParts | None = None
 
     def write(self, folder: Path, parts: Iterable[Mapping[str, Any]]) -> None:
         """Write cell table and manifest into a folder that holds the parts."""
         write_cells(self.plan, folder / CELLS)
         cells = describe_part(folder, folder / CELLS, len(self.plan.ids))
+        surveyed = [] if self.measured is None else write_measured(folder, self.measured)
         write_sealed(
             folder / MANIFEST,
             {
@@ -193,7 +196,7 @@ class Head:
                 "attribution": self.attribution,
                 "inputs": [asdict(file) for file in self.inputs],
                 "counts": dict(self.counts),
-                "parts": [cells, *parts],
+                "parts": [cells, *parts, *surveyed],
             },
         )
 

@@ -15,7 +15,8 @@ from scipy.ndimage import distance_transform_edt
 
 from mapfilter._types import Bools, Floats32, Ints, Ints32
 from mapfilter.database.checked import Part
-from mapfilter.database.manifest import POINTS
+from mapfilter.database.manifest import DEVIATIONS, POINTS, READINGS
+from mapfilter.database.measured import MeasuredParts, read_measured
 from mapfilter.database.parquet import WindowReader, check_places, read_columns
 from mapfilter.errors import InputError, StoreError, fail
 from mapfilter.geodesy import Lattice
@@ -222,6 +223,23 @@ class RadioRouteDatabase:
             best_server=rank[server[order]],
             way_class=(way_class[order], classes),
         )
+
+    def measured(self) -> MeasuredParts | None:
+        """Return what its survey measured; None where levels were predicted.
+
+        Raises
+        ------
+        StoreError
+            A part is damaged, or the database was replaced since it was opened.
+        """
+        parts = {part["path"] for part in self.manifest["parts"]}
+        if DEVIATIONS not in parts or not self.cell_ids:
+            return None
+        readings, deviations = (
+            part_named(name, self.path, self.manifest, self.generation)
+            for name in (READINGS, DEVIATIONS)
+        )
+        return read_measured(readings, deviations, self.lattice, self.cell_ids)
 
     def without_cells(self) -> RadioRouteDatabase:
         """Return the same points as a database of roads alone."""

@@ -12,6 +12,7 @@ from mapfilter._io import atomic_dir
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats32, Ints
 from mapfilter.database.manifest import InputFile, check_database_replaceable
+from mapfilter.database.measured import merged_parts
 from mapfilter.database.parts import Head, write_parts
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
@@ -98,8 +99,17 @@ def rewrite(
             "points_below_floor": written.points - written.received,
             "points_off_rasters": None,
         }
+        measured = database.measured()
+        if measured is not None:
+            measured = merged_parts([measured], [(0, 0)], plan.ids)
         head = Head(
-            database.lattice, plan, parameters, database.attribution, (old, *inputs), counts
+            database.lattice,
+            plan,
+            parameters,
+            database.attribution,
+            (old, *inputs),
+            counts,
+            measured,
         )
         head.write(folder, written.parts)
     return open_database(out)

@@ -63,7 +63,7 @@ def fitted_to_log(options: OptionsT, log: TrackLog) -> tuple[OptionsT, tuple[str
     }
     if measured:
         shown = ", ".join(f"{name} = {value:.3g}" for name, value in measured.items())
-        notes.append(f"errors of motion as measured: {shown}")
+        notes.append(f"errors of motion as the log states them: {shown}")
         changes |= measured
     if not changes:
         return options, tuple(notes)

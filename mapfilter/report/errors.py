@@ -42,14 +42,20 @@ _WIDE, _LEAST_M = 12.0, 0.3
 
 @styled
 def plot_error_over_distance(
-    estimate: TrackEstimate, truth: Truth, ax: Axes | None = None, *, title: str = ""
+    estimate: TrackEstimate,
+    truth: Truth,
+    ax: Axes | None = None,
+    *,
+    title: str = "",
+    single_reports_m: Floats | None = None,
 ) -> Axes:
     """Draw the position error over the true distance travelled.
 
     The error's axis is logarithmic where hundreds of metres become few; the filter's own radii are
     a band, its protection levels dotted; epochs without a position leave a gap. Marks the switch
     from searching to tracking, the 50 m that count as success there, the mean and the 67 and 95 %
-    errors after it, and where the filter was searching or lost. Without a title it is the filter's
+    errors after it, and where the filter was searching or lost. ``single_reports_m`` are errors of
+    reports that were located one by one: their median is a line. Without a title it is the filter's
     name.
     """
     distance_m = truth.distance_at(estimate.time_s)
@@ -58,6 +64,10 @@ def plot_error_over_distance(
     score = accuracy(estimate, truth)
     known_m = errors_m[np.isfinite(errors_m)]
     most_m = max(float(known_m.max(initial=0.0)), 1.1 * SUCCESS_RADIUS_M)
+    beside_m = np.nan
+    if single_reports_m is not None and single_reports_m.size:
+        beside_m = float(np.median(single_reports_m))
+        most_m = max(most_m, beside_m)
     axes = single_axes(ax, *_SIZE_IN)
     axes.set(xlim=(0.0, length_m), ylim=(0.0, 1.15 * most_m))
     if score.switched and most_m > _WIDE * score.error_95_m:
@@ -67,6 +77,9 @@ def plot_error_over_distance(
     shade_statuses(axes, estimate, distance_m)
     near = Look(color=VERMILLION, linewidth=1.2, linestyle=(0, (5, 3)))
     axes.axhline(SUCCESS_RADIUS_M, label=f"{SUCCESS_RADIUS_M:.0f} m", **near)
+    if np.isfinite(beside_m):
+        dash_dot = Look(color=GREY, linewidth=1.2, linestyle=(0, (7, 2, 1, 2)))
+        axes.axhline(beside_m, label=f"single reports, median {beside_m:.0f} m", **dash_dot)
     radii_m = estimate.radii_m.T
     if np.isfinite(radii_m[2]).any():
         for radius_m in radii_m:

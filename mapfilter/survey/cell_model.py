@@ -189,18 +189,24 @@ class Shadowing:
         return np.asarray(self.kernel(points.places))  # type: ignore[operator]
 
 
+def most_telling(points: Sequence[Points]) -> list[Points]:
+    """Return the points of the 40 cells with the most of them, of at least two."""
+    some = [one for one in points if len(one) > 1]
+    return sorted(some, key=lambda one: -len(one))[:_LEARNT_FROM_CELLS]
+
+
 def learn_shadowing(
     points: Sequence[Points], trends: Sequence[Trend], start: Shadowing
 ) -> Shadowing:
     """Return the shadowing under which the levels of all cells together are likeliest.
 
-    There are one of ``points`` and ``trends`` per cell; the 40 cells with the most points are
-    taken. ``start`` is also returned where no cell has two points.
+    There are one of ``points`` and ``trends`` per cell, see :func:`most_telling`. ``start`` is also
+    returned where there is none.
     """
     processes = []
-    pairs = [pair for pair in zip(points, trends, strict=True) if len(pair[0]) > 1]
-    pairs.sort(key=lambda pair: -len(pair[0]))
-    for some, trend in pairs[:_LEARNT_FROM_CELLS]:
+    for some, trend in zip(points, trends, strict=True):
+        if len(some) < 2:
+            continue
         thin = some.thinned(_LEARNT_FROM)
         residual_db = thin.level_dbm - trend.level_dbm(thin.east_m, thin.north_m)
         process = GaussianProcessRegressor(start.kernel, optimizer=None)

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Le
 from scipy.spatial import cKDTree
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from mapfilter._parallel import Progress
 from mapfilter._types import Floats, Ints
@@ -34,6 +35,7 @@ from mapfilter.survey.cell_model import (
     fit_trend,
     learn_shadowing,
     locate_antenna,
+    most_telling,
 )
 from mapfilter.survey.measurements import Measurements, Points, points_by_cell
 
@@ -80,6 +82,12 @@ class SurveyOptions(Options):
     most_points: Annotated[int, Ge(10)] = 1500
 
 
+@cache
+def thread_pools() -> ThreadpoolController:
+    """Return the thread pools of the libraries that are loaded; finding them takes long."""
+    return ThreadpoolController()
+
+
 @dataclass(frozen=True, eq=False)
 class SurveyedCell:
     """The map of one cell.
@@ -113,7 +121,7 @@ class SurveyedCell:
     def predict(self, east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
         """Return the mean level (dBm) and the deviation (dB) of a new reading at places."""
         # Threads make small matrices slower, and their sums depend on how many there are.
-        with threadpool_limits(1):
+        with thread_pools().limit(limits=1):
             return self.field.predict(east_m, north_m)
 
 
@@ -201,9 +209,10 @@ def fit_survey(
 
     cells = {}
     # Threads make small matrices slower, and their sums depend on how many there are.
-    with threadpool_limits(1):
+    with thread_pools().limit(limits=1):
+        telling = most_telling(points)
         for _ in range(_ROUNDS):
-            shadowing = learn_shadowing(points, [trend_of(some) for some in points], shadowing)
+            shadowing = learn_shadowing(telling, [trend_of(some) for some in telling], shadowing)
         for some in points:
             trend = trend_of(some)
             antenna = trend.covariate if isinstance(trend.covariate, DistanceLoss) else None

@@ -58,9 +58,21 @@ def _upload(**columns: str) -> Dialect:
 DIALECTS: Mapping[str, Dialect] = {
     "csv": mapped({}),
     "opencellid": _upload(
-        lac="lac tac", ci="cellid", level_dbm="signal", accuracy_m="rating", technology="act"
+        lac="lac tac",
+        ci="cellid",
+        level_dbm="signal",
+        accuracy_m="rating",
+        technology="act",
+        timing_advance="ta",
     ),
-    "towercollector": _upload(lac="lac", ci="cell_id", level_dbm="dbm", accuracy_m="accuracy"),
+    "towercollector": _upload(
+        lac="lac",
+        ci="cell_id",
+        level_dbm="dbm",
+        accuracy_m="accuracy",
+        timing_advance="ta",
+        neighbour="neighboring",
+    ),
 }
 """Columns named as the fields are; uploads to OpenCellID; exports of Tower Collector."""
 
@@ -194,7 +206,7 @@ def read_antennas_log(path: Path) -> Rows:
             time, operator = values.get("Time", ""), values.get("Operator", "")
         elif kind in ("ACTIVE GSM", "GSM"):
             rows.read += 1
-            received.append((line, values))
+            received.append((line, values | {"neighbour": "0" if kind == "ACTIVE GSM" else "1"}))
         elif kind == "Best Location":
             found = dict.fromkeys(FIELDS, "") | {"time": _iso(time)}
             found |= {"lat": values.get("Lat", ""), "lon": values.get("Lon", "")}
@@ -216,7 +228,8 @@ def _add_logged(
     elif name and level is not None and level[1]:
         rows.aside["levels that are only bounds (>)"] += 1
     elif name and level is not None:
-        rows.add(line, name, {**found, "level_dbm": level[2]})
+        neighbour = cell["neighbour"]
+        rows.add(line, name, {**found, "level_dbm": level[2], "neighbour": neighbour})
 
 
 def _iso(time: str) -> str:

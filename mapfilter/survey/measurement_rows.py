@@ -23,11 +23,18 @@ _FAULTS_SHOWN = 3
 _LATEST_S = 4_102_444_800.0
 _UNAVAILABLE = 2_000_000_000.0
 _LEVEL_DBM = (-170.0, -10.0)
+_MOST_STEPS = 3846.0
+"""Timing advances: of NR 0 to 3846, fewer of older technologies."""
+_YES = ("1", "true", "yes", "neighbour", "neighbor")
+_NO = ("0", "false", "no", "serving")
 IDENTITY = ("mcc", "mnc", "lac", "ci")
 """Fields that name a cell together."""
 REQUIRED = ("lat", "lon", "level_dbm")
 """Fields without which a row is of no use."""
-FIELDS = ("cell", *IDENTITY, *REQUIRED, "time", "accuracy_m", "session")
+FIELDS = (
+    *("cell", *IDENTITY, *REQUIRED, "time", "accuracy_m", "session"),
+    *("timing_advance", "neighbour"),
+)
 """Fields that a column map may name."""
 
 NO_TIME = "times not understood (levels kept)"
@@ -61,11 +68,12 @@ class Rows:
 
     @property
     def columns(self) -> Floats:
-        """Unix seconds, latitude, longitude (WGS 84), level (dBm) and accuracy (m), shape (5, N).
+        """Return all rows as columns, shape (7, N); what is unknown is NaN.
 
-        Unknown times and accuracies are NaN.
+        Unix seconds, latitude, longitude (WGS 84), level (dBm), accuracy (m), timing advance
+        (steps), and 1 for a serving cell, 0 for a neighbour.
         """
-        return np.array(self.values).reshape(-1, 5).T
+        return np.array(self.values).reshape(-1, 7).T
 
     def refuse(self, line: int, name: str, expected: str, got: object, hint: str = "") -> None:
         """Count a bad row and keep the faults of the first ones."""
@@ -136,7 +144,12 @@ class Rows:
             accuracy_m = math.nan
         self.cell.append(self.cells.setdefault(cell, len(self.cells)))
         self.session.append(self.sessions.setdefault(given["session"], len(self.sessions)))
-        self.values.extend((time_s, lat_deg, lon_deg, level_dbm, accuracy_m))
+        steps = number(given["timing_advance"])
+        if steps is None or not 0 <= steps <= _MOST_STEPS:
+            steps = math.nan
+        said = given["neighbour"].lower()
+        serving = 0.0 if said in _YES else 1.0 if said in _NO else math.nan
+        self.values.extend((time_s, lat_deg, lon_deg, level_dbm, accuracy_m, steps, serving))
 
     def notes(self) -> list[str]:
         """Return remarks on how many rows were refused or set aside, and where the first are."""

@@ -55,6 +55,11 @@ class Measurements:
         Of the position, as the receiver reported it; NaN where unknown.
     notes : tuple of str
         Which rows were left out, and why.
+    serving : numpy.ndarray of bool, shape (N,)
+        Whether the cell was the serving one. Where a file does not tell, the only cell of its time
+        was. None where this is not known of any row.
+    timing_advance : numpy.ndarray, shape (N,)
+        Steps, NaN where it was not reported; None as for ``serving``.
     """
 
     crs: str
@@ -69,6 +74,8 @@ class Measurements:
     level_dbm: Floats
     accuracy_m: Floats
     notes: tuple[str, ...] = ()
+    serving: Bools | None = None
+    timing_advance: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.level_dbm)
@@ -76,7 +83,8 @@ class Measurements:
     def where(self, kept: Bools, *notes: str) -> Measurements:
         """Return some of the rows; cells and sessions keep their places."""
         columns = ("cell", "session", "time_s", "east_m", "north_m", "level_dbm", "accuracy_m")
-        some = {name: getattr(self, name)[kept] for name in columns}
+        more = ("serving", "timing_advance") if self.serving is not None else ()
+        some = {name: getattr(self, name)[kept] for name in (*columns, *more)}
         return replace(self, **some, notes=(*self.notes, *notes))
 
     def accurate(self, accuracy_m: float) -> Measurements:
@@ -244,21 +252,24 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
         names += [stem] if count == 1 else [f"{stem}#{i + 1}" for i in range(count)]
     cell = [np.array([places[c] for c in t.cells], dtype=np.int32)[t.cell] for t in tables]
     columns = np.ascontiguousarray(np.concatenate([table.columns for table in tables], axis=1))
-    time_s, lat_deg, lon_deg, level_dbm, accuracy_m = columns
+    time_s, lat_deg, lon_deg, level_dbm, accuracy_m, timing_advance, role = columns
     east_m, north_m = project(crs, lon_deg, lat_deg)
+    of_session = np.concatenate(session)
     joined = Measurements(
         crs,
         cells,
         {cell: identity for table in tables for cell, identity in table.identities.items()},
         tuple(names),
         np.concatenate(cell),
-        np.concatenate(session),
+        of_session,
         time_s,
         east_m,
         north_m,
         level_dbm,
         accuracy_m,
         _notes(tables),
+        np.where(np.isnan(role), _alone(of_session, time_s), role > 0).astype(np.bool_),
+        timing_advance,
     )
     placed = np.isfinite(east_m) & np.isfinite(north_m)
     if not placed.all():
@@ -269,6 +280,16 @@ def _joined(tables: Sequence[Rows], crs: str, gap_s: float) -> Measurements:
             raise fail(InputError, "measurements", f"places where {crs} is used", got, hint)
         joined = joined.where(placed, f"{count} rows left out: {crs} has no such places")
     return _once(joined)
+
+
+def _alone(session: Ints32, time_s: Floats) -> Bools:
+    """Return which rows are the only ones of their session and time."""
+    known = np.isfinite(time_s)
+    keys = np.column_stack([session[known], time_s[known]])
+    _, which, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+    found = np.zeros(len(time_s), dtype=np.bool_)
+    found[known] = count[which] == 1
+    return found
 
 
 def _notes(tables: Sequence[Rows]) -> tuple[str, ...]:

@@ -13,9 +13,10 @@ from mapfilter.config.sections import Config
 from mapfilter.database.build import build, build_roads
 from mapfilter.database.estimate import BuildEstimate, dry_run
 from mapfilter.database.manifest import InputFile
+from mapfilter.database.measured import Readings, read_readings
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, fail
-from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.rasters.raster_set import RxLevRasters, open_rasters
 from mapfilter.workflows.pictures import NETWORK_PICTURES, clear_pictures, draw_network
 from mapfilter.workflows.world import (
     World,
@@ -88,6 +89,7 @@ def run_build(
             tile_px=section.tile_px,
             inputs=_inputs(world),
             attribution=world.streets.attribution,
+            measured=_measured(config),
             executor=executor,
             in_flight=_TASKS_A_WORKER * at_once,
             tiles_a_task=tiles_a_task,
@@ -147,6 +149,15 @@ def run_dry_build(config: Config) -> BuildEstimate:
     estimate = dry_run(rasters, plan, routes, **limits, tile_px=section.tile_px)
     # A build reads the same map, plan and headers first.
     return replace(estimate, seconds=estimate.seconds + reading_s)
+
+
+def _measured(config: Config) -> tuple[Readings, RxLevRasters] | None:
+    """Return what the survey that made the rasters measured; None where it was not kept."""
+    if config.surveyed_plan is None or not config.readings_path.exists():
+        return None
+    if not config.deviation_path.exists():
+        return None
+    return read_readings(config.readings_path), open_rasters(config.deviation_path)
 
 
 def _draw(

@@ -23,7 +23,6 @@ from mapfilter.experiments.benchmarks.ottawa import (
     OttawaOptions,
     centroid_errors_m,
     find_session,
-    surveyed_positioner,
 )
 from mapfilter.experiments.benchmarks.ottawa_sessions import (
     Session,
@@ -39,7 +38,6 @@ from mapfilter.experiments.benchmarks.ottawa_table import (
     session_rows,
     write_left_out,
 )
-from mapfilter.rasters.raster_set import open_rasters
 from mapfilter.report.canvas import BLUE, GREEN, GREY, save
 from mapfilter.report.curves import Distribution, plot_cumulative
 from mapfilter.workflows.build import run_build
@@ -184,10 +182,7 @@ def run_ottawa(
 def find_left_out(task: Task) -> None:
     """Make the map of the other sessions, find the one that was left out, and keep the results."""
     session, others = read_session(task.session), [read_session(file) for file in task.others]
-    surveyed, database = _map_of(others, task.folder)
-    positioner = surveyed_positioner(
-        open_database(database), others, task.options, open_rasters(surveyed)
-    )
+    positioner = task.options.filter.over(open_database(_map_of(others, task.folder)))
     crs = positioner.area.lattice.crs
     factor = step_factor_of(others, crs)
     found = [
@@ -220,7 +215,7 @@ def _is_whole(result: Path) -> bool:
     return True
 
 
-def _map_of(others: Sequence[Session], folder: Path) -> tuple[Path, Path]:
+def _map_of(others: Sequence[Session], folder: Path) -> Path:
     """Make levels, ways and database of sessions, as drive tests without a street map are."""
     files = [str(other.path) for other in others]
     # The trend stays where there is no measurement, which does not mean that nothing is received.
@@ -235,8 +230,8 @@ def _map_of(others: Sequence[Session], folder: Path) -> tuple[Path, Path]:
         },
         context={"folder": Path.cwd()},
     )
-    surveyed = run_survey(config)
-    return surveyed.deviation, run_build(config).database
+    run_survey(config)
+    return run_build(config).database
 
 
 def _curves(every: Sequence[LeftOut]) -> list[Distribution]:

@@ -14,7 +14,7 @@ from mapfilter.survey.measurement_rows import Rows
 from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import format_of, read_recording
-from mapfilter.tracks.schema import TABLES
+from mapfilter.tracks.schema import SERVING, TABLES
 from mapfilter.tracks.store import is_log, read_log
 
 _LONGEST_S = 10.0
@@ -100,7 +100,12 @@ def _add(rows: Rows, radio: pd.DataFrame, positions: pd.DataFrame, *, absolute: 
     if not absolute:
         # Counted from an unknown start, or in an unknown zone: the order alone matters.
         time_s = time_s - time_s.min() + 1.0
-    columns = [time_s, *places[:2], radio["level_dbm"].to_numpy(dtype=np.float64), places[2]]
+    advance = np.full(len(radio), np.nan)
+    if "timing_advance" in radio:
+        advance = radio["timing_advance"].to_numpy(dtype=np.float64, na_value=np.nan)
+    serving = (radio["role"] == SERVING).to_numpy(dtype=np.float64)
+    level_dbm = radio["level_dbm"].to_numpy(dtype=np.float64)
+    columns = [time_s, *places[:2], level_dbm, places[2], advance, serving]
     rows.values.frombytes(np.ascontiguousarray(np.stack(columns)[:, kept].T).tobytes())
     parts = radio[list(_IDENTITY)].fillna(_UNKNOWN).to_numpy(dtype=np.int64)[kept]
     whole = (parts >= 0).all(axis=1)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from mapfilter._io import ensure_writable_folder, read_json
-from mapfilter._types import Floats32
+from mapfilter._types import Floats, Floats32
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import OutputError, StoreError, fail
 from mapfilter.evaluation.accuracy import Truth
@@ -239,11 +239,16 @@ def _ends(level_dbm: Floats32) -> tuple[float, float]:
 
 
 def draw_track(
-    database: RadioRouteDatabase, log: TrackLog, track: PositionedTrack, folder: Path
+    database: RadioRouteDatabase,
+    log: TrackLog,
+    track: PositionedTrack,
+    folder: Path,
+    single_reports_m: Floats | None = None,
 ) -> tuple[Path, ...]:
     """Draw one located log: its belief at a few moments, the track, error and evidence.
 
-    Of the candidate filter these are candidates thinning out (Fig. 1 of the paper).
+    Of the candidate filter these are candidates thinning out (Fig. 1 of the paper). Beside the
+    error the median of those of single reports is drawn, where they are given.
     """
     base, truth = street_map(database, served_points(database)), Truth.of_table(log.truth)
     estimate, evidence = track.estimate, track.estimate.evidence
@@ -256,7 +261,9 @@ def draw_track(
         drawn["belief.png"] = plot_belief(chosen, truth, base)
     drawn["track.png"] = plot_track(estimate, truth, base)
     if truth is not None:
-        drawn["error.png"] = plot_error_over_distance(estimate, truth)
+        drawn["error.png"] = plot_error_over_distance(
+            estimate, truth, single_reports_m=single_reports_m
+        )
     if evidence is not None and len(estimate):
         drawn["evidence.png"] = plot_evidence(estimate, truth)
     return tuple(save(picture, folder / name) for name, picture in drawn.items())

@@ -41,6 +41,7 @@ from mapfilter.tracks.store import is_log
 from mapfilter.workflows.apart import check_out_apart
 from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.pictures import ESTIMATES, FIGURES, SUMMARY, draw_track, older_results
+from mapfilter.workflows.replay_baseline import Baselines, SingleReports, together
 from mapfilter.workflows.replay_lacks import advice_of, check_log, lack_of
 from mapfilter.workflows.terminal import to_jsonable
 from mapfilter.workflows.world import filter_choice, plan_antennas, planned_cells
@@ -114,6 +115,8 @@ class ReplayedLog:
         Files written.
     route : str
         Equal for logs with the same true path; empty without a truth.
+    baseline : SingleReports or None
+        Errors of the reports, each located by itself; None without truth, reports or cells.
     """
 
     name: str
@@ -124,12 +127,13 @@ class ReplayedLog:
     filter_s: float
     outputs: tuple[Path, ...]
     route: str = ""
+    baseline: SingleReports | None = None
 
     @property
     def figures(self) -> dict[str, Any]:
-        """Outcome, notes and, with ground truth, the score."""
+        """Outcome, notes and, with ground truth, the score beside that of single reports."""
         score = asdict(self.accuracy) if self.accuracy is not None else {}
-        return {**asdict(self.outcome), "notes": self.notes, **score}
+        return {**asdict(self.outcome), "notes": self.notes, **score, **_beside(self.baseline)}
 
 
 @dataclass(frozen=True)
@@ -205,6 +209,7 @@ def summary_figures(result: ReplayResult) -> dict[str, Any]:
         "unknown_cells": _most_frequent(outcome.unknown_cells for outcome in outcomes),
         "logs_with_unknown_cells": [log.name for log in result.logs if log.outcome.unknown_cells],
         "notes": _shared_notes(result.logs),
+        **_beside(together([log.baseline for log in result.logs])),
     }
 
 
@@ -221,6 +226,10 @@ def replay_figures(result: ReplayResult) -> dict[str, Any]:
     filter_s = sorted(log.filter_s for log in result.logs)
     shown["partial"] = result.partial
     return {**shown, "filter_s": filter_s[len(filter_s) // 2], "out": result.out}
+
+
+def _beside(baseline: SingleReports | None) -> dict[str, Any]:
+    return {} if baseline is None else {"baseline": baseline.figures}
 
 
 def _sum(counts: Iterable[Mapping[str, int]]) -> dict[str, int]:
@@ -293,6 +302,7 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
     if database is not None:
         journeys.check(database.lattice)
         over(database.lattice.crs, options, cells=True)
+    baselines = Baselines(database, config.journeys.seed)
     wanted, count = config.output.pictures, len(journeys.paths)
     risk = config.integrity.of(IntegrityOptions).risk
 
@@ -311,14 +321,16 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         drawn = wanted == "all" or (wanted == "first" and not index)
         track = locate(log, filter_, rng, snapshots=drawn, risk=risk)
         into = new if count == 1 else new / name
+        baseline = baselines.of(log)
         if database is None:
             pictures = _draw_errors(log, track, into) if drawn else ()
         else:
-            pictures = draw_track(database, log, track, into) if drawn else ()
+            beside_m = baseline.error_m if baseline is not None else None
+            pictures = draw_track(database, log, track, into, beside_m) if drawn else ()
         if database is not None and (STREETS_ALONE in notes or not database.cell_ids):
             log = replace(log, notes=(*log.notes, *advice_of(log, fitted, track.estimate)))
         lack = lack_of(opened, log, options, track.estimate, database)
-        written = _write(name, log, track, into, pictures, lack)
+        written = _write(name, log, track, into, pictures, lack, baseline)
         files = tuple(out / file.relative_to(new) for file in written.outputs)
         return replace(written, outputs=files)
 
@@ -364,6 +376,7 @@ def _write(
     out: Path,
     pictures: tuple[Path, ...],
     lack: str,
+    baseline: SingleReports | None,
 ) -> ReplayedLog:
     files = tuple(out / file for file in ESTIMATES)
     write_estimate(track.estimate, files[0])
@@ -379,6 +392,7 @@ def _write(
         track.filter_s,
         (*files, out / FIGURES, *pictures),
         route_of(log),
+        baseline,
     )
     head = {"log": name, "filter": track.estimate.filter}
     write_json(out / FIGURES, {**head, **to_jsonable(replayed.figures)})

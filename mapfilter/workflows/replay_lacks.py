@@ -9,7 +9,7 @@ from mapfilter._types import Floats
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults
 from mapfilter.geodesy import Lattice, same_crs, short_crs
-from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.log_options import by_streets_alone
@@ -21,6 +21,7 @@ from mapfilter.workflows.world import outside_m
 
 _AWAY_M = 5000.0
 _BY_CELLS = ("candidate", "grid")
+_BY_STREETS = "--filter bayes starts by the streets alone"
 
 
 def check_log(path: Path, log: TrackLog, lattice: Lattice, faults: Faults) -> None:
@@ -74,7 +75,10 @@ def lack_of(
     lack = lacking(log, estimate, cells=has_cells, turns=isinstance(options, BayesFilter))
     name = str(getattr(options, "name", ""))
     if lack and not has_cells and name in _BY_CELLS:
-        return f"the filter {name} needs cells to start, the database has none"
+        return f"the filter {name} needs cells to start, the database has none ({_BY_STREETS})"
+    alone = database is not None and by_streets_alone(BayesFilter(), log, database)
+    if lack and name in _BY_CELLS and alone:
+        return f"{lack} ({_BY_STREETS})"
     if "no motion" not in lack:
         return lack
     if source := _receiver_motion(opened):
@@ -92,7 +96,8 @@ def advice_of(log: TrackLog, options: Any, estimate: TrackEstimate) -> tuple[str
     options
         Of the filter, as fitted to the log.
     """
-    if estimate.converged_at is not None or not isinstance(options, BayesFilter):
+    by_streets = isinstance(options, BayesFilter) and not isinstance(options, GridFilter)
+    if estimate.converged_at is not None or not by_streets:
         return ()
     along_m = float(log.motion["step_m"].abs().sum())
     notes = [

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mapfilter._io import VERSION, ensure_writable_folder
+from mapfilter._io import VERSION, atomic_file, ensure_writable_folder
 from mapfilter._parallel import Progress
 from mapfilter.config.sections import Config
+from mapfilter.database.measured import Readings, write_readings
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.geodesy import Lattice, projected_crs
 from mapfilter.radio.cells import CellPlan, write_cell_plan
@@ -185,6 +186,8 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         tags={"SOFTWARE": f"mapfilter {VERSION}", "MODEL": f"survey {options.method}"},
         progress=progress,
     )
+    with atomic_file(config.readings_path) as temporary:
+        write_readings(readings_of(measurements), temporary)
     plan_path = config.output.dir / "cells.csv"
     cells = surveyed_plan(
         survey,
@@ -215,6 +218,27 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         validation=validation,
         notes=(*measurements.notes, *survey.notes, *_advice(config, survey, factor)),
         pictures=pictures,
+    )
+
+
+def readings_of(measurements: Measurements) -> Readings:
+    """Return the readings of a survey, in its CRS; those of one session and time are one report."""
+    count = len(measurements)
+    # A row without a time is a report of its own.
+    number = np.where(np.isfinite(measurements.time_s), -1, np.arange(count))
+    keys = np.column_stack([measurements.session, np.nan_to_num(measurements.time_s), number])
+    report = np.unique(keys, axis=0, return_inverse=True)[1]
+    serving, advance = measurements.serving, measurements.timing_advance
+    return Readings(
+        measurements.cell_ids,
+        measurements.cell,
+        report.astype(np.int32),
+        measurements.session,
+        measurements.east_m,
+        measurements.north_m,
+        measurements.level_dbm,
+        advance if advance is not None else np.full(count, np.nan),
+        serving if serving is not None else np.zeros(count, dtype=np.bool_),
     )
 
 

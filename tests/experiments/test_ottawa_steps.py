@@ -14,7 +14,6 @@ from mapfilter.experiments.benchmarks.ottawa_sessions import (
     centroids,
     read_session,
     session_log,
-    site_of,
     step_factor_of,
 )
 from mapfilter.filters.contract import Reason, Status
@@ -148,9 +147,7 @@ def test_how_much_longer_true_ways_are(tmp_path):
     assert step_factor_of(both, CRS) == pytest.approx(1.5, rel=1e-3)
 
 
-def test_sites_and_the_middles_of_cells(tmp_path):
-    assert site_of("302-720-29050-511") == "302-720-1"
-    assert site_of("302-720-29050-512") == "302-720-2"
+def test_the_middles_of_cells(tmp_path):
     one = session(tmp_path, cellid=[1, 1, 2], rating=[20.0, 10.0, 21.0])
     found = centroids([one], CRS, 20.0)
     assert set(found) == {"302-720-7-1"}
@@ -161,35 +158,6 @@ def test_sites_and_the_middles_of_cells(tmp_path):
     own = session(tmp_path, ((10, 30), (10, 40), (10, 50)), cellid=[1, 9, 1],
                   rating=[20.0, 5.0, 20.5])  # fmt: skip
     np.testing.assert_allclose(ottawa.centroid_errors_m(own, [one], CRS), [30.0], atol=1e-3)
-
-
-def test_which_rows_make_maps_of_what_was_heard(tmp_path, monkeypatch):
-    """Fixes of 50 m or better; cells that the map does not know count as none of its own."""
-    one = session(tmp_path, cellid=[256, 512, 300], rating=[50.0, 5.0, 50.1], ta=[1.0, nan, 3.0])
-    other = session(tmp_path, ((0, 70), (0, 80)), (0.0, 1.0), cellid=[513, 256], rating=60.0)
-    names = ("302-720-7-512", "302-720-7-256", "302-720-7-513")
-    area = SimpleNamespace(cell_ids=names, band_of={name: k for k, name in enumerate(names)},
-                           lattice=SimpleNamespace(crs=CRS), size_m=(100.0, 100.0))  # fmt: skip
-    given = []
-    monkeypatch.setattr(ottawa, "open_area", lambda _: area)
-    monkeypatch.setattr(
-        ottawa, "ServingStatistics", SimpleNamespace(of_rows=lambda *rows: given.append(rows))
-    )
-    options = ottawa.OttawaOptions()
-    made = ottawa.surveyed_positioner(SimpleNamespace(lattice=area.lattice), [one, other], options)
-    ((rows, lattice, sites, heard),) = given
-    assert rows.cell.tolist() == [1, 0]
-    np.testing.assert_allclose(rows.east_m - EAST_M, [0.0, 20.0], atol=1e-3)
-    np.testing.assert_allclose(rows.north_m, NORTH_M, atol=1e-3)
-    np.testing.assert_array_equal(rows.timing_advance, [1.0, nan])
-    # Cells of one base station are one site.
-    assert sites.tolist() == [1, 0, 1]
-    assert lattice is area.lattice
-    assert heard is options.serving_map
-    assert (made.model.motion, made.model.level_sd_db) == (
-        options.positioner(area).model.motion,
-        None,
-    )
 
 
 S, C, T, L = Status.SEARCHING, Status.CONVERGED, Status.TRACKING, Status.LOST

@@ -1,9 +1,8 @@
 """Tables of sessions that were found, by hand, and what is kept of them on disk."""
 
 import json
-from dataclasses import asdict, replace
+from dataclasses import replace
 from math import isnan, nan, radians
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -28,6 +27,7 @@ from mapfilter.experiments.benchmarks.ottawa_table import (
     session_rows,
     write_left_out,
 )
+from mapfilter.positioning.bayes.options import BayesFilter
 
 
 def test_the_options_that_were_chosen():
@@ -35,25 +35,8 @@ def test_the_options_that_were_chosen():
     assert (FOLDER, LEFT_OUT) == ("cell-ottawa-lte", ("OpenCellID_20200830",))
     assert (GOOD_M, MAP_M, LONGEST_GAP_S, METHODS) == (20.0, 50.0, 30.0, ("bayes", "smoothed"))
     options = OttawaOptions()
-    area = SimpleNamespace(size_m=(100.0, 100.0), cell_ids=("A",))
-    model = options.positioner(area).model
-    assert asdict(model.motion) == {
-        "step_sd_m": 1.0, "typical_step_m": 14.0, "heading_sd_rad": radians(10),
-        "white_share": 0.7, "heading_m": 28.0, "disturbances_per_m": 0.0,
-        "disturbed_rad": radians(40), "bias_sd_rad": radians(6),
-        "bias_drift_rad_per_sqrt_m": radians(0.2), "rate_rad_per_m": radians(0.15),
-        "rate_share": 0.0, "scale_sd": 0.15,
-        "scale_drift_per_sqrt_m": 0.005, "stretch_sd": 0.0, "stretch_m": 25.0,
-    }  # fmt: skip
-    assert model.weights.sd_m == 16.0
-    particles, evidence = options.filter, model.evidence
-    assert (particles.max_particles, particles.min_search_particles) == (10_000, 7_000)
-    assert evidence.serving.weight_per_m == 1 / 150
-    levels = evidence.levels
-    assert (levels.slow_m, levels.fast_m, levels.white_db) == (100.0, 10.0, 3.0)
-    # Of 5 dB in all, as the filter's defaults share them.
-    assert (levels.slow_db, levels.fast_db) == pytest.approx((5 * 7 / 8.7115, 5 * 4 / 8.7115), 1e-4)
-    assert options.unmeasured_db == 8.0
+    # What a user gets: nothing is set for this benchmark.
+    assert options.filter == BayesFilter()
     assert options.errors == ReckoningErrors(0.10, radians(6), radians(5)) == ReckoningErrors()
 
 

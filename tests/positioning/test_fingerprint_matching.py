@@ -10,10 +10,12 @@ from sklearn.neighbors import NearestNeighbors
 
 from mapfilter.positioning.fingerprints.matches import Received, locator
 from mapfilter.positioning.fingerprints.matching import (
+    ByCell,
     Distances,
     LevelErrors,
     Likelihoods,
     Scale,
+    _Excess,
 )
 from mapfilter.positioning.fingerprints.options import Centroid, Neighbours, Probabilistic
 
@@ -199,3 +201,25 @@ def test_a_mismatch_grows_with_strange_levels():
         by = locator(method, reports)
         usual = by(Received(cell, dbm, -1, np.nan)).mismatch
         assert by(Received(cell, strange, -1, np.nan)).mismatch > usual
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.integers(0, 6),
+            st.one_of(st.integers(-110, -40), st.floats(-110, -40, allow_nan=False)),
+        ),
+        min_size=1,
+        max_size=60,
+    ),
+    st.one_of(st.integers(-115, -35), st.floats(-115, -35, allow_nan=False)),
+)
+def test_sums_above_a_threshold_are_those_of_all_levels(readings, threshold_dbm):
+    report, level_dbm = (np.array(column) for column in zip(*readings, strict=True))
+    by_cell = ByCell(7, np.array([0, len(report)]), report, np.arange(len(report)))
+    found = _Excess.of(by_cell, level_dbm.astype(float)).above(threshold_dbm)
+    expected = [
+        sum(max(level - threshold_dbm, 0.0) for at, level in readings if at == one)
+        for one in range(7)
+    ]
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)

@@ -120,7 +120,9 @@ def test_measured_errors_of_motion_are_those_that_are_assumed():
     assert found == (0.1, 8.0, 12.0, 0.07)
     # 0.4 degrees per root second at 4 m/s.
     assert fitted.drift_deg_per_sqrt_m == pytest.approx(0.2)
-    assert notes[0].startswith("errors of motion as measured: step_sd_m = 0.1, scale = 0.07")
+    assert notes[0].startswith(
+        "errors of motion as the log states them: step_sd_m = 0.1, scale = 0.07"
+    )
     kept, _ = fitted_to_log(BayesFilter(heading_sd_deg=2.0), given)
     assert (kept.heading_sd_deg, kept.bias_sd_deg) == (2.0, 12.0)
     kalman, _ = fitted_to_log(KalmanFilter(), given)

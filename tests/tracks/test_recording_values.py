@@ -237,3 +237,26 @@ def test_a_quoted_separator_in_a_file_of_blanks(written):
     found = read_recording(written("smartloc", "\n".join(lines))).tables
     for name, rows in whole.items():
         assert len(found[name]) >= len(rows) - 5, name
+
+
+def test_an_older_log_of_gnettrack_has_no_raw_identity(written):
+    lines = [line.split("\t") for line in gnettrack().splitlines()]
+    at = lines[0].index("RAWCELLID")
+    text = "\n".join("\t".join(line[:at] + line[at + 1 :]) for line in lines)
+    rows = read_recording(written("gnettrack", text)).tables["radio"]
+    serving = rows[rows["role"] == "serving"]
+    # Base station 401, its cell 141; the network is LTE.
+    assert set(serving["ci"]) == {401 * 256 + 141}
+
+
+@pytest.mark.parametrize("names", ["gyr_{}", "gyro_{}", "gyroscope{}", "gyro_{}_radps"])
+def test_sensors_have_several_usual_names(names, tmp_path):
+    head = ["time", "acc_x", "acc_y", "acc_z", *(names.format(axis) for axis in "xyz"), "mood"]
+    rows = [[str(i / 50), "0.1", "0.2", "9.8", "0.01", "0.02", "0.03", "7"] for i in range(20)]
+    path = tmp_path / "sensors.csv"
+    path.write_text("\n".join(",".join(row) for row in [head, *rows]) + "\n")
+    recording = read_recording(path)
+    assert recording.tables["gyroscope"][["x_radps", "y_radps", "z_radps"]].iloc[0].tolist() == [
+        0.01, 0.02, 0.03,
+    ]  # fmt: skip
+    assert any("columns not used: mood" in note for note in recording.notes)

@@ -108,12 +108,12 @@ def test_several_logs_are_told_apart(folder, tmp_path):
 
 
 def test_strangers_are_counted_and_not_located(folder, tmp_path):
-    outcome = assert_done(
-        mapfilter(
-            "locate", "--db", folder / "surveys", "--log", folder / "elsewhere",
-            "--method", "knn", "--out", tmp_path, "--json",
-        )
+    outcome = mapfilter(
+        "locate", "--db", folder / "surveys", "--log", folder / "elsewhere",
+        "--method", "knn", "--out", tmp_path, "--json",
     )  # fmt: skip
+    assert outcome.code == 3
+    assert outcome.err == "mapfilter: nothing is located: no transmitter of the database\n"
     assert outcome.json["located"] == 0
     assert outcome.json["not_located"] == {
         "no transmitter of the database": outcome.json["reports"]

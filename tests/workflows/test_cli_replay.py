@@ -95,7 +95,7 @@ def test_all_cells_unknown_with_pictures(log, replay, tmp_path):
     ("kept", "lack"),
     [
         ((), "no serving cell and no motion"),
-        (("motion",), "no serving cell"),
+        (("motion",), "no serving cell (--filter bayes starts by the streets alone)"),
         (("radio", "truth"), "no motion (mapfilter locate needs none)"),
         (("truth",), "no serving cell and no motion"),
     ],
@@ -266,8 +266,10 @@ def test_a_log_of_motion_alone_is_located_by_the_streets(log, replay, world):
     assert roads.field().level_dbm.shape[2] == 0
     track = mf.locate(mf.read_log(log), database)
     assert (track.estimate.hypotheses > 0).any()
-    # The candidate filter cannot, and no filter with a step or two.
-    assert "no serving cell" in replay(log, "--filter", "candidate").err
+    # Others cannot, and no filter with a step or two.
+    for name in ("candidate", "grid"):
+        refused = replay(log, "--filter", name)
+        assert "no serving cell (--filter bayes starts by the streets alone)" in refused.err
     pd.read_csv(log / "motion.csv").iloc[:4].to_csv(log / "motion.csv", index=False)
     short = replay(log, "--filter", "bayes")
     assert (short.code, "too short a way" in short.err) == (3, True)

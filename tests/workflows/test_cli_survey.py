@@ -51,7 +51,8 @@ def test_a_survey_becomes_rasters_and_a_database(survey, world, tmp_path):
         mapfilter("predict", "-c", config, "--out", tmp_path, "--json", *drawn)
     ).json
     names = {path.name for path in tmp_path.iterdir()}
-    assert names == {"rxlev.tif", "rxlev-deviation.tif", "cells.csv", "pictures"}
+    files = {"rxlev.tif", "rxlev-deviation.tif", "rxlev-readings.parquet", "cells.csv"}
+    assert names == files | {"pictures"}
     pictures = [tmp_path / "pictures" / f"survey-{name}.png" for name in ("levels", "left-out")]
     assert found["pictures"] == [str(path) for path in pictures]
     assert sorted((tmp_path / "pictures").iterdir()) == sorted(pictures)

@@ -197,18 +197,6 @@ def _reckoned(session: Session, crs: str) -> tuple[Floats, Floats]:
     return step_m, heading[of]
 
 
-def site_of(cell: str) -> str:
-    """Return the base station of an LTE cell: its identity without the last byte.
-
-    Examples
-    --------
-    >>> site_of("302-720-29050-9391431"), site_of("302-720-29050-9391383")
-    ('302-720-36685', '302-720-36685')
-    """
-    mcc, mnc, _, identity = cell.split("-")
-    return f"{mcc}-{mnc}-{int(identity) // 256}"
-
-
 def centroids(others: Sequence[Session], crs: str, accuracy_m: float) -> dict[str, Floats]:
     """Return the mean place of each cell's rows in sessions, of fixes that are good enough."""
     places = np.concatenate([other.places(crs) for other in others])

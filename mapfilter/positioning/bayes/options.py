@@ -19,6 +19,12 @@ from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.area_map import AreaMap
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.over_survey import (
+    SURVEYED,
+    SURVEYED_WAYS,
+    filled_field,
+    over_survey,
+)
 from mapfilter.positioning.bayes.radio import EvidenceOptions
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 
@@ -171,17 +177,31 @@ class BayesFilter(Options):
         return "bayes"
 
     def over(self, database: RadioRouteDatabase, *, ways: bool = True) -> BayesPositioner:  # noqa: ARG002
-        """Return the filter over the area of a database, which is read as a whole."""
-        return self.over_area(open_area(database))
+        """Return the filter over the area of a database, which is read as a whole.
+
+        Over surveyed levels, options that have their defaults are those of measured maps
+        (:mod:`mapfilter.positioning.bayes.over_survey`).
+        """
+        measured = database.measured()
+        if measured is None:
+            return self.over_area(open_area(database))
+        roles = {one["role"] for one in database.manifest["inputs"]}
+        tracks = "tracks" in roles and not roles & {"map", "roads"}
+        options = self._with({**SURVEYED, **(SURVEYED_WAYS if tracks else {})})
+        field = filled_field(database.field(), measured)
+        area = AreaMap.of_field(field, database.plan, database.floor_dbm)
+        return over_survey(options.over_area(area), database, measured)
 
     @property
     def resolved(self) -> BayesFilter:
         """Options with the defaults of vehicles in place of those of walkers, where asked for."""
-        if not self.vehicle:
-            return self
+        return self._with(VEHICLE) if self.vehicle else self
+
+    def _with(self, usual: Mapping[str, float]) -> BayesFilter:
+        """Return options in which other defaults are taken for those that have theirs."""
         default = {one.name: one.default for one in fields(self)}
         taken: dict[str, Any] = {
-            name: value for name, value in VEHICLE.items() if getattr(self, name) == default[name]
+            name: value for name, value in usual.items() if getattr(self, name) == default[name]
         }
         return replace(self, **taken)
 

@@ -159,6 +159,7 @@ def fit_locator(
     rng: np.random.Generator | None = None,
     *,
     strongest: int = STRONGEST,
+    validated: int = MOST_VALIDATED,
     progress: Progress | None = None,
 ) -> ReportLocator:
     """Cross-validate a method on a database, calibrate its regions, and prepare it.
@@ -177,6 +178,8 @@ def fit_locator(
         Draws reports from predicted levels; seeded with 0 when left out.
     strongest : int
         Number of cells in such a report.
+    validated : int
+        Most reports by which regions are calibrated.
     progress : callable, optional
         Called with folds done and folds in all.
 
@@ -200,10 +203,8 @@ def fit_locator(
     found = []
     if placed.predicted:
         blocks = "reports drawn with the stated errors"
-        drawn = rng if rng is not None else np.random.default_rng(0)
-        some = simulated_reports(
-            placed, MOST_VALIDATED, strongest, Probabilistic().shared_db, drawn
-        )
+        rng = rng if rng is not None else np.random.default_rng(0)
+        some = simulated_reports(placed, validated, strongest, Probabilistic().shared_db, rng)
         found = [(one, _simulated(placed, one, some)) for one in tried]
     else:
         fold, blocks = folds_of(placed)
@@ -214,7 +215,7 @@ def fit_locator(
                 if progress is not None:
                     progress(begun + done, count * len(tried))
 
-            found.append((one, cross_validate(placed, one, fold, report)))
+            found.append((one, cross_validate(placed, one, fold, report, validated)))
     found.sort(key=lambda pair: float(np.median(pair[1].error_m)) if len(pair[1]) else np.inf)
     chosen, errors = found[0]
     enough = len(errors) >= _LEAST_VALIDATED
@@ -269,14 +270,18 @@ def locate_by(fitted: ReportLocator, reports: Reports) -> LocatedReports:
 
 
 def cross_validate(
-    database: Reports, method: Method, fold: Ints, progress: Progress | None = None
+    database: Reports,
+    method: Method,
+    fold: Ints,
+    progress: Progress | None = None,
+    most: int = MOST_VALIDATED,
 ) -> Errors:
     """Return the errors of a method where each fold is located by the database of the others.
 
-    At most :data:`MOST_VALIDATED` reports are located; those of which no transmitter was received
+    At most ``most`` reports are located, evenly taken; those of which no transmitter was received
     in the other folds have no error.
     """
-    count = min(len(database), MOST_VALIDATED)
+    count = min(len(database), most)
     tried = np.linspace(0, max(len(database) - 1, 0), count).astype(np.int64)
     parts, names = [], np.unique(fold)
     for done, one in enumerate(names):

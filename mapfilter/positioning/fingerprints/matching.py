@@ -8,6 +8,7 @@ Torres-Sospedra et al., Expert Systems with Applications 42 (2015), 9263-9278.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -175,6 +176,67 @@ class LevelErrors:
 
 
 @dataclass(frozen=True, eq=False)
+class _Excess:
+    """For each report the sum of what its levels have above a threshold.
+
+    A database of predicted levels has millions of them, and each report to be located a threshold
+    of its own. Sums above whole dBm are kept; between two of these only the levels there count.
+
+    Parameters
+    ----------
+    first_dbm : int
+        Lowest whole dBm.
+    sums_db : ndarray, shape (Q, R)
+        Sums of the levels above each whole dBm, less that; the last row is zero.
+    count : ndarray of int32, shape (Q, R)
+        Numbers of these levels.
+    edges : ndarray, shape (Q + 1,)
+        Levels of at least each whole dBm, but less than the next, are those between the edges.
+    level_dbm, report : ndarray, shape (N,)
+        By whole dBm.
+    """
+
+    first_dbm: int
+    sums_db: Floats
+    count: Ints32
+    edges: Ints
+    level_dbm: Floats
+    report: Ints
+
+    @classmethod
+    def of(cls, by_cell: ByCell, level_dbm: Floats) -> _Excess:
+        whole = np.floor(level_dbm).astype(np.int64)
+        first, last = int(whole.min()), int(whole.max())
+        order = np.argsort(whole, kind="stable")
+        edges = np.searchsorted(whole[order], np.arange(first, last + 2))
+        level, report, reports = level_dbm[order], by_cell.report[order], by_cell.count
+        steps = last + 2 - first
+        sums, count = np.zeros((steps, reports)), np.zeros((steps, reports), dtype=np.int32)
+        for step in range(steps - 2, -1, -1):
+            own = slice(int(edges[step]), int(edges[step + 1]))
+            over = np.bincount(report[own], level[own] - (first + step), minlength=reports)
+            more = np.bincount(report[own], minlength=reports)
+            # Those above the next whole dBm are one more above this one.
+            sums[step] = sums[step + 1] + count[step + 1] + over
+            count[step] = count[step + 1] + more
+        return cls(first, sums, count, edges, level, report)
+
+    def above(self, threshold_dbm: float) -> Floats:
+        """Return the sums above a threshold, shape (R,)."""
+        step = int(np.floor(threshold_dbm)) - self.first_dbm
+        if step < 0:
+            below_db = self.first_dbm - threshold_dbm
+            return np.asarray(self.sums_db[0] + below_db * self.count[0])
+        if step >= len(self.sums_db) - 1:
+            return np.zeros(self.sums_db.shape[1])
+        own = slice(int(self.edges[step]), int(self.edges[step + 1]))
+        over = np.maximum(self.level_dbm[own] - threshold_dbm, 0.0)
+        found = np.bincount(self.report[own], over, minlength=self.sums_db.shape[1])
+        part_db = self.first_dbm + step + 1 - threshold_dbm
+        return np.asarray(found + self.sums_db[step + 1] + part_db * self.count[step + 1])
+
+
+@dataclass(frozen=True, eq=False)
 class Likelihoods:
     """Log-likelihoods of reports at those of a database.
 
@@ -226,6 +288,10 @@ class Likelihoods:
             reports.predicted,
         )
 
+    @cached_property
+    def _excess(self) -> _Excess:
+        return _Excess.of(self.by_cell, self.level_dbm)
+
     def of(self, cell: Ints32, level_dbm: Floats) -> tuple[Floats, Floats]:
         """Return log-likelihoods of one report: of which cells it has, and of their levels, (R,).
 
@@ -236,19 +302,20 @@ class Likelihoods:
         """
         strength_dbm = filled(level_dbm, cell, self.usual_dbm)
         own = _absence(strength_dbm, self.errors)
-        count, lost, absence = self.by_cell.count, self.loss, self.absence
+        count, lost, absence, errors = self.by_cell.count, self.loss, self.absence, self.errors
         if self.predicted:
             # Phones report the strongest cells: the absence of weaker ones is no evidence.
             least_dbm = max(float(strength_dbm.min()), self.errors.floor_dbm)
-            lost = _absence(self.level_dbm, replace(self.errors, floor_dbm=least_dbm))
-            absence = _sums(self.by_cell, lost)
+            errors = replace(self.errors, floor_dbm=least_dbm)
+            absence = self.errors.absence_per_db * self._excess.above(least_dbm)
         received = -absence - own.sum()
         s0, s1, s2, logs = np.zeros((4, count))
         least_db2 = self.least_db2
         for one, dbm, own_loss in zip(cell.tolist(), level_dbm.tolist(), own.tolist(), strict=True):
             where = self.by_cell.of_cell(one)
             report = self.by_cell.report[where]
-            received[report] += lost[where] + own_loss
+            own_lost = _absence(self.level_dbm[where], errors) if self.predicted else lost[where]
+            received[report] += own_lost + own_loss
             if np.isnan(dbm):
                 continue
             apart_db, variance_db2 = dbm - self.level_dbm[where], self.variance_db2[where]

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from mapfilter.database.measured import Readings
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
 from mapfilter.positioning.fingerprints.reports import (
@@ -55,16 +56,22 @@ def named_neighbours(log: TrackLog, plan: CellPlan) -> TrackLog:
 def reports_of_database(database: RadioRouteDatabase, level_error_db: float = 6.0) -> Reports:
     """Return the levels of a radio-route database as reports at its points.
 
+    Those of a survey are its readings themselves: its rasters tell the level where a cell is
+    received, and not where it is not.
+
     Parameters
     ----------
     level_error_db : float
-        Standard deviation of the error of its levels.
+        Standard deviation of the error of predicted levels.
 
     Raises
     ------
     InputError
         No cell is received at any of its points.
     """
+    measured = database.measured()
+    if measured is not None and len(measured.readings):
+        return _reports_of_survey(measured.readings, database.lattice.crs)
     lattice = database.lattice
     parts = [database.cell_points(cell_id, np.inf) for cell_id in database.cell_ids]
     place = [row.astype(np.int64) * lattice.cols + col for row, col, _ in parts]
@@ -92,6 +99,32 @@ def reports_of_database(database: RadioRouteDatabase, level_error_db: float = 6.
         sd_db=np.full(int(there.sum()), level_error_db),
     )
     return replace(found, predicted=True)
+
+
+def _reports_of_survey(readings: Readings, crs: str) -> Reports:
+    """Return the readings of a survey as reports; each session is a block of its own."""
+    _, first, report = np.unique(readings.report, return_index=True, return_inverse=True)
+    names = np.array(readings.cell_ids, dtype=str)[readings.cell]
+    served = np.flatnonzero(readings.serving)
+    serving = np.full(len(first), "", dtype=names.dtype)
+    serving[report[served]] = names[served]
+    advance = np.full(len(first), np.nan)
+    advance[report[served]] = readings.timing_advance[served]
+    found = make_reports(
+        crs,
+        report,
+        names,
+        readings.level_dbm,
+        count=len(first),
+        places=np.column_stack([readings.east_m[first], readings.north_m[first]]),
+        block=readings.session[first],
+        serving=serving,
+        timing_advance=advance,
+    )
+    if len(found) <= MOST_POINTS:
+        return found
+    kept = np.linspace(0, len(found) - 1, MOST_POINTS).astype(np.int64)
+    return found.some(kept, f"{MOST_POINTS} of {len(found)} reports taken, evenly")
 
 
 def simulated_reports(

@@ -21,7 +21,9 @@ from mapfilter.tracks.readers.recording import Clock, Reading
 from mapfilter.tracks.readers.stale import repeated_readings
 from mapfilter.tracks.readers.text import Text
 
-_NEEDED = {"timestamp", "longitude", "latitude", "rawcellid", "networkmode"}
+_NEEDED = {"timestamp", "longitude", "latitude", "networkmode"}
+_IDENTITIES = ({"rawcellid"}, {"node", "cellid"})
+_LTE_CELLS = 256
 _KMH = 1 / 3.6
 _LEAST_FIELDS = 20
 _MOST_NEIGHBOURS = 18
@@ -30,7 +32,8 @@ _LAYOUT = "%Y.%m.%d_%H.%M.%S"
 
 def _matches(text: Text) -> bool:
     line = text.first_line
-    return set(header_names(line, likely_separator(line))) >= _NEEDED
+    names = set(header_names(line, likely_separator(line)))
+    return names >= _NEEDED and any(names >= needed for needed in _IDENTITIES)
 
 
 def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
@@ -77,6 +80,11 @@ def _serving(rows: Columns, reading: Reading) -> dict[str, Floats]:
     if not rows.has("lac"):
         lac = _hexadecimal(rows.texts("lachex"))
     ci = available(*rows.whole("rawcellid"))
+    if not rows.has("rawcellid"):
+        node, ci = available(*rows.whole("node")), available(*rows.whole("cellid"))
+        # A base station of LTE has 256 cells; GSM and UMTS have none, or that of a controller.
+        lte = (rows.mapped(technology, "networkmode", "networktech") == "LTE") & (node > 0)
+        ci = np.where(lte, node * _LTE_CELLS + ci, ci)
     mcc, mnc = (np.full(len(rows), np.nan) for _ in range(2))
     for word in pd.unique(operator):
         if re.fullmatch(r"\d{5,6}", str(word)):

@@ -10,7 +10,7 @@ from difflib import get_close_matches
 import numpy as np
 
 from mapfilter._types import Floats
-from mapfilter.errors import Faults, InputError, fail
+from mapfilter.errors import Faults, InputError, fail, listed
 from mapfilter.radio.identities import BARS_DBM, levels_of_bars, technology
 from mapfilter.tracks.readers.columns import (
     Columns,
@@ -67,8 +67,16 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
     "pressure_hpa": ("pressure_hpa", "pressure"),
     "steps": ("steps", "step_count"),
     **{
-        f"{sensor}_{axis}": (f"{sensor}_{axis}", f"{sensor}{axis}")
-        for sensor in ("acc", "gyr", "mag")
+        f"{sensor}_{axis}": tuple(
+            name
+            for word in (sensor, *others)
+            for name in (f"{word}_{axis}", f"{word}{axis}", f"{word}_{axis}_{unit}")
+        )
+        for sensor, unit, others in (
+            ("acc", "mps2", ("accel", "accelerometer")),
+            ("gyr", "radps", ("gyro", "gyroscope")),
+            ("mag", "ut", ("magnetometer", "magnetic")),
+        )
         for axis in "xyz"
     },
 }
@@ -145,6 +153,9 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     _add_odometry(mapped, reading, time_s)
     _add_sensors(mapped, reading, time_s)
     _add_cells(mapped, reading, time_s)
+    taken = {name for field in FIELDS for name in mapped.names(field)}
+    if unused := [name for name in rows.names if name and name not in taken]:
+        reading.note(f"columns not used: {listed(unused)}; see --column")
 
 
 def _add(

@@ -24,10 +24,21 @@ _UNIX_S = 1e8
 _CROOKED = 0.05
 
 
+_NAMES = frozenset(
+    ["x", "y", "z", "tx", "ty", "tz", "qx", "qy", "qz", "qw", "x_m", "y_m", "z_m", "r11", "r00"]
+)
+
+
 def _count(text: Text, count: int) -> bool:
     lines = [line for line in text.head[:30] if line.strip() and not line.startswith("#")][:20]
     right = sum(_numbers(line, count) for line in lines)
-    return bool(lines) and right > 0.5 * len(lines)
+    return bool(lines) and right > 0.5 * len(lines) and not _names_others(lines[0])
+
+
+def _names_others(line: str) -> bool:
+    """Return whether a header names columns none of which is of a pose."""
+    words = {word.strip().lower() for word in re.split(r"[,;\s]+", line) if word.strip()}
+    return bool(words) and all(word[0].isalpha() for word in words) and not words & _NAMES
 
 
 def _numbers(line: str, count: int) -> bool:

@@ -1,0 +1,271 @@
+"""What a survey adds to a database: its readings, and how well its levels are known.
+
+``readings.parquet`` has a row for each reading, ``deviations.parquet`` the standard deviation of a
+new reading at each point where a cell was measured. Filters over measured maps need both: a cell
+that was not measured at a place may be received there, and which cell serves is counted
+(:mod:`mapfilter.models.measured_map`). Single reports are compared with the readings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from scipy.ndimage import distance_transform_edt
+
+from mapfilter._types import Bools, Floats, Floats32, Ints32
+from mapfilter.database.manifest import DEVIATIONS, POINTS, READINGS, describe_part
+from mapfilter.database.parquet import Source, dictionary, read_columns, write_columns
+from mapfilter.errors import InputError, StoreError, fail
+from mapfilter.geodesy import Lattice
+from mapfilter.rasters.raster_set import RxLevRasters
+
+_READINGS = {
+    "cell": np.int32,
+    "report": np.int32,
+    "session": np.int32,
+    "east_m": np.float64,
+    "north_m": np.float64,
+    "level_dbm": np.float64,
+    "timing_advance": np.float64,
+    "serving": np.bool_,
+}
+_LARGEST_READ_PX = 1 << 25
+_DEVIATIONS = ("cell", "row", "col", "deviation_db")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Readings:
+    """Readings that a survey was made of, N rows.
+
+    Parameters
+    ----------
+    cell_ids : tuple of str
+    cell, report, session : ndarray of int32, shape (N,)
+        Index into ``cell_ids``; numbers of what was received at one time, and of the drive or walk.
+    east_m, north_m : ndarray, shape (N,)
+        Where the cell was received.
+    level_dbm : ndarray, shape (N,)
+    timing_advance : ndarray, shape (N,)
+        Steps; NaN where it was not reported.
+    serving : ndarray of bool, shape (N,)
+        Whether it was the serving cell.
+    """
+
+    cell_ids: tuple[str, ...]
+    cell: Ints32
+    report: Ints32
+    session: Ints32
+    east_m: Floats
+    north_m: Floats
+    level_dbm: Floats
+    timing_advance: Floats
+    serving: Bools
+
+    def __len__(self) -> int:
+        return len(self.cell)
+
+    def some(self, kept: Bools) -> Readings:
+        """Return some of the rows."""
+        return Readings(self.cell_ids, *(getattr(self, name)[kept] for name in _READINGS))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Deviations:
+    """Standard deviations of a new reading at points where a cell was measured, M rows.
+
+    ``cell`` is an index into ``cell_ids``, ``row`` and ``col`` are the place on the lattice.
+    """
+
+    cell_ids: tuple[str, ...]
+    cell: Ints32
+    row: Ints32
+    col: Ints32
+    deviation_db: Floats32
+
+    def __len__(self) -> int:
+        return len(self.cell)
+
+    def spread(self, cell_ids: Sequence[str], on_way: Bools) -> Floats32:
+        """Return the deviation at every pixel, shape (C, P), NaN where a cell was not measured.
+
+        Parameters
+        ----------
+        cell_ids : sequence of str
+            The C cells that are wanted.
+        on_way : ndarray of bool, shape (rows, cols)
+            Points of the database; pixels beside them have the value of the nearest one.
+        """
+        rows, cols = on_way.shape
+        near = distance_transform_edt(~on_way, return_distances=False, return_indices=True)
+        found = np.full((len(cell_ids), rows * cols), np.nan, dtype=np.float32)
+        of = {cell_id: number for number, cell_id in enumerate(self.cell_ids)}
+        order = np.argsort(self.cell, kind="stable")
+        edges = np.searchsorted(self.cell[order], np.arange(len(self.cell_ids) + 1))
+        for band, cell_id in enumerate(cell_ids):
+            if cell_id not in of:
+                continue
+            own = order[edges[of[cell_id]] : edges[of[cell_id] + 1]]
+            layer = np.full((rows, cols), np.nan, dtype=np.float32)
+            layer[self.row[own], self.col[own]] = self.deviation_db[own]
+            found[band] = layer[near[0], near[1]].ravel()
+        return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredParts:
+    """What the survey of a database measured."""
+
+    readings: Readings
+    deviations: Deviations
+
+
+def merged_parts(
+    parts: Sequence[MeasuredParts], shifts: Sequence[tuple[int, int]], cell_ids: Sequence[str]
+) -> MeasuredParts:
+    """Return the parts of several surveys together, of some cells.
+
+    ``shifts`` are the rows and columns that each survey's lattice lies below and right of the new
+    one's corner. Of a deviation given twice the last counts.
+    """
+    numbers = {cell_id: number for number, cell_id in enumerate(cell_ids)}
+
+    def renamed(names: Sequence[str], cell: Ints32) -> Ints32:
+        own = np.array([numbers.get(name, -1) for name in names] or [-1], dtype=np.int32)
+        return np.asarray(own[cell], dtype=np.int32)
+
+    given = [p.readings for p in parts]
+    readings = [replace(one, cell=renamed(one.cell_ids, one.cell)) for one in given]
+    found = [p.deviations for p in parts]
+    cell = _joined([renamed(f.cell_ids, f.cell) for f in found], np.int32)
+    row = _joined([f.row + down for f, (down, _) in zip(found, shifts, strict=True)], np.int32)
+    col = _joined([f.col + right for f, (_, right) in zip(found, shifts, strict=True)], np.int32)
+    value = _joined([f.deviation_db for f in found], np.float32)
+    table = np.column_stack([cell, row, col])[::-1]
+    _, last = np.unique(table, axis=0, return_index=True)
+    kept = len(cell) - 1 - last
+    kept = kept[cell[kept] >= 0]
+    columns = {
+        name: _joined([getattr(one, name) for one in readings], kind)
+        for name, kind in _READINGS.items()
+    }
+    for name in ("report", "session"):
+        # Numbers of different surveys differ.
+        counts = [int(getattr(one, name).max(initial=-1)) + 1 for one in readings]
+        sizes = [len(one) for one in readings]
+        columns[name] += np.repeat(np.cumsum([0, *counts[:-1]]), sizes).astype(np.int32)
+    rows = Readings(tuple(cell_ids), **columns)
+    deviations = Deviations(tuple(cell_ids), cell[kept], row[kept], col[kept], value[kept])
+    return MeasuredParts(rows.some(rows.cell >= 0), deviations)
+
+
+def deviations_at_points(
+    folder: Path, rasters: RxLevRasters, cell_ids: Sequence[str]
+) -> Deviations:
+    """Return the deviations of a survey's rasters at the points of a database folder.
+
+    Raises
+    ------
+    InputError
+        A raster is damaged, or on another lattice than the points.
+    """
+    points = read_columns(folder / POINTS, ("row", "col"))
+    row, col = (points[name].to_numpy() for name in ("row", "col"))
+    if row.size and not rasters.lattice.contains(row, col).all():
+        hint = "deviations of another survey"
+        raise fail(InputError, str(rasters.path), "the lattice of the levels", "another", hint)
+    known = set(rasters.cell_ids)
+    wanted = [number for number, cell_id in enumerate(cell_ids) if cell_id in known]
+    at_once = max(_LARGEST_READ_PX // (rasters.lattice.rows * rasters.lattice.cols), 1)
+    cells, rows, cols, values = [], [], [], []
+    for start in range(0, len(wanted), at_once):
+        some = np.array(wanted[start : start + at_once], dtype=np.int32)
+        deviation_db = rasters.read(cells=tuple(cell_ids[n] for n in some))[:, row, col]
+        which, kept = np.nonzero(np.isfinite(deviation_db))
+        cells.append(some[which])
+        rows.append(row[kept])
+        cols.append(col[kept])
+        values.append(deviation_db[which, kept])
+    return Deviations(
+        tuple(cell_ids),
+        _joined(cells, np.int32),
+        _joined(rows, np.int32),
+        _joined(cols, np.int32),
+        _joined(values, np.float32),
+    )
+
+
+def write_readings(readings: Readings, path: Path) -> None:
+    """Write the readings of a survey as Parquet."""
+    columns = {name: pa.array(getattr(readings, name)) for name in _READINGS}
+    columns["cell"] = dictionary(readings.cell, readings.cell_ids or ("",))
+    write_columns(pa.table(columns), path)
+
+
+def read_readings(source: Source) -> Readings:
+    """Read what :func:`write_readings` wrote; StoreError where it is damaged."""
+    table = read_columns(source, tuple(_READINGS))
+    cell, cell_ids = _codes(source, table["cell"])
+    columns = {
+        name: table[name].to_numpy().astype(kind)
+        for name, kind in _READINGS.items()
+        if name != "cell"
+    }
+    return Readings(cell_ids, cell, **columns)
+
+
+def write_measured(folder: Path, parts: MeasuredParts) -> list[dict[str, Any]]:
+    """Write both parts into a database folder; return their entries in the manifest."""
+    write_readings(parts.readings, folder / READINGS)
+    found = parts.deviations
+    values = (found.row, found.col, found.deviation_db)
+    columns = [dictionary(found.cell, found.cell_ids or ("",)), *map(pa.array, values)]
+    write_columns(pa.table(dict(zip(_DEVIATIONS, columns, strict=True))), folder / DEVIATIONS)
+    return [
+        describe_part(folder, folder / READINGS, len(parts.readings)),
+        describe_part(folder, folder / DEVIATIONS, len(found)),
+    ]
+
+
+def read_measured(
+    readings: Source, deviations: Source, lattice: Lattice, cell_ids: Sequence[str]
+) -> MeasuredParts:
+    """Read both parts of a database of a lattice and cells.
+
+    Raises
+    ------
+    StoreError
+        A part is damaged, or not of this database.
+    """
+    table = read_columns(deviations, _DEVIATIONS)
+    cell, names = _codes(deviations, table["cell"])
+    row, col = (table[name].to_numpy().astype(np.int32) for name in ("row", "col"))
+    if row.size and not lattice.contains(row, col).all():
+        expected = "points on the database's lattice"
+        raise fail(StoreError, str(deviations), expected, "others", "parts mixed up")
+    deviation_db = table["deviation_db"].to_numpy().astype(np.float32)
+    read = read_readings(readings)
+    for source, some in ((readings, read.cell_ids), (deviations, names)):
+        if not set(some) <= {*cell_ids, ""}:
+            raise fail(StoreError, str(source), "cells of the database", "others", "parts mixed up")
+    return MeasuredParts(read, Deviations(names, cell, row, col, deviation_db))
+
+
+def _codes(source: Source, column: Any) -> tuple[Ints32, tuple[str, ...]]:
+    if column.null_count or not len(column):
+        if not len(column):
+            return np.empty(0, dtype=np.int32), ()
+        raise fail(StoreError, str(source), "a cell in each row", "none", "damaged")
+    joined = column.dictionary_encode().unify_dictionaries().combine_chunks()
+    if hasattr(joined, "chunks"):
+        joined = joined.chunk(0)
+    names = tuple(str(name) for name in joined.dictionary.to_pylist())
+    return joined.indices.to_numpy().astype(np.int32), names
+
+
+def _joined(parts: Sequence[Any], kind: type) -> Any:
+    return np.concatenate([np.empty(0, dtype=kind), *parts]).astype(kind)
