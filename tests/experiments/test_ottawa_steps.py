@@ -77,7 +77,7 @@ def test_rows_that_lack_what_is_needed_are_left_out(tmp_path):
     with pytest.raises(InputError, match="two rows or more, found 1"):
         session(tmp_path, ((0, 0),), (1.0,))
     assert len(session(tmp_path, ((0, 0), (1, 1)), (1.0, 2.0))) == 2
-    with pytest.raises(InputError, match=r"CSV with the columns mcc, mnc.*"):
+    with pytest.raises(InputError, match="a readable file, found No such file"):
         read_session(tmp_path / "none.csv")
 
 

@@ -7,6 +7,7 @@ from math import isnan, nan, radians
 import numpy as np
 import pytest
 
+from mapfilter._io import sealed
 from mapfilter.errors import StoreError
 from mapfilter.evaluation.success import wilson_interval, wilson_interval_of_routes
 from mapfilter.experiments.benchmarks.ottawa import (
@@ -149,6 +150,6 @@ def test_what_came_of_a_session_is_read_as_it_was_written(tmp_path):
      '{"session": "a", "centroid_m": ["x"], "found": []}'],
 )  # fmt: skip
 def test_what_is_damaged_is_told(tmp_path, text):
-    (tmp_path / "found.json").write_text(text)
+    (tmp_path / "found.json").write_text(json.dumps(sealed(json.loads(text))))
     with pytest.raises(StoreError, match="the results of a session"):
         read_left_out(tmp_path / "found.json")

@@ -123,7 +123,7 @@ def test_speed_and_course_become_motion_on_request(database, recordings, tmp_pat
     path = tmp_path / "drive.csv"
     done = replayed(database, tmp_path / "out", "--log", path, "--without", "gnss")
     assert done.code == 3
-    remedy = "no motion (--course-motion, track.course_motion, makes it from the positions)"
+    remedy = "no motion (--course-motion, track.course_motion, makes it from speed and course)"
     assert remedy in done.err
     # As the truth they are no sensor any more, and yet make motion.
     given = ("--log", path, "--truth", path)

@@ -135,7 +135,8 @@ def test_what_is_said_of_rasters_is_said_of_those_to_calibrate(survey, world, tm
 def test_surveyed_cells_far_off_are_refused(survey, tmp_path):
     plan = tmp_path / "cells.csv"
     plan.write_text((survey / "cells.csv").read_text().replace("60.16890", "61.16890"))
-    given = ("-c", survey / "survey.toml", "--out", tmp_path, *settings(cells__plan=plan))
+    out = tmp_path / "out"
+    given = ("-c", survey / "survey.toml", "--out", out, *settings(cells__plan=plan))
     told = f"{plan}: expected cells within 50 km of the area, found 1 of 3 up to"
     assert_refused(mapfilter("predict", *given), told, "(C)")
 
