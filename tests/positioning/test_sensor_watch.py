@@ -170,6 +170,32 @@ def test_serving_cells_one_after_another_are_stuck_too():
     assert {why for _, why, _ in told([*walked(), *pair])[1]} == {Reason.USED}
 
 
+def test_a_night_at_rest_with_cell_ids_alone_is_a_rest():
+    """Three cells serve in turns, now and then for half a minute others."""
+    rng, epochs_ = np.random.default_rng(4), [*walked()]
+    for second in range(30, 8 * 3600, 30):
+        cell = CELLS[3 + rng.integers(4)] if rng.random() < 0.02 else CELLS[rng.integers(3)]
+        epochs_.append(Epoch(float(second), STILL, report([np.nan] * 7, cell)))
+    assert {why for _, why, _ in told(epochs_)[1]} == {Reason.USED}
+
+
+def test_a_timing_advance_that_changes_is_no_stale_report():
+    rows = report([-80, -85, -90])
+    epochs_ = [
+        Epoch(float(k), STEP, tuple(replace(row, timing_advance=float(k // 8)) for row in rows))
+        for k in range(60)
+    ]
+    assert {why for _, _, why in told(epochs_)[1]} == {Reason.USED}
+
+
+@pytest.mark.parametrize(("sd_m", "status"), [(5.0, "TRACKING"), (40.0, "SEARCHING")])
+def test_a_start_known_to_a_hundred_metres_is_searched_from(sd_m, status):
+    state = AREA.begin_at(500_400.0, 4_500_400.0, sd_m, np.random.default_rng(0))
+    assert state.status is Status(status)
+    state, output = AREA.step(state, Epoch(1.0, STEP), np.random.default_rng(1))
+    assert output.fix.status is Status(status)
+
+
 def test_a_measured_step_ends_the_doubt():
     watch, _ = told([*walked(), *at_rest(np.random.default_rng(0), 300, 1.2)])
     assert watch.rest.is_carried

@@ -10,13 +10,14 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import isfinite, nan
+from math import expm1, isfinite, nan
 from typing import Any
 
 import numpy as np
 
 from mapfilter.filters.contract import BeliefFilter, MotionStep, Reason, Status
 from mapfilter.filters.grid import GridBelief, GridFilter
+from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleFilter, ParticleOptions
 from mapfilter.models.fingerprint import BoundReading
 from mapfilter.models.level_errors import LevelReport
@@ -140,10 +141,14 @@ class BayesPositioner(Filter[BayesState]):
     def begin_at(
         self, east_m: float, north_m: float, sd_m: float, rng: np.random.Generator
     ) -> BayesState:
-        """Return the state at a known start, in the CRS of the database."""
+        """Return the state at a known start, in the CRS of the database.
+
+        It is tracked from there, unless ``sd_m`` is so large that it counts as several places.
+        """
         belief = self.filters[True].init(Start(None, True, east_m, north_m, sd_m), rng)
-        belief = replace(belief, status=Status.TRACKING)
-        return replace(self.begin(), belief=belief, status=Status.TRACKING)
+        near = -expm1(-0.5 * (NEAR_M / sd_m) ** 2) if sd_m > 0 else 1.0
+        status = Status.TRACKING if near > self.options.split_mass else Status.SEARCHING
+        return replace(self.begin(), belief=replace(belief, status=status), status=status)
 
     def step(
         self, state: BayesState, epoch: Epoch, rng: np.random.Generator

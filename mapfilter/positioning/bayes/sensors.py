@@ -38,7 +38,10 @@ _AT_REST_DB, _ELSEWHERE_DB, _ALL_DB = 4.0, 9.0, 6.0
 phone is put into a pocket."""
 _BLOCK_SHARE = 0.5
 """Power of a block's likelihoods: blocks near each other repeat the same deviation."""
-_CELLS_AT_REST, _NATS_PER_CELL = 3, 2.0
+_CELLS_AT_REST, _NATS_PER_CELL, _CELLS_S = 3, 2.5, 600.0
+_NATS_PER_S = 1 / 300
+"""Serving cells that are usual at rest, gain from each further one that has not served for so long,
+and what is forgotten with time: now and then others serve, also at rest."""
 _CARRIED_NATS = 6.0
 
 _NATS_PER_M, _NATS_PER_REPEAT, _MOST_ROWS = 0.12, 0.9, 3
@@ -59,8 +62,10 @@ class Rest:
         When the present block began.
     first, present : mapping of str to tuple of float
         Sum and number of each cell's levels, in the first and the present block.
-    served : frozenset of str
-        Serving cells.
+    served : mapping of str to float
+        When each cell has served last.
+    heard_s : float
+        Time of the last report.
     carried_nats : float
         How much the levels speak for being carried on.
     """
@@ -69,7 +74,8 @@ class Rest:
     block_s: float = nan
     first: Mapping[str, tuple[float, int]] = field(default_factory=dict)
     present: Mapping[str, tuple[float, int]] = field(default_factory=dict)
-    served: frozenset[str] = frozenset()
+    served: Mapping[str, float] = field(default_factory=dict)
+    heard_s: float = nan
     carried_nats: float = 0.0
 
     def heard(self, time_s: float, rows: tuple[ReportRow, ...]) -> Rest:
@@ -77,15 +83,13 @@ class Rest:
         if self.is_carried:
             return self
         cells = {row.cell for row in rows if row.role == SERVING and row.cell is not None}
-        new = cells - self.served
-        more = _NATS_PER_CELL * max(
-            len(self.served | new) - max(len(self.served), _CELLS_AT_REST), 0
-        )
-        rest = replace(
-            self,
-            served=self.served | new,
-            carried_nats=min(self.carried_nats + more, _CARRIED_NATS),
-        )
+        recent = {cell: at_s for cell, at_s in self.served.items() if time_s - at_s <= _CELLS_S}
+        known, all_cells = max(len(recent), _CELLS_AT_REST), len(cells | recent.keys())
+        gone_s = time_s - self.heard_s if isfinite(self.heard_s) else 0.0
+        kept = max(self.carried_nats - _NATS_PER_S * gone_s, 0.0)
+        nats = min(kept + _NATS_PER_CELL * max(all_cells - known, 0), _CARRIED_NATS)
+        served = recent | dict.fromkeys(cells, time_s)
+        rest = replace(self, served=served, heard_s=time_s, carried_nats=nats)
         if not isfinite(rest.block_s):
             rest = replace(rest, block_s=time_s)
         elif time_s - rest.block_s >= _BLOCK_S:
@@ -291,11 +295,11 @@ def _repeated(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, bool]:
 
 
 def _keys(rows: tuple[ReportRow, ...]) -> list[tuple[object, ...]]:
-    return [
-        (row.role, row.cell, row.arfcn, row.bsic, row.censored)
-        + ((row.level_dbm,) if isfinite(row.level_dbm) else ())
-        for row in rows
-    ]
+    found = []
+    for row in rows:
+        measured = [x if isfinite(x) else None for x in (row.level_dbm, row.timing_advance)]
+        found.append((row.role, row.cell, row.arfcn, row.bsic, row.censored, *measured))
+    return found
 
 
 def _levels(rows: tuple[ReportRow, ...]) -> list[tuple[str, float]]:
