@@ -295,7 +295,7 @@ def _repeated(watch: SensorWatch, epoch: Epoch) -> tuple[SensorWatch, bool]:
 
 
 def _keys(rows: tuple[ReportRow, ...]) -> list[tuple[object, ...]]:
-    found = []
+    found: list[tuple[object, ...]] = []
     for row in rows:
         measured = [x if isfinite(x) else None for x in (row.level_dbm, row.timing_advance)]
         found.append((row.role, row.cell, row.arfcn, row.bsic, row.censored, *measured))
