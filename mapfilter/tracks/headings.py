@@ -61,6 +61,7 @@ def heading_fault(motion: pd.DataFrame, places: pd.DataFrame) -> str:
 def _both(motion: pd.DataFrame, places: pd.DataFrame) -> tuple[Floats, Floats]:
     """Return headings, and the courses of the positions within the same intervals."""
     nothing = np.empty(0)
+    places = places[np.isfinite(places[["east_m", "north_m"]].to_numpy(np.float64)).all(axis=1)]
     if len(motion) < _FEWEST or len(places) < 2:
         return nothing, nothing
     end_s = motion["time_s"].to_numpy(dtype=np.float64)

@@ -77,7 +77,7 @@ def test_the_usual_options():
     rest = {name: getattr(usual, name) for name in ("slow_db", "fast_db", "white_db")}
     assert replace(levels, **rest) == usual
     assert replace(model.evidence, levels=usual) == evidence
-    particles = ParticleOptions(switch_mass=0.995, switch_hold_m=20.0)
+    particles = ParticleOptions(switch_mass=0.995, switch_hold_m=20.0, split_mass=0.8)
     assert (bound.options, bound.rules) == (particles, AlternativeRules())
     # The step of timing advance is rounded to decimetres in the options.
     assert (bound.satellites, bound.timing) == (GnssOptions(), TimingOptions(step_m=553.5))

@@ -258,6 +258,7 @@ class BayesFilter(Options):
                 min_search_particles=_MORE_BY_MAP * self.min_search_particles,
                 switch_mass=max(self.switch_mass, _LEAST_MASS_BY_MAP),
                 switch_hold_m=max(self.switch_hold_m, _LEAST_HOLD_BY_MAP_M),
+                split_mass=ParticleOptions().split_mass,
             )
         satellites = GnssOptions(
             zenith_m=self.satellite_sd_m,

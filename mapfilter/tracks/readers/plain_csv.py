@@ -201,7 +201,7 @@ def _times(mapped: _Mapped, reading: Reading, options: ReadOptions) -> Floats:
     reading.clock = Clock("utc") if zoned else Clock("local", options.zone)
     if len(time_s) and not np.isfinite(time_s).any():
         first = next((text for text in mapped.texts("time").tolist() if text), "nothing")
-        unclear = re.match(r"\s*\d{1,2}[-/]\d{1,2}[-/]\d{2,4}", first)
+        unclear = re.match(r"\d{1,2}[-/]\d{1,2}[-/]\d{2,4}", first.strip())
         hint = "day or month first? Write 2021-03-04, or 4.3.2021 with dots" if unclear else ""
         raise fail(InputError, f"{reading.path}, time", _TIMES, repr(first[:40]), hint)
     return time_s

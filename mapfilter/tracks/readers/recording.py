@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import InputError, MapfilterError, fail
-from mapfilter.tracks.clock_steps import told_clock_steps
 from mapfilter.tracks.readers.recorded_values import (
     checked_values,
     duplicates,
@@ -259,9 +258,6 @@ class Reading:
             return rows
         time = rows["time_s"].to_numpy()
         if (np.diff(time) < 0).any():
-            step = told_clock_steps(time)
-            if step is not None:
-                self.note(f"{table}: {step}")
             rows = reordered(rows, np.argsort(time, kind="stable"))
             time = rows["time_s"].to_numpy()
         if (np.diff(time) == 0).any():

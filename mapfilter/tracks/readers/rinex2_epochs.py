@@ -16,7 +16,7 @@ from mapfilter.tracks.readers.recording import Reading
 from mapfilter.tracks.readers.rinex_epochs import Observations, Records, Wanted, observed
 
 _DATE = re.compile(
-    rb"\s*(\d{1,4})\s+(\d{1,2})\s+(\d{1,2})\s+(\d{1,2})\s+(\d{1,2})\s+(\d{1,2}(?:\.\d*)?)\s*"
+    rb"(\d{1,4})\s+(\d{1,2})\s+(\d{1,2})\s+(\d{1,2})\s+(\d{1,2})\s+(\d{1,2}(?:\.\d*)?)"
 )
 _MEASURED = (b"0", b"1", b" ", b"")
 _NAMES_OF_LINE, _VALUES_OF_LINE = 12, 5
@@ -113,7 +113,7 @@ def _epochs(lines: Sequence[bytes], lines_of_one: int, *, last: bool) -> _Epochs
 
 def _gps_s(text: bytes) -> float:
     """Return seconds since 6 January 1980, NaN for another text than a date and a time."""
-    if (found := _DATE.fullmatch(text)) is None:
+    if (found := _DATE.fullmatch(text.strip())) is None:
         return np.nan
     year, month, day, hour, minute = map(int, found.groups()[:5])
     if year < 100:
