@@ -1,8 +1,8 @@
 """Each fault of plan, prediction, map, phone and sensors, and the option that is its remedy.
 
 On a walk of 500 m from a known start the filter stays right by its defaults. Without the remedy it
-is wrong or gives up, though not on the same walk without the fault. Disturbed headings and long steps
-do not lead astray on every walk: they are compared over twelve. Faults that are covered
+is wrong or gives up, though not on the same walk without the fault. Disturbed headings and long
+steps do not lead astray on every walk: they are compared over twelve. Faults that are covered
 elsewhere: walks from outside the area in ``test_beyond_the_area``, logs of another city in
 ``test_another_city``, bounds of levels in ``test_report_evidence``, reports that
 repeat themselves in ``test_sensor_watch``.
