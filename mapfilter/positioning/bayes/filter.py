@@ -185,7 +185,8 @@ class BayesPositioner(Filter[BayesState]):
             if state.belief is not None:
                 belief, status = report(before, state.belief, state.status)
                 state = replace(state, belief=belief, status=status)
-                state = self._in_one_place(state, was_unclear=unclear)
+                measured = motion is Reason.USED
+                state = self._in_one_place(state, measured=measured, was_unclear=unclear)
         if reason not in _TOLD_ELSEWHERE:
             cell = next((str(row.cell) for row in epoch.radio if row.cell is not None), "")
             unused.append(UnusedReading(epoch.time_s, "serving", cell, reason))
@@ -370,11 +371,12 @@ class BayesPositioner(Filter[BayesState]):
         )
         return after, Reason.USED
 
-    def _in_one_place(self, state: BayesState, *, was_unclear: bool) -> BayesState:
+    def _in_one_place(self, state: BayesState, *, measured: bool, was_unclear: bool) -> BayesState:
         """Return a state that is LOST while its belief is spread over more than one place.
 
-        Motion may spread it without any reading. Below the mass at which it searches again, it has
-        to converge anew; until then, it is kept as found, and is clear again when it has gathered.
+        Below the mass at which it searches again, it has to converge anew. Motion that is not
+        measured spreads it to all sides, so it is LOST earlier, but kept as found: it is clear
+        again when it has gathered.
         """
         belief, rules = state.belief, self.rules
         if belief is None or state.status not in (Status.CONVERGED, Status.TRACKING):
@@ -383,7 +385,9 @@ class BayesPositioner(Filter[BayesState]):
         if mass < self.options.split_mass:
             belief = replace(belief, status=Status.SEARCHING, agreement_start_m=nan)
             return replace(state, belief=belief, status=Status.LOST)
-        least = rules.clear_from_mass if was_unclear else rules.unclear_below_mass
+        least = 0.0 if measured else rules.unclear_below_mass
+        if was_unclear:
+            least = rules.clear_from_mass
         return state if mass >= least else replace(state, status=Status.LOST, unclear=True)
 
     def _alternative(
