@@ -13,6 +13,7 @@ from mapfilter._io import ensure_writable_folder
 from mapfilter._parallel import Progress
 from mapfilter.config.load import load_config
 from mapfilter.workflows.build import run_build
+from mapfilter.workflows.kernels import compiled_beside
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.replay import ReplayedLog, run_replay
 from mapfilter.workflows.simulate import run_simulate
@@ -71,12 +72,13 @@ def run_demo(
         if progress is not None:
             progress(len(seconds), len(_STAGES))
 
-    with stage("predict"):
-        predicted = run_predict(config)
-    with stage("build"):
-        built = run_build(config)
-    with stage("simulate"):
-        simulated = run_simulate(config)
+    with compiled_beside():
+        with stage("predict"):
+            predicted = run_predict(config)
+        with stage("build"):
+            built = run_build(config)
+        with stage("simulate"):
+            simulated = run_simulate(config)
     with stage("replay"):
         walk = run_replay(config, out / "replay").logs[0]
         old_filter = config.filter.model_copy(update={"name": _OLD_FILTER})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
 from pathlib import Path
@@ -24,6 +25,7 @@ from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.evaluation.success import SuccessSummary, summarise
 from mapfilter.filters.contract import Reason
 from mapfilter.geodesy import Lattice
+from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate import PositionedTrack
 from mapfilter.positioning.estimate_store import write_estimate, write_geojson, write_gpx
 from mapfilter.positioning.filter import Filter, FilterOptions, locate
@@ -39,6 +41,7 @@ from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.placeless import in_frame
 from mapfilter.tracks.store import is_log
 from mapfilter.workflows.apart import check_out_apart
+from mapfilter.workflows.kernels import compiled_beside
 from mapfilter.workflows.logs import journeys_of, open_journey
 from mapfilter.workflows.pictures import ESTIMATES, FIGURES, SUMMARY, draw_track, older_results
 from mapfilter.workflows.replay_baseline import Baselines, SingleReports, together
@@ -279,8 +282,9 @@ def run_replay(config: Config, out: Path, *, progress: Progress | None = None) -
         cannot be written.
     """
     options = filter_choice(config.filter)
-    database = _database(config, options)
-    journeys = _Logs(config, database)
+    with compiled_beside() if isinstance(options, BayesFilter) else nullcontext():
+        database = _database(config, options)
+        journeys = _Logs(config, database)
 
     @cache
     def sites(crs: str) -> CellPlan:
