@@ -197,6 +197,7 @@ def test_poses_make_steps_and_turns(name, made, tmp_path):
     assert motion["step_m"].iloc[1:].to_numpy() == pytest.approx(2.202, abs=0.05)
     expected = -0.02 if name == "kitti" else 0.02
     assert motion["turn_rad"].iloc[1:].to_numpy() == pytest.approx(expected, abs=1e-5)
+    assert read_log(tmp_path / "log").vehicle is None
 
 
 def test_odometry_makes_steps_and_turns(made, tmp_path):
@@ -317,9 +318,10 @@ def test_a_speed_and_a_yaw_rate_are_odometry(speed, rate, tmp_path):
     rows = "".join(f"{k},{told},{turned}\n" for k in range(11))
     (tmp_path / "drive.csv").write_text(f"time,{speed},{rate}\n{rows}")
     run_convert([tmp_path / "drive.csv"], tmp_path / "log")
-    motion = read_log(tmp_path / "log").motion
-    assert motion["step_m"].sum() == pytest.approx(90.0)
-    assert motion["turn_rad"].sum() == pytest.approx(1.0)
+    log = read_log(tmp_path / "log")
+    assert log.motion["step_m"].sum() == pytest.approx(90.0)
+    assert log.motion["turn_rad"].sum() == pytest.approx(1.0)
+    assert log.vehicle is True
     # Beside positions it is the speed of their receiver, and no motion unless asked for.
     rows = "".join(f"{k},{told},{turned},60.1{k},24.9\n" for k in range(11))
     (tmp_path / "drive.csv").write_text(f"time,{speed},{rate},lat,lon\n{rows}")
