@@ -185,4 +185,5 @@ def _receiver_note(recording: Recording, imu: ImuNoise | None, source: str, how:
     if imu is not None:
         text += f"; steps ± {imu.sigma_trans_m:.2g} m, headings ± {imu.sigma_orient_deg:.0f} deg, "
         text += f"{how}"
+        text += f", scale {imu.scale:.0%}" if imu.scale else ""
     return f"{text}; it fails where GNSS does, and shares errors with the positions"

@@ -244,9 +244,7 @@ def make_log(
         tables["pseudoranges"], more = place_satellites(rows, almanac, start_utc_s, where)
         every_note += more
     every_note = tuple(dict.fromkeys(every_note))
-    return TrackLog(
-        str(crs), start_utc_s, **tables, notes=every_note, imu=imu, vehicle=vehicle
-    )
+    return TrackLog(str(crs), start_utc_s, **tables, notes=every_note, imu=imu, vehicle=vehicle)
 
 
 def rows_by_kind(log: TrackLog) -> dict[Kind, pd.DataFrame]:
