@@ -29,8 +29,8 @@ won              found      other, TRACKING   TRACKING   other's  took over
 
 Then, by the status reported before: ``LOST`` stays while the belief searches and becomes
 ``TRACKING`` when it converges; ``CONVERGED`` lasts for one epoch. A belief that had converged and
-is spread over more than one place is ``LOST``: if the leading one has less than half of it, it
-searches again; else it is ``TRACKING`` again as soon as it has gathered. While the null hypothesis
+has less than half of it in one place is ``LOST`` and searches again; while motion is not measured,
+one that has less than 80 % there is ``LOST``, until it has gathered. While the null hypothesis
 is more probable than the belief, one that had converged is ``LOST``, too, and ``OUTSIDE`` where it
 lies at the edge of the area; one that searches is ``OUTSIDE``, and so is one that has left the
 area. A belief does not converge while the null hypothesis is not improbable or the alternative
@@ -95,7 +95,7 @@ class AlternativeRules(Options):
         Negative log-likelihood of the map for each metre under the null hypothesis.
     unclear_below_mass, clear_from_mass : float
         Share of a belief within 50 m of its leading position below which one that had converged is
-        reported as LOST, and from which it is not any more.
+        reported as LOST while motion is not measured, and from which it is not any more.
     """
 
     start_log_odds: float = -1.0

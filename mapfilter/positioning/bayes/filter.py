@@ -180,12 +180,13 @@ class BayesPositioner(Filter[BayesState]):
                 belief, sources = started
                 state = replace(state, belief=belief, sources={**state.sources, **sources})
         else:
-            state, why = self._weighed(state, state.belief, updates, epoch, rng)
+            measured = motion is Reason.USED
+            state, why = self._weighed(state, state.belief, updates, epoch, rng, measured=measured)
             reason = reason if why is Reason.USED else why
             if state.belief is not None:
                 belief, status = report(before, state.belief, state.status)
                 state = replace(state, belief=belief, status=status)
-                state = self._in_one_place(state, was_unclear=unclear)
+                state = self._in_one_place(state, measured=measured, was_unclear=unclear)
         if reason not in _TOLD_ELSEWHERE:
             cell = next((str(row.cell) for row in epoch.radio if row.cell is not None), "")
             unused.append(UnusedReading(epoch.time_s, "serving", cell, reason))
@@ -315,6 +316,8 @@ class BayesPositioner(Filter[BayesState]):
         updates: list[EvidenceUpdate],
         epoch: Epoch,
         rng: np.random.Generator,
+        *,
+        measured: bool,
     ) -> tuple[BayesState, Reason]:
         """Weigh the belief and its alternative; start, prefer or drop the alternative."""
         reading = joined(updates)
@@ -323,7 +326,9 @@ class BayesPositioner(Filter[BayesState]):
         update, rules = self.filters[state.compass].update, self.rules
         plain = self._by_map_alone and not state.path.is_distinctive
         doubt = plain or doubted(rules, before, state.null, state.alternative)
-        reading = replace(reading, doubted=doubt or self.area.at_edge(before.summary.mean))
+        doubt = doubt or self.area.at_edge(before.summary.mean)
+        tracked = measured and before.status is Status.TRACKING
+        reading = replace(reading, doubted=doubt, tracked=tracked)
         belief, info = update(before, reading, rng)
         if info.reason is not Reason.USED:
             return replace(state, belief=belief), info.reason
@@ -332,7 +337,8 @@ class BayesPositioner(Filter[BayesState]):
         if alternative is not None:
             terms = joined(updates, alternative=True) or RadioReading()
             doubt = plain or alternative.null.log_odds > rules.converge_log_odds
-            terms = replace(terms, doubted=doubt)
+            tracked = measured and alternative.belief.status is Status.TRACKING
+            terms = replace(terms, doubted=doubt, tracked=tracked)
             other, _ = update(alternative.belief, terms, rng)
             own = _challenged(rules, alternative.null, terms, alternative.belief, other)
             alternative = replace(alternative, belief=other, null=own)
@@ -370,11 +376,12 @@ class BayesPositioner(Filter[BayesState]):
         )
         return after, Reason.USED
 
-    def _in_one_place(self, state: BayesState, *, was_unclear: bool) -> BayesState:
+    def _in_one_place(self, state: BayesState, *, measured: bool, was_unclear: bool) -> BayesState:
         """Return a state that is LOST while its belief is spread over more than one place.
 
-        Motion may spread it without any reading. Below the mass at which it searches again, it has
-        to converge anew; until then, it is kept as found, and is clear again when it has gathered.
+        Below the mass at which it searches again, it has to converge anew. Motion that is not
+        measured spreads it to all sides, so it is LOST earlier, but kept as found: it is clear
+        again when it has gathered.
         """
         belief, rules = state.belief, self.rules
         if belief is None or state.status not in (Status.CONVERGED, Status.TRACKING):
@@ -383,7 +390,9 @@ class BayesPositioner(Filter[BayesState]):
         if mass < self.options.split_mass:
             belief = replace(belief, status=Status.SEARCHING, agreement_start_m=nan)
             return replace(state, belief=belief, status=Status.LOST)
-        least = rules.clear_from_mass if was_unclear else rules.unclear_below_mass
+        least = 0.0 if measured else rules.unclear_below_mass
+        if was_unclear:
+            least = rules.clear_from_mass
         return state if mass >= least else replace(state, status=Status.LOST, unclear=True)
 
     def _alternative(
