@@ -53,7 +53,10 @@ def mutations(sample: bytes, count: int, seed: int) -> Iterator[bytes]:
 
 @dataclass(frozen=True)
 class Tally:
-    """How many copies a reader read and refused, its longest time and how its memory grew."""
+    """How many copies a reader read and refused, its longest time and how its memory grew.
+
+    Times are of the processor, as a busy machine says nothing about a reader.
+    """
 
     read: int
     refused: int
