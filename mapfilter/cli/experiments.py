@@ -135,7 +135,11 @@ def bench(
 def evaluate(
     name: Annotated[
         str,
-        typer.Argument(metavar="NAME", help="global-positioning, audit, ottawa or single-reports."),
+        typer.Argument(
+            metavar="NAME",
+            help="Simulated: global-positioning, audit. On public recordings (--data): all, ottawa, "
+            "fingerprints, kitti, mall, smartloc, belgium, mountain-view, denver, single-reports.",
+        ),
     ],
     map_file: Annotated[
         Path | None,
@@ -194,6 +198,8 @@ def evaluate(
     from mapfilter.workflows.evaluate_ottawa import run_ottawa
     from mapfilter.workflows.evaluate_single_reports import SETS, run_single_reports
 
+    from mapfilter.workflows.evaluate_recorded import ALL, BENCHMARKS, run_all, run_recorded
+
     check_benchmark(name, data)
     common: dict[str, Any] = {"seed": seed, "workers": workers, "resume": resume}
     result: Any
@@ -205,6 +211,22 @@ def evaluate(
         with rate_bar("evaluate", "sessions") as progress:
             result = run_ottawa(data, folder, runs=runs or OTTAWA_RUNS, progress=progress, **common)
         print_result(result, as_json)
+        return
+    if name in (ALL, *BENCHMARKS) and data is not None:
+        unused = {"--map": map_file, "--bbox": bbox, "--filter": filter_name, "--world": world}
+        refuse(unused | {"--config": config, "--set": settings, "--runs": runs}, name)
+        folder = (out or Path("out") / name).absolute()
+        with rate_bar("evaluate", "runs") as progress:
+            if name == ALL:
+                refuse({"--case": cases}, name)
+                result = run_all(data, folder, progress=progress, **common)
+            else:
+                result = run_recorded(
+                    name, data, folder, parts=cases or (), progress=progress, **common
+                )
+        print_result(result, as_json)
+        if name == ALL and result.missing:
+            raise typer.Exit(PARTIAL)
         return
     if name == "single-reports" and data is not None:
         unused = {"--map": map_file, "--bbox": bbox, "--filter": filter_name, "--config": config}
