@@ -16,7 +16,7 @@ from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, InputError, MapfilterError, fail
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
 from mapfilter.experiments.benchmarks.worst_run import explain
-from mapfilter.experiments.recorded import wifi
+from mapfilter.experiments.recorded import belgium, kitti, mountain_view, wifi
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Task
 from mapfilter.experiments.recorded.kept import (
     read_journey,
@@ -41,7 +41,10 @@ from mapfilter.workflows.terminal import to_jsonable
 
 OTTAWA = "ottawa"
 ALL = "all"
-BENCHMARKS: Mapping[str, Benchmark] = {one.name: one for one in (wifi.BENCHMARK,)}
+BENCHMARKS: Mapping[str, Benchmark] = {
+    one.name: one
+    for one in (wifi.BENCHMARK, kitti.BENCHMARK, belgium.BENCHMARK, mountain_view.BENCHMARK)
+}
 """All but ottawa, which has a workflow of its own, by name."""
 NAMES = (OTTAWA, *BENCHMARKS)
 HEAD, TABLE, PICTURES, WORK, UNITS = "benchmark.json", "table.json", "pictures", "work", "units"
@@ -85,6 +88,7 @@ def run_recorded(
     out: Path,
     *,
     parts: Sequence[str] = (),
+    runs: int | None = None,
     seed: int = 0,
     workers: int = 1,
     resume: bool = False,
@@ -102,6 +106,8 @@ def run_recorded(
         Gets the finished units, ``table.json`` and ``pictures``.
     parts : sequence of str
         All when left out.
+    runs : int, optional
+        At most so many runs of each unit.
     workers : int
         Local processes.
     resume : bool
@@ -118,13 +124,14 @@ def run_recorded(
     began_s = time.perf_counter()
     benchmark = BENCHMARKS[name]
     work, finished = out / WORK, out / UNITS
-    tasks = _chosen(benchmark.tasks(data, work, seed), parts)
+    tasks = _chosen(benchmark.tasks(data, work, seed, runs), parts)
     ensure_writable_folder(out)
     head = {
         "version": _VERSION,
         "name": name,
         "seed": seed,
         "parts": list(parts),
+        "runs": runs,
         "data": _digests(data / benchmark.folder),
     }
     files = [scores_file(finished, task) for task in tasks]
@@ -141,9 +148,7 @@ def run_recorded(
     report(0, 0)
     with local_executor(workers) as executor, kept_when_stopped("runs"):
         jobs = [(name, task, finished) for task in todo]
-        for _ in ordered_results(
-            executor, _judge, jobs, in_flight=2 * workers, progress=report
-        ):
+        for _ in ordered_results(executor, _judge, jobs, in_flight=2 * workers, progress=report):
             pass
     by_task = {task: read_scores(finished, task) or () for task in tasks}
     found = [one for each in by_task.values() for one in each]
@@ -241,9 +246,7 @@ def _digests(folder: Path) -> dict[str, str]:
     return {path.relative_to(folder).as_posix(): sha256_file(path) for path in files}
 
 
-def _draw(
-    by_task: Mapping[Task, Sequence[Found]], finished: Path, folder: Path
-) -> list[Path]:
+def _draw(by_task: Mapping[Task, Sequence[Found]], finished: Path, folder: Path) -> list[Path]:
     """Draw the worst run of each part and method of which a journey was kept."""
     made = []
     every = [one for found in by_task.values() for one in found]

@@ -92,8 +92,14 @@ class Benchmark:
     published_m: Mapping[tuple[str, str], float] = field(default_factory=dict)
     baseline: str = "median"
 
-    def tasks(self, data: Path, work: Path, seed: int) -> list[Task]:
-        """Return all tasks; InputError where files are missing or there is nothing to judge."""
+    def tasks(self, data: Path, work: Path, seed: int, runs: int | None = None) -> list[Task]:
+        """Return all tasks, at most ``runs`` of each unit.
+
+        Raises
+        ------
+        InputError
+            Files are missing, or there is nothing to judge.
+        """
         folder = data / self.folder
         check_there(folder, self.needs)
         found = self.units(folder)
@@ -103,8 +109,8 @@ class Benchmark:
             faults.raise_if_any(InputError)
         return [
             Task(part, unit, run, folder, work, seed)
-            for part, unit, runs in found
-            for run in range(runs)
+            for part, unit, usual in found
+            for run in range(min(usual, runs or usual))
         ]
 
 

@@ -1,4 +1,4 @@
-"""What one benchmark finds in one recording, and the rows of the table that all benchmarks share."""
+"""What a benchmark finds in a recording, and the rows of the table that all benchmarks share."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def table_rows(
     Parameters
     ----------
     published_m : mapping of (part, method) to float, optional
-        The method "" stands for all methods of a part.
+        The method "" stands for all methods of a part, the part "" with it for all parts.
     baseline : {"median", "mean"}
         Statistic of the baseline's errors.
     """
@@ -151,7 +151,7 @@ def table_rows(
     rows = []
     for part, method in dict.fromkeys((one.part, one.method) for one in found):
         own = [one for one in found if (one.part, one.method) == (part, method)]
-        published = known.get((part, method), known.get((part, ""), nan))
+        published = known.get((part, method), known.get((part, ""), known.get(("", ""), nan)))
         rows.append(_row(part, method, own, published, baseline))
     return rows
 
