@@ -16,7 +16,15 @@ from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, InputError, MapfilterError, fail
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
 from mapfilter.experiments.benchmarks.worst_run import explain
-from mapfilter.experiments.recorded import belgium, kitti, mountain_view, wifi
+from mapfilter.experiments.recorded import (
+    belgium,
+    denver,
+    kitti,
+    mall,
+    mountain_view,
+    smartloc,
+    wifi,
+)
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Task
 from mapfilter.experiments.recorded.kept import (
     read_journey,
@@ -42,8 +50,8 @@ from mapfilter.workflows.terminal import to_jsonable
 OTTAWA = "ottawa"
 ALL = "all"
 BENCHMARKS: Mapping[str, Benchmark] = {
-    one.name: one
-    for one in (wifi.BENCHMARK, kitti.BENCHMARK, belgium.BENCHMARK, mountain_view.BENCHMARK)
+    one.BENCHMARK.name: one.BENCHMARK
+    for one in (kitti, mall, smartloc, belgium, wifi, mountain_view, denver)
 }
 """All but ottawa, which has a workflow of its own, by name."""
 NAMES = (OTTAWA, *BENCHMARKS)

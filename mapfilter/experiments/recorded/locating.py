@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from mapfilter.database.store import open_database
+from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate import PositionedTrack
-from mapfilter.positioning.filter import Filter, locate
+from mapfilter.positioning.filter import locate
 from mapfilter.positioning.log_options import by_streets_alone, fitted_to_log
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
@@ -46,6 +46,6 @@ def locate_log(
 
 # Tasks of one process share the map, which takes seconds to read.
 @lru_cache(maxsize=2)
-def _over(database: Path, options: BayesFilter, alone: bool) -> Filter[Any]:
+def _over(database: Path, options: BayesFilter, alone: bool) -> BayesPositioner:
     opened = open_database(database)
     return options.over(opened.without_cells() if alone else opened)

@@ -80,14 +80,15 @@ def judge(task: Task) -> Judged:
     whole = score_journey(
         task.part, "bayes", task.unit, located.estimate, truth, seconds=located.filter_s
     )
+    there = np.isfinite(errors_m)
     coasted_m = coasted_errors_m(log.motion, truth, spans)
     found = replace(
         whole,
-        error_m=errors_m,
-        covered=held,
+        error_m=errors_m[there],
+        covered=held[there],
         baseline_m=coasted_m,
         success=bool(np.median(errors_m) <= RIGHT_M) if len(errors_m) else None,
-        note=f"{len(spans)} outages, largest error at an end {errors_m.max():.0f} m. {whole.note}",
+        note=f"{len(spans)} outages, {int(there.sum())} ends with a position. {whole.note}",
     )
     return Judged((found,), {"bayes": Journey(located.estimate, truth, task.work / _MAP)})
 
