@@ -43,7 +43,7 @@ from mapfilter.experiments.recorded.rows import (
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.canvas import save
 from mapfilter.report.integrity import plot_worst_run
-from mapfilter.workflows.evaluate_ottawa import PARTS, run_ottawa
+from mapfilter.workflows.evaluate_ottawa import run_ottawa
 from mapfilter.workflows.served import served_points, street_map
 from mapfilter.workflows.terminal import to_jsonable
 
@@ -200,9 +200,10 @@ def run_all(
     ensure_writable_folder(out)
     for number, name in enumerate(names):
         part = part_of(progress, number, len(names))
-        common = {"seed": seed, "workers": workers, "resume": resume, "progress": part}
         try:
-            found, seconds[name] = _rows_of(name, data, out / name, **common)
+            found, seconds[name] = _rows_of(
+                name, data, out / name, seed=seed, workers=workers, resume=resume, progress=part
+            )
         except InputError as error:
             missing.append(f"{name}: {error}")
             continue
@@ -229,9 +230,7 @@ def _rows_of(
             name, data, out, seed=seed, workers=workers, resume=resume, progress=progress
         )
         return found.rows, found.seconds
-    ottawa = run_ottawa(
-        data, out, seed=seed, parts=PARTS, workers=workers, resume=resume, progress=progress
-    )
+    ottawa = run_ottawa(data, out, seed=seed, workers=workers, resume=resume, progress=progress)
     return [Row(**vars(row)) for row in ottawa.rows], ottawa.seconds
 
 

@@ -27,8 +27,8 @@ _RESOLUTION_M = 5.0
 def positions_of(table: pd.DataFrame) -> Positions:
     """Return the positions of a log's table ``gnss`` or ``truth``, each once."""
     east, north = (table[name].to_numpy(dtype=np.float64) for name in ("east_m", "north_m"))
-    moved = np.append(True, np.hypot(np.diff(east), np.diff(north)) > 0) if len(east) else []
-    kept = np.asarray(moved, dtype=np.bool_)
+    kept = np.ones(len(east), dtype=np.bool_)
+    kept[1:] = np.hypot(np.diff(east), np.diff(north)) > 0
     return Positions(east[kept], north[kept])
 
 

@@ -2,10 +2,11 @@
 
 The whole chain: the access points of the other walks are the radio map, each scan is located by
 itself (``wifi``), and the positions with their radii go as fixes into the Bayes map filter over
-the walkable part of the plan (``bayes``, ``smoothed``), with steps and headings made of the raw
-sensors. Walks are judged at their surveyed waypoints. The later half of the walks is judged, in
-two parts, each by all other walks: parameters of steps and headings were chosen on walks of the
-first half.
+the walkable part of the plan (``bayes``), and into a Kalman filter without a map (``ekf`` and
+``ekf-smoothed``), with steps and headings made of the raw sensors. Walks are judged at their
+surveyed waypoints, from the first position on, claimed or not: most walks end before the map filter
+claims one. The later half of the walks is judged, in two parts, each by all other walks:
+parameters of steps and headings were chosen on walks of the first half.
 """
 
 from __future__ import annotations
@@ -34,10 +35,15 @@ from mapfilter.experiments.recorded.outages import errors_at
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.experiments.recorded.scoring import score_journey
 from mapfilter.geodesy import Lattice
+from mapfilter.positioning.estimate import PositionedTrack
+from mapfilter.positioning.filter import locate
 from mapfilter.positioning.fingerprints.locating import LocatedReports, fit_locator, locate_by
 from mapfilter.positioning.fingerprints.options import AUTO
 from mapfilter.positioning.fingerprints.sources import reports_of_logs
+from mapfilter.positioning.kalman.filter import KalmanFilter
+from mapfilter.positioning.log_options import fitted_to_log
 from mapfilter.propagation.shadowing import named_rng
+from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.lattice import RouteLattice
 from mapfilter.tracks.combine import CombineOptions
 from mapfilter.tracks.log import TrackLog
@@ -79,7 +85,7 @@ def judge(task: Task) -> Judged:
     fitted = {name: fit_locator(training, METHODS[name]) for name in (AUTO, BASELINE)}
     found: list[Found] = []
     journeys: dict[str, Journey] = {}
-    worst_m = -1.0
+    worst_m: dict[str, float] = {}
     for name in own:
         log = logs[name]
         truth = Truth.of_table(log.truth)
@@ -93,28 +99,37 @@ def judge(task: Task) -> Judged:
         none = (None, None, None)
         found.append(Found("floor", "wifi", name, *none, alone.error_m[known], held, baseline_m))
         fixed = with_fixes(log, alone)
-        for method in ("bayes", "smoothed"):
-            rng = named_rng(task.seed, "mall", name)
-            smooth = method == "smoothed"
-            located = locate_log(fixed, task.work / _MAP, rng, smooth=smooth)
+        for method, located in _located(fixed, task).items():
             scored = score_journey(
                 "floor", method, name, located.estimate, truth, seconds=located.filter_s
             )
             errors_m, covered = errors_at(located.estimate, truth, truth.time_s.tolist())
             there = np.isfinite(errors_m)
-            if not smooth and located.estimate.converged_at is not None:
-                since_s = located.estimate.time_s[located.estimate.converged_at]
-                there &= truth.time_s >= since_s
-            elif not smooth:
-                there[:] = False
-            scored = replace(
-                scored, error_m=errors_m[there], covered=covered[there], baseline_m=baseline_m
+            found.append(
+                replace(
+                    scored,
+                    error_m=errors_m[there],
+                    covered=covered[there],
+                    baseline_m=baseline_m,
+                )
             )
-            found.append(scored)
-            if method == "bayes" and there.any() and errors_m[there].max() > worst_m:
-                worst_m = float(errors_m[there].max())
+            if there.any() and errors_m[there].max() > worst_m.get(method, -1.0):
+                worst_m[method] = float(errors_m[there].max())
                 journeys[method] = Journey(located.estimate, truth, task.work / _MAP)
     return Judged(tuple(found), journeys)
+
+
+def _located(log: TrackLog, task: Task) -> dict[str, PositionedTrack]:
+    """Locate a walk with fixes by all filters."""
+
+    def rng() -> np.random.Generator:
+        return named_rng(task.seed, "mall", task.unit, str(log.start_utc_s))
+
+    found = {"bayes": locate_log(log, task.work / _MAP, rng())}
+    for name, smooth in (("ekf", False), ("ekf-smoothed", True)):
+        options, _ = fitted_to_log(KalmanFilter(smooth=smooth), log)
+        found[name] = locate(log, options.over_sites(CellPlan(log.crs, ())), rng())
+    return found
 
 
 def unpack(archive: Path, target: Path) -> None:

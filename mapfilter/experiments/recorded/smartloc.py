@@ -64,7 +64,7 @@ def prepare(folder: Path, work: Path) -> None:
         log = _drive(file)
         first = log.pseudoranges[log.pseudoranges["time_s"] <= FIRST_S]
         east, north = least_squares_positions(first, log.crs)[1:]
-        middle = Positions(np.median(east)[None], np.median(north)[None])
+        middle = Positions(np.array([np.median(east)]), np.array([np.median(north)]))
         lattice = lattice_about(log.crs, [middle], _MARGIN_M)
         roads_alone(open_ground(lattice), work / _name(file) / _MAP)
 
