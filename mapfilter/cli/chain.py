@@ -339,6 +339,10 @@ def replay(
             help="Probability, at each epoch, that the error exceeds the protection level (1e-3).",
         ),
     ] = None,
+    html: Annotated[
+        bool,
+        typer.Option("--html", help="Write replay.html, too: a page that plays and explains it."),
+    ] = False,
     config: ConfigOption = None,
     settings: SetOption = None,
     out: OutOption = None,
@@ -371,7 +375,7 @@ def replay(
     check_custom_filter(loaded)
     folder = (out or loaded.output.dir / "replay").absolute()
     with progress_bar("replay") as progress:
-        result = run_replay(loaded, folder, progress=progress)
+        result = run_replay(loaded, folder, html=html, progress=progress)
     print_result(replay_figures(result), as_json)
     for warning in result.warnings:
         print_message(warning)
