@@ -134,7 +134,8 @@ def test_differences_add_up_to_the_change_of_log_odds(town_filter, steps):
 
 
 def test_every_reading_has_its_row(town_filter, steps):
-    used = ((step, explained(town_filter, step)) for step in steps[25:])
+    somewhere = (step for step in steps[10:] if isfinite(step[4].fix.east_m))
+    used = ((step, explained(town_filter, step)) for step in somewhere)
     step, found = next(one for one in used if len(one[1].rows) > 1)
     rows = list(step[1].radio)
     assert [row.what for row in found.rows][:2] == ["streets", "serving"]
@@ -144,12 +145,8 @@ def test_every_reading_has_its_row(town_filter, steps):
         [row.level_dbm for row in rows], abs=1e-4
     )
     fix = step[4].fix
-    place = np.array([[fix.east_m - WEST_M, fix.north_m - SOUTH_M]])
-    predicted = TOWN.levels_dbm(place)[0]
-    # The map has the level of the middle of a pixel.
-    assert [row.lead_dbm for row in levels] == pytest.approx(
-        [predicted[row.cell] for row in levels], abs=4.0
-    )
+    at = _pixel(town_filter.area.level_dbm, (fix.east_m - WEST_M, fix.north_m - SOUTH_M))
+    assert [row.lead_dbm for row in levels] == [float(at[row.cell]) for row in levels]
 
 
 def test_nothing_to_explain_before_the_first_belief(town_filter, steps):
