@@ -37,7 +37,7 @@ def encoded(bundle: Mapping[str, Any]) -> str:
 def page_html(bundle: Mapping[str, Any]) -> str:
     """Return the page with a bundle in it."""
     folder = resources.files("mapfilter.viewing") / "page"
-    style = "\n".join(_texts(folder, ".css"))
+    style = "\n".join([*_texts(folder / "vendor", ".css"), *_texts(folder, ".css")])
     scripts = [*_texts(folder / "vendor", ".js"), *_texts(folder, ".js")]
     # A script ends at this text wherever it stands; in a string of JavaScript both are the same.
     script = "\n".join(scripts).replace("</script", "<\\/script")
