@@ -37,3 +37,31 @@ def view(
     from mapfilter.workflows.views import run_view
 
     print_result(run_view(results, out), as_json)
+
+
+def film(
+    result: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RESULT", help="Result of replay --html, or a page.", callback=given_path
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            help="The film: .gif, or .mp4 where ffmpeg is found.",
+            callback=given_path,
+        ),
+    ] = Path("replay.gif"),
+    run: Annotated[int, typer.Option("--run", min=0, help="Of several runs, from 0.")] = 0,
+    pictures: Annotated[
+        int, typer.Option("--pictures", min=1, help="How many, evenly chosen; at most 240.")
+    ] = 150,
+    as_json: JsonOption = False,
+) -> None:
+    """Draw a replay as a film, GIF or MP4."""
+    from mapfilter.workflows.film import run_film
+
+    print_result(run_film(result, out.absolute(), run=run, pictures=pictures), as_json)

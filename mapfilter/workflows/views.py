@@ -58,7 +58,7 @@ def run_view(paths: Sequence[Path], out: Path | None = None) -> dict[str, Any]:
         database = open_database(paths[0])
         bundle = database_view(database)
     else:
-        pages = _pages(paths)
+        pages = pages_of(paths)
         bundle = side_by_side([(shown(str(page)), read_page(page)) for page in pages])
     write_page(bundle, file)
     return view_figures(bundle, file)
@@ -95,7 +95,14 @@ def view_figures(bundle: Mapping[str, Any], file: Path) -> dict[str, Any]:
     }
 
 
-def _pages(paths: Sequence[Path]) -> list[Path]:
+def pages_of(paths: Sequence[Path]) -> list[Path]:
+    """Return the pages of results: files, those of folders, or of the folders in them.
+
+    Raises
+    ------
+    InputError
+        A result has none.
+    """
     found: list[Path] = []
     faults = Faults()
     for path in paths:

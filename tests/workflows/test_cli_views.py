@@ -3,7 +3,6 @@
 from itertools import pairwise
 
 import numpy as np
-import pandas as pd
 import pytest
 from command_line import ONE, assert_done, assert_refused, mapfilter, settings
 
@@ -21,8 +20,12 @@ def replays(world, tmp_path_factory):
     out = tmp_path_factory.mktemp("views")
     for name in NAMES:
         given = ["--db", world.database, "--log", world.journeys / ONE, "--filter", name]
-        few = settings(output__pictures="none", filter__bayes__max_particles=2000,
-                       filter__bayes__min_search_particles=1500, filter__bayes__min_particles=500)  # fmt: skip
+        particles = {
+            "filter__bayes__max_particles": 2000,
+            "filter__bayes__min_search_particles": 1500,
+            "filter__bayes__min_particles": 500,
+        }
+        few = settings(output__pictures="none", **particles)
         assert_done(mapfilter("replay", *given, "--html", "--out", out / name, *few))
     return out
 
@@ -61,7 +64,7 @@ def test_sums_of_contributions_are_those_of_their_rows(bundle):
 
 def test_readings_have_cells_levels_and_reasons(bundle, world):
     run = bundle["runs"][0]
-    radio = pd.read_csv(world.journeys / ONE / "radio.csv")
+    radio = mf.read_log(world.journeys / ONE).radio
     found = run["readings"]
     assert unpacked(found["first"])[-1] == len(radio)
     cells = [bundle["cells"][at]["id"] for at in unpacked(found["cell"])]
