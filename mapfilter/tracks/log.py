@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from mapfilter._html import html_table, shortened
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import projected_crs, short_crs
 from mapfilter.gnss.orbits import Almanac
@@ -90,6 +91,16 @@ class TrackLog:
         notes = f"; {len(self.notes)} notes" if self.notes else ""
         crs = short_crs(self.crs)
         return f"TrackLog({crs}, {self.duration_s:.1f} s{began}; {held}{notes})"
+
+    def _repr_html_(self) -> str:
+        """Return a table, as notebooks show it."""
+        began = "unknown"
+        if np.isfinite(self.start_utc_s):
+            began = datetime.fromtimestamp(self.start_utc_s, UTC).isoformat(" ", "seconds")
+        rows = {f"rows of {name}": n for name in TABLES if (n := len(getattr(self, name)))}
+        head = {"CRS": short_crs(self.crs), "start": began, "seconds": f"{self.duration_s:.1f}"}
+        notes = {"notes": shortened(self.notes)} if self.notes else {}
+        return html_table("Track log", {**head, **rows, **notes})
 
     @property
     def duration_s(self) -> float:

@@ -192,6 +192,20 @@ class BayesPositioner(Filter[BayesState]):
             unused.append(UnusedReading(epoch.time_s, "serving", cell, reason))
         return step_output(self.area, state, epoch.time_s, reason, tuple(unused))
 
+    def evidence_at(
+        self, state: BayesState, epoch: Epoch, rng: np.random.Generator
+    ) -> tuple[BayesState, list[EvidenceUpdate]]:
+        """Return the state moved to an epoch, and the evidence that :meth:`step` weighs it with.
+
+        With the generator as before the step these are the step's own: for explanations of it.
+        """
+        if epoch.fix and not (isfinite(epoch.fix.east_m) and isfinite(epoch.fix.north_m)):
+            epoch = replace(epoch, fix=None)
+        spacing_m = state.particle_spacing_m
+        watch, epoch, _ = watched(state.watch, epoch)
+        moved, _ = self._moved(replace(state, watch=watch), epoch, rng)
+        return self._collected(moved, epoch, spacing_m)
+
     def warm_up(self, merged: Sequence[Epoch]) -> None:  # noqa: ARG002
         """Load the compiled kernels, and prepare the area."""
         if self.grid:
