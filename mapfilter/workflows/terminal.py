@@ -72,6 +72,24 @@ def progress_bar(label: str) -> Iterator[Progress | None]:
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
+@contextlib.contextmanager
+def stage_bar(label: str) -> Iterator[Callable[[int, int, str], None]]:
+    """Show a bar on stderr with the name of each stage, if that is a terminal."""
+    if not sys.stderr.isatty():
+        yield lambda done, total, what: None  # noqa: ARG005
+        return
+    from rich.console import Console
+    from rich.progress import Progress as Bar
+
+    with Bar(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(label)
+
+        def show(done: int, total: int, what: str) -> None:
+            bar.update(task, completed=done, total=total, description=f"{done + 1}/{total} {what}")
+
+        yield show
+
+
 def rate_text(per_s: float, unit: str) -> str:
     """Format a rate per second, or per minute below one per second.
 
